@@ -1,7 +1,7 @@
 """The baseline movement: a straight joint segment as a synchronous S-curve of seven phases.
 
-Speed, acceleration and jerk as the data file gives them, then slowed down uniformly until the torque stays
-within the planner's share of the envelope, or until the duration that is asked for.
+Speed, acceleration and jerk as the data file gives them, then slowed down uniformly until the
+torque stays within the planner's share of the envelope, or until the duration that is asked for.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ _CHECK_S = 2e-3
 
 
 def phases(v: float, a: float, j: float) -> FloatArray:
-    """Durations (7,) s of the fastest S-curve over a distance of 1 within speed, acceleration and jerk."""
+    """Durations (7,) s of the fastest S-curve over a distance of 1 within speed, acceleration and
+    jerk.
+    """
     rise, flat = (a / j, v / a - a / j) if v * j >= a * a else (np.sqrt(v / j), 0.0)
     cruise = 1.0 / v - (2.0 * rise + flat)
     if cruise < 0.0:
@@ -30,9 +32,12 @@ def phases(v: float, a: float, j: float) -> FloatArray:
     return np.array([rise, flat, rise, cruise, rise, flat, rise])
 
 
-def s_curve(q0: FloatArray, q1: FloatArray, scene: PlanningScene, factor: float = 1.0) -> JointTrajectory:
+def s_curve(
+    q0: FloatArray, q1: FloatArray, scene: PlanningScene, factor: float = 1.0
+) -> JointTrajectory:
     """From q0 to q1 (n,) with the data's limits, `factor` times slower."""
-    limits, delta = scene.limits, q1 - q0
+    limits = scene.limits
+    delta = q1 - q0
     size = np.maximum(np.abs(delta), 1e-12)
     v, a, j = (float(np.min(x / size)) for x in (limits.velocity, limits.acceleration, limits.jerk))
     lasting = phases(v, a, j)
@@ -45,7 +50,9 @@ def s_curve(q0: FloatArray, q1: FloatArray, scene: PlanningScene, factor: float 
     kept = [0, *(k + 1 for k in range(7) if lasting[k] > 1e-9)]
     times = factor * np.concatenate([[0.0], np.cumsum(lasting)])[kept]
     s, sd, sdd = np.array(states)[kept].T
-    s, sd[-1], sdd[-1] = s / s[-1], 0.0, 0.0
+    s = s / s[-1]
+    sd[-1] = 0.0
+    sdd[-1] = 0.0
     q, qd, qdd = (np.outer(x, delta) for x in (s, sd / factor, sdd / factor**2))
     return JointTrajectory.from_seconds(scene.cell.robot.joint_names, times, q0 + q, qd, qdd)
 
@@ -62,6 +69,8 @@ def fastest_baseline(q0: FloatArray, q1: FloatArray, scene: PlanningScene, drive
         factor *= _SLOWER
 
 
-def baseline(q0: FloatArray, q1: FloatArray, scene: PlanningScene, duration: float) -> JointTrajectory:
+def baseline(
+    q0: FloatArray, q1: FloatArray, scene: PlanningScene, duration: float
+) -> JointTrajectory:
     """The movement that lasts `duration` [s], at least fastest_baseline."""
     return s_curve(q0, q1, scene, duration / s_curve(q0, q1, scene).duration)

@@ -1,7 +1,8 @@
-"""Cells full of boxes: a thousand of them at random around the robot, and movements between free states.
+"""Cells full of boxes: a thousand of them at random around the robot, and movements between free
+states.
 
-The boxes stay out of a column around the robot's base, where nothing could move. Start and goal are drawn
-until they keep CLEARANCE and their tools are APART; whether a path joins them is not known.
+The boxes stay out of a column around the robot's base, where nothing could move. Start and goal are
+drawn until they keep CLEARANCE and their tools are APART; whether a path joins them is not known.
 """
 
 from __future__ import annotations
@@ -23,9 +24,14 @@ from ir_planner.request.goals import Goal
 from ir_planner.scene.planning_scene import PlanningScene
 
 BOXES = 1000
-REACH, HEIGHT, COLUMN = 3.2, 3.4, 0.7  # m: around the base, above the floor, and what stays empty
+# m: around the base, above the floor, and what stays empty
+REACH = 3.2
+HEIGHT = 3.4
+COLUMN = 0.7
 EDGES = (0.05, 0.22)  # m
-MARGIN, CLEARANCE = 0.01, 0.015  # m: S_m of the movements, and what their ends keep at least
+# m: S_m of the movements, and what their ends keep at least
+MARGIN = 0.01
+CLEARANCE = 0.015
 APART = 0.8  # m between the tools at start and goal
 DRAWN = 4096  # configurations at a time
 TASKS = 5  # of each cell
@@ -51,7 +57,13 @@ def boxes_cell(seed: int, count: int = BOXES) -> Cell:
     clutter = Equipment("clutter", np.eye(4), tuple(bodies), zone)
     cell = load_cell("open")
     return replace(
-        cell, name=f"boxes_{seed}", equipment=(clutter,), stations=(), program=(), signals=(), tasks=()
+        cell,
+        name=f"boxes_{seed}",
+        equipment=(clutter,),
+        stations=(),
+        program=(),
+        signals=(),
+        tasks=(),
     )
 
 
@@ -62,7 +74,8 @@ def boxes_tasks(seed: int, count: int) -> list[Task]:
     found: list[Task] = []
     free = _free(scene, rng)
     for k in range(len(free) - 1):
-        start, goal = free[k], free[k + 1]
+        start = free[k]
+        goal = free[k + 1]
         tools = scene.chain.tcp_poses(np.stack([start, goal]))[:, :3, 3]
         if np.linalg.norm(tools[1] - tools[0]) > APART and len(found) < count:
             found.append(Task(scene.cell.name, str(len(found)), scene, start, goal, MARGIN))
@@ -70,7 +83,9 @@ def boxes_tasks(seed: int, count: int) -> list[Task]:
 
 
 def boxes_rows(cells: int, first: int, more: int) -> list[dict[str, Any]]:
-    """A row per task of so many cells. more: times the work of a request, which decides what is solvable."""
+    """A row per task of so many cells. more: times the work of a request, which decides what is
+    solvable.
+    """
     rows = []
     for seed in range(first, first + cells):
         planner = Planner(time.process_time)
@@ -88,10 +103,14 @@ def boxes_claims(rows: list[dict[str, Any]]) -> list[Claim]:
     if not solvable:
         return []
     solved = [row for row in solvable if row["solved"]]
-    name = f"solved of {len(solvable)} solvable tasks ({len(rows)} drawn), {EDGES_OF_A_REQUEST} edges"
+    name = (
+        f"solved of {len(solvable)} solvable tasks ({len(rows)} drawn), {EDGES_OF_A_REQUEST} edges"
+    )
     return [
         at_least(name, 100.0 * len(solved) / len(solvable), "%", 90.0),
-        at_most("longest of these, processor time", max(row["seconds"] for row in solved), "s", WITHIN),
+        at_most(
+            "longest of these, processor time", max(row["seconds"] for row in solved), "s", WITHIN
+        ),
     ]
 
 
@@ -114,11 +133,15 @@ def _row(planner: Planner, task: Task, more: int) -> dict[str, Any]:
 
 def _joined(task: Task, more: int) -> bool:
     """Whether trees of another seed meet, with `more` times the work of a request."""
-    robot, model = task.scene.cell.robot, task.scene.collision
+    robot = task.scene.cell.robot
+    model = task.scene.collision
     scale = np.maximum(np.sqrt(task.scene.weights / task.scene.weights[0]), 0.1)
     threshold = task.scene.thresholds(task.margin)
-    low, high = robot.position_min, robot.position_max
-    search = BidirectionalTree(model, task.start, task.goal[None], threshold, low, high, scale, 1000)
+    low = robot.position_min
+    high = robot.position_max
+    search = BidirectionalTree(
+        model, task.start, task.goal[None], threshold, low, high, scale, 1000
+    )
     return search.grow(more * EDGES_OF_A_REQUEST)
 
 

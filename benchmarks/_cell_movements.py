@@ -48,10 +48,13 @@ def movements_of(planner: Planner, objective: str = "time_and_energy") -> Iterat
                 name = f"{step.from_station}->{step.to_station}"
                 yield CellMovement(cell, name, step.load, step.trajectory, step.report)
     for task in cell.tasks:
-        there, back = (task.start, task.goal), (task.goal, task.start)
+        there = (task.start, task.goal)
+        back = (task.goal, task.start)
         for ends, name in ((there, task.name), (back, f"{task.name} back")):
             options = PlanOptions(objective=objective, safety_distance=_margin(planner, ends))
-            plan_of = planner.plan_regional(ends[0], Goal(configuration=ends[1], text=name), options)
+            plan_of = planner.plan_regional(
+                ends[0], Goal(configuration=ends[1], text=name), options
+            )
             if plan_of.trajectory is not None:
                 load = planner.scene().load_text
                 yield CellMovement(cell, name, load, plan_of.trajectory, plan_of.report)

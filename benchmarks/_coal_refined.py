@@ -1,9 +1,10 @@
 """Coal's distances along a path at 0.0005 rad, asked only where they could be too small.
 
-No point of a capsule is farther from an axis than the links and the capsule between are long, so a distance
-changes by at most that times what the axis turns. Distances at both ends of a stretch bound it from below in
-between; a pair that can come below what it must keep is asked for in the middle, and so on down to single
-samples. The lengths are those of the robot's data; nothing of the planner takes part.
+No point of a capsule is farther from an axis than the links and the capsule between are long, so a
+distance changes by at most that times what the axis turns. Distances at both ends of a stretch
+bound it from below in between; a pair that can come below what it must keep is asked for in the
+middle, and so on down to single samples. The lengths are those of the robot's data; nothing of the
+planner takes part.
 """
 
 from __future__ import annotations
@@ -27,20 +28,27 @@ _BELOW = -1e-6  # m: what is excluded is less than this
 class RefinedCoal:
     """Coal for one scene, with how far each pair's distance can change."""
 
-    def __init__(self, coal: Coal, model: CollisionModel, robot: RobotModel, capsules: Sequence[Any]) -> None:
+    def __init__(
+        self, coal: Coal, model: CollisionModel, robot: RobotModel, capsules: Sequence[Any]
+    ) -> None:
         self._coal = coal
         by_name = {capsule.name: capsule for capsule in capsules}
         links = np.linalg.norm(np.array(robot.joint_origin)[:, :3, 3], axis=1)
-        self._reach = np.array([_reach(pair, by_name, links) for pair in model.pairs])  # (Z, n): m per rad
+        self._reach = np.array(
+            [_reach(pair, by_name, links) for pair in model.pairs]
+        )  # (Z, n): m per rad
 
     def least(self, q: FloatArray, kept: FloatArray) -> tuple[float, int]:
-        """Least distance minus what its pair must keep [m] at q (M, n), exact where it is negative, and at
-        how many configurations Coal was asked. kept (M, Z) m.
+        """Least distance minus what its pair must keep [m] at q (M, n), exact where it is negative,
+        and at how many configurations Coal was asked. kept (M, Z) m.
         """
-        turned = np.concatenate([np.zeros((1, q.shape[1])), np.abs(np.diff(q, axis=0)).cumsum(axis=0)])
+        turned = np.concatenate(
+            [np.zeros((1, q.shape[1])), np.abs(np.diff(q, axis=0)).cumsum(axis=0)]
+        )
         places = np.unique(np.append(np.arange(0, len(q), _FIRST), len(q) - 1))
         first = np.array([self._coal.distances(q[k]) - kept[k] for k in places])
-        best, asked = float(first.min()), len(places)
+        best = float(first.min())
+        asked = len(places)
         stretches = [
             (int(a), int(b), np.arange(first.shape[1]), first[k], first[k + 1])
             for k, (a, b) in enumerate(itertools.pairwise(places))
@@ -53,16 +61,23 @@ class RefinedCoal:
             open_ = (low < _BELOW) | _changing(kept[a : b + 1], pairs)
             if not open_.any():
                 continue
-            pairs, middle = pairs[open_], (a + b) // 2
+            pairs = pairs[open_]
+            middle = (a + b) // 2
             left = self._some(q[middle], pairs) - kept[middle, pairs]
-            best, asked = min(best, float(left.min())), asked + 1
-            stretches += [(a, middle, pairs, left_a[open_], left), (middle, b, pairs, left, left_b[open_])]
+            best = min(best, float(left.min()))
+            asked = asked + 1
+            stretches += [
+                (a, middle, pairs, left_a[open_], left),
+                (middle, b, pairs, left, left_b[open_]),
+            ]
         return best, asked
 
     def _some(self, q: FloatArray, pairs: IntArray) -> FloatArray:
         """Distances of some pairs at q (n,)."""
         coal = self._coal
-        pinocchio.updateGeometryPlacements(coal.model, coal.data, coal.geometry, coal.geometry_data, q)
+        pinocchio.updateGeometryPlacements(
+            coal.model, coal.data, coal.geometry, coal.geometry_data, q
+        )
         for z in pairs:
             pinocchio.computeDistance(coal.geometry, coal.geometry_data, int(z))
         results = coal.geometry_data.distanceResults
@@ -77,7 +92,9 @@ def _changing(kept: FloatArray, pairs: IntArray) -> BoolArray:
 
 
 def _reach(pair: Any, capsules: dict[str, Any], links: FloatArray) -> FloatArray:
-    """(n,): how far what a joint moves of a pair can be from its axis, seen from the pair's other half."""
+    """(n,): how far what a joint moves of a pair can be from its axis, seen from the pair's other
+    half.
+    """
     result = np.zeros(len(links))
     ends = [capsules[pair.body_a]] + ([capsules[pair.body_b]] if pair.kind == "SELF" else [])
     outer = max(ends, key=lambda capsule: capsule.link)

@@ -1,4 +1,6 @@
-"""Shapes of a cell in Coal, an independent library for distances; the tests of the kernels use them too."""
+"""Shapes of a cell in Coal, an independent library for distances; the tests of the kernels use them
+too.
+"""
 
 from typing import Any
 

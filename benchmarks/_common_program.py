@@ -1,7 +1,8 @@
-"""The common program: baseline movements through the same stations, each configuration nearest to the last.
+"""The common program: baseline movements through the same stations, each configuration nearest to
+the last.
 
-Service lines are the planner's. Where a straight segment is not free, the planner's path of least W stands in
-for it, driven as fast as the limits allow; the share of such segments is reported.
+Service lines are the planner's. Where a straight segment is not free, the planner's path of least W
+stands in for it, driven as fast as the limits allow; the share of such segments is reported.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ from ir_planner.program.node import Node
 
 @dataclass(frozen=True)
 class CommonProgram:
-    """Duration [s], drive energy [J] of its movements, and the share of segments that are not free."""
+    """Duration [s], drive energy [J] of its movements, and the share of segments that are not
+    free.
+    """
 
     duration: float
     drive_energy: float
@@ -33,25 +36,32 @@ def common_program(chains: Chains, planner: Planner, options: PlanOptions) -> Co
     scene = planner.scene(options.load)
     drives = Drives(scene)
     nodes = _nearest(chains)
-    T, E, segments, not_free = 0.0, 0.0, 0, 0
+    T = 0.0
+    E = 0.0
+    segments = 0
+    not_free = 0
     for place, (first, second) in enumerate(itertools.pairwise(nodes)):
         for node, entry in ((first, False), (second, True)):
             line = chains.line(place, node, entry=entry)
             if line is not None:
-                T, E = T + line.duration, E + line.energy - line.base_energy
+                T = T + line.duration
+                E = E + line.energy - line.base_energy
         if np.abs(second.arrival - first.departure).max() < 1e-9:
             continue
         segments += 1
         least = fastest_baseline(first.departure, second.arrival, scene, drives)
         movement = baseline(first.departure, second.arrival, scene, least)
-        if planner.evaluate(movement, options.safety_distance, options.load, "").verification.violation:
+        if planner.evaluate(
+            movement, options.safety_distance, options.load, ""
+        ).verification.violation:
             not_free += 1
             goal = Goal(configuration=second.arrival)
             around = replace(options, objective="movement_cost")
             found = planner.plan_regional(first.departure, goal, around).trajectory
             assert found is not None
             movement = found
-        T, E = T + movement.duration, E + drives.energy(movement)
+        T = T + movement.duration
+        E = E + drives.energy(movement)
     return CommonProgram(T, E, not_free / max(segments, 1))
 
 

@@ -1,7 +1,8 @@
-"""The planner's calls that a comparison makes, each answered as a flat mapping: name -> number or text.
+"""The planner's calls that a comparison makes, each answered as a flat mapping: name -> number or
+text.
 
-An answer holds statuses, ids and every figure of the reports. Texts of statuses, times of stages and other
-wall-clock figures are no part of it.
+An answer holds statuses, ids and every figure of the reports. Texts of statuses, times of stages
+and other wall-clock figures are no part of it.
 """
 
 from __future__ import annotations
@@ -96,7 +97,9 @@ def tasks_of(cell: str) -> list[tuple[str, Any, Any, float]]:
 
 def moved(cell: str, start: Any, goal: Any, margin: float, **changed: Any) -> Answer:
     asked = options(safety_distance=margin, **changed)
-    return movement_of(planner(cell).plan_regional(start, name_of("Goal")(configuration=goal), asked))
+    return movement_of(
+        planner(cell).plan_regional(start, name_of("Goal")(configuration=goal), asked)
+    )
 
 
 def to_station(cell: str) -> Answer:
@@ -129,7 +132,9 @@ def thinned(planned: Any, count: int) -> JointTrajectory:
 def planned(cell: str, k: int) -> JointTrajectory:
     _, start, goal, margin = tasks_of(cell)[k]
     asked = options(safety_distance=margin)
-    found = planner(cell).plan_regional(start, name_of("Goal")(configuration=goal), asked).trajectory
+    found = (
+        planner(cell).plan_regional(start, name_of("Goal")(configuration=goal), asked).trajectory
+    )
     assert isinstance(found, JointTrajectory)
     return found
 
@@ -163,7 +168,10 @@ def ik(cell: str, station: str, method: str) -> Answer:
     goal = name_of("parse_goal")(station, asked.cell)
     near = np.array(asked.cell.machine_home)
     plan = asked.compute_ik(goal, method, S_M, near, "", 32, 3)
-    found = {"status": int(plan.status.code), "rejected": sorted(one.count for one in plan.info.rejected)}
+    found = {
+        "status": int(plan.status.code),
+        "rejected": sorted(one.count for one in plan.info.rejected),
+    }
     found["branches"] = [solution.branch for solution in plan.solutions]
     found["q"] = [np.asarray(solution.q).tolist() for solution in plan.solutions]
     found["clearances"] = [solution.clearance for solution in plan.solutions]

@@ -20,7 +20,9 @@ _MODULES = {
 
 
 def name_of(name: str) -> Any:
-    """The class or function `name` of this checkout's planner. Raises ImportError listing where it is not."""
+    """The class or function `name` of this checkout's planner. Raises ImportError listing where it
+    is not.
+    """
     for module in _MODULES[name]:
         try:
             found = getattr(importlib.import_module(module), name, None)

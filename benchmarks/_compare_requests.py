@@ -1,4 +1,6 @@
-"""The fixed list of requests whose answers two checkouts are compared by: calls of the core, without ROS."""
+"""The fixed list of requests whose answers two checkouts are compared by: calls of the core,
+without ROS.
+"""
 
 from __future__ import annotations
 
@@ -64,7 +66,10 @@ def _programs() -> Iterator[Request]:
         ("cycle time", CYCLE, {}),
     ):
         yield Request("program", f"demo {name}", partial(program, DEMO, (), cycle, **changed))
-    for cell, stations in (("cnc_door", ("home", "pal", "press", "home")), ("open", ("home", "p1", "p2"))):
+    for cell, stations in (
+        ("cnc_door", ("home", "pal", "press", "home")),
+        ("open", ("home", "p1", "p2")),
+    ):
         yield Request("program", f"{cell} stations", partial(program, cell, stations, 0.0))
 
 
@@ -104,7 +109,9 @@ def _variants() -> Iterator[Request]:
                     partial(moved, cell, start, goal, margin, **changed),
                 )
     for cell in (*CELLS, DEMO):
-        yield Request("regional to a station", f"{cell} home to a station", partial(to_station, cell))
+        yield Request(
+            "regional to a station", f"{cell} home to a station", partial(to_station, cell)
+        )
 
 
 def _services() -> Iterator[Request]:
@@ -175,7 +182,9 @@ def _refused() -> Iterator[Request]:
         "outside the limits": lambda: demo.plan_regional(home + 9.0, goal, options()),
         "unknown station": lambda: demo.plan_program(("no_such",), 0.0, options(), home),
         "cycle time too short": lambda: demo.plan_program((), 1.0, options(), home),
-        "budget of one": lambda: demo.plan_regional(home, goal, replace(options(), max_iterations=1)),
+        "budget of one": lambda: demo.plan_regional(
+            home, goal, replace(options(), max_iterations=1)
+        ),
     }
     for name, ask in cases.items():
         yield Request("refusals", name, partial(_status, ask))

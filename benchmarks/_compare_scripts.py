@@ -15,7 +15,9 @@ SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
 
 
 def script_rows(name: str, before: Path, after: Path, rounds: int) -> list[dict[str, Any]]:
-    """A row with the ratio of the least times for every time that both checkouts' benchmark reports."""
+    """A row with the ratio of the least times for every time that both checkouts' benchmark
+    reports.
+    """
     least: tuple[dict[str, float], dict[str, float]] = ({}, {})
     for _ in range(rounds):
         for place, root in enumerate((before, after)):
@@ -25,7 +27,9 @@ def script_rows(name: str, before: Path, after: Path, rounds: int) -> list[dict[
     rows = []
     for key in shared:
         old, new = (1e3 * side[key] for side in least)
-        rows.append({"group": f"{name}: {key}", "before_ms": old, "after_ms": new, "ratio": new / old})
+        rows.append(
+            {"group": f"{name}: {key}", "before_ms": old, "after_ms": new, "ratio": new / old}
+        )
         print(f"{name}: {key:70s} {old:12.5g} {new:12.5g} ms  ratio {new / old:.3f}", flush=True)
     if not shared:
         print(f"benchmark {name}: the checkouts report no time of the same name")
@@ -41,7 +45,9 @@ def _times(name: str, root: Path) -> dict[str, float]:
     with tempfile.TemporaryDirectory() as place:
         result = Path(place) / "result.json"
         command = [sys.executable, str(script), *short, "--json", str(result)]
-        subprocess.run(command, env=environment(root), cwd=root, check=True, stdout=subprocess.DEVNULL)
+        subprocess.run(
+            command, env=environment(root), cwd=root, check=True, stdout=subprocess.DEVNULL
+        )
         return times_in(json.loads(result.read_text()))
 
 
@@ -52,7 +58,9 @@ def times_in(result: dict[str, Any]) -> dict[str, float]:
         if claim["unit"] in SECONDS:
             found[f"claim {claim['name']}"] = claim["value"] * SECONDS[claim["unit"]]
     for row in result["rows"]:
-        words = " ".join(str(value) for key, value in row.items() if isinstance(value, str) and key != "unit")
+        words = " ".join(
+            str(value) for key, value in row.items() if isinstance(value, str) and key != "unit"
+        )
         if row.get("unit") in SECONDS and isinstance(row.get("value"), float):
             found[words] = row["value"] * SECONDS[row["unit"]]
         for key, value in row.items():

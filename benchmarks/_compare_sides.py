@@ -26,8 +26,14 @@ def both_built(before: Path, after: Path) -> str:
 
 def environment(root: Path) -> dict[str, str]:
     """The environment in which the packages of a checkout are imported, on one thread."""
-    packages = os.pathsep.join(str(place) for place in sorted((root.resolve() / "src").glob("ir_*")))
-    return os.environ | {"PYTHONPATH": packages, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    packages = os.pathsep.join(
+        str(place) for place in sorted((root.resolve() / "src").glob("ir_*"))
+    )
+    return os.environ | {
+        "PYTHONPATH": packages,
+        "OMP_NUM_THREADS": "1",
+        "OPENBLAS_NUM_THREADS": "1",
+    }
 
 
 class Side:
@@ -44,7 +50,9 @@ class Side:
         )
         first = self._line()
         if Path(first["checkout"]) != self.root:
-            raise SystemExit(f"{self.root} was to be asked, but the planner is that of {first['checkout']}")
+            raise SystemExit(
+                f"{self.root} was to be asked, but the planner is that of {first['checkout']}"
+            )
         self.requests: list[list[str]] = first["requests"]
 
     def __enter__(self) -> Side:
@@ -73,7 +81,8 @@ def differences(before: dict[str, Any], after: dict[str, Any]) -> list[str]:
     """`name: before -> after` of everything that is not the same; NaN is the same as NaN."""
     found = []
     for name in dict.fromkeys([*before, *after]):
-        old, new = before.get(name, "missing"), after.get(name, "missing")
+        old = before.get(name, "missing")
+        new = after.get(name, "missing")
         if json.dumps(old) != json.dumps(new):
             found.append(f"{name}: {old} -> {new}")
     return found

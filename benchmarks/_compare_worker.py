@@ -1,8 +1,8 @@
 """One checkout's side of a comparison: answers the requests of the list by number.
 
-Reads one number per line, writes one JSON line {group, name, answer, cpu_s, wall_s}. The first line that it
-writes says how many requests there are and which checkout answers. Started by compare.py with the packages
-of that checkout on PYTHONPATH.
+Reads one number per line, writes one JSON line {group, name, answer, cpu_s, wall_s}. The first line
+that it writes says how many requests there are and which checkout answers. Started by compare.py
+with the packages of that checkout on PYTHONPATH.
 """
 
 from __future__ import annotations
@@ -17,8 +17,11 @@ from _compare_requests import Request, requests
 
 
 def answered(request: Request) -> dict[str, Any]:
-    """The request's answer with its processor time and wall time [s]; a crash is an answer as well."""
-    cpu, wall = time.process_time(), time.perf_counter()
+    """The request's answer with its processor time and wall time [s]; a crash is an answer as
+    well.
+    """
+    cpu = time.process_time()
+    wall = time.perf_counter()
     try:
         answer = request.ask()
     except name_of("RequestError") as refused:

@@ -1,4 +1,6 @@
-"""The stepped driver, with controller and encoders, carries a payload: what does its load check find?"""
+"""The stepped driver, with controller and encoders, carries a payload: what does its load check
+find?
+"""
 
 from __future__ import annotations
 
@@ -9,12 +11,22 @@ import numpy as np
 from ir_description import Cell
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver import LoadCheckSettings, LoadFinding, Simulation, SimulationSettings, make_simulation
+from ir_sim_driver import (
+    LoadCheckSettings,
+    LoadFinding,
+    Simulation,
+    SimulationSettings,
+    make_simulation,
+)
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import TrajectoryGoal
 from ir_sim_driver.plant import Carried
 
-SLOWER = (1.0, 1.5, 2.5)  # times the duration by the limits of speed and acceleration: torque may need it
+SLOWER = (
+    1.0,
+    1.5,
+    2.5,
+)  # times the duration by the limits of speed and acceleration: torque may need it
 SETTLING = 0.5  # s
 
 
@@ -41,16 +53,25 @@ class Carrier:
                 while not (outcomes := self.simulation.take_outcomes()):
                     self.simulation.step()
                 found = outcomes[-1].load_check
-                if self.simulation.stopped:  # more than the motors carry so fast: the supervision stopped it
+                if (
+                    self.simulation.stopped
+                ):  # more than the motors carry so fast: the supervision stopped it
                     self._recover()
                 if found is not None:
                     return found
 
     def _goal(self, start: FloatArray, end: FloatArray, slower: float) -> TrajectoryGoal:
-        robot, size, rest = self.simulation.robot, np.abs(end - start), np.zeros((2, len(start)))
-        fastest = (1.9 * size / robot.velocity_max).max(), np.sqrt(6.0 * size / robot.acceleration_max).max()
+        robot = self.simulation.robot
+        size = np.abs(end - start)
+        rest = np.zeros((2, len(start)))
+        fastest = (
+            (1.9 * size / robot.velocity_max).max(),
+            np.sqrt(6.0 * size / robot.acceleration_max).max(),
+        )
         times = np.array([0.0, max(fastest) * slower])
-        path = JointTrajectory.from_seconds(robot.joint_names, times, np.array([start, end]), rest, rest)
+        path = JointTrajectory.from_seconds(
+            robot.joint_names, times, np.array([start, end]), rest, rest
+        )
         return TrajectoryGoal(path)
 
     def _recover(self) -> None:

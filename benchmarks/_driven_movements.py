@@ -1,4 +1,6 @@
-"""Movements of cells with what the planner's model predicts for each, and how a plant drives them."""
+"""Movements of cells with what the planner's model predicts for each, and how a plant drives
+them.
+"""
 
 from __future__ import annotations
 
@@ -68,10 +70,14 @@ class Driven:
 
     def _rest(self) -> None:
         """Stand until the capacitor is empty."""
-        mains, begun = self.simulation.mains, self.simulation.time
+        mains = self.simulation.mains
+        begun = self.simulation.time
         self.simulation.run(REST)
         mains.settle()
-        while mains.meter.reading().capacitor_energy > 0.0 and self.simulation.time < begun + LONGEST_REST:
+        while (
+            mains.meter.reading().capacitor_energy > 0.0
+            and self.simulation.time < begun + LONGEST_REST
+        ):
             self.simulation.run(REST)
             mains.settle()
 

@@ -1,5 +1,5 @@
-"""A planned program on the simulated robot, as the program runner drives it, without real time: what every
-step takes beside what was planned.
+"""A planned program on the simulated robot, as the program runner drives it, without real time:
+what every step takes beside what was planned.
 """
 
 from __future__ import annotations
@@ -23,7 +23,9 @@ from ir_sim_driver import TrajectoryGoal, make_simulation
 from ir_sim_driver.plant import carried
 
 PLANT = "nominal"  # every term that the planner's model lacks is zero
-SHARE, JOULES = 0.03, 20.0  # of a step, whichever is larger
+# of a step, whichever is larger
+SHARE = 0.03
+JOULES = 20.0
 TOTAL = 1.0  # % of the program
 
 
@@ -47,10 +49,13 @@ class Step:
 
 
 class Robot:
-    """A stepped robot that fulfils a program's requests. took: joules of each step by its number."""
+    """A stepped robot that fulfils a program's requests. took: joules of each step by its
+    number.
+    """
 
     def __init__(self, cell: Cell) -> None:
-        self.cell, self.plant = cell, make_simulation(cell, plant=PLANT)
+        self.cell = cell
+        self.plant = make_simulation(cell, plant=PLANT)
         self.plant.backend.reset(np.array(cell.park))
         self.plant.executor.hold(np.array(cell.park))
         self.begun: dict[int, float] = {}
@@ -72,7 +77,7 @@ class Robot:
         plant = self.plant
         return ask.Outcome(plant.time, plant.modes.mode, status, modes, plant.mains.energy())
 
-    def _fulfilled(self, request: ask.Request) -> tuple[Status, tuple[Any, ...]]:  # long: one case a request
+    def _fulfilled(self, request: ask.Request) -> tuple[Status, tuple[Any, ...]]:  # noqa: C901
         plant = self.plant
         match request:
             case ask.Announce(index, event, _):
@@ -94,7 +99,9 @@ class Robot:
             case ask.WaitForMode(modes, timeout):
                 return self._waited(modes, plant.time + timeout), ()
             case ask.Drive(trajectory, cell_hash, load):
-                plant.execute(plant.vet(TrajectoryGoal(trajectory, cell_hash=cell_hash, load=load), 0), 0)
+                plant.execute(
+                    plant.vet(TrajectoryGoal(trajectory, cell_hash=cell_hash, load=load), 0), 0
+                )
                 while not plant.take_outcomes():
                     plant.step()
         return Status.success(), ()
@@ -108,13 +115,17 @@ class Robot:
 
 
 def driven(name: str, longest: float) -> tuple[list[Step], list[Claim]]:
-    """The program of a cell, planned with the defaults and driven; its pauses are cut to `longest` s."""
+    """The program of a cell, planned with the defaults and driven; its pauses are cut to `longest`
+    s.
+    """
     cell = load_cell(name)
     short = tuple(
         step if step.dwell <= longest else replace(step, dwell=longest, power_mode="AUTO")
         for step in cell.program
     )
-    cell, planner = replace(cell, program=short), Planner(itertools.repeat(0.0).__next__)  # no ceiling
+    # no ceiling
+    cell = replace(cell, program=short)
+    planner = Planner(itertools.repeat(0.0).__next__)
     planner.set_cell(cell_to_yaml(cell), "")
     plan = planner.plan_program((), 0.0, PlanOptions(), np.array(cell.park))
     robot = Robot(cell)
@@ -122,18 +133,33 @@ def driven(name: str, longest: float) -> tuple[list[Step], list[Claim]]:
     ended = robot.run(plan.movements)
     total = robot.plant.mains.energy() - begun
     steps = [
-        Step(name, k, str(m.kind), m.to_station, m.power_mode, m.duration, m.report.energy, robot.took[k])
+        Step(
+            name,
+            k,
+            str(m.kind),
+            m.to_station,
+            m.power_mode,
+            m.duration,
+            m.report.energy,
+            robot.took[k],
+        )
         for k, m in enumerate(plan.movements)
         if k in robot.took
     ]
     off = 100.0 * abs(total / plan.report.energy - 1.0)
     moves = [step.share_of_bound for step in steps if step.kind != MovementKind.PAUSE]
     pauses = [step.share_of_bound for step in steps if step.kind == MovementKind.PAUSE]
-    what, count = f"{name} driven, {PLANT} plant", len(plan.movements)
+    what = f"{name} driven, {PLANT} plant"
+    count = len(plan.movements)
     seconds = sum(step.duration for step in steps if step.kind == MovementKind.PAUSE)
     rests = f"{len(pauses)} pauses of {seconds:.0f} s in all"
     return steps, [
-        at_most(f"{what}: steps that did not end, of {count}", count - len(steps) + (not ended.ok), "", 0),
+        at_most(
+            f"{what}: steps that did not end, of {count}",
+            count - len(steps) + (not ended.ok),
+            "",
+            0,
+        ),
         at_most(f"{what}: {len(moves)} movements, worst of 3 % or 20 J", max(moves), "", 1.0),
         at_most(f"{what}: {rests}, worst of 3 % or 20 J", max(pauses, default=0.0), "", 1.0),
         at_most(f"{what}: energy of the program off the planned one", off, "%", TOTAL),

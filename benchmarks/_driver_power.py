@@ -1,4 +1,6 @@
-"""The power side of `benchmarks/driver.py`: watts of modes, times of transitions, the published energy."""
+"""The power side of `benchmarks/driver.py`: watts of modes, times of transitions, the published
+energy.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,9 @@ def until(simulation: Simulation, mode: Mode) -> None:
         if simulation.modes.mode is mode:
             return
         simulation.step()
-    raise RuntimeError(f"{mode.name} has not come within {LIMIT:g} s, it is {simulation.modes.mode.name}")
+    raise RuntimeError(
+        f"{mode.name} has not come within {LIMIT:g} s, it is {simulation.modes.mode.name}"
+    )
 
 
 def press(*bits: str) -> Callable[[Simulation], None]:
@@ -54,7 +58,8 @@ def transition_rows(cell: Cell) -> list[dict[str, Any]]:
     simulation = make_simulation(cell, backend="ideal")
     rows = []
     for mode, enter, leave in RESTS:
-        rest, times = ROW[mode], simulation.modes.times[mode]
+        rest = ROW[mode]
+        times = simulation.modes.times[mode]
         for act, transition, there, asked in (
             (enter, rest.entering, mode, times.enter),
             (leave, rest.leaving, Mode.STAND_ON_MOTORS, times.leave),
@@ -108,7 +113,9 @@ def _watts(simulation: Simulation, mode: Mode, payload: float) -> dict[str, Any]
 
 
 def energy_row(cell: Cell, seconds: float) -> dict[str, Any]:
-    """The ideal robot to and fro and at rest for so long: the meter beside the sum of what it publishes."""
+    """The ideal robot to and fro and at rest for so long: the meter beside the sum of what it
+    publishes.
+    """
     simulation = make_simulation(cell, backend="ideal")
     driver = Driver(simulation, round(TICK / simulation.settings.dt))
     home = simulation.executor.command

@@ -1,7 +1,9 @@
-"""The node as a process of its own, heard from this one: joint states, their periods and losses, its CPU.
+"""The node as a process of its own, heard from this one: joint states, their periods and losses,
+its CPU.
 
-A period is taken three times: where the node sends, where the middleware of this process receives, and where
-this process, in Python, is called back. `bare` is a thread here that only sleeps until the next stamp, before
+A period is taken three times: where the node sends, where the middleware of this process receives,
+and where this process, in Python, is called back. `bare` is a thread here that only sleeps until
+the next stamp, before
 the node starts: what the machine itself gives.
 """
 
@@ -21,7 +23,9 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 
-FIRST, STARTED_S = 500, 60.0  # messages that are passed over, and how long they may take to come
+# messages that are passed over, and how long they may take to come
+FIRST = 500
+STARTED_S = 60.0
 PERIOD_NS = 2_000_000
 
 
@@ -49,10 +53,12 @@ class Heard:
 
 def streamed(cell: str, seconds: float) -> dict[str, Any]:
     """Run the node as a process and listen to joint_states for so long."""
-    heard, bare = Heard(), slept(seconds)
+    heard = Heard()
+    bare = slept(seconds)
     with running("ir_sim_driver.node", cell=cell, wake_port=0) as process:
         rclpy.init()
-        node, executor = rclpy.create_node("driver_benchmark"), SingleThreadedExecutor()
+        node = rclpy.create_node("driver_benchmark")
+        executor = SingleThreadedExecutor()
         executor.add_node(node)
         try:
             node.create_subscription(JointState, "joint_states", heard.hear, QoSProfile(depth=2000))
@@ -62,7 +68,8 @@ def streamed(cell: str, seconds: float) -> dict[str, Any]:
             heard.clear()
             gc.collect()
             gc.freeze()  # a full collection here is no delay of the node
-            before, began = process_cpu(process.pid), time.monotonic()
+            before = process_cpu(process.pid)
+            began = time.monotonic()
             while time.monotonic() - began < seconds:
                 executor.spin_once(timeout_sec=0.1)
             cpu = (process_cpu(process.pid) - before) / (time.monotonic() - began)
@@ -76,7 +83,8 @@ def streamed(cell: str, seconds: float) -> dict[str, Any]:
 
 def slept(seconds: float) -> float:
     """99th percentile of the periods [ms] of a loop that only sleeps until the next stamp."""
-    woken, due = [time.monotonic_ns()], time.monotonic_ns()
+    woken = [time.monotonic_ns()]
+    due = time.monotonic_ns()
     for _ in range(round(1e9 * seconds / PERIOD_NS)):
         due += PERIOD_NS
         time.sleep(max(0.0, (due - time.monotonic_ns()) * 1e-9))
@@ -90,7 +98,9 @@ def _p99_ms(times_ns: list[int]) -> float:
 
 def _row(cell: str, heard: Heard, cpu: float) -> dict[str, Any]:
     """Periods and losses; cpu: share of a core that the node used."""
-    stamps, arrivals, periods = heard.stamps, heard.arrivals, np.diff(heard.arrivals) * 1e3
+    stamps = heard.stamps
+    arrivals = heard.arrivals
+    periods = np.diff(heard.arrivals) * 1e3
     return {
         "case": "streamed pybullet",
         "cell": cell,

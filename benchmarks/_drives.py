@@ -1,7 +1,8 @@
-"""The drives once more, independent of the compiled core: torque by Pinocchio, power, energy at the mains.
+"""The drives once more, independent of the compiled core: torque by Pinocchio, power, energy at the
+mains.
 
-Arm and loads are Pinocchio's; rotors, friction, the gas spring, copper losses and the DC bus follow from the
-description's data.
+Arm and loads are Pinocchio's; rotors, friction, the gas spring, copper losses and the DC bus follow
+from the description's data.
 """
 
 from __future__ import annotations
@@ -36,33 +37,44 @@ class Drives:
 
     def envelope(self, qd: FloatArray) -> FloatArray:
         """Torque (N, n) Nm that gear and motor have at these speeds."""
-        robot, limit = self._scene.cell.robot, np.empty_like(qd)
-        for j, (speeds, torques) in enumerate(zip(robot.envelope_speed, robot.envelope_torque, strict=True)):
+        robot = self._scene.cell.robot
+        limit = np.empty_like(qd)
+        for j, (speeds, torques) in enumerate(
+            zip(robot.envelope_speed, robot.envelope_torque, strict=True)
+        ):
             fast = np.interp(np.abs(qd[:, j]), speeds, torques[1:])
             limit[:, j] = np.where(np.abs(qd[:, j]) < speeds[0], torques[0], fast)
         return limit
 
     def energy(self, trajectory: JointTrajectory, step: float = STEP_S) -> float:
-        """Drive energy [J] at the mains; the capacitor starts empty, what is left in it is not credited."""
+        """Drive energy [J] at the mains; the capacitor starts empty, what is left in it is not
+        credited.
+        """
         span = float(trajectory.times[-1] - trajectory.times[0])
         count = max(int(np.ceil(span / step - 1e-9)), 1)
         dt = span / count
         at = trajectory.sample(trajectory.times[0] + (np.arange(count) + 0.5) * dt)
-        torque, robot = self.torque(at.q, at.qd, at.qdd), self._scene.cell.robot
+        torque = self.torque(at.q, at.qd, at.qdd)
+        robot = self._scene.cell.robot
         power = torque * at.qd + robot.copper_loss * (torque / robot.gear_ratio) ** 2
         return self.mains(power.sum(axis=1) * dt)
 
     def mains(self, wanted: FloatArray) -> float:
         """Energy [J] from the mains for joules (N,) that the axes want together, step by step."""
-        capacity, stored, drawn = self._scene.power.dc_link_capacity_energy, 0.0, 0.0
+        capacity = self._scene.power.dc_link_capacity_energy
+        stored = 0.0
+        drawn = 0.0
         for joules in wanted:
             drawn += max(float(joules) - stored, 0.0)
             stored = min(max(stored - float(joules), 0.0), capacity)
         return drawn
 
     def _counterbalance(self, q: FloatArray) -> FloatArray:
-        """Force of the gas spring times its lever about the pivot's joint, from the robot's data."""
-        torque, spring = np.zeros_like(q), self._scene.cell.robot.counterbalance
+        """Force of the gas spring times its lever about the pivot's joint, from the robot's
+        data.
+        """
+        torque = np.zeros_like(q)
+        spring = self._scene.cell.robot.counterbalance
         if spring is None:
             return torque
         angle = q[:, spring.joint]

@@ -1,5 +1,5 @@
-"""The driver's node as a process under attack: what it answers, and what memory, descriptors and threads it
-has afterwards.
+"""The driver's node as a process under attack: what it answers, and what memory, descriptors and
+threads it has afterwards.
 """
 
 from __future__ import annotations
@@ -49,7 +49,9 @@ SERVICES: tuple[tuple[str, Any], ...] = (
 
 @dataclass
 class Prey:
-    """A driver's process, and a client of it. modes: of its last messages; logs: where it writes."""
+    """A driver's process, and a client of it. modes: of its last messages; logs: where it
+    writes.
+    """
 
     pid: int
     port: int
@@ -65,7 +67,8 @@ class Prey:
             "rss_mb": int(fields["VmRSS"].split()[0]) / 1024.0,
             "descriptors": len(os.listdir(f"/proc/{self.pid}/fd")),
             "threads": int(fields["Threads"]),
-            "log_kb": sum(each.stat().st_size for each in self.logs.rglob("*") if each.is_file()) / 1024.0,
+            "log_kb": sum(each.stat().st_size for each in self.logs.rglob("*") if each.is_file())
+            / 1024.0,
         }
 
 
@@ -78,7 +81,9 @@ def prey() -> Iterator[Prey]:
     more = {"plc.startup_window": "0.0", "transitions.stand_on_brakes_leave": "0.01"}
     with tempfile.TemporaryDirectory() as logs:
         os.environ["ROS_LOG_DIR"] = logs
-        set_logger_level("ir_client", LoggingSeverity.ERROR)  # not every subscription fits a plain publisher
+        set_logger_level(
+            "ir_client", LoggingSeverity.ERROR
+        )  # not every subscription fits a plain publisher
         given: dict[str, str | int] = {"cell": "open", "backend": "ideal", "wake_port": 0, **more}
         with (
             running("ir_sim_driver.node", modbus="true", modbus_port=port, **given) as process,
@@ -102,16 +107,21 @@ def attack(calls: int, presses: int) -> list[dict[str, Any]]:
             ("goals of 100,000 points", max(2, calls // 500), huge),
             ("goals of 2 points", calls // 10, small),
             ("silent Modbus clients", 1_000, silent),
-            *((f"presses amid {rate} Hz", presses, partial(press_all, rate)) for rate in (20, 100, 250)),
+            *(
+                (f"presses amid {rate} Hz", presses, partial(press_all, rate))
+                for rate in (20, 100, 250)
+            ),
         ]
         return [_row(driver, *work) for work in works]
 
 
 def _row(driver: Prey, what: str, count: int, act: Callable[[Prey, int], int]) -> dict[str, Any]:
     act(driver, max(1, count // 10))  # caches fill
-    before, began = driver.has(), time.monotonic()
+    before = driver.has()
+    began = time.monotonic()
     lost = act(driver, count)
-    seconds, after = time.monotonic() - began, driver.has()
+    seconds = time.monotonic() - began
+    after = driver.has()
     table = {f"{key}_before": value for key, value in before.items()}
     table |= {f"{key}_after": value for key, value in after.items()}
     return {"case": "node", "what": what, "cases": count, "lost": lost, "s": seconds, **table}
@@ -119,8 +129,11 @@ def _row(driver: Prey, what: str, count: int, act: Callable[[Prey, int], int]) -
 
 def call(service: str, request: Any, driver: Prey, count: int) -> int:
     """Call a service so often, several at once; how many calls were not answered."""
-    node, executor = driver.client.node, driver.client._executor
-    client = executor.run(lambda: node.create_client(type_of(request), service, qos_profile=SERVICE))
+    node = driver.client.node
+    executor = driver.client._executor
+    client = executor.run(
+        lambda: node.create_client(type_of(request), service, qos_profile=SERVICE)
+    )
     answered = 0
     executor.wait_until(client.service_is_ready, ANSWERED)
     for _ in range(0, count, AT_ONCE):
@@ -139,10 +152,14 @@ def type_of(request: Any) -> Any:
 
 def goals(driver: Prey, count: int, points: int) -> int:
     """Send movements that go nowhere, longer than is taken, or short; how many had no result."""
-    q = np.array(driver.client.next_message(names.CONTROLLER_STATE, ControllerState).reference.positions)
+    q = np.array(
+        driver.client.next_message(names.CONTROLLER_STATE, ControllerState).reference.positions
+    )
     times = 0.1 + np.arange(points) * 0.03
     rest = np.zeros((points, 6))
-    path = JointTrajectory.from_seconds(names.JOINT_NAMES, times, np.tile(q, (points, 1)), rest, rest)
+    path = JointTrajectory.from_seconds(
+        names.JOINT_NAMES, times, np.tile(q, (points, 1)), rest, rest
+    )
     goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(path))
     lost = 0
     for _ in range(count):
@@ -156,7 +173,9 @@ def goals(driver: Prey, count: int, points: int) -> int:
 def silent(driver: Prey, count: int) -> int:
     """Connect so many silent clients; 1 when nobody else is served then."""
     before = driver.has()["descriptors"]
-    links = [socket.create_connection(("127.0.0.1", driver.port), timeout=10.0) for _ in range(count)]
+    links = [
+        socket.create_connection(("127.0.0.1", driver.port), timeout=10.0) for _ in range(count)
+    ]
     served = False
     for _ in range(100):
         try:
@@ -172,12 +191,16 @@ def silent(driver: Prey, count: int) -> int:
 
 
 def press_all(rate: int, driver: Prey, count: int) -> int:
-    """Presses by service, topic and Modbus while a PLC publishes zeros; how many were not latched."""
-    node, executor = driver.client.node, driver.client._executor
+    """Presses by service, topic and Modbus while a PLC publishes zeros; how many were not
+    latched.
+    """
+    node = driver.client.node
+    executor = driver.client._executor
     quality = QoSProfile(depth=1000)
     topic = executor.run(lambda: node.create_publisher(PlcInputs, names.PLC_INPUTS, quality))
     executor.wait_until(lambda: topic.get_subscription_count() > 0, ANSWERED)
-    ended, quiet = threading.Event(), PlcInputs(move_enable=True)
+    ended = threading.Event()
+    quiet = PlcInputs(move_enable=True)
 
     def traffic() -> None:
         while not ended.wait(1.0 / rate):
@@ -185,7 +208,8 @@ def press_all(rate: int, driver: Prey, count: int) -> int:
 
     plc = threading.Thread(target=traffic)
     plc.start()
-    generator, lost = np.random.default_rng(rate), 0
+    generator = np.random.default_rng(rate)
+    lost = 0
     try:
         for k in range(count):
             time.sleep(float(generator.uniform(0.0, 2.0 / rate)))
@@ -219,7 +243,8 @@ def _written(driver: Prey, requests: Sequence[bytes]) -> bool:
 
 def _latched(driver: Prey) -> bool:
     """Whether the stop shows and stays; however late, on a loaded machine."""
-    executor, modes = driver.client._executor, driver.modes
+    executor = driver.client._executor
+    modes = driver.modes
     executor.wait_until(lambda: bool(modes) and modes[-1] == Mode.EMERGENCY_STOP, ANSWERED)
     del modes[:]
     executor.wait_until(lambda: len(modes) >= 5, ANSWERED)
@@ -227,7 +252,8 @@ def _latched(driver: Prey) -> bool:
 
 
 def _recover(driver: Prey) -> None:
-    executor, modes = driver.client._executor, driver.modes
+    executor = driver.client._executor
+    modes = driver.modes
 
     def stands() -> bool:
         return bool(modes) and modes[-1] == Mode.STAND_ON_MOTORS

@@ -12,7 +12,9 @@ from _kernels_rows import Row
 from _results import Claim, at_most
 
 PACKAGE = Path(__file__).resolve().parents[1] / "src" / "ir_kernels"
-IMPORT = "import time, numpy; t = time.perf_counter(); import ir_kernels; print(time.perf_counter() - t)"
+IMPORT = (
+    "import time, numpy; t = time.perf_counter(); import ir_kernels; print(time.perf_counter() - t)"
+)
 
 
 def import_time() -> float:
@@ -29,7 +31,16 @@ def build_time() -> float:
     with tempfile.TemporaryDirectory() as folder:
         begin = time.perf_counter()
         subprocess.run(
-            [sys.executable, "setup.py", "-q", "build_ext", "-b", f"{folder}/lib", "-t", f"{folder}/temp"],
+            [
+                sys.executable,
+                "setup.py",
+                "-q",
+                "build_ext",
+                "-b",
+                f"{folder}/lib",
+                "-t",
+                f"{folder}/temp",
+            ],
             cwd=PACKAGE,
             capture_output=True,
             check=True,

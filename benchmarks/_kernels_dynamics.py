@@ -1,7 +1,8 @@
-"""Dynamics and inverse kinematics half of `benchmarks/kernels.py`: nanoseconds per sample, beside Pinocchio.
+"""Dynamics and inverse kinematics half of `benchmarks/kernels.py`: nanoseconds per sample, beside
+Pinocchio.
 
-One thread, best of several repetitions (what the machine can do, not what its other work leaves), peers in
-the same run.
+One thread, best of several repetitions (what the machine can do, not what its other work leaves),
+peers in the same run.
 """
 
 from __future__ import annotations
@@ -31,24 +32,33 @@ from ir_msgs_py.arrays import FloatArray
 
 SAMPLES = 4096
 PINOCCHIO_SAMPLES = 512
-POSITION_ERROR, ROTATION_ERROR = 1e-4, 3e-4  # m, rad: what counts as arrived
+# m, rad: what counts as arrived
+POSITION_ERROR = 1e-4
+ROTATION_ERROR = 3e-4
 
 
 def _agreement(model: DynamicsModel, peer: Any, samples: Sequence[FloatArray], robot: Any) -> float:
     """Largest difference of the arm's torque from Pinocchio's, relative to the largest torque."""
     q, qd, qdd = samples
     data = peer.createData()
-    rnea = np.array([pinocchio.rnea(peer, data, *sample) for sample in zip(q, qd, qdd, strict=True)])
+    rnea = np.array(
+        [pinocchio.rnea(peer, data, *sample) for sample in zip(q, qd, qdd, strict=True)]
+    )
     drives = (
-        robot.reflected_inertia * qdd + robot.friction_viscous * qd + robot.friction_coulomb * np.sign(qd)
+        robot.reflected_inertia * qdd
+        + robot.friction_viscous * qd
+        + robot.friction_coulomb * np.sign(qd)
     )
     arm = model.inverse_dynamics(q, qd, qdd) - drives + model.counterbalance(q)
     return float(np.abs(arm - rnea).max() / np.abs(rnea).max())
 
 
-def _dynamics(rng: np.random.Generator) -> tuple[list[Row], list[Claim]]:  # long: a table of figures
+def _dynamics(
+    rng: np.random.Generator,
+) -> tuple[list[Row], list[Claim]]:
     robot = load_robot()
-    model, peer = DynamicsModel(robot, (Tool(),)), pinocchio_arm(robot, (Tool(),))
+    model = DynamicsModel(robot, (Tool(),))
+    peer = pinocchio_arm(robot, (Tool(),))
     q = rng.uniform(robot.position_min, robot.position_max, (SAMPLES, 6))
     qd, qdd = rng.normal(size=(2, SAMPLES, 6))
     data = peer.createData()
@@ -73,12 +83,29 @@ def _dynamics(rng: np.random.Generator) -> tuple[list[Row], list[Claim]]:  # lon
         Row("inverse dynamics", "pinocchio.rnea, called from Python", other * 1e9, ns),
         Row("inverse dynamics, double, against Pinocchio", "", other / double, "times faster"),
         Row("mass matrix", "", best(lambda: model.mass_matrix(q), SAMPLES) * 1e9, ns),
-        Row("forward dynamics", "", best(lambda: model.forward_dynamics(q, qd, tau), SAMPLES) * 1e9, ns),
-        Row("torque gradients", "", best(lambda: model.torque_gradients(q, qd, qdd), SAMPLES, 5) * 1e9, ns),
+        Row(
+            "forward dynamics",
+            "",
+            best(lambda: model.forward_dynamics(q, qd, tau), SAMPLES) * 1e9,
+            ns,
+        ),
+        Row(
+            "torque gradients",
+            "",
+            best(lambda: model.torque_gradients(q, qd, qdd), SAMPLES, 5) * 1e9,
+            ns,
+        ),
         Row("axis power", "", best(lambda: model.axis_power(qd, tau), SAMPLES) * 1e9, ns),
         Row("DC bus", "", best(lambda: dc_bus(power, 0.01, bus), SAMPLES) * 1e9, ns),
-        Row("torque bounds, 8 segments", "", best(lambda: model.torque_bounds(c, T), 1, 10) * 1e6, "us"),
-        Row("motion extrema, 8 segments", "", best(lambda: motion_extrema(c, T), 1, 10) * 1e6, "us"),
+        Row(
+            "torque bounds, 8 segments",
+            "",
+            best(lambda: model.torque_bounds(c, T), 1, 10) * 1e6,
+            "us",
+        ),
+        Row(
+            "motion extrema, 8 segments", "", best(lambda: motion_extrema(c, T), 1, 10) * 1e6, "us"
+        ),
     ]
     agrees = _agreement(model, peer, few, robot)
     off = float(np.abs(model.inverse_dynamics_single(q, qd, qdd) - tau).max() / np.abs(tau).max())
@@ -99,7 +126,9 @@ def _closed_form(rng: np.random.Generator) -> tuple[list[Row], list[Claim]]:
     poses = chain.tcp_poses(made)
     seconds = best(lambda: ik.solve(poses), SAMPLES)
     found = ik.solve(poses)
-    missed = sum(float(np.abs(found.of_pose(k) - made[k]).max(axis=1).min()) > 1e-6 for k in range(SAMPLES))
+    missed = sum(
+        float(np.abs(found.of_pose(k) - made[k]).max(axis=1).min()) > 1e-6 for k in range(SAMPLES)
+    )
     error = float(np.abs(chain.tcp_poses(found.q) - poses[found.pose_index]).max())
     us = "us per pose"
     rows = [
@@ -119,23 +148,30 @@ def _descent(rng: np.random.Generator, poses: int) -> tuple[list[Row], list[Clai
     tcp = np.eye(4)
     tcp[:3, 3] = [0.42, 0.0, 0.0]
     chain = Chain(robot, None, tcp)
-    low, high = np.ascontiguousarray(robot.position_min), np.ascontiguousarray(robot.position_max)
+    low = np.ascontiguousarray(robot.position_min)
+    high = np.ascontiguousarray(robot.position_max)
     targets = chain.tcp_poses(rng.uniform(low, high, (poses, 6)))
     starts = np.clip(rng.normal((low + high) / 2.0, (high - low) / 6.0, (poses, 32, 6)), low, high)
-    rows, claims = [], []
+    rows = []
+    claims = []
     variants = {
         "CCD, 32 starts, Newton finish": CcdSettings(max_sweeps=20, newton_steps=20),
         "CCD, 32 starts, pure eq. 3": CcdSettings(),
     }
     for name, settings in variants.items():
-        arrived, seconds = 0, []
+        arrived = 0
+        seconds = []
         for pose, first in zip(targets, starts, strict=True):
             begin = time.perf_counter()
             result = ccd(chain, pose, first, low, high, settings)
             seconds.append(time.perf_counter() - begin)
             arrived += bool(result.reached(POSITION_ERROR, ROTATION_ERROR).any())
-        share, median = 100.0 * arrived / poses, float(np.median(seconds)) * 1e3
-        rows += [Row(name, "", median, "ms per pose, median"), Row(name, "", share, "% of the poses reached")]
+        share = 100.0 * arrived / poses
+        median = float(np.median(seconds)) * 1e3
+        rows += [
+            Row(name, "", median, "ms per pose, median"),
+            Row(name, "", share, "% of the poses reached"),
+        ]
         if settings.newton_steps:
             claims += [
                 at_most(f"{name}: time", median, "ms per pose, median", 1.0),
@@ -148,4 +184,6 @@ def measure(seed: int = 0, poses: int = 500) -> tuple[list[Row], list[Claim]]:
     """All rows and claims of this half."""
     rng = np.random.default_rng(seed)
     parts = [_dynamics(rng), _closed_form(rng), _descent(rng, poses)]
-    return [row for rows, _ in parts for row in rows], [claim for _, claims in parts for claim in claims]
+    return [row for rows, _ in parts for row in rows], [
+        claim for _, claims in parts for claim in claims
+    ]

@@ -1,8 +1,8 @@
-"""Geometry half of `benchmarks/kernels.py`: distances, checks and proofs of motion, per cell and beside the
-peers.
+"""Geometry half of `benchmarks/kernels.py`: distances, checks and proofs of motion, per cell and
+beside the peers.
 
-Path-like batches: straight edges of 0.8 rad (largest joint) between configurations drawn within the limits,
-40 configurations each. Random batches: every configuration drawn anew.
+Path-like batches: straight edges of 0.8 rad (largest joint) between configurations drawn within the
+limits, 40 configurations each. Random batches: every configuration drawn anew.
 """
 
 from __future__ import annotations
@@ -24,15 +24,21 @@ from ir_kernels import FREE, UNDECIDED, Chain, CollisionModel
 from ir_msgs_py.arrays import BoolArray, FloatArray
 
 SAMPLES = 4000  # configurations per batch: a hundred edges
-EDGE, SAFETY, MARGIN = 0.8, 0.02, 0.005  # rad, m, m
+# rad, m, m
+EDGE = 0.8
+SAFETY = 0.02
+MARGIN = 0.005
 FINE = 0.0005  # rad
-COAL_SAMPLES, BULLET_SAMPLES = 200, 40
+COAL_SAMPLES = 200
+BULLET_SAMPLES = 40
 NS = "ns per configuration"
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How often a batch is timed, in how many turns with Coal; edges and compared configurations per cell."""
+    """How often a batch is timed, in how many turns with Coal; edges and compared configurations
+    per cell.
+    """
 
     repetitions: int = 60
     turns: int = 10
@@ -40,7 +46,8 @@ class Effort:
     compared: int = 25_000
 
 
-FULL, QUICK = Effort(), Effort(10, 2, 300, 1000)
+FULL = Effort()
+QUICK = Effort(10, 2, 300, 1000)
 
 
 @dataclass(frozen=True)
@@ -54,14 +61,24 @@ class Body:
     vertices: FloatArray
 
 
-def model_of(cell: Cell, bodies: Sequence[Any] | None = None) -> tuple[CollisionModel, list[Any], list[Any]]:
+def model_of(
+    cell: Cell, bodies: Sequence[Any] | None = None
+) -> tuple[CollisionModel, list[Any], list[Any]]:
     """The cell's collision model, its capsules and its bodies."""
-    robot, tool = cell.robot, cell.tool
+    robot = cell.robot
+    tool = cell.tool
     held = list(tool.capsules) if tool else []
     capsules = [*robot.capsules, *held]
-    own = [*robot.self_pairs, *((c.name, other) for c in held for other in robot.load_self_capsules)]
+    own = [
+        *robot.self_pairs,
+        *((c.name, other) for c in held for other in robot.load_self_capsules),
+    ]
     scene = list(cell.bodies() if bodies is None else bodies)
-    return CollisionModel(Chain(robot, cell.base_pose, cell.tcp), capsules, scene, own), capsules, scene
+    return (
+        CollisionModel(Chain(robot, cell.base_pose, cell.tcp), capsules, scene, own),
+        capsules,
+        scene,
+    )
 
 
 def uniform(cell: Cell, rng: np.random.Generator, count: int) -> FloatArray:
@@ -91,8 +108,10 @@ def threaded(model: CollisionModel, q: FloatArray, repetitions: int) -> float:
 def _speed(cell: Cell, rng: np.random.Generator, effort: Effort) -> tuple[list[Row], list[Claim]]:
     """Distances and checks, beside Coal and PyBullet."""
     model, capsules, bodies = model_of(cell)
-    path, name = path_like(cell, rng), cell.name
-    coal, bullet = Coal(model, capsules, bodies), Bullet(cell, model, bodies)
+    path = path_like(cell, rng)
+    name = cell.name
+    coal = Coal(model, capsules, bodies)
+    bullet = Bullet(cell, model, bodies)
     ours = theirs = np.inf
     for _ in range(effort.turns):  # in turns: the processor's clock changes
         ours = min(ours, best(lambda: model.min_distance(path), SAMPLES, effort.repetitions))
@@ -122,8 +141,12 @@ def _batches(
     timed = {
         "minimum distance, random": best(lambda: model.min_distance(random), SAMPLES, repetitions),
         "minimum distance, path, two threads": threaded(model, path, repetitions),
-        "check against 20 mm, path": best(lambda: model.is_free(path, SAFETY), SAMPLES, repetitions),
-        "check against 20 mm, random": best(lambda: model.is_free(random, SAFETY), SAMPLES, repetitions),
+        "check against 20 mm, path": best(
+            lambda: model.is_free(path, SAFETY), SAMPLES, repetitions
+        ),
+        "check against 20 mm, random": best(
+            lambda: model.is_free(random, SAFETY), SAMPLES, repetitions
+        ),
         f"all {len(model.pairs)} distances": best(lambda: model.distances(path), SAMPLES, 10),
         "link poses": best(lambda: model.chain.link_poses(path), SAMPLES, repetitions),
     }
@@ -167,10 +190,12 @@ def _refuted(model: CollisionModel, q0: FloatArray, q1: FloatArray) -> int:
 
 def _edges(cell: Cell, rng: np.random.Generator, count: int) -> tuple[list[Row], list[Claim]]:
     """Certified edges: their time, those left undecided, and whether a fine sample refutes one."""
-    model, name = model_of(cell)[0], cell.name
+    model = model_of(cell)[0]
+    name = cell.name
     q0, q1 = edges(cell, rng, 12 * count)
     clear = _clear(model, q0, q1)
-    a, b = q0[clear][:count], q1[clear][:count]
+    a = q0[clear][:count]
+    b = q1[clear][:count]
     found = model.certify_edges(a, b, SAFETY)
     everything = model.certify_edges(q0[:count], q1[:count], SAFETY)
     free = everything.verdict == FREE
@@ -188,7 +213,9 @@ def _edges(cell: Cell, rng: np.random.Generator, count: int) -> tuple[list[Row],
 
 
 def _edge_times(name: str, model: CollisionModel, a: FloatArray, b: FloatArray) -> list[Row]:
-    """Microseconds per edge from a to b (N, n): in batches, alone, and sampled instead of certified."""
+    """Microseconds per edge from a to b (N, n): in batches, alone, and sampled instead of
+    certified.
+    """
     few = [(a[k : k + 50], b[k : k + 50]) for k in range(0, len(a) - 49, 50)]
     per_edge = [best(partial(model.certify_edges, *pair, SAFETY), 50, 5) for pair in few]
     single = [(a[k : k + 1], b[k : k + 1]) for k in range(min(200, len(a)))]
@@ -210,12 +237,14 @@ def _boxes(cell: Cell, rng: np.random.Generator) -> tuple[list[Row], list[Claim]
     while len(bodies) < 1000:
         pose = np.eye(4)
         rotation, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-        pose[:3, :3], pose[:3, 3] = rotation * np.linalg.det(rotation), rng.uniform(-2.5, 2.5, 3)
+        pose[:3, :3] = rotation * np.linalg.det(rotation)
+        pose[:3, 3] = rng.uniform(-2.5, 2.5, 3)
         if np.linalg.norm(pose[:2, 3]) > 1.0 and pose[2, 3] > 0.0:
             size = rng.uniform(0.05, 0.3, 3)
             bodies.append(Body(f"box {len(bodies)}", "box", pose, size, np.zeros((0, 3))))
     model, _, _ = model_of(cell, bodies)
-    path, random = path_like(cell, rng), uniform(cell, rng, 400)
+    path = path_like(cell, rng)
+    random = uniform(cell, rng, 400)
     ours = best(lambda: model.min_distance(path), len(path), 20) * 1e6
     other = best(lambda: model.min_distance(random), 400, 10) * 1e6
     us = "us per configuration"
@@ -231,10 +260,14 @@ def _construction(cell: Cell) -> Row:
     begin = time.perf_counter()
     for _ in range(20):
         model_of(cell)
-    return Row(f"{cell.name}: a new collision model", "", (time.perf_counter() - begin) / 20 * 1e6, "us")
+    return Row(
+        f"{cell.name}: a new collision model", "", (time.perf_counter() - begin) / 20 * 1e6, "us"
+    )
 
 
-def measure(cells: Sequence[str], seed: int = 0, effort: Effort = FULL) -> tuple[list[Row], list[Claim]]:
+def measure(
+    cells: Sequence[str], seed: int = 0, effort: Effort = FULL
+) -> tuple[list[Row], list[Claim]]:
     """All rows and claims of this half over the cells."""
     rng = np.random.default_rng(seed)
     rows: list[Row] = []

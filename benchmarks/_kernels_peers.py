@@ -1,4 +1,6 @@
-"""The same cell in Coal through Pinocchio and in PyBullet: what the kernels are measured against."""
+"""The same cell in Coal through Pinocchio and in PyBullet: what the kernels are measured
+against.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ def _se3(pose: FloatArray) -> Any:
 class Coal:
     """All pairs of a collision model, computed by pinocchio.computeDistances."""
 
-    def __init__(self, model: CollisionModel, capsules: Sequence[Any], bodies: Sequence[Any]) -> None:
+    def __init__(
+        self, model: CollisionModel, capsules: Sequence[Any], bodies: Sequence[Any]
+    ) -> None:
         self.model = pinocchio.Model()
         parent = 0
         chain = model.chain
@@ -47,7 +51,9 @@ class Coal:
             index[f"body {body.name}"] = self.geometry.addGeometryObject(item)
         for pair in model.pairs:
             other = pair.body_b if pair.kind == "SELF" else f"body {pair.body_b}"
-            self.geometry.addCollisionPair(pinocchio.CollisionPair(index[pair.body_a], index[other]))
+            self.geometry.addCollisionPair(
+                pinocchio.CollisionPair(index[pair.body_a], index[other])
+            )
         self.data, self.geometry_data = self.model.createData(), self.geometry.createData()
 
     def compute(self, q: FloatArray) -> None:
@@ -83,11 +89,14 @@ class Bullet:
                 str(path), useFixedBase=True, flags=flags, physicsClientId=self.client
             )
         joints = range(pybullet.getNumJoints(self.robot, physicsClientId=self.client))
-        kinds = [pybullet.getJointInfo(self.robot, j, physicsClientId=self.client)[2] for j in joints]
+        kinds = [
+            pybullet.getJointInfo(self.robot, j, physicsClientId=self.client)[2] for j in joints
+        ]
         self.joints = [j for j, kind in enumerate(kinds) if kind == pybullet.JOINT_REVOLUTE]
         self.bodies = [self._body(body) for body in bodies]
         links = {
-            pybullet.getJointInfo(self.robot, j, physicsClientId=self.client)[12].decode(): j for j in joints
+            pybullet.getJointInfo(self.robot, j, physicsClientId=self.client)[12].decode(): j
+            for j in joints
         }
         tool = links.get(f"load_{cell.tool.name}", -1) if cell.tool else -1
         link = {c.name: links.get(cell.robot.link_names[c.link], -1) for c in cell.robot.capsules}
@@ -99,23 +108,34 @@ class Bullet:
         self.own = sorted(own)
 
     def _body(self, body: Any) -> int:
-        make, client = pybullet.createCollisionShape, self.client
+        make = pybullet.createCollisionShape
+        client = self.client
         if body.kind == "box":
-            shape = make(pybullet.GEOM_BOX, halfExtents=list(body.size / 2.0), physicsClientId=client)
+            shape = make(
+                pybullet.GEOM_BOX, halfExtents=list(body.size / 2.0), physicsClientId=client
+            )
         elif body.kind == "cylinder":
             shape = make(
-                pybullet.GEOM_CYLINDER, radius=body.size[0], height=body.size[1], physicsClientId=client
+                pybullet.GEOM_CYLINDER,
+                radius=body.size[0],
+                height=body.size[1],
+                physicsClientId=client,
             )
         elif body.kind == "sphere":
             shape = make(pybullet.GEOM_SPHERE, radius=body.size[0], physicsClientId=client)
         elif body.kind == "capsule":
             shape = make(
-                pybullet.GEOM_CAPSULE, radius=body.size[0], height=body.size[1], physicsClientId=client
+                pybullet.GEOM_CAPSULE,
+                radius=body.size[0],
+                height=body.size[1],
+                physicsClientId=client,
             )
         elif body.kind == "plane":
             shape = make(pybullet.GEOM_PLANE, physicsClientId=client)
         else:
-            shape = make(pybullet.GEOM_MESH, vertices=body.vertices.tolist(), physicsClientId=client)
+            shape = make(
+                pybullet.GEOM_MESH, vertices=body.vertices.tolist(), physicsClientId=client
+            )
         quaternion = pinocchio.Quaternion(np.ascontiguousarray(body.pose[:3, :3])).coeffs()
         return int(
             pybullet.createMultiBody(
@@ -129,11 +149,18 @@ class Bullet:
             pybullet.resetJointState(self.robot, joint, value, physicsClientId=self.client)
         nearest = np.inf
         for body in self.bodies:
-            for point in pybullet.getClosestPoints(self.robot, body, 10.0, physicsClientId=self.client):
+            for point in pybullet.getClosestPoints(
+                self.robot, body, 10.0, physicsClientId=self.client
+            ):
                 nearest = min(nearest, point[8])
         for a, b in self.own:
             found = pybullet.getClosestPoints(
-                self.robot, self.robot, 10.0, linkIndexA=a, linkIndexB=b, physicsClientId=self.client
+                self.robot,
+                self.robot,
+                10.0,
+                linkIndexA=a,
+                linkIndexB=b,
+                physicsClientId=self.client,
             )
             nearest = min(nearest, *(point[8] for point in found))
         return nearest

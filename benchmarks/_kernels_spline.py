@@ -9,22 +9,28 @@ from _kernels_rows import Row, Tool, best
 from ir_description import load_cell
 from ir_kernels import DynamicsModel, SplineCost, SplineDescent, SplineTerms
 
-CONTROL, EVALUATIONS = 38, 200  # control points: 70 samples
+# control points: 70 samples
+CONTROL = 38
+EVALUATIONS = 200
 
 
 def _rows(name: str, rng: np.random.Generator) -> list[Row]:
     cell = load_cell(name)
     robot = cell.robot
-    model, dynamics = model_of(cell)[0], DynamicsModel(robot, (Tool(),), cell.base_pose)
+    model = model_of(cell)[0]
+    dynamics = DynamicsModel(robot, (Tool(),), cell.base_pose)
     limits = (robot.velocity_max, robot.acceleration_max, robot.jerk_max)
     threshold = np.full((1, len(model.pairs)), 0.02)
-    terms = SplineTerms(*limits, robot.position_min, robot.position_max, np.zeros(robot.n), threshold)
+    terms = SplineTerms(
+        *limits, robot.position_min, robot.position_max, np.zeros(robot.n), threshold
+    )
     u = np.clip((np.arange(CONTROL) - 2.0) / (CONTROL - 5.0), 0.0, 1.0)[:, None]
     span = rng.uniform(-0.2, 0.2, robot.n)
     span[0] = 1.5
     middle = np.radians([0.0, -90.0, 100.0, 0.0, 60.0, 0.0])
     control = middle + (u * u * (3.0 - 2.0 * u) - 0.5) * span
-    cost, plain = SplineCost(model, dynamics, terms), SplineCost(model, dynamics, terms, core=None)
+    cost = SplineCost(model, dynamics, terms)
+    plain = SplineCost(model, dynamics, terms, core=None)
 
     def descend() -> SplineDescent:
         return cost.descend(control, 0.1, evaluations=EVALUATIONS, tolerance=0.0)
@@ -32,7 +38,8 @@ def _rows(name: str, rng: np.random.Generator) -> list[Row]:
     end = descend()
     ours = best(lambda: cost.value(end.control, end.interval), 1, 2000)
     theirs = best(lambda: plain.value(end.control, end.interval), 1, 3)
-    what, samples = f"{name}: cost along a spline and its gradient", 2 * (CONTROL - 3)
+    what = f"{name}: cost along a spline and its gradient"
+    samples = 2 * (CONTROL - 3)
     return [
         Row(what, "", ours * 1e6, "us"),
         Row(f"{what}, per sample", "", ours / samples * 1e9, "ns"),

@@ -1,4 +1,6 @@
-"""Layout studies for studies.py: bounds against an exhaustive grid, the demonstration, programs a second."""
+"""Layout studies for studies.py: bounds against an exhaustive grid, the demonstration, programs a
+second.
+"""
 
 from __future__ import annotations
 
@@ -50,9 +52,11 @@ DEMONSTRATION = LayoutSettings(
 )
 
 
-def layout_claims(cell: str, parts: Collection[str], out: Path | None, *, quick: bool) -> list[Claim]:
-    """Claims of the named parts about layout studies, kept in `out` where it is given; quick: without the
-    demonstration's, smaller grids and fewer programs.
+def layout_claims(
+    cell: str, parts: Collection[str], out: Path | None, *, quick: bool
+) -> list[Claim]:
+    """Claims of the named parts about layout studies, kept in `out` where it is given; quick:
+    without the demonstration's, smaller grids and fewer programs.
     """
     small = replace(SMALL, cell=cell, steps=QUICK_STEPS if quick else SMALL.steps)
     timed = replace(small, stations=STATIONS)
@@ -66,19 +70,30 @@ def layout_claims(cell: str, parts: Collection[str], out: Path | None, *, quick:
         "speed": lambda folder: speed(small, folder, 6 if quick else 24),
     }
     with tempfile.TemporaryDirectory() as place:
-        return [claim for name in LAYOUT_PARTS if name in parts for claim in asked[name](out or Path(place))]
+        return [
+            claim
+            for name in LAYOUT_PARTS
+            if name in parts
+            for claim in asked[name](out or Path(place))
+        ]
 
 
 def in_cycle(settings: LayoutSettings, folder: Path) -> LayoutSettings:
-    """The same study in a cycle time: what the given placement takes when it is free, and SHARE more."""
+    """The same study in a cycle time: what the given placement takes when it is free, and SHARE
+    more.
+    """
     planned = run_layout(replace(settings, plans=1, seeds=1), folder / "cycle")
     given = planned.finals[0][0].mean("duration_s")
     return replace(settings, cycle_times=(float(math.ceil((1.0 + SHARE) * given)),))
 
 
 def bounded_against_exhaustive(settings: LayoutSettings, name: str, folder: Path) -> list[Claim]:
-    """What bounds lose of the best of a grid, and how many they plan; the spread is that over seeds."""
-    bounded = run_layout(settings, folder / name)  # rows are the same whoever asks: they are made once
+    """What bounds lose of the best of a grid, and how many they plan; the spread is that over
+    seeds.
+    """
+    bounded = run_layout(
+        settings, folder / name
+    )  # rows are the same whoever asks: they are made once
     whole = run_layout(replace(settings, margin=EVERYTHING), folder / name)
     lost = 100.0 * (least(bounded) / least(whole) - 1.0)
     spread = max(one.spread("cost_j") / one.mean("cost_j") for own in whole.finals for one in own)
@@ -111,7 +126,9 @@ def demonstration(folder: Path) -> list[Claim]:
     return [
         at_least("layout of the demonstration: placements", len(found.known), "", 1000.0),
         at_least("layout of the demonstration: joules saved per cycle", saved, "J", 0.0),
-        at_least("layout of the demonstration: low end of their 90 % interval", within.low, "J", 0.0),
+        at_least(
+            "layout of the demonstration: low end of their 90 % interval", within.low, "J", 0.0
+        ),
     ]
 
 
@@ -128,7 +145,9 @@ def speed(settings: LayoutSettings, folder: Path, programs: int) -> list[Claim]:
     return [
         at_least("programs per second and core", rate[1], "1/s", 1.0),
         at_least("scaling from one worker on one core to two on two", rate[2] / rate[1], "x", 1.8),
-        at_most("overhead of four workers on two cores", 100.0 * (rate[2] / rate[4] - 1.0), "%", 15.0),
+        at_most(
+            "overhead of four workers on two cores", 100.0 * (rate[2] / rate[4] - 1.0), "%", 15.0
+        ),
     ]
 
 

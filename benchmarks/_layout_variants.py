@@ -1,7 +1,7 @@
 """Layout studies of cells that nobody tuned for: what bounds lose of an exhaustive grid of each.
 
-A bundled cell is mirrored, turned and jittered by `_variants`; two of the things that a layout study may
-move, the masses of parts and whether there is a cycle time are drawn with it.
+A bundled cell is mirrored, turned and jittered by `_variants`; two of the things that a layout
+study may move, the masses of parts and whether there is a cycle time are drawn with it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ STEPS = 5  # more placements than the search plans before it has a bound
 EVERYTHING = 1000.0  # a margin that excludes nothing
 SHARE = 0.2  # of the given placement's cycle when it is free: a cycle time has so much more
 REACH = 0.12  # of the distance to the furthest station: how far things go
-TURN_DEG, PARK_DEG = 20.0, 30.0
+TURN_DEG = 20.0
+PARK_DEG = 30.0
 COUNT = 2  # per cell
 STOPS = 3  # of a program: enough for carried parts and for a choice of configurations
 
@@ -54,7 +55,9 @@ def grid(given: Cell, number: int, steps: int, folder: Path) -> Grid:
     file = folder / f"{cell.name}.yaml"
     file.write_text(cell_to_yaml(cell))
     rng = np.random.default_rng([SEED, number, *given.name.encode(), 1])
-    masses = {part.name: (float(round(part.load.mass * rng.uniform(0.3, 1.2), 1)),) for part in cell.parts}
+    masses = {
+        part.name: (float(round(part.load.mass * rng.uniform(0.3, 1.2), 1)),) for part in cell.parts
+    }
     settings = LayoutSettings(
         cell=str(file),
         carried=tuple(one.name for one in cell.equipment if _below_base(one, cell)),
@@ -76,10 +79,15 @@ def _below_base(machine: Equipment, cell: Cell) -> bool:
 
 
 def _moved(cell: Cell, rng: np.random.Generator) -> dict[str, Any]:
-    """Two things that may move, and how far: the base, a machine with stations, the posture, the tool."""
+    """Two things that may move, and how far: the base, a machine with stations, the posture, the
+    tool.
+    """
     far = max(float(np.linalg.norm((s.pose - cell.base_pose)[:2, 3])) for s in cell.stations)
     machines = sorted({station.equipment for station in cell.stations})
-    choices = [("base", part) for part in ("x", "y", "turn_deg")] + [("park", "a1_deg"), ("park", "a2_deg")]
+    choices = [("base", part) for part in ("x", "y", "turn_deg")] + [
+        ("park", "a1_deg"),
+        ("park", "a2_deg"),
+    ]
     choices += [(machine, part) for machine in machines for part in ("x", "y", "turn_deg")]
     choices += [("tool", "x"), ("tool", "a_deg")] if cell.tool is not None else []
     found: dict[str, dict[str, tuple[float, float]]] = {}
@@ -88,7 +96,9 @@ def _moved(cell: Cell, rng: np.random.Generator) -> dict[str, Any]:
         most = PARK_DEG if owner == "park" else TURN_DEG if part.endswith("_deg") else REACH * far
         width = round(most * rng.uniform(0.5, 1.0), 2)
         found.setdefault(owner, {})[part] = (-width, width)
-    own: dict[str, Any] = {name: found.pop(name) for name in ("base", "park", "tool") if name in found}
+    own: dict[str, Any] = {
+        name: found.pop(name) for name in ("base", "park", "tool") if name in found
+    }
     return {**own, "equipment": found}
 
 
@@ -97,7 +107,9 @@ def grid_claims(folder: Path, *, quick: bool) -> list[Claim]:
     cells, count = (CELLS[1:3], 1) if quick else (CELLS, COUNT)
     asked = grids(cells, count, STEPS, folder / "cells")
     rows = [row for one in asked if (row := compared(one, folder)) is not None]
-    enough = at_least("generated grids with a possible placement", len(rows), "", 0.5 * count * len(cells))
+    enough = at_least(
+        "generated grids with a possible placement", len(rows), "", 0.5 * count * len(cells)
+    )
     if not rows:
         return [enough]
     total = {key: sum(row[key] for row in rows) for key in ("plans", "grid_plans", "below_bound")}
@@ -114,12 +126,20 @@ def grid_claims(folder: Path, *, quick: bool) -> list[Claim]:
 
 def compared(one: Grid, folder: Path) -> dict[str, Any] | None:
     """A bounded search against the whole grid, None where no placement is possible."""
-    place, settings = folder / one.name, one.settings
+    place = folder / one.name
+    settings = one.settings
     if one.timed:
         free = run_layout(replace(settings, plans=1, seeds=1), place / "free")
-        seconds = [row["duration_s"] for known in free.known for row in known.plans.values() if row["solved"]]
+        seconds = [
+            row["duration_s"]
+            for known in free.known
+            for row in known.plans.values()
+            if row["solved"]
+        ]
         if seconds:
-            settings = replace(settings, cycle_times=(float(math.ceil((1.0 + SHARE) * seconds[0])),))
+            settings = replace(
+                settings, cycle_times=(float(math.ceil((1.0 + SHARE) * seconds[0])),)
+            )
     whole = run_layout(replace(settings, margin=EVERYTHING), place)
     bounded = run_layout(settings, place)
     if not any(math.isfinite(known.cost) for known in whole.known):
@@ -136,7 +156,8 @@ def compared(one: Grid, folder: Path) -> dict[str, Any] | None:
 
 def of_grid(bounded: Layouts, whole: Layouts) -> dict[str, Any]:
     """What was left out, and what of it costs less than its bound."""
-    best, grid_best = least(bounded), least(whole)
+    best = least(bounded)
+    grid_best = least(whole)
     planned = [known for known in bounded.known if math.isfinite(known.cost)]
     coarse, cost = np.array([[known.coarse, known.cost] for known in planned]).T
     slope = np.clip(np.polyfit(coarse, cost, 1)[0], 0.0, 1.0) if bounded.settings.in_cycles else 1.0
@@ -145,7 +166,10 @@ def of_grid(bounded: Layouts, whole: Layouts) -> dict[str, Any]:
     left = [k for k in whole.known if math.isfinite(k.cost) and k.placement.key not in seen]
     below = [(slope * known.coarse + above - known.cost) / known.cost for known in left]
     spread = max(
-        one.spread("cost_j") / one.mean("cost_j") for own in whole.finals for one in own if one.solved
+        one.spread("cost_j") / one.mean("cost_j")
+        for own in whole.finals
+        for one in own
+        if one.solved
     )
     return {
         "best_j": best,

@@ -12,14 +12,17 @@ _work: Callable[[int], Any] | None = None  # what the processes inherit: it need
 
 
 def over_seeds(work: Callable[[int], Any], seeds: Sequence[int]) -> list[Any]:
-    """Results in the order of the seeds; a process for each core, forked with all that is planned by then.
+    """Results in the order of the seeds; a process for each core, forked with all that is planned
+    by then.
 
     Raises BrokenProcessPool where one of them is killed, as for want of memory.
     """
     global _work
     _work = work
     fork = multiprocessing.get_context("fork")
-    with ProcessPoolExecutor(os.cpu_count(), mp_context=fork) as pool:  # waits: their processor time counts
+    with ProcessPoolExecutor(
+        os.cpu_count(), mp_context=fork
+    ) as pool:  # waits: their processor time counts
         return list(pool.map(_one, seeds))
 
 

@@ -1,4 +1,6 @@
-"""Does the set-back of eq. (5) help at poses where some configurations collide and others are free?"""
+"""Does the set-back of eq. (5) help at poses where some configurations collide and others are
+free?
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,9 @@ from _variants import variant
 from ir_description import load_cell
 from ir_planner.scene import PlanningScene
 
-VARIANTS, QUICK_VARIANTS = 8, 1  # of each cell and seed
+# of each cell and seed
+VARIANTS = 8
+QUICK_VARIANTS = 1
 POSES = 5  # of each
 NEAR = 0.15  # m: the tool or the arm is within it of something
 FEW = 8  # starts whose chance is compared: with more, hardly a pose is missed either way
@@ -42,10 +46,11 @@ ASKED = (DEFAULT, FREE, SWEPT, FREE_SWEPT)
 
 
 def blocked_places(scene: PlanningScene, count: int, rng: np.random.Generator) -> Iterator[Place]:
-    """Poses of the tool at random free configurations near something, where the closed form has others that
-    collide.
+    """Poses of the tool at random free configurations near something, where the closed form has
+    others that collide.
     """
-    robot, kept = scene.cell.robot, scene.thresholds(S_M)
+    robot = scene.cell.robot
+    kept = scene.thresholds(S_M)
     anywhere = replace(scene.cell.stations[0], name="", allowed_contacts=())
     while count:
         drawn = rng.uniform(robot.position_min, robot.position_max, (_BATCH, robot.n))
@@ -72,7 +77,8 @@ def measure(seed: int, quick: bool) -> list[Row]:
                     rng = np.random.default_rng([seed, k, number])
                     found = tried(place, READINGS[reading], rng, QUICK_STARTS if quick else STARTS)
                     rows.append(
-                        {"cell": scene.cell.name, "station": "", "draw": number, "reading": reading} | found
+                        {"cell": scene.cell.name, "station": "", "draw": number, "reading": reading}
+                        | found
                     )
     return rows
 
@@ -81,7 +87,8 @@ def _ending(rows: Sequence[Row], reading: str) -> Statement:
     mine = [row for row in rows if row["reading"] == reading]
     found = percent(
         share(
-            [row["colliding"] / row["starts"] for row in mine], [(row["seed"], row["cell"]) for row in mine]
+            [row["colliding"] / row["starts"] for row in mine],
+            [(row["seed"], row["cell"]) for row in mine],
         )
     )
     says = f"starts that arrive at a configuration that collides, {reading}"
@@ -91,11 +98,21 @@ def _ending(rows: Sequence[Row], reading: str) -> Statement:
 def judge(rows: Sequence[Row]) -> list[Statement]:
     """What the set-back changes."""
     default = list(of_reading(rows, DEFAULT).values())
-    says, succeed = "the set-back of (5) lets more starts end free", "starts that succeed"
-    several, chance = f"{FEW} starts find more with the set-back", "chance of a free configuration"
+    says = "the set-back of (5) lets more starts end free"
+    succeed = "starts that succeed"
+    several = f"{FEW} starts find more with the set-back"
+    chance = "chance of a free configuration"
     return [
         gain(rows, says, succeed, DEFAULT, FREE, share_free, "poses"),
-        gain(rows, "the same where no Newton finishes it", succeed, SWEPT, FREE_SWEPT, share_free, "poses"),
+        gain(
+            rows,
+            "the same where no Newton finishes it",
+            succeed,
+            SWEPT,
+            FREE_SWEPT,
+            share_free,
+            "poses",
+        ),
         gain(rows, several, chance, DEFAULT, FREE, lambda row: chance_of(row, FEW), "poses"),
         pays(rows, "poses"),
         _ending(rows, DEFAULT),
@@ -110,28 +127,33 @@ def follows(statements: Sequence[Statement]) -> str:
     helps = {HOLDS: "lets more starts end free", FAILS: "is not worth 2 points of the starts"}
     worth = {HOLDS: "it pays for its time", FAILS: "it does not pay for its time"}
     return (
-        f"Of the configurations {parts.value:.0f} % collide. Without the set-back {ends_free.value:.1f} % of "
-        f"the starts arrive at one of those, with it {ends.value:.1f} %: Newton's finish moves through "
-        f"bodies. The set-back {helps.get(back.verdict, 'may let a few more starts end free')} "
-        f"({back.value:+.1f} points; {alone.value:+.1f} where {MANY_SWEEPS} sweeps must arrive), and "
+        f"Of the configurations {parts.value:.0f} % collide. Without the set-back "
+        f"{ends_free.value:.1f} % of the starts arrive at one of those, with it {ends.value:.1f} "
+        "%: Newton's finish moves through bodies. The set-back "
+        f"{helps.get(back.verdict, 'may let a few more starts end free')} ({back.value:+.1f} "
+        f"points; {alone.value:+.1f} where {MANY_SWEEPS} sweeps must arrive), and "
         f"{worth.get(rate.verdict, 'whether it pays for its time is open')}."
     )
 
 
 def tables(rows: Sequence[Row]) -> dict[str, list[Row]]:
     """Success by number of starts."""
-    found = [{"reading": name, **chances([row for row in rows if row["reading"] == name])} for name in ASKED]
+    found = [
+        {"reading": name, **chances([row for row in rows if row["reading"] == name])}
+        for name in ASKED
+    ]
     return {"Chance that so many starts find a free configuration, mean of the poses": found}
 
 
 EXPERIMENT = Experiment(
     "ccd_blocked",
     "The set-back of eq. (5) where configurations collide",
-    "A joint whose step ends in collision is set back, so that the configurations that are found are free.",
-    f"In {VARIANTS} variants of {', '.join(CELLS)} per seed, {POSES} poses of the tool each, drawn at random "
-    f"free configurations within {1e3 * NEAR:g} mm of something: only poses at which the closed form has "
-    f"configurations that are free and others that collide. {STARTS} starts per pose and reading; no pilot "
-    "chose these sizes.",
+    "A joint whose step ends in collision is set back, so that the configurations that are found "
+    "are free.",
+    f"In {VARIANTS} variants of {', '.join(CELLS)} per seed, {POSES} poses of the tool each, "
+    f"drawn at random free configurations within {1e3 * NEAR:g} mm of something: only poses at "
+    f"which the closed form has configurations that are free and others that collide. {STARTS} "
+    "starts per pose and reading; no pilot chose these sizes.",
     measure,
     judge,
     follows,

@@ -1,4 +1,6 @@
-"""How surely does cyclic coordinate descent with set-back find configurations at the interaction point?"""
+"""How surely does cyclic coordinate descent with set-back find configurations at the interaction
+point?
+"""
 
 from __future__ import annotations
 
@@ -19,18 +21,30 @@ from ir_planner.configurations.ccd_search import descend
 from ir_planner.configurations.interaction_point import distinct_configurations, random_starts
 from ir_planner.request import Work
 
-STARTS, QUICK_STARTS = 40, 16  # per station and reading
-VARIANTS, QUICK_VARIANTS = 5, 1  # of each cell and seed, with every reading
+# per station and reading
+STARTS = 40
+QUICK_STARTS = 16
+# of each cell and seed, with every reading
+VARIANTS = 5
+QUICK_VARIANTS = 1
 MORE = 50  # variants with the two readings of (5) alone, which differ by little and cost little
 NUMBERS = (1, 2, 4, 8, 16, 32)  # starts whose success is compared
-ASKED, FOUND = 32, 95.0  # starts from which on a free configuration should be known, at so many % of stations
-MANY_SWEEPS, COARSE = 80, 1e-6  # where nothing but sweeps brings the tool there: to 1 mm or 2 mrad
+# starts from which on a free configuration should be known, at so many % of stations
+ASKED = 32
+FOUND = 95.0
+# where nothing but sweeps brings the tool there: to 1 mm or 2 mrad
+MANY_SWEEPS = 80
+COARSE = 1e-6
 POINTS = 2.0  # percentage points of starts from which on a difference is worth having
 NEAR = 1e-3  # rad: a configuration that was found is one of the complete set
 
 
-DEFAULT, LITERAL, FREE, UNIFORM = "as read", "(5) literal", "no set-back", "(1) uniform"
-SWEPT, FREE_SWEPT = "no Newton finish", "no Newton finish, no set-back"
+DEFAULT = "as read"
+LITERAL = "(5) literal"
+FREE = "no set-back"
+UNIFORM = "(1) uniform"
+SWEPT = "no Newton finish"
+FREE_SWEPT = "no Newton finish, no set-back"
 _SWEEPS = InteractionSettings(newton_steps=0, sweeps=MANY_SWEEPS, finish_every=8, xi=COARSE)
 READINGS = {
     DEFAULT: InteractionSettings(),
@@ -44,7 +58,9 @@ READINGS = {
 
 
 def measure(seed: int, quick: bool) -> list[Row]:
-    """A row per station and reading: starts, those that ended free, processor time, configurations found."""
+    """A row per station and reading: starts, those that ended free, processor time, configurations
+    found.
+    """
     rows = []
     cells, variants, more = (CELLS[:2], QUICK_VARIANTS, 0) if quick else (CELLS, VARIANTS, MORE)
     whole = {place.scene.cell.name for place in places(cells, seed, variants)}
@@ -59,17 +75,23 @@ def measure(seed: int, quick: bool) -> list[Row]:
 def tried(place: Place, settings: InteractionSettings, rng: np.random.Generator, count: int) -> Row:
     """What becomes of so many starts at a place."""
     robot = place.scene.cell.robot
-    starts = random_starts(robot.position_min, robot.position_max, count, settings.distribution, rng)
+    starts = random_starts(
+        robot.position_min, robot.position_max, count, settings.distribution, rng
+    )
     work = Work(10**9, np.inf, time.monotonic)
     begin = time.process_time()
     found = descend(place.station.pose, starts, place.scene, place.threshold, settings, work)
     seconds = time.process_time() - begin
     own = distinct_configurations(found.q)
-    known = sum(bool((np.abs(own - q).max(axis=1) < NEAR).any()) for q in place.q) if len(own) else 0
+    known = (
+        sum(bool((np.abs(own - q).max(axis=1) < NEAR).any()) for q in place.q) if len(own) else 0
+    )
     return {
         "starts": count,
         "free": len(found.q),
-        "colliding": sum(n for reason, n in found.rejected.items() if reason.startswith("at the pose")),
+        "colliding": sum(
+            n for reason, n in found.rejected.items() if reason.startswith("at the pose")
+        ),
         "seconds": seconds,
         "known": known,
         "complete": len(place.q),
@@ -108,7 +130,8 @@ def colliding(rows: Sequence[Row], places: str) -> Statement:
 
 def pays(rows: Sequence[Row], places: str) -> Statement:
     """Successes per second with the set-back over those without."""
-    a, b = of_reading(rows, DEFAULT), of_reading(rows, FREE)
+    a = of_reading(rows, DEFAULT)
+    b = of_reading(rows, FREE)
     both = [key for key in a if key in b]
     longer = [a[k]["seconds"] / b[k]["seconds"] for k in both]
     shares = ([share_free(one[k]) for k in both] for one in (a, b))
@@ -132,13 +155,16 @@ def gain(
     """What one reading has more of than the other."""
     some, keys = difference(rows, one, other, by)
     means = mean_difference(some, cells_of(keys))
-    return Statement(says, f"{what}, {one} less {other}", *means, len(some), places, "points", POINTS)
+    return Statement(
+        says, f"{what}, {one} less {other}", *means, len(some), places, "points", POINTS
+    )
 
 
 def judge(rows: Sequence[Row]) -> list[Statement]:
     """Success of the search, and what each of its parts adds."""
     by_station = of_reading(rows, DEFAULT)
-    default, cells = list(by_station.values()), cells_of(by_station)
+    default = list(by_station.values())
+    cells = cells_of(by_station)
     starts = min(ASKED, default[0]["starts"])
     sure = percent(share([chance_of(row, starts) for row in default], cells))
     complete = interval(mean, [100.0 * _known(row) for row in default], groups=cells)
@@ -146,7 +172,8 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
     several = f"{starts} starts reach more stations with the set-back, where no Newton finishes it"
     bare = "Newton's finish lets more starts arrive where nothing is set back"
     spread = "the normal distribution of (1) finds more of the complete set"
-    whole, known = "the search finds the complete set", "of all free configurations"
+    whole = "the search finds the complete set"
+    known = "of all free configurations"
 
     def more(
         says: str,
@@ -158,13 +185,14 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
         return gain(rows, says, what, one, other, by, "stations")
 
     return [
-        Statement(first, "chance, mean of the stations", *sure, len(default), "stations", "%", FOUND),
+        Statement(first, "chance, mean of the "
+"stations", *sure, len(default), "stations", "%", FOUND),
         more("the set-back of (5) lets more starts end free", DEFAULT, FREE),
         more("the same where no Newton finishes it", SWEPT, FREE_SWEPT),
         more("(5) as read, a secant, does better than as printed", DEFAULT, LITERAL),
         more("Newton's finish lets more starts arrive", DEFAULT, SWEPT),
         more("the normal distribution of (1) does better than a uniform one", DEFAULT, UNIFORM),
-        more(several, SWEPT, FREE_SWEPT, "chance of a free one", lambda row: chance_of(row, starts)),
+        more(several, SWEPT, FREE_SWEPT, "chance of a free one", lambda row: chance_of(row, starts)),  # noqa: E501
         pays(rows, "stations"),
         Statement(whole, f"{known} found by {default[0]['starts']} starts, mean", *complete,
                   len(default), "stations", "%", FOUND),
@@ -176,7 +204,9 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
 
 def follows(statements: Sequence[Statement]) -> str:
     """What the figures mean."""
-    sure, back, alone, printed, newton, normal, hard, rate, complete, swept, spread, blocked = statements
+    sure, back, alone, printed, newton, normal, hard, rate, complete, swept, spread, blocked = (
+        statements
+    )
     works = {HOLDS: "The search works", FAILS: "The search is not sure"}.get(
         sure.verdict, "Whether the search is sure enough is open"
     )
@@ -188,28 +218,30 @@ def follows(statements: Sequence[Statement]) -> str:
     }.get(rate.verdict, "whether it pays is open")
     helps = {HOLDS: "it helps", FAILS: "it does not help"}.get(hard.verdict, "it may help")
     where = (
-        "No configuration of the closed form collides at these stations: what sorting out at the end would "
-        "lose is measured in the next chapter."
+        "No configuration of the closed form collides at these stations: what sorting out at the "
+        "end would lose is measured in the next chapter."
         if blocked.value == 0.0
         else f"{blocked.value:.1f} % of the closed form's configurations collide here."
     )
     return (
         f"{works}: a free configuration is known from {ASKED} starts at {sure.value:.1f} % of "
-        f"the stations. The set-back {drop} ({back.value:+.1f} points; {alone.value:+.1f} without "
-        f"Newton's finish), at {1.0 / rate.value:.1f} times the time per success: {pays}. Where sweeps alone "
-        f"must arrive, without Newton's finish, {helps}: the chance of {ASKED} starts changes by "
-        f"{hard.value:+.1f} points. {where} Reading (5) as a secant changes {printed.value:+.1f} points, "
-        f"Newton's finish {newton.value:+.1f} with the set-back and {swept.value:+.1f} without (against "
-        f"{MANY_SWEEPS} sweeps), the normal distribution {normal.value:+.1f} of single starts and "
-        f"{spread.value:+.1f} of the complete set. "
-        f"{complete.value:.0f} % of the complete set are found; the planner's default is the closed form, "
-        "which has all of it; arms without one have a search of their own, and CCD is asked for by name."
+        f"the stations. The set-back {drop} ({back.value:+.1f} points; {alone.value:+.1f} "
+        f"without Newton's finish), at {1.0 / rate.value:.1f} times the time per success: "
+        f"{pays}. Where sweeps alone must arrive, without Newton's finish, {helps}: the chance "
+        f"of {ASKED} starts changes by {hard.value:+.1f} points. {where} Reading (5) as a secant "
+        f"changes {printed.value:+.1f} points, Newton's finish {newton.value:+.1f} with the "
+        f"set-back and {swept.value:+.1f} without (against {MANY_SWEEPS} sweeps), the normal "
+        f"distribution {normal.value:+.1f} of single starts and {spread.value:+.1f} of the "
+        f"complete set. {complete.value:.0f} % of the complete set are found; the planner's "
+        "default is the closed form, which has all of it; arms without one have a search of "
+        "their own, and CCD is asked for by name."
     )
 
 
 def _with_all_readings(rows: Sequence[Row], name: str) -> list[Row]:
     """Rows of a reading at the stations where every reading was tried."""
-    mine, others = of_reading(rows, name), [of_reading(rows, other) for other in READINGS]
+    mine = of_reading(rows, name)
+    others = [of_reading(rows, other) for other in READINGS]
     return [row for key, row in mine.items() if all(key in other for other in others)]
 
 
@@ -253,18 +285,20 @@ def draw(rows: Sequence[Row], file: Path) -> None:
 EXPERIMENT = Experiment(
     "ccd",
     "CCD with set-back from many starts, eqs. (1) to (6)",
-    "Goal configurations at the interaction point are found by cyclic coordinate descent (3) from p random "
-    "starts (1); a joint whose step ends in collision is set back in proportion to the metric distance (5); "
-    "what is near enough and free is accepted (6).",
-    f"All stations of {', '.join(CELLS)} and of {2 * VARIANTS - 1} mirrored, turned and jittered variants of "
-    f"each; {STARTS} starts per station for each reading: (5) as a secant or as printed, none at all "
-    f"(collisions sorted out at the end), all three also without Newton's finish but {MANY_SWEEPS} sweeps "
-    f"and arrived at 1 mm, (1) uniform; {2 * MORE} further variants of each with both readings of (5) only. "
-    f"Only stations where the closed form has a free configuration. {MARGIN}",
+    "Goal configurations at the interaction point are found by cyclic coordinate descent (3) "
+    "from p random starts (1); a joint whose step ends in collision is set back in proportion to "
+    "the metric distance (5); what is near enough and free is accepted (6).",
+    f"All stations of {', '.join(CELLS)} and of {2 * VARIANTS - 1} mirrored, turned and jittered "
+    f"variants of each; {STARTS} starts per station for each reading: (5) as a secant or as "
+    "printed, none at all (collisions sorted out at the end), all three also without Newton's "
+    f"finish but {MANY_SWEEPS} sweeps and arrived at 1 mm, (1) uniform; {2 * MORE} further "
+    "variants of each with both readings of (5) only. Only stations where the closed form has a "
+    f"free configuration. {MARGIN}",
     measure,
     judge,
     follows,
     tables,
     draw,
-    "Chance of a free configuration over the number of starts (left) and over their processor time (right).",
+    "Chance of a free configuration over the number of starts (left) and over their processor "
+    "time (right).",
 )

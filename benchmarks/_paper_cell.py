@@ -1,4 +1,6 @@
-"""Figures 1 and 2 as pictures of the demonstration: cell and zones, service and regional movements."""
+"""Figures 1 and 2 as pictures of the demonstration: cell and zones, service and regional
+movements.
+"""
 
 from __future__ import annotations
 
@@ -24,11 +26,16 @@ CELL = "demo"
 COLOURS = {"OPEN": "tab:green", "SEMI_CLOSED": "tab:orange", "CLOSED": "tab:red"}
 _SAMPLES = 80
 ABOVE = np.eye(3)[:2]  # projections (2, 3) of the world
-_AZIMUTH, _ELEVATION = np.radians(-60.0), np.radians(32.0)
+_AZIMUTH = np.radians(-60.0)
+_ELEVATION = np.radians(32.0)
 CORNER = np.array(
     [
         [-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0],
-        [-np.cos(_AZIMUTH) * np.sin(_ELEVATION), -np.sin(_AZIMUTH) * np.sin(_ELEVATION), np.cos(_ELEVATION)],
+        [
+            -np.cos(_AZIMUTH) * np.sin(_ELEVATION),
+            -np.sin(_AZIMUTH) * np.sin(_ELEVATION),
+            np.cos(_ELEVATION),
+        ],
     ]
 )
 
@@ -36,14 +43,21 @@ CORNER = np.array(
 def measure(seed: int, quick: bool) -> list[Row]:
     """A row per movement of the planned program: the tool's path, and what kind it is."""
     planner = planner_of(CELL)
-    plan = planner.plan_program((), 0.0, PlanOptions(planning_time=60.0), np.array(planner.cell.park))
-    chain, rows = planner.scene().chain, []
+    plan = planner.plan_program(
+        (), 0.0, PlanOptions(planning_time=60.0), np.array(planner.cell.park)
+    )
+    chain = planner.scene().chain
+    rows = []
     for step in plan.movements:
         if step.trajectory is None:
             continue
         times = np.linspace(0.0, step.trajectory.duration, _SAMPLES)
         path = chain.tcp_poses(step.trajectory.sample(times).q)[:, :3, 3]
-        row: Row = {"kind": MovementKind(step.kind).value, "from": step.from_station, "to": step.to_station}
+        row: Row = {
+            "kind": MovementKind(step.kind).value,
+            "from": step.from_station,
+            "to": step.to_station,
+        }
         row |= {"seconds": step.trajectory.duration, "joules": step.report.energy}
         rows.append(row | {"path": np.round(path, 3).tolist()})
     return rows
@@ -51,10 +65,11 @@ def measure(seed: int, quick: bool) -> list[Row]:
 
 def judge(rows: Sequence[Row]) -> list[Statement]:
     """How much of the program is which kind of movement."""
-    nan, found = float("nan"), []
+    nan = float("nan")
+    found = []
     whole = sum(row["seconds"] for row in rows)
     for kinds, name in (((MovementKind.REGIONAL,), "regional"),
-                        ((MovementKind.SERVICE_ENTRY, MovementKind.SERVICE_EXIT), "service")):  # fmt: skip
+                        ((MovementKind.SERVICE_ENTRY, MovementKind.SERVICE_EXIT), "service")):  # fmt: skip  # noqa: E501
         some = [row for row in rows if row["kind"] in [kind.value for kind in kinds]]
         share = 100.0 * sum(row["seconds"] for row in some) / whole
         says = f"{name} movements of the demonstration"
@@ -68,9 +83,10 @@ def follows(statements: Sequence[Statement]) -> str:
     """What the pictures show."""
     regional, service = statements
     return (
-        f"{regional.count} regional and {service.count} service movements, {service.value:.0f} % of the "
-        "moving time inside the zones. These are pictures of this project's cell, drawn from its data; "
-        "they reproduce the arrangement that the paper describes, not its drawings."
+        f"{regional.count} regional and {service.count} service movements, {service.value:.0f} % "
+        "of the moving time inside the zones. These are pictures of this project's cell, drawn "
+        "from its data; they reproduce the arrangement that the paper describes, not its "
+        "drawings."
     )
 
 
@@ -106,7 +122,8 @@ def _machines(panel: Axes, cell: Cell, view: FloatArray) -> None:
             if mesh is not None:
                 points = mesh.points @ body.pose[:3, :3].T + body.pose[:3, 3]
                 _outline(panel, points @ view.T, fc="0.6", ec="0.4", alpha=0.35, lw=0.5, zorder=2)
-        zone, name = machine.zone, machine.zone.kind.lower().replace("_", "-") + " zone"
+        zone = machine.zone
+        name = machine.zone.kind.lower().replace("_", "-") + " zone"
         signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
         points = (0.5 * signs * zone.size) @ zone.pose[:3, :3].T + zone.pose[:3, 3]
         style = {"fc": "none", "ec": COLOURS[zone.kind], "lw": 1.6, "ls": "--", "zorder": 4}
@@ -137,17 +154,18 @@ def _outline(panel: Axes, points: FloatArray, **style: Any) -> None:
 EXPERIMENT = Experiment(
     "figures",
     "Figures 1 and 2: the cell, service and regional movements",
-    "The figures show a robot among technological equipment: stations around it with their forbidden "
-    "zones, some open, some semi-closed, and movements of two kinds, service movements into and out of a "
-    "machine's zone and regional ones from zone to zone. (The figures themselves are not part of this "
-    "repository; this is their description.)",
-    "The demonstration cell was made after them: five stations of equipment around the robot, two of "
-    "them semi-closed. Drawn: the cell with its zones and the robot at its park posture; the path of the "
-    "tool in the planned program, by kind of movement.",
+    "The figures show a robot among technological equipment: stations around it with their "
+    "forbidden zones, some open, some semi-closed, and movements of two kinds, service movements "
+    "into and out of a machine's zone and regional ones from zone to zone. (The figures "
+    "themselves are not part of this repository; this is their description.)",
+    "The demonstration cell was made after them: five stations of equipment around the robot, "
+    "two of them semi-closed. Drawn: the cell with its zones and the robot at its park posture; "
+    "the path of the tool in the planned program, by kind of movement.",
     measure,
     judge,
     follows,
     draw=draw,
-    caption="The demonstration from above with its zones (left), and the tool's path in its program (right).",
+    caption="The demonstration from above with its zones (left), and the tool's path in its "
+    "program (right).",
     seeded=False,
 )

@@ -19,17 +19,22 @@ from ir_msgs_py.arrays import FloatArray
 from ir_planner.scene import movement_cost
 from ir_planner.scene.movement_cost import movement_weights
 
-PAIRS, QUICK_PAIRS = 4000, 60  # per seed
-RANKS = 0.8  # rank correlation from which on W puts about four of five random pairs in the order of joules
+# per seed
+PAIRS = 4000
+QUICK_PAIRS = 60
+# rank correlation from which on W puts about four of five random pairs in the order of joules
+RANKS = 0.8
 LOSES = 5.0  # % of the least joules that a choice by W may cost
 DIRECTIONS = ("up", "down", "level")
-EMPTY, PRINTED = "the load left out of (9)", "(9) as printed, all joints weigh the same"
+EMPTY = "the load left out of (9)"
+PRINTED = "(9) as printed, all joints weigh the same"
 CHOICE = "a pose costs hardly more than the one of least energy"
 
 
 def measure(seed: int, quick: bool) -> list[Row]:
     """A row per movement, and one with what else reaches the same pose where anything does."""
-    planner, rows = planner_of(CELL), []
+    planner = planner_of(CELL)
+    rows = []
     for pair in pairs(planner, QUICK_PAIRS if quick else PAIRS, seed):
         trajectory = pair.common()
         assert trajectory is not None
@@ -42,23 +47,35 @@ def measure(seed: int, quick: bool) -> list[Row]:
 
 def _costs(pair: Pair) -> dict[str, float]:
     """W as read, which counts the load with the last link, and its two other readings."""
-    robot, moved = pair.scene.cell.robot, np.abs(pair.q1 - pair.q0)
+    robot = pair.scene.cell.robot
+    moved = np.abs(pair.q1 - pair.q0)
     empty = movement_weights(robot.link_mass, robot.velocity_max)
     found = {"W": float(movement_cost(pair.scene.weights, pair.q0, pair.q1))}
-    return found | {EMPTY: float(moved @ empty), PRINTED: float(moved.sum() * pair.scene.weights[0])}
+    return found | {
+        EMPTY: float(moved @ empty),
+        PRINTED: float(moved.sum() * pair.scene.weights[0]),
+    }
 
 
 def _choice(pair: Pair) -> list[Row]:
-    """What the choice by W costs among the configurations at the goal's pose; none without a choice."""
+    """What the choice by W costs among the configurations at the goal's pose; none without a
+    choice.
+    """
     goals = pair.scene.inverse_kinematics.solve(pair.scene.chain.tcp_poses(pair.q1[None])).q
     others = [one for one in (replace(pair, q1=goal) for goal in goals) if one.straight_is_free()]
-    movements = [(_costs(one), trajectory, one) for one in others if (trajectory := one.common()) is not None]
+    movements = [
+        (_costs(one), trajectory, one) for one in others if (trajectory := one.common()) is not None
+    ]
     if len(movements) < 2:
         return []
     joules = [one.drive_energy(trajectory) for _, trajectory, one in movements]
-    chosen = {name: joules[int(np.argmin([W[name] for W, _, _ in movements]))] for name in movements[0][0]}
+    chosen = {
+        name: joules[int(np.argmin([W[name] for W, _, _ in movements]))] for name in movements[0][0]
+    }
     found = {"kind": "choice", "choices": len(joules), **chosen, "least": min(joules)}
-    return [found | {"mean": float(np.mean(joules)), "load": pair.load, "direction": pair.direction}]
+    return [
+        found | {"mean": float(np.mean(joules)), "load": pair.load, "direction": pair.direction}
+    ]
 
 
 def concordant(x: FloatArray, y: FloatArray) -> float:
@@ -76,19 +93,26 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
     moved = [row for row in rows if row["kind"] == "movement"]
     choices = [row for row in rows if row["kind"] == "choice"]
     parts = {"all movements": moved}
-    parts |= {f"movements {name}": [r for r in moved if r["direction"] == name] for name in DIRECTIONS}
     parts |= {
-        f"load {load}": [r for r in moved if r["load"] == load] for load in sorted({r["load"] for r in moved})
+        f"movements {name}": [r for r in moved if r["direction"] == name] for name in DIRECTIONS
     }
-    W, joules, seconds = (np.array([row[key] for row in moved]) for key in ("W", "joules", "seconds"))
+    parts |= {
+        f"load {load}": [r for r in moved if r["load"] == load]
+        for load in sorted({r["load"] for r in moved})
+    }
+    W, joules, seconds = (
+        np.array([row[key] for row in moved]) for key in ("W", "joules", "seconds")
+    )
     order = percent(interval(concordant, W, joules))
     return [
         *(_ranked(name, some) for name, some in parts.items()),
-        Statement("two movements are put in the order of their joules", "pairs in the same order", *order,
+        Statement("two movements are put in the order of their "
+"joules", "pairs in the same order", *order,
                   len(W), "movements", "%"),
         _chosen(f"the configuration of least W at {CHOICE}", "W", choices, LOSES),
         _chosen("for comparison: a configuration drawn at random", "mean", choices),
-        Statement("for comparison: the duration of the fastest PTP", "rank correlation with E_drive",
+        Statement("for comparison: the duration of the fastest "
+"PTP", "rank correlation with E_drive",
                   *interval(rank_correlation, seconds, joules), len(moved), "movements"),
         *(_ranked(f"all movements, {name}", moved, name) for name in (EMPTY, PRINTED)),
         *(_chosen(f"for comparison: the configuration of least W, {name}", name, choices)
@@ -98,7 +122,8 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
 
 def _ranked(name: str, rows: Sequence[Row], W: str = "W") -> Statement:
     found = interval(rank_correlation, [row[W] for row in rows], [row["joules"] for row in rows])
-    says, figure = f"W ranks movements by energy: {name}", "rank correlation of W and E_drive"
+    says = f"W ranks movements by energy: {name}"
+    figure = "rank correlation of W and E_drive"
     return Statement(says, figure, *found, len(rows), "movements", bound=RANKS)
 
 
@@ -113,27 +138,35 @@ def follows(statements: Sequence[Statement]) -> str:
     by = {one.says.partition(": ")[2]: one for one in statements}
     choice = next(one for one in statements if one.says.endswith(CHOICE))
     words = {HOLDS: "the ranks agree", FAILS: "they do not agree enough"}
-    parts = [f"{name} {one.value:.3g} ({words.get(one.verdict, 'open')})" for name, one in by.items()
+    parts = [f"{name} {one.value:.3g} "
+f"({words.get(one.verdict, 'open')})" for name, one in by.items()
              if one.bound == RANKS]  # fmt: skip
-    worth = {HOLDS: "hardly more", FAILS: "more than hardly more"}.get(choice.verdict, "which is open")
+    worth = {HOLDS: "hardly more", FAILS: "more than hardly more"}.get(
+        choice.verdict, "which is open"
+    )
     return (
-        f"Rank correlations: {', '.join(parts)}. {_load(by)}W knows neither gravity nor the counterbalance: "
-        "it says the same of lifting and of lowering. Where it chooses the configuration at "
-        f"a pose, the energy lies {choice.value:.1f} % above the least ({worth}: {LOSES:g} %). Here W is a "
-        "first ranking; what is reported and minimised are joules of the full dynamics."
+        f"Rank correlations: {', '.join(parts)}. {_load(by)}W knows neither gravity nor the "
+        "counterbalance: it says the same of lifting and of lowering. Where it chooses the "
+        f"configuration at a pose, the energy lies {choice.value:.1f} % above the least "
+        f"({worth}: {LOSES:g} %). Here W is a first ranking; what is reported and minimised are "
+        "joules of the full dynamics."
     )
 
 
 def _load(by: dict[str, Statement]) -> str:
-    """What becomes of the ranks over all movements where the load is left out of W, "" if not asked."""
-    pooled, empty = by["all movements"], by.get(f"all movements, {EMPTY}")
+    """What becomes of the ranks over all movements where the load is left out of W, "" if not
+    asked.
+    """
+    pooled = by["all movements"]
+    empty = by.get(f"all movements, {EMPTY}")
     if empty is None:
         return ""
     apart = empty.low > pooled.high, empty.high < pooled.low
     how = "better" if apart[0] else "worse" if apart[1] else "no differently"
     return (
-        "The paper's sum is over links; read here, the load counts with the last one, which adds as much to "
-        f"the weight of every joint. With it left out W ranks loaded and empty movements together {how}. "
+        "The paper's sum is over links; read here, the load counts with the last one, which "
+        "adds as much to the weight of every joint. With it left out W ranks loaded and empty "
+        f"movements together {how}. "
     )
 
 
@@ -141,7 +174,8 @@ def tables(rows: Sequence[Row]) -> dict[str, list[Row]]:
     """Rank correlation by direction and load together."""
     moved = [row for row in rows if row["kind"] == "movement"]
     loads = sorted({row["load"] for row in moved})
-    found, readings = [], []
+    found = []
+    readings = []
     for load in loads:
         line: Row = {"load": load}
         for direction in DIRECTIONS:
@@ -176,9 +210,16 @@ def draw(rows: Sequence[Row], file: Path) -> None:
     for name, colour in (("up", "tab:red"), ("level", "0.5"), ("down", "tab:blue")):
         some = [row for row in rows if row.get("rise_m") is not None and row["direction"] == name]
         axes.plot(
-            [r["W"] for r in some], [r["joules"] / 1e3 for r in some], ".", ms=4, color=colour, label=name
+            [r["W"] for r in some],
+            [r["joules"] / 1e3 for r in some],
+            ".",
+            ms=4,
+            color=colour,
+            label=name,
         )
-    axes.set(xlabel="W of eq. (9) [kg rad²/s²·rad]", ylabel="E_drive of the fastest common PTP [kJ]")
+    axes.set(
+        xlabel="W of eq. (9) [kg rad²/s²·rad]", ylabel="E_drive of the fastest common PTP [kJ]"
+    )
     axes.legend(title="the tool moves")
     finished(figure, file)
 
@@ -186,15 +227,16 @@ def draw(rows: Sequence[Row], file: Path) -> None:
 EXPERIMENT = Experiment(
     "w_and_joules",
     "W of eq. (9) against joules",
-    "A movement is chosen by the cost W, the sum over the joints of the mass that they carry, their largest "
-    "speed squared and their travel: the least W takes the least energy.",
-    f"Free straight movements in the cell `open` ({DRAWN}), each as the fastest common S-curve PTP. W and "
-    "drive energy (full dynamics, shared DC bus) are ranked; the claim needs a rank correlation of "
-    f"{RANKS} (about four of five pairs in the right order).",
+    "A movement is chosen by the cost W, the sum over the joints of the mass that they carry, "
+    "their largest speed squared and their travel: the least W takes the least energy.",
+    f"Free straight movements in the cell `open` ({DRAWN}), each as the fastest common S-curve "
+    "PTP. W and drive energy (full dynamics, shared DC bus) are ranked; the claim needs a rank "
+    f"correlation of {RANKS} (about four of five pairs in the right order).",
     measure,
     judge,
     follows,
     tables,
     draw=draw,
-    caption="W against drive energy, coloured by whether the tool rises or sinks by more than 0.15 m.",
+    caption="W against drive energy, coloured by whether the tool rises or sinks by more than "
+    "0.15 m.",
 )

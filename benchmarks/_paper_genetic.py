@@ -1,4 +1,6 @@
-"""What does the genetic correction give in success, time, J and W, and which of its parameters matter?"""
+"""What does the genetic correction give in success, time, J and W, and which of its parameters
+matter?
+"""
 
 from __future__ import annotations
 
@@ -20,9 +22,13 @@ from ir_planner.scene import PlanningScene
 from ir_planner.search.genetic import Genetic
 
 VARIANTS = 18  # of each cell and seed
-ANSWERS, QUICK_ANSWERS = 12, 1  # tasks of each
+# tasks of each
+ANSWERS = 12
+QUICK_ANSWERS = 1
 SWEEPS = {"open": 3, "table_columns": 3, "cnc_door": 2}  # of the first so many get every setting
-DRAWS, QUICK_DRAWS = 2, 1  # searches of each setting per task
+# searches of each setting per task
+DRAWS = 2
+QUICK_DRAWS = 1
 PLANNING_S = 60.0
 PLANNERS = ("genetic", "tree", "")
 SURE = 95.0  # % of the solvable tasks
@@ -41,7 +47,9 @@ SWEPT: dict[str, tuple[dict[str, Any], ...]] = {
 
 
 def blocked(cell: str, seed: int, number: int) -> list[Task]:
-    """Tasks whose straight movement is not free: of a variant, or of the cell itself (even seeds, 0)."""
+    """Tasks whose straight movement is not free: of a variant, or of the cell itself (even seeds,
+    0).
+    """
     if seed % 2 == number == 0:
         return [task for task in tasks_of(cell) if not straight_is_free(task)]
     changed = variant(load_cell(cell), 300 + seed, number)
@@ -89,7 +97,10 @@ def _answers(cell: str, tasks: list[Task]) -> list[Row]:
 
 def _answer(planner: Planner, task: Task, name: str) -> Row:
     asked = PlanOptions(
-        planner_id=name, safety_distance=task.margin, planning_time=PLANNING_S, time_value=TIME_VALUE
+        planner_id=name,
+        safety_distance=task.margin,
+        planning_time=PLANNING_S,
+        time_value=TIME_VALUE,
     )
     begin = time.process_time()
     plan = planner.plan_regional(task.start, Goal(configuration=task.goal), asked)
@@ -114,7 +125,12 @@ def _sweep(cell: str, task: Task, draws: int) -> list[Row]:
             value = next(iter(changed.values()), "")
             row: Row = {"kind": "search", "cell": cell, "variant": task.cell, "task": task.name}
             row |= {"setting": name, "value": value}
-            row |= {"draw": draw, "solved": found.solved, "first_ms": found.first_ms, "all_ms": found.all_ms}
+            row |= {
+                "draw": draw,
+                "solved": found.solved,
+                "first_ms": found.first_ms,
+                "all_ms": found.all_ms,
+            }
             rows.append(row | {"W": found.polished, "work": found.work})
     return rows
 
@@ -124,7 +140,9 @@ def _asked(row: Row) -> tuple[int, str, str]:
     return row["seed"], row["variant"], row["task"]
 
 
-def _ratio(rows: Sequence[Row], one: str, other: str, key: str) -> tuple[list[float], list[tuple[int, str]]]:
+def _ratio(
+    rows: Sequence[Row], one: str, other: str, key: str
+) -> tuple[list[float], list[tuple[int, str]]]:
     a, b = ({_asked(row): row for row in rows if row["planner"] == name} for name in (one, other))
     both = [k for k in a if k in b and a[k]["solved"] and b[k]["solved"]]
     return [a[k][key] / b[k][key] for k in both], [k[:2] for k in both]
@@ -137,9 +155,13 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
     found = []
     mine = [row for row in answers if row["planner"] == "genetic"]
     asked = [row for row in mine if _asked(row) in solvable]
-    some, cells = [row["solved"] for row in asked], [_asked(row)[:2] for row in asked]
-    says, figure = "it finds a movement wherever there is one", "solved of what any planner solves"
-    found.append(Statement(says, figure, *percent(share(some, cells)), len(some), "tasks", "%", SURE))
+    some = [row["solved"] for row in asked]
+    cells = [_asked(row)[:2] for row in asked]
+    says = "it finds a movement wherever there is one"
+    figure = "solved of what any planner solves"
+    found.append(
+        Statement(says, figure, *percent(share(some, cells)), len(some), "tasks", "%", SURE)
+    )
     for says, other, key, figure in (
         ("its movement costs less W than that of a tree", "tree", "W", "W over that of the tree"),
         ("its movement takes less time", "tree", "T", "duration over that of the tree's"),
@@ -150,7 +172,16 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
         some, cells = _ratio(answers, "genetic", other, key)
         mean = interval(geometric_mean, some, groups=cells)
         found.append(
-            Statement(says, f"{figure}, geometric mean", *mean, len(some), "tasks", "", 1.0, at_least=False)
+            Statement(
+                says,
+                f"{figure}, geometric mean",
+                *mean,
+                len(some),
+                "tasks",
+                "",
+                1.0,
+                at_least=False,
+            )
         )
     return found
 
@@ -169,17 +200,21 @@ def follows(statements: Sequence[Statement]) -> str:
         )
     )
     words = {HOLDS: "nothing is surely cheaper", FAILS: "the portfolio is cheaper"}
-    rival = words.get(by["nothing costs less J than it"].verdict, "which of both is cheaper is open")
+    rival = words.get(
+        by["nothing costs less J than it"].verdict, "which of both is cheaper is open"
+    )
     looks = sum(map(len, SWEPT.values()))
     parameters = (
-        "One parameter changed at a time, the table marks with * what differs from the default, each "
-        f"interval alone: of {looks} settings about {0.05 * looks:.0f} would in either column by chance"
+        "One parameter changed at a time, the table marks with * what differs from the default, "
+        f"each interval alone: of {looks} settings about {0.05 * looks:.0f} would in either "
+        "column by chance"
     )
     return (
-        f"The correction alone solves {statements[0].value:.0f} % of what any planner solves. After the same "
-        f"optimisation of path and time its movements cost {W:.2f} times the W, {T:.2f} times the "
-        f"duration, {E:.2f} times the energy and {J:.2f} times the J of those that began with a tree, and "
-        f"{best:.2f} times the J of the portfolio, of which it is one: {rival}. {parameters}."
+        f"The correction alone solves {statements[0].value:.0f} % of what any planner solves. "
+        f"After the same optimisation of path and time its movements cost {W:.2f} times the W, "
+        f"{T:.2f} times the duration, {E:.2f} times the energy and {J:.2f} times the J of those "
+        f"that began with a tree, and {best:.2f} times the J of the portfolio, of which it is "
+        f"one: {rival}. {parameters}."
     )
 
 
@@ -212,7 +247,9 @@ def tables(rows: Sequence[Row]) -> dict[str, list[Row]]:
             f"median {key}": f"{np.median([row[key] for row in solved]):.4g}"
             for key in ("T", "joules", "J", "W")
         }
-        by_planner.append(line | {"median ms": f"{1e3 * np.median([row['seconds'] for row in mine]):.0f}"})
+        by_planner.append(
+            line | {"median ms": f"{1e3 * np.median([row['seconds'] for row in mine]):.0f}"}
+        )
     return {
         "Whole answers (each planner's medians are over what it solved)": by_planner,
         f"One parameter changed, searches alone with at most {EDGES} checks": found,
@@ -226,13 +263,13 @@ def _percent(rows: Sequence[Row]) -> str:
 EXPERIMENT = Experiment(
     "genetic",
     "The genetic correction against time, J and W",
-    "Section IV: where the movement of least W meets a forbidden zone, a genetic algorithm replaces the "
-    "stretch that collides by via configurations; fitness is W and the depth of what collides. Its "
-    "parameters are to be studied.",
-    f"Tasks of {', '.join(CELLS)} and of {2 * VARIANTS - 1} changed variants of each, there and back, "
-    "whose straight movement is blocked. Whole answers for J by `planner_id` `genetic`, `tree` and the "
-    "portfolio, all with the same optimisation, timing and certification; and the search alone with one "
-    "parameter changed at a time.",
+    "Section IV: where the movement of least W meets a forbidden zone, a genetic algorithm "
+    "replaces the stretch that collides by via configurations; fitness is W and the depth of "
+    "what collides. Its parameters are to be studied.",
+    f"Tasks of {', '.join(CELLS)} and of {2 * VARIANTS - 1} changed variants of each, there and "
+    "back, whose straight movement is blocked. Whole answers for J by `planner_id` `genetic`, "
+    "`tree` and the portfolio, all with the same optimisation, timing and certification; and "
+    "the search alone with one parameter changed at a time.",
     measure,
     judge,
     follows,

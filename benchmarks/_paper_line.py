@@ -14,7 +14,11 @@ from _regional_ours import planner_of
 from ir_description import load_power_data
 from ir_msgs_py.options import PlanOptions
 
-TOURS = {"open": 2, "table_columns": 2, "cnc_door": 2}  # random visits per cell and seed, beside the programs
+TOURS = {
+    "open": 2,
+    "table_columns": 2,
+    "cnc_door": 2,
+}  # random visits per cell and seed, beside the programs
 STOPS = 5
 ROBOT = "robot_drives"
 NETWORK = "plc_and_profinet"
@@ -61,20 +65,24 @@ def _shares() -> dict[str, float]:
 
 
 def after(saved: float) -> float:
-    """The robots' share of the line [%] where they take `saved` (0 to 1) less and nothing else changes."""
+    """The robots' share of the line [%] where they take `saved` (0 to 1) less and nothing else
+    changes.
+    """
     robot = _shares()[ROBOT]
     return 100.0 * robot * (1.0 - saved) / (100.0 - robot * saved)
 
 
 def judge(rows: Sequence[Row]) -> list[Statement]:
     """Saved energy of robots, of the line, and the robots' share afterwards."""
-    robot, network = _shares()[ROBOT], _shares()[NETWORK]
+    robot = _shares()[ROBOT]
+    network = _shares()[NETWORK]
     found = []
     for key, what in (
         ("drives", "of the drives, in their movements"),
         ("mains", "at the mains, pauses included"),
     ):
-        saved, programs = [row[key] for row in rows], [(row["cell"], row["stops"]) for row in rows]
+        saved = [row[key] for row in rows]
+        programs = [(row["cell"], row["stops"]) for row in rows]
         count = len(set(programs)), "programs"
         share = interval(lambda x: 100.0 * float(np.mean(x)), saved, groups=programs)
         line = interval(lambda x: robot * float(np.mean(x)), saved, groups=programs)
@@ -93,29 +101,34 @@ def _around(rows: Sequence[Row]) -> Statement:
     """How many movements of the common programs have no free straight segment."""
     columns = ([row[key] for row in rows] for key in ("around", "across"))
     programs = [(row["cell"], row["stops"]) for row in rows]
-    share = interval(lambda some, all_of: 100.0 * float(some.sum() / all_of.sum()), *columns, groups=programs)
+    share = interval(
+        lambda some, all_of: 100.0 * float(some.sum() / all_of.sum()), *columns, groups=programs
+    )
     says = f"{AROUND}: their straight segment is not free"
-    return Statement(says, "share of those from zone to zone", *share, len(set(programs)), "programs", "%")
+    return Statement(
+        says, "share of those from zone to zone", *share, len(set(programs)), "programs", "%"
+    )
 
 
 def follows(statements: Sequence[Statement]) -> str:
     """What the figures mean."""
     drives, line, left, mains, line_mains = statements[:5]
     around = "".join(
-        f" {one.value:.0f} % of the {AROUND}, along the planner's path in straight steps: what they lose "
-        "there is part of what is saved."
+        f" {one.value:.0f} % of the {AROUND}, along the planner's path in straight steps: what "
+        "they lose there is part of what is saved."
         for one in statements
         if AROUND in one.says
     )
     worth = {HOLDS: "more", FAILS: "not more"}.get(line.verdict, "not surely more")
     least, most = sorted((line.value, line_mains.value))
     return (
-        f"Planned programs save {drives.value:.0f} % of the drives' energy and {mains.value:.0f} % of the "
-        f"robot's at the mains. If Table I's {_shares()[ROBOT]:g} % are drives alone, a line saves "
-        f"{line.value:.1f} % ({worth} than PLCs and network take) and the robots' share becomes "
-        f"{left.value:.1f} %; if they are whole robots, {line_mains.value:.1f} %. So planning robots "
-        f"better is worth {least:.0f} to {most:.0f} % of a line's energy, of which the hall takes half and "
-        f"line stand-by 4.5 %. That other consumers stay as they are is assumed, not measured.{around}"
+        f"Planned programs save {drives.value:.0f} % of the drives' energy and {mains.value:.0f} "
+        f"% of the robot's at the mains. If Table I's {_shares()[ROBOT]:g} % are drives alone, a "
+        f"line saves {line.value:.1f} % ({worth} than PLCs and network take) and the robots' "
+        f"share becomes {left.value:.1f} %; if they are whole robots, {line_mains.value:.1f} %. "
+        f"So planning robots better is worth {least:.0f} to {most:.0f} % of a line's energy, of "
+        "which the hall takes half and line stand-by 4.5 %. That other consumers stay as they "
+        f"are is assumed, not measured.{around}"
     )
 
 
@@ -126,7 +139,9 @@ def tables(rows: Sequence[Row]) -> dict[str, list[Row]]:
         line = {"cell": row["cell"], "stations": row["stops"], "seconds": f"{row['seconds']:.1f}"}
         line |= {f"{key} saved [%]": f"{100.0 * row[key]:.1f}" for key in ("drives", "mains")}
         found.append(line | {"around bodies": f"{row['around']} of {row['across']}"})
-    return {"Saved by every program, and how many movements of the common one run around bodies": found}
+    return {
+        "Saved by every program, and how many movements of the common one run around bodies": found
+    }
 
 
 def draw(rows: Sequence[Row], file: Path) -> None:
@@ -150,16 +165,19 @@ def draw(rows: Sequence[Row], file: Path) -> None:
 EXPERIMENT = Experiment(
     "line",
     "Table I: the robot's share of a line",
-    "Robot drives take 25.5 % of the energy of a robotic production line, spot welding, gelation and "
-    "gluing 18 %, PLCs and PROFINET 2 %, line stand-by 4.5 %, the factory's environment half (Table I).",
-    f"The demonstration's program and random visits of {STOPS} stations of {', '.join(TOURS)}: the "
-    "planned program against the common program (same stations, nearest configurations by W, S-curve "
-    "PTPs, along the planner's path where they are not free, service lines and pauses as today) over the "
-    "same seconds. What is saved is put into Table I, all else unchanged.",
+    "Robot drives take 25.5 % of the energy of a robotic production line, spot welding, gelation "
+    "and gluing 18 %, PLCs and PROFINET 2 %, line stand-by 4.5 %, the factory's environment half "
+    "(Table I).",
+    f"The demonstration's program and random visits of {STOPS} stations of {', '.join(TOURS)}: "
+    "the planned program against the common program (same stations, nearest configurations by "
+    "W, S-curve PTPs, along the planner's path where they are not free, service lines and "
+    "pauses as today) over the same seconds. What is saved is put into Table I, all else "
+    "unchanged.",
     measure,
     judge,
     follows,
     tables,
     draw=draw,
-    caption="Energy of the line before and after, if Table I counts drives alone; the numbers are the sums.",
+    caption="Energy of the line before and after, if Table I counts drives alone; the numbers "
+    "are the sums.",
 )

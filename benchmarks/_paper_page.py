@@ -1,4 +1,6 @@
-"""docs/reproduction.md, written from what the experiments on the claims of the paper have stored."""
+"""docs/reproduction.md, written from what the experiments on the claims of the paper have
+stored.
+"""
 
 from __future__ import annotations
 
@@ -34,12 +36,14 @@ cells and movements, not the searches in them. Every interval is one of 95 % by 
 that is why each seed must say the same alone, so that chance has to deceive twice for a wrong verdict. An
 interval says what another draw would change, not what another machine would, or what else runs on it: the
 ratio of two times of milliseconds can move further than that.
-"""
+"""  # noqa: E501
 
 
 @dataclass(frozen=True, eq=False)
 class Chapter:
-    """An experiment with what it found; picture: relative to the page, "" for none; seconds: of processor."""
+    """An experiment with what it found; picture: relative to the page, "" for none; seconds: of
+    processor.
+    """
 
     experiment: Experiment
     statements: list[Statement]
@@ -49,7 +53,11 @@ class Chapter:
 
 
 def page(
-    chapters: Sequence[Chapter], missing: Sequence[str], seeds: Sequence[int], machine: str, quick: bool
+    chapters: Sequence[Chapter],
+    missing: Sequence[str],
+    seeds: Sequence[int],
+    machine: str,
+    quick: bool,
 ) -> str:
     """The whole page."""
     named = f"{'seeds' if len(seeds) > 1 else 'seed'} {' and '.join(map(str, seeds))}"
@@ -110,7 +118,9 @@ def measured(one: Statement) -> str:
 
 
 def numbers(*x: float) -> list[str]:
-    """Three digits each, and as many more, up to six, as different numbers need to look different."""
+    """Three digits each, and as many more, up to six, as different numbers need to look
+    different.
+    """
     for digits in range(3, 7):
         shown = [number(one, digits) for one in x]
         if len(set(shown)) == len(set(x)):
@@ -140,7 +150,9 @@ def table(rows: Sequence[Row]) -> str:
         return ""
     keys = list(rows[0])
     lines = [f"| {' | '.join(keys)} |", f"|{' --- |' * len(keys)}"]
-    lines += [f"| {' | '.join(str(row.get(key, '')).replace('|', '/') for key in keys)} |" for row in rows]
+    lines += [
+        f"| {' | '.join(str(row.get(key, '')).replace('|', '/') for key in keys)} |" for row in rows
+    ]
     return "\n".join(lines)
 
 

@@ -22,10 +22,12 @@ CELL = "open"
 AROUND = 0.03  # m that the straight movement keeps
 S_M = 0.02  # m
 REACH = (0.3, 2.0)  # rad: largest joint of a movement
-LEVEL_M = 0.15  # m: height of the tool's end over its start from which on a movement lifts or lowers
+LEVEL_M = (
+    0.15  # m: height of the tool's end over its start from which on a movement lifts or lowers
+)
 DRAWN = (
-    "half with the 155 kg tool and half empty; from a random configuration in a random direction of the "
-    f"joint space, the joint that moves most by {REACH[0]:g} to {REACH[1]:g} rad"
+    "half with the 155 kg tool and half empty; from a random configuration in a random "
+    f"direction of the joint space, the joint that moves most by {REACH[0]:g} to {REACH[1]:g} rad"
 )
 _SAMPLES = 60
 ENERGY_STEP = 4e-3  # s: energies are compared to a percent, not to a joule
@@ -49,7 +51,8 @@ class Pair:
 
     def straight_is_free(self) -> bool:
         """Whether the straight movement moves and keeps AROUND, as the drawn ones do."""
-        delta, t = self.q1 - self.q0, np.linspace(0.0, 1.0, _SAMPLES)[:, None]
+        delta = self.q1 - self.q0
+        t = np.linspace(0.0, 1.0, _SAMPLES)[:, None]
         moves = float(np.abs(delta).max()) > 1e-3
         return moves and bool(self.scene.collision.is_free(self.q0 + t * delta, AROUND).all())
 
@@ -64,8 +67,8 @@ class Pair:
         return Context.of(self.scene, options, Work(100_000, np.inf, time.monotonic))
 
     def common(self, duration: float = 0.0, objective: str = "time") -> JointTrajectory | None:
-        """The common S-curve PTP: of `duration` [s], else slowed down as is best for the objective; None
-        where no torque carries the load.
+        """The common S-curve PTP: of `duration` [s], else slowed down as is best for the objective;
+        None where no torque carries the load.
         """
         options = PlanOptions(objective=objective, duration=duration, safety_distance=S_M)
         movement = baseline(self.q0, self.q1, self.context(options))
@@ -78,8 +81,8 @@ class Pair:
 
 
 def pairs(planner: Planner, count: int, seed: int) -> Iterator[Pair]:
-    """Movements in mixed directions, in turn with the cell's tool and without load, that a common PTP can
-    make.
+    """Movements in mixed directions, in turn with the cell's tool and without load, that a common
+    PTP can make.
     """
     rng = np.random.default_rng([seed, 14])
     scenes = [planner.scene(), planner.scene(NO_LOAD)]

@@ -1,9 +1,10 @@
-"""One search, alone: what a planner needs until its first certified path, in checks and processor time.
+"""One search, alone: what a planner needs until its first certified path, in checks and processor
+time.
 
-Planners of OMPL run in a process forked for each search, on the same kernel and with the same counting as
-behind `planner_id`. Their processor time counts from their first check to their last: what it takes to set up
-OMPL's problem in a new process (2 ms, as much as an easy search) is no property of a planner, and would make
-all of their times alike. The project's own searches run here.
+Planners of OMPL run in a process forked for each search, on the same kernel and with the same
+counting as behind `planner_id`. Their processor time counts from their first check to their last:
+what it takes to set up OMPL's problem in a new process (2 ms, as much as an easy search) is no
+property of a planner, and would make all of their times alike. The project's own searches run here.
 """
 
 from __future__ import annotations
@@ -52,7 +53,9 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Whether a path was found, checks in edges, seconds of processor time, W of the path when shortened."""
+    """Whether a path was found, checks in edges, seconds of processor time, W of the path when
+    shortened.
+    """
 
     solved: bool
     edges: int
@@ -60,16 +63,20 @@ class Found:
     W: float
 
 
-def searched(name: str, question: Question, seed: int, edges: int, cell: float | None = None) -> Found:
-    """One search by the planner of that name with `edges` to spend. cell [rad]: of KPIECE's grid, None: its
-    default.
+def searched(
+    name: str, question: Question, seed: int, edges: int, cell: float | None = None
+) -> Found:
+    """One search by the planner of that name with `edges` to spend. cell [rad]: of KPIECE's grid,
+    None: its default.
     """
     search = SEARCHES[name]
     if isinstance(search, OmplSearch):
         cells = search.cells() if cell is None else cell
         parameters = Parameters(search.planner, search.parameters(), cells)
         return _forked(question, parameters, seed, edges)
-    space, _ = question.space(edges), question.scene.weights  # the models are there before the clock starts
+    # the models are there before the clock starts
+    space = question.space(edges)
+    _ = question.scene.weights
     space.states_free(question.start[None])
     begin = time.process_time()
     found = search.find(Ends(question.start, question.goal[None]), space, seed, space.work)
@@ -81,14 +88,17 @@ def searched(name: str, question: Question, seed: int, edges: int, cell: float |
 def _cost(path: FloatArray | None, question: Question) -> float:
     if path is None:
         return float("nan")
-    space, weights = question.space(100_000), question.scene.weights
+    space = question.space(100_000)
+    weights = question.scene.weights
     return path_cost(weights, pulled(fewest_corners(path, space, weights), space, weights))
 
 
 def _forked(question: Question, parameters: Parameters, seed: int, edges: int) -> Found:
     threshold = question.space(1).threshold
     goals = question.goal[None]
-    problem = Problem(question.scene, threshold, question.start, goals, parameters, seed, edges, LATE_S)
+    problem = Problem(
+        question.scene, threshold, question.start, goals, parameters, seed, edges, LATE_S
+    )
     question.scene.collision.is_free(goals, threshold)  # the models are there before the fork
     ours, theirs = _FORK.Pipe()
     process = _FORK.Process(target=_solve, args=(problem, theirs))
@@ -121,7 +131,9 @@ class Clock:
     """Seconds of processor time from the first call of a function to the end of its last."""
 
     def __init__(self, now: Callable[[], float] = time.process_time) -> None:
-        self._now, self._first, self._last = now, math.nan, math.nan
+        self._now = now
+        self._first = math.nan
+        self._last = math.nan
 
     @property
     def seconds(self) -> float:

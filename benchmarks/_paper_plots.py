@@ -16,7 +16,9 @@ from matplotlib.figure import Figure
 DPI = 100
 
 
-def panels(count: int, *, width: float = 4.6, height: float = 4.0) -> tuple[Figure, tuple[Axes, ...]]:
+def panels(
+    count: int, *, width: float = 4.6, height: float = 4.0
+) -> tuple[Figure, tuple[Axes, ...]]:
     """A figure with so many panels side by side, `width` x `height` inch each."""
     figure, axes = plt.subplots(1, count, figsize=(width * count, height), squeeze=False)
     for panel in axes[0]:

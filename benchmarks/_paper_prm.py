@@ -11,9 +11,16 @@ from _paper_statistics import geometric_mean, interval, median, variation
 from _paper_zones import KINDS, MOST, questions
 from _regional_tasks import tasks_of
 
-DRAWS, EDGES = 8, 15_000  # of each planner per task; checks
-TASKS, PLACES, AMONG = 5, 8, 2  # tasks of cells; cells of each type of zones per seed, and movements in each
-_SEEDS, _FIRST = 1000, 500  # between the cells of two seeds; the first, beyond those of the claims on zones
+# of each planner per task; checks
+DRAWS = 8
+EDGES = 15_000
+# tasks of cells; cells of each type of zones per seed, and movements in each
+TASKS = 5
+PLACES = 8
+AMONG = 2
+# between the cells of two seeds; the first, beyond those of the claims on zones
+_SEEDS = 1000
+_FIRST = 500
 MOSTLY = 0.8  # share of the draws that must be solved: where checks end the others, time can't vary
 CELLS = ("open", "table_columns", "cnc_door")
 OTHERS = ("kpiece", "bkpiece", "lbkpiece", "sbl", "rrt", "rrt_connect", "tree", "genetic")
@@ -34,8 +41,9 @@ def measure(seed: int, quick: bool) -> list[Row]:
 
 
 def _blocked(seed: int, quick: bool) -> list[tuple[str, str, Question]]:
-    """Questions whose straight movement is not free: tasks of cells, and among MOST zones of each type; each
-    with where it is asked (there and back, and movements among the same zones, are one place) and its name.
+    """Questions whose straight movement is not free: tasks of cells, and among MOST zones of each
+    type; each with where it is asked (there and back, and movements among the same zones, are one
+    place) and its name.
     """
     tasks = [task for cell in CELLS for task in tasks_of(cell)]
     asked = [
@@ -69,7 +77,8 @@ def _variations(rows: Sequence[Row], planner: str, key: str = "seconds") -> dict
 
 def judge(rows: Sequence[Row]) -> list[Statement]:
     """Variation of PRM's time, and against every other planner's."""
-    prm, places = _variations(rows, "prm"), {row["task"]: row["place"] for row in rows}
+    prm = _variations(rows, "prm")
+    places = {row["task"]: row["place"] for row in rows}
     found = [
         Statement("PRM's time is unpredictable: it varies as much as it lasts",
                   "coefficient of variation of the processor time, median of the tasks",
@@ -95,17 +104,21 @@ def follows(statements: Sequence[Statement]) -> str:
     rest = [one.says.rpartition(" ")[2] for one in others if one.verdict not in (HOLDS, FAILS)]
     parts = [
         f"{what} {', '.join(names)}"
-        for what, names in (("more than that of", more), ("less than that of", less), ("open against", rest))
+        for what, names in (
+            ("more than that of", more),
+            ("less than that of", less),
+            ("open against", rest),
+        )
         if names
     ]
     lasts = {HOLDS: "as much as it lasts", FAILS: "less than it lasts"}.get(
         prm.verdict, "about as much as it lasts"
     )
     return (
-        f"PRM's coefficient of variation is {prm.value:.2f} [{prm.low:.2f}, {prm.high:.2f}]: its time varies "
-        f"{lasts}; {'; '.join(parts)}. Every planner that draws at random has a time that varies; what helps "
-        "users is a budget in counted work, and the same answer for the same seed, which PRM can't promise, "
-        "for it divides its work by time."
+        f"PRM's coefficient of variation is {prm.value:.2f} [{prm.low:.2f}, {prm.high:.2f}]: its "
+        f"time varies {lasts}; {'; '.join(parts)}. Every planner that draws at random has a time "
+        "that varies; what helps users is a budget in counted work, and the same answer for the "
+        "same seed, which PRM can't promise, for it divides its work by time."
     )
 
 
@@ -115,8 +128,14 @@ def tables(rows: Sequence[Row]) -> dict[str, list[Row]]:
     for name in ("prm", *OTHERS):
         mine = [row for row in rows if row["planner"] == name]
         ms = [1e3 * row["seconds"] for row in mine]
-        line: Row = {"planner": name, "solved": f"{100 * np.mean([row['solved'] for row in mine]):.0f} %"}
-        line |= {"median ms": f"{np.median(ms):.1f}", "95th percentile ms": f"{np.percentile(ms, 95):.1f}"}
+        line: Row = {
+            "planner": name,
+            "solved": f"{100 * np.mean([row['solved'] for row in mine]):.0f} %",
+        }
+        line |= {
+            "median ms": f"{np.median(ms):.1f}",
+            "95th percentile ms": f"{np.percentile(ms, 95):.1f}",
+        }
         varies = {key: list(_variations(rows, name, key).values()) for key in ("seconds", "edges")}
         time, checks = (f"{np.median(x):.2f}" if x else "" for x in varies.values())
         found.append(line | {"variation of time": time, "of checks": checks})
@@ -127,11 +146,12 @@ EXPERIMENT = Experiment(
     "prm_time",
     "PRM: is its time unpredictable?",
     "The time that PRM takes is unpredictable.",
-    f"Movements whose straight one is blocked, tasks of {', '.join(CELLS)} and among {MOST} zones of "
-    f"each type; {DRAWS} draws of each planner per task, at most {EDGES} checks; processor time "
-    f"until the first certified path. A task counts for planners that solve at least {MOSTLY:.0%} of its "
-    "draws. OMPL's planners run in a process per search, all on the same kernel; their clock runs from the "
-    "first check to the last, without what the process and its problem take to be set up.",
+    f"Movements whose straight one is blocked, tasks of {', '.join(CELLS)} and among {MOST} "
+    f"zones of each type; {DRAWS} draws of each planner per task, at most {EDGES} checks; "
+    "processor time until the first certified path. A task counts for planners that solve at "
+    f"least {MOSTLY:.0%} of its draws. OMPL's planners run in a process per search, all on the "
+    "same kernel; their clock runs from the first check to the last, without what the process "
+    "and its problem take to be set up.",
     measure,
     judge,
     follows,

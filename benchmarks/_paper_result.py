@@ -1,9 +1,11 @@
-"""What an experiment on a claim of the paper answers: statements with intervals, and a verdict for each.
+"""What an experiment on a claim of the paper answers: statements with intervals, and a verdict for
+each.
 
-A statement names a figure and the bound from which on the paper is right. It holds where the whole 95 %
-interval keeps the bound, it does not where none of it does, else it can't be decided. An experiment runs with
-several seeds, which share nothing: where one of them alone says otherwise, it can't be decided either. What
-can't be decided says how much larger a sample would decide it, if its figure stays.
+A statement names a figure and the bound from which on the paper is right. It holds where the whole
+95 % interval keeps the bound, it does not where none of it does, else it can't be decided. An
+experiment runs with
+several seeds, which share nothing: where one of them alone says otherwise, it can't be decided
+either. What can't be decided says how much larger a sample would decide it, if its figure stays.
 """
 
 from __future__ import annotations
@@ -16,17 +18,20 @@ from typing import Any
 
 Row = dict[str, Any]
 
-HOLDS, FAILS, OPEN = "holds", "does not hold", "cannot be decided"
-MEASURED, CALIBRATED = "measured", "calibration"
+HOLDS = "holds"
+FAILS = "does not hold"
+OPEN = "cannot be decided"
+MEASURED = "measured"
+CALIBRATED = "calibration"
 JUDGED = (HOLDS, FAILS, OPEN)
 MOST_TIMES = 50  # a sample so many times as large is not made
 
 
 @dataclass(frozen=True)
 class Statement:
-    """says: what would follow from the paper; figure: what was measured, `value` with its interval from `low`
-    to `high`, from `count` of `what`. It holds from `bound` on, or up to it (`at_least` False); a nan bound:
-    nothing is claimed.
+    """says: what would follow from the paper; figure: what was measured, `value` with its interval
+    from `low` to `high`, from `count` of `what`. It holds from `bound` on, or up to it (`at_least`
+    False); a nan bound: nothing is claimed.
     """
 
     says: str
@@ -57,8 +62,10 @@ class Statement:
         return HOLDS if kept[0] else OPEN if kept[1] else FAILS
 
     def short_by(self, seeds: int) -> float:
-        """How many times the sample each of so many seeds would need alone for an interval that ends at the
-        bound: it narrows with the root of the sample. Inf where the figure is the bound, nan without a width.
+        """How many times the sample each of so many seeds would need alone for an interval that
+        ends at the
+        bound: it narrows with the root of the sample. Inf where the figure is the bound, nan
+        without a width.
         """
         gap = abs(self.value - self.bound)
         width = self.value - self.low if self.value > self.bound else self.high - self.value
@@ -67,9 +74,10 @@ class Statement:
 
 @dataclass(frozen=True)
 class Experiment:
-    """One claim: `paper` is its statement in our words, `asked` what is done about it. measure(seed, quick)
-    answers rows; judge(rows) statements; follows(statements) what that means; tables(rows) further tables by
-    their titles; draw(rows, file) a picture, which `caption` explains.
+    """One claim: `paper` is its statement in our words, `asked` what is done about it.
+    measure(seed, quick) answers rows; judge(rows) statements; follows(statements) what that means;
+    tables(rows) further tables by their titles; draw(rows, file) a picture, which `caption`
+    explains.
     """
 
     name: str
@@ -86,7 +94,9 @@ class Experiment:
 
 
 def judged(experiment: Experiment, rows: Sequence[Row]) -> list[Statement]:
-    """The statements over all rows, each with its verdict; one that a seed alone contradicts is open."""
+    """The statements over all rows, each with its verdict; one that a seed alone contradicts is
+    open.
+    """
     whole = experiment.judge(rows)
     seeds = sorted({row["seed"] for row in rows})
     several = seeds if len(seeds) > 1 else []
@@ -94,7 +104,8 @@ def judged(experiment: Experiment, rows: Sequence[Row]) -> list[Statement]:
     found = []
     for k, statement in enumerate(whole):
         others = [by_seed[k].alone for by_seed in apart]
-        verdict, note = statement.alone, statement.note
+        verdict = statement.alone
+        note = statement.note
         if verdict in (HOLDS, FAILS) and any(other != verdict for other in others):
             note = f"over all seeds it {verdict}; seed by seed: {', '.join(others)}"
             verdict = OPEN

@@ -19,8 +19,13 @@ EDGES = 6000  # checks of a search, in certified edges: one that spends them cou
 SIZES = (0, 1, 3, 10, 30, MOST)
 FEW = 10  # zones up to which there are few
 KPIECE_SIZES = (1, 10, 30, MOST)
-KPIECE_PLACES, PLACES, TASKS = 80, 8, 3  # cells per type and seed of either claim, movements in each
-CROWDED, RIVALS = 48, ("rrt", "genetic")  # cells among MOST zones alone, and who searches there
+# cells per type and seed of either claim, movements in each
+KPIECE_PLACES = 80
+PLACES = 8
+TASKS = 3
+# cells among MOST zones alone, and who searches there
+CROWDED = 48
+RIVALS = ("rrt", "genetic")
 _SEEDS = 1000  # between the cells of two seeds
 ONE_CELL = math.inf  # rad: a finite one, however large, parts the joints at zero
 SUPERFLUOUS = 0.9  # of the checks without cells: less would be worth having them
@@ -34,18 +39,30 @@ def _among_zones(
     """What rows say of a question (type and number of zones, cell, movement), and the question."""
     for kind in KINDS:
         for place in places[:1] if quick else places:
-            for k, asked in enumerate(questions(kind, sizes, 1 if quick else TASKS, _SEEDS * seed + place)):
+            for k, asked in enumerate(
+                questions(kind, sizes, 1 if quick else TASKS, _SEEDS * seed + place)
+            ):
                 for size, question in asked.items():
                     yield {"kind": kind, "zones": size, "place": place, "task": k}, question
 
 
-def _row(planner: str, question: Question, seed: int, cell: float | None = None, edges: int = EDGES) -> Row:
+def _row(
+    planner: str, question: Question, seed: int, cell: float | None = None, edges: int = EDGES
+) -> Row:
     found = searched(planner, question, seed, edges, cell)
-    return {"planner": planner, "solved": found.solved, "edges": found.edges, "seconds": found.seconds}
+    return {
+        "planner": planner,
+        "solved": found.solved,
+        "edges": found.edges,
+        "seconds": found.seconds,
+    }
 
 
-def _ratios(rows: Sequence[Row], one: Row, other: Row, key: str = "edges") -> tuple[FloatArray, list[str]]:
-    """Ratios of a figure between rows that differ in what the two conditions say only; and the cell with its
+def _ratios(
+    rows: Sequence[Row], one: Row, other: Row, key: str = "edges"
+) -> tuple[FloatArray, list[str]]:
+    """Ratios of a figure between rows that differ in what the two conditions say only; and the cell
+    with its
     smaller and larger versions that each comes from: cells are what is drawn independently.
     """
     named = [name for name in ("seed", "kind", "place", "zones", "task", "draw") if name not in one]
@@ -54,7 +71,8 @@ def _ratios(rows: Sequence[Row], one: Row, other: Row, key: str = "edges") -> tu
         same = [row for row in rows if all(row[k] == v for k, v in condition.items())]
         return {tuple(row.get(name) for name in named): max(float(row[key]), 1e-4) for row in same}
 
-    a, b = taken(one), taken(other)
+    a = taken(one)
+    b = taken(other)
     both = [k for k in a if k in b]
     return np.array([a[k] / b[k] for k in both]), [str(k[:3]) for k in both]
 
@@ -68,7 +86,9 @@ def measure_kpiece(seed: int, quick: bool) -> list[Row]:
     for asked, question in _among_zones(seed, KPIECE_SIZES, range(KPIECE_PLACES), quick=quick):
         for draw in range(1 if quick else 2):
             for name, cell in (("cells", None), ("no cells", ONE_CELL)):
-                rows.append(asked | {"grid": name, "draw": draw} | _row("kpiece", question, draw, cell))
+                rows.append(
+                    asked | {"grid": name, "draw": draw} | _row("kpiece", question, draw, cell)
+                )
     return rows
 
 
@@ -98,17 +118,21 @@ def follows_kpiece(statements: Sequence[Statement]) -> str:
     few, many = statements
     tenth = 1.0 - SUPERFLUOUS
     start = {
-        HOLDS: f"The paper is right: with few zones the cells save less than {tenth:.0%} of the checks "
+        HOLDS: f"The paper is right: with few zones the cells save less than {tenth:.0%} of the "
+        f"checks ({few.value:.2f} of those without)",
+        FAILS: f"Even with few zones the cells save more than {tenth:.0%} of the checks "
         f"({few.value:.2f} of those without)",
-        FAILS: f"Even with few zones the cells save more than {tenth:.0%} of the checks ({few.value:.2f} of "
-        "those without)",
     }.get(few.verdict, f"With few zones the ratio is {few.value:.2f}, which doesn't decide it")
     then = {HOLDS: "nor do they among more", FAILS: "among more they save more than that"}
     if few.verdict != HOLDS:
-        then = {HOLDS: "among more they save less than that", FAILS: "among more they do save that much"}
+        then = {
+            HOLDS: "among more they save less than that",
+            FAILS: "among more they do save that much",
+        }
     rest = "costs no checks" if max(few.low, many.low) <= 1.0 else "costs checks"
     return (
-        f"{start}; {then.get(many.verdict, 'whether they save that among more is open')} ({many.value:.2f} "
+        f"{start}; {then.get(many.verdict, 'whether they save that among more is open')} "
+        f"({many.value:.2f} "
         f"[{many.low:.2f}, {many.high:.2f}]). The grid {rest}: it stays as OMPL has it."
     )
 
@@ -117,7 +141,9 @@ def follows_kpiece(statements: Sequence[Statement]) -> str:
 
 
 def measure_rrt(seed: int, quick: bool) -> list[Row]:
-    """A row per search of each planner in every size of some cells, and of two among MOST zones of others."""
+    """A row per search of each planner in every size of some cells, and of two among MOST zones of
+    others.
+    """
     rows: list[Row] = []
     for sizes, places, planners in (
         (SIZES, range(PLACES), COMPARED),
@@ -139,7 +165,11 @@ def judge_rrt(rows: Sequence[Row]) -> list[Statement]:
         ratio, groups = _ratios(some, {"zones": MOST}, {"zones": 1})
         where = "all types" if len(kinds) > 1 else kinds[0].lower().replace("_", "-") + " zones"
         own = planner == "rrt"
-        says = f"RRT slows down with the number of zones: {where}" if own else f"for comparison: {planner}"
+        says = (
+            f"RRT slows down with the number of zones: {where}"
+            if own
+            else f"for comparison: {planner}"
+        )
         figure = f"checks among {MOST} zones over checks among one, geometric mean"
         mean = interval(geometric_mean, ratio, groups=groups)
         bound = SLOWER if own else float("nan")
@@ -147,12 +177,19 @@ def judge_rrt(rows: Sequence[Row]) -> list[Statement]:
     among = [row for row in rows if row["zones"] == MOST]
     ratio, groups = _ratios(among, {"planner": "genetic"}, {"planner": "rrt"}, "seconds")
     mean = interval(geometric_mean, ratio, groups=groups)
-    says, figure = (
-        f"among {MOST} zones the genetic correction is faster than RRT",
-        "processor time over RRT's",
-    )
+    says = f"among {MOST} zones the genetic correction is faster than RRT"
+    figure = "processor time over RRT's"
     found.append(
-        Statement(says, f"{figure}, geometric mean", *mean, len(ratio), "movements", "", 1.0, at_least=False)
+        Statement(
+            says,
+            f"{figure}, geometric mean",
+            *mean,
+            len(ratio),
+            "movements",
+            "",
+            1.0,
+            at_least=False,
+        )
     )
     return found
 
@@ -171,12 +208,13 @@ def follows_rrt(statements: Sequence[Statement]) -> str:
     too = [name for name, one in compared.items() if one.low >= SLOWER]
     others = f"{', '.join(too)} slow down too" if too else "none of the others surely slows down"
     return (
-        f"{slows}: it needs {opened:.1f}, {semi:.1f} and {closed:.1f} times the checks among {MOST} open, "
-        f"semi-closed and closed zones ({rrt:.1f} over all). Of the others, RRTConnect needs {connect:.1f}, "
-        f"the planner's own tree {tree:.1f} and the genetic correction {genetic:.1f} times: {others}. Those "
-        "that ask for the straight movement first spend one check where it is free, as it is among few "
-        f"zones. Over all searches among {MOST} zones, solved or not, the genetic correction takes "
-        f"{time:.2f} times the processor time of RRT{helps}."
+        f"{slows}: it needs {opened:.1f}, {semi:.1f} and {closed:.1f} times the checks among "
+        f"{MOST} open, semi-closed and closed zones ({rrt:.1f} over all). Of the others, "
+        f"RRTConnect needs {connect:.1f}, the planner's own tree {tree:.1f} and the genetic "
+        f"correction {genetic:.1f} times: {others}. Those that ask for the straight movement "
+        "first spend one check where it is free, as it is among few zones. Over all searches "
+        f"among {MOST} zones, solved or not, the genetic correction takes {time:.2f} times the "
+        f"processor time of RRT{helps}."
     )
 
 
@@ -187,30 +225,47 @@ def in_every_size(rows: Sequence[Row]) -> list[Row]:
 
 def tables_rrt(rows: Sequence[Row]) -> dict[str, list[Row]]:
     """Median processor time and the share solved, by size."""
-    rows, found = in_every_size(rows), []
+    rows = in_every_size(rows)
+    found = []
     for kind in KINDS:
         for size in SIZES:
             line: Row = {"type": kind.lower().replace("_", "-"), "zones": size}
             for planner in COMPARED:
-                some = [r for r in rows if (r["kind"], r["zones"], r["planner"]) == (kind, size, planner)]
+                some = [
+                    r
+                    for r in rows
+                    if (r["kind"], r["zones"], r["planner"]) == (kind, size, planner)
+                ]
                 ms = 1e3 * float(np.median([row["seconds"] for row in some]))
-                line[planner] = f"{ms:.1f} ms, {100 * np.mean([row['solved'] for row in some]):.0f} %"
+                line[planner] = (
+                    f"{ms:.1f} ms, {100 * np.mean([row['solved'] for row in some]):.0f} %"
+                )
             found.append(line)
     return {"Median processor time of a search and share solved within its checks": found}
 
 
 def draw_rrt(rows: Sequence[Row], file: Path) -> None:
     """Time over the number of zones."""
-    rows, (figure, axes) = in_every_size(rows), panels(3, width=3.6, height=3.4)
+    rows = in_every_size(rows)
+    (figure, axes) = panels(3, width=3.6, height=3.4)
     for panel, kind in zip(axes, KINDS, strict=True):
         for planner in COMPARED:
             mine = [row for row in rows if row["kind"] == kind and row["planner"] == planner]
-            times = [[1e3 * row["seconds"] for row in mine if row["zones"] == size] for size in SIZES]
+            times = [
+                [1e3 * row["seconds"] for row in mine if row["zones"] == size] for size in SIZES
+            ]
             panel.plot(
-                [max(size, 0.3) for size in SIZES], [np.mean(t) for t in times], "o-", ms=3, label=planner
+                [max(size, 0.3) for size in SIZES],
+                [np.mean(t) for t in times],
+                "o-",
+                ms=3,
+                label=planner,
             )
         panel.set(
-            xscale="log", yscale="log", xlabel="zones (left: none)", title=kind.lower().replace("_", "-")
+            xscale="log",
+            yscale="log",
+            xlabel="zones (left: none)",
+            title=kind.lower().replace("_", "-"),
         )
     axes[0].set_ylabel("processor time of a search, mean [ms]")
     axes[0].legend(fontsize=8)
@@ -220,13 +275,14 @@ def draw_rrt(rows: Sequence[Row], file: Path) -> None:
 KPIECE = Experiment(
     "kpiece_cells",
     "KPIECE: are the cells superfluous with few zones?",
-    "KPIECE divides the space into cells, which are superfluous where there are few forbidden zones.",
-    "OMPL's KPIECE1 among 1 to 100 zones (open, semi-closed, closed; machines of 0.3 to 0.6 m at random "
-    "around the robot), with cells of 0.3 rad over the first three joints, and with one cell "
-    "alone. Movements between free configurations, the same ones in every size, whose "
+    "KPIECE divides the space into cells, which are superfluous where there are few forbidden "
+    "zones.",
+    "OMPL's KPIECE1 among 1 to 100 zones (open, semi-closed, closed; machines of 0.3 to 0.6 m "
+    "at random around the robot), with cells of 0.3 rad over the first three joints, and with "
+    "one cell alone. Movements between free configurations, the same ones in every size, whose "
     f"straight movement is blocked in the largest; {KPIECE_PLACES} cells of each type and seed. "
-    f"Counted: checks until the first path, at most {EDGES}. "
-    f"Superfluous: at least {SUPERFLUOUS:.0%} of the checks that it takes without cells.",
+    f"Counted: checks until the first path, at most {EDGES}. Superfluous: at least "
+    f"{SUPERFLUOUS:.0%} of the checks that it takes without cells.",
     measure_kpiece,
     judge_kpiece,
     follows_kpiece,
@@ -235,17 +291,19 @@ RRT = Experiment(
     "rrt_zones",
     "RRT and the number of zones",
     "RRT becomes slow as the number of forbidden zones grows.",
-    f"Cells and movements drawn as for KPIECE, {PLACES} cells of each type and seed among 0 to 100 zones, "
-    f"and for the last statement {CROWDED} further ones among {MOST}; OMPL's RRT and RRTConnect, the "
-    f"planner's own bidirectional tree and the genetic correction, at most {EDGES} checks each. The clock of "
-    "OMPL's planners runs from their first check to their last, without what a process and its problem take "
-    "to be set up; their checks come one by one, those of the genetic correction in batches. Slower: "
-    f"at least {SLOWER} times the checks among one zone.",
+    f"Cells and movements drawn as for KPIECE, {PLACES} cells of each type and seed among 0 to "
+    f"100 zones, and for the last statement {CROWDED} further ones among {MOST}; OMPL's RRT and "
+    "RRTConnect, the planner's own bidirectional tree and the genetic correction, at most "
+    f"{EDGES} checks each. The clock of OMPL's planners runs from their first check to their "
+    "last, without what a process and its problem take to be set up; their checks come one by "
+    f"one, those of the genetic correction in batches. Slower: at least {SLOWER} times the "
+    "checks among one zone.",
     measure_rrt,
     judge_rrt,
     follows_rrt,
     tables_rrt,
     draw_rrt,
-    "Mean processor time of one search over the number of zones, by type; the same movements in every size.",
+    "Mean processor time of one search over the number of zones, by type; the same movements in "
+    "every size.",
 )
 EXPERIMENTS = (KPIECE, RRT)

@@ -1,4 +1,6 @@
-"""How much energy do optimised movements take against the common S-curve PTP (-80 to +20 % of section V)?"""
+"""How much energy do optimised movements take against the common S-curve PTP (-80 to +20 % of
+section V)?
+"""
 
 from __future__ import annotations
 
@@ -16,16 +18,23 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Goal, Planner
 
-PAIRS, QUICK_PAIRS = 1200, 24  # per seed
-LOW, HIGH = -80.0, 20.0  # % of section V
+# per seed
+PAIRS = 1200
+QUICK_PAIRS = 24
+# % of section V
+LOW = -80.0
+HIGH = 20.0
 WITHIN = 0.95  # share of the movements that must lie within
-LARGE = 1000.0  # J of the common PTP from which on a relative change is no accident of a small reference
+# J of the common PTP from which on a relative change is no accident of a small reference
+LARGE = 1000.0
 UNCHANGED = 0.05  # % up to which the answer is taken for the PTP itself
 PLANNING_S = 60.0
-SAME_TIME, LEAST_J = "same time", "free, least J"
+SAME_TIME = "same time"
+LEAST_J = "free, least J"
 ITSELF = f"{SAME_TIME}: the PTP itself is the answer"
 SLOWED = f"the common PTP slowed down for {LEAST_J.split(', ')[1]}"
-ARMS = {  # objective, whether the duration is that of the PTP, and one of how many movements is asked
+# objective, whether the duration is that of the PTP, and one of how many movements is asked
+ARMS = {
     SAME_TIME: ("energy", True, 1),
     LEAST_J: ("time_and_energy", False, 1),
     "free, least time": ("time", False, 2),
@@ -64,7 +73,9 @@ def _row(planner: Planner, pair: Pair) -> Row:
 
 
 def change(rows: Sequence[Row], arm: str) -> FloatArray:
-    """Change of E_drive against the common PTP [%], of the movements whose reference is not small."""
+    """Change of E_drive against the common PTP [%], of the movements whose reference is not
+    small.
+    """
     large = [row for row in rows if row["common_J"] >= LARGE and f"{arm} J" in row]
     return np.array([100.0 * (row[f"{arm} J"] / row["common_J"] - 1.0) for row in large])
 
@@ -76,23 +87,26 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
         x = change(rows, arm)
         inside = percent(wilson(int(((x >= LOW) & (x <= HIGH)).sum()), len(x)))
         found += [
-            Statement(f"{arm}: the change lies between {LOW:g} and {HIGH:+g} %", "share of the movements",
+            Statement(f"{arm}: the change lies between {LOW:g} and "
+f"{HIGH:+g} %", "share of the movements",
                       *inside, len(x), "movements", "%", 100.0 * WITHIN),
             Statement(f"{arm}: savings reach {-LOW:g} %", "change, first percentile",
-                      *interval(lambda x: float(np.percentile(x, 1.0)), x), len(x), "movements", "%", LOW,
+                      *interval(lambda x: float(np.percentile(x, 1.0)), x), len(x), "movements", "%", LOW,  # noqa: E501
                       at_least=False),
             Statement(f"{arm}: some movements take {HIGH:g} % more", "change, 99th percentile",
-                      *interval(lambda x: float(np.percentile(x, 99.0)), x), len(x), "movements", "%", HIGH),
-            Statement(f"{arm}: what is usual", "change, median", *interval(median, x), len(x), "movements",
+                      *interval(lambda x: float(np.percentile(x, 99.0)), x), len(x), "movements", "%", HIGH),  # noqa: E501
+            Statement(f"{arm}: what is usual", "change, median", *interval(median, x), len(x), "movements",  # noqa: E501
                       "%"),
         ]  # fmt: skip
-    x, kept = change(rows, SLOWED), np.abs(change(rows, SAME_TIME)) < UNCHANGED
+    x = change(rows, SLOWED)
+    kept = np.abs(change(rows, SAME_TIME)) < UNCHANGED
     same = percent(wilson(int(kept.sum()), len(kept)))
     return [
         *found,
         _lowered(rows),
         Statement(ITSELF, "share of the movements", *same, len(kept), "movements", "%"),
-        Statement(f"for comparison: {SLOWED}", "change, median", *interval(median, x), len(x), "movements",
+        Statement("for comparison: "
+f"{SLOWED}", "change, median", *interval(median, x), len(x), "movements",
                   "%"),
     ]  # fmt: skip
 
@@ -126,13 +140,13 @@ def follows(statements: Sequence[Statement]) -> str:
         (FAILS, FAILS): ", but neither of its ends occurs",
     }.get((most.verdict, upper), "")
     return (
-        f"{fits}{ends}; the median change is {usual.value:.1f} % [{usual.low:.1f}, {usual.high:.1f}], the "
-        f"first percentile {most.value:.0f} %, the 99th {highest:+.1f} % (the PTP is among the answers, and "
-        f"the answer itself for {by[ITSELF].value:.0f} % of the movements). "
-        f"{_why(by)}Free in time the median is "
-        f"{free:+.1f} % for least J, where the common PTP slowed down for the same has {slowed:+.1f} %, and "
-        f"{time:+.1f} % for least time: what is saved depends on the duration "
-        "and the objective, so a range without both says little."
+        f"{fits}{ends}; the median change is {usual.value:.1f} % [{usual.low:.1f}, "
+        f"{usual.high:.1f}], the first percentile {most.value:.0f} %, the 99th {highest:+.1f} % "
+        f"(the PTP is among the answers, and the answer itself for {by[ITSELF].value:.0f} % of "
+        f"the movements). {_why(by)}Free in time the median is {free:+.1f} % for least J, where "
+        f"the common PTP slowed down for the same has {slowed:+.1f} %, and {time:+.1f} % for "
+        "least time: what is saved depends on the duration and the objective, so a range "
+        "without both says little."
     )
 
 
@@ -143,8 +157,8 @@ def _why(by: dict[str, Statement]) -> str:
         return ""
     back = ", which gives energy back that the optimised time scaling keeps on the bus"
     return (
-        f"Of the {lowered.count} movements that save {-LOW:g} % or more, {lowered.value:.0f} % lower the tool"
-        f"{back if lowered.low > 50.0 else ''}. "
+        f"Of the {lowered.count} movements that save {-LOW:g} % or more, {lowered.value:.0f} % "
+        f"lower the tool{back if lowered.low > 50.0 else ''}. "
     )
 
 
@@ -169,7 +183,10 @@ def draw(rows: Sequence[Row], file: Path) -> None:
         x = np.sort(np.clip(change(rows, arm), -100.0, 100.0))
         axes.plot(x, np.arange(1, len(x) + 1) / max(len(x), 1), lw=1.6, label=arm)
     axes.axvspan(LOW, HIGH, color="0.5", alpha=0.15, label="range of section V")
-    axes.set(xlabel="change of E_drive against the common S-curve PTP [%]", ylabel="share of the movements")
+    axes.set(
+        xlabel="change of E_drive against the common S-curve PTP [%]",
+        ylabel="share of the movements",
+    )
     axes.legend(fontsize=8)
     finished(figure, file)
 
@@ -177,12 +194,13 @@ def draw(rows: Sequence[Row], file: Path) -> None:
 EXPERIMENT = Experiment(
     "savings",
     "Energy of optimised movements against the common PTP",
-    "Section V: optimised trajectories take between 80 % less and 20 % more energy than the common ones.",
-    f"Free straight movements in `open` ({DRAWN}). Reference: the "
-    "fastest common S-curve PTP between the same configurations. Answers of the planner: of the same "
-    "duration, and free in time for J, for time, and for W; beside least J the PTP, slowed down as is best "
-    "for J. E_drive by the full dynamics on a shared DC "
-    f"bus. Relative changes only where the reference is at least {LARGE / 1e3:g} kJ.",
+    "Section V: optimised trajectories take between 80 % less and 20 % more energy than the "
+    "common ones.",
+    f"Free straight movements in `open` ({DRAWN}). Reference: the fastest common S-curve PTP "
+    "between the same configurations. Answers of the planner: of the same duration, and free in "
+    "time for J, for time, and for W; beside least J the PTP, slowed down as is best for J. "
+    "E_drive by the full dynamics on a shared DC bus. Relative changes only where the reference "
+    f"is at least {LARGE / 1e3:g} kJ.",
     measure,
     judge,
     follows,

@@ -1,4 +1,6 @@
-"""What does the spline of eq. (10) cost in joules against a cubic and a quintic of the same duration?"""
+"""What does the spline of eq. (10) cost in joules against a cubic and a quintic of the same
+duration?
+"""
 
 from __future__ import annotations
 
@@ -19,18 +21,31 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import natural_durations, spline_through, virtual_knots
 from ir_planner.scene import torque_use
 
-PAIRS, QUICK_PAIRS = 250, 40  # per seed
+# per seed
+PAIRS = 250
+QUICK_PAIRS = 40
 SLOWER = 1.5  # times the fastest common PTP, or longer: every curve has to stay within the limits
-STEP, STEPS = 1.05, 60  # by which a duration grows until they do, and how often at most
+# by which a duration grows until they do, and how often at most
+STEP = 1.05
+STEPS = 60
 _SAMPLES = 200
-VIAS, ASIDE = 2, 0.15  # of a path with vias, as the genetic correction has; how far [rad] they lie aside
+# of a path with vias, as the genetic correction has; how far [rad] they lie aside
+VIAS = 2
+ASIDE = 0.15
 SAME = 1.0
-SPLINE, CUBIC, QUINTIC, COMMON = "spline (10)", "cubic", "quintic", "common S-curve"
+SPLINE = "spline (10)"
+CUBIC = "cubic"
+QUINTIC = "quintic"
+COMMON = "common S-curve"
 
 
 def measure(seed: int, quick: bool) -> list[Row]:
-    """A row per movement and number of vias: joules of every curve and the seconds that all of them take."""
-    planner, rng, rows = planner_of(CELL), np.random.default_rng([seed, 10]), []
+    """A row per movement and number of vias: joules of every curve and the seconds that all of them
+    take.
+    """
+    planner = planner_of(CELL)
+    rng = np.random.default_rng([seed, 10])
+    rows = []
     for pair in pairs(planner, QUICK_PAIRS if quick else PAIRS, seed):
         common = pair.common()
         assert common is not None
@@ -41,7 +56,8 @@ def measure(seed: int, quick: bool) -> list[Row]:
             curves = curves_within(pair, points, SLOWER * common.duration)
             if curves is None:
                 continue
-            vias, seconds = len(points) - 2, curves[SPLINE].duration
+            vias = len(points) - 2
+            seconds = curves[SPLINE].duration
             if not vias and (slower := pair.common(seconds)) is not None:
                 curves[COMMON] = slower
             rows.append(_row(pair, vias, curves) | {"seconds": seconds})
@@ -52,13 +68,14 @@ CURVES = (SPLINE, CUBIC, QUINTIC)
 
 
 def curve(pair: Pair, points: FloatArray, duration: float, name: str) -> JointTrajectory:
-    """A curve through points (M, n): all of them at the same times. The cubic is at rest at both ends and
-    accelerates there at once; the other two begin and end without acceleration.
+    """A curve through points (M, n): all of them at the same times. The cubic is at rest at both
+    ends and accelerates there at once; the other two begin and end without acceleration.
     """
     steps = np.maximum(natural_durations(points, pair.scene.cell.robot.velocity_max), 1e-3)
     at = np.concatenate([[0.0], np.cumsum(steps)])
     times = at * duration / at[-1]
-    names, rest = pair.scene.cell.robot.joint_names, np.zeros(points.shape[1])
+    names = pair.scene.cell.robot.joint_names
+    rest = np.zeros(points.shape[1])
     if name == SPLINE:
         found = spline_through(points, times, virtual_knots(times))
         return JointTrajectory.from_seconds(
@@ -69,9 +86,12 @@ def curve(pair: Pair, points: FloatArray, duration: float, name: str) -> JointTr
     return JointTrajectory.from_seconds(names, times, *(spline(times, order) for order in range(3)))
 
 
-def curves_within(pair: Pair, points: FloatArray, shortest: float) -> dict[str, JointTrajectory] | None:
-    """All curves through points (M, n) in the same seconds: in `shortest` or, by steps, in the first longer
-    duration in which each stays within the limits; None where the arm can't be held there.
+def curves_within(
+    pair: Pair, points: FloatArray, shortest: float
+) -> dict[str, JointTrajectory] | None:
+    """All curves through points (M, n) in the same seconds: in `shortest` or, by steps, in the
+    first longer duration in which each stays within the limits; None where the arm can't be held
+    there.
     """
     for k in range(STEPS):
         curves = {name: curve(pair, points, shortest * STEP**k, name) for name in CURVES}
@@ -81,9 +101,12 @@ def curves_within(pair: Pair, points: FloatArray, shortest: float) -> dict[str, 
 
 
 def _within(pair: Pair, trajectory: JointTrajectory) -> bool:
-    """Whether samples keep the limits of speed, acceleration and of the torque that plans may use."""
+    """Whether samples keep the limits of speed, acceleration and of the torque that plans may
+    use.
+    """
     motion = trajectory.sample(np.linspace(0.0, trajectory.duration, _SAMPLES))
-    limits, use = pair.scene.limits, torque_use(pair.scene.dynamics, motion.q, motion.qd, motion.qdd)
+    limits = pair.scene.limits
+    use = torque_use(pair.scene.dynamics, motion.q, motion.qd, motion.qdd)
     moves = (np.abs(motion.qd) <= limits.velocity) & (np.abs(motion.qdd) <= limits.acceleration)
     return bool((moves & (use <= limits.torque_share)).all())
 
@@ -111,7 +134,9 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
             where = f"through {vias} vias" if vias else "between two points"
             says = f"{where} the spline costs no more than the {name}"
             figure = f"E_drive of the spline over that of the {name}"
-            found.append(Statement(says, figure, *ratio, len(both), "movements", "", SAME, at_least=False))
+            found.append(
+                Statement(says, figure, *ratio, len(both), "movements", "", SAME, at_least=False)
+            )
     return found
 
 
@@ -123,20 +148,27 @@ def follows(statements: Sequence[Statement]) -> str:
     cubic_vias, quintic_vias = (by[f"through {VIAS} vias the spline costs no more than the {name}"]
                                 for name in (CUBIC, QUINTIC))  # fmt: skip
     return (
-        f"Between two points the spline takes {100 * (quintic - 1):+.1f} % joules against the quintic and "
-        f"{100 * (cubic - 1):+.1f} % against the cubic; through {VIAS} vias {100 * (quintic_vias - 1):+.1f} "
-        f"% and {100 * (cubic_vias - 1):+.1f} %. {_cheaper(statements)} The cubic accelerates at once, with "
-        "a jump of torque at either end, the others do not. Eq. (10) is kept as a curve; the planner "
-        "optimises path and time scaling for joules."
+        f"Between two points the spline takes {100 * (quintic - 1):+.1f} % joules against the "
+        f"quintic and {100 * (cubic - 1):+.1f} % against the cubic; through {VIAS} vias "
+        f"{100 * (quintic_vias - 1):+.1f} % and {100 * (cubic_vias - 1):+.1f} %. "
+        f"{_cheaper(statements)} The cubic accelerates at once, with a jump of torque at either "
+        "end, the others do not. Eq. (10) is kept as a curve; the planner optimises path and "
+        "time scaling for joules."
     )
 
 
 def _cheaper(statements: Sequence[Statement]) -> str:
     """Which curves it costs more than, which not, and what is open."""
     parts = []
-    for verdict, words in ((FAILS, "It costs more than"), (HOLDS, "It costs no more than"), (OPEN, "Open:")):
+    for verdict, words in (
+        (FAILS, "It costs more than"),
+        (HOLDS, "It costs no more than"),
+        (OPEN, "Open:"),
+    ):
         some = [
-            one.says.split(" the spline costs no more than ") for one in statements if one.verdict == verdict
+            one.says.split(" the spline costs no more than ")
+            for one in statements
+            if one.verdict == verdict
         ]
         if some:
             parts.append(f"{words} {'; '.join(f'{curve} {where}' for where, curve in some)}.")
@@ -160,13 +192,14 @@ def draw(rows: Sequence[Row], file: Path) -> None:
 EXPERIMENT = Experiment(
     "spline",
     "The spline of eq. (10) against cubic and quintic",
-    "Trajectories are composed of five cubic segments per joint with continuous speed and acceleration, "
+    "Trajectories are composed of five cubic segments per joint with continuous speed and "
+    "acceleration, "
     "which begin and end at rest without acceleration, as the smooth curve of low degree.",
-    f"Random free movements in `open` ({DRAWN}): straight ones, and ones through {VIAS} vias {ASIDE} rad "
-    "aside (then eq. (10) has its five cubics). All curves pass the same points at the same times: in "
-    f"{SLOWER} times the duration of the fastest common PTP, or longer by steps of "
-    f"{100 * (STEP - 1):.0f} % until each of them keeps the limits of speed, acceleration and torque (of "
-    "jerk none: the cubic starts with a jump of acceleration).",
+    f"Random free movements in `open` ({DRAWN}): straight ones, and ones through {VIAS} vias "
+    f"{ASIDE} rad aside (then eq. (10) has its five cubics). All curves pass the same points at "
+    f"the same times: in {SLOWER} times the duration of the fastest common PTP, or longer by "
+    f"steps of {100 * (STEP - 1):.0f} % until each of them keeps the limits of speed, "
+    "acceleration and torque (of jerk none: the cubic starts with a jump of acceleration).",
     measure,
     judge,
     follows,

@@ -19,8 +19,8 @@ from ir_planner.scene import PlanningScene
 Key = tuple[int, str, str, int]  # seed, cell, station, draw
 CELLS = ("cnc_door", "deep_box", "demo", "table_columns", "open")
 MARGIN = (
-    f"S_m is {1e3 * S_M:g} mm, or {100 * SHARE_OF_BEST:g} % of the best clearance at the station where that "
-    "is less."
+    f"S_m is {1e3 * S_M:g} mm, or {100 * SHARE_OF_BEST:g} % of the best clearance at the station "
+    "where that is less."
 )
 
 
@@ -36,7 +36,11 @@ class Place:
     @property
     def words(self) -> Row:
         """What rows say of it."""
-        return {"cell": self.scene.cell.name, "station": self.station.name, "zone": self.station.zone}
+        return {
+            "cell": self.scene.cell.name,
+            "station": self.station.name,
+            "zone": self.station.zone,
+        }
 
     @property
     def threshold(self) -> FloatArray:
@@ -45,8 +49,8 @@ class Place:
 
 
 def places(cells: tuple[str, ...], seed: int, variants: int) -> Iterator[Place]:
-    """Stations that have a free configuration, of so many variants of each cell; with an even seed the first
-    of them is the cell as it is.
+    """Stations that have a free configuration, of so many variants of each cell; with an even seed
+    the first of them is the cell as it is.
     """
     for name in cells:
         cell = load_cell(name)
@@ -73,14 +77,17 @@ def of_reading(rows: Sequence[Row], reading: str) -> dict[Key, Row]:
 def difference(
     rows: Sequence[Row], one: str, other: str, success: Callable[[Row], float]
 ) -> tuple[list[float], list[Key]]:
-    """Success of one reading less the other's [percentage points] where both were tried, and of what each
-    is.
+    """Success of one reading less the other's [percentage points] where both were tried, and of
+    what each is.
     """
-    a, b = of_reading(rows, one), of_reading(rows, other)
+    a = of_reading(rows, one)
+    b = of_reading(rows, other)
     both = [key for key in a if key in b]
     return [100.0 * (success(a[key]) - success(b[key])) for key in both], both
 
 
 def cells_of(keys: Iterable[Key]) -> list[tuple[int, str]]:
-    """Seed and cell of each: stations of one cell stand among the same machines, cells are drawn apart."""
+    """Seed and cell of each: stations of one cell stand among the same machines, cells are drawn
+    apart.
+    """
     return [key[:2] for key in keys]

@@ -17,19 +17,22 @@ Statistic = Callable[..., float]
 
 
 def interval(
-    statistic: Statistic, *columns: Sequence[float] | FloatArray, groups: Sequence[Hashable] | None = None
+    statistic: Statistic,
+    *columns: Sequence[float] | FloatArray,
+    groups: Sequence[Hashable] | None = None,
 ) -> tuple[float, float, float]:
     """The statistic of columns (N,) with its 95 % interval: value, low, high.
 
-    groups: what each row belongs to; groups are drawn as a whole, for rows of one task are no independent
-    sample. Nan where there is nothing to draw from.
+    groups: what each row belongs to; groups are drawn as a whole, for rows of one task are no
+    independent sample. Nan where there is nothing to draw from.
     """
     data = [np.asarray(column, dtype=float) for column in columns]
     if len(data[0]) == 0:
         return math.nan, math.nan, math.nan
     members = _members(groups) if groups is not None else None
     count = len(members) if members is not None else len(data[0])
-    value, rng = float(statistic(*data)), np.random.default_rng(_SEED)
+    value = float(statistic(*data))
+    rng = np.random.default_rng(_SEED)
     if count < 2:
         return value, math.nan, math.nan
     drawn = np.empty(RESAMPLES)
@@ -67,7 +70,8 @@ def geometric_mean(x: FloatArray) -> float:
 
 def rank_correlation(x: FloatArray, y: FloatArray) -> float:
     """Spearman's, nan where one of both is constant."""
-    a, b = rankdata(x), rankdata(y)
+    a = rankdata(x)
+    b = rankdata(y)
     if np.ptp(a) == 0.0 or np.ptp(b) == 0.0:
         return math.nan
     return float(np.corrcoef(a, b)[0, 1])
@@ -78,9 +82,11 @@ def variation(x: FloatArray) -> float:
     return float(np.std(x, ddof=1) / np.mean(x)) if len(x) > 1 and np.mean(x) > 0.0 else math.nan
 
 
-def share(successes: Sequence[float], groups: Sequence[Hashable] | None = None) -> tuple[float, float, float]:
-    """The mean of successes or chances (N,) in [0, 1] with its interval; where all are equal nothing can be
-    resampled, and the interval is Wilson's for so many groups.
+def share(
+    successes: Sequence[float], groups: Sequence[Hashable] | None = None
+) -> tuple[float, float, float]:
+    """The mean of successes or chances (N,) in [0, 1] with its interval; where all are equal
+    nothing can be resampled, and the interval is Wilson's for so many groups.
     """
     found = interval(mean, successes, groups=groups)
     if found[1] < found[2] or not len(successes):
@@ -92,9 +98,10 @@ def share(successes: Sequence[float], groups: Sequence[Hashable] | None = None) 
 def mean_difference(
     points: Sequence[float], groups: Sequence[Hashable] | None = None
 ) -> tuple[float, float, float]:
-    """The mean of differences (N,) of two successes [percentage points] with its interval. Where all are
-    equal nothing can be resampled: as many groups without another difference leave a share of such by
-    Wilson possible, to either side.
+    """The mean of differences (N,) of two successes [percentage points] with its interval. Where
+    all are
+    equal nothing can be resampled: as many groups without another difference leave a share of such
+    by Wilson possible, to either side.
     """
     found = interval(mean, points, groups=groups)
     if not len(points) or found[1] < found[2]:
@@ -113,7 +120,12 @@ def wilson(successes: int, count: int) -> tuple[float, float, float]:
     """A share with its 95 % interval after Wilson, which is right near 0 and 1 too."""
     if count == 0:
         return math.nan, math.nan, math.nan
-    z, share = 1.96, successes / count
+    z = 1.96
+    share = successes / count
     middle = (share + z * z / (2 * count)) / (1 + z * z / count)
-    half = z * math.sqrt(share * (1 - share) / count + z * z / (4 * count * count)) / (1 + z * z / count)
+    half = (
+        z
+        * math.sqrt(share * (1 - share) / count + z * z / (4 * count * count))
+        / (1 + z * z / count)
+    )
     return share, middle - half, middle + half

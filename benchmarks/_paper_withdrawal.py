@@ -1,4 +1,6 @@
-"""How surely does the withdrawal of eq. (7) leave a machine, and which of its parts does it need?"""
+"""How surely does the withdrawal of eq. (7) leave a machine, and which of its parts does it
+need?
+"""
 
 from __future__ import annotations
 
@@ -24,30 +26,40 @@ from ir_planner.service.exit_tree import ExitTree
 from ir_planner.service.modified_ga import ModifiedGa
 
 CELLS = ("cnc_door", "deep_box", "demo")
-VARIANTS, DRAWS, QUICK_DRAWS = 136, 1, 1  # of each cell and seed; searches per station and reading
-EDGES, SECONDS = 8_000, 20.0  # certified edges of a search, and its ceiling
+# of each cell and seed; searches per station and reading
+VARIANTS = 136
+DRAWS = 1
+QUICK_DRAWS = 1
+# certified edges of a search, and its ceiling
+EDGES = 8_000
+SECONDS = 20.0
 SURE = 95.0  # % of the searches
 POINTS = 2.0  # percentage points of searches from which on a difference is worth having
 SOONER = 0.9  # of the time
 NO_DRIFT = 0.001  # m: the least first step, so that the mean hardly moves the tool
-FARTHEST, SPACING, JUMP = 2.0, 0.03, 0.35  # m, m, rad: a line, its points, and their steps in a branch
+# m, m, rad: a line, its points, and their steps in a branch
+FARTHEST = 2.0
+SPACING = 0.03
+JUMP = 0.35
 
 
 class PrintedMean(modified_ga._Walker):
-    """Eq. (7) with its mean as printed: W_i mu, mu proportional to D, the same for every joint, without a
-    direction.
+    """Eq. (7) with its mean as printed: W_i mu, mu proportional to D, the same for every joint,
+    without a direction.
     """
 
     def _mean(self, parents: ExitPopulation) -> FloatArray:
-        """Mean steps (N, n): mu is D metres as radians, times the share of the first step in the first D."""
+        """Mean steps (N, n): mu is D metres as radians, times the share of the first step in the
+        first D.
+        """
         per_metre = self.settings.step / self.first_total
         return np.asarray((per_metre * parents.total)[:, None] * self.W)
 
 
 @dataclass(frozen=True)
 class Reading:
-    """Settings of the walk, or another search in its place; printed: the mean as printed; line: straight back
-    along the tool's axis.
+    """Settings of the walk, or another search in its place; printed: the mean as printed; line:
+    straight back along the tool's axis.
     """
 
     changed: dict[str, Any]
@@ -56,7 +68,9 @@ class Reading:
     line: bool = False
 
 
-DEFAULT, TREES, LINE = "as read", "two trees instead", "a straight line instead"
+DEFAULT = "as read"
+TREES = "two trees instead"
+LINE = "a straight line instead"
 READINGS = {
     DEFAULT: Reading({}),
     "inverse weights": Reading({"weighting": "inverse"}),
@@ -70,9 +84,13 @@ READINGS = {
 
 
 def measure(seed: int, quick: bool) -> list[Row]:
-    """A row per search: station, reading, whether it left, processor time, edges and W of the path."""
+    """A row per search: station, reading, whether it left, processor time, edges and W of the
+    path.
+    """
     rows = []
-    for number, place in enumerate(places(CELLS[:1] if quick else CELLS, seed, 1 if quick else VARIANTS)):
+    for number, place in enumerate(
+        places(CELLS[:1] if quick else CELLS, seed, 1 if quick else VARIANTS)
+    ):
         _searched(
             place, READINGS[DEFAULT], 1000 * seed
         )  # the place's models are there before any clock starts
@@ -84,7 +102,9 @@ def measure(seed: int, quick: bool) -> list[Row]:
 
 
 def in_turn(names: Sequence[str], number: int) -> list[str]:
-    """The names from another one on at every place: none of them is always the first to be timed."""
+    """The names from another one on at every place: none of them is always the first to be
+    timed.
+    """
     first = number % len(names)
     return [*names[first:], *names[:first]]
 
@@ -93,7 +113,8 @@ def _searched(place: Place, reading: Reading, seed: int) -> Row:
     options = PlanOptions(seed=seed, safety_distance=place.margin, planning_time=SECONDS)
     work = Work(EDGES, time.process_time() + SECONDS, time.process_time)
     problem = Exit.of(place.q[0], Context.of(place.scene, options, work, place.station.name))
-    settings, sequence = ModifiedGa(**reading.changed), np.random.SeedSequence(seed)
+    settings = ModifiedGa(**reading.changed)
+    sequence = np.random.SeedSequence(seed)
     begin = time.process_time()
     if reading.line:
         paths = straight_out(problem)
@@ -103,12 +124,19 @@ def _searched(place: Place, reading: Reading, seed: int) -> Row:
         walker = PrintedMean if reading.printed else modified_ga._Walker
         paths = walker(problem, settings, np.random.default_rng(sequence)).run(1).paths
     seconds = time.process_time() - begin
-    row: Row = {"solved": bool(paths), "seconds": seconds, "edges": work.iterations, "W": float("nan")}
+    row: Row = {
+        "solved": bool(paths),
+        "seconds": seconds,
+        "edges": work.iterations,
+        "W": float("nan"),
+    }
     if paths:
         free = problem.inside.of(
             place.scene, place.margin, Work(10**6, np.inf, time.monotonic), place.station.name
         )
-        row["W"] = path_cost(place.scene.weights, fewest_corners(paths[0], free, place.scene.weights, 11))
+        row["W"] = path_cost(
+            place.scene.weights, fewest_corners(paths[0], free, place.scene.weights, 11)
+        )
     return row
 
 
@@ -117,7 +145,8 @@ def straight_out(problem: Exit) -> list[FloatArray]:
     back = np.arange(0.0, FARTHEST, SPACING)
     poses = np.repeat(np.asarray(problem.area.station.pose)[None], len(back), axis=0)
     poses[:, :3, 3] -= back[:, None] * poses[0, :3, 0]
-    found, path = problem.inside.scene.inverse_kinematics.solve(poses), [problem.interaction]
+    found = problem.inside.scene.inverse_kinematics.solve(poses)
+    path = [problem.interaction]
     for k in range(1, len(back)):
         jump = np.abs(found.of_pose(k) - path[-1]).max(axis=1)
         if jump.min(initial=np.inf) > JUMP:
@@ -140,7 +169,8 @@ def _success(rows: Sequence[Row], zones: str, kinds: tuple[str, ...]) -> Stateme
 def _more(rows: Sequence[Row], says: str, one: str, other: str) -> Statement:
     some, keys = difference(rows, one, other, lambda row: row["solved"])
     cells = cells_of(keys)
-    figure, what = f"searches that leave, {one} less {other}", f"searches in {len(set(cells))} cells"
+    figure = f"searches that leave, {one} less {other}"
+    what = f"searches in {len(set(cells))} cells"
     return Statement(says, figure, *mean_difference(some, cells), len(some), what, "points", POINTS)
 
 
@@ -149,16 +179,30 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
     types = (("open", ("OPEN",)), ("semi-closed", ("SEMI_CLOSED",)), ("closed", ("CLOSED",)))
     found = [_success(rows, name, kinds) for name, kinds in types]
     for says, one, other in (
-        ("weights proportional to the mass do better than inverse ones", DEFAULT, "inverse weights"),
+        (
+            "weights proportional to the mass do better than inverse ones",
+            DEFAULT,
+            "inverse weights",
+        ),
         ("the drift of the mean is needed", DEFAULT, "no drift"),
-        ("the drift is needed with inverse weights", "inverse weights", "inverse weights, no drift"),
+        (
+            "the drift is needed with inverse weights",
+            "inverse weights",
+            "inverse weights, no drift",
+        ),
         ("the mean as read does better than as printed", DEFAULT, "mean as printed"),
         ("eq. (7) leaves more often than two trees", DEFAULT, TREES),
     ):
         found.append(_more(rows, says, one, other))
     over = "processor time over that of the other, geometric mean"
     for says, other, figure, key, bound in (
-        ("weights proportional to the mass are sooner out", "inverse weights", over, "seconds", SOONER),
+        (
+            "weights proportional to the mass are sooner out",
+            "inverse weights",
+            over,
+            "seconds",
+            SOONER,
+        ),
         ("the drift is sooner out", "no drift", over, "seconds", SOONER),
         ("the mean as read is sooner out", "mean as printed", over, "seconds", SOONER),
         ("eq. (7) is sooner out than two trees", TREES, over, "seconds", SOONER),
@@ -170,11 +214,14 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
             1.0,
         ),
     ):
-        a, b = of_reading(rows, DEFAULT), of_reading(rows, other)
+        a = of_reading(rows, DEFAULT)
+        b = of_reading(rows, other)
         both = [k for k in a if a[k]["solved"] and b[k]["solved"] and b[k][key] > 0.0]
         ratios = [a[k][key] / b[k][key] for k in both]
         ratio = interval(geometric_mean, ratios, groups=cells_of(both))
-        found.append(Statement(says, figure, *ratio, len(both), "searches", "", bound, at_least=False))
+        found.append(
+            Statement(says, figure, *ratio, len(both), "searches", "", bound, at_least=False)
+        )
     return [*found, _more(rows, "eq. (7) leaves more often than a straight line", DEFAULT, LINE)]
 
 
@@ -182,20 +229,24 @@ def follows(statements: Sequence[Statement]) -> str:
     """What the figures mean."""
     opened, semi, closed, weights, drift, _, printed, trees, *soon, cost, line = statements
     by_weights, by_drift, by_mean, by_trees = (one.value for one in soon)
-    cheaper = {HOLDS: "its paths cost less than those of trees", FAILS: "its paths cost no less than trees'"}
+    cheaper = {
+        HOLDS: "its paths cost less than those of trees",
+        FAILS: "its paths cost no less than trees'",
+    }
     faster = {HOLDS: "it is sooner out", FAILS: "it is not sooner out"}
     price = cheaper.get(cost.verdict, "what its paths cost against trees' is open")
     speed = faster.get(soon[-1].verdict, "whether it is sooner out is open")
     return (
-        f"The withdrawal alone leaves {opened.value:.0f} % of the open, {semi.value:.0f} % of the "
-        f"semi-closed and {closed.value:.0f} % of the closed zones. Weights in proportion to the mass "
-        f"change that by {weights.value:+.1f} points against inverse ones and take {by_weights:.2f} times "
-        f"their processor time; the drift {drift.value:+.1f} points and {by_drift:.2f} times the time "
-        f"without; the mean as read {printed.value:+.1f} points and {by_mean:.2f} times the time as "
-        f"printed. Against two trees: {trees.value:+.1f} points, {by_trees:.2f} times the time, "
-        f"{cost.value:.2f} times the W: {price}, and {speed}. Against the straight line: "
-        f"{line.value:+.1f} points. Where every search leaves, success can't set readings apart, but their "
-        "times can. The planner asks (7) first, and trees where it finds nothing."
+        f"The withdrawal alone leaves {opened.value:.0f} % of the open, {semi.value:.0f} % of "
+        f"the semi-closed and {closed.value:.0f} % of the closed zones. Weights in proportion to "
+        f"the mass change that by {weights.value:+.1f} points against inverse ones and take "
+        f"{by_weights:.2f} times their processor time; the drift {drift.value:+.1f} points and "
+        f"{by_drift:.2f} times the time without; the mean as read {printed.value:+.1f} points "
+        f"and {by_mean:.2f} times the time as printed. Against two trees: {trees.value:+.1f} "
+        f"points, {by_trees:.2f} times the time, {cost.value:.2f} times the W: {price}, and "
+        f"{speed}. Against the straight line: {line.value:+.1f} points. Where every search "
+        "leaves, success can't set readings apart, but their times can. The planner asks (7) "
+        "first, and trees where it finds nothing."
     )
 
 
@@ -206,12 +257,15 @@ def tables(rows: Sequence[Row]) -> dict[str, list[Row]]:
         line: Row = {"reading": name}
         for zone in ("OPEN", "SEMI_CLOSED", "CLOSED"):
             some = [r for r in rows if r["reading"] == name and r["zone"] == zone]
-            share = f"{100 * np.mean([r['solved'] for r in some]):.0f} % of {len(some)}" if some else ""
+            share = (
+                f"{100 * np.mean([r['solved'] for r in some]):.0f} % of {len(some)}" if some else ""
+            )
             line[zone.lower().replace("_", "-")] = share
         mine = [row for row in rows if row["reading"] == name]
         line["median ms"] = f"{1e3 * np.median([row['seconds'] for row in mine]):.1f}"
         found.append(
-            line | {"95th percentile ms": f"{1e3 * np.percentile([r['seconds'] for r in mine], 95):.0f}"}
+            line
+            | {"95th percentile ms": f"{1e3 * np.percentile([r['seconds'] for r in mine], 95):.0f}"}
         )
     return {"Searches that leave the zone, and their processor time": found}
 
@@ -219,16 +273,17 @@ def tables(rows: Sequence[Row]) -> dict[str, list[Row]]:
 EXPERIMENT = Experiment(
     "withdrawal",
     "Withdrawal by eq. (7), the modified GA",
-    "From the goal configuration a population of perturbed copies, W_i n_i with n_i ~ N(mu_i, sigma), "
-    "weighted by the mass from the tool to the joint and ranked by the total metric distance D, leads "
-    "out of semi-closed and closed zones.",
-    f"Stations of {', '.join(CELLS)} and of {2 * VARIANTS - 1} mirrored, turned and jittered variants of "
-    f"each, nothing held, from their cheapest free configuration, {DRAWS} per station, at most {EDGES} "
-    "certified steps. Readings: weights proportional to the mass (as printed) or inverse; the mean with its "
-    f"drift outwards, without (a first step of {1e3 * NO_DRIFT:g} mm, and momentum to match), or as printed "
-    f"(W_i mu_i, mu_i proportional to D and equal for all joints: {ModifiedGa().step:g} rad at the first D, "
-    "for the paper has no number); as rivals two bidirectional trees, and a straight line back along the "
-    f"tool's axis. Left: outside the zone and free without allowed contacts. {MARGIN}",
+    "From the goal configuration a population of perturbed copies, W_i n_i with n_i ~ N(mu_i, "
+    "sigma), weighted by the mass from the tool to the joint and ranked by the total metric "
+    "distance D, leads out of semi-closed and closed zones.",
+    f"Stations of {', '.join(CELLS)} and of {2 * VARIANTS - 1} mirrored, turned and jittered "
+    f"variants of each, nothing held, from their cheapest free configuration, {DRAWS} per "
+    f"station, at most {EDGES} certified steps. Readings: weights proportional to the mass (as "
+    "printed) or inverse; the mean with its drift outwards, without (a first step of "
+    f"{1e3 * NO_DRIFT:g} mm, and momentum to match), or as printed (W_i mu_i, mu_i proportional "
+    f"to D and equal for all joints: {ModifiedGa().step:g} rad at the first D, for the paper has "
+    "no number); as rivals two bidirectional trees, and a straight line back along the tool's "
+    f"axis. Left: outside the zone and free without allowed contacts. {MARGIN}",
     measure,
     judge,
     follows,

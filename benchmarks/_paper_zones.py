@@ -1,4 +1,6 @@
-"""Cells with any number of forbidden zones, open, semi-closed or closed, and movements among them."""
+"""Cells with any number of forbidden zones, open, semi-closed or closed, and movements among
+them.
+"""
 
 from __future__ import annotations
 
@@ -16,17 +18,19 @@ from ir_msgs_py.arrays import FloatArray
 
 KINDS = ("OPEN", "SEMI_CLOSED", "CLOSED")
 MOST = 100
-NEAR, FAR, HIGH = 1.1, 2.6, 1.4  # m: around the base, and up to where machines stand on pedestals
+# m: around the base, and up to where machines stand on pedestals
+NEAR = 1.1
+FAR = 2.6
+HIGH = 1.4
 EDGES = (0.3, 0.6)  # m of a machine
 WALL = 0.03  # m
-MARGIN, CLEARANCE, APART = (
-    0.01,
-    0.015,
-    0.8,
-)  # m: S_m, what ends keep at least, and how far the tools are apart
+# m: S_m, what ends keep at least, and how far the tools are apart
+MARGIN = 0.01
+CLEARANCE = 0.015
+APART = 0.8
 _DRAWN = 2048  # configurations at a time
-# Walls of a machine by its type, as the axis that they are normal to and the side: a solid block is reached
-# from everywhere; one with an open front from one side; a bin from above alone.
+# Walls of a machine by its type, as the axis that they are normal to and the side: a solid block is
+# reached from everywhere; one with an open front from one side; a bin from above alone.
 _WALLS = {
     "SEMI_CLOSED": ((0, 1), (1, -1), (1, 1), (2, -1), (2, 1)),
     "CLOSED": ((0, -1), (0, 1), (1, -1), (1, 1), (2, -1)),
@@ -34,19 +38,29 @@ _WALLS = {
 
 
 def zones_cell(kind: str, count: int, seed: int) -> Cell:
-    """The cell `open` with `count` machines of a type; those of a smaller cell stand in every larger one."""
+    """The cell `open` with `count` machines of a type; those of a smaller cell stand in every
+    larger one.
+    """
     rng = np.random.default_rng([seed, KINDS.index(kind), 0])
     cell = load_cell("open")
     machines = []
     for k in range(MOST):
-        angle, radius = rng.uniform(-np.pi, np.pi), rng.uniform(NEAR, FAR)
-        size, height = rng.uniform(*EDGES, 3), rng.uniform(0.0, HIGH)
+        angle = rng.uniform(-np.pi, np.pi)
+        radius = rng.uniform(NEAR, FAR)
+        size = rng.uniform(*EDGES, 3)
+        height = rng.uniform(0.0, HIGH)
         place = cell.base_pose[:3, 3] + [radius * np.cos(angle), radius * np.sin(angle), 0.0]
         place[2] = height + 0.5 * size[2]
         machines.append(_machine(f"machine_{k}", kind, pose_of(place, _about_z(angle)), size))
     taken = tuple(machines[:count])
     return replace(
-        cell, name=f"{kind.lower()}_{count}", equipment=taken, stations=(), program=(), signals=(), tasks=()
+        cell,
+        name=f"{kind.lower()}_{count}",
+        equipment=taken,
+        stations=(),
+        program=(),
+        signals=(),
+        tasks=(),
     )
 
 
@@ -56,9 +70,13 @@ def _machine(name: str, kind: str, pose: FloatArray, size: FloatArray) -> Equipm
     else:
         bodies = []
         for axis, side in _WALLS[kind]:
-            walls, middle = size.copy(), np.zeros(3)
-            walls[axis], middle[axis] = WALL, 0.5 * side * (size[axis] - WALL)
-            bodies.append(Body(f"{name}_wall_{axis}{'-+'[side > 0]}", "box", pose_of(middle), walls))
+            walls = size.copy()
+            middle = np.zeros(3)
+            walls[axis] = WALL
+            middle[axis] = 0.5 * side * (size[axis] - WALL)
+            bodies.append(
+                Body(f"{name}_wall_{axis}{'-+'[side > 0]}", "box", pose_of(middle), walls)
+            )
     return Equipment(name, pose, tuple(bodies), Zone(cast("ZoneKind", kind), np.eye(4), size))
 
 
@@ -68,9 +86,11 @@ def _about_z(angle: float) -> FloatArray:
     )
 
 
-def questions(kind: str, sizes: tuple[int, ...], count: int, seed: int) -> list[dict[int, Question]]:
-    """`count` movements, each between the same configurations in every size of the cell: free ends in the
-    largest, where the straight movement is not free.
+def questions(
+    kind: str, sizes: tuple[int, ...], count: int, seed: int
+) -> list[dict[int, Question]]:
+    """`count` movements, each between the same configurations in every size of the cell: free ends
+    in the largest, where the straight movement is not free.
     """
     scenes = {size: scene_of_cell(zones_cell(kind, size, seed)) for size in sizes}
     crowded = scenes[max(sizes)]

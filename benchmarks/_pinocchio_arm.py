@@ -17,7 +17,8 @@ def pinocchio_arm(
     robot: RobotModel, loads: Sequence[Any] = (), base_pose: FloatArray | None = None
 ) -> pinocchio.Model:
     """Links and loads without rotors and friction; base_pose (4, 4) of the robot in the cell."""
-    model, parent = pinocchio.Model(), 0
+    model = pinocchio.Model()
+    parent = 0
     turn = np.eye(3) if base_pose is None else np.asarray(base_pose)[:3, :3]
     model.gravity.linear = turn.T @ [0.0, 0.0, -STANDARD_GRAVITY]
     for i, (origin, axis) in enumerate(zip(robot.joint_origin, robot.joint_axis, strict=True)):

@@ -1,7 +1,8 @@
 """All chains of configurations of a small program, and the cheapest of them.
 
-The configurations at the stops are the planner's own. Every edge costs what the planner finds for it with the
-request's options; a chain is enumerated by dynamic programming. Edges are planned in the order of a lower
+The configurations at the stops are the planner's own. Every edge costs what the planner finds for
+it with the request's options; a chain is enumerated by dynamic programming. Edges are planned in
+the order of a lower
 bound that nothing can undercut: what is left unplanned cannot belong to a cheaper chain.
 """
 
@@ -39,7 +40,8 @@ def cost_of(report: TrajectoryReport, options: PlanOptions) -> float:
 
 @dataclass(eq=False)
 class Chains:
-    """Layers of nodes with costs (A, B) of the edges between them, lower bounds first; `planned` (A, B).
+    """Layers of nodes with costs (A, B) of the edges between them, lower bounds first; `planned`
+    (A, B).
 
     `known` is shared by the instances of one cell. `edges`: how many were planned here.
     """
@@ -55,7 +57,8 @@ class Chains:
 
     def __post_init__(self) -> None:
         for place in range(len(self.route)):
-            first, second = self.layers[place], self.layers[place + 1]
+            first = self.layers[place]
+            second = self.layers[place + 1]
             lines = [self._lines(place, node, entry=True) for node in second]
             exits = [self._lines(place, node, entry=False) for node in first]
             self.costs.append(np.add.outer(exits, lines) + self._bounds(place))
@@ -63,10 +66,17 @@ class Chains:
 
     @staticmethod
     def of(
-        planner: Planner, stations: tuple[str, ...], start: FloatArray, options: PlanOptions, known: EdgeCosts
+        planner: Planner,
+        stations: tuple[str, ...],
+        start: FloatArray,
+        options: PlanOptions,
+        known: EdgeCosts,
     ) -> Chains:
-        """Chains through stations from start (n,). Raises StageError where a stop has no configuration."""
-        cell, settings = planner.cell, planner.settings
+        """Chains through stations from start (n,). Raises StageError where a stop has no
+        configuration.
+        """
+        cell = planner.cell
+        settings = planner.settings
         steps = placed_steps(cell, steps_of(cell, stations), cell.parts_at_start())
         scenes = Scenes(cell, planner.scene().power, settings.drives, options.load == NO_LOAD)
         route = Route.over(steps, scenes)
@@ -83,10 +93,14 @@ class Chains:
         return float(np.prod([float(len(layer)) for layer in self.layers]))
 
     def cheapest(self, until: Callable[[], bool] = lambda: False) -> tuple[list[int], float, bool]:
-        """Configuration at each stop of the cheapest chain, its cost (inf: none), whether it is proved."""
+        """Configuration at each stop of the cheapest chain, its cost (inf: none), whether it is
+        proved.
+        """
         while True:
             chosen, cost = self._shortest()
-            open_edges = [k for k in range(len(self.costs)) if not self.planned[k][chosen[k], chosen[k + 1]]]
+            open_edges = [
+                k for k in range(len(self.costs)) if not self.planned[k][chosen[k], chosen[k + 1]]
+            ]
             if not open_edges or not np.isfinite(cost):
                 return chosen, cost, True
             if until():
@@ -102,8 +116,8 @@ class Chains:
         return float(sum(cost[a, b] for cost, a, b in steps))
 
     def nearest(self, stops: list[tuple[FloatArray, FloatArray]]) -> list[int]:
-        """Index of the node at each stop whose configuration there, and the one outside, are nearest to those
-        of stops [((n,), (n,))]: one configuration may have several withdrawals.
+        """Index of the node at each stop whose configuration there, and the one outside, are
+        nearest to those of stops [((n,), (n,))]: one configuration may have several withdrawals.
         """
         chosen = [0]
         for layer, (q, outside) in zip(self.layers[1:], stops, strict=True):
@@ -112,7 +126,8 @@ class Chains:
         return chosen
 
     def _shortest(self) -> tuple[list[int], float]:
-        total, came = np.zeros(len(self.layers[0])), []
+        total = np.zeros(len(self.layers[0]))
+        came = []
         for cost in self.costs:
             through = total[:, None] + cost
             came.append(np.argmin(through, axis=0))
@@ -126,15 +141,20 @@ class Chains:
         scene = self.route.arriving(place)
         goals = np.array([node.arrival for node in self.layers[place + 1]])
         if self.options.objective == "movement_cost":
-            return np.array([least_travel(scene, node.departure, goals) for node in self.layers[place]])
+            return np.array(
+                [least_travel(scene, node.departure, goals) for node in self.layers[place]]
+            )
         value = self.options.time_value
-        return np.array([least_cost(scene, node.departure, goals, value) for node in self.layers[place]])
+        return np.array(
+            [least_cost(scene, node.departure, goals, value) for node in self.layers[place]]
+        )
 
     def _plan(self, place: int, a: int, b: int) -> None:
         """Replace the bound of an edge by what the planner finds."""
         if self.planned[place][a, b]:
             return
-        first, second = self.layers[place][a], self.layers[place + 1][b]
+        first = self.layers[place][a]
+        second = self.layers[place + 1][b]
         bound = self._bound(place, first, second)
         found = self._across(place, first, second)
         if found < bound - 1e-6 * abs(bound):
@@ -143,7 +163,8 @@ class Chains:
         self.planned[place][a, b] = True
 
     def _bound(self, place: int, first: Node, second: Node) -> float:
-        scene, goals = self.route.arriving(place), second.arrival[None]
+        scene = self.route.arriving(place)
+        goals = second.arrival[None]
         if self.options.objective == "movement_cost":
             return float(least_travel(scene, first.departure, goals)[0])
         return float(least_cost(scene, first.departure, goals, self.options.time_value)[0])
@@ -161,7 +182,9 @@ class Chains:
         return self.known[key]
 
     def _lines(self, place: int, node: Node, *, entry: bool) -> float:
-        """Cost of a service line into the stop of a place or out of the one before it; inf: not possible."""
+        """Cost of a service line into the stop of a place or out of the one before it; inf: not
+        possible.
+        """
         if len(node.line.points) < 2:
             return 0.0
         key = (node.line.points.tobytes(), self._asked(), b"in" if entry else b"out")
@@ -171,7 +194,9 @@ class Chains:
         return self.known[key]
 
     def line(self, place: int, node: Node, *, entry: bool) -> TrajectoryReport | None:
-        """The service line into the stop of a place or out of the one before it; None: none, or not free."""
+        """The service line into the stop of a place or out of the one before it; None: none, or not
+        free.
+        """
         if len(node.line.points) < 2:
             return None
         name = self.route.name(place if entry else place - 1)

@@ -30,9 +30,9 @@ def readers_of(channel: RawChannel) -> dict[str, Read]:
     assert decode is not None
     store = get_typestore(Stores.ROS2_JAZZY)
     return {
-        "this project": lambda messages: Columns(messages, channel.type, channel.schema_text).numbers(
-            "position", 6
-        ),
+        "this project": lambda messages: Columns(
+            messages, channel.type, channel.schema_text
+        ).numbers("position", 6),
         "mcap-ros2-support": lambda messages: np.array([decode(m).position for m in messages]),
         "rosbags": lambda messages: np.array(
             [_position(store.deserialize_cdr(m, channel.type)) for m in messages]
@@ -70,7 +70,8 @@ def reader_rows(path: Path, most: int) -> Iterator[dict[str, Any]]:
 
 def damaged_messages(message: bytes) -> list[bytes]:
     """The message cut short, or with some bytes replaced."""
-    chance, found = random.Random(1), []
+    chance = random.Random(1)
+    found = []
     for _ in range(DAMAGED):
         data = bytearray(message)
         for _ in range(chance.randint(1, 8)):

@@ -1,4 +1,6 @@
-"""A cell's run as a recording, made without a robot: movements and rests at 500 Hz with their mains meter."""
+"""A cell's run as a recording, made without a robot: movements and rests at 500 Hz with their mains
+meter.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +17,13 @@ from ir_msgs.msg import ControllerState, PlannedMovement, PowerState, ProgramSta
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.write import CellFiles, RecordingSession, RecordingWriter
 
-START, TICK = 1_700_000_000_000_000_000, 2_000_000  # ns
+# ns
+START = 1_700_000_000_000_000_000
+TICK = 2_000_000
 STEP_SECONDS = 4.0
-METER, STATES = 5, 10  # ticks between two readings of the meter, and of the controller
+# ticks between two readings of the meter, and of the controller
+METER = 5
+STATES = 10
 TOPICS = {
     "/joint_states": ("sensor_msgs/msg/JointState", False),
     "/ir_sim_driver/power_state": ("ir_msgs/msg/PowerState", False),
@@ -38,32 +44,51 @@ def write_run(path: Path, seconds: float) -> int:
     home = np.array(cell.machine_home)
     ends = (home, home + np.array([0.4, 0.1, -0.1, 0.3, 0.2, -0.4]))
     for index in range(count):
-        _step(session, index, count, ends[index % 2], ends[(index + 1) % 2], list(cell.robot.joint_names))
+        _step(
+            session,
+            index,
+            count,
+            ends[index % 2],
+            ends[(index + 1) % 2],
+            list(cell.robot.joint_names),
+        )
     return session.finish().messages
 
 
-def _step(session: RecordingSession, index: int, count: int, start: Any, end: Any, joints: list[str]) -> None:
+def _step(
+    session: RecordingSession, index: int, count: int, start: Any, end: Any, joints: list[str]
+) -> None:
     ticks = round(STEP_SECONDS * 1e9 / TICK)
     begun = START + index * ticks * TICK
     x = np.arange(ticks) / ticks
     q = start + (end - start) * (10.0 * x**3 - 15.0 * x**4 + 6.0 * x**5)[:, None]
     qd = (end - start) * ((30.0 * x**2 - 60.0 * x**3 + 30.0 * x**4) / STEP_SECONDS)[:, None]
     effort = np.random.default_rng(index).normal(0.0, 100.0, q.shape)  # noise, as of a real robot
-    movement = PlannedMovement(kind="regional", from_station="home", to_station="home", load="gripper")
-    movement.trajectory_id, movement.duration = f"{index:016x}", STEP_SECONDS
-    state = ProgramState(program_id="run", index=index, total=count, event="started", movement=movement)
+    movement = PlannedMovement(
+        kind="regional", from_station="home", to_station="home", load="gripper"
+    )
+    movement.trajectory_id = f"{index:016x}"
+    movement.duration = STEP_SECONDS
+    state = ProgramState(
+        program_id="run", index=index, total=count, event="started", movement=movement
+    )
     _put(session, "/ir_program_runner/program_state", state, begun)
     for k in range(ticks):
         now = begun + k * TICK
         message = JointState(name=joints, position=q[k], velocity=qd[k], effort=effort[k])
         _put(session, "/joint_states", message, now)
         if k % METER == 0:
-            power = PowerState(mode=1, target_mode=1, power=900.0, base_power=735.0, bus_voltage=560.0)
+            power = PowerState(
+                mode=1, target_mode=1, power=900.0, base_power=735.0, bus_voltage=560.0
+            )
             power.energy = 900.0 * (now - START) * 1e-9
-            power.joint_power, power.joint_torque = effort[k] * qd[k], effort[k]
+            power.joint_power = effort[k] * qd[k]
+            power.joint_torque = effort[k]
             _put(session, "/ir_sim_driver/power_state", power, now)
         if k % STATES == 0:
-            follows = ControllerState(joint_names=joints, trajectory_id=f"{index:016x}", speed_scaling=1.0)
+            follows = ControllerState(
+                joint_names=joints, trajectory_id=f"{index:016x}", speed_scaling=1.0
+            )
             follows.path_time = k * TICK * 1e-9
             _put(session, "/ir_sim_driver/controller_state", follows, now)
     state.event = "ended"

@@ -1,4 +1,6 @@
-"""Topics of a whole cell from one process: joint states at 1 kHz, each with its number in its stamp."""
+"""Topics of a whole cell from one process: joint states at 1 kHz, each with its number in its
+stamp.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,8 @@ def main() -> None:
     shares = [(node.create_publisher(type(m), topic, deep), m, every) for topic, m, every in others]
     while not states.get_subscription_count():
         time.sleep(0.01)
-    seconds, begun = float(sys.argv[1]), time.monotonic()
+    seconds = float(sys.argv[1])
+    begun = time.monotonic()
     for k in range(round(seconds / PERIOD)):
         joints.header.stamp = Time(sec=k // 1000, nanosec=k % 1000 * 1_000_000)
         states.publish(joints)

@@ -38,7 +38,9 @@ def best_of(planner: Planner, task: Task, seconds: float) -> dict[str, Cost]:
 def read(file: Path) -> dict[str, tuple[str, float]]:
     """Method and J per task of an earlier run's JSON."""
     rows = json.loads(file.read_text())["rows"]
-    return {row["task"]: (row["best_by"], float(row["best_J"])) for row in rows if row.get("best_J")}
+    return {
+        row["task"]: (row["best_by"], float(row["best_J"])) for row in rows if row.get("best_J")
+    }
 
 
 def _ompl(task: Task, seconds: float) -> Iterator[tuple[OmplPath, Cost]]:
@@ -55,7 +57,9 @@ def _ompl(task: Task, seconds: float) -> Iterator[tuple[OmplPath, Cost]]:
 
 
 def _followed(planner: Planner, task: Task, seconds: float) -> Iterator[Cost]:
-    """OMPL's paths driven by the planner: half of the time finds paths, half drives the cheapest of them."""
+    """OMPL's paths driven by the planner: half of the time finds paths, half drives the cheapest of
+    them.
+    """
     paths = sorted(_ompl(task, 0.5 * seconds), key=lambda found: found[1].J)
     end = time.perf_counter() + 0.5 * seconds
     for path, _ in paths:

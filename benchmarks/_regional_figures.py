@@ -1,4 +1,6 @@
-"""What a task of the regional benchmark measured, as a row of table and JSON, and what all tasks claim."""
+"""What a task of the regional benchmark measured, as a row of table and JSON, and what all tasks
+claim.
+"""
 
 from __future__ import annotations
 
@@ -90,7 +92,11 @@ class Figures:
             row[f"{planner}_J"] = _median([peer.cost.J for peer in found if peer.cost], 0)
         if self.peer is not None and self.peer.cost is not None:
             best = self.peer.cost
-            row |= {"ompl_J": round(best.J), "ompl_T": round(best.duration, 3), "ompl_E": round(best.energy)}
+            row |= {
+                "ompl_J": round(best.J),
+                "ompl_T": round(best.duration, 3),
+                "ompl_E": round(best.energy),
+            }
             row["ompl_by"] = f"{self.peer.planner} {self.peer.how}"
         if np.isfinite(self.best_known):
             row |= {"best_J": round(self.best_known, 1), "best_by": self.best_by}
@@ -153,10 +159,14 @@ def _against_ompl(figures: list[Figures]) -> list[Claim]:
         ours = float(np.median([cost.J for cost in f.costs])) if f.costs else np.inf
         below["best"] += ours < least.J
         below["median"] += ours < float(np.median([cost.J for cost in theirs]))
-        worse += sum(cost.duration > least.duration and cost.energy > least.energy for cost in f.costs)
+        worse += sum(
+            cost.duration > least.duration and cost.energy > least.energy for cost in f.costs
+        )
     count = len(beside)
     return [
-        at_least(f"tasks with median J below OMPL's {name}", 100.0 * below[name] / count, "%", 100.0)
+        at_least(
+            f"tasks with median J below OMPL's {name}", 100.0 * below[name] / count, "%", 100.0
+        )
         for name in ("median", "best")
     ] + [at_most("runs with both duration and energy above OMPL's best", worse, "runs", 0)]
 

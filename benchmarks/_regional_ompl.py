@@ -1,9 +1,9 @@
 """Paths by OMPL: RRTConnect and BKPIECE1 with their defaults, simplified by OMPL's PathSimplifier.
 
-A state is valid where the project's is_free kernel finds every pair beyond its threshold, the planner's own
-one. A motion is checked every 0.01 rad of its fastest joint, all states in one call of the kernel: a
-validator of states alone would cost OMPL ten times the time from Python. So its paths are sampled, not
-proved.
+A state is valid where the project's is_free kernel finds every pair beyond its threshold, the
+planner's own one. A motion is checked every 0.01 rad of its fastest joint, all states in one call
+of the kernel: a validator of states alone would cost OMPL ten times the time from Python. So its
+paths are sampled, not proved.
 """
 
 from __future__ import annotations
@@ -25,12 +25,16 @@ SIMPLIFY_S = 0.25  # ceiling of a simplification
 BSPLINE_STEPS = 5  # OMPL's default
 
 util.setLogLevel(util.LogLevel.LOG_NONE)
-util.RNG.setSeed(1)  # once in a process: what follows is the same in every run, as far as ceilings allow
+util.RNG.setSeed(
+    1
+)  # once in a process: what follows is the same in every run, as far as ceilings allow
 
 
 @dataclass(frozen=True, eq=False)
 class OmplPath:
-    """A path: corners (M, n) after simplification, the same rounded off by B-splines (P, n); seconds."""
+    """A path: corners (M, n) after simplification, the same rounded off by B-splines (P, n);
+    seconds.
+    """
 
     corners: FloatArray
     smooth: FloatArray
@@ -60,7 +64,8 @@ class _Validator(base.MotionValidator):  # type: ignore[misc]
 
     def __init__(self, information: base.SpaceInformation, free: Free, n: int) -> None:
         super().__init__(information)
-        self._free, self._n = free, n
+        self._free = free
+        self._n = n
 
     def checkMotion(self, first: base.State, last: base.State) -> bool:  # noqa: N802 - OMPL's name
         n = self._n
@@ -68,8 +73,12 @@ class _Validator(base.MotionValidator):  # type: ignore[misc]
 
 
 def ompl_path(task: Task, planner: str, seconds: float = SEARCH_S) -> OmplPath | None:
-    """A path of one search, None where its time was up; each call draws on in OMPL's random numbers."""
-    robot, n, free = task.scene.cell.robot, len(task.start), Free(task)
+    """A path of one search, None where its time was up; each call draws on in OMPL's random
+    numbers.
+    """
+    robot = task.scene.cell.robot
+    n = len(task.start)
+    free = Free(task)
     bounds = base.RealVectorBounds(n)
     for j in range(n):
         bounds.setLow(j, float(robot.position_min[j]))
@@ -90,7 +99,8 @@ def ompl_path(task: Task, planner: str, seconds: float = SEARCH_S) -> OmplPath |
     found_at = time.perf_counter()
     if not setup.haveExactSolutionPath():
         return None
-    path, simplifier = setup.getSolutionPath(), geometric.PathSimplifier(information)
+    path = setup.getSolutionPath()
+    simplifier = geometric.PathSimplifier(information)
     simplifier.simplify(path, SIMPLIFY_S)
     corners = _points(path, n)
     if len(corners) > 2:

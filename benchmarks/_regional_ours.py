@@ -1,4 +1,6 @@
-"""Runs of the planner: what a regional movement costs and how long it took, and whether answers repeat."""
+"""Runs of the planner: what a regional movement costs and how long it took, and whether answers
+repeat.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,9 @@ from ir_planner.request.goals import Goal
 
 PLANNING_TIME = 1.0  # s
 ENDLESS = 100_000_000  # certified edges: more than the time holds
-UNHURRIED = 60.0  # s: where ids are compared, so that the budget of work ends a search and never the clock
+UNHURRIED = (
+    60.0  # s: where ids are compared, so that the budget of work ends a search and never the clock
+)
 FIRST = "first feasible"  # how the note of the stage begins that knew the first free path
 NOTHING = "nothing free"
 
@@ -104,14 +108,20 @@ def runs(planner: Planner, task: Task, seeds: int) -> list[Run]:
 
 def patient_runs(planner: Planner, task: Task, seeds: int) -> list[Run]:
     """The same with as much work as PLANNING_TIME holds."""
-    return [run(planner, task, replace(asked(task, seed), max_iterations=ENDLESS)) for seed in range(seeds)]
+    return [
+        run(planner, task, replace(asked(task, seed), max_iterations=ENDLESS))
+        for seed in range(seeds)
+    ]
 
 
 def until(planner: Planner, task: Task, seconds: float, iterations: int) -> Iterator[Cost]:
     """Costs of answers with a large budget and one seed after the other, until the time is up."""
-    end, seed = time.perf_counter() + seconds, 1000
+    end = time.perf_counter() + seconds
+    seed = 1000
     while (left := end - time.perf_counter()) > 0.0:
-        options = replace(asked(task, seed), planning_time=max(left, 0.05), max_iterations=iterations)
+        options = replace(
+            asked(task, seed), planning_time=max(left, 0.05), max_iterations=iterations
+        )
         found = run(planner, task, options)
         if found.cost is not None:
             yield found.cost
@@ -119,12 +129,15 @@ def until(planner: Planner, task: Task, seconds: float, iterations: int) -> Iter
 
 
 def repeats(planner: Planner, tasks: Sequence[Task]) -> tuple[int, int]:
-    """How many of the answers come again bit by bit: asked twice, and by two threads at once; of how many."""
+    """How many of the answers come again bit by bit: asked twice, and by two threads at once; of
+    how many.
+    """
 
     def identity(task: Task, seed: int) -> str:
         return run(planner, task, replace(asked(task, seed), planning_time=UNHURRIED)).trajectory_id
 
-    same, count = 0, 0
+    same = 0
+    count = 0
     with ThreadPoolExecutor(2) as threads:
         for task, other in zip(tasks, [*tasks[1:], tasks[0]], strict=True):
             alone = identity(task, 0), identity(other, 1)
@@ -148,7 +161,9 @@ def knows(planner: Planner, task: Task, planner_id: str) -> bool:
     return True
 
 
-def solved_alone(planner: Planner, tasks: Sequence[Task], planner_id: str, seeds: int) -> tuple[int, int]:
+def solved_alone(
+    planner: Planner, tasks: Sequence[Task], planner_id: str, seeds: int
+) -> tuple[int, int]:
     """Answers of one planner_id alone that are certified, of how many."""
     found = [
         run(planner, task, replace(asked(task, seed), planner_id=planner_id)).solved

@@ -15,7 +15,9 @@ from matplotlib.ticker import FixedLocator, NullLocator, ScalarFormatter
 
 
 def plot(figures: list[Figures], file: Path) -> None:
-    """Every movement as a mark, tasks from left to right: its J over the least J known for the task."""
+    """Every movement as a mark, tasks from left to right: its J over the least J known for the
+    task.
+    """
     known = [f for f in figures if np.isfinite(f.best_known)]
     series = {
         "planner": [(x, cost.J / f.best_known) for x, f in enumerate(known) for cost in f.costs],

@@ -1,4 +1,6 @@
-"""What the regional benchmark asks: every task of the cells, there and back, and what its answers cost."""
+"""What the regional benchmark asks: every task of the cells, there and back, and what its answers
+cost.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,9 @@ class Task:
 
 @dataclass(frozen=True)
 class Cost:
-    """J [J] = drive energy + 500 W x T, duration T [s]; energy [J] at the mains without the base load."""
+    """J [J] = drive energy + 500 W x T, duration T [s]; energy [J] at the mains without the base
+    load.
+    """
 
     J: float
     duration: float
@@ -62,7 +66,8 @@ def scene_of_cell(cell: Cell) -> PlanningScene:
 def tasks_of(cell: str) -> list[Task]:
     """Every task of a cell, there and back: `start->goal` and `goal->start`."""
     scene = scene_of(cell)
-    described, tasks = scene.cell, []
+    described = scene.cell
+    tasks = []
     for task in described.tasks:
         start, goal = (np.array(q, dtype=np.float64) for q in (task.start, task.goal))
         ends = float(scene.collision.min_distance(np.stack([start, goal])).distance.min())
@@ -75,6 +80,8 @@ def tasks_of(cell: str) -> list[Task]:
 
 
 def cost_of(trajectory: Any, scene: PlanningScene, step: float = STEP_S) -> Cost:
-    """Cost of whatever has times, a duration and sample(t): the same joules for the project and its peers."""
+    """Cost of whatever has times, a duration and sample(t): the same joules for the project and its
+    peers.
+    """
     found = movement_energy(trajectory, scene, step)
     return Cost.of(found.total - found.base, trajectory.duration - float(trajectory.times[0]))

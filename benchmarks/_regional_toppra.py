@@ -1,10 +1,12 @@
-"""Times for a path by TOPP-RA (PyPI toppra), with the project's limits of speed, acceleration and torque.
+"""Times for a path by TOPP-RA (PyPI toppra), with the project's limits of speed, acceleration and
+torque.
 
-Torque is a linear constraint on s'' and s'^2: rigid-body torque and rotor inertia exactly, Coulomb friction
-with the sign of the path's direction. Viscous friction and the torque envelope depend on s' itself; both are
-tangents at the profile of the iteration before, and the step of the envelope counts for every place that was
-ever beyond its speed. The profile is sampled afterwards and slowed down uniformly as far as it still exceeds
-a limit. TOPP-RA knows no limit of jerk, so these movements are ones that the drives could not follow.
+Torque is a linear constraint on s'' and s'^2: rigid-body torque and rotor inertia exactly, Coulomb
+friction with the sign of the path's direction. Viscous friction and the torque envelope depend on
+s' itself; both are tangents at the profile of the iteration before, and the step of the envelope
+counts for every place that was ever beyond its speed. The profile is sampled afterwards and slowed
+down uniformly as far as it still exceeds a limit. TOPP-RA knows no limit of jerk, so these
+movements are ones that the drives could not follow.
 """
 
 from __future__ import annotations
@@ -40,8 +42,10 @@ class _Limits(LinearConstraint):  # type: ignore[misc]
     def __init__(self, scene: PlanningScene, path: SplineInterpolator, grid: FloatArray) -> None:
         super().__init__()
         self.identical = True
-        self._robot, self._grid = scene.cell.robot, grid
-        robot, dynamics = scene.cell.robot, scene.dynamics
+        self._robot = scene.cell.robot
+        self._grid = grid
+        robot = scene.cell.robot
+        dynamics = scene.dynamics
         self._q, self._ps, self._pss = (np.ascontiguousarray(path(grid, k)) for k in (0, 1, 2))
         rest = np.zeros_like(self._q)
         dry = robot.friction_coulomb * np.sign(self._ps)
@@ -64,10 +68,9 @@ class _Limits(LinearConstraint):  # type: ignore[misc]
         robot = self._robot
         x = np.maximum(x, 1e-3 * self._xbound[:, 1])
         root = np.sqrt(x)[:, None]
-        slope, offset = (
-            np.abs(self._ps) / (2.0 * root),
-            0.5 * np.abs(self._ps) * root,
-        )  # |qd| = offset + slope x
+        # |qd| = offset + slope x
+        slope = np.abs(self._ps) / (2.0 * root)
+        offset = 0.5 * np.abs(self._ps) * root
         sign = np.sign(self._ps)
         b = self._b + robot.friction_viscous * sign * slope
         c = self._c + robot.friction_viscous * sign * offset
@@ -75,24 +78,33 @@ class _Limits(LinearConstraint):  # type: ignore[misc]
         rows = []  # a u + b x + c <= g, each (N+1, n)
         for side in (1.0, -1.0):
             rows.append((side * self._a, side * b, side * c, robot.envelope_torque[:, 0]))
-            speed, torque = robot.envelope_speed, robot.envelope_torque[:, 1:]
+            speed = robot.envelope_speed
+            torque = robot.envelope_torque[:, 1:]
             for k in range(speed.shape[1] - 1):
                 fall = (torque[:, k + 1] - torque[:, k]) / (speed[:, k + 1] - speed[:, k])
                 here = np.where(self._fast, 1.0, 0.0)
                 line = side * c - fall * (offset - speed[:, k])
                 rows.append(
-                    (here * side * self._a, here * (side * b - fall * slope), here * line, torque[:, k])
+                    (
+                        here * side * self._a,
+                        here * (side * b - fall * slope),
+                        here * line,
+                        torque[:, k],
+                    )
                 )
             most = robot.acceleration_max
             rows.append((side * self._ps, side * self._pss, 0.0 * self._ps, most))
         unit = [np.broadcast_to(g, self._ps.shape) for *_, g in rows]
-        self._rows = [np.hstack([row[k] / g for row, g in zip(rows, unit, strict=True)]) for k in range(3)]
+        self._rows = [
+            np.hstack([row[k] / g for row, g in zip(rows, unit, strict=True)]) for k in range(3)
+        ]
 
     def compute_constraint_params(
         self, path: SplineInterpolator, gridpoints: FloatArray
     ) -> tuple[FloatArray | None, ...]:
         a, b, c = self._rows
-        F, g = np.eye(a.shape[1]), np.ones(a.shape[1])
+        F = np.eye(a.shape[1])
+        g = np.ones(a.shape[1])
         parts = canlinear_colloc_to_interpolate(a, b, c, F, g, None, None, gridpoints, True)
         return (*parts[:5], None, self._xbound)
 
@@ -113,10 +125,13 @@ class _Leg:
 
 
 class PathTrajectory:
-    """Legs one after the other, slowed down by a factor; sampled as the project's trajectories are."""
+    """Legs one after the other, slowed down by a factor; sampled as the project's trajectories
+    are.
+    """
 
     def __init__(self, legs: list[_Leg], factor: float = 1.0) -> None:
-        self._legs, self._factor = legs, factor
+        self._legs = legs
+        self._factor = factor
         self._starts = np.concatenate([[0.0], np.cumsum([leg.times[-1] for leg in legs])])
         self.times = np.array([0.0, factor * self._starts[-1]])
         self.duration = float(self.times[-1])
@@ -132,7 +147,9 @@ class PathTrajectory:
     def sample(self, t: FloatArray) -> Samples:
         """Motion at t (M,) [s]."""
         quick = np.asarray(t) / self._factor
-        which = np.clip(np.searchsorted(self._starts, quick, side="right") - 1, 0, len(self._legs) - 1)
+        which = np.clip(
+            np.searchsorted(self._starts, quick, side="right") - 1, 0, len(self._legs) - 1
+        )
         q, qd, qdd = (np.zeros((len(quick), self._legs[0].path.dof)) for _ in range(3))
         for index, leg in enumerate(self._legs):
             mine = which == index
@@ -142,9 +159,12 @@ class PathTrajectory:
             local = np.clip(quick[mine] - self._starts[index], 0.0, times[-1])
             k = np.clip(np.searchsorted(times, local, side="right") - 1, 0, len(times) - 2)
             u = 0.5 * np.diff(leg.x)[k] / np.diff(leg.grid)[k]
-            tau, v = local - times[k], np.sqrt(leg.x[k])
-            s, sd = leg.grid[k] + tau * (v + 0.5 * u * tau), v + u * tau
-            ps, pss = leg.path(s, 1), leg.path(s, 2)
+            tau = local - times[k]
+            v = np.sqrt(leg.x[k])
+            s = leg.grid[k] + tau * (v + 0.5 * u * tau)
+            sd = v + u * tau
+            ps = leg.path(s, 1)
+            pss = leg.path(s, 2)
             q[mine] = leg.path(s)
             qd[mine] = ps * sd[:, None] / self._factor
             qdd[mine] = (pss * sd[:, None] ** 2 + ps * u[:, None]) / self._factor**2
@@ -155,7 +175,9 @@ def _excess(trajectory: PathTrajectory, scene: PlanningScene) -> float:
     """Largest used share of speed, acceleration and torque limits."""
     at = trajectory.sample(np.arange(0.0, trajectory.duration, CHECK_S))
     robot = scene.cell.robot
-    torque = scene.dynamics.inverse_dynamics(at.q, at.qd, at.qdd) / scene.dynamics.torque_limit(at.qd)
+    torque = scene.dynamics.inverse_dynamics(at.q, at.qd, at.qdd) / scene.dynamics.torque_limit(
+        at.qd
+    )
     shares = (at.qd / robot.velocity_max, at.qdd / robot.acceleration_max, torque)
     return float(max(np.abs(share).max() for share in shares))
 
@@ -164,7 +186,9 @@ def _fastest_leg(points: FloatArray, scene: PlanningScene) -> _Leg | None:
     """TOPP-RA over a spline through the points, iterated until its tangents are where it drives."""
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     path = SplineInterpolator(length / length[-1], points, "natural")
-    grid = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, GRID + 1)))  # finer at the ends, where s' changes most
+    grid = 0.5 * (
+        1.0 - np.cos(np.linspace(0.0, np.pi, GRID + 1))
+    )  # finer at the ends, where s' changes most
     limits = _Limits(scene, path, grid)
     best: tuple[float, _Leg] | None = None
     for _ in range(ITERATIONS):
@@ -181,7 +205,9 @@ def _fastest_leg(points: FloatArray, scene: PlanningScene) -> _Leg | None:
 
 
 def _allowed(trajectory: PathTrajectory, scene: PlanningScene) -> PathTrajectory | None:
-    """The trajectory, slowed down uniformly as far as it exceeds a limit; None where that doesn't help."""
+    """The trajectory, slowed down uniformly as far as it exceeds a limit; None where that doesn't
+    help.
+    """
     for _ in range(60):
         excess = _excess(trajectory, scene)
         if excess <= 1.0 + SLACK:
@@ -201,7 +227,9 @@ def _cheapest(legs: list[_Leg], scene: PlanningScene) -> tuple[PathTrajectory, C
 
 
 def timed(path: OmplPath, task: Task) -> tuple[PathTrajectory, Cost, str] | None:
-    """OMPL's path driven along its B-spline, or with stops at its corners where that hits; and which."""
+    """OMPL's path driven along its B-spline, or with stops at its corners where that hits; and
+    which.
+    """
     if len(path.corners) > 2 and _spline_free(path.smooth, task):
         leg = _fastest_leg(path.smooth, task.scene)
         slowed = _cheapest([leg], task.scene) if leg else None

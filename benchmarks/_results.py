@@ -1,4 +1,6 @@
-"""What every benchmark shares: its command line, and rows, claims, machine and commit at its end."""
+"""What every benchmark shares: its command line, and rows, claims, machine and commit at its
+end.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +44,9 @@ def machine() -> str:
         if info.exists()
         else []
     )
-    found = f"{names[0].split(':')[1].strip()}, {len(names)} cores" if names else platform.processor()
+    found = (
+        f"{names[0].split(':')[1].strip()}, {len(names)} cores" if names else platform.processor()
+    )
     return f"{found}, load {os.getloadavg()[0]:.1f}"
 
 
@@ -55,13 +59,20 @@ def commit(root: Path | None = None) -> str:
     return done.stdout.strip()
 
 
-def command_line(doc: str | None, cells: Sequence[str], seeds: int, quick: str) -> argparse.ArgumentParser:
+def command_line(
+    doc: str | None, cells: Sequence[str], seeds: int, quick: str
+) -> argparse.ArgumentParser:
     """A parser with --cell, --seeds, --quick and --json.
 
-    doc: the script's own text; cells: the default ones; seeds: the default; quick: what --quick leaves.
+    doc: the script's own text; cells: the default ones; seeds: the default; quick: what --quick
+    leaves.
     """
-    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cell", action="append", help=f"file or bundled cell; default: {', '.join(cells)}")
+    parser = argparse.ArgumentParser(
+        description=doc, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--cell", action="append", help=f"file or bundled cell; default: {', '.join(cells)}"
+    )
     parser.add_argument("--seeds", type=int, default=seeds, help=f"default: {seeds}")
     add_ending(parser, quick)
     return parser
@@ -75,10 +86,14 @@ def add_ending(parser: argparse.ArgumentParser, quick: str) -> None:
 
 def line_of(row: dict[str, Any]) -> str:
     """A row as `key value  key value`."""
-    return "  ".join(f"{key} {v:.4g}" if isinstance(v, float) else f"{key} {v}" for key, v in row.items())
+    return "  ".join(
+        f"{key} {v:.4g}" if isinstance(v, float) else f"{key} {v}" for key, v in row.items()
+    )
 
 
-def finish(path: Path | None, rows: Sequence[dict[str, Any]], claims: Sequence[Claim], **more: Any) -> None:
+def finish(
+    path: Path | None, rows: Sequence[dict[str, Any]], claims: Sequence[Claim], **more: Any
+) -> None:
     """Print the claims, and write everything where there is a path."""
     print_claims(claims)
     write_json(path, rows, claims, **more)

@@ -12,7 +12,10 @@ from ir_description.poses import pose_of
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 
-NEAREST, FARTHEST, HIGHEST = 3.4, 10.0, 3.0  # m: beyond the arm, so that every size has the same free paths
+# m: beyond the arm, so that every size has the same free paths
+NEAREST = 3.4
+FARTHEST = 10.0
+HIGHEST = 3.0
 EDGES = (0.05, 0.3)  # m
 PER_WAVE = 10  # points of a trajectory
 WAVE_S = 3.0
@@ -20,24 +23,34 @@ AMPLITUDE = 0.15  # rad
 
 
 def crowded(name: str, bodies: int, seed: int) -> Cell:
-    """A cell filled up to `bodies` bodies by machines, each a box with a station and a contact it allows."""
+    """A cell filled up to `bodies` bodies by machines, each a box with a station and a contact it
+    allows.
+    """
     cell = load_cell(name)
     bodies = max(bodies - len(cell.bodies()), 0)
     rng = np.random.default_rng([seed, bodies])
-    angle, radius = rng.uniform(-np.pi, np.pi, bodies), rng.uniform(NEAREST, FARTHEST, bodies)
-    places = np.stack([radius * np.cos(angle), radius * np.sin(angle), rng.uniform(0.2, HIGHEST, bodies)])
+    angle = rng.uniform(-np.pi, np.pi, bodies)
+    radius = rng.uniform(NEAREST, FARTHEST, bodies)
+    places = np.stack(
+        [radius * np.cos(angle), radius * np.sin(angle), rng.uniform(0.2, HIGHEST, bodies)]
+    )
     edges = rng.uniform(*EDGES, (bodies, 3))
     base = cell.base_pose[:3, 3] * [1.0, 1.0, 0.0]
     machines = tuple(
-        _machine(k, base + place, size) for k, (place, size) in enumerate(zip(places.T, edges, strict=True))
+        _machine(k, base + place, size)
+        for k, (place, size) in enumerate(zip(places.T, edges, strict=True))
     )
     capsule = cell.robot.capsules[-1].name
     stations = tuple(
-        station_at(machine, f"at_{machine.name}", np.eye(4), (AllowedContact(capsule, body.name, 0.0),))
+        station_at(
+            machine, f"at_{machine.name}", np.eye(4), (AllowedContact(capsule, body.name, 0.0),)
+        )
         for machine in machines
         for body in machine.bodies
     )
-    return replace(cell, equipment=(*cell.equipment, *machines), stations=(*cell.stations, *stations))
+    return replace(
+        cell, equipment=(*cell.equipment, *machines), stations=(*cell.stations, *stations)
+    )
 
 
 def _machine(number: int, place: FloatArray, size: FloatArray) -> Equipment:
@@ -59,18 +72,24 @@ def tour(cell: Cell, stops: int, seed: int) -> tuple[str, ...]:
 
 def with_turns(cell: Cell, half_range: float) -> Cell:
     """The cell whose robot may turn A4 and A6 by `half_range` rad in both directions."""
-    robot, turning = cell.robot, [3, 5]
-    low, high = np.array(robot.position_min), np.array(robot.position_max)
-    low[turning], high[turning] = -half_range, half_range
+    robot = cell.robot
+    turning = [3, 5]
+    low = np.array(robot.position_min)
+    high = np.array(robot.position_max)
+    low[turning] = -half_range
+    high[turning] = half_range
     return replace(cell, robot=replace(robot, position_min=low, position_max=high), tasks=())
 
 
 def waves(cell: Cell, points: int) -> JointTrajectory:
-    """A slow wave of all joints from home to beside it, at rest at both; more points last longer."""
+    """A slow wave of all joints from home to beside it, at rest at both; more points last
+    longer.
+    """
     duration = WAVE_S * points / PER_WAVE
     share = np.linspace(0.0, 1.0, points)
     ramp = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)  # at rest at both ends
-    slope, bend = 30.0 * share**2 * (1.0 - share) ** 2, 60.0 * share * (1.0 - share) * (1.0 - 2.0 * share)
+    slope = 30.0 * share**2 * (1.0 - share) ** 2
+    bend = 60.0 * share * (1.0 - share) * (1.0 - 2.0 * share)
     turns = 2.0 * np.pi * max(points // (2 * PER_WAVE), 1)
     swing = AMPLITUDE * np.array([1.0, 0.5, -0.5, 1.0, 1.0, -1.0])
     phase = turns * ramp

@@ -1,4 +1,6 @@
-"""What one step costs at one size: processor seconds and memory, in a process of its own; and exponents."""
+"""What one step costs at one size: processor seconds and memory, in a process of its own; and
+exponents.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,9 @@ class Prepared:
 
 
 def measured(prepare: Callable[[], Prepared]) -> tuple[float, Cost] | str:
-    """Size and cost of what `prepare` returns, in a child of this process; a sentence where it failed."""
+    """Size and cost of what `prepare` returns, in a child of this process; a sentence where it
+    failed.
+    """
     here, there = multiprocessing.Pipe(duplex=False)
     child = multiprocessing.get_context("fork").Process(target=_child, args=(there, prepare))
     child.start()
@@ -56,7 +60,8 @@ def _child(there: Connection, prepare: Callable[[], Prepared]) -> None:
         before = _resident()
         spent = _timed(prepared.call)
         if spent < WARM_S:  # again, now that caches are filled
-            total, most = 0.0, max(QUIET_S, 2.0 * spent)
+            total = 0.0
+            most = max(QUIET_S, 2.0 * spent)
             while total < most:
                 spent = min(spent, again := _timed(prepared.call))
                 total += again
@@ -78,8 +83,11 @@ def _resident() -> int:
 
 
 def exponent(sizes: Sequence[float], values: Sequence[float]) -> float:
-    """Slope of log(value) over log(size), fitted over the upper half of the range; nan: too few sizes."""
-    x, y = np.log(np.asarray(sizes)), np.log(np.maximum(values, 1e-9))
+    """Slope of log(value) over log(size), fitted over the upper half of the range; nan: too few
+    sizes.
+    """
+    x = np.log(np.asarray(sizes))
+    y = np.log(np.maximum(values, 1e-9))
     upper = x >= 0.5 * (x.min() + x.max()) - 1e-9 if len(x) else np.zeros(0, bool)
     if upper.sum() < 2:
         upper = np.argsort(np.argsort(x)) >= len(x) - 2

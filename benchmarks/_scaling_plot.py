@@ -38,7 +38,11 @@ def plot(rows: Sequence[Row], file: Path) -> None:
     """Times above, memory below, one column per axis."""
     axes_with_rows = [axis for axis in AXES if any(row.axis == axis for row in rows)]
     figure, panels = plt.subplots(
-        2, len(axes_with_rows), figsize=(4.6 * len(axes_with_rows), 8.4), squeeze=False, sharex="col"
+        2,
+        len(axes_with_rows),
+        figsize=(4.6 * len(axes_with_rows), 8.4),
+        squeeze=False,
+        sharex="col",
     )
     slopes = exponents(rows)
     sizes = {axis: [row.size for row in rows if row.axis == axis] for axis in axes_with_rows}

@@ -1,4 +1,6 @@
-"""The steps of benchmarks/scaling.py: what is prepared at a size, what is called, how it may grow."""
+"""The steps of benchmarks/scaling.py: what is prepared at a size, what is called, how it may
+grow.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,14 @@ import numpy as np
 from _scaling_cells import crowded, tour, waves, with_turns
 from _scaling_measure import Prepared
 
-from ir_description import Cell, cell_from_yaml, cell_to_yaml, check_cell, load_cell, load_power_data
+from ir_description import (
+    Cell,
+    cell_from_yaml,
+    cell_to_yaml,
+    check_cell,
+    load_cell,
+    load_power_data,
+)
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Goal, Planner, ProgramPlan, Reference
 from ir_planner.checks import cell_shapes
@@ -21,7 +30,9 @@ from ir_planner.request import Work
 from ir_planner.scene import load_text, scene_with
 from ir_sim_driver.motion import ExecutionSettings, check_trajectory
 
-LINEAR, SQUARE = 1.25, 2.25  # exponents, with what caches of the processor and noise add
+# exponents, with what caches of the processor and noise add
+LINEAR = 1.25
+SQUARE = 2.25
 TURNING_STOPS = 4
 CEILING = 600.0  # s of planning
 MARGIN = 0.02  # m
@@ -30,7 +41,9 @@ STATES = 1000
 
 @dataclass(frozen=True)
 class Step:
-    """A step on an axis. prepare: (cell, size, seed) to a call; bound: of the exponent of its time."""
+    """A step on an axis. prepare: (cell, size, seed) to a call; bound: of the exponent of its
+    time.
+    """
 
     axis: str
     name: str
@@ -89,14 +102,16 @@ def _scene(planner: Planner) -> Callable[[], object]:
 
 
 def _states(planner: Planner) -> Callable[[], object]:
-    robot, model = planner.cell.robot, planner.scene().collision
+    robot = planner.cell.robot
+    model = planner.scene().collision
     q = np.random.default_rng(0).uniform(robot.position_min, robot.position_max, (STATES, robot.n))
     return lambda: model.min_distance(q)
 
 
 def _movement(planner: Planner) -> Callable[[], object]:
     cell = planner.cell
-    start, goal = cell.machine_home, Goal(configuration=cell.park)
+    start = cell.machine_home
+    goal = Goal(configuration=cell.park)
 
     def call() -> object:
         plan = planner.plan_regional(start, goal, options(0))
@@ -134,13 +149,21 @@ def _tour(name: str, size: int, seed: int) -> Prepared:
 
 
 def _turns(name: str, size: int, seed: int) -> Prepared:
-    """`size` is the range of A4 and A6 in degrees; what counts is how many configurations it leaves."""
+    """`size` is the range of A4 and A6 in degrees; what counts is how many configurations it
+    leaves.
+    """
     cell = with_turns(load_cell(name), np.radians(float(size)))
-    stations, power = tour(cell, TURNING_STOPS, seed), load_power_data()
+    stations = tour(cell, TURNING_STOPS, seed)
+    power = load_power_data()
     request = ProgramRequest(cell, power, stations, cell.posture("park"), options(seed))
-    scene, home = scene_with(cell, load_text(cell), power), cell.machine_home
+    scene = scene_with(cell, load_text(cell), power)
+    home = cell.machine_home
     found = [
-        len(free_configurations(scene.station(name).pose, scene, scene.thresholds(MARGIN, name), home).q)
+        len(
+            free_configurations(
+                scene.station(name).pose, scene, scene.thresholds(MARGIN, name), home
+            ).q
+        )
         for name in stations
     ]
 
@@ -181,7 +204,8 @@ def _optimised(planner: Planner, points: int) -> Callable[[], object]:
 
 
 def _vetted(planner: Planner, points: int) -> Callable[[], object]:
-    given, robot = waves(planner.cell, points), planner.cell.robot
+    given = waves(planner.cell, points)
+    robot = planner.cell.robot
     dynamics = planner.scene().dynamics
     return lambda: check_trajectory(given, robot, dynamics, ExecutionSettings())
 

@@ -1,4 +1,6 @@
-"""Second opinions on movements: distances by Coal at 0.0005 rad, limits at 10 kHz, torque by Pinocchio."""
+"""Second opinions on movements: distances by Coal at 0.0005 rad, limits at 10 kHz, torque by
+Pinocchio.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ RATE = 10_000.0  # Hz
 
 
 def sampled_densely(trajectory: JointTrajectory, step: float = STEP) -> FloatArray:
-    """Configurations (M, n) along the path; no joint moves more than `step` [rad] from one to the next."""
+    """Configurations (M, n) along the path; no joint moves more than `step` [rad] from one to the
+    next.
+    """
     times = trajectory.times
     instants = np.linspace(times[0], times[-1], max(int((times[-1] - times[0]) * RATE), 2))
     steps = np.abs(np.diff(trajectory.sample(instants).q, axis=0)).max(axis=1)
@@ -45,12 +49,13 @@ class SecondOpinion:
     def clearance_left(
         self, trajectory: JointTrajectory, margin: float, station: str = "", step: float = STEP
     ) -> tuple[float, int]:
-        """Least distance minus what its pair must keep [m] by Coal, exact where it is negative, and at how
-        many configurations it was asked.
+        """Least distance minus what its pair must keep [m] by Coal, exact where it is negative, and
+        at how many configurations it was asked.
 
         station: inside its zone its allowed contacts keep their own distances.
         """
-        asked, plain = sampled_densely(trajectory, step), self._scene.thresholds(margin)
+        asked = sampled_densely(trajectory, step)
+        plain = self._scene.thresholds(margin)
         kept = np.broadcast_to(plain, (len(asked), len(plain)))
         if station:
             inside = tcp_inside(asked, self._scene, station, margin)
@@ -64,7 +69,8 @@ class SecondOpinion:
 
     def largest_share(self, trajectory: JointTrajectory) -> float:
         """Largest used share of position, speed, acceleration, jerk and torque limits at 10 kHz."""
-        robot, times = self._scene.cell.robot, trajectory.times
+        robot = self._scene.cell.robot
+        times = trajectory.times
         count = max(int(np.ceil((times[-1] - times[0]) * RATE)), 1) + 1
         at = trajectory.sample(np.linspace(times[0], times[-1], count))
         middle = 0.5 * (robot.position_max + robot.position_min)

@@ -14,8 +14,11 @@ from ir_msgs_py.ros.client import Client
 
 
 def over_ros(cell: str, stations: list[str], seeds: int) -> tuple[FloatArray, bool]:
-    """Milliseconds that an answer of the node takes beyond its own planning_time, and whether ids repeat."""
-    extra, repeats = [], True
+    """Milliseconds that an answer of the node takes beyond its own planning_time, and whether ids
+    repeat.
+    """
+    extra = []
+    repeats = True
     with running("ir_planner.node", cell=cell), Client(timeout=60.0) as client:
         for station in stations:
             for seed in range(seeds):

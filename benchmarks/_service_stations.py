@@ -1,4 +1,6 @@
-"""One station of the service benchmark: stage one, eq. (7) alone, and the whole movement, over seeds."""
+"""One station of the service benchmark: stage one, eq. (7) alone, and the whole movement, over
+seeds.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,9 @@ S_M = 0.02  # m
 SHARE_OF_BEST = 0.8  # of the station's best clearance, where that is smaller
 STARTS = 32
 REPETITIONS = 50
-EDGES, CEILING = 60_000, 30.0  # certified edges, s
+# certified edges, s
+EDGES = 60_000
+CEILING = 30.0
 
 
 @dataclass(frozen=True)
@@ -84,7 +88,9 @@ def milliseconds(function: Callable[[], T]) -> tuple[T, float]:
 
 
 def margin_at(scene: PlanningScene, station: Station) -> float:
-    """S_m [m], or 80 % of the best clearance of the configurations at the station where that is smaller."""
+    """S_m [m], or 80 % of the best clearance of the configurations at the station where that is
+    smaller.
+    """
     q = scene.inverse_kinematics.solve(station.pose[None]).q
     if len(q) == 0:
         return S_M
@@ -95,7 +101,8 @@ def margin_at(scene: PlanningScene, station: Station) -> float:
 
 def measured(scene: PlanningScene, station: Station, seeds: int) -> StationFigures:
     """All figures of one station."""
-    margin, park = margin_at(scene, station), np.array(scene.cell.park)
+    margin = margin_at(scene, station)
+    park = np.array(scene.cell.park)
     threshold = scene.thresholds(margin, station.name)
 
     def closed() -> Any:
@@ -113,7 +120,9 @@ def measured(scene: PlanningScene, station: Station, seeds: int) -> StationFigur
         return sum(_walks_out(free[0], context, weighting) for context in here)
 
     candidates = [plan.candidates[0] for plan, _ in plans if plan.candidates]
-    paths = [1e3 * sum(s.seconds for s in plan.info.stages if s.name != "timing") for plan, _ in plans]
+    paths = [
+        1e3 * sum(s.seconds for s in plan.info.stages if s.name != "timing") for plan, _ in plans
+    ]
     return StationFigures(
         cell=scene.cell.name,
         station=station.name,
@@ -143,11 +152,16 @@ def _work() -> Work:
     return Work(EDGES, time.monotonic() + CEILING, time.monotonic)
 
 
-def _searched(scene: PlanningScene, station: Station, threshold: FloatArray, seed: int) -> tuple[bool, float]:
+def _searched(
+    scene: PlanningScene, station: Station, threshold: FloatArray, seed: int
+) -> tuple[bool, float]:
     """Whether CCD finds a free configuration, and its milliseconds."""
-    park, settings = np.array(scene.cell.park), InteractionSettings()
+    park = np.array(scene.cell.park)
+    settings = InteractionSettings()
     found, took = milliseconds(
-        lambda: searched_configurations(station.pose, scene, threshold, park, STARTS, seed, settings, _work())
+        lambda: searched_configurations(
+            station.pose, scene, threshold, park, STARTS, seed, settings, _work()
+        )
     )
     return len(found.q) > 0, took
 

@@ -1,4 +1,6 @@
-"""Programs of today against the planner's: PTP at 100 %, an old one with detours, a trace, a seam."""
+"""Programs of today against the planner's: PTP at 100 %, an old one with detours, a trace, a
+seam.
+"""
 
 from __future__ import annotations
 
@@ -65,8 +67,8 @@ END
 
 @dataclass(frozen=True)
 class Row:
-    """A side of a comparison: seconds, joules and what is saved, with the ends of its 90 % interval; along_s:
-    seconds that the tool works along paths.
+    """A side of a comparison: seconds, joules and what is saved, with the ends of its 90 %
+    interval; along_s: seconds that the tool works along paths.
     """
 
     baseline: str
@@ -93,10 +95,20 @@ def baselines() -> tuple[list[dict[str, Any]], list[Claim]]:
     same = [row for row in planned if row.side == "same cycle time"]
     claims = [
         at_least(
-            "planned programs certified", sum(row.certified for row in planned) / len(planned), "share", 1.0
+            "planned programs certified",
+            sum(row.certified for row in planned) / len(planned),
+            "share",
+            1.0,
         ),
-        at_least("saved at the same cycle time, least of four", min(r.saved_percent for r in same), "%", 5.0),
-        at_least("lower end of that interval, least of four", min(r.saved_low for r in same), "J", 0.0),
+        at_least(
+            "saved at the same cycle time, least of four",
+            min(r.saved_percent for r in same),
+            "%",
+            5.0,
+        ),
+        at_least(
+            "lower end of that interval, least of four", min(r.saved_low for r in same), "J", 0.0
+        ),
         at_least("seconds along the seam over today's, least", _along(rows), "share", 1.0 - ALONG),
     ]
     return [asdict(row) for row in rows], claims
@@ -161,8 +173,12 @@ def _seam(cycle_time: float) -> BeforeAfter:
 
 def _trace(cycle_time: float) -> BeforeAfter:
     planner = _planner("open")
-    options = argparse.Namespace(mapping=TRACES / "rsi_log.yaml", load="", bandwidth=0.0, between=None)
-    return before_after(planner, today_of_trace(options, planner, TRACES / "rsi_log.csv"), cycle_time)
+    options = argparse.Namespace(
+        mapping=TRACES / "rsi_log.yaml", load="", bandwidth=0.0, between=None
+    )
+    return before_after(
+        planner, today_of_trace(options, planner, TRACES / "rsi_log.csv"), cycle_time
+    )
 
 
 RUNS = {"PTP at 100 %": _common, "an old program": _old, "a trace": _trace, "a seam": _seam}

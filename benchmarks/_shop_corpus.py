@@ -1,4 +1,6 @@
-"""Programs of the corpus, driven, written as KRL, read back and driven again: how near the points come."""
+"""Programs of the corpus, driven, written as KRL, read back and driven again: how near the points
+come.
+"""
 
 from __future__ import annotations
 
@@ -29,14 +31,18 @@ from ir_planner.krl.export import attached
 
 CORPUS = Path(__file__).parents[1] / "tests" / "krl" / "programs"
 CELL = "open"
-_SPACING, _FEWEST = 0.2, 6  # s between the points that are written, and how many at least
-_DEG, _MM = 1e-4, 1e-3  # that a point may be off
+# s between the points that are written, and how many at least
+_SPACING = 0.2
+_FEWEST = 6
+# that a point may be off
+_DEG = 1e-4
+_MM = 1e-3
 
 
 @dataclass(frozen=True)
 class CorpusRow:
-    """A program: movements, points that were written, how far they are off when they are driven again [deg],
-    [mm] of the tcp; the sentence of one that is refused, else "".
+    """A program: movements, points that were written, how far they are off when they are driven
+    again [deg], [mm] of the tcp; the sentence of one that is refused, else "".
     """
 
     program: str
@@ -57,25 +63,30 @@ def read(path: Path, planner: Planner) -> tuple[Followed, tuple[DrivenStep, ...]
     text = path.read_text(encoding="utf-8")
     inputs = {int(n): value == "true" for n, value in re.findall(r";input (\d+) (\w+)", text)}
     others = [
-        path.parent / "with" / name for line in re.findall(r";with (.+)", text) for name in line.split()
+        path.parent / "with" / name
+        for line in re.findall(r";with (.+)", text)
+        for name in line.split()
     ]
     files = [path, *([data] if (data := path.with_suffix(".dat")).exists() else []), *others]
-    cell, sources = planner.cell, [parse(one.read_text(encoding="utf-8"), one.name) for one in files]
+    cell = planner.cell
+    sources = [parse(one.read_text(encoding="utf-8"), one.name) for one in files]
     program = follow(sources, cell.machine_home, tool_in_flange(cell.tcp), inputs=inputs)
     return program, drive(program, planner.scene("none"), cell.machine_home)[0]
 
 
 def round_trip(steps: Sequence[DrivenStep], planner: Planner) -> tuple[int, float, float]:
-    """How many points are written for driven steps, and the largest error [deg], [mm] of one of them when the
-    text is read and driven again.
+    """How many points are written for driven steps, and the largest error [deg], [mm] of one of
+    them when the text is read and driven again.
     """
     moving = [step.trajectory for step in steps if step.moves]
     if not moving:
         return 0, 0.0, 0.0
-    scene, cell = planner.scene("none"), planner.cell
+    scene = planner.scene("none")
+    cell = planner.cell
     shares = [_shares(one.duration) for one in moving]
     points = [one.sample(share * one.duration).q for one, share in zip(moving, shares, strict=True)]
-    parts, left = list[Any](), iter(zip(moving, points, strict=True))
+    parts = list[Any]()
+    left = iter(zip(moving, points, strict=True))
     for step in steps:
         if step.moves:
             one, reached = next(left)
@@ -87,7 +98,9 @@ def round_trip(steps: Sequence[DrivenStep], planner: Planner) -> tuple[int, floa
             parts.append(WrittenSignals((), tuple((f"OUTPUT_{n}", on) for n, on in step.outputs)))
     source, data = written("AGAIN", moving[0].positions[0], parts, attached(scene), [])
     texts = [parse(source, "again.src"), parse(data, "again.dat")]
-    again = drive(follow(texts, cell.machine_home, tool_in_flange(cell.tcp)), scene, cell.machine_home)[0]
+    again = drive(
+        follow(texts, cell.machine_home, tool_in_flange(cell.tcp)), scene, cell.machine_home
+    )[0]
     driven = [step.trajectory for step in again if step.moves]
     passed = [
         one.sample(np.minimum(share * one.duration, one.duration)).q
@@ -121,7 +134,9 @@ def corpus() -> tuple[list[dict[str, Any]], list[Claim]]:
     claims = [
         at_least("programs of the corpus", len(rows), "programs", 40),
         at_least("of them driven", len(driven), "programs", 25),
-        at_most("points after writing and reading", max(row.off_deg for row in driven), "deg", _DEG),
+        at_most(
+            "points after writing and reading", max(row.off_deg for row in driven), "deg", _DEG
+        ),
         at_most("points after writing and reading", max(row.off_mm for row in driven), "mm", _MM),
     ]
     return [asdict(row) for row in rows], claims

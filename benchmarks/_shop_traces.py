@@ -1,4 +1,6 @@
-"""What positions alone are worth: motions of known energy, sampled with noise, and the stated bound."""
+"""What positions alone are worth: motions of known energy, sampled with noise, and the stated
+bound.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +48,8 @@ def traces() -> tuple[list[dict[str, Any]], list[Claim]]:
     assert plan.common is not None
     steps = (*plan.movements, *plan.common.movements)
     motions = [_rested(step.trajectory) for step in steps if step.trajectory is not None]
-    scene, draw = planner.scene(""), np.random.default_rng(0)
+    scene = planner.scene("")
+    draw = np.random.default_rng(0)
 
     def joules(motion: JointTrajectory) -> float:
         return movement_energy(motion, scene).total
@@ -57,17 +60,27 @@ def traces() -> tuple[list[dict[str, Any]], list[Claim]]:
     usual = [row for row in rows if row.rate_hz > 50.0 and row.noise_rad <= NOISES[2]]
     claims = [
         at_least(
-            "energies within the stated bound", float(np.mean([row.within for row in rows])), "share", 0.9
+            "energies within the stated bound",
+            float(np.mean([row.within for row in rows])),
+            "share",
+            0.9,
         ),
-        at_most("error of an energy, usual logs, worst", max(row.error_worst for row in usual), "%", 3.0),
+        at_most(
+            "error of an energy, usual logs, worst", max(row.error_worst for row in usual), "%", 3.0
+        ),
     ]
     return [asdict(row) for row in rows], claims
 
 
 def _row(
-    motions: list[JointTrajectory], rate: float, noise: float, joules: Any, draw: np.random.Generator
+    motions: list[JointTrajectory],
+    rate: float,
+    noise: float,
+    joules: Any,
+    draw: np.random.Generator,
 ) -> Row:
-    errors, bounds = [], []
+    errors = []
+    bounds = []
     for motion in motions:
         times: FloatArray = np.arange(0.0, motion.duration, 1.0 / rate)
         q = motion.sample(times).q
@@ -79,15 +92,21 @@ def _row(
         bounds.append(100.0 * found.bound / known)
     within = float(np.mean(np.abs(errors) <= np.array(bounds)))
     worst = float(np.abs(errors).max())
-    return Row(rate, noise, len(motions), float(np.mean(errors)), worst, float(np.mean(bounds)), within)
+    return Row(
+        rate, noise, len(motions), float(np.mean(errors)), worst, float(np.mean(bounds)), within
+    )
 
 
 def _rested(motion: JointTrajectory) -> JointTrajectory:
     """With a standstill before and after it."""
-    times = np.concatenate([[0.0], motion.times - motion.times[0] + REST, [motion.duration + 2.0 * REST]])
+    times = np.concatenate(
+        [[0.0], motion.times - motion.times[0] + REST, [motion.duration + 2.0 * REST]]
+    )
     q = np.vstack([motion.positions[:1], motion.positions, motion.positions[-1:]])
     still = np.zeros((1, q.shape[1]))
-    speeds = [np.vstack([still, values, still]) for values in (motion.velocities, motion.accelerations)]
+    speeds = [
+        np.vstack([still, values, still]) for values in (motion.velocities, motion.accelerations)
+    ]
     return JointTrajectory.from_seconds(motion.joint_names, times, q, *speeds)
 
 

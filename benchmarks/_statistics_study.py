@@ -1,4 +1,6 @@
-"""Statistics for studies.py: the documented studies, judged by figures of their own from the rows alone."""
+"""Statistics for studies.py: the documented studies, judged by figures of their own from the rows
+alone.
+"""
 
 from __future__ import annotations
 
@@ -29,14 +31,25 @@ STATISTICS_PARTS = ("statistics",)
 QUICK = 8  # pairs
 SAMPLES = 10_000
 COUNTS = (10, 20, 30, 60, 100)  # pairs of a sample
-COLUMNS = ("duration_s", "predicted_j", "direct_j", "indirect_j", "peak_w", "path_m", None, "torque_share")
-SIMULATED, SIZES = 20_000, (10, 20, 60, 200)  # samples of a distribution, and values in each
+COLUMNS = (
+    "duration_s",
+    "predicted_j",
+    "direct_j",
+    "indirect_j",
+    "peak_w",
+    "path_m",
+    None,
+    "torque_share",
+)
+# samples of a distribution, and values in each
+SIMULATED = 20_000
+SIZES = (10, 20, 60, 200)
 HELD = 80.0  # %: of robots drawn for 60 pairs 90 % +- 10 % lie in a 90 % interval
 
 
 def statistics_claims(parts: Collection[str], out: Path | None, *, quick: bool) -> list[Claim]:
-    """Claims about the study that `ir study statistics --example` asks for, the same with a robot of its own
-    for each pair, and one for the fastest; quick: the first alone, with few pairs.
+    """Claims about the study that `ir study statistics --example` asks for, the same with a robot
+    of its own for each pair, and one for the fastest; quick: the first alone, with few pairs.
     """
     if "statistics" not in parts:
         return []
@@ -48,7 +61,9 @@ def statistics_claims(parts: Collection[str], out: Path | None, *, quick: bool) 
         if quick:
             return recomputed(one, folder / "example")
         drawn = made(replace(asked, plant=DRAWN), folder / "drawn")
-        fastest = made(replace(asked, objective="time", pairs=min(asked.pairs, 20)), folder / "time")
+        fastest = made(
+            replace(asked, objective="time", pairs=min(asked.pairs, 20)), folder / "time"
+        )
         claims = [*recomputed(one, folder / "example"), *held(drawn), *never_slower(fastest)]
     resampled(one)
     simulated()
@@ -59,7 +74,8 @@ def made(settings: StatisticsSettings, folder: Path) -> Finished:
     """Run a study and print what it says."""
     finished = run_statistics(settings, folder, Means())
     print(
-        f"{settings.objective}, plant {settings.plant}: {finished.summary}\n{finished.summed_up}", flush=True
+        f"{settings.objective}, plant {settings.plant}: {finished.summary}\n{finished.summed_up}",
+        flush=True,
     )
     return finished
 
@@ -87,7 +103,11 @@ def both(row: dict[str, Any]) -> bool:
 
 def movements(row: dict[str, Any]) -> list[dict[str, Any]]:
     """The measured movements of a pair that are not the same one."""
-    found = {one["trajectory_id"]: one for one in row.values() if isinstance(one, dict) and one.get("solved")}
+    found = {
+        one["trajectory_id"]: one
+        for one in row.values()
+        if isinstance(one, dict) and one.get("solved")
+    }
     return [one for one in found.values() if math.isfinite(one["direct_j"])]
 
 
@@ -97,7 +117,9 @@ def percent(first: float, second: float) -> float:
 
 
 def largest(each: Comparison, values: Sequence[float]) -> float:
-    """The largest difference [%] of a comparison's mean, interval and median from those of the values."""
+    """The largest difference [%] of a comparison's mean, interval and median from those of the
+    values.
+    """
     if len(values) < 2 or max(values) - min(values) < 1e-6:
         return 0.0
     expected = (fmean(values), *ends(values, t_quantile(0.95, len(values) - 1)), median(values))
@@ -106,13 +128,19 @@ def largest(each: Comparison, values: Sequence[float]) -> float:
 
 
 def ends(values: Sequence[float], t: float) -> tuple[float, float]:
-    """Of the interval of a mean: the union of Student's and of Hall's, whose cubic is solved here."""
-    count, mean, spread = len(values), fmean(values), stdev(values)
+    """Of the interval of a mean: the union of Student's and of Hall's, whose cubic is solved
+    here.
+    """
+    count = len(values)
+    mean = fmean(values)
+    spread = stdev(values)
     third = fmean([(value - mean) ** 3 for value in values]) / spread**3
     k = third * count**2 / ((count - 1) * (count - 2)) / math.sqrt(count) if count > 2 else 0.0
 
     def solved(wanted: float) -> float:
-        return float(brentq(lambda x: x + k * (2 * x * x + 1) / 6 + k * k * x**3 / 27 - wanted, -1e4, 1e4))
+        return float(
+            brentq(lambda x: x + k * (2 * x * x + 1) / 6 + k * k * x**3 / 27 - wanted, -1e4, 1e4)
+        )
 
     error = spread / math.sqrt(count)
     return mean - error * max(t, solved(t)), mean - error * min(-t, solved(-t))
@@ -120,10 +148,14 @@ def ends(values: Sequence[float], t: float) -> tuple[float, float]:
 
 def t_quantile(level: float, freedom: int) -> float:
     """Of Student's t, by integrating its density."""
-    scale = math.exp(math.lgamma((freedom + 1) / 2) - math.lgamma(freedom / 2)) / math.sqrt(freedom * math.pi)
+    scale = math.exp(math.lgamma((freedom + 1) / 2) - math.lgamma(freedom / 2)) / math.sqrt(
+        freedom * math.pi
+    )
 
     def missing(x: float) -> float:
-        below = quad(lambda u: scale * (1 + u * u / freedom) ** (-(freedom + 1) / 2), 0.0, x, epsabs=1e-13)
+        below = quad(
+            lambda u: scale * (1 + u * u / freedom) ** (-(freedom + 1) / 2), 0.0, x, epsabs=1e-13
+        )
         return float(0.5 + below[0] - level)
 
     return float(brentq(missing, 0.0, 100.0, xtol=1e-12))
@@ -139,18 +171,27 @@ def held(finished: Finished) -> list[Claim]:
 def never_slower(finished: Finished) -> list[Claim]:
     """Law 4."""
     slower = finished.findings.slower
-    return [at_most("statistics: slower with joints of their own laws, objective time", slower, "", 0.0)]
+    return [
+        at_most("statistics: slower with joints of their own laws, objective time", slower, "", 0.0)
+    ]
 
 
 def resampled(finished: Finished) -> None:
-    """How often the interval of the mean holds where pairs are drawn from the differences of a study."""
+    """How often the interval of the mean holds where pairs are drawn from the differences of a
+    study.
+    """
     rng = np.random.default_rng(5)
     for each in finished.findings.comparisons:
-        if each.name not in ("duration", "energy, direct") or each.pairs < 2 or math.isnan(each.mean.low):
+        if (
+            each.name not in ("duration", "energy, direct")
+            or each.pairs < 2
+            or math.isnan(each.mean.low)
+        ):
             continue
         row: dict[str, object] = {"held of 90 %": each.name}
         for count in COUNTS:
-            drawn, t = rng.choice(each.values, (SAMPLES, count)), t_quantile(0.95, count - 1)
+            drawn = rng.choice(each.values, (SAMPLES, count))
+            t = t_quantile(0.95, count - 1)
             found = [ends(values, t) for values in drawn.tolist() if max(values) > min(values)]
             inside = [low <= each.mean.value <= high for low, high in found]
             row[f"{count} pairs"] = 100.0 * sum(inside) / SAMPLES
@@ -158,23 +199,34 @@ def resampled(finished: Finished) -> None:
 
 
 def simulated() -> None:
-    """How often the interval of the mean holds that of a distribution, and Student's (bracketed)."""
+    """How often the interval of the mean holds that of a distribution, and Student's
+    (bracketed).
+    """
     rng = np.random.default_rng(1)
     drawn: dict[str, tuple[float, Callable[[tuple[int, int]], FloatArray]]] = {
         "normal": (0.0, lambda size: rng.normal(size=size)),
         "t of 3": (0.0, lambda size: rng.standard_t(3.0, size)),
         "exponential": (1.0, lambda size: rng.exponential(size=size)),
         "lognormal": (math.exp(0.5), lambda size: rng.lognormal(size=size)),
-        "a third zeros": (2 / 3, lambda size: rng.exponential(size=size) * (rng.random(size) > 1 / 3)),
-        "three quarters zeros": (0.25, lambda size: rng.exponential(size=size) * (rng.random(size) < 0.25)),
+        "a third zeros": (
+            2 / 3,
+            lambda size: rng.exponential(size=size) * (rng.random(size) > 1 / 3),
+        ),
+        "three quarters zeros": (
+            0.25,
+            lambda size: rng.exponential(size=size) * (rng.random(size) < 0.25),
+        ),
     }
     for name, (truth, draw) in drawn.items():
         row: dict[str, object] = {"held of 90 %": name}
         for count in SIZES:
             samples = [values for values in draw((SIMULATED, count)) if not alike(values)]
-            found, t = [mean_of(values) for values in samples], t_quantile(0.95, count - 1)
+            found = [mean_of(values) for values in samples]
+            t = t_quantile(0.95, count - 1)
             halves = [t * values.std(ddof=1) / math.sqrt(count) for values in samples]
             held = fmean(one.low <= truth <= one.high for one in found)
-            student = fmean(abs(one.value - truth) <= half for one, half in zip(found, halves, strict=True))
+            student = fmean(
+                abs(one.value - truth) <= half for one, half in zip(found, halves, strict=True)
+            )
             row[f"of {count}"] = f"{100.0 * held:.1f} ({100.0 * student:.1f})"
         print(line_of(row), flush=True)

@@ -1,4 +1,6 @@
-"""Random paths of the tool in a cell, and an oracle that looks for somebody who can drive a path."""
+"""Random paths of the tool in a cell, and an oracle that looks for somebody who can drive a
+path.
+"""
 
 from __future__ import annotations
 
@@ -17,21 +19,31 @@ from ir_planner.cartesian.tool_path import ToolPath
 from ir_planner.scene import PlanningScene
 
 MARGIN = 0.02  # m
-_LENGTHS, _SPEEDS = (0.15, 0.9), (0.05, 0.4)  # m, m/s
+# m, m/s
+_LENGTHS = (0.15, 0.9)
+_SPEEDS = (0.05, 0.4)
 _TURN = np.radians(30.0)
 _DRAWS = 40  # of the oracle
-_STEP, _JUMP = 5e-3, 0.2  # m between its samples, rad between two of them
-_FINE_STEP, _FINE_DRAWS = 6e-4, 2  # m, where axes jump, and in how many draws
+# m between its samples, rad between two of them
+_STEP = 5e-3
+_JUMP = 0.2
+# m, where axes jump, and in how many draws
+_FINE_STEP = 6e-4
+_FINE_DRAWS = 2
 _BEND = 0.3  # rad
 _SLOWER = 0.9  # of the tolerance of the speed
-_ERROR, _TURNED = 1e-4, 1e-2  # m that the tool may be off the path, and rad
-_SHORTEST, _RAMPS = 0.02, 9  # s of a ramp, and how many are tried at each end
+# m that the tool may be off the path, and rad
+_ERROR = 1e-4
+_TURNED = 1e-2
+# s of a ramp, and how many are tried at each end
+_SHORTEST = 0.02
+_RAMPS = 9
 _ASKED = 100  # configurations at which torque is asked for
 
 
 def random_path(rng: np.random.Generator, scene: PlanningScene) -> CartesianPath:
-    """A path whose ends can be reached without collision: line, circle, spline or corner, the angle about the
-    tool's axis free or not.
+    """A path whose ends can be reached without collision: line, circle, spline or corner, the angle
+    about the tool's axis free or not.
     """
     while True:
         path = _drawn(rng, scene)
@@ -50,7 +62,11 @@ def _drawn(rng: np.random.Generator, scene: PlanningScene) -> CartesianPath:
     start = scene.chain.tcp_poses(rng.uniform(robot.position_min, robot.position_max)[None])[0]
     ahead, aside, _ = Rotation.random(random_state=rng).as_matrix()
     length = rng.uniform(*_LENGTHS)
-    turn = rng.uniform(0.0, _TURN) * rng.integers(0, 2) * Rotation.random(random_state=rng).as_matrix()[0]
+    turn = (
+        rng.uniform(0.0, _TURN)
+        * rng.integers(0, 2)
+        * Rotation.random(random_state=rng).as_matrix()[0]
+    )
 
     def pose(share: float, off: float) -> FloatArray:
         result = np.array(start)
@@ -58,7 +74,8 @@ def _drawn(rng: np.random.Generator, scene: PlanningScene) -> CartesianPath:
         result[:3, :3] = start[:3, :3] @ Rotation.from_rotvec(share * turn).as_matrix()
         return result
 
-    kind, off = rng.integers(0, 4), rng.uniform(0.05, 0.4)
+    kind = rng.integers(0, 4)
+    off = rng.uniform(0.05, 0.4)
     segments: tuple[CartesianSegment, ...]
     if kind == 0:
         segments = (CartesianSegment("line", (pose(1.0, 0.0),)),)
@@ -68,7 +85,9 @@ def _drawn(rng: np.random.Generator, scene: PlanningScene) -> CartesianPath:
         inner = [pose(share, rng.uniform(-0.15, 0.15)) for share in (0.3, 0.6)]
         segments = (CartesianSegment("spline", (*inner, pose(1.0, 0.0))),)
     else:
-        segments = tuple(CartesianSegment("line", (one,)) for one in (pose(0.5, off), pose(1.0, 0.0)))
+        segments = tuple(
+            CartesianSegment("line", (one,)) for one in (pose(0.5, off), pose(1.0, 0.0))
+        )
     return CartesianPath(
         start,
         segments,
@@ -79,9 +98,10 @@ def _drawn(rng: np.random.Generator, scene: PlanningScene) -> CartesianPath:
 
 
 def oracle(path: CartesianPath, scene: PlanningScene, rng: np.random.Generator) -> bool:
-    """Whether some configuration, followed from the start with an angle that is constant, changes evenly or
-    bends, keeps to the path, axis limits, distances, speeds, accelerations and torque from rest to rest, at
-    the speed asked for or as much slower as its tolerance allows. Where axes jump, samples are closer.
+    """Whether some configuration, followed from the start with an angle that is constant, changes
+    evenly or bends, keeps to the path, axis limits, distances, speeds, accelerations and torque
+    from rest to rest, at the speed asked for or as much slower as its tolerance allows. Where axes
+    jump, samples are closer.
 
     It keeps the reserve of torque that the planner leaves to the feedback in every movement.
     """
@@ -110,7 +130,8 @@ def _driven(
     s = np.linspace(0.0, whole.length, max(int(whole.length / step), 20))
     angle = PchipInterpolator(np.linspace(0.0, whole.length, len(values)), values)
     middle = 0.5 * (s[1:] + s[:-1])
-    poses, between = _turned(whole, s, angle), _turned(whole, middle, angle)
+    poses = _turned(whole, s, angle)
+    between = _turned(whole, middle, angle)
     found = scene.inverse_kinematics.solve(poses)
     sets = [found.of_pose(k) for k in range(len(s))]
     slowest = path.tool_speed * (1.0 - _SLOWER * path.speed_tolerance)
@@ -150,7 +171,9 @@ def _followed(q: FloatArray, sets: list[FloatArray]) -> FloatArray | None:
 
 
 def _drivable(q: FloatArray, s: FloatArray, speed: float, scene: PlanningScene) -> bool:
-    """Whether the chain is free and can be driven from rest to rest, with one of some ramps at each end."""
+    """Whether the chain is free and can be driven from rest to rest, with one of some ramps at each
+    end.
+    """
     if not scene.collision.is_free(q, scene.thresholds(MARGIN)).all():
         return False
     if any(np.abs(b - a).max() > _JUMP for a, b in itertools.pairwise(q)):
@@ -158,24 +181,32 @@ def _drivable(q: FloatArray, s: FloatArray, speed: float, scene: PlanningScene) 
     spline = make_interp_spline(s, q, k=5)
     ramps = np.geomspace(_SHORTEST, max(s[-1] / speed, 2.0 * _SHORTEST), _RAMPS)
     return all(
-        any(_within(_half(spline, s[-1], speed, ramp, back), scene) for ramp in ramps) for back in (0, 1)
+        any(_within(_half(spline, s[-1], speed, ramp, back), scene) for ramp in ramps)
+        for back in (0, 1)
     )
 
 
 def _half(
     spline: BSpline, length: float, speed: float, ramp: float, back: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """q and its derivatives by time (M, n) from one end to the middle, speed rising as 3 x^2 - 2 x^3."""
+    """q and its derivatives by time (M, n) from one end to the middle, speed rising as 3 x^2 - 2
+    x^3.
+    """
     x = np.linspace(0.0, 1.0, _ASKED)
-    v, a, j = speed * x**2 * (3 - 2 * x), speed / ramp * 6 * x * (1 - x), speed / ramp**2 * (6 - 12 * x)
+    v = speed * x**2 * (3 - 2 * x)
+    a = speed / ramp * 6 * x * (1 - x)
+    j = speed / ramp**2 * (6 - 12 * x)
     at = speed * ramp * x**3 * (1.0 - 0.5 * x)
     even = np.linspace(at[-1], max(0.5 * length, at[-1]), _ASKED)
-    at, v = np.concatenate([at, even]), np.concatenate([v, np.full(_ASKED, speed)])
+    at = np.concatenate([at, even])
+    v = np.concatenate([v, np.full(_ASKED, speed)])
     a, j = (np.concatenate([one, np.zeros(_ASKED)])[:, None] for one in (a, j))
     if at[-1] > length:  # the ramp is longer than the path
         return tuple(np.full((1, spline.c.shape[1]), np.inf) for _ in range(4))  # type: ignore[return-value]
     sign = -1.0 if back else 1.0  # a stop is a start back in time, with speed and jerk turned round
-    q, first, second, third = (spline(length - at if back else at, nu=k) * sign**k for k in range(4))
+    q, first, second, third = (
+        spline(length - at if back else at, nu=k) * sign**k for k in range(4)
+    )
     v = v[:, None]
     return (
         q,
@@ -185,7 +216,9 @@ def _half(
     )
 
 
-def _within(motion: tuple[FloatArray, FloatArray, FloatArray, FloatArray], scene: PlanningScene) -> bool:
+def _within(
+    motion: tuple[FloatArray, FloatArray, FloatArray, FloatArray], scene: PlanningScene
+) -> bool:
     q, qd, qdd, qddd = motion
     robot = scene.cell.robot
     bounds = ((qd, robot.velocity_max), (qdd, robot.acceleration_max), (qddd, robot.jerk_max))

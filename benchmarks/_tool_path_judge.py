@@ -1,5 +1,5 @@
-"""A judge of paths of the tool that shares nothing with the planner: places by formulas of its own, the tool
-by Pinocchio, its speed by differences.
+"""A judge of paths of the tool that shares nothing with the planner: places by formulas of its own,
+the tool by Pinocchio, its speed by differences.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ _CUBIC = 4  # places from which on a spline is cubic
 
 @dataclass(frozen=True)
 class Seen:
-    """error [m]: largest distance from the path outside rounded corners; axis [rad]: largest angle between
-    the tool's axis and the one asked for, on single lines; speed: by what share the tool is off its speed.
+    """error [m]: largest distance from the path outside rounded corners; axis [rad]: largest angle
+    between the tool's axis and the one asked for, on single lines; speed: by what share the tool is
+    off its speed.
     """
 
     error: float
@@ -44,7 +45,9 @@ def places(segment: CartesianSegment, start: FloatArray) -> FloatArray:
     u = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ends, axis=0), axis=1))])
     fine = np.linspace(0.0, u[-1], 2 * _count(ends))
     if len(ends) < _CUBIC:
-        return np.column_stack([np.polyval(np.polyfit(u, axis, 2), fine) for axis in np.transpose(ends)])
+        return np.column_stack(
+            [np.polyval(np.polyfit(u, axis, 2), fine) for axis in np.transpose(ends)]
+        )
     return np.asarray(CubicSpline(u, np.array(ends))(fine))
 
 
@@ -71,7 +74,9 @@ def seen(trajectory: JointTrajectory, path: CartesianPath, scene: PlanningScene)
     """What a trajectory makes of a path without approach and retract."""
     times = np.arange(0.0, trajectory.duration, 1.0 / _RATE)
     tcp = _tool(trajectory.sample(times).q, scene)
-    whole, corners, start = [], [], path.start[:3, 3]
+    whole = []
+    corners = []
+    start = path.start[:3, 3]
     for segment in path.segments:
         whole.append(places(segment, start))
         start = segment.poses[-1][:3, 3]
@@ -88,7 +93,8 @@ def seen(trajectory: JointTrajectory, path: CartesianPath, scene: PlanningScene)
 def _tool(q: FloatArray, scene: PlanningScene) -> FloatArray:
     """Poses (M, 4, 4) of the tcp by Pinocchio."""
     model = pinocchio_arm(scene.cell.robot, (), scene.cell.base_pose)
-    data, found = model.createData(), np.empty((len(q), 4, 4))
+    data = model.createData()
+    found = np.empty((len(q), 4, 4))
     for k, one in enumerate(q):
         pinocchio.forwardKinematics(model, data, one)
         found[k] = data.oMi[model.njoints - 1].homogeneous
@@ -100,7 +106,8 @@ def _from_polyline(points: FloatArray, dense: FloatArray) -> tuple[FloatArray, F
     steps = np.linalg.norm(np.diff(dense, axis=0), axis=1)
     length = np.concatenate([[0.0], np.cumsum(steps)])
     nearest = cKDTree(dense).query(points)[1]
-    best, along = np.full(len(points), np.inf), np.zeros(len(points))
+    best = np.full(len(points), np.inf)
+    along = np.zeros(len(points))
     for shift in (-1, 0):
         k = np.clip(nearest + shift, 0, len(dense) - 2)
         edge = dense[k + 1] - dense[k]

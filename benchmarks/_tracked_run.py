@@ -1,8 +1,10 @@
-"""A plant that follows its commands exactly, in batch: what a recording of it would hold, in seconds.
+"""A plant that follows its commands exactly, in batch: what a recording of it would hold, in
+seconds.
 
-Torques by the kernels' inverse dynamics with the plant's masses, rotors and spring, friction by formulas of
-this module (docs/plant.md) with gears that warm up; drives, DC link and meter are the driver's own. Without a
-controller there is no tracking error; `_truth_fit` compares one plant with the stepped driver.
+Torques by the kernels' inverse dynamics with the plant's masses, rotors and spring, friction by
+formulas of this module (docs/plant.md) with gears that warm up; drives, DC link and meter are the
+driver's own. Without a controller there is no tracking error; `_truth_fit` compares one plant with
+the stepped driver.
 """
 
 from __future__ import annotations
@@ -42,15 +44,19 @@ class _Stretch:
 
 
 class TrackedRun:
-    """One plant in one cell and what its meter and encoders read; the same calls as `SimulatedRun`."""
+    """One plant in one cell and what its meter and encoders read; the same calls as
+    `SimulatedRun`.
+    """
 
     def __init__(self, cell: Cell, plant: Plant, load: str) -> None:
-        self.cell, self.plant = cell, plant
+        self.cell = cell
+        self.plant = plant
         self.command = np.array(cell.machine_home)
         self._load = load
         self._loads: dict[str, tuple[Load, ...]] = {}
         self._models: dict[str, DynamicsModel] = {}
-        self._base, self._meter = BasePower(plant.watts), PowerMeter(plant, DT)
+        self._base = BasePower(plant.watts)
+        self._meter = PowerMeter(plant, DT)
         self._temperature: FloatArray = np.array(plant.gears.start)
         self._runs: list[tuple[float, float, str]] = [(0.0, np.inf, load)]
         self._steps = 0
@@ -79,8 +85,11 @@ class TrackedRun:
         return began, began + trajectory.duration
 
     def energy(self, trajectory: JointTrajectory) -> float:
-        """J at the mains that a movement from rest takes, of no other consequence than that gears warm up."""
-        stretch, meter = self._along(trajectory), PowerMeter(self.plant, DT)
+        """J at the mains that a movement from rest takes, of no other consequence than that gears
+        warm up.
+        """
+        stretch = self._along(trajectory)
+        meter = PowerMeter(self.plant, DT)
         torque, base, tool = self._torques(stretch), *self._standing(stretch)
         meter.add(base, tool, True, len(torque))
         meter.settle(Work(stretch.qd, torque))
@@ -102,7 +111,8 @@ class TrackedRun:
 
     def samples(self, modes: Sequence[str]) -> Samples:
         """All readings on one grid."""
-        names, q = self.cell.robot.joint_names, np.concatenate(self._q)
+        names = self.cell.robot.joint_names
+        q = np.concatenate(self._q)
         count = 2.0 * np.pi / COUNTS / np.array(self.cell.robot.gear_ratio)
         q = np.rint(q / count) * count
         columns = {name: q[:, k].copy() for k, name in enumerate(names)}
@@ -115,7 +125,8 @@ class TrackedRun:
     def _pass(self, stretch: _Stretch) -> None:
         """Let a stretch take place: torques, then the meter, reading by reading."""
         torque, base, tool = self._torques(stretch), *self._standing(stretch)
-        count, on = len(torque), stretch.mode is Mode.STAND_ON_MOTORS
+        count = len(torque)
+        on = stretch.mode is Mode.STAND_ON_MOTORS
         for first in range(0, count, READING):
             rows = slice(first, min(first + READING, count))
             steps = rows.stop - rows.start
@@ -143,12 +154,15 @@ class TrackedRun:
 
     def _torques(self, stretch: _Stretch) -> FloatArray:
         """Motor torque (N, n) [Nm] at the joints; warms the gears."""
-        q, qd, qdd = stretch.q, stretch.qd, stretch.qdd
+        q = stretch.q
+        qd = stretch.qd
+        qdd = stretch.qdd
         if stretch.mode is not Mode.STAND_ON_MOTORS:
             self._warm(np.zeros(q.shape[1]), len(q))
             return np.zeros_like(q)
         drive = self._model(stretch.load).inverse_dynamics(q, qd, qdd)
-        through, gears = drive - self.plant.robot.reflected_inertia * qdd, self.plant.gears
+        through = drive - self.plant.robot.reflected_inertia * qdd
+        gears = self.plant.gears
         share = np.where(through * qd >= 0.0, gears.load_driven, gears.load_back)
         near_rest = gears.stribeck * np.exp(-((qd / gears.stribeck_speed) ** 2))
         dry = (gears.coulomb + share * np.abs(through) + near_rest) * np.tanh(qd / _STILL)

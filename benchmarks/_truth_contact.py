@@ -1,7 +1,8 @@
 """Contact: what touches a machine stops and says so, what touches nothing doesn't. Judged by Coal.
 
-Trajectories are straight in the joints, from a free configuration to one that collides, or to a free one. The
-judge has its own kinematics and Coal's distances, at the recorded positions of the simulated robot.
+Trajectories are straight in the joints, from a free configuration to one that collides, or to a
+free one. The judge has its own kinematics and Coal's distances, at the recorded positions of the
+simulated robot.
 """
 
 from __future__ import annotations
@@ -25,8 +26,10 @@ from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import ErrorCode, Outcome, TrajectoryGoal
 
 TITLE = "contact with machines, floor and parts"
-TOUCHING, FREE = 100, 1000
-QUICK_TOUCHING, QUICK_FREE = 10, 20
+TOUCHING = 100
+FREE = 1000
+QUICK_TOUCHING = 10
+QUICK_FREE = 20
 SLOWLY = 5.0  # times the duration
 REACTION = 2.0  # ms from the first touch until the motors brake
 AGREED = 1e-4  # m between the judge's distances and those of the driver, of shapes that curve
@@ -37,8 +40,10 @@ class Judge:
     """Coal's distances of everything that can touch in `cell` with this load."""
 
     def __init__(self, simulation: Simulation) -> None:
-        cell, scene = simulation.cell, simulation.cell_watch.scene
-        self._robot, self._base = cell.robot, cell.base_pose
+        cell = simulation.cell
+        scene = simulation.cell_watch.scene
+        self._robot = cell.robot
+        self._base = cell.base_pose
         self._pairs = scene.model.pairs
         bodies = [*cell.bodies(), *simulation.cell_watch.lying]
         self._bodies = {body.name: (solid(body), _transform(body.pose)) for body in bodies}
@@ -54,7 +59,9 @@ class Judge:
         self._request.enable_signed_distance = True
 
     def least(self, q: FloatArray) -> tuple[float, set[str]]:
-        """Least distance [m] at q (n,) of the pairs whose bounding balls meet, and its pair; inf: none do."""
+        """Least distance [m] at q (n,) of the pairs whose bounding balls meet, and its pair; inf:
+        none do.
+        """
         poses = self._poses(q)
         near = [pair for pair in self._pairs if self._meet(pair[1], pair[2], poses)]
         found = [(self._distance(*pair, poses), {pair[1], pair[2]}) for pair in near]
@@ -89,7 +96,9 @@ class Judge:
 
     def _poses(self, q: FloatArray) -> list[FloatArray]:
         poses = [self._base]
-        for origin, axis, angle in zip(self._robot.joint_origin, self._robot.joint_axis, q, strict=True):
+        for origin, axis, angle in zip(
+            self._robot.joint_origin, self._robot.joint_axis, q, strict=True
+        ):
             turn = np.eye(4)
             turn[:3, :3] = Rotation.from_rotvec(angle * np.asarray(axis)).as_matrix()
             poses.append(poses[-1] @ np.asarray(origin) @ turn)
@@ -115,18 +124,25 @@ def measured(asked: Asked) -> Found:
     """Trajectories that touch and that don't, in all cells."""
     touching, free = (QUICK_TOUCHING, QUICK_FREE) if asked.quick else (TOUCHING, FREE)
     rng = np.random.default_rng(asked.seeds)
-    found, total, clear = Found(), Tally(), Tally()
+    found = Found()
+    total = Tally()
+    clear = Tally()
     for k, (name, load) in enumerate(places := _places(asked.cells)):
         simulation = make_simulation(name, load)
-        judge, share = Judge(simulation), slice(k, None, len(places))
+        judge = Judge(simulation)
+        share = slice(k, None, len(places))
         for number in range(touching)[share]:
             _touch(simulation, judge, rng, 1.0 if number % 2 else SLOWLY, total)
         for _ in range(free)[share]:
             _keep_clear(simulation, judge, rng, clear)
-        found.rows.append({"cell": name, "load": load, "touching": total.driven, "free": clear.driven})
+        found.rows.append(
+            {"cell": name, "load": load, "touching": total.driven, "free": clear.driven}
+        )
     found.claims.extend(
         [
-            at_least("touching trajectories: refused before the start", total.refused, "", total.driven),
+            at_least(
+                "touching trajectories: refused before the start", total.refused, "", total.driven
+            ),
             at_least("started all the same: stopped with CONTACT", total.stopped, "", total.driven),
             at_most("started all the same: ended SUCCESSFUL", total.successful, "", 0),
             at_least("pair named as Coal finds it", total.named, "", total.driven),
@@ -154,7 +170,8 @@ def _places(cells: Sequence[str]) -> list[tuple[str, str]]:
 
 def _configuration(simulation: Simulation, rng: np.random.Generator, free: bool) -> FloatArray:
     """A random one that is free by 20 mm, or that touches."""
-    model, robot = simulation.cell_watch.scene.model, simulation.robot
+    model = simulation.cell_watch.scene.model
+    robot = simulation.robot
     while True:
         q = rng.uniform(robot.position_min, robot.position_max, (64, robot.n))
         q[:, [3, 5]] *= 0.3  # whole turns of the wrist take long
@@ -164,11 +181,14 @@ def _configuration(simulation: Simulation, rng: np.random.Generator, free: bool)
             return np.asarray(q[good[0]])
 
 
-def _goal(simulation: Simulation, start: FloatArray, end: FloatArray, slower: float) -> TrajectoryGoal | None:
-    """Straight from rest to rest, as fast as the limits allow, or so many times slower; None where the robot
-    has not the torque.
+def _goal(
+    simulation: Simulation, start: FloatArray, end: FloatArray, slower: float
+) -> TrajectoryGoal | None:
+    """Straight from rest to rest, as fast as the limits allow, or so many times slower; None where
+    the robot has not the torque.
     """
-    robot, far = simulation.robot, np.abs(end - start)
+    robot = simulation.robot
+    far = np.abs(end - start)
     fastest = (
         float((1.9 * far / robot.velocity_max).max()),
         float(np.sqrt(5.8 * far / robot.acceleration_max).max()),
@@ -177,7 +197,9 @@ def _goal(simulation: Simulation, start: FloatArray, end: FloatArray, slower: fl
     for _ in range(8):
         rest = np.zeros((2, robot.n))
         times = np.array([0.0, T * slower])
-        path = JointTrajectory.from_seconds(robot.joint_names, times, np.array([start, end]), rest, rest)
+        path = JointTrajectory.from_seconds(
+            robot.joint_names, times, np.array([start, end]), rest, rest
+        )
         goal = TrajectoryGoal(path, allow_collision=True)
         try:
             simulation.vet(goal, 0)
@@ -242,7 +264,9 @@ def _touch(
     tally.depth = max(tally.depth, outcome.contact.depth * 1e3)
 
 
-def _keep_clear(simulation: Simulation, judge: Judge, rng: np.random.Generator, tally: Tally) -> None:
+def _keep_clear(
+    simulation: Simulation, judge: Judge, rng: np.random.Generator, tally: Tally
+) -> None:
     """A trajectory that the driver lets start: what the judge says of it."""
     while True:
         start, end = (_configuration(simulation, rng, True) for _ in range(2))

@@ -1,4 +1,6 @@
-"""The plant's equations against Pinocchio, and PyBullet's steps against another integration of the same."""
+"""The plant's equations against Pinocchio, and PyBullet's steps against another integration of the
+same.
+"""
 
 from __future__ import annotations
 
@@ -17,23 +19,28 @@ from ir_sim_driver import TrajectoryGoal, make_simulation
 from ir_sim_driver.plant import PyBulletBackend
 
 TITLE = "torques against Pinocchio, PyBullet's steps against an integration of its own"
-CELL, STATES = "open", 200
+CELL = "open"
+STATES = 200
 FINE = 4  # steps of the other integration per step of the plant
-TORQUE, POSITION = 1e-9, 1e-4  # relative, rad
+# relative, rad
+TORQUE = 1e-9
+POSITION = 1e-4
 
 
 class Equations:
-    """(H + J_r) dv/dt + h + friction - counterbalance = tau of the nominal plant, by Pinocchio and formulas
-    written once more.
+    """(H + J_r) dv/dt + h + friction - counterbalance = tau of the nominal plant, by Pinocchio and
+    formulas written once more.
     """
 
     def __init__(self, robot: RobotModel, loads: tuple[Load, ...], base_pose: FloatArray) -> None:
-        self.robot, self.model = robot, pinocchio_arm(robot, loads, base_pose)
+        self.robot = robot
+        self.model = pinocchio_arm(robot, loads, base_pose)
         self.data = self.model.createData()
 
     def resistance(self, q: FloatArray, v: FloatArray) -> FloatArray:
         """Friction less counterbalance (n,) [Nm]."""
-        r, c = self.robot, self.robot.counterbalance
+        r = self.robot
+        c = self.robot.counterbalance
         torque: FloatArray = r.friction_viscous * v + r.friction_coulomb * np.tanh(v / 1e-3)
         if c is not None:
             turn = np.exp(1j * q[c.joint])  # z + ix turns by +q about +y
@@ -64,7 +71,9 @@ def measured(asked: Asked) -> Found:
     simulation = make_simulation(cell)
     assert isinstance(simulation.backend, PyBulletBackend)
     equations = Equations(cell.robot, loads, np.array(cell.base_pose))
-    rng, worst, robot = np.random.default_rng(0), 0.0, cell.robot
+    rng = np.random.default_rng(0)
+    worst = 0.0
+    robot = cell.robot
     for _ in range(STATES):
         q = rng.uniform(robot.position_min, robot.position_max)
         v, a = rng.uniform(-1.0, 1.0, (2, robot.n)) * [robot.velocity_max, robot.acceleration_max]
@@ -72,16 +81,23 @@ def measured(asked: Asked) -> Found:
         off = np.abs(simulation.backend.required_torque(q, v, a) - want).max()
         worst = max(worst, float(off / np.abs(want).max()))
     rows: list[dict[str, Any]] = []
-    chosen = [each.movement for each in predicted(CELL) if each.movement.load == simulation.load.text]
+    chosen = [
+        each.movement for each in predicted(CELL) if each.movement.load == simulation.load.text
+    ]
     for movement in chosen[: 2 if asked.quick else 10]:
         apart = _apart(equations, simulation, movement.trajectory)
-        rows.append({"movement": movement.name, "s": movement.trajectory.duration, "apart_rad": apart})
+        rows.append(
+            {"movement": movement.name, "s": movement.trajectory.duration, "apart_rad": apart}
+        )
     return Found(
         rows,
         [
             at_most(f"plant's torque against Pinocchio, {STATES} states", worst, "", TORQUE),
             at_most(
-                "PyBullet against another integration", max(r["apart_rad"] for r in rows), "rad", POSITION
+                "PyBullet against another integration",
+                max(r["apart_rad"] for r in rows),
+                "rad",
+                POSITION,
             ),
         ],
     )
@@ -89,19 +105,23 @@ def measured(asked: Asked) -> Found:
 
 def _apart(equations: Equations, simulation: Any, trajectory: Any) -> float:
     """Largest difference [rad] of the two integrations under the same motor torques."""
-    backend, dt = simulation.backend, simulation.settings.dt
+    backend = simulation.backend
+    dt = simulation.settings.dt
     start = np.array(trajectory.positions[0])
     backend.reset(start)
     simulation.executor.hold(start)
     simulation.run(0.5)
     simulation.execute(simulation.vet(TrajectoryGoal(trajectory), 0), 0)
-    q, v = backend.q.copy(), backend.qd.copy()
-    torques, positions = [], []
+    q = backend.q.copy()
+    v = backend.qd.copy()
+    torques = []
+    positions = []
     while not simulation.take_outcomes():
         simulation.step()
         torques.append(backend.torque)
         positions.append(backend.q)
-    worst, h = 0.0, dt / FINE
+    worst = 0.0
+    h = dt / FINE
     # a step's torque acts at its begin: half a step before and half a step after it in the mean
     ramps = zip(torques, [*torques[1:], torques[-1]], positions, strict=True)
     for now, then, reached in ramps:
@@ -110,12 +130,15 @@ def _apart(equations: Equations, simulation: Any, trajectory: Any) -> float:
             middle = v + 0.5 * h * _implicit(equations, q, v, tau, 0.5 * h)
             q_middle = q + 0.5 * h * v
             a = _implicit(equations, q_middle, v, tau, h)
-            q, v = q + h * middle, v + h * a
+            q = q + h * middle
+            v = v + h * a
         worst = max(worst, float(np.abs(q - reached).max()))
     return worst
 
 
-def _implicit(equations: Equations, q: FloatArray, v: FloatArray, tau: FloatArray, h: float) -> FloatArray:
+def _implicit(
+    equations: Equations, q: FloatArray, v: FloatArray, tau: FloatArray, h: float
+) -> FloatArray:
     """Acceleration over a step of h that ends at the speed at which the friction acts."""
     a = equations.acceleration(q, v, tau)
     for _ in range(3):

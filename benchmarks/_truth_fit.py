@@ -1,9 +1,12 @@
-"""Predicted against measured energy on typical plants, before and after a fit on a programme of excitation.
+"""Predicted against measured energy on typical plants, before and after a fit on a programme of
+excitation.
 
-Each plant drives the programme that `ir energy excite` plans for the cell; its watts are fitted. Then it
-drives movements that the fit has not seen: those of the cell's program. Everything that is called measured is
-measured on the simulated plant. The plants follow their commands exactly (`_tracked_run`: seconds each
-instead of minutes); STEPPED of them are stepped with controller and encoders as well, and compared.
+Each plant drives the programme that `ir energy excite` plans for the cell; its watts are fitted.
+Then it
+drives movements that the fit has not seen: those of the cell's program. Everything that is called
+measured is measured on the simulated plant. The plants follow their commands exactly
+(`_tracked_run`: seconds each instead of minutes); STEPPED of them are stepped with controller and
+encoders as well, and compared.
 """
 
 from __future__ import annotations
@@ -39,13 +42,18 @@ from ir_studies.simulated_run import SimulatedRun
 
 TITLE = "energy before and after a fit, on plants drawn at random"
 CELL = "demo"
-FULL, QUICK = Excitation(seconds=180.0), Excitation(seconds=25.0, postures=1)
+FULL = Excitation(seconds=180.0)
+QUICK = Excitation(seconds=25.0, postures=1)
 DRAWS = 200
 STEPPED = 1  # plants
 SETTLING = 1.0  # s after a movement: the capacitors give their charge to the holding torque
 STEPPED_WITHIN = 1.0  # % of the energy of a movement
 WINDOW = 0.1  # s: of the root mean square of the power's error
-MEDIAN, WORST, POWER, COVERED = 2.0, 5.0, 4.0, (80.0, 97.0)  # %
+# %
+MEDIAN = 2.0
+WORST = 5.0
+POWER = 4.0
+COVERED = (80.0, 97.0)
 
 
 @dataclass(frozen=True)
@@ -58,12 +66,15 @@ class Test:
 
 def measured(asked: Asked) -> Found:
     """Errors of energies and powers over the plants, and how often the interval holds."""
-    planner, prior = planner_in(CELL, PlannerSettings()), data_sheet()
+    planner = planner_in(CELL, PlannerSettings())
+    prior = data_sheet()
     programme = plan_programme(planner, prior, QUICK if asked.quick else FULL)
     tests = [Test(m.trajectory, m.load) for m in movements_of(planner)]
     tests = [_to_first(planner, tests[0]), *tests]
     loads = {*(test.load for test in tests), *(step.load for step in programme.steps)}
-    rig = _Rig(planner.cell, prior, programme, tests, {load: planner.scene(load).loads for load in loads})
+    rig = _Rig(
+        planner.cell, prior, programme, tests, {load: planner.scene(load).loads for load in loads}
+    )
     plants: list[Plant] = over_seeds(rig.plant, range(asked.seeds))
     off = [] if asked.quick else over_seeds(rig.stepped, range(min(STEPPED, asked.seeds)))
     return Found([plant.row() for plant in plants], [*_claims(plants), *_stepped_claims(off)])
@@ -79,7 +90,9 @@ def _to_first(planner: Planner, first: Test) -> Test:
 
 @dataclass(frozen=True)
 class Plant:
-    """One typical plant: its tests before and after the fit, errors as shares of what was measured."""
+    """One typical plant: its tests before and after the fit, errors as shares of what was
+    measured.
+    """
 
     seed: int
     seconds: float
@@ -94,7 +107,10 @@ class Plant:
         row: dict[str, Any] = {"plant": f"typical:{self.seed}", "fitted s": self.seconds}
         for name, errors in self.errors.items():
             sizes = 100.0 * np.abs(errors)
-            row |= {f"{name} median %": float(np.median(sizes)), f"{name} worst %": float(sizes.max())}
+            row |= {
+                f"{name} median %": float(np.median(sizes)),
+                f"{name} worst %": float(sizes.max()),
+            }
             row[f"{name} covered %"] = 100.0 * float(np.mean(self.covered[name]))
         row |= {"power rms %": 100.0 * float(np.median(self.power)), "width %": 100.0 * self.width}
         return row | {"determined": self.determined}
@@ -117,14 +133,17 @@ class _Rig:
         found = fit(samples.part(0.0, end), model, self.prior)
         errors: dict[str, list[float]] = {"before": [], "after": []}
         covered: dict[str, list[bool]] = {"before": [], "after": []}
-        power, widths = [], []
+        power = []
+        widths = []
         for test, span in zip(self.tests, spans, strict=True):
             part = samples.part(*span)
             watts = float(part.watts.mean())
             planned = planned_samples(test.trajectory, self.held[test.load], self.prior.modes)
             prepared = model.prepare(planned)
             for name, each in (("before", self.prior), ("after", found.parameters)):
-                drawn = np.array([model.watts(draw, prepared).mean() for draw in each.draws(DRAWS, 0)])
+                drawn = np.array(
+                    [model.watts(draw, prepared).mean() for draw in each.draws(DRAWS, 0)]
+                )
                 expected = float(model.watts(each.mean, prepared).mean())
                 low, high = interval_over(expected, drawn - expected)
                 errors[name].append(expected / watts - 1.0)
@@ -141,14 +160,15 @@ class _Rig:
         return PowerModel(self.cell.robot, link, self.cell.base_pose, self.prior)
 
     def followed(self, seed: int) -> tuple[Samples, float, list[tuple[float, float]]]:
-        """What a plant that follows exactly shows, when the programme ended, and from start to end of each
-        test [s].
+        """What a plant that follows exactly shows, when the programme ended, and from start to end
+        of each test [s].
         """
         plant = typical_plant(self.cell.robot, load_power_data(self.prior.controller), seed)
         run = TrackedRun(self.cell, plant, self.programme.steps[0].load)
         for step in self.programme.steps:
             run.follow(step, self.held[step.load])
-        end, spans = run.time, []
+        end = run.time
+        spans = []
         for test in self.tests:
             run.hold(test.load, self.held[test.load])
             spans.append(run.drive(test.trajectory))
@@ -165,7 +185,8 @@ class _Rig:
             run.hold(test.load)
             spans.append(run.drive(test.trajectory))
             run.advance(SETTLING)
-        trace, runs = run.trace(), [(-np.inf, np.inf, ())]
+        trace = run.trace()
+        runs = [(-np.inf, np.inf, ())]
         stepped = samples_of(trace, trace, self.prior.joints, self.prior.modes, runs)
         samples, _, others = self.followed(seed)
         return [
@@ -191,7 +212,9 @@ def _claims(plants: list[Plant]) -> list[Claim]:
         at_most("energy of a movement after the fit, worst", float(after.max()), "%", WORST),
         at_most(f"power rms over {WINDOW:g} s after the fit, of the mean", power, "%", POWER),
         at_least("movements within the 90 % interval after the fit", covered, "%", COVERED[0]),
-        at_most("movements within the 90 % interval after the fit, not more", covered, "%", COVERED[1]),
+        at_most(
+            "movements within the 90 % interval after the fit, not more", covered, "%", COVERED[1]
+        ),
     ]
 
 

@@ -1,7 +1,8 @@
-"""Do the 90 % intervals that the planner gives before any measurement hold what typical plants draw?
+"""Do the 90 % intervals that the planner gives before any measurement hold what typical plants
+draw?
 
-The plants are drawn by the driver's own rules (docs/plant.md), which the planner's assumptions do not know;
-they follow the commands exactly (`_tracked_run`).
+The plants are drawn by the driver's own rules (docs/plant.md), which the planner's assumptions do
+not know; they follow the commands exactly (`_tracked_run`).
 """
 
 from __future__ import annotations
@@ -22,20 +23,30 @@ from ir_sim_driver.plant import typical_plant
 
 TITLE = "90 % intervals before any measurement, against simulated energies of typical plants"
 QUICK = ("open",)
-LEAST, MOST = 0.80, 0.97  # share of energies that lie within
+# share of energies that lie within
+LEAST = 0.80
+MOST = 0.97
 
 
 def measured(asked: Asked) -> Found:
     """A row for each plant: which share of its movements lies within, below and above."""
     every = all_predicted(QUICK if asked.quick else asked.cells)
     bounds = [_interval(each) for each in every]
-    rows: list[dict[str, Any]] = over_seeds(lambda seed: _held(every, bounds, seed), range(asked.seeds))
+    rows: list[dict[str, Any]] = over_seeds(
+        lambda seed: _held(every, bounds, seed), range(asked.seeds)
+    )
     within = float(np.mean([row["within"] for row in rows]))
     widths = [(b.high - b.low) / each.energy for b, each in zip(bounds, every, strict=True)]
     rows.append(
-        {"plant": "all", "parameters": load_power_parameters().name, "width": float(np.median(widths))}
+        {
+            "plant": "all",
+            "parameters": load_power_parameters().name,
+            "width": float(np.median(widths)),
+        }
     )
-    name = f"energies of {asked.seeds} typical plants within the 90 % interval before any measurement"
+    name = (
+        f"energies of {asked.seeds} typical plants within the 90 % interval before any measurement"
+    )
     return Found(rows, [at_least(name, within, "", LEAST), at_most(name, within, "", MOST)])
 
 
@@ -47,10 +58,12 @@ def _interval(each: Predicted) -> Interval:
 
 def _held(every: list[Predicted], bounds: list[Interval], seed: int) -> dict[str, Any]:
     plants: dict[str, TrackedRun] = {}
-    low, high = np.array([b.low for b in bounds]), np.array([b.high for b in bounds])
+    low = np.array([b.low for b in bounds])
+    high = np.array([b.high for b in bounds])
     found = []
     for each in every:
-        movement, cell = each.movement, each.movement.cell
+        movement = each.movement
+        cell = each.movement.cell
         if cell.name not in plants:
             plant = typical_plant(cell.robot, load_power_data(), seed)
             plants[cell.name] = TrackedRun(cell, plant, movement.load)
@@ -63,4 +76,6 @@ def _held(every: list[Predicted], bounds: list[Interval], seed: int) -> dict[str
         "below": np.mean(energy < low),
         "above": np.mean(energy > high),
     }
-    return {"plant": f"typical:{seed}", "movements": len(every)} | {k: float(v) for k, v in shares.items()}
+    return {"plant": f"typical:{seed}", "movements": len(every)} | {
+        k: float(v) for k, v in shares.items()
+    }

@@ -1,9 +1,10 @@
 """Is a load noticed that is not the declared one, and never one that is?
 
-Torques of drawn plants come from their own masses and gears, by formulas of this module, in batch; what they
-are weighed with is the driver's check. Movements go from rest to rest, at random speeds. The friction of axes
-that stand is drawn too: whatever holds them, up to `_HOLDS` of their Coulomb friction. A few of the movements
-are driven by the stepped driver (`_driven_loads`).
+Torques of drawn plants come from their own masses and gears, by formulas of this module, in batch;
+what they are weighed with is the driver's check. Movements go from rest to rest, at random speeds.
+The friction of axes
+that stand is drawn too: whatever holds them, up to `_HOLDS` of their Coulomb friction. A few of the
+movements are driven by the stepped driver (`_driven_loads`).
 """
 
 from __future__ import annotations
@@ -18,19 +19,30 @@ from _over_seeds import over_seeds
 from _results import Claim, at_least, at_most
 from _truth_section import Asked, Found
 
-from ir_description import Cell, Load, PowerParameters, data_sheet, load_cell, load_power_data, robot_marks
+from ir_description import (
+    Cell,
+    Load,
+    PowerParameters,
+    data_sheet,
+    load_cell,
+    load_power_data,
+    robot_marks,
+)
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.load_check import Declared, LoadFinding, Motion, Uncertainty, weighed
 from ir_sim_driver.plant import Carried, Plant, nominal_plant, typical_plant
 
 TITLE = "a load that is not the declared one"
-PAYLOAD, ERRORS = 155.0, (0.05, 0.2, 0.5)
+PAYLOAD = 155.0
+ERRORS = (0.05, 0.2, 0.5)
 PAYLOADS = (25.0, 75.0, 155.0, 200.0)
 INSTANTS = 24
 THRESHOLD = 3.0
 _REFERENCE = 40.0  # deg C to which the friction of the data belongs
-_SURE = 3.0  # times the spread of estimates over drawn plants, beyond the threshold: what surely shows
+_SURE = (
+    3.0  # times the spread of estimates over drawn plants, beyond the threshold: what surely shows
+)
 _HOLDS = 0.8
 _FIT = 0.2  # of the deviations of friction that a fit leaves
 _KINDS = {"A1": [0], "A2": [1], "A3": [2], "A5": [4], "all axes": [0, 1, 2, 3, 4, 5]}
@@ -46,24 +58,32 @@ class Movement(NamedTuple):
 
 def measured(asked: Asked) -> Found:
     """Count alarms that are false and loads that are missed; the smallest masses that show."""
-    cell, generator = load_cell(asked.cells[0]), np.random.default_rng(20)
+    cell = load_cell(asked.cells[0])
+    generator = np.random.default_rng(20)
     many, few = (1000, 100) if asked.quick else (10_000, 1000)
     rows = [false_alarms(cell, generator, many)]
     plants = {
         "nominal": [nominal_plant(cell.robot, load_power_data())],
-        "typical": [typical_plant(cell.robot, load_power_data(), seed) for seed in range(asked.seeds)],
+        "typical": [
+            typical_plant(cell.robot, load_power_data(), seed) for seed in range(asked.seeds)
+        ],
     }
     for name, drawn in plants.items():
         for fitted in (False, True):
             rows += [noticed(cell, generator, few, name, drawn, error, fitted) for error in ERRORS]
     rows += smallest(cell, generator, few // 4)
     stepped = [
-        row for part in over_seeds(_stepped, range(-1, 2 if asked.quick else asked.seeds)) for row in part
+        row
+        for part in over_seeds(_stepped, range(-1, 2 if asked.quick else asked.seeds))
+        for row in part
     ]
     rows += stepped
     asked_for = [row for row in rows if row["case"] == "wrong load" and row["error"] == 0.2]
     seen = [row["noticed"] for row in asked_for]
-    missed = {name: max(row["missed_up_to"] for row in asked_for if row["plant"] == name) for name in plants}
+    missed = {
+        name: max(row["missed_up_to"] for row in asked_for if row["plant"] == name)
+        for name in plants
+    }
     sure = THRESHOLD + _SURE * rows[0]["rms"]
     scale = 10_000 / many
     return Found(
@@ -71,27 +91,44 @@ def measured(asked: Asked) -> Found:
         [
             at_most("false alarms in 10,000 movements", rows[0]["alarms"] * scale, "", 1.0),
             *_stepped_claims(stepped),
-            at_least("20 % of 155 kg noticed on A2 and A3", 100.0 * min(seen), "% of movements", 100.0),
-            at_most(
-                "largest 20 % that was missed, nominal plant", missed["nominal"], "deviations", THRESHOLD
+            at_least(
+                "20 % of 155 kg noticed on A2 and A3", 100.0 * min(seen), "% of movements", 100.0
             ),
-            at_most("largest 20 % that was missed, drawn plants", missed["typical"], "deviations", sure),
+            at_most(
+                "largest 20 % that was missed, nominal plant",
+                missed["nominal"],
+                "deviations",
+                THRESHOLD,
+            ),
+            at_most(
+                "largest 20 % that was missed, drawn plants", missed["typical"], "deviations", sure
+            ),
         ],
     )
 
 
 def _stepped(seed: int) -> list[dict[str, Any]]:
-    """What the stepped driver finds on movements of A2, A3 and all axes, as declared and with a fifth more;
-    a seed below 0 is the nominal plant.
+    """What the stepped driver finds on movements of A2, A3 and all axes, as declared and with a
+    fifth more; a seed below 0 is the nominal plant.
     """
-    plant, generator = "nominal" if seed < 0 else f"typical:{seed}", np.random.default_rng(100 + seed)
-    cell, rows = load_cell("open"), []
+    plant = "nominal" if seed < 0 else f"typical:{seed}"
+    generator = np.random.default_rng(100 + seed)
+    cell = load_cell("open")
+    rows = []
     for error in (0.0, 0.2):
         carrier = Carrier(cell, plant, _payload(cell, PAYLOAD), error)
         for axes in (_KINDS["A2"], _KINDS["A3"], _KINDS["all axes"]):
             found = carrier.weigh(lambda axes=axes: _ends(_movement(cell, generator, axes)))
-            row = {"case": "stepped", "plant": plant, "error": error, "axes": len(axes), "mass": found.mass}
-            rows.append(row | {"deviations": found.mass / found.mass_deviation, "noticed": found.noticed})
+            row = {
+                "case": "stepped",
+                "plant": plant,
+                "error": error,
+                "axes": len(axes),
+                "mass": found.mass,
+            }
+            rows.append(
+                row | {"deviations": found.mass / found.mass_deviation, "noticed": found.noticed}
+            )
     return rows
 
 
@@ -105,13 +142,17 @@ def _stepped_claims(rows: list[dict[str, Any]]) -> list[Claim]:
     share = 100.0 * sum(row["noticed"] for row in wrong) / len(wrong)
     return [
         at_most("stepped driver: false alarms", sum(row["noticed"] for row in as_declared), "", 0),
-        at_least("stepped driver: 20 % of 155 kg noticed on A2 and A3", share, "% of movements", 100.0),
+        at_least(
+            "stepped driver: 20 % of 155 kg noticed on A2 and A3", share, "% of movements", 100.0
+        ),
     ]
 
 
 def false_alarms(cell: Cell, generator: np.random.Generator, count: int) -> dict[str, Any]:
     """Movements with the declared load, each on a plant of its own."""
-    robot, data, load = _known(cell, data_sheet()), load_power_data(), _payload(cell, PAYLOAD)
+    robot = _known(cell, data_sheet())
+    data = load_power_data()
+    load = _payload(cell, PAYLOAD)
     z = []
     for seed in range(count):
         movement = _movement(cell, generator, _KINDS["all axes"] if seed % 2 else _KINDS["A2"])
@@ -119,8 +160,15 @@ def false_alarms(cell: Cell, generator: np.random.Generator, count: int) -> dict
         found = _weighed(plant, movement, load.loads, load, robot, cell)
         z.append(found.mass / found.mass_deviation)
     alarms = int((np.abs(z) > THRESHOLD).sum())
-    worst, rms = float(np.abs(z).max()), float(np.sqrt(np.mean(np.square(z))))
-    return {"case": "declared load", "movements": count, "alarms": alarms, "worst": worst, "rms": rms}
+    worst = float(np.abs(z).max())
+    rms = float(np.sqrt(np.mean(np.square(z))))
+    return {
+        "case": "declared load",
+        "movements": count,
+        "alarms": alarms,
+        "worst": worst,
+        "rms": rms,
+    }
 
 
 def noticed(
@@ -132,11 +180,14 @@ def noticed(
     error: float,
     fitted: bool,
 ) -> dict[str, Any]:
-    """Movements of A2 or A3 with more load than declared: the share noticed, and the largest mass that
-    is not, in standard deviations on its movement.
+    """Movements of A2 or A3 with more load than declared: the share noticed, and the largest mass
+    that is not, in standard deviations on its movement.
     """
-    declared, carried = _payload(cell, PAYLOAD), _payload(cell, PAYLOAD * (1.0 + error))
-    hits, off, missed = 0, [], [0.0]
+    declared = _payload(cell, PAYLOAD)
+    carried = _payload(cell, PAYLOAD * (1.0 + error))
+    hits = 0
+    off = []
+    missed = [0.0]
     for k in range(count):
         plant = plants[k % len(plants)]
         parameters = _as_a_fit_leaves_it(plant) if fitted else data_sheet()
@@ -160,7 +211,8 @@ def noticed(
 
 def smallest(cell: Cell, generator: np.random.Generator, count: int) -> list[dict[str, Any]]:
     """Three standard deviations of the mass: the smallest that shows, by movement and payload."""
-    robot, plant = _known(cell, data_sheet()), nominal_plant(cell.robot, load_power_data())
+    robot = _known(cell, data_sheet())
+    plant = nominal_plant(cell.robot, load_power_data())
     rows = []
     for kind, axes in _KINDS.items():
         for payload in PAYLOADS:
@@ -196,14 +248,18 @@ def _payload(cell: Cell, mass: float) -> Carried:
 def _movement(cell: Cell, generator: np.random.Generator, axes: Sequence[int]) -> Movement:
     """From rest to rest, of these axes, between anywhere and anywhere, at up to full speed."""
     robot = cell.robot
-    low, high = 0.9 * robot.position_min, 0.9 * robot.position_max
-    start, delta = generator.uniform(low, high), np.zeros(robot.n)
+    low = 0.9 * robot.position_min
+    high = 0.9 * robot.position_max
+    start = generator.uniform(low, high)
+    delta = np.zeros(robot.n)
     for axis in axes:
         least = 0.15 * (high[axis] - low[axis])
         while abs(delta[axis]) < least:
             delta[axis] = generator.uniform(low[axis], high[axis]) - start[axis]
     size = np.abs(delta)
-    T = max((1.9 * size / robot.velocity_max).max(), np.sqrt(6.0 * size / robot.acceleration_max).max())
+    T = max(
+        (1.9 * size / robot.velocity_max).max(), np.sqrt(6.0 * size / robot.acceleration_max).max()
+    )
     T *= generator.uniform(1.0, 4.0)
     s = ((np.arange(INSTANTS) + 0.5) / INSTANTS)[:, None]
     return Movement(
@@ -228,7 +284,9 @@ def _weighed(
 
 
 def _holding(plant: Plant, movement: Movement) -> FloatArray:
-    """Friction (n,) [Nm] of the axes that stand, the same all along; drawn by where the movement begins."""
+    """Friction (n,) [Nm] of the axes that stand, the same all along; drawn by where the movement
+    begins.
+    """
     draw = np.random.default_rng(np.abs(movement.q[0] * 1e6).astype(np.uint64)).uniform(
         -_HOLDS, _HOLDS, plant.robot.n
     )
@@ -237,7 +295,9 @@ def _holding(plant: Plant, movement: Movement) -> FloatArray:
 
 def _viscous(plant: Plant) -> FloatArray:
     gears = plant.gears
-    return np.asarray(gears.viscous * np.exp(-gears.viscous_per_kelvin * (gears.start - _REFERENCE)))
+    return np.asarray(
+        gears.viscous * np.exp(-gears.viscous_per_kelvin * (gears.start - _REFERENCE))
+    )
 
 
 def _torque(plant: Plant, movement: Movement, loads: Sequence[Load], cell: Cell) -> FloatArray:
@@ -246,7 +306,8 @@ def _torque(plant: Plant, movement: Movement, loads: Sequence[Load], cell: Cell)
     none = np.zeros(plant.robot.n)
     smooth = replace(plant.robot, friction_viscous=none, friction_coulomb=none)
     drive = DynamicsModel(smooth, tuple(loads), cell.base_pose).inverse_dynamics(q, qd, qdd)
-    through, gears = drive - plant.robot.reflected_inertia * qdd, plant.gears
+    through = drive - plant.robot.reflected_inertia * qdd
+    gears = plant.gears
     share = np.where(through * qd >= 0.0, gears.load_driven, gears.load_back)
     near_rest = gears.stribeck * np.exp(-((qd / gears.stribeck_speed) ** 2))
     dry = (gears.coulomb + share * np.abs(through) + near_rest) * np.tanh(qd / 1e-3)
@@ -254,10 +315,14 @@ def _torque(plant: Plant, movement: Movement, loads: Sequence[Load], cell: Cell)
 
 
 def _as_a_fit_leaves_it(plant: Plant) -> PowerParameters:
-    """The plant's own friction, a fifth as uncertain as before; the masses as the data have them."""
+    """The plant's own friction, a fifth as uncertain as before; the masses as the data have
+    them.
+    """
     known = data_sheet()
-    mean, factor = known.mean.copy(), np.ones(len(known.mean))
+    mean = known.mean.copy()
+    factor = np.ones(len(known.mean))
     for term, values in (("viscous", _viscous(plant)), ("coulomb", plant.gears.coulomb)):
-        mean[known.places(term)], factor[known.places(term)] = values, _FIT
+        mean[known.places(term)] = values
+        factor[known.places(term)] = _FIT
     covariance = known.covariance * np.outer(factor, factor)
     return replace(known, name=f"fit of {plant.name}", mean=mean, covariance=covariance)

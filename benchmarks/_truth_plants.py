@@ -1,4 +1,6 @@
-"""Typical plants that drive the movements of the cells: do they stay within the tube, at what energy?"""
+"""Typical plants that drive the movements of the cells: do they stay within the tube, at what
+energy?
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,8 @@ from _truth_section import Asked, Found
 
 TITLE = "typical plants: tracking, tube, and predicted against simulated energy before any fit"
 QUICK = ("open",)
-OBJECTIVES, QUICK_OBJECTIVES = ("time", "time_and_energy"), ("time",)
+OBJECTIVES = ("time", "time_and_energy")
+QUICK_OBJECTIVES = ("time",)
 
 
 def measured(asked: Asked) -> Found:
@@ -25,11 +28,18 @@ def measured(asked: Asked) -> Found:
         every = all_predicted(cells, objective)
         work = partial(_driven, every, objective)
         rows += over_seeds(work, range(asked.seeds))
-    kept = sum(row["movements"] - row["failed"] for row in rows) / sum(row["movements"] for row in rows)
+    kept = sum(row["movements"] - row["failed"] for row in rows) / sum(
+        row["movements"] for row in rows
+    )
     return Found(
         rows,
         [
-            at_least(f"{asked.seeds} typical plants: share of movements driven in the tube", kept, "", 1.0),
+            at_least(
+                f"{asked.seeds} typical plants: share of movements driven in the tube",
+                kept,
+                "",
+                1.0,
+            ),
             at_most("their largest tool deviation", max(row["tool_mm"] for row in rows), "mm", 5.0),
         ],
     )
@@ -38,7 +48,11 @@ def measured(asked: Asked) -> Found:
 def _driven(every: Sequence[Any], objective: str, seed: int) -> dict[str, Any]:
     """What a plant makes of all movements; energies of those that ended successful."""
     plants = plant_by_cell(every, f"typical:{seed}")
-    off, tool, error, settling, failed = [], [0.0], [0.0], [0.0], 0
+    off = []
+    tool = [0.0]
+    error = [0.0]
+    settling = [0.0]
+    failed = 0
     for each in every:
         movement = each.movement
         plant = plants[movement.cell.name]

@@ -1,8 +1,8 @@
 """The torque reserve: how much robots that differ from their data need, and what leaving it costs.
 
-The default of `torque_reserve` follows from the first row: the 99 % quantile, over drawn robots and the
-fastest movements of the cells, of the largest share of the torque envelope that a robot needs beyond what its
-data say, and TRACKING for the feedback itself, rounded up to a twentieth.
+The default of `torque_reserve` follows from the first row: the 99 % quantile, over drawn robots and
+the fastest movements of the cells, of the largest share of the torque envelope that a robot needs
+beyond what its data say, and TRACKING for the feedback itself, rounded up to a twentieth.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ OBJECTIVES = ("time", "time_and_energy")
 
 def measured(asked: Asked) -> Found:
     """What the reserve has to be, and what it costs in seconds and joules."""
-    found, default = Found(), PlannerSettings().torque_reserve
+    found = Found()
+    default = PlannerSettings().torque_reserve
     sheet = load_power_parameters()
     robots = [sheet.drawn(seed) for seed in range(ROBOTS_PER_SEED * asked.seeds)]
     for objective in OBJECTIVES:
@@ -51,7 +52,9 @@ def measured(asked: Asked) -> Found:
 
 
 def _claim(needed: float, default: float) -> Claim:
-    return at_most("torque beyond the plan's, 99 % quantile, with the feedback", needed, "", default)
+    return at_most(
+        "torque beyond the plan's, 99 % quantile, with the feedback", needed, "", default
+    )
 
 
 def _planned(cells: Sequence[str], objective: str, reserve: float) -> list[CellMovement]:

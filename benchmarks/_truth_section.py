@@ -11,7 +11,9 @@ from _results import Claim
 
 @dataclass(frozen=True)
 class Asked:
-    """Cells by name or file, how many seeds, and whether the section has a quarter of two minutes only."""
+    """Cells by name or file, how many seeds, and whether the section has a quarter of two minutes
+    only.
+    """
 
     cells: Sequence[str]
     seeds: int

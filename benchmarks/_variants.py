@@ -1,8 +1,10 @@
-"""Cells that nobody tuned for: bundled ones mirrored, turned about the vertical axis and jittered, by seed.
+"""Cells that nobody tuned for: bundled ones mirrored, turned about the vertical axis and jittered,
+by seed.
 
-Mirrored: everything at y of the base goes to -y, and A1, A4 and A6 of the tasks change their signs. Turned:
-all machines about the robot's vertical axis, and A1 of the tasks with them. Jittered: every machine by some
-centimetres and degrees, while the tasks stay; those whose ends come too near are left out.
+Mirrored: everything at y of the base goes to -y, and A1, A4 and A6 of the tasks change their signs.
+Turned: all machines about the robot's vertical axis, and A1 of the tasks with them. Jittered: every
+machine by some centimetres and degrees, while the tasks stay; those whose ends come too near are
+left out.
 """
 
 from __future__ import annotations
@@ -19,7 +21,9 @@ from ir_description.poses import composed
 from ir_msgs_py.arrays import FloatArray
 
 TURN = np.radians(40.0)  # at most
-SHIFT, TILT = 0.03, np.radians(2.0)  # standard deviations: m, rad about the vertical axis
+# standard deviations: m, rad about the vertical axis
+SHIFT = 0.03
+TILT = np.radians(2.0)
 CLEARANCE = 0.01  # m that the ends of a task must keep
 TASKS = 0.5  # share of the tasks that must be left; else another jitter is drawn
 _MIRROR = np.diag([1.0, -1.0, 1.0, 1.0])
@@ -72,14 +76,18 @@ def mirrored(cell: Cell) -> Cell:
         return replace(old, pose=reflected(old.pose), pose_in_equipment=own(old.pose_in_equipment))
 
     tasks = tuple(
-        Task(task.name, task.start * _MIRRORED_JOINTS, task.goal * _MIRRORED_JOINTS) for task in cell.tasks
+        Task(task.name, task.start * _MIRRORED_JOINTS, task.goal * _MIRRORED_JOINTS)
+        for task in cell.tasks
     )
-    machines, stations = tuple(map(machine, cell.equipment)), tuple(map(station, cell.stations))
+    machines = tuple(map(machine, cell.equipment))
+    stations = tuple(map(station, cell.stations))
     return replace(cell, equipment=machines, stations=stations, tasks=tasks)
 
 
 def turned(cell: Cell, angle: float) -> Cell:
-    """All machines turned by an angle [rad] about the z axis of the robot's base, and A1 with them."""
+    """All machines turned by an angle [rad] about the z axis of the robot's base, and A1 with
+    them.
+    """
     base = np.asarray(cell.base_pose)
     turn = base @ _about_z(angle) @ np.linalg.inv(base)
     sign = float(np.sign((cell.robot.joint_origin[0][:3, :3] @ cell.robot.joint_axis[0])[2]))
@@ -109,7 +117,8 @@ def _with_free_tasks(cell: Cell) -> Cell:
     free = tuple(
         task
         for task in cell.tasks
-        if scene.collision.min_distance(np.stack([task.start, task.goal])).distance.min() > CLEARANCE
+        if scene.collision.min_distance(np.stack([task.start, task.goal])).distance.min()
+        > CLEARANCE
     )
     return replace(cell, tasks=free)
 

@@ -2,10 +2,12 @@
 
     python benchmarks/anytime.py [--cell FILE]... [--seeds N] [--quick] [--json FILE]
 
-The demonstration with what it saves, as a user gets it; and 20 stops in a cell whose joints A4 and A6 turn so
-far that they have 8 configurations each or more. Then requests of three stops with savings, with a front and
-within a cycle time: what is spent beyond a planning_time of a third of what they take, and how long the
-planner goes on at most after it was asked to stop. Processor seconds; "elapsed" is the clock's, on all cores.
+The demonstration with what it saves, as a user gets it; and 20 stops in a cell whose joints A4 and
+A6 turn so far that they have 8 configurations each or more. Then requests of three stops with
+savings, with a front and
+within a cycle time: what is spent beyond a planning_time of a third of what they take, and how long
+the planner goes on at most after it was asked to stop. Processor seconds; "elapsed" is the clock's,
+on all cores.
 """
 
 from __future__ import annotations
@@ -35,8 +37,8 @@ SHARE = 1.0 / 3.0  # of a request's own time, after which it is cut
 
 @dataclass(frozen=True)
 class Row:
-    """One request: processor seconds, seconds elapsed, of that after planning_time, longest time between two
-    looks at whether to stop (both processor seconds), mean configurations per stop.
+    """One request: processor seconds, seconds elapsed, of that after planning_time, longest time
+    between two looks at whether to stop (both processor seconds), mean configurations per stop.
     """
 
     cell: str
@@ -64,12 +66,14 @@ class Watch:
     """Asked whether to stop: never; remembers the longest time between two such questions."""
 
     def __init__(self) -> None:
-        self.last, self.longest = time.process_time(), 0.0
+        self.last = time.process_time()
+        self.longest = 0.0
 
     def __call__(self) -> bool:
         """Go on."""
         now = time.process_time()
-        self.longest, self.last = max(self.longest, now - self.last), now
+        self.longest = max(self.longest, now - self.last)
+        self.last = now
         return False
 
 
@@ -90,7 +94,8 @@ def planned(
     """The program under a ceiling [s] for all of its steps; None: refused."""
     stops = len(request.stops or planner.cell.program)
     options = PlanOptions(seed=seed, planning_time=seconds / stops)
-    start, more = np.array(planner.cell.park), {"savings": request.savings}
+    start = np.array(planner.cell.park)
+    more = {"savings": request.savings}
     try:
         return planner.plan_program(
             request.stops, request.cycle, options, start, cancelled=watch,
@@ -103,28 +108,42 @@ def planned(
 def measured(cell: str, request: Request, seed: int) -> Row:
     """A request in full."""
     planner = planner_of(cell, time.monotonic, request.turns)
-    begin, elapsed, watch = time.process_time(), time.monotonic(), Watch()
+    begin = time.process_time()
+    elapsed = time.monotonic()
+    watch = Watch()
     plan = planned(planner, request, CEILING * LONG, seed, watch)
-    took, elapsed = time.process_time() - begin, time.monotonic() - elapsed
+    took = time.process_time() - begin
+    elapsed = time.monotonic() - elapsed
     assert plan is not None
     assert plan.status.ok, plan.status.message
     found = next(stage for stage in plan.info.stages if stage.name == "configurations")
     layers = found.note.split(" x ")[1:]
     return Row(
-        cell, request.asked, took, elapsed, 0.0, watch.longest, float(np.mean([int(n) for n in layers]))
+        cell,
+        request.asked,
+        took,
+        elapsed,
+        0.0,
+        watch.longest,
+        float(np.mean([int(n) for n in layers])),
     )
 
 
 def cut(cell: str, request: Request, seed: int) -> Row:
-    """A request on one core: how long it is not stopped, and what it takes beyond a share of its time."""
+    """A request on one core: how long it is not stopped, and what it takes beyond a share of its
+    time.
+    """
     cores = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {min(cores)})
     try:
         whole = measured(cell, request, seed)
-        planner, seconds = planner_of(cell, time.process_time), SHARE * whole.processor_s
-        begin, elapsed = time.process_time(), time.monotonic()
+        planner = planner_of(cell, time.process_time)
+        seconds = SHARE * whole.processor_s
+        begin = time.process_time()
+        elapsed = time.monotonic()
         planned(planner, request, seconds, seed, Watch())
-        took, elapsed = time.process_time() - begin, time.monotonic() - elapsed
+        took = time.process_time() - begin
+        elapsed = time.monotonic() - elapsed
     finally:
         os.sched_setaffinity(0, cores)
     beyond = max(took - seconds, 0.0)
@@ -134,7 +153,9 @@ def cut(cell: str, request: Request, seed: int) -> Row:
 def requests_of(cell: str, seed: int) -> list[Request]:
     """Requests that are cut: savings, a front, a cycle time of three stops."""
     stops = (*tour(planner_of(cell, time.monotonic).cell, STOPS - 1, seed), "park")
-    free = planned(planner_of(cell, time.monotonic), Request("free", stops), CEILING * STOPS, seed, Watch())
+    free = planned(
+        planner_of(cell, time.monotonic), Request("free", stops), CEILING * STOPS, seed, Watch()
+    )
     assert free is not None
     return [
         Request("savings", stops, savings=True),
@@ -146,7 +167,12 @@ def requests_of(cell: str, seed: int) -> list[Request]:
 def claims_of(whole: list[Row], tours: list[Row], cuts: list[Row]) -> list[Claim]:
     """What all of them are held to."""
     claims = [
-        at_most("demonstration with savings: processor time", max(r.processor_s for r in whole), "s", 3.0),
+        at_most(
+            "demonstration with savings: processor time",
+            max(r.processor_s for r in whole),
+            "s",
+            3.0,
+        ),
         at_most("demonstration with savings: elapsed", max(r.elapsed_s for r in whole), "s", 3.0),
     ]
     for row in tours:
@@ -173,10 +199,14 @@ def arguments() -> argparse.Namespace:
 def main() -> None:
     """Measure, print, write."""
     given = arguments()
-    whole, tours, cuts = list[Row](), list[Row](), list[Row]()
+    whole = list[Row]()
+    tours = list[Row]()
+    cuts = list[Row]()
     cells = given.cell or CELLS
     for seed in range(1 if given.quick else given.seeds):
-        whole.append(measured("demo", Request("demonstration with savings", (), savings=True), seed))
+        whole.append(
+            measured("demo", Request("demonstration with savings", (), savings=True), seed)
+        )
         print(line_of(asdict(whole[-1])), flush=True)
         for cell in cells:
             stops = tour(planner_of(cell, time.monotonic).cell, LONG, seed)

@@ -1,9 +1,11 @@
 """Are paths of the tool driven as asked for, whenever somebody could, and how soon is that known?
 
-    python benchmarks/cartesian.py [--cell FILE]... [--seeds N] [--first SEED] [--quick] [--json FILE]
-Random lines, circles, splines and rounded corners in every cell, with and without a free angle about the
-tool's axis. What is certified is judged by Pinocchio (places, speed), Coal (distances at 0.0005 rad) and
-10 kHz samples (limits); what is refused is put to an oracle that draws configurations and angles.
+    python benchmarks/cartesian.py [--cell FILE]... [--seeds N] [--first SEED] [--quick] [--json
+    FILE]
+Random lines, circles, splines and rounded corners in every cell, with and without a free angle
+about the tool's axis. What is certified is judged by Pinocchio (places, speed), Coal (distances at
+0.0005 rad) and 10 kHz samples (limits); what is refused is put to an oracle that draws
+configurations and angles.
 """
 
 from __future__ import annotations
@@ -23,14 +25,19 @@ from ir_msgs_py.options import PlanOptions
 from ir_planner import CartesianPlan, Planner
 from ir_planner.scene import PlanningScene
 
-SEEDS, QUICK_SEEDS = 200, 8
+SEEDS = 200
+QUICK_SEEDS = 8
 CELLS = tuple(sorted(bundled_cells()))
-_LIMIT, _NEAR = 1.0 + 1e-6, 2e-6  # share of a limit, m of a distance, that rounding may cost
+# share of a limit, m of a distance, that rounding may cost
+_LIMIT = 1.0 + 1e-6
+_NEAR = 2e-6
 
 
 @dataclass(frozen=True)
 class Row:
-    """One path: what it is, how it was answered in `process_s`, what the judges saw of a certified one."""
+    """One path: what it is, how it was answered in `process_s`, what the judges saw of a certified
+    one.
+    """
 
     cell: str
     seed: int
@@ -49,7 +56,8 @@ class Row:
 
 def row_of(cell: str, seed: int, planner: Planner, judge: SecondOpinion) -> Row:
     """Plan a random path and judge the answer."""
-    scene, rng = planner.scene(), np.random.default_rng(seed)
+    scene = planner.scene()
+    rng = np.random.default_rng(seed)
     path = random_path(rng, scene)
     plan, took = timed(planner, path)
     kind = "corner" if len(path.segments) > 1 else path.segments[0].kind
@@ -103,7 +111,9 @@ def main() -> None:
             print(line_of(asdict(rows[-1])), flush=True)
         lines += line_seconds(planner, planner.scene(), max(seeds // 10, 2))
     certified = [row for row in rows if row.certified]
-    objected = [r for r in certified if r.clearance_left_mm < -1e3 * _NEAR or r.largest_share > _LIMIT]
+    objected = [
+        r for r in certified if r.clearance_left_mm < -1e3 * _NEAR or r.largest_share > _LIMIT
+    ]
     beyond = max(row.tool_error_mm - row.claimed_mm for row in certified)
     missed = [row for row in rows if row.oracle and not row.certified]
     claims = [

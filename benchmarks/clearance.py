@@ -1,11 +1,13 @@
 """Is the reported clearance of a movement at most the true one?
 
-    python benchmarks/clearance.py [--cell FILE]... [--movements N] [--seeds N] [--quick] [--json FILE]
+    python benchmarks/clearance.py [--cell FILE]... [--movements N] [--seeds N] [--quick] [--json
+    FILE]
 
-Movements of the cells' tasks, and of three variants of each cell, with the default work and as many seeds as
-it takes; every different answer counts once. Beside `min_clearance` of each report stands the least distance
-that Coal finds at configurations at most 0.0005 rad apart, over all pairs: it is never below the true minimum
-by more than Coal's own tolerance, and above it by what may hide between two configurations. Closes with one
+Movements of the cells' tasks, and of three variants of each cell, with the default work and as many
+seeds as it takes; every different answer counts once. Beside `min_clearance` of each report stands
+the least distance that Coal finds at configurations at most 0.0005 rad apart, over all pairs: it is
+never below the true minimum by more than Coal's own tolerance, and above it by what may hide
+between two configurations. Closes with one
 line per figure: measured value, bound, holds or falls short.
 """
 
@@ -24,8 +26,11 @@ from _variants import variant_files
 
 TOLERANCE = 2e-6  # m: what Coal's iterations leave between it and the true distance
 BELOW = 1e-4  # m by which a report may lie below the true minimum and still be useful
-MOVEMENTS, QUICK = 200, 6
-PER_CELL, VARIANTS = 3, Path("out/variants")  # mirrored, turned and jittered cells besides
+MOVEMENTS = 200
+QUICK = 6
+# mirrored, turned and jittered cells besides
+PER_CELL = 3
+VARIANTS = Path("out/variants")
 
 
 def arguments() -> argparse.Namespace:
@@ -43,7 +48,8 @@ def movements(cells: list[str], seeds: int, count: int) -> Iterator[dict[str, ob
     tasks = [(name, task) for name in cells for task in tasks_of(name)]
     planners = {name: planner_of(name) for name in cells}
     opinions = {name: SecondOpinion(scene_of(name)) for name in cells}
-    done, known = 0, set[str]()
+    done = 0
+    known = set[str]()
     for seed, (name, task) in ((seed, each) for seed in range(seeds) for each in tasks):
         if done == count:
             return
@@ -74,10 +80,17 @@ def main() -> None:
         print(line_of(row), flush=True)
     above = np.array([row["above_um"] for row in rows], dtype=float) * 1e-6
     claims = [
-        at_most(f"reports above the true clearance, of {len(rows)}", (above > TOLERANCE).sum(), "", 0),
-        at_most("largest report less Coal's least distance", 1e6 * above.max(initial=-np.inf), "um", 2.0),
         at_most(
-            "report below Coal's least distance, worst", -1e6 * above.min(initial=np.inf), "um", 1e6 * BELOW
+            f"reports above the true clearance, of {len(rows)}", (above > TOLERANCE).sum(), "", 0
+        ),
+        at_most(
+            "largest report less Coal's least distance", 1e6 * above.max(initial=-np.inf), "um", 2.0
+        ),
+        at_most(
+            "report below Coal's least distance, worst",
+            -1e6 * above.min(initial=np.inf),
+            "um",
+            1e6 * BELOW,
         ),
     ]
     finish(given.json, rows, claims)

@@ -3,11 +3,13 @@
     python benchmarks/compare.py --before CHECKOUT [--after CHECKOUT] [--only TEXT]... [--rounds N]
                                  [--script NAME]... [--quick] [--json FILE]
 
-A fixed list of requests is answered by the planner's core of each checkout, both built, each in a process of
-its own. Answers: status, trajectory ids, program id and every figure of the reports, bit by bit; each
-difference is listed. Speed: the same request before, after, before, after, N rounds, never at once; the
-ratio after : before of the least processor times of a request, and the median of it over the requests of a
-group. --script also runs a benchmark of each checkout in turns and compares its times of the same name.
+A fixed list of requests is answered by the planner's core of each checkout, both built, each in a
+process of its own. Answers: status, trajectory ids, program id and every figure of the reports, bit
+by bit; each difference is listed. Speed: the same request before, after, before, after, N rounds,
+never at once; the
+ratio after : before of the least processor times of a request, and the median of it over the
+requests of a group. --script also runs a benchmark of each checkout in turns and compares its times
+of the same name.
 """
 
 from __future__ import annotations
@@ -33,7 +35,9 @@ def arguments() -> argparse.Namespace:
     )
     parser.add_argument("--before", type=Path, required=True, help="a checkout with a built core")
     parser.add_argument("--after", type=Path, default=HERE, help="another one; default: this one")
-    parser.add_argument("--only", action="append", help="requests whose group or name contains this")
+    parser.add_argument(
+        "--only", action="append", help="requests whose group or name contains this"
+    )
     parser.add_argument("--rounds", type=int, default=3, help="timed rounds; 0: the answers alone")
     parser.add_argument(
         "--script", action="append", default=[], help="a benchmark to run in both, as kernels"
@@ -49,7 +53,9 @@ def arguments() -> argparse.Namespace:
 def chosen(names: list[list[str]], given: argparse.Namespace) -> list[int]:
     """Numbers of the requests that are asked."""
     only = given.only or [""]
-    found = [k for k, words in enumerate(names) if any(text in word for text in only for word in words)]
+    found = [
+        k for k, words in enumerate(names) if any(text in word for text in only for word in words)
+    ]
     return found[::3] if given.quick else found
 
 
@@ -87,7 +93,9 @@ def groups_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Median ratio of the times per group."""
     found = []
     for group in dict.fromkeys(row["group"] for row in rows if "before_ms" in row):
-        times = np.array([[row["before_ms"], row["after_ms"]] for row in rows if row["group"] == group])
+        times = np.array(
+            [[row["before_ms"], row["after_ms"]] for row in rows if row["group"] == group]
+        )
         ratio = float(np.median(times[:, 1] / times[:, 0]))
         sums = times.sum(axis=0)
         found.append(
@@ -105,8 +113,12 @@ def groups_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def claims_of(rows: list[dict[str, Any]], groups: list[dict[str, Any]]) -> list[Claim]:
     """Identity, and the median ratio of each group and of all."""
     different = sum(not row["identical"] for row in rows)
-    claims = [at_most(f"all answers identical: different ones of {len(rows)}", different, "answers", 0)]
-    claims += [at_most(f"median ratio {group['group']}", group["ratio"], "1", RATIO) for group in groups]
+    claims = [
+        at_most(f"all answers identical: different ones of {len(rows)}", different, "answers", 0)
+    ]
+    claims += [
+        at_most(f"median ratio {group['group']}", group["ratio"], "1", RATIO) for group in groups
+    ]
     ratios = [row["after_ms"] / row["before_ms"] for row in rows if "before_ms" in row]
     if ratios:
         claims.append(at_most("median ratio of all requests", float(np.median(ratios)), "1", RATIO))
@@ -119,7 +131,9 @@ def main() -> None:
     rounds = min(given.rounds, 1) if given.quick else given.rounds
     with Side(given.before) as before, Side(given.after) as after:
         if before.requests != after.requests:
-            raise SystemExit("the checkouts have different cells or stations: their requests don't pair")
+            raise SystemExit(
+                "the checkouts have different cells or stations: their requests don't pair"
+            )
         rows = []
         for k in chosen(after.requests, given):
             rows.append(row_of(k, (before, after), rounds))
@@ -131,7 +145,9 @@ def main() -> None:
         groups += more
         if more:
             ratio = float(np.median([row["ratio"] for row in more]))
-            claims.append(at_most(f"median ratio of the times of benchmark {name}", ratio, "1", RATIO))
+            claims.append(
+                at_most(f"median ratio of the times of benchmark {name}", ratio, "1", RATIO)
+            )
     commits = {"before": commit(given.before), "after": commit(given.after)}
     finish(given.json, [*rows, *groups], claims, compared=commits)
 

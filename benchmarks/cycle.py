@@ -1,15 +1,16 @@
 """What does a program cost over its cycle time, and what does it save against the common program?
 
-    python benchmarks/cycle.py [--cell FILE]... [--variants N] [--points N] [--rivals N] [--seeds N] [--quick]
+    python benchmarks/cycle.py [--cell FILE]... [--variants N] [--points N] [--rivals N] [--seeds N]
+    [--quick]
                                [--json FILE]
 
-The stations of a cell in turn and back to the posture park, without pauses. Cycle times from the shortest to
-twice the free one; E is the mains energy over the whole cycle, the wait to its end included. The law: a cycle
-that is d longer costs at most d of standing on motors more, and the drive energy of the movements alone never
-rises while the wait at the end stays in its mode. Then the planner has the time of the common program:
-synchronous S-curves at full speed through the same stations, each in the configuration nearest to the last
-one. Variants are mirrored, turned and jittered cells, by seed; those with a station that can't be reached any
-more are named and left out.
+The stations of a cell in turn and back to the posture park, without pauses. Cycle times from the
+shortest to twice the free one; E is the mains energy over the whole cycle, the wait to its end
+included. The law: a cycle that is d longer costs at most d of standing on motors more, and the
+drive energy of the movements alone never rises while the wait at the end stays in its mode. Then
+the planner has the time of the common program: synchronous S-curves at full speed through the same
+stations, each in the configuration nearest to the last one. Variants are mirrored, turned and
+jittered cells, by seed; those with a station that can't be reached any more are named and left out.
 """
 
 from __future__ import annotations
@@ -39,8 +40,9 @@ TOLERANCE = 1e-3  # of E: what two plans may differ by although the law holds
 
 @dataclass(frozen=True)
 class Row:
-    """One program: cycle time [s], mains energy over the cycle [J], drive energy of its movements [J], mode
-    of the wait at its end ("": on motors, or none), stated gap [%], processor seconds of planning.
+    """One program: cycle time [s], mains energy over the cycle [J], drive energy of its movements
+    [J], mode of the wait at its end ("": on motors, or none), stated gap [%], processor seconds of
+    planning.
     """
 
     cell: str
@@ -59,8 +61,11 @@ class Programs:
     """Programs of one cell through all of its stations."""
 
     def __init__(self, cell: str, seed: int, work: int = 1) -> None:
-        self.cell, self.seed, default = cell, seed, PlannerSettings()
-        most, improvement = work * default.max_iterations, work * default.improvement_iterations
+        self.cell = cell
+        self.seed = seed
+        default = PlannerSettings()
+        most = work * default.max_iterations
+        improvement = work * default.improvement_iterations
         settings = replace(default, max_iterations=most, improvement_iterations=improvement)
         self.planner = Planner(time.monotonic, settings)
         self.planner.set_cell("", cell)
@@ -79,7 +84,9 @@ class Programs:
         except RequestError:
             plan = None
         if plan is None or not plan.status.ok:
-            return Row(self.cell, self.seed, what, cycle, float("nan"), float("nan"), False, "", 0.0, 0.0)
+            return Row(
+                self.cell, self.seed, what, cycle, float("nan"), float("nan"), False, "", 0.0, 0.0
+            )
         took = time.process_time() - begin
         reports = [movement.report for movement in plan.movements if not movement.is_pause]
         drives = sum(report.energy - report.base_energy for report in reports)
@@ -87,7 +94,16 @@ class Programs:
         lasting = sum(movement.duration for movement in plan.movements)
         wait = plan.movements[-1].power_mode.replace("STAND_ON_MOTORS", "")
         return Row(
-            self.cell, self.seed, what, lasting, plan.report.energy, drives, certified, wait, plan.gap, took
+            self.cell,
+            self.seed,
+            what,
+            lasting,
+            plan.report.energy,
+            drives,
+            certified,
+            wait,
+            plan.gap,
+            took,
         )
 
     def over_cycle_times(self, points: int) -> list[Row]:
@@ -98,12 +114,16 @@ class Programs:
         return [self.planned("cycle", float(cycle)) for cycle in cycles]
 
     def against_common(self) -> tuple[list[Row], float]:
-        """The common program and the planner's in the same time, and the share of segments not free."""
+        """The common program and the planner's in the same time, and the share of segments not
+        free.
+        """
         chains = Chains.of(self.planner, self.stops, self.start, self.options(), {})
         common = common_program(chains, self.planner, self.options())
         base = self.planner.scene().base_watts * common.duration
         E = common.drive_energy
-        plain = Row(self.cell, self.seed, "common", common.duration, E + base, E, True, "", 0.0, 0.0)
+        plain = Row(
+            self.cell, self.seed, "common", common.duration, E + base, E, True, "", 0.0, 0.0
+        )
         return [plain, self.planned("at the common time", common.duration)], common.not_free
 
     @property
@@ -125,16 +145,21 @@ def above_best(rows: list[Row], rivals: list[Row]) -> float:
     """By how much [%] the dearest row lies above the best known program of its cycle time."""
     worst = 0.0
     for row in rows:
-        same = [r.energy for r in (row, *rivals) if abs(r.cycle - row.cycle) < SAME and np.isfinite(r.energy)]
+        same = [
+            r.energy
+            for r in (row, *rivals)
+            if abs(r.cycle - row.cycle) < SAME and np.isfinite(r.energy)
+        ]
         worst = max(worst, 100.0 * (row.energy / min(same) - 1.0)) if same else worst
     return worst
 
 
 def excess(rows: list[Row], waiting: float) -> tuple[float, float]:
-    """By how much [%] the law and the fall of the drive energy (in one mode of waiting) are missed at worst,
-    from point to point.
+    """By how much [%] the law and the fall of the drive energy (in one mode of waiting) are missed
+    at worst, from point to point.
     """
-    law, rise = [-100.0], [-100.0]
+    law = [-100.0]
+    rise = [-100.0]
     for before, after in itertools.pairwise([row for row in rows if np.isfinite(row.energy)]):
         allowed = before.energy + waiting * (after.cycle - before.cycle)
         law.append(100.0 * (after.energy / allowed - 1.0))
@@ -143,7 +168,9 @@ def excess(rows: list[Row], waiting: float) -> tuple[float, float]:
     return max(law), max(rise)
 
 
-def claims_of(cell: str, rows: list[Row], pair: list[Row], waiting: float, not_free: float) -> list[Claim]:
+def claims_of(
+    cell: str, rows: list[Row], pair: list[Row], waiting: float, not_free: float
+) -> list[Claim]:
     """What one cell is held to."""
     law, rise = excess(rows, waiting)
     refused = sum(not np.isfinite(row.energy) for row in rows)
@@ -156,18 +183,29 @@ def claims_of(cell: str, rows: list[Row], pair: list[Row], waiting: float, not_f
         at_most(f"{cell}: cycle times that are refused, of {len(rows)}", refused, "", 0),
         at_most(f"{cell}: programs with a movement that is not certified", uncertified, "", 0),
         at_most(f"{cell}: E(T + d) above E(T) + P_wait d, worst", law, "%", bound),
-        at_most(f"{cell}: rise of the movements' drive energy while the wait keeps its mode", rise, "%", 0.5),
-        at_most(f"{cell}: processor seconds of a request with a cycle time, median", seconds, "s", 6.0),
+        at_most(
+            f"{cell}: rise of the movements' drive energy while the wait keeps its mode",
+            rise,
+            "%",
+            0.5,
+        ),
+        at_most(
+            f"{cell}: processor seconds of a request with a cycle time, median", seconds, "s", 6.0
+        ),
         at_least(f"{cell}: drive energy saved against the common program", drives, "%", 20.0),
         at_least(f"{cell}: mains energy saved against the common program", mains, "%", 0.0),
-        at_most(f"{cell}: segments of the common program that are not free", 100 * not_free, "%", 100.0),
+        at_most(
+            f"{cell}: segments of the common program that are not free", 100 * not_free, "%", 100.0
+        ),
     ]
 
 
 def arguments() -> argparse.Namespace:
     """The command line."""
     parser = command_line(__doc__, (CELL,), 1, "3 cycle times, 1 rival")
-    parser.add_argument("--rivals", type=int, default=20, help="seeds with ten times the work; default: 20")
+    parser.add_argument(
+        "--rivals", type=int, default=20, help="seeds with ten times the work; default: 20"
+    )
     parser.add_argument("--points", type=int, default=12, help="cycle times; default: 12")
     parser.add_argument("--variants", type=int, default=0, help="of each cell besides; default: 0")
     given = parser.parse_args()
@@ -195,7 +233,10 @@ def main() -> None:
                 print(line_of(asdict(row)), flush=True)
             rows += [*points, *rivals, *pair]
             claims += claims_of(cell, points, pair, programs.waiting, not_free)
-            name = f"{cell}: energy above the best of {given.rivals} seeds with ten times the work, worst"
+            name = (
+                f"{cell}: energy above the best of {given.rivals} seeds with ten times the "
+                "work, worst"
+            )
             claims.append(at_most(name, above_best(points, rivals), "%", 2.0))
     finish(given.json, [asdict(row) for row in rows], claims)
 

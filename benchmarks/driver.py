@@ -1,13 +1,18 @@
-"""How fast is the simulated robot, how well does it follow, and how regular is what the node publishes?
+"""How fast is the simulated robot, how well does it follow, and how regular is what the node
+publishes?
 
     python benchmarks/driver.py [--cell FILE]... [--seeds N] [--seconds S] [--quick] [--json FILE]
 
-Each cell's robot carries its tool through random rest-to-rest movements within the limits, stepped without
-ROS: as they are, then scaled, disturbed and canceled. The power modes are entered and left (Table II, times
-of transitions). Then the node runs as a process of its own, and a subscriber here counts its joint states.
+Each cell's robot carries its tool through random rest-to-rest movements within the limits, stepped
+without
+ROS: as they are, then scaled, disturbed and canceled. The power modes are entered and left (Table
+II, times of transitions). Then the node runs as a process of its own, and a subscriber here counts
+its joint states.
 
-Periods are those of a machine that nobody else uses. Where others do, `chrt -f 10` before the command keeps
-their turns out of the figures: beside 30 busy processes p99 was 2.4 ms then, at 2.07 ms of a bare sleep.
+Periods are those of a machine that nobody else uses. Where others do, `chrt -f 10` before the
+command keeps
+their turns out of the figures: beside 30 busy processes p99 was 2.4 ms then, at 2.07 ms of a bare
+sleep.
 """
 
 from __future__ import annotations
@@ -31,11 +36,17 @@ CELL = "demo"
 DT = 0.001
 MOVEMENTS = 4
 LEAD_IN = 3.0  # s
-DISTURBANCE = np.array([600.0, 600.0, 600.0, 100.0, 100.0, 100.0])  # Nm, the bound of docs/driver.md
+DISTURBANCE = np.array(
+    [600.0, 600.0, 600.0, 100.0, 100.0, 100.0]
+)  # Nm, the bound of docs/driver.md
 
 
-def random_movements(simulation: Simulation, generator: np.random.Generator) -> list[JointTrajectory]:
-    """Quintic movements from rest to rest that the driver accepts, each starting where the last one ends."""
+def random_movements(
+    simulation: Simulation, generator: np.random.Generator
+) -> list[JointTrajectory]:
+    """Quintic movements from rest to rest that the driver accepts, each starting where the last one
+    ends.
+    """
     robot = simulation.robot
     movements: list[JointTrajectory] = []
     q = simulation.executor.command
@@ -77,13 +88,19 @@ def model_energy(simulation: Simulation, trajectory: JointTrajectory) -> float:
 
 
 def stepped(cell: Cell, backend: str, seed: int) -> dict[str, Any]:
-    """Drive random movements without ROS; factor over real time, deviation, energy against the model."""
+    """Drive random movements without ROS; factor over real time, deviation, energy against the
+    model.
+    """
     simulation = make_simulation(cell, backend=backend)
     movements = random_movements(simulation, np.random.default_rng(seed))
-    worst_energy, deviation, seconds, cpu = 0.0, 0.0, 0.0, 0.0
+    worst_energy = 0.0
+    deviation = 0.0
+    seconds = 0.0
+    cpu = 0.0
     for trajectory in movements:
         simulation.execute(simulation.vet(TrajectoryGoal(trajectory), 0), 0)
-        began, clock = simulation.time, time.process_time()
+        began = simulation.time
+        clock = time.process_time()
         outcomes: list[Any] = []
         while not outcomes:
             simulation.run(0.05)
@@ -106,14 +123,23 @@ def stepped(cell: Cell, backend: str, seed: int) -> dict[str, Any]:
 
 
 def disturbed(cell: Cell, seed: int) -> dict[str, Any]:
-    """Scale, hold, disturb up to the documented bound and cancel at random instants: the tool's deviation."""
+    """Scale, hold, disturb up to the documented bound and cancel at random instants: the tool's
+    deviation.
+    """
     simulation = make_simulation(cell)
     generator = np.random.default_rng(seed)
-    worst, ended = 0.0, []
+    worst = 0.0
+    ended = []
     for trajectory in random_movements(simulation, generator):
-        start = LEAD_IN + np.array(trajectory.times_ns) * 1e-9  # it may be canceled: come from wherever it is
+        start = (
+            LEAD_IN + np.array(trajectory.times_ns) * 1e-9
+        )  # it may be canceled: come from wherever it is
         goal = JointTrajectory.from_seconds(
-            simulation.robot.joint_names, start, trajectory.positions, np.zeros((2, 6)), np.zeros((2, 6))
+            simulation.robot.joint_names,
+            start,
+            trajectory.positions,
+            np.zeros((2, 6)),
+            np.zeros((2, 6)),
         )
         goal_id = simulation.execute(simulation.vet(TrajectoryGoal(goal), 0), 0)
         until = simulation.time + generator.uniform(0.5, 1.0) * start[-1]
@@ -145,15 +171,21 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
     def over(case: str, key: str, pick: Callable[[Iterator[float]], float] = max) -> float:
         return float(pick(row[key] for row in rows if row["case"] == case))
 
-    bullet, ideal, streams = "stepped pybullet", "stepped ideal", "streamed pybullet"
+    bullet = "stepped pybullet"
+    ideal = "stepped ideal"
+    streams = "streamed pybullet"
     energy = 100.0 * over(bullet, "energy_error")
     claims = [
         at_least("stepped with PyBullet, times real time", over(bullet, "factor", min), "", 10.0),
-        at_least("stepped with the ideal robot, times real time", over(ideal, "factor", min), "", 100.0),
+        at_least(
+            "stepped with the ideal robot, times real time", over(ideal, "factor", min), "", 100.0
+        ),
         at_most("tool deviation, PyBullet", over(bullet, "deviation_mm"), "mm", 1.0),
         at_most("energy against the model, beyond 200 J", energy, "%", 5.0),
         at_most("tool deviation, scaled, disturbed", over("disturbed", "deviation_mm"), "mm", 5.0),
-        at_most("tube left when disturbed up to the bound", over("disturbed", "violated"), "times", 0),
+        at_most(
+            "tube left when disturbed up to the bound", over("disturbed", "violated"), "times", 0
+        ),
         at_most("power modes against Table II", over("Table II", "error_percent"), "%", 1.0),
         at_most("transitions against their parameters", over("transition", "error_s"), "s", 0.1),
         at_most("energy against the published power", over("energy", "error_percent"), "%", 0.1),
@@ -169,7 +201,9 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
 
 def arguments() -> argparse.Namespace:
     """The command line."""
-    parser = command_line(__doc__, (CELL,), 3, "1 seed, 3 s of listening, 6 min of modes and movements")
+    parser = command_line(
+        __doc__, (CELL,), 3, "1 seed, 3 s of listening, 6 min of modes and movements"
+    )
     heard = "of listening to the node; 0 leaves it out"
     parser.add_argument("--seconds", type=float, default=10.0, help=heard)
     given = parser.parse_args()

@@ -1,14 +1,15 @@
-"""How near is a movement of a requested duration to the least energy, and what does the baseline cost?
+"""How near is a movement of a requested duration to the least energy, and what does the baseline
+cost?
 
     python benchmarks/energy.py [--cell FILE]... [--movements N] [--starts N] [--seeds N] [--quick]
                                 [--json FILE]
 
-Free movements between random configurations, in turn with the cell's tool and without load, at 1.2 and 1.5
-times the fastest that the planner finds. Drive energy of the planner's answer beside the best of N starts of
-IPOPT (CasADi; mesh of 60 intervals, Coulomb friction smoothed over 0.01 rad/s), whose answers are put on the
-same interpolant and slowed down until they are certified; and beside the baseline movement. Both keep the
-planner's reserve of torque. All energies by the implementation on Pinocchio, which shares no code with the
-compiled core. Planning takes processor time.
+Free movements between random configurations, in turn with the cell's tool and without load, at 1.2
+and 1.5 times the fastest that the planner finds. Drive energy of the planner's answer beside the
+best of N starts of IPOPT (CasADi; mesh of 60 intervals, Coulomb friction smoothed over 0.01 rad/s),
+whose answers are put on the same interpolant and slowed down until they are certified; and beside
+the baseline movement. Both keep the planner's reserve of torque. All energies by the implementation
+on Pinocchio, which shares no code with the compiled core. Planning takes processor time.
 """
 
 from __future__ import annotations
@@ -35,9 +36,13 @@ from ir_planner.scene import PlanningScene
 
 FACTORS = (1.2, 1.5)
 CEILING = 120.0  # s: work ends a request, never the clock
-S_M, AROUND = 0.02, 0.08  # m: safety distance; clearance of the straight movement, so that peers stay free
+# m: safety distance; clearance of the straight movement, so that peers stay free
+S_M = 0.02
+AROUND = 0.08
 REACH = (0.4, 1.6)  # rad: largest joint of a movement
-SLOWER, MOST = 1.002, 1.03  # steps of the slow-down of a peer's answer, and how much of it at most
+# steps of the slow-down of a peer's answer, and how much of it at most
+SLOWER = 1.002
+MOST = 1.03
 TIMED = 3  # answers whose median time counts
 
 
@@ -78,21 +83,28 @@ class Row:
 class Peer(Protocol):
     """Another method for the least energy at a duration."""
 
-    def solve(self, q0: FloatArray, q1: FloatArray, duration: float, seed: int) -> JointTrajectory | None:
+    def solve(
+        self, q0: FloatArray, q1: FloatArray, duration: float, seed: int
+    ) -> JointTrajectory | None:
         """A movement q0 -> q1 (n,) in `duration` [s], None where it finds none."""
 
 
 def peer_of(scene: PlanningScene) -> Peer:
     """IPOPT for a scene."""
     if importlib.util.find_spec("casadi") is None:
-        raise SystemExit("CasADi is not installed: run make setup, or leave its starts out with --starts 0")
+        raise SystemExit(
+            "CasADi is not installed: run make setup, or leave its starts out with --starts 0"
+        )
     peer: Peer = importlib.import_module("_energy_peer").EnergyPeer(scene)
     return peer
 
 
-def movements(scene: PlanningScene, count: int, seed: int) -> Iterator[tuple[FloatArray, FloatArray]]:
+def movements(
+    scene: PlanningScene, count: int, seed: int
+) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Ends (n,) of straight movements that keep AROUND, in mixed directions."""
-    robot, rng = scene.cell.robot, np.random.default_rng(seed)
+    robot = scene.cell.robot
+    rng = np.random.default_rng(seed)
     t = np.linspace(0.0, 1.0, 60)[:, None]
     while count:
         q0 = rng.uniform(robot.position_min, robot.position_max)
@@ -107,7 +119,9 @@ def movements(scene: PlanningScene, count: int, seed: int) -> Iterator[tuple[Flo
 def certified(
     planner: Planner, trajectory: JointTrajectory, scene: PlanningScene, load: str
 ) -> JointTrajectory | None:
-    """A peer's answer, slowed down uniformly until it is certified; None where that does not help."""
+    """A peer's answer, slowed down uniformly until it is certified; None where that does not
+    help.
+    """
     factor = 1.0
     while factor <= MOST:
         slower = _slowed(trajectory, factor)
@@ -130,23 +144,38 @@ def _slowed(trajectory: JointTrajectory, factor: float) -> JointTrajectory:
 
 
 def measured(
-    cell: str, number: int, case: Case, planner: Planner, drives: Drives, peer: Peer | None, starts: int
+    cell: str,
+    number: int,
+    case: Case,
+    planner: Planner,
+    drives: Drives,
+    peer: Peer | None,
+    starts: int,
 ) -> Row:
     """The planner, its peers and the baseline at one duration."""
     scene = planner.scene(case.load)
     options = PlanOptions(
-        objective="energy", duration=case.duration, load=case.load, planning_time=CEILING, safety_distance=S_M
+        objective="energy",
+        duration=case.duration,
+        load=case.load,
+        planning_time=CEILING,
+        safety_distance=S_M,
     )
     took = []
     for _ in range(TIMED):
         begin = time.process_time()
         plan = planner.plan_regional(case.q0, Goal(configuration=case.q1), options)
         took.append(1e3 * (time.process_time() - begin))
-    mine, disagreement = float("nan"), 0.0
+    mine = float("nan")
+    disagreement = 0.0
     if plan.trajectory is not None:
         mine = drives.energy(plan.trajectory)
         disagreement = abs(mine / (plan.report.energy - plan.report.base_energy) - 1.0)
-    solved = [] if peer is None else [peer.solve(case.q0, case.q1, case.duration, k) for k in range(starts)]
+    solved = (
+        []
+        if peer is None
+        else [peer.solve(case.q0, case.q1, case.duration, k) for k in range(starts)]
+    )
     kept = [certified(planner, one, scene, case.load) for one in solved if one is not None]
     costs = [drives.energy(one) for one in kept if one is not None]
     plain = float("nan")
@@ -177,7 +206,9 @@ def rows_of(cell: str, count: int, starts: int, seed: int) -> Iterator[Row]:
     peers = {load: peer_of(planner.scene(load)) if starts else None for load in loads}
     for number, (q0, q1) in enumerate(movements(planner.scene(""), count, seed)):
         load = loads[number % len(loads)]
-        options = PlanOptions(objective="time", load=load, planning_time=CEILING, safety_distance=S_M)
+        options = PlanOptions(
+            objective="time", load=load, planning_time=CEILING, safety_distance=S_M
+        )
         fastest = planner.plan_regional(q0, Goal(configuration=q1), options).report.duration
         for factor in FACTORS:
             case = Case(q0, q1, load, factor, factor * fastest)
@@ -195,14 +226,19 @@ def claims_of(rows: list[Row]) -> list[Claim]:
     if beside:
         claims += [
             at_most(
-                f"drive energy above the best peer, median of {len(beside)}", np.median(beside), "%", 1.0
+                f"drive energy above the best peer, median of {len(beside)}",
+                np.median(beside),
+                "%",
+                1.0,
             ),
             at_most("drive energy above the best peer, worst", max(beside), "%", 3.0),
         ]
     if against:
         claims += [
             at_most(f"answers above the baseline movement, of {len(against)}", above, "", 0),
-            at_least("saved against the baseline movement, median", float(np.median(saved)), "%", 0.0),
+            at_least(
+                "saved against the baseline movement, median", float(np.median(saved)), "%", 0.0
+            ),
         ]
     slowest = float(np.median([row.planning_ms for row in rows]))
     different = max(row.disagreement for row in rows)
@@ -217,7 +253,9 @@ def arguments() -> argparse.Namespace:
     """The command line."""
     parser = command_line(__doc__, ("open",), 1, "2 movements, 1 start of IPOPT")
     parser.add_argument("--movements", type=int, default=10, help="per cell; default: 10")
-    parser.add_argument("--starts", type=int, default=10, help="of IPOPT per duration; default: 10; 0: none")
+    parser.add_argument(
+        "--starts", type=int, default=10, help="of IPOPT per duration; default: 10; 0: none"
+    )
     given = parser.parse_args()
     if given.quick:
         given.movements, given.starts = min(given.movements, 2), min(given.starts, 1)

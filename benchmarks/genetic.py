@@ -2,10 +2,10 @@
 
     python benchmarks/genetic.py [--cell FILE]... [--seeds N] [--quick] [--json FILE]
 
-Every task there and back whose straight movement is not free, with the default settings and with one of them
-changed. "first": until the first free path (no generation follows it), "all": until the different paths are
-there, both in ms of processor time; W of the cheapest path as a multiple of the straight movement's, raw
-and polished; work in edges.
+Every task there and back whose straight movement is not free, with the default settings and with
+one of them changed. "first": until the first free path (no generation follows it), "all": until the
+different paths are there, both in ms of processor time; W of the cheapest path as a multiple of the
+straight movement's, raw and polished; work in edges.
 """
 
 from __future__ import annotations
@@ -44,7 +44,9 @@ EDGES = 60_000  # the planner's default budget
 
 @dataclass(frozen=True)
 class Search:
-    """One search: solved, ms, paths, W as a multiple of the straight movement's (nan: nothing), work."""
+    """One search: solved, ms, paths, W as a multiple of the straight movement's (nan: nothing),
+    work.
+    """
 
     solved: bool
     first_ms: float
@@ -78,14 +80,19 @@ def searched(task: Task, settings: Genetic, seed: int) -> Search:
     """One seed."""
     _, first_ms, _ = timed(task, replace(settings, settle=0, paths=1), seed)
     found, all_ms, space = timed(task, settings, seed)
-    work, weights = space.work.iterations, task.scene.weights
+    work = space.work.iterations
+    weights = task.scene.weights
     if not found.paths:
         return Search(False, first_ms, all_ms, 0, np.nan, np.nan, work)
     straight = float(movement_cost(weights, task.start, task.goal))
-    polished = [pulled(fewest_corners(path, space, weights), space, weights) for path in found.paths]
+    polished = [
+        pulled(fewest_corners(path, space, weights), space, weights) for path in found.paths
+    ]
     cheapest = min(path_cost(weights, path) for path in polished)
     raw = path_cost(weights, found.paths[0])
-    return Search(True, first_ms, all_ms, len(found.paths), raw / straight, cheapest / straight, work)
+    return Search(
+        True, first_ms, all_ms, len(found.paths), raw / straight, cheapest / straight, work
+    )
 
 
 def row_of(cell: str, variant: str, searches: list[Search]) -> dict[str, Any]:
@@ -117,12 +124,16 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
     """What the default settings are held to."""
     by_cell = {row["cell"]: row for row in rows if row["variant"] == DEFAULT}
     claims = [
-        at_least(f"{cell}: corrected", 100.0 * by_cell[cell]["solved"] / by_cell[cell]["of"], "%", 100.0)
+        at_least(
+            f"{cell}: corrected", 100.0 * by_cell[cell]["solved"] / by_cell[cell]["of"], "%", 100.0
+        )
         for cell in ("open", "table_columns")
         if cell in by_cell
     ]
     if "open" in by_cell:
-        claims.append(at_most("open: first free path, median", by_cell["open"]["first_ms"], "ms", 4.0))
+        claims.append(
+            at_most("open: first free path, median", by_cell["open"]["first_ms"], "ms", 4.0)
+        )
     if "table_columns" in by_cell:
         found = by_cell["table_columns"]["all_p95_ms"]
         claims.append(at_most("table_columns: all paths, p95", found, "ms", 90.0))
@@ -131,7 +142,9 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
 
 def arguments() -> argparse.Namespace:
     """The command line."""
-    given = command_line(__doc__, CELLS, 10, "1 seed, the default settings and two variants").parse_args()
+    given = command_line(
+        __doc__, CELLS, 10, "1 seed, the default settings and two variants"
+    ).parse_args()
     if given.quick:
         given.seeds = min(given.seeds, 1)
     return given
@@ -146,7 +159,9 @@ def main() -> None:
         tasks = [task for task in tasks_of(cell) if not straight_is_free(task)]
         for variant, changed in variants.items():
             settings = Genetic(**changed)
-            searches = [searched(task, settings, seed) for task in tasks for seed in range(given.seeds)]
+            searches = [
+                searched(task, settings, seed) for task in tasks for seed in range(given.seeds)
+            ]
             if searches:
                 rows.append(row_of(tasks[0].cell, variant, searches))
                 print(line_of(rows[-1]), flush=True)

@@ -1,11 +1,14 @@
-"""What does the driver survive: goals that run away, lost emergency stops, impossible loads, floods?
+"""What does the driver survive: goals that run away, lost emergency stops, impossible loads,
+floods?
 
     python benchmarks/hostile.py [--seeds N] [--quick] [--json FILE]
 
-The cases and their independent judge are those of tests/faults, with other seeds: finite differences of the
-executed positions against the robot's limits, presses of the emergency stop in every mode amid a PLC's
-traffic, random loads on the physics, requests of every kind in any order, deviations in every mode. Then the
-node is flooded as a process of its own: what it loses, and its memory, descriptors, threads and log.
+The cases and their independent judge are those of tests/faults, with other seeds: finite
+differences of the executed positions against the robot's limits, presses of the emergency stop in
+every mode amid a PLC's traffic, random loads on the physics, requests of every kind in any order,
+deviations in every mode. Then the
+node is flooded as a process of its own: what it loses, and its memory, descriptors, threads and
+log.
 """
 
 from __future__ import annotations
@@ -73,7 +76,13 @@ def load_row(cases: int, seed: int) -> dict[str, Any]:
 def fuzz_row(cases: int, seed: int) -> dict[str, Any]:
     """Hostile requests of every kind, and how many laws were broken."""
     done, wrong = cases_of("test_fuzz_driver").attacked(cases, seed)
-    return {"case": "fuzz", "seed": seed, "cases": cases, "taken": _taken(done), "broken": len(wrong)}
+    return {
+        "case": "fuzz",
+        "seed": seed,
+        "cases": cases,
+        "taken": _taken(done),
+        "broken": len(wrong),
+    }
 
 
 def _taken(done: Counter[str]) -> int:
@@ -87,14 +96,20 @@ def deviation_row(cases: int, seed: int) -> dict[str, Any]:
 
 
 def driving_row(seconds: float) -> dict[str, Any]:
-    """Simulated driving without a pause, stepped: memory of this process after a tenth and at the end."""
+    """Simulated driving without a pause, stepped: memory of this process after a tenth and at the
+    end.
+    """
     simulation = make_simulation(cases_of("test_runaway_goals").BARE, backend="ideal")
     driver = Driver(simulation)
-    generator, home = np.random.default_rng(FIRST_SEED), np.array(simulation.cell.machine_home)
-    stamp, early = 0, 0.0
+    generator = np.random.default_rng(FIRST_SEED)
+    home = np.array(simulation.cell.machine_home)
+    stamp = 0
+    early = 0.0
     while simulation.time < seconds:
         target = home + generator.uniform(-0.4, 0.4, 6)
-        path = JointTrajectory.from_seconds(names.JOINT_NAMES, [2.5], target[None], np.zeros((1, 6)))
+        path = JointTrajectory.from_seconds(
+            names.JOINT_NAMES, [2.5], target[None], np.zeros((1, 6))
+        )
         simulation.execute(simulation.vet(TrajectoryGoal(path), stamp), stamp)
         for _ in range(1_300):
             stamp += 2_000_000
@@ -119,7 +134,9 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
 
     def grown(case: str, key: str) -> float:
         of_case = (row for row in rows if row["case"] == case)
-        return max((float(row[f"{key}_after"] - row[f"{key}_before"]) for row in of_case), default=0.0)
+        return max(
+            (float(row[f"{key}_after"] - row[f"{key}_before"]) for row in of_case), default=0.0
+        )
 
     return [
         at_least("goals that were accepted and judged", total("goals", "accepted"), "", 10),
@@ -144,7 +161,9 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--seeds", type=int, default=4, help="default: 4")
-    add_ending(parser, "1 seed, 300 goals, 84 presses, 60 loads, 300 requests, 5 minutes of driving")
+    add_ending(
+        parser, "1 seed, 300 goals, 84 presses, 60 loads, 300 requests, 5 minutes of driving"
+    )
     given = parser.parse_args()
     counts = (300, 84, 60, 300, 70) if given.quick else (4_000, 1_000, 500, 5_000, 500)
     makers = (goal_row, stop_row, load_row, fuzz_row, deviation_row)

@@ -1,8 +1,10 @@
-"""What the compiled core costs, beside Coal through Pinocchio, PyBullet and Pinocchio's RNEA in the same run.
+"""What the compiled core costs, beside Coal through Pinocchio, PyBullet and Pinocchio's RNEA in the
+same run.
 
     python benchmarks/kernels.py [--cell FILE]... [--seeds N] [--build] [--quick] [--json FILE]
 
-Best of several repetitions on one thread, unless a row says otherwise. Closes with one line per figure that
+Best of several repetitions on one thread, unless a row says otherwise. Closes with one line per
+figure that
 was asked for: measured value, bound, holds or falls short.
 """
 
@@ -39,7 +41,10 @@ def main() -> None:
     claims: list[Claim] = []
     effort = QUICK if given.quick else FULL
     for seed in range(given.seeds):
-        for part in (_kernels_geometry.measure(given.cell, seed, effort), _kernels_dynamics.measure(seed)):
+        for part in (
+            _kernels_geometry.measure(given.cell, seed, effort),
+            _kernels_dynamics.measure(seed),
+        ):
             rows += part[0]
             claims += part[1]
         rows += _kernels_spline.measure(given.cell, seed)
@@ -47,7 +52,10 @@ def main() -> None:
     rows += part[0]
     claims += part[1]
     for row in rows:
-        print(f"{row.kernel + (' (' + row.peer + ')' if row.peer else ''):72s} {row.value:12.3f} {row.unit}")
+        print(
+            f"{row.kernel + (' (' + row.peer + ')' if row.peer else ''):72s} {row.value:12.3f} "
+            f"{row.unit}"
+        )
     finish(given.json, [asdict(row) for row in rows], claims)
 
 

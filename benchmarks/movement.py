@@ -1,13 +1,14 @@
 """How soon is one regional movement known: a coarse solution, and the certified answer?
 
-    python benchmarks/movement.py [--cell FILE]... [--variants N [--variant-seed N]] [--seeds N] [--quick]
+    python benchmarks/movement.py [--cell FILE]... [--variants N [--variant-seed N]] [--seeds N]
+    [--quick]
                                   [--json FILE]
 
-Every task of the cells, there and back, apart by whether its straight movement (PTP) is free. Processor time,
-the least of the repetitions (the seed stays). Coarse: an estimate from the straight segment where it is free,
-else from guesses of all classes; `first`: from the first free path alone. Their costs, with the penalties of
-a coarse solution, are held against J of the answer. --variants: instead of the cells, N of each that nobody
-tuned for.
+Every task of the cells, there and back, apart by whether its straight movement (PTP) is free.
+Processor time, the least of the repetitions (the seed stays). Coarse: an estimate from the straight
+segment where it is free, else from guesses of all classes; `first`: from the first free path alone.
+Their costs, with the penalties of a coarse solution, are held against J of the answer. --variants:
+instead of the cells, N of each that nobody tuned for.
 """
 
 from __future__ import annotations
@@ -62,13 +63,16 @@ def least(repetitions: int, function: Callable[[], float]) -> tuple[float, float
 
 
 def coarse(planner: Planner, task: Task, *, alone: bool) -> float:
-    """Cost of the coarse solution: `alone` of the straight segment where it is free, of the first free path
-    where not; else of the cheapest of guesses where the segment is not free.
+    """Cost of the coarse solution: `alone` of the straight segment where it is free, of the first
+    free path where not; else of the cheapest of guesses where the segment is not free.
     """
-    options, cell = asked(task), task.scene.cell
+    options = asked(task)
+    cell = task.scene.cell
     work = Work(planner.settings.max_iterations, time.monotonic() + UNHURRIED, time.monotonic)
-    context, searches = Context.of(task.scene, options, work), planner.settings.searches
-    ends, space = Ends(task.start, task.goal[None]), FreeSpace.of(task.scene, task.margin, work)
+    context = Context.of(task.scene, options, work)
+    searches = planner.settings.searches
+    ends = Ends(task.start, task.goal[None])
+    space = FreeSpace.of(task.scene, task.margin, work)
     segment = np.stack([task.start, task.goal])
     if space.edges_free(segment[:1], segment[1:])[0]:
         return estimate([segment], Refinement(context)).cost
@@ -95,7 +99,9 @@ def measured(planner: Planner, task: Task, repetitions: int) -> Row:
     first_ms, first = least(repetitions, lambda: coarse(planner, task, alone=True))
     coarse_ms, cheapest = least(repetitions, lambda: coarse(planner, task, alone=False))
     free = bool(found.verdict[0] == FREE)
-    return Row(task.label, free, first_ms, _over(first, J), coarse_ms, _over(cheapest, J), answer_ms, J)
+    return Row(
+        task.label, free, first_ms, _over(first, J), coarse_ms, _over(cheapest, J), answer_ms, J
+    )
 
 
 def _over(cost: float, J: float) -> float:
@@ -112,8 +118,18 @@ def claims_of(rows: Sequence[Row]) -> list[Claim]:
         near = 100.0 * float(np.mean([row.coarse_over <= NEAR for row in some]))
         first = 100.0 * float(np.mean([row.first_over <= NEAR for row in some]))
         claims += [
-            at_most(f"{name}: certified answer, median", np.median([r.answer_ms for r in some]), "ms", bound),
-            at_most(f"{name}: first coarse solution, median", np.median([r.first_ms for r in some]), "ms", 2),
+            at_most(
+                f"{name}: certified answer, median",
+                np.median([r.answer_ms for r in some]),
+                "ms",
+                bound,
+            ),
+            at_most(
+                f"{name}: first coarse solution, median",
+                np.median([r.first_ms for r in some]),
+                "ms",
+                2,
+            ),
             at_least(f"{name}: it costs at most {NEAR} times the answer", first, "%", 95.0),
             at_most(
                 f"{name}: coarse solutions of all classes, median",
@@ -129,8 +145,12 @@ def claims_of(rows: Sequence[Row]) -> list[Claim]:
 def arguments() -> argparse.Namespace:
     """The command line."""
     parser = command_line(__doc__, CELLS, 10, "3 repetitions of every third task")
-    parser.add_argument("--variants", type=int, default=0, help="mirrored, turned and jittered ones per cell")
-    parser.add_argument("--variant-seed", type=int, default=0, help="what the variants are drawn from")
+    parser.add_argument(
+        "--variants", type=int, default=0, help="mirrored, turned and jittered ones per cell"
+    )
+    parser.add_argument(
+        "--variant-seed", type=int, default=0, help="what the variants are drawn from"
+    )
     given = parser.parse_args()
     given.cell = given.cell or CELLS
     if given.variants:

@@ -1,11 +1,13 @@
-"""How still do a program's figures hold: over payloads, over seeds, over the work that they are given?
+"""How still do a program's figures hold: over payloads, over seeds, over the work that they are
+given?
 
     python benchmarks/noise.py [--cell FILE]... [--seeds N] [--steps N] [--quick] [--json FILE]
 
 All stations of a cell in turn and back to the posture park. Payloads: the mass of the tool of the
-demonstration cell in even steps up to 195 kg, its centre where it is, its inertia in proportion, in one cycle
-time; noise is the largest residual of the energy at the mains from its quadratic fit. Seeds: spread of J with
-the default work. Work: J with ten times the default work, over that with the default.
+demonstration cell in even steps up to 195 kg, its centre where it is, its inertia in proportion, in
+one cycle time; noise is the largest residual of the energy at the mains from its quadratic fit.
+Seeds: spread of J with the default work. Work: J with ten times the default work, over that with
+the default.
 """
 
 from __future__ import annotations
@@ -24,7 +26,9 @@ from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner
 
 CELLS = ("demo", "open", "table_columns", "cnc_door", "deep_box")
-HEAVIEST, LIGHTEST = 195.0, 0.01  # kg; a mass is above 0
+# kg; a mass is above 0
+HEAVIEST = 195.0
+LIGHTEST = 0.01
 ROUNDING = 0.05  # %: within a tolerance any chain is as good as the best
 LONGER = 1.1  # times the free cycle with the heaviest payload: what all of them can keep
 MUCH = 80_000  # max_iterations: ten times of what goes into better movements by default
@@ -32,8 +36,8 @@ MUCH = 80_000  # max_iterations: ten times of what goes into better movements by
 
 @dataclass(frozen=True)
 class Row:
-    """One program. asked: what was varied; value: payload [kg], seed or max_iterations; energy: at the mains
-    [J]; J: of its movements; processor seconds of planning. Not found: nan.
+    """One program. asked: what was varied; value: payload [kg], seed or max_iterations; energy: at
+    the mains [J]; J: of its movements; processor seconds of planning. Not found: nan.
     """
 
     cell: str
@@ -66,11 +70,16 @@ def over_payloads(cell: Cell, steps: int) -> list[Row]:
     heaviest = planned(loaded(cell, HEAVIEST), "free", HEAVIEST, PlanOptions(planning_time=CEILING))
     masses = np.linspace(LIGHTEST, HEAVIEST, steps + 1)
     cycle = LONGER * heaviest.cycle
-    return [planned(loaded(cell, float(mass)), "payload", float(mass), options, cycle) for mass in masses]
+    return [
+        planned(loaded(cell, float(mass)), "payload", float(mass), options, cycle)
+        for mass in masses
+    ]
 
 
 def loaded(cell: Cell, mass: float) -> Cell:
-    """The cell with another mass [kg] at its tool; nothing attaches its parts, which hardly weigh."""
+    """The cell with another mass [kg] at its tool; nothing attaches its parts, which hardly
+    weigh.
+    """
     assert cell.tool is not None
     parts = tuple(replace(part, load=_weighing(part.load, LIGHTEST)) for part in cell.parts)
     return replace(cell, tool=_weighing(cell.tool, mass), parts=parts)
@@ -81,8 +90,11 @@ def _weighing(load: Load, mass: float) -> Load:
 
 
 def noise(rows: Sequence[Row]) -> float:
-    """Largest residual [%] of the energy over the value from its quadratic fit; inf where one is missing."""
-    x, y = np.array([row.value for row in rows]), np.array([row.energy for row in rows])
+    """Largest residual [%] of the energy over the value from its quadratic fit; inf where one is
+    missing.
+    """
+    x = np.array([row.value for row in rows])
+    y = np.array([row.energy for row in rows])
     if not np.isfinite(y).all():
         return float("inf")
     scaled = x / x.max()
@@ -112,17 +124,25 @@ def main() -> None:
     rows = over_payloads(load_cell("demo"), given.steps)
     print(*(line_of(asdict(row)) for row in rows), sep="\n", flush=True)
     claims: list[Claim] = []
-    name = f"demo: residual of {len(rows)} payloads up to {HEAVIEST:.4g} kg from their quadratic fit"
+    name = (
+        f"demo: residual of {len(rows)} payloads up to {HEAVIEST:.4g} kg from their quadratic fit"
+    )
     claims.append(at_most(name, noise(rows), "%", 1.0))
     for name in given.cell or CELLS:
-        cell, ceiling = load_cell(name), PlanOptions(planning_time=CEILING)
+        cell = load_cell(name)
+        ceiling = PlanOptions(planning_time=CEILING)
         seeds = [planned(cell, "seed", k, replace(ceiling, seed=k)) for k in range(given.seeds)]
         much = planned(cell, "max_iterations", MUCH, replace(ceiling, max_iterations=MUCH))
         print(*(line_of(asdict(row)) for row in (*seeds, much)), sep="\n", flush=True)
         more = 100.0 * (much.J / seeds[0].J - 1.0)
         claims += [
             at_most(f"{name}: spread of J over {given.seeds} seeds", spread(seeds), "%", 1.0),
-            at_most(f"{name}: J with ten times the work above that with the default", more, "%", ROUNDING),
+            at_most(
+                f"{name}: J with ten times the work above that with the default",
+                more,
+                "%",
+                ROUNDING,
+            ),
         ]
         rows += [*seeds, much]
     finish(given.json, [asdict(row) for row in rows], claims)

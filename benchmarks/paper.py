@@ -3,10 +3,12 @@
     python benchmarks/paper.py [--only NAME]... [--workers N] [--seeds N] [--first-seed N] [--again]
                                [--write] [--out FOLDER] [--page FILE] [--quick] [--json FILE]
 
-Every claim is an experiment of its own (`_paper_<claim>.py`). What one has found is stored as JSON and CSV in
---out; the next run goes on with those that are missing, --only measures the named ones anew, --again all.
-Then the page is written from everything that is stored: docs/reproduction.md, or with --quick a page of its
-own. Printed are the statements with their intervals, and those with a bound as claims.
+Every claim is an experiment of its own (`_paper_<claim>.py`). What one has found is stored as JSON
+and CSV in
+--out; the next run goes on with those that are missing, --only measures the named ones anew,
+--again all.
+Then the page is written from everything that is stored: docs/reproduction.md, or with --quick a
+page of its own. Printed are the statements with their intervals, and those with a bound as claims.
 """
 
 from __future__ import annotations
@@ -31,7 +33,9 @@ from _results import Claim, add_ending, commit, machine, print_claims, write_jso
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "reproduction.md"
-SEEDS, FIRST = 2, 6  # seeds 0 to 5 are those of the pilots that the sizes of the samples come from
+# seeds 0 to 5 are those of the pilots that the sizes of the samples come from
+SEEDS = 2
+FIRST = 6
 
 
 def arguments() -> argparse.Namespace:
@@ -40,18 +44,33 @@ def arguments() -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     names = ", ".join(EXPERIMENTS)
-    parser.add_argument("--only", action="append", choices=list(EXPERIMENTS), metavar="NAME", help=names)
-    parser.add_argument("--workers", type=int, default=1, help="claims that are measured side by side")
-    parser.add_argument("--seeds", type=int, default=SEEDS, help=f"independent repetitions; default: {SEEDS}")
-    parser.add_argument("--first-seed", type=int, default=FIRST, help=f"the first of them; default: {FIRST}")
+    parser.add_argument(
+        "--only", action="append", choices=list(EXPERIMENTS), metavar="NAME", help=names
+    )
+    parser.add_argument(
+        "--workers", type=int, default=1, help="claims that are measured side by side"
+    )
+    parser.add_argument(
+        "--seeds", type=int, default=SEEDS, help=f"independent repetitions; default: {SEEDS}"
+    )
+    parser.add_argument(
+        "--first-seed", type=int, default=FIRST, help=f"the first of them; default: {FIRST}"
+    )
     parser.add_argument("--again", action="store_true", help="measure also what is stored")
-    parser.add_argument("--write", action="store_true", help="measure nothing: the page from what is stored")
-    parser.add_argument("--out", type=Path, default=ROOT / "out" / "paper", help="where rows are stored")
-    parser.add_argument("--page", type=Path, help="default: docs/reproduction.md; --quick: in --out")
+    parser.add_argument(
+        "--write", action="store_true", help="measure nothing: the page from what is stored"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=ROOT / "out" / "paper", help="where rows are stored"
+    )
+    parser.add_argument(
+        "--page", type=Path, help="default: docs/reproduction.md; --quick: in --out"
+    )
     add_ending(parser, "small samples, one seed, a page of its own")
     given = parser.parse_args()
     if given.quick:
-        given.seeds, given.out = 1, given.out / "quick"
+        given.seeds = 1
+        given.out = given.out / "quick"
     given.page = given.page or (given.out / "reproduction.md" if given.quick else PAGE)
     return given
 
@@ -63,7 +82,9 @@ def seeds_of(given: argparse.Namespace) -> list[int]:
 
 def processor_seconds() -> float:
     """Of this process and of those that it has waited for."""
-    mine, others = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    mine, others = (
+        resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    )
     return mine.ru_utime + mine.ru_stime + others.ru_utime + others.ru_stime
 
 
@@ -73,7 +94,9 @@ def run_all(names: Sequence[str], given: argparse.Namespace) -> None:
         for name in names:
             run(name, given)
         return
-    spawned = multiprocessing.get_context("spawn")  # a claim's processor time has no part of another's
+    spawned = multiprocessing.get_context(
+        "spawn"
+    )  # a claim's processor time has no part of another's
     with ProcessPoolExecutor(given.workers, spawned, max_tasks_per_child=1) as pool:
         for _ in pool.map(run, names, itertools.repeat(given)):
             pass
@@ -83,14 +106,24 @@ def run(name: str, given: argparse.Namespace) -> None:
     """Measure a claim and store its rows."""
     experiment = EXPERIMENTS[name]
     print(f"{name}: measured", flush=True)
-    begin, wall = processor_seconds(), time.perf_counter()
+    begin = processor_seconds()
+    wall = time.perf_counter()
     rows = [
         {"seed": seed, **row}
         for seed in seeds_of(given)[: None if experiment.seeded else 1]
         for row in experiment.measure(seed, given.quick)
     ]
-    stored = {"name": experiment.name, "seeds": seeds_of(given), "commit": commit(), "machine": machine()}
-    stored |= {"processor_s": processor_seconds() - begin, "wall_s": time.perf_counter() - wall, "rows": rows}
+    stored = {
+        "name": experiment.name,
+        "seeds": seeds_of(given),
+        "commit": commit(),
+        "machine": machine(),
+    }
+    stored |= {
+        "processor_s": processor_seconds() - begin,
+        "wall_s": time.perf_counter() - wall,
+        "rows": rows,
+    }
     given.out.mkdir(parents=True, exist_ok=True)
     part = given.out / f"{experiment.name}.part"
     part.write_text(json.dumps(stored, indent=1))
@@ -143,14 +176,22 @@ def main() -> None:
         if name not in asked:
             print(f"{name}: as it is stored", flush=True)
     run_all(asked, given)
-    there = {name: found for name, one in EXPERIMENTS.items() if (found := stored(one, given)) is not None}
+    there = {
+        name: found
+        for name, one in EXPERIMENTS.items()
+        if (found := stored(one, given)) is not None
+    }
     folder = given.page.parent
-    chapters = [chapter(EXPERIMENTS[name], found, folder / "images", folder) for name, found in there.items()]
+    chapters = [
+        chapter(EXPERIMENTS[name], found, folder / "images", folder)
+        for name, found in there.items()
+    ]
     left = [name for name in EXPERIMENTS if name not in there]
     machines = {found["machine"].split(", load")[0] for found in there.values()}
     text = page(chapters, left, seeds_of(given), ", ".join(sorted(machines)), given.quick)
     write(text, given.page)
-    claims, rows = [], []
+    claims = []
+    rows = []
     for one in chapters:
         claims += claims_of(one.statements)
         rows += [asdict(statement) | {"claim": one.experiment.name} for statement in one.statements]

@@ -1,10 +1,11 @@
-"""Does the planner's node grow? What calls of each service leave in memory, descriptors and threads.
+"""Does the planner's node grow? What calls of each service leave in memory, descriptors and
+threads.
 
     python benchmarks/planner_soak.py [--cell NAME] [--seeds N] [--quick] [--json FILE]
 
-The requests are those of tests/faults/test_hostile_requests.py: one that makes sense for each service, and
-hostile ones. They go through the handlers of a node that publishes as always. The first tenth fills the
-memories that are bounded in number and bytes; growth is counted from there.
+The requests are those of tests/faults/test_hostile_requests.py: one that makes sense for each
+service, and hostile ones. They go through the handlers of a node that publishes as always. The
+first tenth fills the memories that are bounded in number and bytes; growth is counted from there.
 """
 
 from __future__ import annotations
@@ -46,10 +47,16 @@ def taken() -> tuple[float, int, int]:
 
 
 def soaked(node: PlannerNode, cell: str, calls: int, seed: int) -> dict[str, Any]:
-    """So many calls of each service, every second one hostile; what the process has more at the end."""
-    cases, rng = hostile_requests(), np.random.default_rng(seed)
-    handlers = {name: node._requests.guarded(getattr(node._requests, name)) for name in cases.REQUESTS}
-    began, before = time.process_time(), taken()
+    """So many calls of each service, every second one hostile; what the process has more at the
+    end.
+    """
+    cases = hostile_requests()
+    rng = np.random.default_rng(seed)
+    handlers = {
+        name: node._requests.guarded(getattr(node._requests, name)) for name in cases.REQUESTS
+    }
+    began = time.process_time()
+    before = taken()
     for call in range(calls):
         if call == int(WARM * calls):
             before = taken()
@@ -86,14 +93,21 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
 def main() -> None:
     """Run the calls, print what they leave."""
     given = command_line(__doc__, ("demo",), 1, "100 calls of each service").parse_args()
-    calls, cells = 100 if given.quick else 5_000, given.cell or ["demo"]
+    calls = 100 if given.quick else 5_000
+    cells = given.cell or ["demo"]
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     rclpy.init()
     small = [
         Parameter(name, Parameter.Type.INTEGER, value)
-        for name, value in (("stored_trajectories", 50), ("stored_programs", 10), ("stored_megabytes", 20))
+        for name, value in (
+            ("stored_trajectories", 50),
+            ("stored_programs", 10),
+            ("stored_megabytes", 20),
+        )
     ]
-    node = PlannerNode(parameter_overrides=[Parameter("cell", Parameter.Type.STRING, "demo"), *small])
+    node = PlannerNode(
+        parameter_overrides=[Parameter("cell", Parameter.Type.STRING, "demo"), *small]
+    )
     node._requests.log = lambda sentence: None
     node._last_state.take(np.array(hostile_requests().HOME), time.monotonic())
     rows = []

@@ -1,15 +1,17 @@
-"""Does a program go through the best configurations, and how far is it from the best where it does not?
+"""Does a program go through the best configurations, and how far is it from the best where it does
+not?
 
-    python benchmarks/program.py [--cell FILE]... [--instances N] [--seeds N] [--quick] [--json FILE]
+    python benchmarks/program.py [--cell FILE]... [--instances N] [--seeds N] [--quick] [--json
+    FILE]
 
-Small programs are drawn by seed: 3 to 6 stops of a cell, with its tool and without. Each is planned for J
-(drive energy + 500 W x T) and for W of eq. (9). Beside it stand all chains of the same configurations, every
-edge at the cost that the planner finds for it (edges that cannot belong to a cheaper chain by an exact lower
-bound are left out). "answer": cost of the movements of the answer over the best chain's; "chain": cost of its
-configurations with the same edges, over the best's.
+Small programs are drawn by seed: 3 to 6 stops of a cell, with its tool and without. Each is planned
+for J (drive energy + 500 W x T) and for W of eq. (9). Beside it stand all chains of the same
+configurations, every edge at the cost that the planner finds for it (edges that cannot belong to a
+cheaper chain by an exact lower bound are left out). "answer": cost of the movements of the answer
+over the best chain's; "chain": cost of its configurations with the same edges, over the best's.
 
-Then the demonstration's own program is driven by the simulated robot on the nominal plant, without real time:
-every movement and pause, and the whole, against what was planned.
+Then the demonstration's own program is driven by the simulated robot on the nominal plant, without
+real time: every movement and pause, and the whole, against what was planned.
 """
 
 from __future__ import annotations
@@ -38,7 +40,9 @@ OBJECTIVES = {"J": "time_and_energy", "W": "movement_cost"}
 BOUND = 1.01  # of the best chain
 ROUNDING = 1e-6  # %
 STOPS = (3, 6)
-DRIVEN, QUICK_PAUSE = "demo", 30.0  # the cell whose program is driven; s: what --quick cuts its pauses to
+# the cell whose program is driven; s: what --quick cuts its pauses to
+DRIVEN = "demo"
+QUICK_PAUSE = 30.0
 CHAINS_S = 300.0  # ceiling of the search through all chains of one instance
 
 
@@ -54,8 +58,8 @@ class Instance:
 
 @dataclass(frozen=True)
 class Row:
-    """One program and objective; costs J or W, ratios to the best chain (inf: nothing found), the answer's
-    own gap [%], seconds.
+    """One program and objective; costs J or W, ratios to the best chain (inf: nothing found), the
+    answer's own gap [%], seconds.
     """
 
     cell: str
@@ -118,7 +122,8 @@ def instances(cell: str, count: int, seed: int) -> list[Instance]:
 
 def compared(instance: Instance, objective: str, seed: int, known: EdgeCosts) -> Row:
     """The program as it is planned, beside all chains."""
-    planner, wanted = planner_of(instance.cell), OBJECTIVES[objective]
+    planner = planner_of(instance.cell)
+    wanted = OBJECTIVES[objective]
     options = PlanOptions(
         seed=seed,
         planning_time=CEILING,
@@ -130,16 +135,22 @@ def compared(instance: Instance, objective: str, seed: int, known: EdgeCosts) ->
     begin = time.perf_counter()
     plan = planner.plan_program(instance.stops, 0.0, options, start)
     planned = time.perf_counter()
-    count, edges, proved, best, ratios = 0.0, 0, True, float("inf"), (1.0, 1.0)
+    count = 0.0
+    edges = 0
+    proved = True
+    best = float("inf")
+    ratios = (1.0, 1.0)
     try:
         chains = Chains.of(planner, instance.stops, start, options, known)
         _, best, proved = chains.cheapest(lambda: time.perf_counter() > planned + CHAINS_S)
-        count, edges = chains.count, chains.edges
+        count = chains.count
+        edges = chains.edges
         ratios = _ratios(plan, chains, best, options)
     except StageError:
         ratios = (float("inf"), float("inf")) if plan.status.ok else ratios
     took = time.perf_counter() - planned
-    stops, load = " ".join(instance.stops), instance.load or "tool"
+    stops = " ".join(instance.stops)
+    load = instance.load or "tool"
     return Row(
         instance.cell,
         stops,
@@ -156,8 +167,12 @@ def compared(instance: Instance, objective: str, seed: int, known: EdgeCosts) ->
     )
 
 
-def _ratios(plan: ProgramPlan, chains: Chains, best: float, options: PlanOptions) -> tuple[float, float]:
-    """Cost of the answer, and of its configurations, over the best chain's; 1 where neither found any."""
+def _ratios(
+    plan: ProgramPlan, chains: Chains, best: float, options: PlanOptions
+) -> tuple[float, float]:
+    """Cost of the answer, and of its configurations, over the best chain's; 1 where neither found
+    any.
+    """
     if not plan.status.ok:
         return (float("inf"),) * 2 if np.isfinite(best) else (1.0, 1.0)
     answer = sum(cost_of(movement.report, options) for movement in plan.movements)
@@ -166,8 +181,8 @@ def _ratios(plan: ProgramPlan, chains: Chains, best: float, options: PlanOptions
 
 
 def _stops(plan: ProgramPlan) -> list[tuple[FloatArray, FloatArray]]:
-    """Configuration (n,) at each stop, and where its line in begins: of an entry; or of a regional movement
-    that no entry follows, which ends at both.
+    """Configuration (n,) at each stop, and where its line in begins: of an entry; or of a regional
+    movement that no entry follows, which ends at both.
     """
     kinds = [str(movement.kind) for movement in plan.movements]
     ends = []
@@ -208,7 +223,9 @@ def claims_of(rows: list[Row]) -> list[Claim]:
 def arguments() -> argparse.Namespace:
     """The command line."""
     parser = command_line(__doc__, CELLS, 1, "2 programs of each cell, short pauses")
-    parser.add_argument("--instances", type=int, default=8, help="programs of each cell; default: 8")
+    parser.add_argument(
+        "--instances", type=int, default=8, help="programs of each cell; default: 8"
+    )
     given = parser.parse_args()
     if given.quick:
         given.instances = min(given.instances, 2)

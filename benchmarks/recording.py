@@ -2,9 +2,9 @@
 
     python benchmarks/recording.py [--seconds S] [--minutes M] [--kills N] [--demo FILE] [--quick]
 
-A process publishes joint states at 1 kHz and the other topics of a cell, `ir-record` records them. A run of
-ten minutes is analysed and reported. Recordings are killed and read. A plan is recorded and planned again,
-or the demonstration's recording. The CDR reader is held against two libraries.
+A process publishes joint states at 1 kHz and the other topics of a cell, `ir-record` records them.
+A run of ten minutes is analysed and reported. Recordings are killed and read. A plan is recorded
+and planned again, or the demonstration's recording. The CDR reader is held against two libraries.
 """
 
 from __future__ import annotations
@@ -39,7 +39,11 @@ HERE = Path(__file__).resolve().parent
 def streamed(folder: Path, seconds: float) -> dict[str, Any]:
     """Record 1 kHz joint states and everything else for so long, in processes of their own."""
     path = folder / "stream.mcap"
-    environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_DOMAIN_ID": DOMAIN, **os.environ}
+    environment = {
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_DOMAIN_ID": DOMAIN,
+        **os.environ,
+    }
     record = [sys.executable, "-m", "ir_recorder.node", str(path), "--root", str(folder)]
     talk = [sys.executable, str(HERE / "_recording_talker.py"), str(seconds)]
     pipe = subprocess.PIPE
@@ -50,10 +54,12 @@ def streamed(folder: Path, seconds: float) -> dict[str, Any]:
         while not path.exists():
             time.sleep(0.05)
         time.sleep(1.0)  # the recorder's imports are no part of its share
-        before, begun = process_cpu(recorder.pid), time.monotonic()
+        before = process_cpu(recorder.pid)
+        begun = time.monotonic()
         assert talker.stdout is not None
         talker.stdout.readline()
-        cpu, passed = process_cpu(recorder.pid) - before, time.monotonic() - begun
+        cpu = process_cpu(recorder.pid) - before
+        passed = time.monotonic() - begun
         time.sleep(1.0)  # what was sent last arrives
         recorder.send_signal(signal.SIGINT)
         recorder.wait()
@@ -75,10 +81,12 @@ def streamed(folder: Path, seconds: float) -> dict[str, Any]:
 
 def reported(folder: Path, minutes: float) -> tuple[dict[str, Any], Path]:
     """Analyse and report a run of so many minutes in a process of its own."""
-    path, page = folder / "run.mcap", folder / "run.html"
+    path = folder / "run.mcap"
+    page = folder / "run.html"
     messages = write_run(path, 60.0 * minutes)
     command = [sys.executable, "-m", "ir_cli.main", "report", str(path), "-o", str(page)]
-    before, begun = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, time.monotonic()
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    begun = time.monotonic()
     subprocess.run([*command, "--root", str(folder)], check=True, capture_output=True)
     row = {
         "case": "report",
@@ -132,11 +140,15 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
     return [
         at_most(f"joint states lost in {stream['seconds']:g} s at 1 kHz", stream["lost"], "", 0),
         at_most("recorder's processor time", stream["cpu_percent"], "% of a core", 30.0),
-        at_most(f"{report['minutes']:g} minutes analysed and reported", report["wall_s"], "s", 15.0),
+        at_most(
+            f"{report['minutes']:g} minutes analysed and reported", report["wall_s"], "s", 15.0
+        ),
         at_most(page, report["page_mb"], "MB", 8.0),
         at_least("requests planned again with equal ids", again["equal"], "", again["requests"]),
         at_most(f"lost by a kill, worst of {len(of('killed'))}", lost, "s", 1.0),
-        at_least("reading columns, times the faster library", peer / own["us_per_message"], "", 1.0),
+        at_least(
+            "reading columns, times the faster library", peer / own["us_per_message"], "", 1.0
+        ),
         at_least("readers that agree", sum(row["equal"] for row in (own, *others)), "", 3),
         at_most("damaged messages without a sentence", own["other_errors"], "", 0),
     ]
@@ -148,13 +160,17 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--seconds", type=float, default=60.0, help="of recording at 1 kHz (60)")
-    parser.add_argument("--minutes", type=float, default=10.0, help="of the run that is reported (10)")
+    parser.add_argument(
+        "--minutes", type=float, default=10.0, help="of the run that is reported (10)"
+    )
     parser.add_argument("--kills", type=int, default=50, help="recordings that are killed (50)")
     parser.add_argument("--demo", type=Path, help="recording of the demonstration to plan again")
     add_ending(parser, "10 s of recording, 2 minutes of a run, 5 kills")
     given = parser.parse_args()
     if given.quick:
-        given.seconds, given.minutes, given.kills = 10.0, 2.0, 5
+        given.seconds = 10.0
+        given.minutes = 2.0
+        given.kills = 5
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         rows: list[dict[str, Any]] = []

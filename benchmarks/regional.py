@@ -1,17 +1,20 @@
-"""What does a regional movement cost, how fast is it known, and what do OMPL and TOPP-RA reach beside it?
+"""What does a regional movement cost, how fast is it known, and what do OMPL and TOPP-RA reach
+beside it?
 
-    python benchmarks/regional.py [--cell FILE]... [--task NAME]... [--seeds N] [--peers N] [--coal N]
+    python benchmarks/regional.py [--cell FILE]... [--task NAME]... [--seeds N] [--peers N] [--coal
+    N]
                                   [--variants N [--variant-seed N]]
-                                  [--patient N] [--best-seconds S | --minute] [--best FILE] [--quick]
-                                  [--json FILE] [--plot FILE]
+                                  [--patient N] [--best-seconds S | --minute] [--best FILE]
+                                  [--quick] [--json FILE] [--plot FILE]
 
-Every task there and back with J = drive energy without base load + 500 W x T, with the default budget and
-with 1 s of work; then OMPL's RRTConnect and
-BKPIECE1 (validity by the project's own kernel every 0.01 rad, PathSimplifier) with TOPP-RA over their paths
-(speed, acceleration and torque, no limit of jerk) and the uniform slow-down of least J. The best known J
-is what any method finds in longer time: some seconds per task, or --minute for 60 s of each method; an
-earlier run's JSON adds what it found by --best. --variants: instead of the cells, N of each that nobody tuned
-for. Coal looks at the first N different movements of a task.
+Every task there and back with J = drive energy without base load + 500 W x T, with the default
+budget and with 1 s of work; then OMPL's RRTConnect and
+BKPIECE1 (validity by the project's own kernel every 0.01 rad, PathSimplifier) with TOPP-RA over
+their paths (speed, acceleration and torque, no limit of jerk) and the uniform slow-down of least J.
+The best known J
+is what any method finds in longer time: some seconds per task, or --minute for 60 s of each method;
+an earlier run's JSON adds what it found by --best. --variants: instead of the cells, N of each that
+nobody tuned for. Coal looks at the first N different movements of a task.
 """
 
 from __future__ import annotations
@@ -55,14 +58,26 @@ def arguments() -> argparse.Namespace:
     quick = "2 tasks per cell there and back, 2 seeds, 1 search, 0.3 s for the best known J"
     parser = command_line(__doc__, CELLS, 30, quick)
     parser.add_argument("--task", action="append", help="only tasks of this name, as home->p1")
-    parser.add_argument("--variants", type=int, default=0, help="mirrored, turned and jittered ones per cell")
-    parser.add_argument("--variant-seed", type=int, default=0, help="what the variants are drawn from")
+    parser.add_argument(
+        "--variants", type=int, default=0, help="mirrored, turned and jittered ones per cell"
+    )
+    parser.add_argument(
+        "--variant-seed", type=int, default=0, help="what the variants are drawn from"
+    )
     parser.add_argument("--patient", type=int, default=3, help="seeds with 1 s of work per task")
-    parser.add_argument("--peers", type=int, default=5, help="searches of each of OMPL's planners per task")
+    parser.add_argument(
+        "--peers", type=int, default=5, help="searches of each of OMPL's planners per task"
+    )
     parser.add_argument("--coal", type=int, default=1, help="movements per task that Coal checks")
-    parser.add_argument("--best-seconds", type=float, default=5.0, help="per task for the best known J")
-    parser.add_argument("--minute", action="store_true", help="60 s of each method for the best known J")
-    parser.add_argument("--best", type=Path, help="JSON of an earlier run whose best J count as well")
+    parser.add_argument(
+        "--best-seconds", type=float, default=5.0, help="per task for the best known J"
+    )
+    parser.add_argument(
+        "--minute", action="store_true", help="60 s of each method for the best known J"
+    )
+    parser.add_argument(
+        "--best", type=Path, help="JSON of an earlier run whose best J count as well"
+    )
     parser.add_argument("--plot", type=Path, default=Path("out/regional.png"))
     given = parser.parse_args()
     if given.quick:
@@ -78,7 +93,9 @@ def chosen_tasks(given: argparse.Namespace) -> dict[str, list[Task]]:
         cells = variant_files(cells, given.variants, given.variant_seed, VARIANTS)
     chosen = {cell: tasks_of(cell) for cell in cells}
     if given.task:
-        chosen = {cell: [t for t in tasks if t.name in given.task] for cell, tasks in chosen.items()}
+        chosen = {
+            cell: [t for t in tasks if t.name in given.task] for cell, tasks in chosen.items()
+        }
     elif given.quick:
         chosen = {cell: tasks[:4] for cell, tasks in chosen.items()}
     chosen = {cell: tasks for cell, tasks in chosen.items() if tasks}
@@ -110,8 +127,14 @@ def best_known(
     peers: tuple[PeerRun, ...],
     earlier: dict[str, tuple[str, float]],
 ) -> tuple[str, float]:
-    """Method and least J of these runs, of longer ones of each method, and of an earlier benchmark."""
-    found = [(name, cost.J) for name, cost in best_of(planner, task, seconds).items()] if seconds else []
+    """Method and least J of these runs, of longer ones of each method, and of an earlier
+    benchmark.
+    """
+    found = (
+        [(name, cost.J) for name, cost in best_of(planner, task, seconds).items()]
+        if seconds
+        else []
+    )
     found += [("planner", one.cost.J) for one in mine if one.cost is not None]
     found += [("OMPL", one.cost.J) for one in peers if one.cost is not None]
     found += [earlier[task.label]] if task.label in earlier else []
@@ -132,7 +155,9 @@ def measured(
     seconds = 60.0 if given.minute else given.best_seconds / METHODS
     by, J = best_known(planner, task, seconds, [*mine, *patient], peers, earlier)
     different = {one.trajectory_id: one.trajectory for one in mine if one.trajectory is not None}
-    coal = [opinion.clearance_left(one, task.margin) for one in list(different.values())[: given.coal]]
+    coal = [
+        opinion.clearance_left(one, task.margin) for one in list(different.values())[: given.coal]
+    ]
     return Figures(
         task,
         tuple(mine),
@@ -149,7 +174,8 @@ def measured(
 
 def genetic_claims(asked_tasks: dict[str, list[Task]], seeds: int) -> list[Claim]:
     """What the genetic search solves alone, per cell."""
-    solved, count = 0, 0
+    solved = 0
+    count = 0
     for cell, tasks in asked_tasks.items():
         planner = planner_of(cell)
         if not knows(planner, tasks[0], GENETIC):
@@ -158,10 +184,15 @@ def genetic_claims(asked_tasks: dict[str, list[Task]], seeds: int) -> list[Claim
         found, of = solved_alone(planner, tasks, GENETIC, seeds)
         print(f"planner_id {GENETIC!r} alone, {cell}: {found} of {of} answers certified")
         if tasks[0].cell in GENETIC_CELLS:
-            solved, count = solved + found, count + of
+            solved = solved + found
+            count = count + of
     if not count:
         return []
-    return [at_least(f"{GENETIC} alone, {' and '.join(GENETIC_CELLS)}", 100.0 * solved / count, "%", 100.0)]
+    return [
+        at_least(
+            f"{GENETIC} alone, {' and '.join(GENETIC_CELLS)}", 100.0 * solved / count, "%", 100.0
+        )
+    ]
 
 
 def repeat_claim(asked_tasks: dict[str, list[Task]]) -> Claim:
@@ -175,8 +206,21 @@ def repeat_claim(asked_tasks: dict[str, list[Task]]) -> Claim:
 def tables(figures: list[Figures]) -> None:
     """Print what was measured, OMPL beside the planner."""
     planners = list(dict.fromkeys(peer.planner for f in figures for peer in f.peers))
-    columns = ["task", "S_m_mm", "solved", "truncated", "first_ms", "final_ms", "J", "T", "E", "clearance_mm"]
-    columns += [f"{name}_{what}" for name in planners for what in ("solved", "first_ms", "final_ms", "J")]
+    columns = [
+        "task",
+        "S_m_mm",
+        "solved",
+        "truncated",
+        "first_ms",
+        "final_ms",
+        "J",
+        "T",
+        "E",
+        "clearance_mm",
+    ]
+    columns += [
+        f"{name}_{what}" for name in planners for what in ("solved", "first_ms", "final_ms", "J")
+    ]
     columns += ["ompl_J", "ompl_T", "ompl_E", "best_J", "near_best", "near_best_1s", "best_by"]
     rows = [["-" if f.row().get(c) is None else str(f.row()[c]) for c in columns] for f in figures]
     heads = [c.replace("RRTConnect", "RRTC").replace("BKPIECE1", "BKP") for c in columns]
@@ -189,8 +233,15 @@ def remarks(given: argparse.Namespace, noted: bool, earlier: bool) -> None:
     """Print how the figures were found."""
     print()
     if not noted:
-        print("no stage notes the first feasible path: its time is that of the whole stage that found it")
-    spent = "60 s of each method" if given.minute else f"{given.best_seconds:g} s per task for all methods"
+        print(
+            "no stage notes the first feasible path: its time is that of the whole stage that "
+            "found it"
+        )
+    spent = (
+        "60 s of each method"
+        if given.minute
+        else f"{given.best_seconds:g} s per task for all methods"
+    )
     print(f"best known J: these runs, {spent}{', an earlier run' if earlier else ''}")
     print("OMPL: paths sampled every 0.01 rad, not proved; TOPP-RA: no limit of jerk")
 
@@ -203,18 +254,25 @@ def main() -> None:
     figures: list[Figures] = []
     noted = True
     for cell, tasks in chosen.items():
-        planner, opinion = planner_of(cell), SecondOpinion(tasks[0].scene)
+        planner = planner_of(cell)
+        opinion = SecondOpinion(tasks[0].scene)
         for task in tasks:
             figures.append(measured(planner, task, opinion, given, earlier))
             row = figures[-1].row()
             shown = ("task", "solved", "first_ms", "final_ms", "J", "ompl_J", "best_J")
             print(line_of({key: row.get(key, "-") for key in shown}), flush=True)
-        plan = planner.plan_regional(tasks[0].start, Goal(configuration=tasks[0].goal), asked(tasks[0]))
+        plan = planner.plan_regional(
+            tasks[0].start, Goal(configuration=tasks[0].goal), asked(tasks[0])
+        )
         noted &= notes_first(plan.info)
     print()
     tables(figures)
     remarks(given, noted, bool(earlier))
-    claims = [*claims_of(figures), *genetic_claims(chosen, min(given.seeds, 5)), repeat_claim(chosen)]
+    claims = [
+        *claims_of(figures),
+        *genetic_claims(chosen, min(given.seeds, 5)),
+        repeat_claim(chosen),
+    ]
     plot(figures, given.plot)
     finish(given.json, [figure.row() for figure in figures], claims)
 

@@ -1,14 +1,16 @@
-"""Does everything hold for every robot: inverse kinematics, certified plans, the set-up of a new one?
+"""Does everything hold for every robot: inverse kinematics, certified plans, the set-up of a new
+one?
 
     python benchmarks/robots.py [--cell FILE]... [--poses N] [--seeds N] [--quick] [--json FILE]
 
 Inverse kinematics: the robot of each cell in N random configurations; a pose is missed where the
-configuration it was made from is not among the answers. Beside the four robots an arm with offsets at its
-wrist, which is solved by the search. Plans: the tasks of the cell, or from park along its stations and back,
-each seed; every movement is judged again by Coal at configurations at most 0.0005 rad apart and by limits and
-torques with Pinocchio. Set-up: the commands of docs/robot_guide.md on the URDF of each robot: a new robot,
-checked and planned in processor time, then driven in real time and reported by `ir demo`, a process of its
-own. Closes with one line per figure: measured value, bound, holds or falls short.
+configuration it was made from is not among the answers. Beside the four robots an arm with offsets
+at its wrist, which is solved by the search. Plans: the tasks of the cell, or from park along its
+stations and back, each seed; every movement is judged again by Coal at configurations at most
+0.0005 rad apart and by limits and torques with Pinocchio. Set-up: the commands of
+docs/robot_guide.md on the URDF of each robot: a new robot, checked and planned in processor time,
+then driven in real time and reported by `ir demo`, a process of its own. Closes with one line per
+figure: measured value, bound, holds or falls short.
 """
 
 from __future__ import annotations
@@ -35,7 +37,9 @@ from ir_msgs_py.options import PlanOptions
 from ir_planner import Goal, Planner, parse_goal
 
 CELLS = ("open", "kr300_pallets", "kr6_bench", "ur10e_bench")
-POSES, QUICK_POSES, SEARCHED = 10_000, 300, 1_000
+POSES = 10_000
+QUICK_POSES = 300
+SEARCHED = 1_000
 NEAR = 1e-5  # rad: a configuration beside a singularity is known to half the digits
 COAL = 2e-6  # m: what Coal's iterations leave between it and the true distance
 CELL_OF_GUIDE = """\
@@ -69,7 +73,10 @@ def ik_row(robot: RobotModel | SimpleNamespace, poses: int) -> Row:
     chain = Chain(robot)
     solver = inverse_kinematics(chain, robot.position_min, robot.position_max)
     q = np.random.default_rng(0).uniform(robot.position_min, robot.position_max, (poses, 6))
-    wanted, missed, worst, begin = chain.tcp_poses(q), 0, np.zeros(2), time.process_time()
+    wanted = chain.tcp_poses(q)
+    missed = 0
+    worst = np.zeros(2)
+    begin = time.process_time()
     seconds = 0.0
     for first in range(0, poses, 500):
         part = slice(first, min(first + 500, poses))
@@ -99,7 +106,9 @@ def errors(reached: FloatArray, wanted: FloatArray) -> FloatArray:
     """Largest distance [m] and angle [rad] between poses (M, 4, 4)."""
     away = np.linalg.norm(reached[:, :3, 3] - wanted[:, :3, 3], axis=1)
     turn = np.swapaxes(reached[:, :3, :3], 1, 2) @ wanted[:, :3, :3] - np.eye(3)
-    return np.array([away.max(initial=0.0), np.linalg.norm(turn, axis=(1, 2)).max(initial=0.0) / np.sqrt(2)])
+    return np.array(
+        [away.max(initial=0.0), np.linalg.norm(turn, axis=(1, 2)).max(initial=0.0) / np.sqrt(2)]
+    )
 
 
 def is_there(found: FloatArray, made: FloatArray) -> bool:
@@ -135,7 +144,9 @@ def plan_rows(cell: str, seeds: int) -> list[Row]:
 
 
 def asked_of(cell: Cell) -> Iterator[tuple[str, FloatArray | None, Goal]]:
-    """Name, start (None: where the last one ended) and goal: the tasks, or along the stations and back."""
+    """Name, start (None: where the last one ended) and goal: the tasks, or along the stations and
+    back.
+    """
     for task in cell.tasks:
         yield task.name, task.start, Goal(configuration=task.goal, text=task.name)
     if not cell.tasks:
@@ -151,9 +162,11 @@ def guide_row(robot: RobotModel, folder: Path) -> Row:
     (folder / "robot.urdf").write_text(robot_urdf(robot))
     (folder / "drives.yaml").write_text(sheet.replace("my_robot", "own"))
     (folder / "cell.yaml").write_text(CELL_OF_GUIDE.format(park=np.round(moved, 6).tolist()))
-    own, cell = str(folder / "own.yaml"), str(folder / "cell.yaml")
+    own = str(folder / "own.yaml")
+    cell = str(folder / "cell.yaml")
     goal = " ".join(f"A{k} {angle:.6f}" for k, angle in enumerate(moved, start=1))
-    urdf, drives = str(folder / "robot.urdf"), str(folder / "drives.yaml")
+    urdf = str(folder / "robot.urdf")
+    drives = str(folder / "drives.yaml")
     begin = time.process_time()
     codes = [
         ir(["robot", "new", "--urdf", urdf, "--drives", drives, "-o", own]),
@@ -166,12 +179,20 @@ def guide_row(robot: RobotModel, folder: Path) -> Row:
     q = np.random.default_rng(0).uniform(robot.position_min, robot.position_max, (100, 6))
     copy = Chain(robot_named(own)).link_poses(q)[:, -1]
     off = float(np.abs(copy - Chain(robot).link_poses(q)[:, -1]).max())
-    row = {"robot": robot.name, "codes": str(codes), "failed": sum(codes), "seconds": seconds, "off": off}
+    row = {
+        "robot": robot.name,
+        "codes": str(codes),
+        "failed": sum(codes),
+        "seconds": seconds,
+        "off": off,
+    }
     return row | driven(folder)
 
 
 def driven(folder: Path) -> Row:
-    """`ir demo` in the new robot's cell: its last line, elapsed seconds, whether it failed, pages written."""
+    """`ir demo` in the new robot's cell: its last line, elapsed seconds, whether it failed, pages
+    written.
+    """
     words = [sys.executable, "-m", "ir_cli.main", "demo", "--cell", "cell.yaml"]
     begin = time.monotonic()
     done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
@@ -199,13 +220,21 @@ def claims_of(ik: list[Row], plans: list[Row], guide: list[Row]) -> list[Claim]:
         above = max((row["clearance_mm"] - row["coal_mm"] for row in solved), default=np.inf)
         claims.append(at_most(f"reported above Coal's distance, {cell}", 1e-3 * above, "m", COAL))
         torque = max((row["limit_share"] for row in solved), default=np.inf)
-        claims.append(at_most(f"largest share of a limit, torque by Pinocchio, {cell}", torque, "", 1 + 1e-6))
+        claims.append(
+            at_most(f"largest share of a limit, torque by Pinocchio, {cell}", torque, "", 1 + 1e-6)
+        )
     for row in guide:
-        claims.append(at_most(f"commands of the guide that fail, {row['robot']}", row["failed"], "", 0))
-        claims.append(at_most(f"processor time of the guide, {row['robot']}", row["seconds"], "s", 600))
+        claims.append(
+            at_most(f"commands of the guide that fail, {row['robot']}", row["failed"], "", 0)
+        )
+        claims.append(
+            at_most(f"processor time of the guide, {row['robot']}", row["seconds"], "s", 600)
+        )
         claims.append(at_most(f"checks of the drive that fail, {row['robot']}", row["demo"], "", 0))
         claims.append(at_least(f"report of the drive, {row['robot']}", row["reports"], "", 1))
-        claims.append(at_most(f"planned, driven, reported, {row['robot']}", row["demo_seconds"], "s", 600))
+        claims.append(
+            at_most(f"planned, driven, reported, {row['robot']}", row["demo_seconds"], "s", 600)
+        )
     return claims
 
 
@@ -216,8 +245,12 @@ def main() -> None:
     given = parser.parse_args()
     poses, seeds = (min(given.poses, QUICK_POSES), 1) if given.quick else (given.poses, given.seeds)
     cells = given.cell or list(CELLS)
-    robots: dict[str, RobotModel] = {load_cell(cell).robot.name: load_cell(cell).robot for cell in cells}
-    ik, plans, guide = [], list[Row](), []
+    robots: dict[str, RobotModel] = {
+        load_cell(cell).robot.name: load_cell(cell).robot for cell in cells
+    }
+    ik = []
+    plans = list[Row]()
+    guide = []
     for robot in robots.values():
         ik.append(ik_row(robot, poses))
         print(line_of(ik[-1]), flush=True)

@@ -1,13 +1,15 @@
 """How do time and memory grow with bodies, stops, configurations and trajectory points?
 
-    python benchmarks/scaling.py [--cell FILE] [--seeds N] [--axis NAME]... [--most N] [--plot FILE] [--quick]
+    python benchmarks/scaling.py [--cell FILE] [--seeds N] [--axis NAME]... [--most N] [--plot FILE]
+    [--quick]
                                  [--json FILE]
 
-Every step is measured in a process of its own: processor seconds of one call, and the memory that it takes at
-most. The exponent is the slope of log(time) over log(size), fitted over the upper half of the range: 1 is
-linear. Bodies: the cell is filled up with boxes, each a machine with a station and an allowed contact. Stops:
-tours of the cell's stations. Configurations: the same tour while A4 and A6 may turn less and less. Points:
-waves of all joints, which last longer the more points they have.
+Every step is measured in a process of its own: processor seconds of one call, and the memory that
+it takes at most. The exponent is the slope of log(time) over log(size), fitted over the upper half
+of the range: 1 is linear. Bodies: the cell is filled up with boxes, each a machine with a station
+and an allowed contact. Stops: tours of the cell's stations. Configurations: the same tour while A4
+and A6 may turn less and less. Points: waves of all joints, which last longer the more points they
+have.
 """
 
 from __future__ import annotations
@@ -37,7 +39,9 @@ def arguments() -> argparse.Namespace:
 
 
 def rows_of(step: Step, sizes: tuple[int, ...], cell: str, seeds: int) -> list[Row]:
-    """One row per size; the first size that is refused or fails ends the step, with its sentence."""
+    """One row per size; the first size that is refused or fails ends the step, with its
+    sentence.
+    """
     rows: list[Row] = []
     for size in sizes:
         found = [measured(partial(step.prepare, cell, size, seed)) for seed in range(seeds)]

@@ -3,10 +3,10 @@
     python benchmarks/service.py [--cell FILE]... [--seeds N] [--coal N] [--no-ros] [--quick]
                                  [--json FILE]
 
-At every station: configurations in closed form and by CCD from 32 starts; eq. (7) alone with literal and
-inverse weighting; the whole movement. "path": found, shortened and proved as a path; "answer": with its time,
-energy and the proof of the trajectory. Then Coal checks distances, the limits are sampled at 10 kHz, and the
-node is asked.
+At every station: configurations in closed form and by CCD from 32 starts; eq. (7) alone with
+literal and inverse weighting; the whole movement. "path": found, shortened and proved as a path;
+"answer": with its time, energy and the proof of the trajectory. Then Coal checks distances, the
+limits are sampled at 10 kHz, and the node is asked.
 """
 
 from __future__ import annotations
@@ -30,7 +30,9 @@ def claims_of(figures: list[StationFigures]) -> list[Claim]:
     free = [f for f in figures if f.free]
     runs = sum(len(f.ccd_ms) for f in free)
     claims = [
-        at_most("closed form with clearances, per pose", max(f.analytic_ms for f in figures), "ms", 0.1),
+        at_most(
+            "closed form with clearances, per pose", max(f.analytic_ms for f in figures), "ms", 0.1
+        ),
         at_least("ccd finds a free one", 100.0 * sum(f.ccd_found for f in free) / runs, "%", 98.0),
         at_most("ccd, median", float(np.median([f.ccd_ms for f in free])), "ms", 20.0),
         at_least("withdrawals certified", 100.0 * sum(f.found for f in free) / runs, "%", 100.0),
@@ -45,18 +47,26 @@ def claims_of(figures: list[StationFigures]) -> list[Claim]:
             path = float(np.median([f.path_ms for f in there]))
             answer = float(np.median([f.answer_ms for f in there]))
             claims.append(at_most(f"path found and proved, {what}, median", path, "ms", bound))
-            claims.append(at_most(f"answer with time and energy, {what}, median", answer, "ms", bound))
+            claims.append(
+                at_most(f"answer with time and energy, {what}, median", answer, "ms", bound)
+            )
     paths = np.concatenate([f.path_ms for f in free])
     answers = np.concatenate([f.answer_ms for f in free])
-    claims.append(at_most("path found and proved, p95", float(np.percentile(paths, 95)), "ms", 250.0))
-    claims.append(at_most("answer with time and energy, p95", float(np.percentile(answers, 95)), "ms", 250.0))
+    claims.append(
+        at_most("path found and proved, p95", float(np.percentile(paths, 95)), "ms", 250.0)
+    )
+    claims.append(
+        at_most("answer with time and energy, p95", float(np.percentile(answers, 95)), "ms", 250.0)
+    )
     return claims
 
 
 def arguments() -> argparse.Namespace:
     """The command line."""
     parser = command_line(__doc__, CELLS, 5, "1 seed, the first cell, Coal at one station")
-    parser.add_argument("--coal", type=int, default=1, help="movements per station that Coal checks")
+    parser.add_argument(
+        "--coal", type=int, default=1, help="movements per station that Coal checks"
+    )
     parser.add_argument("--no-ros", action="store_true", help="leave the node out")
     given = parser.parse_args()
     if given.quick:
@@ -65,8 +75,12 @@ def arguments() -> argparse.Namespace:
     return given
 
 
-def checked(figures: list[StationFigures], scenes: dict[str, PlanningScene], coal: int) -> list[Claim]:
-    """Second opinions: Coal looks at so many movements of a station, the limits are sampled in all."""
+def checked(
+    figures: list[StationFigures], scenes: dict[str, PlanningScene], coal: int
+) -> list[Claim]:
+    """Second opinions: Coal looks at so many movements of a station, the limits are sampled in
+    all.
+    """
     opinions = {name: SecondOpinion(scene) for name, scene in scenes.items()}
     left: list[tuple[float, int]] = []
     shares: list[float] = []
@@ -77,7 +91,9 @@ def checked(figures: list[StationFigures], scenes: dict[str, PlanningScene], coa
         left += [opinion.clearance_left(one, figure.margin, figure.station) for one in asked]
     claims = []
     if left:
-        name = f"least distance beyond S_m by Coal, {sum(count for _, count in left)} configurations"
+        name = (
+            f"least distance beyond S_m by Coal, {sum(count for _, count in left)} configurations"
+        )
         claims.append(at_least(name, min(least for least, _ in left), "m", -1e-6))
     if shares:
         claims.append(at_most("largest share of a limit at 10 kHz", max(shares), "1", 1.0 + 1e-6))
@@ -105,7 +121,10 @@ def main() -> None:
         for station in scene.cell.stations:
             figures.append(measured(scene, station, given.seeds))
             print(line_of(figures[-1].row()), flush=True)
-    claims = [*claims_of(figures), *checked(figures[: 1 if given.quick else None], scenes, given.coal)]
+    claims = [
+        *claims_of(figures),
+        *checked(figures[: 1 if given.quick else None], scenes, given.coal),
+    ]
     if not given.no_ros:
         claims += node_claims(figures, given.cell[0], given.seeds)
     finish(given.json, [figure.row() for figure in figures], claims)

@@ -1,12 +1,13 @@
-"""What is left of a program that goes through KRL, what do today's programs lose, what is a trace worth?
+"""What is left of a program that goes through KRL, what do today's programs lose, what is a trace
+worth?
 
     python benchmarks/shop_floor.py [--cell FILE]... [--seeds N] [--quick] [--json FILE]
 
-Every cell's program, or a random visit of its stations for each seed, is planned, written as KRL, read back,
-driven by the controller's model and certified again: what that costs, how near the ends come, and what Coal
-at 0.0005 rad and limits at 10 kHz say of it. The programs of the tests' corpus make the same trip. Four
-programs of today, one of them with a seam, are held against the planner's. Motions of known energy are
-sampled with noise and judged from positions alone.
+Every cell's program, or a random visit of its stations for each seed, is planned, written as KRL,
+read back, driven by the controller's model and certified again: what that costs, how near the ends
+come, and what Coal at 0.0005 rad and limits at 10 kHz say of it. The programs of the tests' corpus
+make the same trip. Four programs of today, one of them with a seam, are held against the planner's.
+Motions of known energy are sampled with noise and judged from positions alone.
 """
 
 from __future__ import annotations
@@ -26,10 +27,20 @@ from ir_description import bundled_cells, load_cell
 from ir_krl import follow, parse
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner import KrlExport, Planner, ProgramPlan, RequestError, evaluate_krl, export_krl, tool_in_flange
+from ir_planner import (
+    KrlExport,
+    Planner,
+    ProgramPlan,
+    RequestError,
+    evaluate_krl,
+    export_krl,
+    tool_in_flange,
+)
 from ir_planner.krl.judged import contacts_at, scenes_of
 
-SEEDS, QUICK_SEEDS, VISITS = 3, 1, 3
+SEEDS = 3
+QUICK_SEEDS = 1
+VISITS = 3
 MARGIN = 0.02  # m, the default of a request
 PROOF_MM = -0.1  # what a proof may leave: its tolerance, and Coal's own
 CELLS = tuple(sorted(bundled_cells()))
@@ -37,9 +48,10 @@ CELLS = tuple(sorted(bundled_cells()))
 
 @dataclass(frozen=True)
 class Row:
-    """One program: movements; seconds and joules of the movements before and after; the largest deviation of
-    a joint [rad], the largest error of an end that is read back [deg, mm]; by Coal the least distance above
-    what its pair must keep [mm], at 10 kHz the largest share of a limit; why it was refused, else "".
+    """One program: movements; seconds and joules of the movements before and after; the largest
+    deviation of a joint [rad], the largest error of an end that is read back [deg, mm]; by Coal the
+    least distance above what its pair must keep [mm], at 10 kHz the largest share of a limit; why
+    it was refused, else "".
     """
 
     cell: str
@@ -60,7 +72,9 @@ class Row:
 
 
 def stations_for(planner: Planner, seed: int) -> tuple[str, ...]:
-    """Seed 0 asks for the cell's program where it has one, the others for stations drawn at random."""
+    """Seed 0 asks for the cell's program where it has one, the others for stations drawn at
+    random.
+    """
     cell = planner.cell
     if seed == 0 and cell.program:
         return ()
@@ -71,7 +85,9 @@ def stations_for(planner: Planner, seed: int) -> tuple[str, ...]:
 
 def row_of(cell: str, seed: int, planner: Planner) -> Row | None:
     """Plan, export, read back; None where the planner finds no program."""
-    plan = planner.plan_program(stations_for(planner, seed), 0.0, PlanOptions(), planner.cell.posture("park"))
+    plan = planner.plan_program(
+        stations_for(planner, seed), 0.0, PlanOptions(), planner.cell.posture("park")
+    )
     if not plan.status.ok:
         return None
     moving = [step for step in plan.movements if not step.is_pause]
@@ -85,7 +101,8 @@ def row_of(cell: str, seed: int, planner: Planner) -> Row | None:
     driven = driven_again(planner, export)
     degrees, millimetres = ends_apart(planner, plan, driven)
     left, share = second_opinion(planner, plan, driven)
-    before, after = export.planned, export.exported
+    before = export.planned
+    after = export.exported
     figures = (before.duration, after.duration, before.energy, after.energy, export.deviation)
     judged = (export.exported.certified, left, share)
     return Row(cell, seed, len(moving), *figures, degrees, millimetres, *judged, "", took)
@@ -99,7 +116,9 @@ def driven_again(planner: Planner, export: KrlExport) -> list[JointTrajectory]:
     return [one.step.trajectory for one in evaluate_krl(planner, program).steps if one.step.moves]
 
 
-def ends_apart(planner: Planner, plan: ProgramPlan, driven: Sequence[JointTrajectory]) -> tuple[float, float]:
+def ends_apart(
+    planner: Planner, plan: ProgramPlan, driven: Sequence[JointTrajectory]
+) -> tuple[float, float]:
     """Largest error of an end of a movement [deg], [mm] of the tcp."""
     planned = [step.trajectory for step in plan.movements if step.trajectory is not None]
     pairs = list(zip(driven, planned, strict=True))
@@ -108,16 +127,23 @@ def ends_apart(planner: Planner, plan: ProgramPlan, driven: Sequence[JointTrajec
     )
     chain = planner.scene("").chain
     away = chain.tcp_poses(first)[:, :3, 3] - chain.tcp_poses(second)[:, :3, 3]
-    return float(np.degrees(np.abs(first - second)).max()), 1e3 * float(np.linalg.norm(away, axis=1).max())
+    return float(np.degrees(np.abs(first - second)).max()), 1e3 * float(
+        np.linalg.norm(away, axis=1).max()
+    )
 
 
 def second_opinion(
     planner: Planner, plan: ProgramPlan, driven: Sequence[JointTrajectory]
 ) -> tuple[float, float]:
-    """By Coal the least distance above what is kept [mm]; the largest share of a limit at 10 kHz."""
-    scenes = scenes_of(plan.movements, planner.cell, planner.scene("").power, planner.settings.drives)
+    """By Coal the least distance above what is kept [mm]; the largest share of a limit at 10
+    kHz.
+    """
+    scenes = scenes_of(
+        plan.movements, planner.cell, planner.scene("").power, planner.settings.drives
+    )
     moving = [(s, scene) for s, scene in zip(plan.movements, scenes, strict=True) if not s.is_pause]
-    left, share = np.inf, 0.0
+    left = np.inf
+    share = 0.0
     for trajectory, (step, scene) in zip(driven, moving, strict=True):
         opinion = SecondOpinion(scene)
         left = min(left, opinion.clearance_left(trajectory, MARGIN, contacts_at(step))[0])
@@ -145,13 +171,22 @@ def main() -> None:
     dearer = [row.exported_joules / row.planned_joules - 1.0 for row in written]
     claims = [
         at_least("programs written", len(written) / len(rows), "share", 1.0),
-        at_least("of them certified again", float(np.mean([row.certified for row in written])), "share", 1.0),
+        at_least(
+            "of them certified again",
+            float(np.mean([row.certified for row in written])),
+            "share",
+            1.0,
+        ),
         at_most("ends that are read back", max(row.end_deg for row in written), "deg", 1e-4),
         at_most("ends that are read back", max(row.end_mm for row in written), "mm", 1e-3),
-        at_most("joints apart from the plan", max(row.deviation_rad for row in written), "rad", 2e-3),
+        at_most(
+            "joints apart from the plan", max(row.deviation_rad for row in written), "rad", 2e-3
+        ),
         at_most("slower than planned, median", 100.0 * float(np.median(slower)), "%", 5.0),
         at_most("dearer than planned, median", 100.0 * float(np.median(dearer)), "%", 2.0),
-        at_least("by Coal, above what is kept", min(row.coal_left_mm for row in written), "mm", PROOF_MM),
+        at_least(
+            "by Coal, above what is kept", min(row.coal_left_mm for row in written), "mm", PROOF_MM
+        ),
         at_most("limits at 10 kHz", max(row.limit_share for row in written), "share", 1.0 + 1e-6),
     ]
     found = [([asdict(row) for row in rows], claims), corpus(), baselines(), traces()]

@@ -1,10 +1,12 @@
-"""Do the four nodes grow in an hour of work? Memory, descriptors, threads and logs, minute by minute.
+"""Do the four nodes grow in an hour of work? Memory, descriptors, threads and logs, minute by
+minute.
 
     python benchmarks/soak.py [--minutes N] [--rest SECONDS] [--quick] [--json FILE]
 
-Planner, driver with physics and Modbus, runner and recorder run as processes in real time. A client plans
-programs and has them run, asks every service that it can, is killed and comes back, and presses the emergency
-stop; the recorder writes one file after the other. Growth is counted from a tenth of the time on.
+Planner, driver with physics and Modbus, runner and recorder run as processes in real time. A client
+plans programs and has them run, asks every service that it can, is killed and comes back, and
+presses the emergency stop; the recorder writes one file after the other. Growth is counted from a
+tenth of the time on.
 """
 
 from __future__ import annotations
@@ -46,14 +48,18 @@ NODES = ("ir_planner", "ir_sim_driver", "ir_program_runner", "ir_recorder")
 STATIONS = (("p1", "p2"), ("p1b", "conv"), ("cab", "p1"))
 WARM = 0.1  # share of the time
 ASKED = 20  # rounds of quick calls in a cycle of work
-QUICK, FULL = 2.0, 60.0  # min
+# min
+QUICK = 2.0
+FULL = 60.0
 
 
 class Shift:
     """The nodes at work. processes: their ids; kept: a folder for logs and recordings."""
 
     def __init__(self, processes: dict[str, int], port: int, kept: Path) -> None:
-        self._processes, self._port, self._kept = processes, port, kept
+        self._processes = processes
+        self._port = port
+        self._kept = kept
         self.programs = self.calls = self.presses = self.refused = 0
 
     def has(self) -> dict[str, float]:
@@ -69,7 +75,9 @@ class Shift:
         return row
 
     def work(self, client: Client, cycle: int) -> None:
-        """A cycle: calls, a program, a stop, a pause, a recording; a refusal counts and is no failure."""
+        """A cycle: calls, a program, a stop, a pause, a recording; a refusal counts and is no
+        failure.
+        """
         state = client.next_message(names.JOINT_STATES, JointState)
         requests = (
             (names.CHECK_STATE, CheckState.Request(state=state)),
@@ -103,7 +111,9 @@ class Shift:
     def _record(self, client: Client, cycle: int) -> None:
         client.call("/ir_recorder/stop", StopRecording.Request())
         path = self._kept / "shift.mcap"
-        client.ask("/ir_recorder/start", StartRecording.Request(path=str(path), overwrite=cycle > 0))
+        client.ask(
+            "/ir_recorder/start", StartRecording.Request(path=str(path), overwrite=cycle > 0)
+        )
 
     def _pause(self, client: Client) -> None:
         client.ask(names.START_PAUSE, StartPause.Request(pause=10.0))
@@ -137,14 +147,20 @@ def soaked(minutes: float, rest: float) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     with tempfile.TemporaryDirectory() as folder, ExitStack() as nodes:
         kept = Path(folder)
-        os.environ["ROS_LOG_DIR"], os.environ["IR_FILE_ROOTS"] = str(kept), str(kept)
+        os.environ["ROS_LOG_DIR"] = str(kept)
+        os.environ["IR_FILE_ROOTS"] = str(kept)
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             port = int(free.getsockname()[1])
         small = {"stored_trajectories": 50, "stored_programs": 10, "stored_megabytes": 20}
         given: dict[str, dict[str, str | int]] = {
             "ir_planner": {"cell": "open", **small},
-            "ir_sim_driver": {"cell": "open", "modbus": "true", "modbus_port": port, "wake_port": 0},
+            "ir_sim_driver": {
+                "cell": "open",
+                "modbus": "true",
+                "modbus_port": port,
+                "wake_port": 0,
+            },
             "ir_program_runner": {},
             "ir_recorder": {},
         }
@@ -152,7 +168,9 @@ def soaked(minutes: float, rest: float) -> list[dict[str, Any]]:
             name: nodes.enter_context(running(f"{name}.node", **parameters)).pid
             for name, parameters in given.items()
         }
-        shift, began, cycle = Shift(processes, port, kept), time.monotonic(), 0
+        shift = Shift(processes, port, kept)
+        began = time.monotonic()
+        cycle = 0
         while time.monotonic() - began < 60.0 * minutes:
             with Client(timeout=60.0) as client:  # a new one in every cycle
                 shift.work(client, cycle)
@@ -160,7 +178,12 @@ def soaked(minutes: float, rest: float) -> list[dict[str, Any]]:
             cycle += 1
             passed = (time.monotonic() - began) / 60.0
             if passed >= len(rows) + 1 or (minutes < 10.0 and passed > 0.3 * (len(rows) + 1)):
-                row = {"minute": passed, **shift.has(), "programs": shift.programs, "calls": shift.calls}
+                row = {
+                    "minute": passed,
+                    **shift.has(),
+                    "programs": shift.programs,
+                    "calls": shift.calls,
+                }
                 rows.append({**row, "presses": shift.presses, "refused": shift.refused})
                 print(line_of(rows[-1]), flush=True)
     return rows
@@ -172,7 +195,9 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
     early = next(row for row in rows if row["minute"] >= WARM * minutes)
 
     def grown(ending: str) -> float:
-        return max(float(rows[-1][f"{name}_{ending}"] - early[f"{name}_{ending}"]) for name in NODES)
+        return max(
+            float(rows[-1][f"{name}_{ending}"] - early[f"{name}_{ending}"]) for name in NODES
+        )
 
     return [
         at_least("minutes of work", minutes, "min", 1.0),
@@ -190,7 +215,9 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--minutes", type=float, default=FULL, help=f"default: {FULL:g}")
-    parser.add_argument("--rest", type=float, default=0.0, help="s after each cycle of work; default: 0")
+    parser.add_argument(
+        "--rest", type=float, default=0.0, help="s after each cycle of work; default: 0"
+    )
     add_ending(parser, f"{QUICK:g} minutes")
     given = parser.parse_args()
     rows = soaked(QUICK if given.quick else given.minutes, given.rest)

@@ -2,10 +2,10 @@
 
     python benchmarks/standby.py [--cell FILE]... [--seeds N] [--quick] [--json FILE]
 
-Pauses of 1 s to 2 h at random postures, with and without part, the controller's times as in the data and
-drawn. Known lengths and timeout policies over eight equally likely lengths are held against exhaustive search
-over sequences of modes with timers on a grid, in code of its own, and against the simulated controller, which
-is stepped without real time.
+Pauses of 1 s to 2 h at random postures, with and without part, the controller's times as in the
+data and drawn. Known lengths and timeout policies over eight equally likely lengths are held
+against exhaustive search over sequences of modes with timers on a grid, in code of its own, and
+against the simulated controller, which is stepped without real time.
 """
 
 from __future__ import annotations
@@ -29,7 +29,9 @@ from ir_planner.scene import PlanningScene, load_text, scene_with
 from ir_sim_driver.controller import SimulationSettings, make_simulation
 from ir_sim_driver.power import IdleTimes
 
-CELL, SEEDS, QUICK_SEEDS = "demo", 60, 12
+CELL = "demo"
+SEEDS = 60
+QUICK_SEEDS = 12
 LENGTHS = 8
 JOULES = 20.0  # that a prediction may be off whatever the pause
 APART = 0.01  # m between the robot and what stands around it
@@ -38,7 +40,9 @@ STEP = 0.01  # s: nothing moves, and no time of the controller is shorter
 
 @dataclass(frozen=True)
 class Row:
-    """One controller: pause [s], planned, least on the grid and measured energy [J]; the same of a policy."""
+    """One controller: pause [s], planned, least on the grid and measured energy [J]; the same of a
+    policy.
+    """
 
     cell: str
     seed: int
@@ -65,7 +69,9 @@ def free_posture(rng: np.random.Generator, scene: PlanningScene) -> FloatArray:
     """A configuration (n,) in which nothing touches: the simulated robot stops at a contact."""
     robot = scene.cell.robot
     while True:
-        q = robot.position_min + rng.uniform(0.2, 0.8, robot.n) * (robot.position_max - robot.position_min)
+        q = robot.position_min + rng.uniform(0.2, 0.8, robot.n) * (
+            robot.position_max - robot.position_min
+        )
         if state_check(q, scene, APART, 1).valid:
             return q
 
@@ -82,9 +88,11 @@ def controller_of(rests: Rests) -> Controller:
     )
 
 
-def measured(rests_cell: str, load: str, q: FloatArray, times: TransitionTimes, timer: float, pause: float,
+def measured(rests_cell: str, load: str, q: FloatArray, times: TransitionTimes, timer: float, pause: float,  # noqa: E501
              wake_at: float) -> float:  # fmt: skip
-    """Energy [J] that the simulated controller draws over a pause [s] that it is woken from in time."""
+    """Energy [J] that the simulated controller draws over a pause [s] that it is woken from in
+    time.
+    """
     idle = IdleTimes(motors_to_brakes_in_program=timer)
     settings = SimulationSettings(dt=STEP, transitions=times, idle=idle)
     plant = make_simulation(load_cell(rests_cell), load, "ideal", settings)
@@ -103,7 +111,8 @@ def measured(rests_cell: str, load: str, q: FloatArray, times: TransitionTimes, 
 
 def row_of(name: str, seed: int) -> Row:
     """Plan, search and drive the pauses of a seed."""
-    rng, cell = np.random.default_rng([seed, *name.encode()]), load_cell(name)
+    rng = np.random.default_rng([seed, *name.encode()])
+    cell = load_cell(name)
     times, timer = times_of(rng, drawn=seed % 2 == 1)
     tool = load_text(cell)
     load = (NO_LOAD, tool, f"{tool}+{cell.parts[0].name}" if cell.parts else tool)[seed % 3]
@@ -130,7 +139,9 @@ def row_of(name: str, seed: int) -> Row:
 
 
 def off(row: Row) -> float:
-    """How far the measured energy is from the planned one, as a share of what is allowed: 3 % or 20 J."""
+    """How far the measured energy is from the planned one, as a share of what is allowed: 3 % or 20
+    J.
+    """
     return abs(row.measured - row.planned) / max(JOULES, 0.03 * row.planned)
 
 

@@ -1,19 +1,20 @@
-"""Does every planner solve what it is asked, certified? Is an arena that was killed the same afterwards? Do
-layout studies find the best?
+"""Does every planner solve what it is asked, certified? Is an arena that was killed the same
+afterwards? Do layout studies find the best?
 
     python benchmarks/studies.py [--only PART]... [--out FOLDER] [--cell NAME]... [--seeds N]
                                  [--planner NAME]... [--coal N] [--quick] [--json FILE]
 
-Every planner is asked for every task of the cells, there and back, until it has solved it with one of the
-seeds; Coal looks at its answers every 0.0005 rad, at so many per planner and cell. Then `ir arena` runs the
-cells with one request per run, is killed with SIGKILL once it has made a third, and goes on; its table is
-held against that of an arena which ran through, without the columns of times and without planners that can't
-promise the same bytes. The statistics of `ir study statistics --example` are computed once more from their
-rows; robots drawn for each pair are held against the predicted interval, and asynchronous joints with the
-objective time against synchronous ones. Layout studies of the demonstration: the bounds against an exhaustive
-grid, free and in a cycle time, and again on variants of bundled cells; at least 1,000 placements against the
-given one; and how many programs one, two and four processes plan per second. --only runs one of these parts;
-a study that was interrupted goes on where it ended when the same --out is given.
+Every planner is asked for every task of the cells, there and back, until it has solved it with one
+of the seeds; Coal looks at its answers every 0.0005 rad, at so many per planner and cell. Then `ir
+arena` runs the cells with one request per run, is killed with SIGKILL once it has made a third, and
+goes on; its table is held against that of an arena which ran through, without the columns of times
+and without planners that can't promise the same bytes. The statistics of `ir study statistics
+--example` are computed once more from their rows; robots drawn for each pair are held against the
+predicted interval, and asynchronous joints with the objective time against synchronous ones. Layout
+studies of the demonstration: the bounds against an exhaustive grid, free and in a cycle time, and
+again on variants of bundled cells; at least 1,000 placements against the given one; and how many
+programs one, two and four processes plan per second. --only runs one of these parts; a study that
+was interrupted goes on where it ended when the same --out is given.
 """
 
 from __future__ import annotations
@@ -47,12 +48,21 @@ from ir_studies.arena.table import TIMES
 from ir_studies.work.results import NAME
 
 CELLS = ("open",)
-PLANNERS = (PORTFOLIO, "genetic", "tree", "sbl", "kpiece", "bkpiece", "lbkpiece", "prm", "rrt", "rrt_connect",
+PLANNERS = (PORTFOLIO, "genetic", "tree", "sbl", "kpiece", "bkpiece", "lbkpiece", "prm", "rrt", "rrt_connect",  # noqa: E501
             "aorrtc")  # fmt: skip
-CEILING_S = 60.0  # s of a request: the work ends it, not the clock, also on a machine that others use
+CEILING_S = (
+    60.0  # s of a request: the work ends it, not the clock, also on a machine that others use
+)
 WAIT_S = 600.0
 PARTS = ("planners", "killed", *STATISTICS_PARTS, *LAYOUT_PARTS)
-IN_BOTH = ("portfolio", "sbl", "kpiece", "bkpiece", "lbkpiece", "rrt_connect")  # of the arena that is killed
+IN_BOTH = (
+    "portfolio",
+    "sbl",
+    "kpiece",
+    "bkpiece",
+    "lbkpiece",
+    "rrt_connect",
+)  # of the arena that is killed
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,10 +84,16 @@ def arguments() -> argparse.Namespace:
         3,
         "2 answers per planner that Coal checks, 1 seed and 3 planners of the arena, 8 pairs",
     )
-    parser.add_argument("--only", action="append", choices=PARTS, metavar="PART", help=", ".join(PARTS))
-    parser.add_argument("--out", type=Path, help="where layout studies are kept; default: a folder for now")
+    parser.add_argument(
+        "--only", action="append", choices=PARTS, metavar="PART", help=", ".join(PARTS)
+    )
+    parser.add_argument(
+        "--out", type=Path, help="where layout studies are kept; default: a folder for now"
+    )
     parser.add_argument("--planner", action="append", help=f"default: {', '.join(PLANNERS)}")
-    parser.add_argument("--coal", type=int, default=24, help="answers per planner and cell that Coal checks")
+    parser.add_argument(
+        "--coal", type=int, default=24, help="answers per planner and cell that Coal checks"
+    )
     given = parser.parse_args()
     if given.quick:
         given.coal = min(given.coal, 2)
@@ -85,33 +101,57 @@ def arguments() -> argparse.Namespace:
 
 
 def answer(planner: Planner, task: Task, name: str, seeds: int) -> Answer:
-    """Ask with seed after seed until the task is solved; whatever is returned uncertified ends it."""
+    """Ask with seed after seed until the task is solved; whatever is returned uncertified ends
+    it.
+    """
     begin = time.perf_counter()
     for seed in range(seeds):
         options = asked(task, seed)
         options = type(options)(
-            **{**vars(options), "planner_id": "" if name == PORTFOLIO else name, "planning_time": CEILING_S}
+            **{
+                **vars(options),
+                "planner_id": "" if name == PORTFOLIO else name,
+                "planning_time": CEILING_S,
+            }
         )
         plan = planner.plan_regional(task.start, Goal(configuration=task.goal), options)
         if plan.trajectory is not None:
             break
     took = 1e3 * (time.perf_counter() - begin)
-    return Answer(task, plan.trajectory, plan.trajectory is None or plan.report.certified, seed, took)
+    return Answer(
+        task, plan.trajectory, plan.trajectory is None or plan.report.certified, seed, took
+    )
 
 
-def answers_of(cell: str, planners: Sequence[str], given: argparse.Namespace) -> list[dict[str, object]]:
+def answers_of(
+    cell: str, planners: Sequence[str], given: argparse.Namespace
+) -> list[dict[str, object]]:
     """A row per planner: what it solved, what is not certified, and the least that Coal leaves."""
-    tasks, planner = tasks_of(cell), planner_of(cell)
-    opinion, rows = SecondOpinion(tasks[0].scene), []
+    tasks = tasks_of(cell)
+    planner = planner_of(cell)
+    opinion = SecondOpinion(tasks[0].scene)
+    rows = []
     for name in planners:
         found = [answer(planner, task, name, given.seeds) for task in tasks]
         solved = [one for one in found if one.trajectory is not None]
         seen = solved[:: max(len(solved) // given.coal, 1)][: given.coal]
-        coal = [opinion.clearance_left(one.trajectory, one.task.margin) for one in seen if one.trajectory]
-        row: dict[str, object] = {"cell": cell, "planner": name, "solved": len(solved), "tasks": len(tasks)}
+        coal = [
+            opinion.clearance_left(one.trajectory, one.task.margin)
+            for one in seen
+            if one.trajectory
+        ]
+        row: dict[str, object] = {
+            "cell": cell,
+            "planner": name,
+            "solved": len(solved),
+            "tasks": len(tasks),
+        }
         row |= {"uncertified": sum(not one.certified for one in found), "coal": len(seen)}
         row |= {"left_mm": 1e3 * min((left for left, _ in coal), default=math.nan)}
-        row |= {"asked": sum(count for _, count in coal), "most_seeds": 1 + max(one.seed for one in found)}
+        row |= {
+            "asked": sum(count for _, count in coal),
+            "most_seeds": 1 + max(one.seed for one in found),
+        }
         row |= {"median_ms": sorted(one.milliseconds for one in found)[len(found) // 2]}
         rows.append(row)
         print(line_of(row), flush=True)
@@ -148,11 +188,17 @@ def killed_when(process: subprocess.Popen[bytes], results: Path, lines: int) -> 
 
 
 def table(folder: Path) -> list[dict[str, str]]:
-    """The table without what a clock wrote, and without planners that can't promise the same bytes."""
+    """The table without what a clock wrote, and without planners that can't promise the same
+    bytes.
+    """
     with (folder / "table.csv").open() as file:
         rows = list(csv.DictReader(file))
     free = {name for name, search in SEARCHES.items() if not repeatable(search)}
-    return [{k: v for k, v in row.items() if k not in TIMES} for row in rows if row["planner"] not in free]
+    return [
+        {k: v for k, v in row.items() if k not in TIMES}
+        for row in rows
+        if row["planner"] not in free
+    ]
 
 
 def killed_and_resumed(cells: Sequence[str], planners: Sequence[str], seeds: int) -> list[Claim]:
@@ -165,7 +211,8 @@ def killed_and_resumed(cells: Sequence[str], planners: Sequence[str], seeds: int
         for name in ("a", "b"):
             if arena(settings, folder / name).wait(3600.0) != 0:
                 return [at_least("the arena ends after it was killed", 0.0, "", 1.0)]
-        one, other = table(folder / "a"), table(folder / "b")
+        one = table(folder / "a")
+        other = table(folder / "b")
     print(f"killed after {before - 2} of {count} runs")
     differing = sum(a != b for a, b in zip(one, other, strict=True))
     return [
@@ -176,27 +223,42 @@ def killed_and_resumed(cells: Sequence[str], planners: Sequence[str], seeds: int
 
 def claims_of(rows: Sequence[dict[str, object]]) -> list[Claim]:
     """Claims about all planners."""
-    total = {key: sum(float(str(row[key])) for row in rows) for key in ("solved", "tasks", "uncertified")}
-    worst = min(float(str(row["solved"])) / float(str(row["tasks"])) for row in rows if row["cell"] == "open")
+    total = {
+        key: sum(float(str(row[key])) for row in rows) for key in ("solved", "tasks", "uncertified")
+    }
+    worst = min(
+        float(str(row["solved"])) / float(str(row["tasks"]))
+        for row in rows
+        if row["cell"] == "open"
+    )
     left = min(float(str(row["left_mm"])) for row in rows)
     seen, asked_ = (sum(int(str(row[key])) for row in rows) for key in ("coal", "asked"))
     return [
         at_least("tasks of `open` that the worst planner solves", 100.0 * worst, "%", 100.0),
-        at_most(f"answers that are not certified, of {total['solved']:g}", total["uncertified"], "", 0.0),
-        at_least(f"Coal, {seen} answers at {asked_} places: distance over its bound", left, "mm", -1e-3),
+        at_most(
+            f"answers that are not certified, of {total['solved']:g}", total["uncertified"], "", 0.0
+        ),
+        at_least(
+            f"Coal, {seen} answers at {asked_} places: distance over its bound", left, "mm", -1e-3
+        ),
     ]
 
 
 def main() -> None:
     """Measure, print, write."""
     given = arguments()
-    cells, planners = given.cell or list(CELLS), given.planner or list(PLANNERS)
-    parts, rows, claims = given.only or PARTS, [], []
+    cells = given.cell or list(CELLS)
+    planners = given.planner or list(PLANNERS)
+    parts = given.only or PARTS
+    rows = []
+    claims = []
     if "planners" in parts:
         rows = [row for cell in cells for row in answers_of(cell, planners, given)]
         claims += claims_of(rows) if "open" in cells else []
     if "killed" in parts:
-        both = [name for name in planners if name in IN_BOTH][: 3 if given.quick else None] or planners
+        both = [name for name in planners if name in IN_BOTH][
+            : 3 if given.quick else None
+        ] or planners
         claims += killed_and_resumed(cells[:1], both, 1 if given.quick else given.seeds)
     claims += statistics_claims(parts, given.out, quick=given.quick)
     claims += layout_claims("demo", parts, given.out, quick=given.quick)

@@ -1,9 +1,11 @@
 """Are the watts right on a plant that is not the planner's model, and is what goes wrong noticed?
 
-    python benchmarks/truth.py [--cell FILE]... [--seeds N] [--only SECTION]... [--quick] [--json FILE]
+    python benchmarks/truth.py [--cell FILE]... [--seeds N] [--only SECTION]... [--quick] [--json
+    FILE]
 
-Each section is a module `_truth_NAME.py` with a TITLE and a function `measured(asked) -> Found` (see
-`_truth_section.py`); whatever modules there are, are run. All figures are of the simulated plant.
+Each section is a module `_truth_NAME.py` with a TITLE and a function `measured(asked) -> Found`
+(see `_truth_section.py`); whatever modules there are, are run. All figures are of the simulated
+plant.
 """
 
 from __future__ import annotations
@@ -17,7 +19,8 @@ from _results import Claim, command_line, finish, line_of
 from _truth_section import Asked
 
 CELLS = ("demo", "open", "cnc_door", "deep_box", "table_columns")
-SEEDS, QUICK_SEEDS = 20, 3
+SEEDS = 20
+QUICK_SEEDS = 3
 NO_SECTIONS = ("section",)
 
 
@@ -31,7 +34,9 @@ def sections() -> list[str]:
 def main() -> None:
     """Run the sections and print what they found."""
     parser = command_line(__doc__, CELLS, SEEDS, f"{QUICK_SEEDS} plants, fewer movements")
-    parser.add_argument("--only", action="append", choices=sections(), help="run this section; repeatable")
+    parser.add_argument(
+        "--only", action="append", choices=sections(), help="run this section; repeatable"
+    )
     arguments = parser.parse_args()
     seeds = min(arguments.seeds, QUICK_SEEDS) if arguments.quick else arguments.seeds
     asked = Asked(arguments.cell or CELLS, seeds, arguments.quick)

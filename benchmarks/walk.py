@@ -1,11 +1,12 @@
-"""How long does a newcomer wait? The tutorial typed from nothing, and the first answers of a cold start.
+"""How long does a newcomer wait? The tutorial typed from nothing, and the first answers of a cold
+start.
 
     python benchmarks/walk.py [--quick] [--json FILE]
 
-Follows docs/tutorial.md: every line is typed into a file, every command is a process of its own, in an empty
-folder. Then `ir --help` and `ir plan demo`, each in a fresh process, the shortest of some runs. Prints
-elapsed and processor seconds of each command. Closes with one line per figure: measured value, bound, holds
-or falls short.
+Follows docs/tutorial.md: every line is typed into a file, every command is a process of its own, in
+an empty folder. Then `ir --help` and `ir plan demo`, each in a fresh process, the shortest of some
+runs. Prints elapsed and processor seconds of each command. Closes with one line per figure:
+measured value, bound, holds or falls short.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ from _results import Claim, add_ending, at_most, finish, line_of
 PAGE = "tutorial.md"
 TYPED = "first_cell.yaml"
 IR = (sys.executable, "-m", "ir_cli.main")
-RUNS, QUICK_RUNS = 10, 3
+RUNS = 10
+QUICK_RUNS = 3
 Row = dict[str, Any]
 
 
@@ -38,12 +40,20 @@ def timed(words: str, folder: str) -> Row:
     elapsed = time.perf_counter() - begin
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     processor = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
-    return {"command": f"ir {words}", "seconds": elapsed, "processor": processor, "code": done.returncode}
+    return {
+        "command": f"ir {words}",
+        "seconds": elapsed,
+        "processor": processor,
+        "code": done.returncode,
+    }
 
 
 def walked(folder: str) -> list[Row]:
-    """One row per command of the tutorial, in its order; unexpected: its exit code is not the page's."""
-    typed, rows = Path(folder) / TYPED, list[Row]()
+    """One row per command of the tutorial, in its order; unexpected: its exit code is not the
+    page's.
+    """
+    typed = Path(folder) / TYPED
+    rows = list[Row]()
     typed.write_text("")
     for snippet in snippets(PAGE):
         if snippet.language == "yaml":
@@ -60,7 +70,10 @@ def claims_of(walk: list[Row], first: list[Row]) -> list[Claim]:
     """What was asked for, measured."""
     claims = [
         at_most(
-            f"commands of {PAGE} that end unlike the page, of {len(walk)}", _sum(walk, "unexpected"), "", 0
+            f"commands of {PAGE} that end unlike the page, of {len(walk)}",
+            _sum(walk, "unexpected"),
+            "",
+            0,
         ),
         at_most(f"all commands of {PAGE}", _sum(walk, "seconds"), "s", 600),
     ]

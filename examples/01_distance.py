@@ -15,10 +15,14 @@ def main() -> None:
     planner = Planner(time.monotonic)
     planner.set_cell("", "demo")
     for joints_deg in (HOME_DEG, IN_A_TABLE_DEG):
-        state = planner.check_state(np.radians(joints_deg), SAFETY_DISTANCE, max_pairs=4, load="", station="")
+        state = planner.check_state(
+            np.radians(joints_deg), SAFETY_DISTANCE, max_pairs=4, load="", station=""
+        )
         print(f"{joints_deg} deg: {'free' if state.valid else 'not free'}")
         for pair in state.pairs:
-            print(f"{1000.0 * pair.distance:8.1f} mm  {pair.body_a} and {pair.body_b} ({pair.kind})")
+            print(
+                f"{1000.0 * pair.distance:8.1f} mm  {pair.body_a} and {pair.body_b} ({pair.kind})"
+            )
 
 
 if __name__ == "__main__":

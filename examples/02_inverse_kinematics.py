@@ -1,4 +1,6 @@
-"""Inverse kinematics: all free configurations at a station, in closed form and by the paper's search."""
+"""Inverse kinematics: all free configurations at a station, in closed form and by the paper's
+search.
+"""
 
 import time
 
@@ -14,7 +16,9 @@ def main() -> None:
     cell = planner.set_cell("", "demo")
     goal = parse_goal("gauge_measure", cell)
     for method in ("analytic", "ccd"):
-        answer = planner.compute_ik(goal, method, SAFETY_DISTANCE, np.array(cell.machine_home), load="")
+        answer = planner.compute_ik(
+            goal, method, SAFETY_DISTANCE, np.array(cell.machine_home), load=""
+        )
         print(f"{method}: {len(answer.solutions)} configurations, cheapest first by W of eq. (9)")
         for solution in answer.solutions[:3]:
             joints = ", ".join(f"{angle:7.1f}" for angle in np.degrees(solution.q))

@@ -1,4 +1,6 @@
-"""One regional movement: seconds, joules and clearance, certified for every instant; then the slower one."""
+"""One regional movement: seconds, joules and clearance, certified for every instant; then the
+slower one.
+"""
 
 import time
 
@@ -18,8 +20,9 @@ def main() -> None:
             raise SystemExit(plan.status.message)
         report = plan.report
         print(
-            f"objective {options.objective}: {report.duration:.2f} s, {report.energy:.0f} J at the mains, "
-            f"peak {report.peak_power / 1000.0:.1f} kW, clearance {1000.0 * report.min_clearance:.0f} mm, "
+            f"objective {options.objective}: {report.duration:.2f} s, {report.energy:.0f} J at "
+            f"the mains, peak {report.peak_power / 1000.0:.1f} kW, clearance "
+            f"{1000.0 * report.min_clearance:.0f} mm, "
             f"{'certified' if report.certified else 'not certified'}"
         )
         print(f"  {len(plan.trajectory.times)} points, id {plan.trajectory.trajectory_id}")

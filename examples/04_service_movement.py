@@ -11,7 +11,9 @@ def main() -> None:
     planner = Planner(time.monotonic)
     cell = planner.set_cell("", "demo")
     near = np.array(cell.machine_home)
-    plan = planner.plan_service("lathe_work", "exit", None, near, max_candidates=3, options=PlanOptions())
+    plan = planner.plan_service(
+        "lathe_work", "exit", None, near, max_candidates=3, options=PlanOptions()
+    )
     if not plan.status.ok:
         raise SystemExit(plan.status.message)
     for candidate in plan.candidates:
@@ -21,7 +23,10 @@ def main() -> None:
             f"tcp path {report.path_length:.2f} m, clearance {1000.0 * report.min_clearance:.0f} mm"
         )
         for pair in report.contacts:
-            print(f"  allowed contact: {pair.body_a} and {pair.body_b}, {1000.0 * pair.distance:.1f} mm")
+            print(
+                f"  allowed contact: {pair.body_a} and {pair.body_b}, "
+                f"{1000.0 * pair.distance:.1f} mm"
+            )
     for rejection in plan.info.rejected:
         print(f"rejected {rejection.count} times: {rejection.reason}")
 

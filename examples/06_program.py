@@ -19,7 +19,10 @@ def main() -> None:
             f"{step.kind:14} {places:30} {step.power_mode or step.load:16} "
             f"{step.duration:7.2f} s {step.report.energy:9.0f} J"
         )
-    print(f"program {plan.program_id}: {plan.report.duration:.1f} s, {plan.report.energy / 1000.0:.1f} kJ")
+    print(
+        f"program {plan.program_id}: {plan.report.duration:.1f} s, "
+        f"{plan.report.energy / 1000.0:.1f} kJ"
+    )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,6 @@
-"""Standby: which power mode takes the least energy in a pause, when to wake the controller, what is saved."""
+"""Standby: which power mode takes the least energy in a pause, when to wake the controller, what is
+saved.
+"""
 
 import time
 
@@ -11,12 +13,14 @@ def main() -> None:
     planner = Planner(time.monotonic)
     planner.set_cell("", "demo")
     print(
-        "pause [s]  mode             wake at [s]  energy [kJ]  saved [kJ]: against the timer, against motors"
+        "pause [s]  mode             wake at [s]  energy [kJ]  saved [kJ]: against the timer, "
+        "against motors"
     )
     for pause in PAUSES:
         advice = planner.standby(pause, q=None, load="")
         print(
-            f"{pause:9.0f}  {advice.chosen.name:15}  {advice.wake_at:11.1f}  {advice.energy / 1000.0:11.1f}  "
+            f"{pause:9.0f}  {advice.chosen.name:15}  {advice.wake_at:11.1f}  "
+            f"{advice.energy / 1000.0:11.1f}  "
             f"{advice.saving / 1000.0:29.1f}, {advice.saving_on_motors / 1000.0:14.1f}"
         )
 

@@ -19,7 +19,10 @@ def main() -> None:
                 f"clearance {report.min_clearance:.3f} m, {proof}"
             )
             run = cell.execute(cell.get_trajectory(plan.trajectory_id))
-            print(f"  driven: {run.energy:.0f} J, tool within {run.max_tool_deviation * 1000.0:.2f} mm")
+            print(
+                f"  driven: {run.energy:.0f} J, tool within "
+                f"{run.max_tool_deviation * 1000.0:.2f} mm"
+            )
 
 
 if __name__ == "__main__":

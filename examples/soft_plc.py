@@ -3,7 +3,8 @@
 Start the driver first, with short transitions so that the example takes a minute:
 
     ir_sim_driver --ros-args -p modbus:=true -p transitions.hibernation_enter:=2.0
-        -p transitions.hibernation_minimum_stay:=2.0 -p transitions.hibernation_leave:=3.0     (one line)
+        -p transitions.hibernation_minimum_stay:=2.0 -p transitions.hibernation_leave:=3.0     (one
+        line)
 
 then: python examples/soft_plc.py [--host 127.0.0.1] [--port 5020] [--mac 02:00:00:c4:02:10]
     [--wake-port 9009]
@@ -20,7 +21,13 @@ from pymodbus.client import ModbusTcpClient
 from ir_msgs_py.wake_on_lan import magic_packet
 from ir_sim_driver.plc.modbus_map import COILS, HEARTBEAT, INPUT_REGISTERS, PAUSE
 
-MODES = {0: "stand on motors", 1: "moving", 2: "stand on brakes", 3: "bus power off", 4: "hibernation"}
+MODES = {
+    0: "stand on motors",
+    1: "moving",
+    2: "stand on brakes",
+    3: "bus power off",
+    4: "hibernation",
+}
 POLL = 0.2  # s
 OFF_THE_NETWORK = 4  # Modbus exception of a controller in hibernation
 
@@ -31,7 +38,9 @@ class SoftPlc:
     def __init__(self, host: str, port: int) -> None:
         self._client = ModbusTcpClient(host, port=port)
         if not self._client.connect():
-            raise SystemExit(f"no answer from {host}:{port}; is the driver started with modbus:=true?")
+            raise SystemExit(
+                f"no answer from {host}:{port}; is the driver started with modbus:=true?"
+            )
 
     def set(self, bit: str, level: bool) -> None:
         """Set one coil."""
@@ -52,7 +61,8 @@ class SoftPlc:
 
     def watch(self, seconds: float, until: str = "") -> None:
         """Print the mode when it changes, for so long or until it begins with a text."""
-        shown, end = "", time.monotonic() + seconds
+        shown = ""
+        end = time.monotonic() + seconds
         while time.monotonic() < end:
             now = self.mode()
             if now.partition(",")[0] != shown:

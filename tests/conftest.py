@@ -1,7 +1,8 @@
-"""Every test process talks in a ROS domain of its own, finds its peers fast and leaves no logs behind.
+"""Every test process talks in a ROS domain of its own, finds its peers fast and leaves no logs
+behind.
 
-Two sessions on one machine, and the workers of one session (pytest-xdist), must not hear each other. The
-settings are environment variables because the tests' own subprocesses inherit them.
+Two sessions on one machine, and the workers of one session (pytest-xdist), must not hear each
+other. The settings are environment variables because the tests' own subprocesses inherit them.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from hypothesis import HealthCheck, settings
 from ir_msgs_py.ros.network import apply_network
 from ir_msgs_py.ros.testing import own_domain
 
-# The same examples in every run, however long it takes to make and to try one: a red test is a change of the
-# code, never luck or a busy machine.
+# The same examples in every run, however long it takes to make and to try one: a red test is a
+# change of the code, never luck or a busy machine.
 # To look for new examples:
 # pytest --hypothesis-profile=default --hypothesis-seed=N
 settings.register_profile(
@@ -28,12 +29,14 @@ settings.load_profile("repeatable")
 
 _HERE = Path(__file__).parent
 REAL_TIME = (_HERE / "nodes", _HERE / "system")
-"""Folders of tests in which nodes talk over DDS in real time, on a machine that others may use too."""
+"""Folders of tests in which nodes talk over DDS in real time, on a machine that others may use
+too.
+"""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Repeat a failed test of real nodes once: what fails twice is a fault, and the run counts what did not
-    ("1 rerun"). Nothing else is repeated.
+    """Repeat a failed test of real nodes once: what fails twice is a fault, and the run counts what
+    did not ("1 rerun"). Nothing else is repeated.
     """
     for item in items:
         if any(item.path.is_relative_to(folder) for folder in REAL_TIME):

@@ -1,7 +1,9 @@
-"""A headless Chromium, driven through its DevTools protocol: for looking at pages and for operating them.
+"""A headless Chromium, driven through its DevTools protocol: for looking at pages and for operating
+them.
 
-Only what pictures and tests need: open a page in a size and colour scheme, run a script in it, press keys,
-drag the pointer, take a picture, print; with every console error and every request to a network collected.
+Only what pictures and tests need: open a page in a size and colour scheme, run a script in it,
+press keys, drag the pointer, take a picture, print; with every console error and every request to a
+network collected.
 """
 
 from __future__ import annotations
@@ -25,10 +27,16 @@ from websockets.sync.client import ClientConnection, connect
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = (
-    # without a graphics card 2D is drawn 20 times faster by the processor itself than by a card it imitates
+    # without a graphics card 2D is drawn 20 times faster by the processor itself than by a card it
+    # imitates
     *("--disable-accelerated-2d-canvas", "--disable-gpu-rasterization"),
     *("--headless=new", "--no-sandbox", "--hide-scrollbars", "--use-angle=swiftshader"),
-    *("--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--remote-debugging-port=0", "about:blank"),
+    *(
+        "--enable-unsafe-swiftshader",
+        "--disable-dev-shm-usage",
+        "--remote-debugging-port=0",
+        "about:blank",
+    ),
 )
 START_SECONDS = 60.0
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
@@ -85,7 +93,10 @@ class Browser:
         raise PageError("the browser ended before it listened")
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self._socket.close()
         self._process.send_signal(signal.SIGTERM)
@@ -99,7 +110,9 @@ class Browser:
         self._profile.cleanup()
 
     def call(self, method: str, session: str = "", **parameters: Any) -> dict[str, Any]:
-        """The answer to one command; events meanwhile are kept. PageError with the browser's words."""
+        """The answer to one command; events meanwhile are kept. PageError with the browser's
+        words.
+        """
         self._number += 1
         request = {"id": self._number, "method": method, "params": parameters}
         if session:
@@ -139,7 +152,9 @@ class Page:
         self._browser = browser
         self._address = page if isinstance(page, str) else page.resolve().as_uri()
         target = browser.call("Target.createTarget", url="about:blank")["targetId"]
-        self._session = browser.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        self._session = browser.call("Target.attachToTarget", targetId=target, flatten=True)[
+            "sessionId"
+        ]
         self._target = target
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable")
@@ -157,13 +172,19 @@ class Page:
     def size(self, wide: int, high: int, *, touch: bool = False) -> None:
         """Sets the window's inner size [px]; touch: a phone's screen, operated by a finger."""
         self.call(
-            "Emulation.setDeviceMetricsOverride", width=wide, height=high, deviceScaleFactor=1, mobile=touch
+            "Emulation.setDeviceMetricsOverride",
+            width=wide,
+            height=high,
+            deviceScaleFactor=1,
+            mobile=touch,
         )
         self.call("Emulation.setTouchEmulationEnabled", enabled=touch)
 
     def run(self, script: str) -> Any:
         """The value of an expression in the page, a promise awaited; PageError where it throws."""
-        answer = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
+        answer = self.call(
+            "Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True
+        )
         if "exceptionDetails" in answer:
             thrown = answer["exceptionDetails"]
             raise PageError(str(thrown.get("exception", thrown).get("description", thrown)))
@@ -182,7 +203,9 @@ class Page:
         self.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
     def pointer(self, kind: str, x: float, y: float, **more: Any) -> None:
-        """A movement of the pointer, a press or a release: "mouseMoved", "mousePressed", "mouseReleased"."""
+        """A movement of the pointer, a press or a release: "mouseMoved", "mousePressed",
+        "mouseReleased".
+        """
         held = {} if kind == "mouseMoved" and not more else {"button": "left", "clickCount": 1}
         self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **{**held, **more})
 
@@ -197,7 +220,11 @@ class Page:
         """Presses and releases a key in what has the focus."""
         text = {"text": key} if len(key) == 1 else {}
         self.call(
-            "Input.dispatchKeyEvent", type="keyDown", key=key, code="Space" if key == " " else key, **text
+            "Input.dispatchKeyEvent",
+            type="keyDown",
+            key=key,
+            code="Space" if key == " " else key,
+            **text,
         )
         self.call("Input.dispatchKeyEvent", type="keyUp", key=key)
 
@@ -225,7 +252,9 @@ class Page:
 
     def downloads(self, folder: Path) -> None:
         """Files that the page offers go into a folder without asking."""
-        self._browser.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(folder))
+        self._browser.call(
+            "Browser.setDownloadBehavior", behavior="allow", downloadPath=str(folder)
+        )
 
     def close(self) -> None:
         """Closes the page."""
@@ -242,7 +271,11 @@ class Page:
         def fault(method: str, event: Mapping[str, Any]) -> str:
             if method == "Runtime.exceptionThrown":
                 return str(event["exceptionDetails"])
-            if method == "Runtime.consoleAPICalled" and event["type"] in ("error", "warning", "assert"):
+            if method == "Runtime.consoleAPICalled" and event["type"] in (
+                "error",
+                "warning",
+                "assert",
+            ):
                 return str(event["args"])
             if method == "Log.entryAdded" and event["entry"]["level"] == "error":
                 return str(event["entry"]["text"])
@@ -258,6 +291,10 @@ class Page:
             if method != "Network.requestWillBeSent":
                 return ""
             address = str(event["request"]["url"])
-            return "" if address.startswith(("data:", "blob:")) or address == self._address else address
+            return (
+                ""
+                if address.startswith(("data:", "blob:")) or address == self._address
+                else address
+            )
 
         return self._events(asked)

@@ -30,9 +30,14 @@ def canonical(name: str) -> str:
 
 
 def installed(site: Path) -> dict[str, str]:
-    """Return the versions of the distributions in a site-packages folder, by the names of their folders."""
+    """Return the versions of the distributions in a site-packages folder, by the names of their
+    folders.
+    """
     folders = (folder.name.removesuffix(".dist-info") for folder in site.glob("*.dist-info"))
-    return {canonical(name): version for name, _, version in (folder.rpartition("-") for folder in folders)}
+    return {
+        canonical(name): version
+        for name, _, version in (folder.rpartition("-") for folder in folders)
+    }
 
 
 def pins() -> dict[str, str]:
@@ -45,10 +50,15 @@ def pins() -> dict[str, str]:
 def wanted(requirements: Path) -> set[str]:
     """Return what the requirements ask for, and what came with it when they were last installed.
 
-    Not every pin is needed by every interpreter, so what came is known from that installation alone.
+    Not every pin is needed by every interpreter, so what came is known from that installation
+    alone.
     """
     lines = requirements.read_text().splitlines()
-    named = {canonical(re.split(r"[\[=<>~!; ]", line)[0]) for line in lines if line[:1] not in ("", "#", "-")}
+    named = {
+        canonical(re.split(r"[\[=<>~!; ]", line)[0])
+        for line in lines
+        if line[:1] not in ("", "#", "-")
+    }
     came = came_with(requirements)
     return named | (set(came.read_text().split()) if came.exists() else set())
 
@@ -60,22 +70,29 @@ def came_with(requirements: Path) -> Path:
 
 def missing_wheels(site: Path, requirements: Path) -> list[str]:
     """Return the wanted distributions that aren't there in their pinned version."""
-    there, pinned = installed(site), pins()
-    return sorted(name for name in wanted(requirements) & set(pinned) if there.get(name) != pinned[name])
+    there = installed(site)
+    pinned = pins()
+    return sorted(
+        name for name in wanted(requirements) & set(pinned) if there.get(name) != pinned[name]
+    )
 
 
 def missing_editable(site: Path, folders: Iterable[Path]) -> list[str]:
     """Return the packages of src/ that aren't installed from where they lie."""
 
     def is_there(folder: Path) -> bool:
-        urls = [file.read_text() for file in site.glob(f"{folder.name}-*.dist-info/direct_url.json")]
+        urls = [
+            file.read_text() for file in site.glob(f"{folder.name}-*.dist-info/direct_url.json")
+        ]
         return any(json.loads(url).get("url") == folder.as_uri() for url in urls)
 
     return [folder.name for folder in folders if not is_there(folder)]
 
 
 def note_what_came(site: Path, requirements: Path, before: dict[str, str]) -> None:
-    """Write down which pinned distributions these requirements brought, beside those of `before`."""
+    """Write down which pinned distributions these requirements brought, beside those of
+    `before`.
+    """
     came = came_with(requirements)
     known = set(came.read_text().split()) if came.exists() else set()
     new = {name for name, version in installed(site).items() if before.get(name) != version}

@@ -1,4 +1,6 @@
-"""A live view of what a recording says, as it stood at one instant: for its picture, without nodes."""
+"""A live view of what a recording says, as it stood at one instant: for its picture, without
+nodes.
+"""
 
 from __future__ import annotations
 
@@ -23,12 +25,14 @@ WINDOW = 60.0  # s
 @contextmanager
 def live_view(analysis: Analysis, until: float) -> Iterator[LiveServer]:
     """Serves the minute before `until` [s of the recording]; the buttons do nothing."""
-    now, view = [0.0], CellView()
+    now = [0.0]
+    view = CellView()
     stream = Stream(clock=lambda: now[0])
     for t in np.arange(max(until - WINDOW, 0.0), until, 1.0 / RATE):
         now[0] = float(t)
         stream.add(_heard_at(analysis, view, now[0]), always=("w",))
-    server, ended = LiveServer(stream, lambda name, value: Answer(False, ""), lambda: view.scene), Event()
+    server = LiveServer(stream, lambda name, value: Answer(False, ""), lambda: view.scene)
+    ended = Event()
 
     def beat() -> None:
         while not ended.wait(0.5):
@@ -47,7 +51,9 @@ def live_view(analysis: Analysis, until: float) -> Iterator[LiveServer]:
 def _heard_at(analysis: Analysis, view: CellView, t: float) -> dict[str, Any]:
     """Values of the stream at a time [s]; the recording has joint states, power and a cell."""
     recording = analysis.recording
-    joints, power, cell = recording.joints, recording.power, analysis.cell
+    joints = recording.joints
+    power = recording.power
+    cell = analysis.cell
     assert joints is not None
     assert power is not None
     assert cell is not None
@@ -55,9 +61,13 @@ def _heard_at(analysis: Analysis, view: CellView, t: float) -> dict[str, Any]:
     movement = step.movement if step is not None else None
     load = next((name for time, name in reversed(analysis.loads.observations) if time <= t), "none")
     q = joints.position[np.searchsorted(joints.time, t)]
-    heard = Heard(recording.cell_yaml, joints=cell.robot.joint_names, q=q, load=load, movement=movement)
-    at, since = np.searchsorted(power.time, t), np.searchsorted(power.time, t - 1.0 / RATE)
-    watts, mode = power.power[since : at + 1], mode_name(int(power.mode[at]))
+    heard = Heard(
+        recording.cell_yaml, joints=cell.robot.joint_names, q=q, load=load, movement=movement
+    )
+    at = np.searchsorted(power.time, t)
+    since = np.searchsorted(power.time, t - 1.0 / RATE)
+    watts = power.power[since : at + 1]
+    mode = mode_name(int(power.mode[at]))
     values: dict[str, Any] = {
         **view.look(heard),
         **{"w": [float(watts.min()), float(watts.max())], "energy": float(power.energy[at])},
@@ -71,7 +81,13 @@ def _heard_at(analysis: Analysis, view: CellView, t: float) -> dict[str, Any]:
     if step is not None and movement is not None:
         kind = "pause" if movement.is_pause else movement.kind
         place = [step.index + 1, step.total]
-        values["step"] = {"label": step.label, "kind": kind, "event": "started", "at": place, "note": ""}
+        values["step"] = {
+            "label": step.label,
+            "kind": kind,
+            "event": "started",
+            "at": place,
+            "note": "",
+        }
     return values
 
 

@@ -34,8 +34,8 @@ PIP = ("-m", "pip", "--disable-pip-version-check", "--no-input")
 class Stage:
     """One step: what it says, what it depends on, what of its result is missing, and the commands.
 
-    after: names of the steps whose results it needs. Builds run side by side with everything, and yield to
-    installs; these run one after another, for they write into one environment.
+    after: names of the steps whose results it needs. Builds run side by side with everything, and
+    yield to installs; these run one after another, for they write into one environment.
     """
 
     name: str
@@ -71,7 +71,9 @@ def fingerprint(files: Iterable[Path], *words: str) -> str:
 
 def packages() -> list[Path]:
     """Return the Python packages of src/ other than the compiled core."""
-    return sorted(setup.parent for setup in (ROOT / "src").glob("*/setup.py") if setup.parent != KERNELS)
+    return sorted(
+        setup.parent for setup in (ROOT / "src").glob("*/setup.py") if setup.parent != KERNELS
+    )
 
 
 def interface_files() -> list[Path]:
@@ -81,12 +83,16 @@ def interface_files() -> list[Path]:
 
 def kernel_files() -> list[Path]:
     """Return what the compiled core is made from."""
-    return [file for pattern in ("cpp/*", "*.py", "*.toml", "*.cfg") for file in KERNELS.glob(pattern)]
+    return [
+        file for pattern in ("cpp/*", "*.py", "*.toml", "*.cfg") for file in KERNELS.glob(pattern)
+    ]
 
 
 def metadata_files() -> list[Path]:
     """Return what describes the Python packages."""
-    return [f for p in packages() for f in p.iterdir() if f.suffix in (".py", ".cfg", ".toml", ".xml")]
+    return [
+        f for p in packages() for f in p.iterdir() if f.suffix in (".py", ".cfg", ".toml", ".xml")
+    ]
 
 
 class Stages:
@@ -161,7 +167,9 @@ class Stages:
             f"core_{variant}",
             f"compiled core for {runs_on}",
             fingerprint(kernel_files(), self.version),
-            lambda: [] if any((KERNELS / "ir_kernels").glob(f"_{variant}*.so")) else [f"_{variant}*.so"],
+            lambda: (
+                [] if any((KERNELS / "ir_kernels").glob(f"_{variant}*.so")) else [f"_{variant}*.so"]
+            ),
             after=(TOOLS.stem,),
             builds=(str(PYTHON), "setup.py", "-q", "build_ext", "--inplace"),
             folder=KERNELS,

@@ -1,6 +1,8 @@
-"""Write the rooms of the packages into docs/architecture.md: what each is, and which room imports which.
+"""Write the rooms of the packages into docs/architecture.md: what each is, and which room imports
+which.
 
-The parts between `<!-- rooms of PACKAGE -->` and `<!-- end -->` are written; the rest of the page stays.
+The parts between `<!-- rooms of PACKAGE -->` and `<!-- end -->` are written; the rest of the page
+stays.
 """
 
 from __future__ import annotations
@@ -52,8 +54,11 @@ def arrows(package: str) -> Arrows:
 
 
 def floors(known: Arrows) -> list[list[str]]:
-    """Rooms from the ground up: each floor imports only floors below it. Raises ValueError at a cycle."""
-    left, result = dict(known), []
+    """Rooms from the ground up: each floor imports only floors below it. Raises ValueError at a
+    cycle.
+    """
+    left = dict(known)
+    result = []
     while left:
         floor = sorted(room for room, others in left.items() if not others & left.keys())
         if not floor:
@@ -71,17 +76,22 @@ def direct(known: Arrows) -> Arrows:
         return known[room] | {far for near in known[room] for far in reached(near)}
 
     return {
-        room: {near for near in others if not any(near in reached(other) for other in others - {near})}
+        room: {
+            near for near in others if not any(near in reached(other) for other in others - {near})
+        }
         for room, others in known.items()
     }
 
 
 def part(package: str) -> str:
     """Table and drawing of a package."""
-    files, known = rooms(package), arrows(package)
+    files = rooms(package)
+    known = arrows(package)
     stack = floors(known)
     rows = [f"| `{room}` | {first_words(files[room])} |" for floor in stack for room in floor]
-    drawn = [f"  {room} --> {near}" for room in sorted(known) for near in sorted(direct(known)[room])]
+    drawn = [
+        f"  {room} --> {near}" for room in sorted(known) for near in sorted(direct(known)[room])
+    ]
     return "\n".join(
         (
             "| name | content |",

@@ -1,8 +1,9 @@
 """Builds the documentation as a site that works offline: out/site/index.html.
 
-Pages are README.md and docs/; the reference of the packages is written from their docstrings, that of the
-commands from their help, that of the interfaces from the message files (docs/interface_reference.md). A link
-that leads nowhere, a page that no list holds and a name without a docstring are warnings, and warnings fail.
+Pages are README.md and docs/; the reference of the packages is written from their docstrings, that
+of the commands from their help, that of the interfaces from the message files
+(docs/interface_reference.md). A link that leads nowhere, a page that no list holds and a name
+without a docstring are warnings, and warnings fail.
 """
 
 from __future__ import annotations
@@ -56,7 +57,9 @@ class Site:
         shutil.rmtree(self.out, ignore_errors=True)
         self.out.mkdir(parents=True)
         listed = {source for section in SECTIONS for source in section.sources(self.pages)}
-        self.warnings += [f"{source} is in no list" for source in self.pages if source not in listed]
+        self.warnings += [
+            f"{source} is in no list" for source in self.pages if source not in listed
+        ]
         links = Links(ROOT, self.out, self.pages)
         index = []
         for page in self.pages.values():
@@ -79,7 +82,9 @@ class Site:
             for source in section.sources(self.pages):
                 other = self.pages[source]
                 here = ' class="here"' if other is page else ""
-                entries.append(f'<li><a{here} href="{up}{other.target}">{escape(titled(other))}</a></li>')
+                entries.append(
+                    f'<li><a{here} href="{up}{other.target}">{escape(titled(other))}</a></li>'
+                )
             entries.append("</ul>")
         return (
             "<!doctype html>\n"

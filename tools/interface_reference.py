@@ -13,7 +13,7 @@ HEAD = """# Interface reference
 
 Written by `make docs` from the files of `ros_ws/src/ir_msgs`; edit those. Units are SI, angles radians.
 Which node has which service, topic and action: [interfaces.md](interfaces.md).
-"""
+"""  # noqa: E501
 
 
 def page() -> str:
@@ -24,7 +24,8 @@ def page() -> str:
         links = ", ".join(f"[{file.stem}](#{file.stem.lower()})" for file in files)
         parts.append(f"## {title}\n\n{links}\n")
         parts += [
-            f"### {file.stem}\n\n```\n{file.read_text(encoding='utf-8').rstrip()}\n```\n" for file in files
+            f"### {file.stem}\n\n```\n{file.read_text(encoding='utf-8').rstrip()}\n```\n"
+            for file in files
         ]
     return "\n".join(parts)
 

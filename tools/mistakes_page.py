@@ -1,4 +1,5 @@
-"""Writes docs/mistakes.md: what people get wrong in a cell file, and the sentence that each mistake gets.
+"""Writes docs/mistakes.md: what people get wrong in a cell file, and the sentence that each mistake
+gets.
 
 Each mistake is made in examples/first_cell.yaml, and `ir cell check` is asked.
 """
@@ -28,7 +29,9 @@ Written by `make docs` from the answers of `ir cell check`; a test compares. Eac
 
 @dataclass(frozen=True)
 class Mistake:
-    """What stands in the file, what was typed instead, and a part of the sentence that must come."""
+    """What stands in the file, what was typed instead, and a part of the sentence that must
+    come.
+    """
 
     kind: str
     meant: str
@@ -40,17 +43,27 @@ class Mistake:
 MISTAKES = (
     Mistake("Units", "size: [0.8, 1.2, 0.5]", "size: [800, 900, 500]", "0.9 for 900 mm?"),
     Mistake("Units", "size: [0.8, 1.2, 0.5]", "size: [800, 1200, 500]", "1.2 for 1200 mm?"),
-    Mistake("Units", "pose: {xyz: [1.7, 0.6, 0]}", "pose: {xyz: [1700, 600, 0]}", "1.7 for 1700 mm?"),
-    Mistake("Units", "pose: {xyz: [0.3, -1.9, 0]}", "pose: {xyz: [300, -900, 0]}", "in m, not in mm"),
+    Mistake(
+        "Units", "pose: {xyz: [1.7, 0.6, 0]}", "pose: {xyz: [1700, 600, 0]}", "1.7 for 1700 mm?"
+    ),
+    Mistake(
+        "Units", "pose: {xyz: [0.3, -1.9, 0]}", "pose: {xyz: [300, -900, 0]}", "in m, not in mm"
+    ),
     Mistake("Units", "approach_distance: 0.7", "approach_distance: 700", "0.7 for 700 mm?"),
     Mistake("Units", "mass: 60", "mass: 60000", "60 for 60000 g?"),
     Mistake("Units", "mass: 60", "mass: 60 kg", "must be a number"),
     Mistake("Units", "radius: 0.09", "radius: 0,09", "decimals have a point"),
     Mistake(
-        "Units", "park_deg: [0, -125, 120, 0, 80, 0]", "park_deg: [0, -2.18, 2.09, 0, 1.4, 0]", "write park?"
+        "Units",
+        "park_deg: [0, -125, 120, 0, 80, 0]",
+        "park_deg: [0, -2.18, 2.09, 0, 1.4, 0]",
+        "write park?",
     ),
     Mistake(
-        "Units", "park_deg: [0, -125, 120, 0, 80, 0]", "park: [0, -125, 120, 0, 80, 0]", "write park_deg?"
+        "Units",
+        "park_deg: [0, -125, 120, 0, 80, 0]",
+        "park: [0, -125, 120, 0, 80, 0]",
+        "write park_deg?",
     ),
     Mistake("Units", "abc_deg: [0, 90, 0]}", "abc_deg: [0, 1.5708, 0]}", "90 for 1.5708 rad?"),
     Mistake("Names", "robot: kr210_r2700_extra", "robot: kr210", "known are kr210_r2700_extra"),
@@ -62,8 +75,15 @@ MISTAKES = (
     Mistake("Names", "    station: pick\n", "    station: pallet\n", "known are pick, form"),
     Mistake("Reach", "pose: {xyz: [0.3, 0, 1.0]}", "pose: {xyz: [1.8, 0, 1.0]}", "the arm reaches"),
     Mistake("Reach", "pose: {xyz: [0, 0, 0.6]", "pose: {xyz: [0, 0, 0.4]", "inside pallet_deck"),
-    Mistake("Reach", "pose: {xyz: [0.3, -1.9, 0]}", "pose: {xyz: [0.3, -0.4, 0]}", "in the robot's base"),
-    Mistake("Reach", "abc_deg: [0, 90, 0]}", "abc_deg: [0, -90, 0]}", "can't be reached in this orientation"),
+    Mistake(
+        "Reach", "pose: {xyz: [0.3, -1.9, 0]}", "pose: {xyz: [0.3, -0.4, 0]}", "in the robot's base"
+    ),
+    Mistake(
+        "Reach",
+        "abc_deg: [0, 90, 0]}",
+        "abc_deg: [0, -90, 0]}",
+        "can't be reached in this orientation",
+    ),
     Mistake(
         "Contacts",
         "          - {between: [blank_held, pallet_deck], safety_distance: 0.0025}\n",
@@ -79,12 +99,23 @@ MISTAKES = (
         deep=True,
     ),
     Mistake("Zones", "kind: OPEN", "kind: TABLE", "must be one of OPEN"),
-    Mistake("Doors", "wait_for: [door_is_open], ", "", "change that before by signal open_door", deep=True),
+    Mistake(
+        "Doors",
+        "wait_for: [door_is_open], ",
+        "",
+        "change that before by signal open_door",
+        deep=True,
+    ),
     Mistake("Doors", ", set_signals: [open_door]", "", "which nothing in the cell brings about"),
     Mistake("Doors", "    state: door_closed\n", "", "must say its state"),
-    Mistake("Doors", "on: door_open, off", "on: open, off", "must be one of door_open, door_closed"),
     Mistake(
-        "Doors", "wait_for: [door_is_open]", "wait_for: [door_open]", "known are open_door, door_is_open"
+        "Doors", "on: door_open, off", "on: open, off", "must be one of door_open, door_closed"
+    ),
+    Mistake(
+        "Doors",
+        "wait_for: [door_is_open]",
+        "wait_for: [door_open]",
+        "known are open_door, door_is_open",
     ),
     Mistake("Writing", "  - name: press\n", "\t- name: press\n", "a tab; indent by spaces"),
     Mistake("Writing", "p1: [0.42, 0.11, 0]", "p1: [0.42, 0.11]", "has 2 entries, must have 3"),
@@ -92,7 +123,9 @@ MISTAKES = (
     Mistake("Missing", "robot: kr210_r2700_extra\n", "", "the file has no robot"),
     Mistake("Program", "attach: blank, ", "", "no part is held"),
     Mistake("Program", "{pause: 60}", "{pause: 60, power_mode: SLEEP}", "BUS_POWER_OFF"),
-    Mistake("Program", "{pause: 60}", "{pause: 60, power_mode: HIBERNATION}", "needs at least 300 s"),
+    Mistake(
+        "Program", "{pause: 60}", "{pause: 60, power_mode: HIBERNATION}", "needs at least 300 s"
+    ),
     Mistake("Program", "mass: 20", "mass: 200", "carries at most 210 kg"),
 )
 

@@ -1,7 +1,8 @@
 """Set up a copy of the sources with the oldest supported versions, and run the tests there.
 
-The copy lies in out/oldest: its requirements are those of requirements/, with the versions of `[oldest]` in
-requirements/supported.toml, and its set-up is the usual one. Only what has changed is copied and built again.
+The copy lies in out/oldest: its requirements are those of requirements/, with the versions of
+`[oldest]` in requirements/supported.toml, and its set-up is the usual one. Only what has changed is
+copied and built again.
 The tests run on the portable variant of the compiled core: no other run tests it as a whole.
 
     python tools/oldest_versions.py [--python VERSION] [--newest] [what pytest takes]
@@ -47,7 +48,12 @@ NEEDS = re.compile(
     r"|with_ompl"
 )
 """Words of the test files that are left out with LEFT_OUT."""
-_ROS_OF_ANOTHER = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH", "PYTHONPATH", "AMENT_PREFIX_PATH")
+_ROS_OF_ANOTHER = (
+    "_ROS_WHEELS_BOOTSTRAP_COMPLETE",
+    "LD_LIBRARY_PATH",
+    "PYTHONPATH",
+    "AMENT_PREFIX_PATH",
+)
 
 
 def supported() -> dict[str, object]:
@@ -78,11 +84,16 @@ def without(requirements: str, names: set[str]) -> str:
 
 
 def copy_sources(copy: Path, changed: dict[str, str]) -> None:
-    """Bring the copy up to date with the files that git knows; files of equal content keep their time."""
-    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True).stdout
+    """Bring the copy up to date with the files that git knows; files of equal content keep their
+    time.
+    """
+    listed = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True
+    ).stdout
     names = [name for name in listed.decode().split("\0") if name and (ROOT / name).is_file()]
     for name in names:
-        source, target = ROOT / name, copy / name
+        source = ROOT / name
+        target = copy / name
         content = changed[name].encode() if name in changed else source.read_bytes()
         if not target.is_file() or target.read_bytes() != content:
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -99,9 +110,12 @@ def copy_sources(copy: Path, changed: dict[str, str]) -> None:
 
 def requirements(versions: dict[str, str]) -> dict[str, str]:
     """Return the changed files of requirements/ by their paths."""
-    folder, names = ROOT / "requirements", {canonical(name) for name in LEFT_OUT}
+    folder = ROOT / "requirements"
+    names = {canonical(name) for name in LEFT_OUT}
     files = {
-        f"requirements/{name}.txt": without((folder / f"{name}.txt").read_text(encoding="utf-8"), names)
+        f"requirements/{name}.txt": without(
+            (folder / f"{name}.txt").read_text(encoding="utf-8"), names
+        )
         for name in ("tools", "build", "run", "dev")
     }
     constraints = (folder / "constraints.txt").read_text(encoding="utf-8")
@@ -110,7 +124,9 @@ def requirements(versions: dict[str, str]) -> dict[str, str]:
 
 def tests(copy: Path) -> list[str]:
     """Return the test files of FOLDERS that need nothing of what is left out."""
-    files = [path for folder in FOLDERS for path in sorted((copy / "tests" / folder).glob("test_*.py"))]
+    files = [
+        path for folder in FOLDERS for path in sorted((copy / "tests" / folder).glob("test_*.py"))
+    ]
     kept = [path for path in files if not NEEDS.search(path.read_text(encoding="utf-8"))]
     print("left out:", ", ".join(path.name for path in files if path not in kept), flush=True)
     return [str(path.relative_to(copy)) for path in kept]
@@ -121,8 +137,12 @@ def main() -> int:
     table = supported()
     oldest = dict(table["oldest"])  # type: ignore[call-overload]
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--python", default=oldest.pop("python"), help="version (default: %(default)s)")
-    parser.add_argument("--newest", action="store_true", help="with the versions of constraints.txt")
+    parser.add_argument(
+        "--python", default=oldest.pop("python"), help="version (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--newest", action="store_true", help="with the versions of constraints.txt"
+    )
     arguments, pytest = parser.parse_known_args()
     copy = ROOT / "out" / ("newest" if arguments.newest else "oldest") / arguments.python
     copy.mkdir(parents=True, exist_ok=True)
@@ -139,7 +159,9 @@ def main() -> int:
     if found.returncode:
         return found.returncode
     made = subprocess.run(
-        [found.stdout.strip(), "tools/set_up.py", "--tests", "--portable"], cwd=copy, env=environment
+        [found.stdout.strip(), "tools/set_up.py", "--tests", "--portable"],
+        cwd=copy,
+        env=environment,
     ).returncode
     if made:
         return made
@@ -148,7 +170,9 @@ def main() -> int:
     command = [
         ".venv/bin/python", "-m", "pytest", *side_by_side, "-m", "not long", *tests(copy), *chosen,
     ]  # fmt: skip
-    return subprocess.run(command, cwd=copy, env={**environment, "IR_KERNELS": "baseline"}).returncode
+    return subprocess.run(
+        command, cwd=copy, env={**environment, "IR_KERNELS": "baseline"}
+    ).returncode
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
-"""Draw the picture of docs/planning.md: a trajectory before and after, and its trade of time for energy.
+"""Draw the picture of docs/planning.md: a trajectory before and after, and its trade of time for
+energy.
 
     python tools/optimization_pictures.py [--folder docs/images]
 
-The pictures are what the planner answers: run this again when it changes. The figures that the page names
-are printed.
+The pictures are what the planner answers: run this again when it changes. The figures that the page
+names are printed.
 """
 
 from __future__ import annotations
@@ -26,8 +27,11 @@ mpl.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 
-CELL, TASK = "deep_box", "bin->pal"
-BEFORE, AFTER, STEEL = "#c2272d", "#2a6fbb", "#8a8f98"
+CELL = "deep_box"
+TASK = "bin->pal"
+BEFORE = "#c2272d"
+AFTER = "#2a6fbb"
+STEEL = "#8a8f98"
 
 
 def main() -> None:
@@ -57,7 +61,9 @@ def optimized() -> tuple[PlanningScene, JointTrajectory, OptimizationPlan]:
     return scene, given, planner.optimize_trajectory(given, PlanOptions(planning_time=60.0))
 
 
-def distances(panel: Axes, before: JointTrajectory, after: JointTrajectory, scene: PlanningScene) -> None:
+def distances(
+    panel: Axes, before: JointTrajectory, after: JointTrajectory, scene: PlanningScene
+) -> None:
     """Smallest distance of all pairs over the share of the duration."""
     share = np.linspace(0.0, 1.0, 400)
     for trajectory, colour, text in ((before, BEFORE, "before"), (after, AFTER, "after")):
@@ -79,7 +85,12 @@ def front(panel: Axes, plan: OptimizationPlan, scene: PlanningScene) -> None:
     fastest = plan.front[0].trajectory
     factors = np.linspace(1.0, durations[-1] / durations[0], 40)
     slowed = [movement_energy(stretched(fastest, float(factor)), scene).total for factor in factors]
-    panel.plot(factors * durations[0], np.array(slowed) / 1e3, color=STEEL, label="the fastest, slowed down")
+    panel.plot(
+        factors * durations[0],
+        np.array(slowed) / 1e3,
+        color=STEEL,
+        label="the fastest, slowed down",
+    )
     panel.plot(
         durations,
         np.array(energies) / 1e3,
@@ -88,7 +99,12 @@ def front(panel: Axes, plan: OptimizationPlan, scene: PlanningScene) -> None:
         label="least energy at each duration, certified",
     )
     panel.plot(
-        plan.after.duration, plan.after.energy / 1e3, "*", markersize=13, color=BEFORE, label="least J"
+        plan.after.duration,
+        plan.after.energy / 1e3,
+        "*",
+        markersize=13,
+        color=BEFORE,
+        label="least J",
     )
     panel.set_xlabel("duration [s]")
     panel.set_ylabel("energy at the mains with base load [kJ]")

@@ -1,4 +1,6 @@
-"""Write docs/parameters.md: every parameter of the nodes, and every search, as the code describes them."""
+"""Write docs/parameters.md: every parameter of the nodes, and every search, as the code describes
+them.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,7 @@ HEAD = """# Parameters
 
 Written by `make docs` from the settings classes; edit those. A setting is the ROS parameter of the same
 name. It is checked against its range when the node starts and whenever it is changed.
-"""
+"""  # noqa: E501
 
 
 def searches() -> str:

@@ -1,4 +1,5 @@
-"""Draw the pictures of docs/report.md: a report at a desk, on a tablet, a phone and paper; the live view.
+"""Draw the pictures of docs/report.md: a report at a desk, on a tablet, a phone and paper; the live
+view.
 
     make demo && python tools/report_pictures.py [--recording out/demo.mcap] [--folder docs/images]
 
@@ -24,7 +25,9 @@ PAPER = (740, 1094)  # px at 96 dpi: A4 less the margins of the page's style
 
 @dataclass(frozen=True)
 class Shot:
-    """A picture: width and height of the window [px], the place that is scrolled to, and how it is shown."""
+    """A picture: width and height of the window [px], the place that is scrolled to, and how it is
+    shown.
+    """
 
     name: str
     size: tuple[int, int]
@@ -42,7 +45,10 @@ SHOTS = (
     Shot("report_methods.png", (1400, 640), at="#methods"),
     Shot("report_print.png", PAPER, media="print"),
 )
-LIVE_SHOTS = (Shot("live.png", (1400, 1500)), Shot("live_phone.png", (390, 1500), dark=True, touch=True))
+LIVE_SHOTS = (
+    Shot("live.png", (1400, 1500)),
+    Shot("live_phone.png", (390, 1500), dark=True, touch=True),
+)
 
 
 def main() -> int:
@@ -53,7 +59,9 @@ def main() -> int:
     parser.add_argument(
         "--recording", type=Path, default=Path("out/demo.mcap"), help="default: out/demo.mcap"
     )
-    parser.add_argument("--folder", type=Path, default=Path("docs/images"), help="default: docs/images")
+    parser.add_argument(
+        "--folder", type=Path, default=Path("docs/images"), help="default: docs/images"
+    )
     asked = parser.parse_args()
     asked.folder.mkdir(parents=True, exist_ok=True)
     analysis = analyse(read_recording(asked.recording))

@@ -1,7 +1,9 @@
-"""Write ros_ws/src/ir_bringup/security/policy.xml: what SROS 2 lets each node of a cell say, hear and ask.
+"""Write ros_ws/src/ir_bringup/security/policy.xml: what SROS 2 lets each node of a cell say, hear
+and ask.
 
-Made from the contract of names. `python tools/security_policy.py --namespace /cell_1` prints the policy of a
-cell in a namespace. Format: policy 0.2.0 of ros2/sros2, one enclave for each node, and one for people.
+Made from the contract of names. `python tools/security_policy.py --namespace /cell_1` prints the
+policy of a cell in a namespace. Format: policy 0.2.0 of ros2/sros2, one enclave for each node, and
+one for people.
 """
 
 from __future__ import annotations
@@ -42,7 +44,12 @@ COMMON = Rights(
 )
 PLANNER = Rights(
     publish=(names.CELL, names.PLANNED_TRAJECTORY, names.PROGRAM_SAVINGS, names.PLANNER_MARKERS),
-    subscribe=(names.JOINT_STATES, names.CARRIED_LOAD, names.CONTROLLER_TIMERS, names.MACHINE_STATES),
+    subscribe=(
+        names.JOINT_STATES,
+        names.CARRIED_LOAD,
+        names.CONTROLLER_TIMERS,
+        names.MACHINE_STATES,
+    ),
     reply=(
         *(names.SET_CELL, names.GET_CELL, names.SET_EQUIPMENT, names.CHECK_STATE),
         names.CHECK_STATES,
@@ -74,7 +81,13 @@ RUNNER = Rights(
     publish=(names.SIGNALS, names.MACHINE_SIGNALS, names.PROGRAM_STATE),
     subscribe=(names.SIGNALS, names.POWER_STATE, names.CONTROLLER_TIMERS),
     request=(
-        *(names.GET_PROGRAM, names.GET_TRAJECTORY, names.SET_PLC_INPUT, names.SET_LOAD, names.QUERY_MODES),
+        *(
+            names.GET_PROGRAM,
+            names.GET_TRAJECTORY,
+            names.SET_PLC_INPUT,
+            names.SET_LOAD,
+            names.QUERY_MODES,
+        ),
     ),
     execute=(names.RUN_PROGRAM,),
     call=(names.EXECUTE_TRAJECTORY,),
@@ -87,7 +100,11 @@ ANSWERING = (*NODES, names.STUDIES)
 CALLS = tuple(f"{node}/{names.CALLS}" for node in ANSWERING)
 REPORTS = (*PLANNER.publish, *DRIVER.publish, *RUNNER.publish, *COMMON.publish, *CALLS)
 RECORDER = Rights(
-    subscribe=(*REPORTS, *COMMANDS, *(f"{action}/_action/status" for action in (*ACTIONS, names.RUN_STUDY))),
+    subscribe=(
+        *REPORTS,
+        *COMMANDS,
+        *(f"{action}/_action/status" for action in (*ACTIONS, names.RUN_STUDY)),
+    ),
     reply=(names.START_RECORDING, names.STOP_RECORDING),
     request=(
         names.GET_CELL,
@@ -119,7 +136,9 @@ def rights() -> dict[str, Rights]:
     found = {}
     for node, own in {**CELL, names.STUDIES: STUDIES, names.LIVE: LIVE, OPERATOR: PEOPLE}.items():
         found[node] = Rights(
-            _sorted(own.publish, COMMON.publish, (f"{node}/{names.CALLS}",) if node in ANSWERING else ()),
+            _sorted(
+                own.publish, COMMON.publish, (f"{node}/{names.CALLS}",) if node in ANSWERING else ()
+            ),
             _sorted(own.subscribe, COMMON.subscribe),
             _sorted(own.reply, tuple(f"{node}/{service}" for service in PARAMETER_SERVICES)),
             _sorted(own.request),
@@ -135,7 +154,9 @@ def policy(namespace: str = "/") -> str:
     enclaves = Xml.SubElement(root, "enclaves")
     for node, own in rights().items():
         enclave = Xml.SubElement(enclaves, "enclave", path=f"{namespace.rstrip('/')}/{node}")
-        profile = Xml.SubElement(Xml.SubElement(enclave, "profiles"), "profile", ns=namespace, node=node)
+        profile = Xml.SubElement(
+            Xml.SubElement(enclave, "profiles"), "profile", ns=namespace, node=node
+        )
         for group, right, allowed in (
             ("topics", "publish", own.publish),
             ("topics", "subscribe", own.subscribe),
@@ -149,7 +170,9 @@ def policy(namespace: str = "/") -> str:
                 for name in allowed:
                     Xml.SubElement(element, group.removesuffix("s")).text = name
     Xml.indent(root)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + Xml.tostring(root, encoding="unicode") + "\n"
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n' + Xml.tostring(root, encoding="unicode") + "\n"
+    )
 
 
 def _sorted(*groups: tuple[str, ...]) -> tuple[str, ...]:
@@ -159,7 +182,9 @@ def _sorted(*groups: tuple[str, ...]) -> tuple[str, ...]:
 def main() -> int:
     """Write the file, or print the policy of a namespace."""
     parser = argparse.ArgumentParser(description="Writes the SROS 2 policy of a cell.")
-    parser.add_argument("--namespace", help="of the cell (/cell_1): print instead of writing the file")
+    parser.add_argument(
+        "--namespace", help="of the cell (/cell_1): print instead of writing the file"
+    )
     namespace = parser.parse_args().namespace
     if namespace is not None:
         sys.stdout.write(policy(f"/{namespace.strip('/')}"))

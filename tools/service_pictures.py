@@ -1,9 +1,10 @@
-"""Draw the pictures of docs/service_movements.md: stage one, the raw walk of eq. (7), the candidates.
+"""Draw the pictures of docs/service_movements.md: stage one, the raw walk of eq. (7), the
+candidates.
 
     python tools/service_pictures.py [--folder docs/images]
 
-Everything is in the machine's frame, x into the machine. The pictures are what the planner answers: run
-this again when it changes.
+Everything is in the machine's frame, x into the machine. The pictures are what the planner answers:
+run this again when it changes.
 """
 
 from __future__ import annotations
@@ -35,10 +36,14 @@ mpl.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 
-SIDE, PLAN = (0, 2), (0, 1)  # machine axes that a panel shows
+# machine axes that a panel shows
+SIDE = (0, 2)
+PLAN = (0, 1)
 PICTURES = (("cnc_door", "press", "service_press.png"), ("deep_box", "tun", "service_tunnel.png"))
 S_M = 0.02
-STEEL, ZONE, ARM = "#8a8f98", "#d08700", "#2a6fbb"
+STEEL = "#8a8f98"
+ZONE = "#d08700"
+ARM = "#2a6fbb"
 
 
 def main() -> None:
@@ -97,7 +102,9 @@ def raw_walk(panel: Axes, walk: Walk, scene: PlanningScene, station: str) -> Non
 
 
 def candidates(panel: Axes, plan: ServicePlan, scene: PlanningScene, station: str) -> None:
-    """Certified candidates, from above; the arm at work and outside, and the closest pair of the best."""
+    """Certified candidates, from above; the arm at work and outside, and the closest pair of the
+    best.
+    """
     surroundings(panel, scene, station, PLAN)
     for candidate, colour in zip(plan.candidates, (ARM, "#3a9d5d", "#8e5bb5"), strict=False):
         trajectory = candidate.trajectory
@@ -116,7 +123,9 @@ def candidates(panel: Axes, plan: ServicePlan, scene: PlanningScene, station: st
         label = f"closest: {pair.body_a} to {pair.body_b}"
         panel.plot(*ends.T, "o-", color="#c2272d", markersize=4, linewidth=2, label=label)
     panel.legend(loc="lower left", fontsize=8)
-    panel.set_title("Shortened, timed, certified (s, least clearance),\nthe arm at work and outside")
+    panel.set_title(
+        "Shortened, timed, certified (s, least clearance),\nthe arm at work and outside"
+    )
 
 
 def seen(points: FloatArray, scene: PlanningScene, station: str) -> FloatArray:
@@ -138,7 +147,12 @@ def surroundings(panel: Axes, scene: PlanningScene, station: str, axes: tuple[in
             STEEL,
             0.35 if axes == SIDE else 0.8,
         )
-    outline(panel, seen(corners(machine.zone.pose, machine.zone.size), scene, station)[:, axes], ZONE, 0.06)
+    outline(
+        panel,
+        seen(corners(machine.zone.pose, machine.zone.size), scene, station)[:, axes],
+        ZONE,
+        0.06,
+    )
     panel.set_aspect("equal")
     panel.set_xlim(-1.9, 0.7)
     panel.set_ylim((-0.05, 2.15) if axes == SIDE else (-1.1, 1.1))
@@ -159,7 +173,12 @@ def outline(panel: Axes, points: FloatArray, colour: str, alpha: float) -> None:
 
 
 def arm(
-    panel: Axes, q: FloatArray, scene: PlanningScene, station: str, axes: tuple[int, int], colour: str
+    panel: Axes,
+    q: FloatArray,
+    scene: PlanningScene,
+    station: str,
+    axes: tuple[int, int],
+    colour: str,
 ) -> None:
     """Capsules from link 3 to the tool, as outlines of their true width."""
     links = scene.chain.link_poses(q[None])[0]
@@ -172,7 +191,9 @@ def arm(
         link = links[capsule.link]
         ends = np.stack([capsule.p0, capsule.p1]) @ link[:3, :3].T + link[:3, 3]
         flat = seen(ends, scene, station)[:, axes]
-        outline(panel, np.concatenate([end + capsule.radius * circle for end in flat]), colour, 0.25)
+        outline(
+            panel, np.concatenate([end + capsule.radius * circle for end in flat]), colour, 0.25
+        )
 
 
 if __name__ == "__main__":

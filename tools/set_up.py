@@ -2,11 +2,12 @@
 
     python tools/set_up.py [--tests] [--portable]
 
-Standard library only: it runs before anything is installed. Every stage has a fingerprint of what it depends
-on; a stage whose fingerprint lies in .venv/.setup is skipped. Downloads and builds run side by side. What
-pip and the compilers say goes to out/setup/STAGE.log, whose end is shown when a stage fails. What somebody
-has uninstalled since is installed again. --tests: also what checks, tests and benchmarks need. --portable:
-also the compiled core for any x86-64, which runs where .venv is taken to another processor.
+Standard library only: it runs before anything is installed. Every stage has a fingerprint of what
+it depends on; a stage whose fingerprint lies in .venv/.setup is skipped. Downloads and builds run
+side by side. What pip and the compilers say goes to out/setup/STAGE.log, whose end is shown when a
+stage fails. What somebody has uninstalled since is installed again. --tests: also what checks,
+tests and benchmarks need. --portable: also the compiled core for any x86-64, which runs where .venv
+is taken to another processor.
 """
 
 from __future__ import annotations
@@ -28,7 +29,13 @@ from _distributions import ROOT, STAMPS, VENV, installed, note_what_came, said, 
 from _stages import LOGS, PYTHON, Stage, Stages
 
 ONE_INSTALLS = threading.Lock()
-ROS_OF_THE_SHELL = ("PYTHONPATH", "PYTHONHOME", "AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH", "LD_LIBRARY_PATH")
+ROS_OF_THE_SHELL = (
+    "PYTHONPATH",
+    "PYTHONHOME",
+    "AMENT_PREFIX_PATH",
+    "CMAKE_PREFIX_PATH",
+    "LD_LIBRARY_PATH",
+)
 
 
 class SetupError(Exception):
@@ -39,15 +46,15 @@ def check_machine() -> None:
     """Raise a sentence for what no package index can deliver."""
     if sys.platform != "linux" or platform.machine() not in ("x86_64", "AMD64"):
         raise SetupError(
-            f"The ROS 2 wheels exist for x86-64 Linux; this is {platform.machine()} {platform.system()}. "
-            "Use the container in docker/ instead."
+            f"The ROS 2 wheels exist for x86-64 Linux; this is {platform.machine()} "
+            f"{platform.system()}. Use the container in docker/ instead."
         )
     compilers = (os.environ.get("CXX", "g++"), os.environ.get("CC", "gcc"))
     absent = [name for name in compilers if shutil.which(name.split()[0]) is None]
     if absent:
         raise SetupError(
-            f"No {' and no '.join(absent)} on the path. A C++ compiler builds the interfaces and the core: "
-            "apt install g++ (Debian, Ubuntu) or dnf install gcc-c++ (Fedora)."
+            f"No {' and no '.join(absent)} on the path. A C++ compiler builds the interfaces and "
+            "the core: apt install g++ (Debian, Ubuntu) or dnf install gcc-c++ (Fedora)."
         )
 
 
@@ -56,21 +63,28 @@ def make_venv() -> None:
     place = STAMPS / "place"
     moved = place.exists() and place.read_text() != str(VENV)
     runs = (
-        PYTHON.exists() and subprocess.run([PYTHON, "-c", "import pip"], capture_output=True).returncode == 0
+        PYTHON.exists()
+        and subprocess.run([PYTHON, "-c", "import pip"], capture_output=True).returncode == 0
     )
     if moved or not runs:
         if VENV.exists() and Path(sys.prefix).resolve() == VENV.resolve():
-            raise SetupError(f"{VENV} has been moved or lacks pip. Remove it: rm -rf .venv; make setup")
+            raise SetupError(
+                f"{VENV} has been moved or lacks pip. Remove it: rm -rf .venv; make setup"
+            )
         print(f"virtual environment of Python {platform.python_version()} in .venv", flush=True)
         shutil.rmtree(VENV, ignore_errors=True)
         run((sys.executable, "-m", "venv", str(VENV)), LOGS / "venv.log")
     STAMPS.mkdir(exist_ok=True)
     place.write_text(str(VENV))
-    (VENV / "COLCON_IGNORE").touch()  # else colcon takes the wheels' package.xml files for packages to build
+    (
+        VENV / "COLCON_IGNORE"
+    ).touch()  # else colcon takes the wheels' package.xml files for packages to build
 
 
 def run(command: tuple[str, ...], log: Path, folder: Path = ROOT, **variables: str) -> None:
-    """Run one command with its output in the log; raise with the end of its output when it fails."""
+    """Run one command with its output in the log; raise with the end of its output when it
+    fails.
+    """
     environment = {k: v for k, v in os.environ.items() if k not in ROS_OF_THE_SHELL} | variables
     environment["PATH"] = f"{VENV / 'bin'}{os.pathsep}{environment.get('PATH', os.defpath)}"
     with log.open("a") as output:
@@ -83,7 +97,9 @@ def run(command: tuple[str, ...], log: Path, folder: Path = ROOT, **variables: s
     if code != 0:
         lines = log.read_bytes()[start:].decode(errors="replace").splitlines()
         useful = [line for line in lines if "is ignored: it is" not in line]
-        raise SetupError("\n".join([*useful[-40:], f"{' '.join(command)} failed; all of it is in {log}"]))
+        raise SetupError(
+            "\n".join([*useful[-40:], f"{' '.join(command)} failed; all of it is in {log}"])
+        )
 
 
 def set_up(tests: bool, portable: bool) -> None:
@@ -101,7 +117,8 @@ def set_up(tests: bool, portable: bool) -> None:
     called = f"{sys.version_info[0]}.{sys.version_info[1]}"
     if own != called:
         raise SetupError(
-            f".venv is of Python {own}, asked for is {called}. To change it: rm -rf .venv, then again."
+            f".venv is of Python {own}, asked for is {called}. To change it: rm -rf .venv, then "
+            "again."
         )
     stages = [stage for stage in Stages(own).all(tests, portable) if needed(stage)]
     left = [stage.says for stage in stages]
@@ -124,7 +141,8 @@ def needed(stage: Stage) -> bool:
 
 
 def side_by_side(stages: list[Stage], site: Path) -> Iterator[tuple[Stage, float]]:
-    """Complete the stages, each after those that it needs, and yield each with its seconds once it is done.
+    """Complete the stages, each after those that it needs, and yield each with its seconds once it
+    is done.
 
     All that can end does before the first failure is raised.
     """
@@ -165,7 +183,10 @@ def complete(stage: Stage, site: Path) -> float:
             seconds += time.monotonic() - start
     stage.stamp.write_text(stage.fingerprint)
     if missing := stage.missing():
-        sentence = f"  {stage.name}: not all of it is there{said(missing)}; see {stage.log.relative_to(ROOT)}"
+        sentence = (
+            f"  {stage.name}: not all of it is there{said(missing)}; see "
+            f"{stage.log.relative_to(ROOT)}"
+        )
         print(sentence, file=sys.stderr, flush=True)
     return seconds
 
@@ -173,8 +194,12 @@ def complete(stage: Stage, site: Path) -> float:
 def main() -> int:
     """Set up under a lock: two calls at a time would install into each other."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--tests", action="store_true", help="also what checks, tests and benchmarks need")
-    parser.add_argument("--portable", action="store_true", help="also the compiled core for any x86-64")
+    parser.add_argument(
+        "--tests", action="store_true", help="also what checks, tests and benchmarks need"
+    )
+    parser.add_argument(
+        "--portable", action="store_true", help="also the compiled core for any x86-64"
+    )
     arguments = parser.parse_args()
     LOGS.mkdir(parents=True, exist_ok=True)
     with (LOGS / ".lock").open("w") as lock:

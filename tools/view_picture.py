@@ -17,7 +17,9 @@ PATIENCE = 120.0  # s
 
 
 PLANNED = "document.body.innerText.includes('at the mains')"
-NO_NOTICE = "document.querySelector('.mantine-Notification-closeButton')?.click()"  # of software rendering
+NO_NOTICE = (
+    "document.querySelector('.mantine-Notification-closeButton')?.click()"  # of software rendering
+)
 
 
 def main() -> None:

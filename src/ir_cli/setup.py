@@ -18,7 +18,8 @@ setup(
     zip_safe=False,
     maintainer="The maintainers",
     maintainer_email="maintainers@example.org",
-    description="The ir command: demonstration without launch files, service calls, cells and reports",
+    description="The ir command: demonstration without launch files, service calls, cells and "
+    "reports",
     license="Apache-2.0",
     entry_points={"console_scripts": ["ir = ir_cli.main:main"]},
 )

@@ -6,9 +6,13 @@ PACKAGE = "ir_description"
 
 
 def data_files() -> list[str]:
-    """Everything under data/, relative to the package: robots, power modes, cells and their meshes."""
+    """Everything under data/, relative to the package: robots, power modes, cells and their
+    meshes.
+    """
     root = Path(__file__).parent / PACKAGE
-    return sorted(str(path.relative_to(root)) for path in (root / "data").rglob("*") if path.is_file())
+    return sorted(
+        str(path.relative_to(root)) for path in (root / "data").rglob("*") if path.is_file()
+    )
 
 
 setup(
@@ -25,7 +29,8 @@ setup(
     zip_safe=False,
     maintainer="The ir maintainers",
     maintainer_email="maintainers@example.org",
-    description="The robot and the cells as data: limits, drives, power modes, cells, validated loading.",
+    description="The robot and the cells as data: limits, drives, power modes, cells, validated "
+    "loading.",
     license="Apache-2.0",
     python_requires=">=3.11",
 )

@@ -1,7 +1,7 @@
 """Builds the compiled core twice: for this machine, and for any x86-64; or not at all, and says so.
 
-IR_KERNELS_VARIANTS names the variants to build, with commas: native,baseline (both where it isn't set), one
-of them, or none (empty: what lies here already is installed).
+IR_KERNELS_VARIANTS names the variants to build, with commas: native,baseline (both where it isn't
+set), one of them, or none (empty: what lies here already is installed).
 """
 
 import copy
@@ -22,7 +22,14 @@ X86 = platform.machine().lower() in ("x86_64", "amd64")
 # GCC 12 takes the deliberately undefined values of its own AVX-512 header for a mistake.
 WARNINGS = ["-Wall", "-Wextra", "-Wno-psabi", "-Wno-uninitialized", "-Wno-maybe-uninitialized"]
 # No -ffast-math: NaN checks and the order of additions are part of what is promised.
-OPTIMISE = ["-O3", "-std=c++17", "-fvisibility=hidden", "-g0", "-fno-math-errno", "-fno-trapping-math"]
+OPTIMISE = [
+    "-O3",
+    "-std=c++17",
+    "-fvisibility=hidden",
+    "-g0",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+]
 SANITIZE = [
     "-O1",
     "-g1",
@@ -30,14 +37,15 @@ SANITIZE = [
     "-fno-sanitize-recover=undefined",
     "-fno-omit-frame-pointer",
 ]
-# What GCC may use on its own under -march=native, as preprocessor name -> name of __builtin_cpu_supports.
+# What GCC may use on its own under -march=native, as preprocessor name -> name of
+# __builtin_cpu_supports.
 FEATURES = {
     "__POPCNT__": "popcnt", "__SSE3__": "sse3", "__SSSE3__": "ssse3", "__SSE4_1__": "sse4.1",
-    "__SSE4_2__": "sse4.2", "__SSE4A__": "sse4a", "__AVX__": "avx", "__FMA__": "fma", "__FMA4__": "fma4",
-    "__XOP__": "xop", "__BMI__": "bmi", "__BMI2__": "bmi2", "__AVX2__": "avx2", "__AVX512F__": "avx512f",
+    "__SSE4_2__": "sse4.2", "__SSE4A__": "sse4a", "__AVX__": "avx", "__FMA__": "fma", "__FMA4__": "fma4",  # noqa: E501
+    "__XOP__": "xop", "__BMI__": "bmi", "__BMI2__": "bmi2", "__AVX2__": "avx2", "__AVX512F__": "avx512f",  # noqa: E501
     "__AVX512DQ__": "avx512dq", "__AVX512CD__": "avx512cd", "__AVX512BW__": "avx512bw",
     "__AVX512VL__": "avx512vl", "__AVX512IFMA__": "avx512ifma", "__AVX512VBMI__": "avx512vbmi",
-    "__AVX512VBMI2__": "avx512vbmi2", "__AVX512VNNI__": "avx512vnni", "__AVX512BITALG__": "avx512bitalg",
+    "__AVX512VBMI2__": "avx512vbmi2", "__AVX512VNNI__": "avx512vnni", "__AVX512BITALG__": "avx512bitalg",  # noqa: E501
     "__AVX512VPOPCNTDQ__": "avx512vpopcntdq",
 }  # fmt: skip
 
@@ -49,7 +57,9 @@ def extensions() -> list[Extension]:
         include = [pybind11.get_include()]
     except ImportError:
         include = []  # the distribution's pybind11-dev, found by the compiler on its own
-    variants = [name for name in os.environ.get("IR_KERNELS_VARIANTS", "native,baseline").split(",") if name]
+    variants = [
+        name for name in os.environ.get("IR_KERNELS_VARIANTS", "native,baseline").split(",") if name
+    ]
     if unknown := set(variants) - {"native", "baseline"}:
         raise SystemExit(
             f"IR_KERNELS_VARIANTS names {', '.join(sorted(unknown))}: known are native, baseline"
@@ -73,7 +83,9 @@ def extensions() -> list[Extension]:
 
 
 def native_features(compiler: str) -> list[str]:
-    """What `-march=native` switches on here: the loader compares it with the processor it finds itself on."""
+    """What `-march=native` switches on here: the loader compares it with the processor it finds
+    itself on.
+    """
     command = [compiler, "-march=native", "-dM", "-E", "-x", "c++", os.devnull]
     macros = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     defined = {line.split()[1] for line in macros.splitlines()}
@@ -81,7 +93,9 @@ def native_features(compiler: str) -> list[str]:
 
 
 class BuildVariants(build_ext):
-    """The variants are built side by side; a compiler that is missing or fails leaves the NumPy reference."""
+    """The variants are built side by side; a compiler that is missing or fails leaves the NumPy
+    reference.
+    """
 
     def finalize_options(self):
         super().finalize_options()
@@ -93,13 +107,16 @@ class BuildVariants(build_ext):
             os.path.exists(self.get_ext_fullpath(e.name)) for e in self.extensions
         ):
             print(
-                f"{PACKAGE}: no C++ compiler with pybind11 was found: nothing compiled, the (slow) NumPy "
+                f"{PACKAGE}: no C++ compiler with pybind11 was found: nothing compiled, the "
+                "(slow) NumPy "
                 "reference will be used. Install g++ and pybind11 and install again.",
                 file=sys.stderr,
             )
 
     def copy_file(self, infile, outfile, *args, **options):
-        """Beside its place and renamed: who has the old file mapped keeps it, nobody finds half a file."""
+        """Beside its place and renamed: who has the old file mapped keeps it, nobody finds half a
+        file.
+        """
         beside = f"{outfile}.new"
         copied = super().copy_file(infile, beside, *args, **options)
         if not self.dry_run:
@@ -152,6 +169,7 @@ if __name__ == "__main__":  # pip and colcon run it under that name too
         install_requires=["numpy"],
         python_requires=">=3.10",
         zip_safe=False,
-        description="Kinematics, exact distances, certified motion, dynamics, inverse kinematics, compiled.",
+        description="Kinematics, exact distances, certified motion, dynamics, inverse "
+        "kinematics, compiled.",
         license="Apache-2.0",
     )

@@ -17,6 +17,7 @@ setup(
     zip_safe=False,
     maintainer="The maintainers",
     maintainer_email="maintainers@example.org",
-    description="KUKA Robot Language: programs read, run as a controller would drive them, and written",
+    description="KUKA Robot Language: programs read, run as a controller would drive them, and "
+    "written",
     license="Apache-2.0",
 )

@@ -1,4 +1,6 @@
-"""The shared vocabulary in Python: value types, names, conversions, a client for scripts, test fixtures."""
+"""The shared vocabulary in Python: value types, names, conversions, a client for scripts, test
+fixtures.
+"""
 
 from setuptools import find_packages, setup
 
@@ -18,6 +20,7 @@ setup(
     zip_safe=False,
     maintainer="The maintainers",
     maintainer_email="maintainers@example.org",
-    description="Shared vocabulary in Python: value types, names, conversions, client for scripts, fixtures",
+    description="Shared vocabulary in Python: value types, names, conversions, client for "
+    "scripts, fixtures",
     license="Apache-2.0",
 )

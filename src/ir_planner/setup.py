@@ -18,7 +18,8 @@ setup(
     zip_safe=False,
     maintainer="The maintainers",
     maintainer_email="maintainers@example.org",
-    description="Plans collision-free movements and programs with their joules, seconds and clearance",
+    description="Plans collision-free movements and programs with their joules, seconds and "
+    "clearance",
     license="Apache-2.0",
     entry_points={"console_scripts": ["ir_planner = ir_planner.node:main"]},
 )

@@ -1,4 +1,6 @@
-"""Runs a planned program on the driver: movements, pauses with their power mode, signals of the machines."""
+"""Runs a planned program on the driver: movements, pauses with their power mode, signals of the
+machines.
+"""
 
 from setuptools import find_packages, setup
 
@@ -17,7 +19,8 @@ setup(
     zip_safe=False,
     maintainer="The maintainers",
     maintainer_email="maintainers@example.org",
-    description="Runs a planned program: movements, pauses with their power mode, signals of the machines",
+    description="Runs a planned program: movements, pauses with their power mode, signals of the "
+    "machines",
     license="Apache-2.0",
     entry_points={"console_scripts": ["ir_program_runner = ir_program_runner.node:main"]},
 )

@@ -27,7 +27,8 @@ setup(
     zip_safe=False,
     maintainer="The maintainers",
     maintainer_email="maintainers@example.org",
-    description="Recorder node, playback, offline analysis and HTML report of a robot cell's MCAP files",
+    description="Recorder node, playback, offline analysis and HTML report of a robot cell's "
+    "MCAP files",
     license="Apache-2.0",
     entry_points={
         "console_scripts": [

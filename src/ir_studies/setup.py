@@ -17,7 +17,8 @@ setup(
     zip_safe=False,
     maintainer="The maintainers",
     maintainer_email="maintainers@example.org",
-    description="Many plans of a cell, and what follows: planners compared, where things should stand",
+    description="Many plans of a cell, and what follows: planners compared, where things should "
+    "stand",
     license="Apache-2.0",
     extras_require={"cluster": ["dask", "distributed"]},
     entry_points={"console_scripts": ["ir_studies = ir_studies.node:main"]},

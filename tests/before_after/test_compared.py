@@ -1,4 +1,6 @@
-"""Today's program against the planner's: the same stops, sums that agree, savings by common draws."""
+"""Today's program against the planner's: the same stops, sums that agree, savings by common
+draws.
+"""
 
 from __future__ import annotations
 
@@ -32,9 +34,13 @@ def test_all_programs_make_the_same_stops_and_pauses(compared: BeforeAfter) -> N
         assert [hop.seconds for hop in side.hops if hop.is_pause][:2] == pytest.approx([5.0, 40.0])
         assert side.certified
     ends = [
-        np.array([step.trajectory.positions[-1] for step in side.movements if step.trajectory is not None])[
-            -1
-        ]
+        np.array(
+            [
+                step.trajectory.positions[-1]
+                for step in side.movements
+                if step.trajectory is not None
+            ]
+        )[-1]
         for side in (compared.today, *compared.sides)
     ]
     assert np.ptp(ends, axis=0) == pytest.approx(np.zeros(6), abs=1e-6)
@@ -67,14 +73,19 @@ def test_a_saving_is_known_better_than_the_energies_that_it_is_the_difference_of
         assert saving.certain
 
 
-def test_a_line_that_needs_more_time_lets_todays_program_wait_as_well(compared: BeforeAfter) -> None:
+def test_a_line_that_needs_more_time_lets_todays_program_wait_as_well(
+    compared: BeforeAfter,
+) -> None:
     """Today's robot waits on motors, by the controller's timer on brakes after 20 s."""
-    line, today = compared.sides[2], compared.today.report
+    line = compared.sides[2]
+    today = compared.today.report
     watts = (line.saving.common - today.energy) / (60.0 - today.duration)
     assert 600.0 < watts < 800.0
 
 
-def test_changes_are_the_largest_savings_and_the_least_work_comes_first(compared: BeforeAfter) -> None:
+def test_changes_are_the_largest_savings_and_the_least_work_comes_first(
+    compared: BeforeAfter,
+) -> None:
     works = [change.work for change in compared.changes]
     assert works == sorted(works)
     assert compared.changes[0].name == "pause at point_2"
@@ -91,10 +102,13 @@ def test_the_common_program_saves_what_the_planner_says(planner: Planner) -> Non
     park = planner.cell.park
     found = before_after_common(planner, ("p1", "home"), park)
     plan = planner.plan_program(("p1", "home"), 0.0, PlanOptions(), park, savings=True)
-    total, saving = plan.savings.total, found.sides[0].saving
+    total = plan.savings.total
+    saving = found.sides[0].saving
     assert saving.common == pytest.approx(total.common)
     assert saving.saved == pytest.approx(total.saved)
-    assert (saving.saved_low, saving.saved_high) == pytest.approx((total.saved_low, total.saved_high))
+    assert (saving.saved_low, saving.saved_high) == pytest.approx(
+        (total.saved_low, total.saved_high)
+    )
 
 
 def test_the_planners_own_program_as_todays_saves_next_to_nothing(planner: Planner) -> None:
@@ -111,7 +125,8 @@ def test_a_motion_that_is_faster_than_the_limits_is_compared_with_the_free_progr
     planner: Planner,
 ) -> None:
     """A trace a little faster than the limits ended in "the shortest is ..." and no comparison."""
-    home, plan = planner.cell.machine_home, planner.plan_regional
+    home = planner.cell.machine_home
+    plan = planner.plan_regional
     found = plan(home, parse_goal("p1", planner.cell), PlanOptions(objective="time")).trajectory
     assert found is not None
     fast = JointTrajectory.from_seconds(found.joint_names, 0.9 * found.times, found.positions)

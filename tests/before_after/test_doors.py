@@ -34,7 +34,8 @@ def today(*doors: Doors | None) -> tuple[Today, AskedProgram]:
     planner.set_cell("", "demo")
     plan = planner.plan_regional(CELL.machine_home, parse_goal("lathe_work", CELL), PlanOptions())
     assert plan.trajectory is not None
-    into, end = plan.trajectory, np.asarray(plan.trajectory.positions[-1])
+    into = plan.trajectory
+    end = np.asarray(plan.trajectory.positions[-1])
     stretches = tuple(Stretch(into, end, into.duration, works=True, doors=each) for each in doors)
     known = Today("t", "trace", np.asarray(CELL.machine_home), stretches)
     return known, asked_program(known, planner.scene(NO_LOAD))
@@ -56,7 +57,12 @@ def test_todays_movements_are_judged_with_the_doors_as_recorded() -> None:
 @pytest.mark.parametrize(
     ("doors", "signals", "begin", "sentence"),
     [
-        ((None, None), (), (), "doors at the start are assumed, as the cell has them: lathe door_open"),
+        (
+            (None, None),
+            (),
+            (),
+            "doors at the start are assumed, as the cell has them: lathe door_open",
+        ),
         ((SHUT, SHUT), (), SHUT, "doors at the start as recorded: lathe door_closed"),
         ((SHUT, ()), (Signal("lathe_open_door", True),), SHUT, "as recorded: lathe door_closed"),
         ((MOVES,), (), MOVES, "as recorded: lathe door_open changing to door_closed"),

@@ -15,7 +15,11 @@ from pyarrow import parquet
 from ir_cli.main import main
 from ir_msgs_py.before_after import BeforeAfter
 from ir_planner import Planner
-from ir_recorder.report.before_after import before_after_columns, before_after_html, write_before_after_table
+from ir_recorder.report.before_after import (
+    before_after_columns,
+    before_after_html,
+    write_before_after_table,
+)
 from ir_recorder.report.costs import Costs
 
 
@@ -26,27 +30,42 @@ def data_of(page: str) -> dict:
 def test_the_page_has_both_motions_and_all_figures(compared: BeforeAfter, planner: Planner) -> None:
     page = before_after_html(compared, planner.cell)
     data = data_of(page)
-    assert [side["name"] for side in data["sides"]] == ["today", "same cycle time", "free", "for the line"]
+    assert [side["name"] for side in data["sides"]] == [
+        "today",
+        "same cycle time",
+        "free",
+        "for the line",
+    ]
     today = data["sides"][0]
-    angles = np.frombuffer(base64.b64decode(today["angles"]), "<i2").reshape(-1, 6) * today["angleStep"]
+    angles = (
+        np.frombuffer(base64.b64decode(today["angles"]), "<i2").reshape(-1, 6) * today["angleStep"]
+    )
     assert angles[0] == pytest.approx(planner.cell.machine_home, abs=2e-4)
     first = compared.today.movements[0].trajectory
     assert first is not None
     row = round(0.3 / today["step"])
-    assert angles[row] == pytest.approx(first.sample(np.array([row * today["step"]])).q[0], abs=2e-4)
+    assert angles[row] == pytest.approx(
+        first.sample(np.array([row * today["step"]])).q[0], abs=2e-4
+    )
     for words in ("saved a year", "CO2", "peak power", "pause at point_2", "(assumed)"):
         assert words in page
 
 
 def test_an_interval_with_zero_in_it_says_so(compared: BeforeAfter, planner: Planner) -> None:
-    doubtful = tuple(replace(side, saving=replace(side.saving, saved_low=-1.0)) for side in compared.sides)
+    doubtful = tuple(
+        replace(side, saving=replace(side.saving, saved_low=-1.0)) for side in compared.sides
+    )
     page = before_after_html(replace(compared, sides=doubtful), planner.cell)
     assert "zero lies in it: it is open whether anything is saved" in page
     assert "zero lies in it" not in before_after_html(compared, planner.cell)
 
 
-def test_names_of_a_program_cannot_write_into_the_page(compared: BeforeAfter, planner: Planner) -> None:
-    page = before_after_html(replace(compared, name="<script>x()", notes=("</script>",)), planner.cell)
+def test_names_of_a_program_cannot_write_into_the_page(
+    compared: BeforeAfter, planner: Planner
+) -> None:
+    page = before_after_html(
+        replace(compared, name="<script>x()", notes=("</script>",)), planner.cell
+    )
     assert "<script>x()" not in page
     assert page.count("</script>") == 2
 
@@ -56,7 +75,9 @@ def test_the_table_has_the_years_of_the_costs(compared: BeforeAfter, tmp_path: P
     row = columns["program"].index("same cycle time")
     side = compared.sides[0]
     cycles = 8 * 3600 * 0.85 * 2 * 240 / compared.today.report.duration
-    assert columns["year_saved_money"][row] == pytest.approx(cycles * side.saving.saved / 3.6e6 * 0.5)
+    assert columns["year_saved_money"][row] == pytest.approx(
+        cycles * side.saving.saved / 3.6e6 * 0.5
+    )
     path = write_before_after_table(compared, tmp_path / "table.csv")
     with path.open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -69,9 +90,16 @@ def test_the_table_has_the_years_of_the_costs(compared: BeforeAfter, tmp_path: P
 
 
 def test_every_amount_of_the_table_follows_from_the_joules(compared: BeforeAfter) -> None:
-    """By their own arithmetic: shifts, years, money and CO2 with their intervals, and sums over the steps."""
+    """By their own arithmetic: shifts, years, money and CO2 with their intervals, and sums over the
+    steps.
+    """
     costs = Costs(
-        price=0.31, grid=0.12, shift_hours=7.5, shifts_per_day=3, days_per_year=300, availability=0.9
+        price=0.31,
+        grid=0.12,
+        shift_hours=7.5,
+        shifts_per_day=3,
+        days_per_year=300,
+        availability=0.9,
     )
     columns = before_after_columns(compared, costs)
     rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
@@ -89,16 +117,26 @@ def test_every_amount_of_the_table_follows_from_the_joules(compared: BeforeAfter
             assert whole[f"year_co2_kg{end}"] == pytest.approx(kwh * cycles * 900 * 0.12)
             saved = whole[f"saved{end}_j"] / 3.6e6
             assert whole[f"year_saved_money{end}"] == pytest.approx(saved * cycles * 900 * 0.31)
-        assert 0.0 < whole["peak_low_w"] <= whole["peak_w"] <= whole["peak_high_w"] < 2.0 * whole["peak_w"]
+        assert (
+            0.0
+            < whole["peak_low_w"]
+            <= whole["peak_w"]
+            <= whole["peak_high_w"]
+            < 2.0 * whole["peak_w"]
+        )
         own = [row for row in rows if row["program"] == whole["program"] and row["what"] != "cycle"]
         steps = [row for row in own if not row["what"].startswith("change")]
         for name in ("seconds_s", "energy_j"):
             assert sum(row[name] for row in steps) == pytest.approx(whole[name])
     changes = [row for row in rows if row["what"].startswith("change")]
-    assert [row["saved_j"] for row in changes] == [change.saving.saved for change in compared.changes]
+    assert [row["saved_j"] for row in changes] == [
+        change.saving.saved for change in compared.changes
+    ]
 
 
-def test_a_program_that_is_too_slow_for_the_cycles_says_so(compared: BeforeAfter, planner: Planner) -> None:
+def test_a_program_that_is_too_slow_for_the_cycles_says_so(
+    compared: BeforeAfter, planner: Planner
+) -> None:
     assert "fit: it is slower" not in before_after_html(compared, planner.cell)
     free = compared.sides[1]
     slow = replace(free, report=replace(free.report, duration=1.5 * compared.today.report.duration))
@@ -109,7 +147,8 @@ def test_a_program_that_is_too_slow_for_the_cycles_says_so(compared: BeforeAfter
 def test_the_command_writes_the_page_and_prints_the_figures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    page, old = tmp_path / "page.html", Path(__file__).parent / "old.src"
+    page = tmp_path / "page.html"
+    old = Path(__file__).parent / "old.src"
     arguments = ["compare", "open", str(old), "-o", str(page), "--json"]
     assert main(arguments) == 0
     answer = json.loads(capsys.readouterr().out)

@@ -1,4 +1,6 @@
-"""No saving comes from cutting a process short: what the tool works along is driven by every program."""
+"""No saving comes from cutting a process short: what the tool works along is driven by every
+program.
+"""
 
 from __future__ import annotations
 
@@ -40,8 +42,12 @@ $OUT[1]=FALSE
 $VEL.CP=1
 LIN_REL {Z 100}
 PTP XHOME"""
-SPEED, CORNER = 0.1, 0.01  # m/s, m
-POINTS = np.array([[0.0, 0.0], [0.06, 0.0], [0.06, 0.09], [0.01, 0.09]])  # m, of the seam from its beginning
+# m/s, m
+SPEED = 0.1
+CORNER = 0.01
+POINTS = np.array(
+    [[0.0, 0.0], [0.06, 0.0], [0.06, 0.09], [0.01, 0.09]]
+)  # m, of the seam from its beginning
 
 
 def evaluated(planner: Planner, lines: str) -> EvaluatedProgram:
@@ -75,27 +81,37 @@ def distance_to_the_seam(places: np.ndarray, origin: np.ndarray) -> np.ndarray:
     corners = origin + np.column_stack([POINTS, np.zeros(len(POINTS))])
     away = []
     for first, last in pairwise(corners):
-        share = np.clip((places - first) @ (last - first) / ((last - first) @ (last - first)), 0.0, 1.0)
+        share = np.clip(
+            (places - first) @ (last - first) / ((last - first) @ (last - first)), 0.0, 1.0
+        )
         away.append(np.linalg.norm(places - first - share[:, None] * (last - first), axis=1))
     return np.asarray(np.min(away, axis=0))
 
 
-def test_every_program_works_along_the_seam_at_its_speed(welded: BeforeAfter, planner: Planner) -> None:
+def test_every_program_works_along_the_seam_at_its_speed(
+    welded: BeforeAfter, planner: Planner
+) -> None:
     origin = tool_along(welded.today, planner)[0][0]
     ends = origin + np.array([[0.0, 0.0, 0.0], [*POINTS[-1], 0.0]])
-    length = np.linalg.norm(np.diff(POINTS, axis=0), axis=1).sum() - 4 * CORNER  # of the cut corners at most
+    length = (
+        np.linalg.norm(np.diff(POINTS, axis=0), axis=1).sum() - 4 * CORNER
+    )  # of the cut corners at most
     for side in (welded.today, *welded.sides):
         places, seconds = tool_along(side, planner)
         assert places[[0, -1]] == pytest.approx(ends, abs=2e-4)
         assert distance_to_the_seam(places, origin).max() < CORNER
         speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / 2e-3
-        assert speeds.max() < 1.01 * SPEED or side is welded.today  # the controller's corners overlap
+        assert (
+            speeds.max() < 1.01 * SPEED or side is welded.today
+        )  # the controller's corners overlap
         assert np.linalg.norm(np.diff(places, axis=0), axis=1).sum() > length
         assert seconds > length / SPEED
 
 
 def test_nothing_is_saved_by_cutting_a_process(welded: BeforeAfter) -> None:
-    """Law: the process costs in every program what such work costs; only what is around it may be dropped."""
+    """Law: the process costs in every program what such work costs; only what is around it may be
+    dropped.
+    """
     names = [hop.name for hop in welded.today.hops]
     assert names == ["start to lines_8_to_10", "along lines_8_to_10", "lines_8_to_10 to home"]
     for side in welded.sides:
@@ -109,7 +125,9 @@ def test_nothing_is_saved_by_cutting_a_process(welded: BeforeAfter) -> None:
 
 
 def test_corners_of_a_process_are_not_counted_as_stops_less(welded: BeforeAfter) -> None:
-    """Today's program drives it in a movement from corner to corner, the planner in one that rests there."""
+    """Today's program drives it in a movement from corner to corner, the planner in one that rests
+    there.
+    """
     along = next(step for step in welded.today.movements if step.kind == MovementKind.CARTESIAN)
     none = np.zeros(3)
     (change,) = changes(Costed((along, along), (none, none)), Costed((along,), (none,)))
@@ -121,7 +139,11 @@ def test_what_is_taken_for_positioning_is_said_and_can_be_named(found: Evaluated
     free = today_of_krl(found, ())
     assert not any(one.process for one in free.stretches)
     assert any("taken for positioning" in note and "test.src:8:1" in note for note in free.notes)
-    named = [one.process.name for one in today_of_krl(found, [(4, 4)]).stretches if one.process is not None]
+    named = [
+        one.process.name
+        for one in today_of_krl(found, [(4, 4)]).stretches
+        if one.process is not None
+    ]
     assert named == ["line_4"]
     with pytest.raises(RequestError, match="no motion stands in lines 10 to 8"):
         today_of_krl(found, [(10, 8)])
@@ -135,7 +157,9 @@ def test_corners_that_become_exact_are_said(planner: Planner, found: EvaluatedPr
     assert any("drive them exactly, which takes them longer" in note for note in notes)
 
 
-def test_a_visit_of_stations_alone_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_visit_of_stations_alone_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     source = tmp_path / "seam.src"
     source.write_text(f"DEF SEAM( )\n{SEAM}\nEND\n", encoding="utf-8")
     assert main(["krl", "import", str(source), "--cell", "open", "--compare"]) == 2
@@ -159,4 +183,6 @@ def test_the_cells_own_path_gives_what_it_allows(planner: Planner, found: Evalua
     theirs.set_cell("cell", "")
     asked = asked_program(today, theirs.scene("")).cell
     assert [step.target for step in asked.program] == ["bead", "home"]
-    assert (asked.path("bead").tool_speed, asked.path("bead").free_angle) == pytest.approx((SPEED, 0.5))
+    assert (asked.path("bead").tool_speed, asked.path("bead").free_angle) == pytest.approx(
+        (SPEED, 0.5)
+    )

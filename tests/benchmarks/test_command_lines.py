@@ -27,7 +27,9 @@ OTHERS = {
 def ran(script: str, *words: str) -> str:
     """What a benchmark prints."""
     command = [sys.executable, str(ROOT / "benchmarks" / f"{script}.py"), *words]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=os.environ, check=False)
+    done = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, env=os.environ, check=False
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -53,10 +55,14 @@ print(json.dumps(found))
 
 @pytest.fixture(scope="module")
 def help_of() -> dict[str, list[Any]]:
-    """How each script ended that was asked for help, 0 = well, and what it printed: imports once for all."""
+    """How each script ended that was asked for help, 0 = well, and what it printed: imports once
+    for all.
+    """
     names = [path.stem for path in SCRIPTS]
     command = [sys.executable, "-c", HELP_OF_ALL, str(ROOT / "benchmarks"), *names]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=os.environ, check=False)
+    done = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, env=os.environ, check=False
+    )
     assert done.returncode == 0, done.stderr
     found: dict[str, list[Any]] = json.loads(done.stdout)
     return found
@@ -75,7 +81,9 @@ def test_a_quick_run_prints_its_claims_and_writes_them(tmp_path: Path) -> None:
     result = json.loads(file.read_text())
     assert set(result) == {"machine", "commit", "rows", "claims"}
     assert len(result["rows"]) == 12  # six tasks, there and back
-    assert [set(claim) for claim in result["claims"]] == [{"name", "value", "unit", "bound", "holds"}] * 2
+    assert [set(claim) for claim in result["claims"]] == [
+        {"name", "value", "unit", "bound", "holds"}
+    ] * 2
     lines = printed.splitlines()[-2:]
     for line, claim in zip(lines, result["claims"], strict=True):
         assert line.startswith(claim["name"])

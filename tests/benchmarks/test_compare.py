@@ -1,4 +1,6 @@
-"""Two checkouts are compared by answers and times: the same one agrees with itself, another does not."""
+"""Two checkouts are compared by answers and times: the same one agrees with itself, another does
+not.
+"""
 
 from __future__ import annotations
 

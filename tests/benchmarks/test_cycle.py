@@ -1,4 +1,6 @@
-"""The law of cycle times is judged from point to point, and the common program takes the nearest stops."""
+"""The law of cycle times is judged from point to point, and the common program takes the nearest
+stops.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,11 @@ def test_a_longer_cycle_may_cost_the_wait_and_no_more() -> None:
 
 
 def test_a_refused_cycle_time_is_passed_over() -> None:
-    rows = [row(10.0, 1000.0, 500.0), row(12.0, float("nan"), float("nan")), row(13.0, 1300.0, 490.0)]
+    rows = [
+        row(10.0, 1000.0, 500.0),
+        row(12.0, float("nan"), float("nan")),
+        row(13.0, 1300.0, 490.0),
+    ]
     law, _ = excess(rows, 100.0)
     assert law == pytest.approx(0.0)
 

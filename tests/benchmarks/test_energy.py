@@ -1,4 +1,6 @@
-"""What movements are judged by: the baseline keeps the limits, and two implementations agree on joules."""
+"""What movements are judged by: the baseline keeps the limits, and two implementations agree on
+joules.
+"""
 
 from __future__ import annotations
 
@@ -25,16 +27,19 @@ def test_phases_last_as_long_as_those_of_the_planner() -> None:
     """Another derivation of the same law, whose phases the planner rounds up to its grid."""
     rng = np.random.default_rng(0)
     for v, a, j in 10.0 ** rng.uniform(-1.0, 2.0, (200, 3)):
-        mine, theirs = float(phases(v, a, j).sum()), GRID_S * free_law((v, a, j)).total
+        mine = float(phases(v, a, j).sum())
+        theirs = GRID_S * free_law((v, a, j)).total
         assert mine <= theirs * (1.0 + 1e-9)
         assert theirs <= 1.02 * mine + 0.02
 
 
 def test_the_baseline_keeps_the_limits_and_its_duration(planner: Planner) -> None:
     scene = planner.scene()
-    drives, limits = Drives(scene), scene.limits
+    drives = Drives(scene)
+    limits = scene.limits
     for task in planner.cell.tasks:
-        q0, q1 = np.array(task.start), np.array(task.goal)
+        q0 = np.array(task.start)
+        q1 = np.array(task.goal)
         least = fastest_baseline(q0, q1, scene, drives)
         assert least >= s_curve(q0, q1, scene).duration
         trajectory = baseline(q0, q1, scene, 1.3 * least)

@@ -1,4 +1,6 @@
-"""IPOPT beside the planner: its answers are trajectories, and its joules are those of the drives."""
+"""IPOPT beside the planner: its answers are trajectories, and its joules are those of the
+drives.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ def test_a_peer_is_certified_and_cheaper_than_the_baseline() -> None:
     peer = EnergyPeer(scene)
     found = peer.solve(q0, q1, duration, 0)
     assert found is not None
-    assert peer.energy == pytest.approx(drives.energy(found), rel=0.01)  # smoothed friction, 60 intervals
+    assert peer.energy == pytest.approx(
+        drives.energy(found), rel=0.01
+    )  # smoothed friction, 60 intervals
     answer = certified(planner, found, scene, "")
     assert answer is not None
     assert answer.duration <= MOST * duration

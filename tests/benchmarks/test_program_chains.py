@@ -1,4 +1,6 @@
-"""The best chain of a small program is that of an enumeration, and lower bounds are never undercut."""
+"""The best chain of a small program is that of an enumeration, and lower bounds are never
+undercut.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,8 @@ def test_the_cheapest_chain_is_that_of_an_enumeration(planner: Planner, objectiv
 def test_no_movement_undercuts_its_lower_bounds(planner: Planner) -> None:
     scene = planner.scene()
     for task in planner.cell.tasks:
-        start, goal = np.array(task.start), np.array(task.goal)
+        start = np.array(task.start)
+        goal = np.array(task.goal)
         options = PlanOptions(planning_time=60.0, max_iterations=2000)
         report = planner.plan_regional(start, Goal(configuration=goal), options).report
         J = report.energy - report.base_energy + 500.0 * report.duration
@@ -49,21 +52,27 @@ def test_no_movement_undercuts_its_lower_bounds(planner: Planner) -> None:
 
 
 def test_least_times_are_those_of_the_phase_law(planner: Planner) -> None:
-    """One joint alone: the closed form against the planner's law, whose phases are rounded up to its grid."""
-    limits, rng = planner.scene().limits, np.random.default_rng(0)
+    """One joint alone: the closed form against the planner's law, whose phases are rounded up to
+    its grid.
+    """
+    limits = planner.scene().limits
+    rng = np.random.default_rng(0)
     for size in 10.0 ** rng.uniform(-3.0, 0.5, 50):
         for joint in range(6):
             delta = np.zeros(6)
             delta[joint] = size
             law = GRID_S * free_law(path_limits(delta, limits)).total
-            bounds = [np.array([x[joint]]) for x in (limits.velocity, limits.acceleration, limits.jerk)]
+            bounds = [
+                np.array([x[joint]]) for x in (limits.velocity, limits.acceleration, limits.jerk)
+            ]
             least = float(least_times(np.array([size]), *bounds)[0])
             assert least <= law * (1.0 + 1e-9)
             assert law <= 1.02 * least + 0.02
 
 
 def test_potential_does_not_depend_on_the_path(planner: Planner) -> None:
-    scene, rng = planner.scene(), np.random.default_rng(1)
+    scene = planner.scene()
+    rng = np.random.default_rng(1)
     a, b, c = rng.uniform(-1.0, 1.0, (3, 6)) + np.array(planner.cell.machine_home)
     direct = potential_gain(scene, a, c[None])[0]
     around = potential_gain(scene, a, b[None])[0] + potential_gain(scene, b, c[None])[0]

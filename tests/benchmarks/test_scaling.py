@@ -1,4 +1,6 @@
-"""How cost grows: slopes are found again, inputs have the size that was asked for, runs end well."""
+"""How cost grows: slopes are found again, inputs have the size that was asked for, runs end
+well.
+"""
 
 from __future__ import annotations
 
@@ -74,10 +76,23 @@ def test_waves_are_at_rest_at_their_ends_and_agree_with_their_derivatives(points
 
 
 def test_a_tiny_run_prints_exponents_and_draws(tmp_path: Path) -> None:
-    file, picture = tmp_path / "scaling.json", tmp_path / "scaling.png"
-    words = ["--quick", "--axis", "points", "--most", "100", "--json", str(file), "--plot", str(picture)]
+    file = tmp_path / "scaling.json"
+    picture = tmp_path / "scaling.png"
+    words = [
+        "--quick",
+        "--axis",
+        "points",
+        "--most",
+        "100",
+        "--json",
+        str(file),
+        "--plot",
+        str(picture),
+    ]
     command = [sys.executable, str(ROOT / "benchmarks" / "scaling.py"), *words]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=os.environ, check=False)
+    done = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, env=os.environ, check=False
+    )
     assert done.returncode == 0, done.stderr
     result = json.loads(file.read_text())
     assert {row["axis"] for row in result["rows"]} == {"points"}

@@ -1,4 +1,6 @@
-"""Variants of cells are the same cells seen in a mirror, turned, or with machines a little elsewhere."""
+"""Variants of cells are the same cells seen in a mirror, turned, or with machines a little
+elsewhere.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +18,14 @@ MIRROR = np.diag([1.0, -1.0, 1.0, 1.0])
 
 @pytest.mark.parametrize("name", CELLS)
 def test_distances_are_those_of_the_cell_itself(name: str) -> None:
-    """What the robot is near at the ends of the tasks stays as near in the mirror and after a turn."""
+    """What the robot is near at the ends of the tasks stays as near in the mirror and after a
+    turn.
+    """
     cell = load_cell(name)
     for changed in (mirrored(cell), turned(cell, 0.3)):
         for old, new in zip(cell.tasks, changed.tasks, strict=True):
-            before, after = scene_of_cell(cell), scene_of_cell(changed)
+            before = scene_of_cell(cell)
+            after = scene_of_cell(changed)
             for q, r in ((old.start, new.start), (old.goal, new.goal)):
                 a = before.collision.min_distance(np.asarray(q)[None]).distance[0]
                 b = after.collision.min_distance(np.asarray(r)[None]).distance[0]
@@ -29,10 +34,13 @@ def test_distances_are_those_of_the_cell_itself(name: str) -> None:
 
 def test_the_tool_is_seen_in_the_mirror() -> None:
     cell = load_cell("open")
-    old, new = scene_of_cell(cell).chain, scene_of_cell(mirrored(cell)).chain
+    old = scene_of_cell(cell).chain
+    new = scene_of_cell(mirrored(cell)).chain
     for task, other in zip(cell.tasks, mirrored(cell).tasks, strict=True):
         pose = old.tcp_poses(np.asarray(task.goal)[None])[0]
-        assert np.allclose(new.tcp_poses(np.asarray(other.goal)[None])[0], MIRROR @ pose @ MIRROR, atol=1e-9)
+        assert np.allclose(
+            new.tcp_poses(np.asarray(other.goal)[None])[0], MIRROR @ pose @ MIRROR, atol=1e-9
+        )
 
 
 def test_a_seed_gives_the_same_variant_and_another_one_not() -> None:

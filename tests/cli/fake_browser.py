@@ -1,4 +1,6 @@
-"""A browser that looks at `ir view`, as far as messages go: what it would show, and what a person does."""
+"""A browser that looks at `ir view`, as far as messages go: what it would show, and what a person
+does.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ PATIENCE = 60.0  # s: a busy machine
 
 
 class FakeBrowser:
-    """Connected until it is closed; `controls` are the panel's by uuid, `nodes` the scene's by name."""
+    """Connected until it is closed; `controls` are the panel's by uuid, `nodes` the scene's by
+    name.
+    """
 
     def __init__(self, port: int, token: str, origin: str | None = None) -> None:
         self._socket = connect(
@@ -57,12 +61,20 @@ class FakeBrowser:
             self.controls.pop(message["uuid"], None)
         elif kind.startswith("Gui") and "uuid" in message:
             value = {"value": message["value"]} if "value" in message else {}
-            self.controls[message["uuid"]] = {**message.get("props", {}), **value, "uuid": message["uuid"]}
+            self.controls[message["uuid"]] = {
+                **message.get("props", {}),
+                **value,
+                "uuid": message["uuid"],
+            }
         elif kind == "RemoveSceneNodeMessage":
             self.nodes.pop(message["name"], None)
         elif kind == "SceneNodeUpdateMessage":
             self.nodes.get(message["name"], {}).update(message["updates"])
-        elif kind in ("SetPositionMessage", "SetOrientationMessage", "SetSceneNodeVisibilityMessage"):
+        elif kind in (
+            "SetPositionMessage",
+            "SetOrientationMessage",
+            "SetSceneNodeVisibilityMessage",
+        ):
             changed = {key: value for key, value in message.items() if key not in ("type", "name")}
             self.nodes.setdefault(message["name"], {}).update(changed)
         elif "name" in message and "props" in message:
@@ -71,7 +83,9 @@ class FakeBrowser:
     @property
     def text(self) -> str:
         """All that stands in the panel as HTML."""
-        return "\n".join(str(each["content"]) for each in list(self.controls.values()) if "content" in each)
+        return "\n".join(
+            str(each["content"]) for each in list(self.controls.values()) if "content" in each
+        )
 
     def red(self) -> set[str]:
         """Names of bodies and capsules that are drawn in red."""
@@ -91,7 +105,9 @@ class FakeBrowser:
 
     def drag(self, position: Sequence[float], wxyz: Sequence[float] = (1.0, 0.0, 0.0, 0.0)) -> None:
         """Move the handle to a place in the world."""
-        self.send("TransformControlsUpdateMessage", name="/drag", position=list(position), wxyz=list(wxyz))
+        self.send(
+            "TransformControlsUpdateMessage", name="/drag", position=list(position), wxyz=list(wxyz)
+        )
 
     def send(self, kind: str, **fields: Any) -> None:
         """Send any message."""

@@ -1,4 +1,6 @@
-"""Small cells as people write them, with what they get wrong: contacts, zones, approaches, heights."""
+"""Small cells as people write them, with what they get wrong: contacts, zones, approaches,
+heights.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ Document = dict[str, Any]
 
 @st.composite
 def broken_documents(draw: st.DrawFn) -> Document:
-    """A begun cell whose table stands where somebody measured it badly, with a part, in one of two sizes."""
+    """A begun cell whose table stands where somebody measured it badly, with a part, in one of two
+    sizes.
+    """
     name = draw(st.sampled_from(ROBOTS))
     document: Document = yaml.safe_load(cell_text("generated", name, load_robot(name)))
     scale = 1.0 if name == "kr210_r2700_extra" else 0.35

@@ -26,7 +26,8 @@ class Machine:
 
     def __init__(self, context: Context) -> None:
         self.node = Node("machine", context=context)
-        self.running, self.ended = threading.Event(), threading.Event()
+        self.running = threading.Event()
+        self.ended = threading.Event()
         self.server = ActionServer(
             self.node,
             RunProgram,
@@ -48,7 +49,8 @@ class Machine:
         self.running.set()
         while not (goal.is_cancel_requested or self.ended.wait(0.01)):
             pass
-        result.status.code, result.status.message = -7, "canceled"
+        result.status.code = -7
+        result.status.message = "canceled"
         goal.canceled()
         return result
 
@@ -60,7 +62,9 @@ def ros_discovery_range() -> str:
 
 
 @pytest.fixture
-def machine(ros_context: Context, ros_domain_id: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[Machine]:
+def machine(
+    ros_context: Context, ros_domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Machine]:
     monkeypatch.setenv("ROS_DOMAIN_ID", str(ros_domain_id))
     machine = Machine(ros_context)
     executor = MultiThreadedExecutor(num_threads=4, context=ros_context)
@@ -75,14 +79,18 @@ def machine(ros_context: Context, ros_domain_id: int, monkeypatch: pytest.Monkey
     machine.node.destroy_node()
 
 
-def test_a_goal_is_sent_and_its_result_printed(machine: Machine, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_goal_is_sent_and_its_result_printed(
+    machine: Machine, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["send_goal", ACTION, "{program_id: short}", "--feedback"]) == 0
     printed = capsys.readouterr().out
     assert "phase: moving" in printed
     assert "executed: 3" in printed
 
 
-def test_another_process_cancels_what_runs(machine: Machine, capsys: pytest.CaptureFixture[str]) -> None:
+def test_another_process_cancels_what_runs(
+    machine: Machine, capsys: pytest.CaptureFixture[str]
+) -> None:
     codes: list[int] = []
 
     def send() -> None:
@@ -90,8 +98,11 @@ def test_another_process_cancels_what_runs(machine: Machine, capsys: pytest.Capt
         from ir_cli.action_commands import run_send_goal
 
         arguments = type("Arguments", (), {})()
-        arguments.action, arguments.values, arguments.full = ACTION, ["{program_id: long}"], False
-        arguments.feedback, arguments.timeout = False, 60.0
+        arguments.action = ACTION
+        arguments.values = ["{program_id: long}"]
+        arguments.full = False
+        arguments.feedback = False
+        arguments.timeout = 60.0
         codes.append(run_send_goal(arguments))
 
     sender = threading.Thread(target=send)

@@ -42,5 +42,7 @@ def test_a_quick_one_of_settings_keeps_the_rest(tmp_path: Path) -> None:
 
 
 def test_settings_that_are_missing_are_asked_for() -> None:
-    with pytest.raises(InputError, match=r"SETTINGS\.yaml is missing: ir arena --example prints one"):
+    with pytest.raises(
+        InputError, match=r"SETTINGS\.yaml is missing: ir arena --example prints one"
+    ):
         asked(parsed())

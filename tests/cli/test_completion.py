@@ -27,7 +27,10 @@ def completed(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
 
     def complete(*words: str) -> set[str]:
         asked = subprocess.run(
-            ["bash", "-c", ASK, "bash", str(script), "ir", *words], capture_output=True, text=True, check=True
+            ["bash", "-c", ASK, "bash", str(script), "ir", *words],
+            capture_output=True,
+            text=True,
+            check=True,
         )
         return set(asked.stdout.split())
 

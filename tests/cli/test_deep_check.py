@@ -1,4 +1,6 @@
-"""`ir cell check --deep`: what it suggests makes the cell plan, and what it calls fine is planned."""
+"""`ir cell check --deep`: what it suggests makes the cell plan, and what it calls fine is
+planned.
+"""
 
 from __future__ import annotations
 
@@ -69,7 +71,9 @@ def test_what_the_check_calls_fine_is_planned(document: Document, seed: int) -> 
 @pytest.mark.long
 @settings(max_examples=40, deadline=None)
 @given(document=broken_documents(), seed=st.integers(1, 1000))
-def test_what_the_check_calls_fine_is_planned_over_many_cells(document: Document, seed: int) -> None:
+def test_what_the_check_calls_fine_is_planned_over_many_cells(
+    document: Document, seed: int
+) -> None:
     check_planned(document, seed)
 
 
@@ -90,13 +94,15 @@ def test_what_a_station_of_the_demonstration_lacks_is_suggested(
     name: str, missing: dict[str, object]
 ) -> None:
     mended, found = mended_cell(changed(load_cell("demo"), name, **missing))
-    assert [(each.subject, next(iter(yaml.safe_load(each.yaml)))) for each in found if each.yaml] == [
-        (name, next(iter(missing)))
-    ]
+    assert [
+        (each.subject, next(iter(yaml.safe_load(each.yaml)))) for each in found if each.yaml
+    ] == [(name, next(iter(missing)))]
     assert [each for each in mended_cell(mended)[1] if each.yaml] == []
 
 
-def test_a_station_in_a_body_is_to_be_moved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_station_in_a_body_is_to_be_moved(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     text = cell_to_yaml(load_cell("kr6_bench"))
     document: Document = yaml.safe_load(text)
     station = document["equipment"][1]["stations"][0]

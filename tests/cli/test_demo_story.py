@@ -23,7 +23,9 @@ def pauses(demonstration: Demonstration) -> list[float]:
     return [step.dwell for step in demonstration._cell.program if step.kind == "PAUSE"]
 
 
-def test_pauses_are_shortened_with_a_fact_that_says_so_and_real_ones_are_the_programs(tmp_path: Path) -> None:
+def test_pauses_are_shortened_with_a_fact_that_says_so_and_real_ones_are_the_programs(
+    tmp_path: Path,
+) -> None:
     full = [step.dwell for step in load_cell("demo").program if step.kind == "PAUSE"]
     assert max(full) > LONGEST_PAUSE
     short = Demonstration("demo", tmp_path, 0, "nominal", Progress())

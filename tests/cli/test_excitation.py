@@ -22,7 +22,17 @@ from ir_recorder.measure import PowerModel
 def test_every_movement_is_certified_and_begins_where_the_one_before_ended(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["energy", "excite", "demo", "--seconds", "12", "--postures", "1", "--output", str(tmp_path)]
+    words = [
+        "energy",
+        "excite",
+        "demo",
+        "--seconds",
+        "12",
+        "--postures",
+        "1",
+        "--output",
+        str(tmp_path),
+    ]
     assert main([*words, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     page = yaml.safe_load((tmp_path / "programme.yaml").read_text())
@@ -36,7 +46,10 @@ def test_every_movement_is_certified_and_begins_where_the_one_before_ended(
         np.testing.assert_allclose(trajectory.positions[0], here, atol=1e-9)
         here = trajectory.positions[-1]
         assert planner.evaluate(trajectory, 0.02, step["load"], "").verification.certified
-    assert {step["mode"] for step in page["steps"] if "mode" in step} >= {"STAND_ON_BRAKES", "BUS_POWER_OFF"}
+    assert {step["mode"] for step in page["steps"] if "mode" in step} >= {
+        "STAND_ON_BRAKES",
+        "BUS_POWER_OFF",
+    }
     assert set(found["identified"]).isdisjoint(found["missing"])
     assert "watts.HIBERNATION" in found["missing"]
     assert any("hibernate" in sentence for sentence in found["advice"])
@@ -45,17 +58,21 @@ def test_every_movement_is_certified_and_begins_where_the_one_before_ended(
 
 
 def test_the_choice_prefers_what_the_prior_does_not_know() -> None:
-    planner, prior = planner_of("open"), data_sheet()
+    planner = planner_of("open")
+    prior = data_sheet()
     cell = planner.cell
     model = PowerModel(cell.robot, load_power_data().dc_link, cell.base_pose, prior)
-    design, home = Design(model, prior), np.array(cell.machine_home)
+    design = Design(model, prior)
+    home = np.array(cell.machine_home)
     before = design.identified()
     assert before.found == ()
     from ir_cli.excitation.pool import Excursion
 
     def excursion(axis: int) -> Excursion:
         there = home + 0.8 * np.eye(6)[axis]
-        ends = (straight(cell.robot.joint_names, *pair, 2.0) for pair in ((home, there), (there, home)))
+        ends = (
+            straight(cell.robot.joint_names, *pair, 2.0) for pair in ((home, there), (there, home))
+        )
         return Excursion(f"A{axis + 1}", 0, "none", *ends)
 
     pool = [excursion(axis) for axis in range(6)]

@@ -32,7 +32,8 @@ class Planner:
         self.asked.append(goal.request)
         result = Plan.Result(program_id="asked")
         result.status.code = 1
-        result.report.duration, result.report.energy = goal.request.cycle_time or 11.0, 9_000.0
+        result.report.duration = goal.request.cycle_time or 11.0
+        result.report.energy = 9_000.0
         result.front = [
             ProgramPoint(cycle_time=10.0, energy=9_500.0, program_id="fast"),
             ProgramPoint(cycle_time=12.0, energy=8_800.0, program_id="least"),
@@ -53,7 +54,9 @@ def ros_discovery_range() -> str:
 
 
 @pytest.fixture
-def planner(ros_context: Context, ros_domain_id: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[Planner]:
+def planner(
+    ros_context: Context, ros_domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Planner]:
     monkeypatch.setenv("ROS_DOMAIN_ID", str(ros_domain_id))
     executor = SingleThreadedExecutor(context=ros_context)
     planner = Planner(ros_context)
@@ -86,7 +89,15 @@ def test_the_front_is_printed_and_drawn(
 def test_a_chosen_cycle_time_is_planned_too(
     planner: Planner, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["front", "--cycle-time", "13", "--points", "3", "--out", str(tmp_path / "front.png")]
+    arguments = [
+        "front",
+        "--cycle-time",
+        "13",
+        "--points",
+        "3",
+        "--out",
+        str(tmp_path / "front.png"),
+    ]
     assert main(arguments) == 0
     assert [asked.cycle_time for asked in planner.asked] == [0.0, 13.0]
     assert "chosen cycle time" in capsys.readouterr().out

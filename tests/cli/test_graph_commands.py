@@ -26,12 +26,18 @@ def ros_discovery_range() -> str:
 
 
 @pytest.fixture
-def machine(ros_context: Context, ros_domain_id: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[Node]:
-    """A node with a service that says yes to "ab" and a latched topic, in the domain of the commands."""
+def machine(
+    ros_context: Context, ros_domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Node]:
+    """A node with a service that says yes to "ab" and a latched topic, in the domain of the
+    commands.
+    """
     monkeypatch.setenv("ROS_DOMAIN_ID", str(ros_domain_id))
     node = Node("machine", context=ros_context)
 
-    def answer(request: SetPlcInput.Request, response: SetPlcInput.Response) -> SetPlcInput.Response:
+    def answer(
+        request: SetPlcInput.Request, response: SetPlcInput.Response
+    ) -> SetPlcInput.Response:
         known = request.name == "ab"
         response.status.code = 1 if known else -19
         response.status.message = "" if known else f"input {request.name} is unknown: known are ab"
@@ -77,7 +83,9 @@ def test_echo_prints_the_latched_message(machine: Node, capsys: pytest.CaptureFi
 def test_list_shows_names_with_types(
     machine: Node, capsys: pytest.CaptureFixture[str], wait_for: WaitFor
 ) -> None:
-    """What is there at that moment: discovery may take a busy machine longer than a graph takes to settle."""
+    """What is there at that moment: discovery may take a busy machine longer than a graph takes to
+    settle.
+    """
 
     def listed() -> bool:
         assert main(["list", "topics"]) == 0
@@ -89,7 +97,9 @@ def test_list_shows_names_with_types(
 def test_a_typo_is_answered_with_the_name_that_was_meant(
     machine: Node, capsys: pytest.CaptureFixture[str], wait_for: WaitFor
 ) -> None:
-    """As soon as the graph is whole: a busy machine may find half of it, and nothing more for a second."""
+    """As soon as the graph is whole: a busy machine may find half of it, and nothing more for a
+    second.
+    """
 
     def answered() -> bool:
         assert main(["call", "/machin/set", "{}"]) == 1

@@ -67,12 +67,16 @@ def test_a_node_that_has_its_parameters_only_is_still_starting(
 
 def test_a_node_that_is_in_another_namespace_is_named(clock: Callable[[], float]) -> None:
     with pytest.raises(CommandError, match="did you mean /cell_1/ir_planner/get_cell"):
-        type_of(lambda: {"/cell_1/ir_planner/get_cell": "x/srv/A"}, "/ir_planner/get_cell", "service")
+        type_of(
+            lambda: {"/cell_1/ir_planner/get_cell": "x/srv/A"}, "/ir_planner/get_cell", "service"
+        )
     assert clock() < DISCOVERY_SECONDS + 0.1
 
 
 def test_nodes_that_somebody_starts_on_this_host_get_a_minute(clock: Callable[[], float]) -> None:
-    """Four processes that start at once on a slow machine: nothing is seen of them for half of it."""
+    """Four processes that start at once on a slow machine: nothing is seen of them for half of
+    it.
+    """
     namespace = f"/starting_{os.getpid()}"
     name = f"{namespace}/ir_planner/set_cell"
 
@@ -97,7 +101,9 @@ def test_nodes_that_somebody_starts_on_this_host_get_a_minute(clock: Callable[[]
     assert clock() - began < DISCOVERY_SECONDS + 0.1
 
 
-def test_a_process_that_was_held_up_has_not_seen_that_nothing_came(clock: Callable[[], float]) -> None:
+def test_a_process_that_was_held_up_has_not_seen_that_nothing_came(
+    clock: Callable[[], float],
+) -> None:
     """3 s between two looks: what discovery had to say in them is heard a moment later."""
     looks: list[float] = []
 
@@ -134,7 +140,9 @@ def test_a_graph_has_settled_when_it_has_not_grown_for_a_second(clock: Callable[
 
 def test_an_empty_graph_hints_at_the_domain(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", "42")
-    with pytest.raises(CommandError, match="do the nodes run, and in this domain\\? ROS_DOMAIN_ID is 42"):
+    with pytest.raises(
+        CommandError, match="do the nodes run, and in this domain\\? ROS_DOMAIN_ID is 42"
+    ):
         type_of(dict, "/a", "service", seconds=0.05)
 
 
@@ -144,5 +152,7 @@ def test_the_type_may_be_left_out_or_short(typed: str) -> None:
 
 
 def test_another_type_is_named() -> None:
-    with pytest.raises(CommandError, match="has the type ir_msgs/srv/SetLoad, not ir_msgs/srv/GetCell"):
+    with pytest.raises(
+        CommandError, match="has the type ir_msgs/srv/SetLoad, not ir_msgs/srv/GetCell"
+    ):
         checked_type("ir_msgs/srv/GetCell", "ir_msgs/srv/SetLoad", "/a", "service")

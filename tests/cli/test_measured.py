@@ -33,7 +33,9 @@ def planner() -> Planner:
 
 @pytest.fixture(scope="module")
 def movement(planner: Planner) -> JointTrajectory:
-    plan = planner.plan_regional(planner.cell.machine_home, parse_goal("p1", planner.cell), PlanOptions())
+    plan = planner.plan_regional(
+        planner.cell.machine_home, parse_goal("p1", planner.cell), PlanOptions()
+    )
     assert plan.trajectory is not None
     return plan.trajectory
 
@@ -45,14 +47,19 @@ def sampled(movement: JointTrajectory, rate: float, noise: float) -> tuple[np.nd
     return times, q + np.random.default_rng(1).normal(0.0, noise, q.shape)
 
 
-@pytest.mark.parametrize(("rate", "noise"), [(250.0, 0.0), (83.3, 1e-5), (83.3, 1e-4), (20.0, 1e-5)])
+@pytest.mark.parametrize(
+    ("rate", "noise"), [(250.0, 0.0), (83.3, 1e-5), (83.3, 1e-4), (20.0, 1e-5)]
+)
 def test_the_energy_of_positions_alone_holds_within_the_bound_that_is_stated(
     planner: Planner, movement: JointTrajectory, rate: float, noise: float
 ) -> None:
     scene = planner.scene("")
     still = movement_energy(movement, scene).total
     found = measured(
-        JOINT_NAMES, *sampled(movement, rate, noise), lambda one: movement_energy(one, scene).total, 8.0
+        JOINT_NAMES,
+        *sampled(movement, rate, noise),
+        lambda one: movement_energy(one, scene).total,
+        8.0,
     )
     stretches, lost = stretches_of(found.trajectory)
     stretch = max(stretches, key=lambda one: one.seconds)
@@ -61,13 +68,17 @@ def test_the_energy_of_positions_alone_holds_within_the_bound_that_is_stated(
     beyond = (stretch.seconds - movement.duration) * 800.0  # W: more than motors at rest take
     assert abs(moving - still) <= found.bound + max(beyond, 0.0)
     assert found.bound < 0.1 * still
-    assert sum(one.seconds for one in stretches) + lost == pytest.approx(found.trajectory.duration, abs=1e-6)
+    assert sum(one.seconds for one in stretches) + lost == pytest.approx(
+        found.trajectory.duration, abs=1e-6
+    )
 
 
 def test_much_noise_leaves_much_open(planner: Planner, movement: JointTrajectory) -> None:
     scene = planner.scene("")
     joules = lambda one: movement_energy(one, scene).total  # noqa: E731
-    bounds = [measured(JOINT_NAMES, *sampled(movement, 83.3, s), joules, 16.0).bound for s in (1e-6, 3e-4)]
+    bounds = [
+        measured(JOINT_NAMES, *sampled(movement, 83.3, s), joules, 16.0).bound for s in (1e-6, 3e-4)
+    ]
     assert bounds[1] > 2.0 * bounds[0]
 
 
@@ -144,7 +155,9 @@ def test_a_gap_at_a_standstill_is_one(tmp_path: Path) -> None:
 def test_rows_in_a_wrong_unit_of_time_are_a_sentence() -> None:
     """Milliseconds taken for seconds: an hour of rows 12 s apart was smoothed for minutes."""
     time = 12.0 * np.arange(300)
-    with pytest.raises(InputError, match=r"the rows are 12 s apart: .* at most 0.1 s; is the unit of time"):
+    with pytest.raises(
+        InputError, match=r"the rows are 12 s apart: .* at most 0.1 s; is the unit of time"
+    ):
         measured(("a",), time, np.zeros((300, 1)), lambda _: 0.0)
 
 
@@ -158,7 +171,8 @@ def test_turns_that_a_log_does_not_count_are_counted(
     planner: Planner, movement: JointTrajectory, first: float
 ) -> None:
     """A log within half a turn jumps by a whole one where the joint goes on."""
-    robot, (times, q) = planner.cell.robot, logged(movement)
+    robot = planner.cell.robot
+    (times, q) = logged(movement)
     q = q + np.radians([0, 0, 0, 0, 0, first])
     q[:, 5] += np.radians(20.0) * times / times[-1] * np.sign(first)
     written = (q + np.pi) % (2.0 * np.pi) - np.pi
@@ -166,18 +180,27 @@ def test_turns_that_a_log_does_not_count_are_counted(
     np.testing.assert_allclose(np.diff(found, axis=0), np.diff(q, axis=0), atol=1e-12)
     assert ((found >= robot.position_min) & (found <= robot.position_max)).all()
     turned = abs(first) > 90.0
-    assert notes == (("joint_a6 jumps by whole turns in the file: taken as going on",) if turned else ())
+    assert notes == (
+        ("joint_a6 jumps by whole turns in the file: taken as going on",) if turned else ()
+    )
 
 
-def test_what_the_robot_can_not_have_driven_is_refused(planner: Planner, movement: JointTrajectory) -> None:
+def test_what_the_robot_can_not_have_driven_is_refused(
+    planner: Planner, movement: JointTrajectory
+) -> None:
     """A wrong unit was a movement of 38 MJ, of which the planner saved 99 %."""
-    robot, (times, q) = planner.cell.robot, logged(movement)
+    robot = planner.cell.robot
+    (times, q) = logged(movement)
     jump = q + np.where(times > times[40], 0.5, 0.0)[:, None] * np.eye(6)[3]
     for time_, positions, words in (
         (times, np.degrees(q), "times as fast as it can: are the units"),
         (times * 1e-3, q, "times as fast as it can"),
         (times, jump, "joint_a4 moves by 28.6 deg between 0.160 s and 0.164 s"),
-        (times, 0.0 * q + np.eye(6)[0] * -90.0, "joint_a1 is at -5157 deg, its range is -185 to 185 deg"),
+        (
+            times,
+            0.0 * q + np.eye(6)[0] * -90.0,
+            "joint_a1 is at -5157 deg, its range is -185 to 185 deg",
+        ),
     ):
         with pytest.raises(InputError, match=re.escape(words)):
             counted_turns("log", time_, positions, robot)
@@ -198,7 +221,9 @@ def test_speeds_that_positions_contradict_are_refused(
     with pytest.raises(InputError, match=r"rad in all, by its speeds it is .* which is right"):
         read_motion(path, JOINT_NAMES)
     write_trace(path, JointTrajectory.from_seconds(JOINT_NAMES, times, at.q, factor * at.qd))
-    assert not isinstance(read_motion(path, JOINT_NAMES), JointTrajectory)  # speeds alone are measured ones
+    assert not isinstance(
+        read_motion(path, JOINT_NAMES), JointTrajectory
+    )  # speeds alone are measured ones
 
 
 def test_one_cycle_is_taken_out_of_a_long_file() -> None:
@@ -218,8 +243,12 @@ def test_a_bandwidth_that_makes_no_sense_is_refused(bandwidth: float) -> None:
         measured(JOINT_NAMES, 0.01 * np.arange(20.0), np.zeros((20, 6)), lambda _: 1.0, bandwidth)
 
 
-@pytest.mark.parametrize(("columns", "words"), [("{time: t, powr: P}", "'powr' is no column of a trace")])
-def test_a_name_that_a_mapping_gets_wrong_is_named(columns: str, words: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("columns", "words"), [("{time: t, powr: P}", "'powr' is no column of a trace")]
+)
+def test_a_name_that_a_mapping_gets_wrong_is_named(
+    columns: str, words: str, tmp_path: Path
+) -> None:
     (tmp_path / "m.yaml").write_text(f"format: ir_trace/1\ncolumns: {columns}\n", encoding="utf-8")
     with pytest.raises(InputError, match=words):
         read_motion(TRACES / "rsi_log.csv", JOINT_NAMES, tmp_path / "m.yaml")
@@ -238,7 +267,9 @@ def test_few_rows_are_a_sentence() -> None:
 
 
 def test_a_movement_lasts_as_long_as_it_did(movement: JointTrajectory) -> None:
-    """Below a threshold of speed 12 ms were cut off at each end: a fast movement seemed to break limits."""
+    """Below a threshold of speed 12 ms were cut off at each end: a fast movement seemed to break
+    limits.
+    """
     found = measured(JOINT_NAMES, *sampled(movement, 500.0, 1e-5), lambda _: 1.0, 22.0)
     ((stretch,), lost) = stretches_of(found.trajectory)
     assert stretch.seconds == pytest.approx(movement.duration, abs=0.016)

@@ -34,8 +34,13 @@ def test_help_is_that_of_the_commands() -> None:
 
 
 def test_help_imports_nothing_that_takes_long() -> None:
-    code = "import sys; from ir_cli.main import _parser; _parser('').format_help(); print(*sys.modules)"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    code = (
+        "import sys; from ir_cli.main import _parser; _parser('').format_help(); "
+        "print(*sys.modules)"
+    )
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout
     assert not {"numpy", "yaml", "scipy", "rclpy", "importlib.metadata"} & set(loaded.split())
 
 
@@ -45,7 +50,16 @@ def test_no_command_without_ros_imports_rclpy(tmp_path: Path) -> None:
         ["move", "demo", "home", "park", "--trajectory", str(trace)],
         ["evaluate", "demo", str(trace)],
         ["optimize", "demo", str(trace), "--planning-time", "1"],
-        ["compare", "open", "--stations", "p1", "--start", "home", "-o", str(tmp_path / "compared.html")],
+        [
+            "compare",
+            "open",
+            "--stations",
+            "p1",
+            "--start",
+            "home",
+            "-o",
+            str(tmp_path / "compared.html"),
+        ],
         ["ik", "demo", "lathe_work"],
         ["check", "demo", "home"],
         ["standby", "demo", "--pause", "300"],
@@ -64,7 +78,9 @@ def test_no_command_without_ros_imports_rclpy(tmp_path: Path) -> None:
     assert {line[0] for line in lines} | others == set(WITHOUT_ROS)
 
 
-def test_the_totals_of_a_program_are_the_sums_of_its_steps(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_totals_of_a_program_are_the_sums_of_its_steps(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     found = answered(capsys, *STATIONS)
     assert found["certified"]
     assert found["notes"] == [DOORS]
@@ -72,10 +88,14 @@ def test_the_totals_of_a_program_are_the_sums_of_its_steps(capsys: pytest.Captur
         assert found[key] == pytest.approx(sum(step[key] for step in found["steps"]))
         moving = sum(step[key] for step in found["steps"] if step["kind"] != "pause")
         assert found[f"moving_{key}"] == pytest.approx(moving)
-    assert found["clearance"] == min(s["clearance"] for s in found["steps"] if s["clearance"] is not None)
+    assert found["clearance"] == min(
+        s["clearance"] for s in found["steps"] if s["clearance"] is not None
+    )
 
 
-def test_a_program_has_its_own_pauses_in_csv(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_program_has_its_own_pauses_in_csv(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     text = "\n".join(line for line in _yaml("demo").splitlines() if "- {station" not in line)
     (tmp_path / "pauses.yaml").write_text(text)
     assert main(["plan", str(tmp_path / "pauses.yaml"), "--csv"]) == 0
@@ -110,7 +130,8 @@ def test_what_is_written_is_evaluated_to_the_same(
 def test_a_trace_of_positions_alone_in_degrees_costs_nearly_the_same(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    trace, sampled = tmp_path / "m.csv", tmp_path / "sampled.csv"
+    trace = tmp_path / "m.csv"
+    sampled = tmp_path / "sampled.csv"
     planned = answered(capsys, "move", "open", "home", "park", "--trajectory", str(trace))
     rows = list(csv.DictReader(trace.open()))
     from ir_cli.offline.trace_file import read_trace
@@ -150,7 +171,9 @@ def test_a_standby_names_its_mode_and_what_it_saves(capsys: pytest.CaptureFixtur
     assert found["modes"][-1]["mode"] == found["chosen"]
     assert found["modes"][0]["seconds"] >= 0.0
     least = min(each for each in energies.values() if each is not None)
-    assert 0.5 * least < found["joules"] <= least  # modes one after the other cost at most the best alone
+    assert (
+        0.5 * least < found["joules"] <= least
+    )  # modes one after the other cost at most the best alone
     assert found["saving"] == pytest.approx(energies["STAND_ON_MOTORS"] - found["joules"])
 
 

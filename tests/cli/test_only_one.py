@@ -14,7 +14,9 @@ def test_a_claim_is_refused_while_another_holds_it_and_free_after() -> None:
     namespace = f"/claimed_{os.getpid()}"
     first = claim("77", namespace)
     assert first is not None
-    with pytest.raises(CommandError, match=f"another `ir up` or `ir demo` .* in {namespace} of domain 77"):
+    with pytest.raises(
+        CommandError, match=f"another `ir up` or `ir demo` .* in {namespace} of domain 77"
+    ):
         claim("77", namespace)
     others = [claim("78", namespace), claim("77", f"{namespace}_b")]
     first.close()

@@ -63,7 +63,8 @@ def test_a_plan_that_was_never_driven_is_recorded_and_planned_again(
     assert_planned_figures_are_those_of_the_answer(analysis, raw)
     (search,) = analysis.recording.searches  # configurations above the conveyor are searched
     assert isinstance(search, ConfigurationLog)
-    page, doors = report_html(analysis, ()), "assumed, as the cell has them: lathe door_open"
+    page = report_html(analysis, ())
+    doors = "assumed, as the cell has them: lathe door_open"
     assert f"of {search.starts} random starts {search.accepted} were accepted" in page
     assert f"<li>doors at the start <b>{doors}</b></li>" in page
     assert capsys.readouterr().out.endswith(f"\nnote: doors at the start are {doors}\n")
@@ -81,11 +82,15 @@ def data_of(page: str) -> dict[str, Any]:
 
 
 def assert_motion_is_that_of_the_plan(page: str, answer: dict[str, Any]) -> None:
-    """The picture moves as long as the plan, from home, with the joules of the plan under its power."""
+    """The picture moves as long as the plan, from home, with the joules of the plan under its
+    power.
+    """
     drawn = data_of(page)
     scene = drawn["scene"]
     assert drawn["end"] == pytest.approx(answer["seconds"])
-    shorts = {name: np.frombuffer(base64.b64decode(scene[name]), "<i2") for name in ("angles", "power")}
+    shorts = {
+        name: np.frombuffer(base64.b64decode(scene[name]), "<i2") for name in ("angles", "power")
+    }
     q = scene["angleStep"] * shorts["angles"].reshape(scene["frames"], 6)
     assert q[0] == pytest.approx(load_cell("kr6_bench").park, abs=2e-4)
     joules = float(shorts["power"].sum()) * scene["step"]

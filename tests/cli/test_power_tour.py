@@ -1,4 +1,6 @@
-"""Waiting for the mains meter: it counts its own time, since on a busy machine it lags behind the clock."""
+"""Waiting for the mains meter: it counts its own time, since on a busy machine it lags behind the
+clock.
+"""
 
 from __future__ import annotations
 
@@ -21,12 +23,15 @@ EVERY = 0.01  # s of real time
 
 
 class FakeMeter:
-    """A client of a meter whose readings are `step` s apart on its own clock, and `EVERY` s of real time."""
+    """A client of a meter whose readings are `step` s apart on its own clock, and `EVERY` s of real
+    time.
+    """
 
     def __init__(self, behind: float, step: float) -> None:
         now = SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=round(NOW * 1e9)))
         self.node = SimpleNamespace(get_clock=lambda: now)
-        self._stamp, self._step = NOW - behind, step
+        self._stamp = NOW - behind
+        self._step = step
         self._take: Callable[[PowerState], None] = lambda state: None
         self.passed = 0.0
 

@@ -32,7 +32,9 @@ def check_until_it_raises(nodes: NodeProcesses) -> None:
 
 
 def test_strings_stay_strings_and_numbers_numbers_on_the_command_line() -> None:
-    command = NodeCommand("some.node", {"cell": "123", "rate": 2.5, "on": True, "facts": ["a=1", "b"]})
+    command = NodeCommand(
+        "some.node", {"cell": "123", "rate": 2.5, "on": True, "facts": ["a=1", "b"]}
+    )
     line = command.arguments()
     assert 'cell:="123"' in line
     assert "rate:=2.5" in line
@@ -58,7 +60,10 @@ def test_a_node_that_is_killed_is_named_with_the_signal(tmp_path: Path) -> None:
 
 
 def test_leaving_the_context_ends_all_nodes(tmp_path: Path) -> None:
-    body = "import os, signal\nprint(os.getpid(), flush=True)\nprint('up', flush=True)\nsignal.pause()\n"
+    body = (
+        "import os, signal\nprint(os.getpid(), flush=True)\nprint('up', "
+        "flush=True)\nsignal.pause()\n"
+    )
     environment = write_module(tmp_path, "waiting", body)
     with NodeProcesses(tmp_path / "log", environment) as nodes:
         nodes.start([NodeCommand("waiting")])

@@ -25,7 +25,9 @@ def sheet(name: str, **known: str) -> str:
 
     robot = load_robot(name)
     home = np.round(np.degrees(robot.machine_home), 9).tolist()
-    text = TEMPLATE.replace("name: my_robot", "name: copied").replace("[0, -90, 90, 0, 0, 0]", str(home))
+    text = TEMPLATE.replace("name: my_robot", "name: copied").replace(
+        "[0, -90, 90, 0, 0, 0]", str(home)
+    )
     for key, value in known.items():
         text = re.sub(rf"^{key}: .*$", f"{key}: {value}", text, flags=re.MULTILINE)
     return text
@@ -38,7 +40,8 @@ def first(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (tmp_path / "robot.urdf").write_text(robot_urdf(load_robot("ur10e")))
     (tmp_path / "drives.yaml").write_text(sheet("ur10e"))
     out = tmp_path / "copied.yaml"
-    urdf, drives = str(tmp_path / "robot.urdf"), str(tmp_path / "drives.yaml")
+    urdf = str(tmp_path / "robot.urdf")
+    drives = str(tmp_path / "drives.yaml")
     assert main(["robot", "new", "--urdf", urdf, "--drives", drives, "-o", str(out)]) == 0
     return out
 
@@ -50,7 +53,8 @@ def made(first: Path, tmp_path: Path) -> Path:
 
 
 def test_a_robot_made_from_a_urdf_moves_and_weighs_as_the_urdf_says(made: Path) -> None:
-    robot, original = robot_named(str(made)), load_robot("ur10e")
+    robot = robot_named(str(made))
+    original = load_robot("ur10e")
     q = np.random.default_rng(0).uniform(original.position_min, original.position_max, (50, 6))
     poses, expected = (Chain(each).link_poses(q)[:, -1] for each in (robot, original))
     assert np.abs(poses - expected).max() < EXACT
@@ -60,7 +64,8 @@ def test_a_robot_made_from_a_urdf_moves_and_weighs_as_the_urdf_says(made: Path) 
 
 
 def test_its_capsules_enclose_the_shapes_of_the_urdf(made: Path) -> None:
-    robot, original = robot_named(str(made)), load_robot("ur10e")
+    robot = robot_named(str(made))
+    original = load_robot("ur10e")
     for link in range(7):
         inside = [capsule for capsule in robot.capsules if capsule.link == link]
         for capsule in (each for each in original.capsules if each.link == link):
@@ -99,12 +104,15 @@ def test_a_check_finds_a_drive_that_cannot_hold_the_arm(
 ) -> None:
     text = re.sub(r"(gear_peak_torque_nm: .value: .330.0, )330.0", r"\g<1>20.0", made.read_text())
     rows = "[[1.0, 19.0], [2.1, 10.0]]"
-    text = re.sub(r"(envelope_rad_s_nm: .value: .)(\[\[.*?\]\]), \[\[.*?\]\]", rf"\g<1>\g<2>, {rows}", text)
+    text = re.sub(
+        r"(envelope_rad_s_nm: .value: .)(\[\[.*?\]\]), \[\[.*?\]\]", rf"\g<1>\g<2>, {rows}", text
+    )
     made.write_text(text)
     assert main(["robot", "check", str(made)]) == 1
     out = capsys.readouterr().out
     assert re.search(
-        r"shoulder_lift_joint: at machine home, empty, gravity needs \d+ Nm, the drive has 20 Nm", out
+        r"shoulder_lift_joint: at machine home, empty, gravity needs \d+ Nm, the drive has 20 Nm",
+        out,
     )
 
 
@@ -114,18 +122,25 @@ def test_a_check_names_links_that_are_near_in_most_postures() -> None:
     *others, last = robot.capsules
     wide = replace(robot, capsules=(*others, replace(last, radius=last.radius + 0.06)))
     found = [each for each in remarks_on(wide) if each.subject == "self_pairs"]
-    assert any(last.name in each.sentence and "in 100 % of 2000 postures" in each.sentence for each in found)
+    assert any(
+        last.name in each.sentence and "in 100 % of 2000 postures" in each.sentence
+        for each in found
+    )
     assert {each.severity for each in found} == {"warning"}
 
 
-def test_all_errors_of_a_file_are_printed_in_one_run(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_all_errors_of_a_file_are_printed_in_one_run(
+    made: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     text = made.read_text().replace("source:", "sauce:", 1).replace("radius: ", "radius: -", 1)
     made.write_text(text)
     assert main(["robot", "check", str(made)]) == 1
     assert "ir: 2 errors" in capsys.readouterr().err
 
 
-def test_seven_axes_are_refused_with_their_names(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_seven_axes_are_refused_with_their_names(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     urdf = robot_urdf(load_robot("ur10e")).replace(
         'name="flange_joint" type="fixed"', 'name="axis_7" type="revolute"'
     )

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from ir_cli.suggestions import nearest, unknown_name
 
-KNOWN = ["/ir_planner/get_cell", "/ir_planner/set_cell", "/ir_sim_driver/recover", "/ir_recorder/start"]
+KNOWN = [
+    "/ir_planner/get_cell",
+    "/ir_planner/set_cell",
+    "/ir_sim_driver/recover",
+    "/ir_recorder/start",
+]
 
 
 def test_typing_mistakes_and_missing_nodes_are_understood() -> None:
@@ -14,6 +19,8 @@ def test_typing_mistakes_and_missing_nodes_are_understood() -> None:
 
 
 def test_a_long_list_is_cut() -> None:
-    sentence = unknown_name("service", "/q", [f"/name_{k:02d}" for k in range(55)], "ir list services")
+    sentence = unknown_name(
+        "service", "/q", [f"/name_{k:02d}" for k in range(55)], "ir list services"
+    )
     assert "and 47 more (ir list services shows all)" in sentence
     assert sentence.count("/name_") == 8

@@ -1,4 +1,6 @@
-"""`ir up`: parameters are held against what the nodes know, ports are free, and nothing is left behind."""
+"""`ir up`: parameters are held against what the nodes know, ports are free, and nothing is left
+behind.
+"""
 
 from __future__ import annotations
 
@@ -44,8 +46,11 @@ with NodeProcesses(Path(sys.argv[1]), {"PYTHONPATH": sys.argv[2]}) as nodes:
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGHUP])
-def test_nodes_end_with_the_process_that_started_them(number: int, tmp_path: Path, wait_for: Any) -> None:
-    pid, end = tmp_path / "pid", tmp_path / "end"
+def test_nodes_end_with_the_process_that_started_them(
+    number: int, tmp_path: Path, wait_for: Any
+) -> None:
+    pid = tmp_path / "pid"
+    end = tmp_path / "end"
     (tmp_path / "waiting.py").write_text(WAITING.format(pid=str(pid), end=str(end)))
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
     parent = subprocess.Popen([sys.executable, "-c", PARENT, str(tmp_path / "log"), path])
@@ -60,7 +65,9 @@ def test_nodes_end_with_the_process_that_started_them(number: int, tmp_path: Pat
 
 
 def test_a_parameter_goes_to_every_node_that_has_it_or_to_the_one_that_is_named() -> None:
-    values = given_parameters(["regeneration:=none", "ir_planner:max_iterations:=9", "signal_timeout:=5"])
+    values = given_parameters(
+        ["regeneration:=none", "ir_planner:max_iterations:=9", "signal_timeout:=5"]
+    )
     assert values == {
         "ir_planner": {"regeneration": "none", "max_iterations": 9},
         "ir_sim_driver": {"regeneration": "none"},
@@ -128,7 +135,9 @@ def test_taken_ports_are_replaced_by_free_ones_for_driver_and_runner() -> None:
 
 
 @pytest.mark.parametrize("kind", [UDP, TCP])
-def test_a_free_port_is_none_that_the_system_or_dds_gives_away_meanwhile(kind: socket.SocketKind) -> None:
+def test_a_free_port_is_none_that_the_system_or_dds_gives_away_meanwhile(
+    kind: socket.SocketKind,
+) -> None:
     found = [free_port(kind) for _ in range(50)]
     assert len(set(found)) > 1  # two that start at once choose different ones
     for port in found:

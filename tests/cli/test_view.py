@@ -1,4 +1,6 @@
-"""`ir view`: what browsers are shown when files, hands and plans change, and how the command ends."""
+"""`ir view`: what browsers are shown when files, hands and plans change, and how the command
+ends.
+"""
 
 from __future__ import annotations
 
@@ -120,7 +122,9 @@ def test_the_cell_is_drawn_checked_and_planned(view: View) -> None:
 
 def test_a_saved_file_is_shown_and_one_with_errors_keeps_the_last_cell(view: View) -> None:
     view.shows("at the mains")
-    view.write(CELL.replace("size: [0.4, 0.6, 0.2]", "size: [0.4, -0.6, 0.2]").replace("dwell", "dwel"))
+    view.write(
+        CELL.replace("size: [0.4, 0.6, 0.2]", "size: [0.4, -0.6, 0.2]").replace("dwell", "dwel")
+    )
     view.shows(
         "the last cell that could be read is shown",
         "bodies[0].size[1] is -0.6 m",
@@ -137,9 +141,13 @@ def test_a_saved_file_is_shown_and_one_with_errors_keeps_the_last_cell(view: Vie
 
 
 @pytest.mark.long
-def test_a_file_that_is_wrong_from_the_start_is_shown_as_soon_as_it_can_be_read(tmp_path: Path) -> None:
+def test_a_file_that_is_wrong_from_the_start_is_shown_as_soon_as_it_can_be_read(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / "small.yaml"
-    path.write_text(CELL.replace("robot: kr6_r900_2", "robot: kr6_r900_3 # <img src=x onerror=alert(1)>"))
+    path.write_text(
+        CELL.replace("robot: kr6_r900_2", "robot: kr6_r900_3 # <img src=x onerror=alert(1)>")
+    )
     view = View(path)
     try:
         view.shows("kr6_r900_3", "is unknown")
@@ -167,13 +175,18 @@ def test_sliders_move_the_robot_and_the_nearest_pair(view: View) -> None:
     view.shows("top")  # it comes down to the table
     cell = load_cell(view.path)
     view.until(lambda: view.session._stage.near is not None)
-    assert set(view.session._stage.near.names) <= {c.name for c in cell.capsules()} | {"top", "floor"}
+    assert set(view.session._stage.near.names) <= {c.name for c in cell.capsules()} | {
+        "top",
+        "floor",
+    }
     view.change("A2", float("nan"))  # from a program that is no browser
     view.change("A1", 10.0)
     view.until(lambda: abs(view.session._stage.q[0] - np.radians(10.0)) < 1e-9)
 
 
-def test_a_machine_is_dragged_checked_planned_and_saved_with_its_comments(view: View, tmp_path: Path) -> None:
+def test_a_machine_is_dragged_checked_planned_and_saved_with_its_comments(
+    view: View, tmp_path: Path
+) -> None:
     view.shows("at the mains")
     view.change("drag", "machine table")
     view.until(lambda: "/drag" in view.browser.nodes)
@@ -184,7 +197,9 @@ def test_a_machine_is_dragged_checked_planned_and_saved_with_its_comments(view: 
     view.change("Save as a new file", True)
     view.shows("written: ")
     saved = tmp_path / "small_moved.yaml"
-    assert saved.read_text() == CELL.replace("pose: {xyz: [0.6, 0, 0]}", "pose: {xyz: [0.62, 0.1, 0]}")
+    assert saved.read_text() == CELL.replace(
+        "pose: {xyz: [0.6, 0, 0]}", "pose: {xyz: [0.62, 0.1, 0]}"
+    )
     view.change("Undo all moves", True)
     view.until(lambda: "pose: {" not in view.browser.text)
     view.browser.drag((float("nan"), 0.0, 0.0))
@@ -198,7 +213,9 @@ def test_a_station_is_dragged_in_its_machine(view: View) -> None:
     view.until(lambda: "/drag" in view.browser.nodes)
     wxyz = view.browser.nodes["/drag"]["wxyz"]
     view.browser.drag((0.55, 0.1, 0.5), wxyz)
-    view.shows("# station pick", "pose: {xyz: [-0.05, 0.1, 0.5], abc_deg: [0, 90, 0]}", "at the mains")
+    view.shows(
+        "# station pick", "pose: {xyz: [-0.05, 0.1, 0.5], abc_deg: [0, 90, 0]}", "at the mains"
+    )
 
 
 @pytest.mark.long
@@ -239,7 +256,9 @@ def test_pages_from_elsewhere_are_refused_and_nothing_is_published(view: View) -
         FakeBrowser(view.port, TOKEN, "http://evil.example")
     FakeBrowser(view.port, TOKEN, f"http://localhost:{view.port}").close()
     handled = view.server._websock_server._incoming_handlers
-    shared = [handlers for message, handlers in handled.items() if message.__name__.startswith("ShareUrl")]
+    shared = [
+        handlers for message, handlers in handled.items() if message.__name__.startswith("ShareUrl")
+    ]
     assert [handlers for handlers in shared if handlers] == []
     assert view.server.get_host() == "127.0.0.1"
 
@@ -276,7 +295,8 @@ def test_only_who_has_the_address_with_its_token_gets_an_answer(view: View) -> N
 
 
 def test_the_latest_of_each_kind_waits_in_the_order_in_which_it_came() -> None:
-    inbox, seen = Inbox(), list[str]()
+    inbox = Inbox()
+    seen = list[str]()
     for key, word in (("a", "old"), ("b", "b"), ("a", "new")):
         inbox.post(key, lambda word=word: seen.append(word))  # type: ignore[misc]
     for action in inbox.take(0.0):

@@ -27,7 +27,9 @@ from ir_msgs_py.arrays import FloatArray
 
 TOOL = Path(__file__).resolve().parents[2] / "tools" / "_chromium.py"
 PATIENCE = 60.0  # s: a busy machine
-SMALL, LARGE = (500, 400), (900, 700)  # px
+# px
+SMALL = (500, 400)
+LARGE = (900, 700)
 says = "document.body.innerText.includes({!r})".format
 CELL = """\
 format: ir_cell/1
@@ -41,7 +43,7 @@ equipment:
     bodies: [{name: top, kind: box, size: [0.4, 0.6, 0.2], xyz: [0, 0, 0.1]}]
     stations: [{name: pick, pose: {xyz: [-0.05, 0.1, 0.45], abc_deg: [0, 90, 0]}, approach_distance: 0.1}]
 program: [{station: pick, dwell: 0.1}, {posture: home}]
-"""
+"""  # noqa: E501
 
 
 @pytest.fixture
@@ -74,7 +76,9 @@ def viewed(browser: Any, path: Path, wide: int, high: int) -> Iterator[Any]:
         page.wait("document.querySelector('canvas') !== null", PATIENCE)
         yield page
         assert [fault for fault in page.faults if "THREE.Clock" not in fault] == []
-        assert [asked for asked in page.requests if not asked.startswith(address.split("?")[0])] == []
+        assert [
+            asked for asked in page.requests if not asked.startswith(address.split("?")[0])
+        ] == []
         page.close()
     finally:
         view.send_signal(signal.SIGINT)
@@ -89,7 +93,9 @@ def test_the_page_draws_plays_and_follows_the_file(browser: Any, tmp_path: Path)
     path.write_text(CELL)
     with viewed(browser, path, *SMALL) as page:
         drawn = page.picture(tmp_path / "first.png").read_bytes()
-        buttons = "[...document.querySelectorAll('button')].find((b) => b.innerText === {!r})".format
+        buttons = (
+            "[...document.querySelectorAll('button')].find((b) => b.innerText === {!r})".format
+        )
         page.run(f"{buttons('Play')}.click()")
         page.wait(says("kW"), PATIENCE)
         page.wait(f"Boolean({buttons('Stop')})", PATIENCE)
@@ -98,18 +104,23 @@ def test_the_page_draws_plays_and_follows_the_file(browser: Any, tmp_path: Path)
             assert time.monotonic() < deadline, "the robot is not drawn anew"
         path.write_text(CELL.replace("size: [0.4,", "size: [-0.4,"))
         page.wait(says("the last cell that could be read is shown"), PATIENCE)
-        path.write_text(CELL.replace("name: pick", "name: place").replace("station: pick", "station: place"))
+        path.write_text(
+            CELL.replace("name: pick", "name: place").replace("station: pick", "station: place")
+        )
         page.wait(says("place with none"), PATIENCE)
 
 
 def on_screen(cell: Cell, wide: int, high: int) -> Callable[[FloatArray], tuple[float, float]]:
-    """Where the first view shows a point (3,) [m] of the cell [px]: a camera of three.js, 75 degrees high."""
+    """Where the first view shows a point (3,) [m] of the cell [px]: a camera of three.js, 75
+    degrees high.
+    """
     server = SimpleNamespace(initial_camera=SimpleNamespace())
     look_at(server, cell)
     eye = server.initial_camera.position
     ahead = normalised(server.initial_camera.look_at - eye)
     right = normalised(np.cross(ahead, [0.0, 0.0, 1.0]))
-    up, pixels = np.cross(right, ahead), 0.5 * high / np.tan(np.radians(75.0) / 2.0)
+    up = np.cross(right, ahead)
+    pixels = 0.5 * high / np.tan(np.radians(75.0) / 2.0)
 
     def place(point: FloatArray) -> tuple[float, float]:
         ray = point - eye
@@ -132,7 +143,9 @@ def choose_to_move(page: Any, what: str) -> None:
     option = last("[role=option]", f"e.innerText === {what!r}")
     page.wait(option, PATIENCE)
     page.run(f"{option}.click()")
-    page.wait("document.body.textContent.includes('/drag')", PATIENCE)  # the handle, in the tree of the scene
+    page.wait(
+        "document.body.textContent.includes('/drag')", PATIENCE
+    )  # the handle, in the tree of the scene
     page.frame()
 
 
@@ -147,7 +160,9 @@ def test_a_station_that_the_mouse_drags_is_planned_anew(browser: Any, tmp_path: 
     pose = cell.station("pick").pose
     with viewed(browser, path, *LARGE) as page:
         choose_to_move(page, "station pick")
-        wide, high = page.run("((c) => [c.clientWidth, c.clientHeight])(document.querySelector('canvas'))")
+        wide, high = page.run(
+            "((c) => [c.clientWidth, c.clientHeight])(document.querySelector('canvas'))"
+        )
         assert wide < LARGE[0] - 200  # the panel stands beside the picture
         at = on_screen(cell, wide, high)
         begin, end = (at(pose[:3, 3] + along * pose[:3, 0]) for along in (0.4, 0.55))
@@ -162,7 +177,9 @@ def test_a_station_that_the_mouse_drags_is_planned_anew(browser: Any, tmp_path: 
         page.wait(says("# station pick"), PATIENCE)
         page.wait(f"document.body.innerText.match(/cycle ([0-9.]+) s/)?.[1] > {before}", PATIENCE)
         page.picture(tmp_path / "dragged.png", whole=False)
-        (x, y, z) = page.run(r"document.body.innerText.match(/pose: \{xyz: \[([^\]]*)/)[1]").split(", ")
+        (x, y, z) = page.run(r"document.body.innerText.match(/pose: \{xyz: \[([^\]]*)/)[1]").split(
+            ", "
+        )
         assert (x, y) == ("-0.05", "0.1")
         assert float(z) == pytest.approx(0.45 - 0.15, abs=0.02)
         assert path.read_text() == CELL

@@ -48,7 +48,9 @@ equipment:
 
 numbers = st.floats(-5.0, 5.0).map(lambda value: round(value, 3))
 angles = st.floats(-180.0, 180.0).map(lambda value: round(value, 1))
-poses = st.tuples(st.tuples(numbers, numbers, numbers), st.none() | st.tuples(angles, angles, angles))
+poses = st.tuples(
+    st.tuples(numbers, numbers, numbers), st.none() | st.tuples(angles, angles, angles)
+)
 
 
 def without_poses(text: str) -> list[str]:
@@ -56,7 +58,9 @@ def without_poses(text: str) -> list[str]:
     return [line.partition("#")[2] for line in text.splitlines() if "#" in line]
 
 
-def dragged(cell: Cell, target: Target, xyz: tuple[float, ...], abc: tuple[float, ...] | None) -> np.ndarray:
+def dragged(
+    cell: Cell, target: Target, xyz: tuple[float, ...], abc: tuple[float, ...] | None
+) -> np.ndarray:
     before = pose_in(cell, target)
     return meant(pose_of(xyz, before[:3, :3] if abc is None else rotation_from_abc(abc)), before)
 
@@ -67,7 +71,9 @@ def test_the_file_reads_back_as_the_cell_that_was_shown(data: st.DataObject) -> 
     name = data.draw(st.sampled_from(["demo", "", ""]))
     text = (BUNDLED / f"{name}.yaml").read_text() if name else LAYOUTS
     cell = load_cell(name) if name else cell_from_yaml(text)
-    chosen = data.draw(st.lists(st.sampled_from(targets(cell)), min_size=1, max_size=4, unique=True))
+    chosen = data.draw(
+        st.lists(st.sampled_from(targets(cell)), min_size=1, max_size=4, unique=True)
+    )
     moves = {target: dragged(cell, target, *data.draw(poses)) for target in chosen}
     new = edited(text, cell, moves)
     assert cell_to_yaml(cell_from_yaml(new)) == cell_to_yaml(cell_with(cell, moves))
@@ -99,7 +105,11 @@ def test_nothing_is_overwritten_and_a_changed_file_is_not_mixed(tmp_path: Path) 
     path.write_text(LAYOUTS.replace("xyz: [0, 0, 1]", "xyz: [0, 0, 2]"), encoding="utf-8")
     with pytest.raises(SavingError, match="changed meanwhile"):
         save(Watched(str(path)), cell, moves)
-    assert sorted(each.name for each in tmp_path.iterdir()) == ["c.yaml", "c_moved.yaml", "c_moved_2.yaml"]
+    assert sorted(each.name for each in tmp_path.iterdir()) == [
+        "c.yaml",
+        "c_moved.yaml",
+        "c_moved_2.yaml",
+    ]
     watched = Watched(str(path))
     path.unlink()
     with pytest.raises(SavingError):

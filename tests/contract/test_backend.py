@@ -1,4 +1,6 @@
-"""What every robot behind the controller must do: the contract of `Backend`, for each registered one."""
+"""What every robot behind the controller must do: the contract of `Backend`, for each registered
+one.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ from ir_sim_driver.plant.backend import Backend, Work
 SETTINGS = SimulationSettings()
 DT = SETTINGS.dt
 TRACKING = 1e-4
-"""Largest deviation [rad] from a command within all limits: 0.3 mm at 3 m of reach; the tube is 5 mm."""
+"""Largest deviation [rad] from a command within all limits: 0.3 mm at 3 m of reach; the tube is 5
+mm.
+"""
 TORQUE = 5.0
 """Largest error [Nm] of a torque: about 0.1 % of what A1 to A3 can give."""
 REACH = np.array([0.5, 0.3, -0.3, 0.4, -0.3, 0.5])
@@ -97,7 +101,9 @@ def test_it_holds_its_position_with_the_torque_of_gravity(backend: Backend, cell
     assert np.abs(held(backend) - holding(cell, tool(cell))).max() < TORQUE
 
 
-def test_it_follows_a_motion_with_the_torque_of_the_equations_of_motion(backend: Backend, cell: Cell) -> None:
+def test_it_follows_a_motion_with_the_torque_of_the_equations_of_motion(
+    backend: Backend, cell: Cell
+) -> None:
     commands = motion(home(cell))
     reached = drive(backend, commands)
     assert np.abs(reached - commands).max() < TRACKING
@@ -110,7 +116,9 @@ def test_it_follows_a_motion_with_the_torque_of_the_equations_of_motion(backend:
     dynamics = DynamicsModel(cell.robot, tool(cell), cell.base_pose)
     expected = dynamics.inverse_dynamics(path[1:-1], middle, qdd)
     assert np.abs(work.speed - middle).max() < 0.01
-    sliding = np.abs(middle).min(axis=1) > 0.01  # below, each backend smooths friction in its own manner
+    sliding = (
+        np.abs(middle).min(axis=1) > 0.01
+    )  # below, each backend smooths friction in its own manner
     assert sliding.sum() > 0.8 * len(commands)
     off = work.torque - expected
     off[~sliding] = 0.0
@@ -191,7 +199,8 @@ def test_it_drives_on_from_where_the_brakes_held_it(backend: Backend, cell: Cell
 
 def test_a_load_changes_the_torque_and_not_the_state(backend: Backend, cell: Cell) -> None:
     drive(backend, np.tile(home(cell), (10, 1)))
-    q, carried = np.array(backend.q), np.array(backend.torque)
+    q = np.array(backend.q)
+    carried = np.array(backend.torque)
     backend.set_load(())
     assert np.array_equal(backend.q, q)
     assert backend.standing

@@ -1,4 +1,6 @@
-"""What every chart and table of the report must do: the contract of `Chart`, for each registered one."""
+"""What every chart and table of the report must do: the contract of `Chart`, for each registered
+one.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,9 @@ class Balance(HTMLParser):
         self.links: list[str] = []
 
     def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
-        self.links += [value or "" for name, value in attributes if name in ("src", "href", "data", "action")]
+        self.links += [
+            value or "" for name, value in attributes if name in ("src", "href", "data", "action")
+        ]
         if tag not in VOID:
             self.open.append(tag)
 
@@ -53,14 +57,22 @@ def maker() -> ModuleType:
 @pytest.fixture(scope="module")
 def analysis(tmp_path_factory: pytest.TempPathFactory) -> Analysis:
     """Of a whole run, a few seconds long."""
-    return analyse(read_recording(maker().demo_run().record(tmp_path_factory.mktemp("chart") / "run.mcap")))
+    return analyse(
+        read_recording(maker().demo_run().record(tmp_path_factory.mktemp("chart") / "run.mcap"))
+    )
 
 
 @pytest.fixture(scope="module")
 def bare(analysis: Analysis) -> Analysis:
     """Of a recording in which everything is missing."""
     recording = replace(
-        analysis.recording, power=None, joints=None, controller=None, events=(), loads=(), cell_yaml=""
+        analysis.recording,
+        power=None,
+        joints=None,
+        controller=None,
+        events=(),
+        loads=(),
+        cell_yaml="",
     )
     return analyse(recording)
 
@@ -101,7 +113,8 @@ def test_texts_of_a_recording_cannot_become_markup(chart: Chart, analysis: Analy
         replace(
             result,
             step=replace(
-                result.step, movement=replace(result.step.movement, from_station=EVIL, to_station=EVIL)
+                result.step,
+                movement=replace(result.step.movement, from_station=EVIL, to_station=EVIL),
             ),
         )
         for result in analysis.steps

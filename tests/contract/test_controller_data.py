@@ -1,4 +1,6 @@
-"""What every controller's power table must be: modes from shallow to deep, times, bits, measured watts."""
+"""What every controller's power table must be: modes from shallow to deep, times, bits, measured
+watts.
+"""
 
 from __future__ import annotations
 
@@ -68,10 +70,14 @@ def test_the_plant_draws_the_measured_watts(power: PowerData, mode: str) -> None
     settings = SimulationSettings(controller=ControllerSettings(start_mode=mode))
     simulation = make_simulation("open", backend="ideal", settings=settings, data=power)
     payload = max(row.payload for row in power.table_2)
-    assert simulation.standing_power(Mode[mode]) == pytest.approx(power.measured(payload, mode), rel=WATTS)
+    assert simulation.standing_power(Mode[mode]) == pytest.approx(
+        power.measured(payload, mode), rel=WATTS
+    )
 
 
-def test_a_longer_pause_never_rests_shallower_and_costs_at_most_the_longer_rest(planner: Planner) -> None:
+def test_a_longer_pause_never_rests_shallower_and_costs_at_most_the_longer_rest(
+    planner: Planner,
+) -> None:
     before = planner.standby(float(PAUSES[0]), None, "")
     for shorter, longer in itertools.pairwise(PAUSES):
         now = planner.standby(float(longer), None, "")

@@ -1,4 +1,6 @@
-"""What every search for exit paths must do: the contract of `ExitSearch`, for each registered one."""
+"""What every search for exit paths must do: the contract of `ExitSearch`, for each registered
+one.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,15 @@ from ir_planner.configurations import free_configurations
 from ir_planner.request import Context, Journal, Work
 from ir_planner.service import EXIT_SEARCHES, Exit, ExitSearch, ExitsFound
 
-SEED, WORK, WANTED = 7, 60_000, 2
-STATIONS = (("demo", "gauge_measure"), ("demo", "lathe_work"), ("cnc_door", "press"), ("deep_box", "tun"))
+SEED = 7
+WORK = 60_000
+WANTED = 2
+STATIONS = (
+    ("demo", "gauge_measure"),
+    ("demo", "lathe_work"),
+    ("cnc_door", "press"),
+    ("deep_box", "tun"),
+)
 
 Answer = tuple[ExitsFound, Exit]
 
@@ -31,7 +40,8 @@ def problem_at(cell: str, station: str, work: Work) -> Exit:
     """To leave a station from the free configuration of least W."""
     planner = Planner(itertools.repeat(0.0).__next__)
     planner.set_cell("", cell)
-    scene, options = planner.scene(), PlanOptions()
+    scene = planner.scene()
+    options = PlanOptions()
     context = Context(scene, options, Journal(work, SEED), station)
     found = free_configurations(
         scene.station(station).pose, scene, context.thresholds(), np.array(scene.cell.park)
@@ -111,7 +121,8 @@ def test_its_settings_are_fields_with_a_sentence_and_a_range(search: ExitSearch)
 def test_a_request_can_ask_for_it_by_name(name: str) -> None:
     planner = Planner(itertools.repeat(0.0).__next__)
     cell = planner.set_cell("", "demo")
-    near, options = np.array(cell.park), PlanOptions(planner_id=name)
+    near = np.array(cell.park)
+    options = PlanOptions(planner_id=name)
     plan = planner.plan_service("lathe_work", "exit", None, near, 1, options)
     assert plan.status.ok, plan.status.message
     assert [candidate.method for candidate in plan.candidates] == [name]
@@ -121,7 +132,8 @@ def test_a_request_can_ask_for_it_by_name(name: str) -> None:
 def test_an_unknown_name_lists_the_known() -> None:
     planner = Planner(itertools.repeat(0.0).__next__)
     cell = planner.set_cell("", "demo")
-    near, options = np.array(cell.park), PlanOptions(planner_id="teleport")
+    near = np.array(cell.park)
+    options = PlanOptions(planner_id="teleport")
     with pytest.raises(RequestError) as refused:
         planner.plan_service("lathe_work", "exit", None, near, 1, options)
     assert all(name in str(refused.value) for name in EXIT_SEARCHES)

@@ -1,4 +1,6 @@
-"""What every link between PLC and controller must do: the contract of `Link`, for each registered one."""
+"""What every link between PLC and controller must do: the contract of `Link`, for each registered
+one.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,9 @@ class Recorder:
     def write_inputs(self, writer: str, levels: Mapping[str, bool]) -> None:
         self.calls.append(f"{writer} writes {dict(levels)}")
 
-    def write_mode_and_pause(self, writer: str, mode: OperatingMode | None, pause: float | None) -> None:
+    def write_mode_and_pause(
+        self, writer: str, mode: OperatingMode | None, pause: float | None
+    ) -> None:
         self.calls.append(f"{writer} turns the switch to {mode} and asks for a pause of {pause} s")
 
     def heartbeat(self, timeout: float) -> None:

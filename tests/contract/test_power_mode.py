@@ -1,4 +1,6 @@
-"""What every power mode to rest in must have beside its row: the contract of the table `ir_msgs_py.modes`."""
+"""What every power mode to rest in must have beside its row: the contract of the table
+`ir_msgs_py.modes`.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,8 @@ def test_the_message_has_its_numbers(row: ModeRow) -> None:
 
 
 def test_it_has_times_and_a_shortest_stay(row: ModeRow) -> None:
-    times, name = TransitionTimes(), row.mode.name
+    times = TransitionTimes()
+    name = row.mode.name
     least = times.enter(name) + times.minimum_stay(name) + times.leave(name)
     assert (least > 0.0) == (row in RESTS)
     assert times.of(row.mode).time_min_pause == least
@@ -70,7 +73,9 @@ def test_a_program_may_rest_in_it_and_the_planner_knows_what_that_costs(row: Mod
 
 def test_the_plant_rests_in_it_as_the_row_says(row: ModeRow) -> None:
     controller = ControllerSettings(start_mode=row.mode.name)
-    simulation = make_simulation("open", backend="ideal", settings=SimulationSettings(controller=controller))
+    simulation = make_simulation(
+        "open", backend="ideal", settings=SimulationSettings(controller=controller)
+    )
     if row.bit:
         simulation.plc.rest = row.mode
     simulation.run(0.1)

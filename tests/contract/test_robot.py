@@ -1,4 +1,6 @@
-"""What every bundled robot must be: the contract of a robot's data, from kinematics to a driven movement."""
+"""What every bundled robot must be: the contract of a robot's data, from kinematics to a driven
+movement.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,14 @@ import numpy as np
 import pinocchio
 import pytest
 
-from ir_description import CellFileError, RobotModel, bundled_robots, cell_from_yaml, load_robot, robot_urdf
+from ir_description import (
+    CellFileError,
+    RobotModel,
+    bundled_robots,
+    cell_from_yaml,
+    load_robot,
+    robot_urdf,
+)
 from ir_kernels import Chain, DynamicsModel, inverse_kinematics
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner, parse_goal
@@ -41,7 +50,8 @@ def test_pinocchio_reads_its_urdf_and_agrees_on_kinematics_and_dynamics(robot: R
     model = pinocchio.buildModelFromXML(robot_urdf(robot))
     model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
     data = model.createData()
-    dynamics, chain = DynamicsModel(robot), Chain(robot)
+    dynamics = DynamicsModel(robot)
+    chain = Chain(robot)
     assert list(model.names)[1:] == list(robot.joint_names)
     q = configurations(robot)
     for k, bias in enumerate(dynamics.bias(q, np.ones_like(q))):
@@ -72,10 +82,14 @@ def test_it_stands_free_at_machine_home_and_holds_itself_there(robot: RobotModel
     home = robot.machine_home[None]
     still = np.zeros_like(home)
     dynamics = DynamicsModel(robot)
-    assert (np.abs(dynamics.inverse_dynamics(home, still, still)) < dynamics.torque_limit(still)).all()
+    assert (
+        np.abs(dynamics.inverse_dynamics(home, still, still)) < dynamics.torque_limit(still)
+    ).all()
 
 
-def test_a_movement_is_planned_certified_and_driven_at_the_planned_energy(robot: RobotModel) -> None:
+def test_a_movement_is_planned_certified_and_driven_at_the_planned_energy(
+    robot: RobotModel,
+) -> None:
     planner = Planner(itertools.repeat(0.0).__next__)
     cell = planner.set_cell(CELL.format(name=robot.name), "")
     home = np.array(robot.machine_home)

@@ -18,7 +18,8 @@ from ir_planner.request import Work
 from ir_planner.scene import PlanningScene, path_cost
 from ir_planner.search import SEARCHES, Ends, Found, Search, repeatable
 
-SEED, WORK = 7, 60_000
+SEED = 7
+WORK = 60_000
 LITTLE_WORK = 1_500  # where an edge is asked for in Python: it costs ten times as much
 # They share an adapter, which is tested with `kpiece` and `prm`.
 ALIKE = ("bkpiece", "lbkpiece", "rrt", "rrt_connect", "aorrtc")
@@ -84,15 +85,22 @@ def answers_again(search: Search, seed: int = SEED) -> list[Answer]:
     found = []
     for cell, task in TASKS:
         scene = scene_of(cell)
-        space = FreeSpace.of(scene, SAFETY_DISTANCE, unhurried(LITTLE_WORK if interpreted else WORK))
+        space = FreeSpace.of(
+            scene, SAFETY_DISTANCE, unhurried(LITTLE_WORK if interpreted else WORK)
+        )
         ends = asked(scene, task)
         found.append((search.find(ends, space, seed, space.work), space, ends))
     return found
 
 
 def sampled(path: np.ndarray) -> np.ndarray:
-    """Configurations (K, n) along a path, no joint moving more than SAMPLES from one to the next."""
-    parts = [np.linspace(a, b, 2 + int(np.abs(b - a).max() / SAMPLES)) for a, b in itertools.pairwise(path)]
+    """Configurations (K, n) along a path, no joint moving more than SAMPLES from one to the
+    next.
+    """
+    parts = [
+        np.linspace(a, b, 2 + int(np.abs(b - a).max() / SAMPLES))
+        for a, b in itertools.pairwise(path)
+    ]
     return np.concatenate(parts)
 
 
@@ -154,7 +162,8 @@ def test_it_finds_nothing_where_no_path_leads(search: Search) -> None:
     planner.set_cell(WALLED_IN, "")
     scene = planner.scene()
     ends = Ends(
-        np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]), np.radians([[180.0, -90.0, 90.0, 0.0, 0.0, 0.0]])
+        np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]),
+        np.radians([[180.0, -90.0, 90.0, 0.0, 0.0, 0.0]]),
     )
     reach = FreeSpace.of(scene, SAFETY_DISTANCE, unhurried())
     assert reach.states_free(np.vstack((ends.start, ends.goals))).all()
@@ -190,7 +199,9 @@ def test_an_unknown_name_lists_the_known() -> None:
     task = planner.set_cell("", "open").tasks[0]
     options = PlanOptions(planner_id="teleport")
     with pytest.raises(RequestError) as refused:
-        planner.plan_regional(np.array(task.start), Goal(configuration=np.array(task.goal)), options)
+        planner.plan_regional(
+            np.array(task.start), Goal(configuration=np.array(task.goal)), options
+        )
     assert all(name in str(refused.value) for name in SEARCHES)
 
 
@@ -208,7 +219,11 @@ class Careless:
 
 @pytest.mark.parametrize(
     "contract",
-    [test_paths_join_the_ends_and_are_free, test_work_is_charged, test_it_finds_nothing_where_no_path_leads],
+    [
+        test_paths_join_the_ends_and_are_free,
+        test_work_is_charged,
+        test_it_finds_nothing_where_no_path_leads,
+    ],
 )
 def test_the_contract_notices_a_search_that_breaks_it(contract: Callable[[Search], None]) -> None:
     with pytest.raises(AssertionError):

@@ -18,7 +18,11 @@ MISTAKES = (
     ("name: infeed_stand, kind: box", "name: infeed_stand, kind: cube", "must be one of box"),
     ("zone: SEMI_CLOSED", "zoone: SEMI_CLOSED", "unknown key 'zoone'"),
     ("{name: lathe_wall_left,", "{name: lathe_bed,", "lathe_bed is there twice"),
-    ("station: gauge_measure, planner", "station: gauge_mesure, planner", "'gauge_mesure' is unknown"),
+    (
+        "station: gauge_measure, planner",
+        "station: gauge_mesure, planner",
+        "'gauge_mesure' is unknown",
+    ),
     ("{pause: 1800, power_mode: HIBERNATION}", "{pause: 1800, power_mode: SLEEP}", "'SLEEP'"),
     ("{between: [t_f1, gear_lying]", "{between: [t_f9, gear_lying]", "'t_f9' is unknown"),
     ("{pause: 180,", "{pause: -180,", "604800"),
@@ -52,7 +56,9 @@ def test_all_mistakes_are_reported_with_their_lines(
     assert len(found) == len(expected), [str(error) for error in found]
     for error, (line, word) in zip(found, sorted(expected), strict=True):
         assert word in error.sentence
-        assert error.line == line or ("t_f9" in error.sentence and line - 8 <= error.line <= line), lines
+        assert error.line == line or (
+            "t_f9" in error.sentence and line - 8 <= error.line <= line
+        ), lines
 
 
 @pytest.mark.parametrize("name", bundled_cells())
@@ -76,7 +82,9 @@ def test_a_file_that_is_not_there_is_one_error(tmp_path: Path) -> None:
 
 
 def test_numbers_of_entries_are_those_of_the_file(tmp_path: Path) -> None:
-    text = DEMO.replace("kind: box, size: [0.8, 1.2, 0.15]", "kind: ball, size: [0.8, 1.2, 0.15]", 1)
+    text = DEMO.replace(
+        "kind: box, size: [0.8, 1.2, 0.15]", "kind: ball, size: [0.8, 1.2, 0.15]", 1
+    )
     text = text.replace(
         "radius: 0.02, length: 0.10, xyz: [0, 0.045", "radius: -2, length: 0.10, xyz: [0, 0.045", 1
     )
@@ -99,7 +107,12 @@ equipment:
 
 def test_a_mesh_that_cannot_be_read_makes_no_other_key_unknown(tmp_path: Path) -> None:
     found = [error.sentence for error in read(tmp_path, MESH_CELL) if "bodies" in error.sentence]
-    places = ["[0].mesh: file", "[1] has the unknown key 'colour'", "[1].xyz[2] is '3 m'", "[1].mesh: file"]
+    places = [
+        "[0].mesh: file",
+        "[1] has the unknown key 'colour'",
+        "[1].xyz[2] is '3 m'",
+        "[1].mesh: file",
+    ]
     assert len(found) == len(places), found
     for place in places:
         assert any(f"equipment[0].bodies{place}" in sentence for sentence in found), place
@@ -110,7 +123,8 @@ def test_a_mesh_that_cannot_be_read_makes_no_other_key_unknown(tmp_path: Path) -
     [
         ("attach: gear", "atach: gear", "unknown key 'atach'"),
         ("attach: gear", "attach: geer", "part 'geer' is unknown"),
-        ("states:\n      door_open: [lathe_door_up]\n      door_closed: [lathe_door_down]", "states: [up]",
+        ("states:\n      door_open: [lathe_door_up]\n      door_closed: "
+"[lathe_door_down]", "states: [up]",
          "equipment[1].states must be a mapping"),
         ("follows: lathe_open_door", "follow: lathe_open_door", "unknown key 'follow'"),
     ],
@@ -120,7 +134,9 @@ def test_what_follows_from_a_mistake_is_not_reported(
 ) -> None:
     assert written in DEMO
     found = read(tmp_path, DEMO.replace(written, typed, 1))
-    assert [word in error.sentence for error in found] == [True], [error.sentence for error in found]
+    assert [word in error.sentence for error in found] == [True], [
+        error.sentence for error in found
+    ]
 
 
 def test_a_part_that_nobody_holds_is_reported_where_the_program_is_whole(tmp_path: Path) -> None:

@@ -1,4 +1,6 @@
-"""Meshes from CAD as convex pieces: they contain the mesh, are repeatable, and hostile files are refused."""
+"""Meshes from CAD as convex pieces: they contain the mesh, are repeatable, and hostile files are
+refused.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,9 @@ def c_frame() -> FloatArray:
     count = len(PROFILE)
     low = np.column_stack([PROFILE, np.zeros(count)])
     points = np.concatenate([low, low + np.array([0.0, 0.0, 0.5])])
-    faces = [(a, c, b) for a, b, c in FACES] + [(a + count, b + count, c + count) for a, b, c in FACES]
+    faces = [(a, c, b) for a, b, c in FACES] + [
+        (a + count, b + count, c + count) for a, b, c in FACES
+    ]
     for k in range(count):
         n = (k + 1) % count
         faces += [(k, n, n + count), (k, n + count, k + count)]
@@ -60,7 +64,8 @@ def gltf_of(triangles: FloatArray, uri: str) -> dict[str, object]:
     """A glTF of the triangles, whose y is up."""
     count = 3 * len(triangles)
     points = triangles.reshape(-1, 3)[:, [0, 2, 1]] * (1, 1, -1)
-    low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    low = points.min(axis=0).tolist()
+    high = points.max(axis=0).tolist()
     return {
         "asset": {"version": "2.0"},
         "scene": 0,
@@ -68,7 +73,14 @@ def gltf_of(triangles: FloatArray, uri: str) -> dict[str, object]:
         "nodes": [{"mesh": 0}],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
         "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": count, "type": "VEC3", "min": low, "max": high}
+            {
+                "bufferView": 0,
+                "componentType": 5126,
+                "count": count,
+                "type": "VEC3",
+                "min": low,
+                "max": high,
+            }
         ],
         "bufferViews": [{"buffer": 0, "byteLength": 12 * count}],
         "buffers": [{"byteLength": 12 * count, "uri": uri}],
@@ -126,15 +138,23 @@ def coal_mesh(triangles: FloatArray) -> coal.BVHModelOBBRSS:
 
 
 def distance(body: object, sphere: object, there: object) -> float:
-    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    request = coal.DistanceRequest()
+    result = coal.DistanceResult()
     return float(coal.distance(body, coal.Transform3s(), sphere, there, request, result))
 
 
 def test_distances_from_the_pieces_are_safe_and_as_near_as_stated(divided: ConvexPieces) -> None:
-    """Coal measures to the mesh itself; inside the solid it sees its shell, so points outside are taken."""
-    triangles, rng = c_frame(), np.random.default_rng(1)
-    mesh, sphere = coal_mesh(triangles), coal.Sphere(1e-6)
-    bodies = [Body(f"p{k}", "mesh", np.eye(4), np.zeros(3), each) for k, each in enumerate(divided.vertices)]
+    """Coal measures to the mesh itself; inside the solid it sees its shell, so points outside are
+    taken.
+    """
+    triangles = c_frame()
+    rng = np.random.default_rng(1)
+    mesh = coal_mesh(triangles)
+    sphere = coal.Sphere(1e-6)
+    bodies = [
+        Body(f"p{k}", "mesh", np.eye(4), np.zeros(3), each)
+        for k, each in enumerate(divided.vertices)
+    ]
     points = rng.uniform((-0.3, -0.3, -0.3), (1.3, 1.3, 0.8), (120, 3))
     points = points[winding(triangles, points) < 0.5]
     for point in points:
@@ -148,7 +168,8 @@ def test_distances_from_the_pieces_are_safe_and_as_near_as_stated(divided: Conve
 
 
 def test_every_point_of_the_surface_lies_in_a_piece(divided: ConvexPieces) -> None:
-    triangles, rng = c_frame(), np.random.default_rng(2)
+    triangles = c_frame()
+    rng = np.random.default_rng(2)
     shares = rng.dirichlet(np.ones(3), (200, len(triangles)))
     points = np.einsum("ntk,tkx->ntx", shares, triangles).reshape(-1, 3)
     shapes = [coal.Convex.convexHull(_points(each), False, "") for each in divided.vertices]
@@ -157,7 +178,12 @@ def test_every_point_of_the_surface_lies_in_a_piece(divided: ConvexPieces) -> No
         there = coal.Transform3s(np.eye(3), point)
         depth = [
             coal.distance(
-                shape, coal.Transform3s(), sphere, there, coal.DistanceRequest(), coal.DistanceResult()
+                shape,
+                coal.Transform3s(),
+                sphere,
+                there,
+                coal.DistanceRequest(),
+                coal.DistanceResult(),
             )
             for shape in shapes
         ]
@@ -294,7 +320,8 @@ paths:
     segments: [{line: {xyz: [1.1, 0, 1.0]}}]
 """
 CUBE = c_frame()
-OPEN, NAN = CUBE[:-1], np.where(np.arange(3) == 0, np.nan, CUBE)
+OPEN = CUBE[:-1]
+NAN = np.where(np.arange(3) == 0, np.nan, CUBE)
 
 
 @pytest.mark.parametrize(
@@ -349,10 +376,15 @@ def test_a_division_that_crashes_is_a_sentence(monkeypatch: pytest.MonkeyPatch) 
 
 
 @pytest.mark.parametrize("gap", [0.0, 0.01])
-def test_containment_is_not_claimed_where_a_gap_is_left(gap: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_containment_is_not_claimed_where_a_gap_is_left(
+    gap: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(convex, "_CUTS", 11)  # until its pieces are as small as the margin
     box = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
-    halves = [box * (0.5 - gap / 2.0, 1, 1), box * (0.5 - gap / 2.0, 1, 1) + (0.5 + gap / 2.0, 0, 0)]
+    halves = [
+        box * (0.5 - gap / 2.0, 1, 1),
+        box * (0.5 - gap / 2.0, 1, 1) + (0.5 + gap / 2.0, 0, 0),
+    ]
     wide = [1.005 * (each - each.mean(axis=0)) + each.mean(axis=0) for each in halves]
     triangles = np.random.default_rng(3).uniform(0.05, 0.95, (4, 3, 3))
     assert contains(wide, triangles) == (gap == 0.0)
@@ -413,7 +445,8 @@ def test_hollows_and_more_shells_than_pieces_are_divided_as_a_whole(
         return [triangles.reshape(-1, 3)]
 
     monkeypatch.setattr(convex, "decomposed", box)
-    outer, other = shell((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)), shell((0.2, 0.2, 0.2), (0.8, 0.8, 0.8))
+    outer = shell((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    other = shell((0.2, 0.2, 0.2), (0.8, 0.8, 0.8))
     inner = other if most == 1 else other[:, ::-1]
     convex.convex_pieces(np.concatenate([outer, inner]), most)
     assert whole == [24]

@@ -85,7 +85,9 @@ def test_a_part_is_a_body_where_it_lies_and_a_load_while_it_is_held(cell: Cell) 
     put = held.after(next(step for step in cell.program if step.detach))
     lying = next(body for body in cell.bodies(put) if body.name == "gear_lying")
     held_centre = (
-        cell.station("outfeed_place").pose @ inverse(cell.tcp) @ np.append(cell.loads("gear")[1].com, 1.0)
+        cell.station("outfeed_place").pose
+        @ inverse(cell.tcp)
+        @ np.append(cell.loads("gear")[1].com, 1.0)
     )
     assert lying.pose[:3, 3] == pytest.approx(held_centre[:3])
 
@@ -165,7 +167,9 @@ def test_the_default_zone_encloses_bodies_in_any_orientation() -> None:
             zone = zone_around("OPEN", [body])
             surface = surface_points(body, rng) @ pose[:3, :3].T + pose[:3, 3] - zone.pose[:3, 3]
             assert (np.abs(surface) <= zone.size / 2 + 1e-12).all()
-            assert np.abs(surface).max(axis=0) == pytest.approx(zone.size / 2, rel=0.05)  # and no larger
+            assert np.abs(surface).max(axis=0) == pytest.approx(
+                zone.size / 2, rel=0.05
+            )  # and no larger
 
 
 def table_with(stations: str, zone: str = "OPEN") -> Cell:
@@ -185,10 +189,13 @@ equipment:
 
 def test_the_default_zone_holds_what_stands_on_a_table_up_to_its_stations() -> None:
     rng = np.random.default_rng(3)
-    low, high = np.array([-0.4, -0.3, 0.0]), np.array([0.4, 0.3, 0.7])
+    low = np.array([-0.4, -0.3, 0.0])
+    high = np.array([0.4, 0.3, 0.7])
     for _ in range(10):
         places = rng.uniform([-0.6, -0.5, 0.5], [0.6, 0.5, 1.2], (2, 3))
-        items = (f"{{name: s{k}, pose: {{xyz: {place.tolist()}}}}}" for k, place in enumerate(places))
+        items = (
+            f"{{name: s{k}, pose: {{xyz: {place.tolist()}}}}}" for k, place in enumerate(places)
+        )
         cell = table_with(f"[{', '.join(items)}]")
         zone = cell.machine("table").zone_in_equipment
         ends = zone.pose[:3, 3] - zone.size / 2, zone.pose[:3, 3] + zone.size / 2
@@ -255,7 +262,10 @@ def test_a_body_whose_middle_was_meant_as_its_underside_is_found(cell: Cell) -> 
 
 def test_angles_in_radians_are_found(cell: Cell) -> None:
     assert not [each for each in check_cell(cell) if "rad?" in each.sentence]
-    for abc, meant in (([3.14, 0, 0], "180 for 3.14 rad?"), ([0.7, -1.571, 0], "-90 for -1.571 rad?")):
+    for abc, meant in (
+        ([3.14, 0, 0], "180 for 3.14 rad?"),
+        ([0.7, -1.571, 0], "-90 for -1.571 rad?"),
+    ):
         turned = pose_of([0.0, 0.0, 0.5], rotation_from_abc(abc))
         (finding,) = (
             each
@@ -273,13 +283,17 @@ def test_angles_in_radians_are_found(cell: Cell) -> None:
 
 
 def test_overlapping_zones_are_found(cell: Cell) -> None:
-    close = cell.with_equipment("gauge", pose=composed(cell.machine("infeed").pose, pose_of([0.5, 0.0, 0.0])))
+    close = cell.with_equipment(
+        "gauge", pose=composed(cell.machine("infeed").pose, pose_of([0.5, 0.0, 0.0]))
+    )
     assert ("warning", "infeed") in found(close)
 
 
 def test_a_contact_allowed_outside_its_zone_is_found(cell: Cell) -> None:
     lathe = cell.machine("lathe")
-    small = replace(lathe, zone_in_equipment=Zone("SEMI_CLOSED", pose_of([1.0, 0.0, 0.5]), np.ones(3)))
+    small = replace(
+        lathe, zone_in_equipment=Zone("SEMI_CLOSED", pose_of([1.0, 0.0, 0.5]), np.ones(3))
+    )
     outside = replace(cell, equipment=tuple(small if m is lathe else m for m in cell.equipment))
     assert ("warning", "lathe_work") in found(outside)
 

@@ -35,7 +35,9 @@ def test_a_door_that_a_signal_moves_does_not_count_a_door_of_another_kind_does()
     door = DEMO.machine("lathe")
     assert door.switch is not None
     assert cell_hash(DEMO.with_equipment("lathe", state=door.switch.off)) == cell_hash(DEMO)
-    fixed = replace(DEMO, equipment=tuple(replace(machine, switch=None) for machine in DEMO.equipment))
+    fixed = replace(
+        DEMO, equipment=tuple(replace(machine, switch=None) for machine in DEMO.equipment)
+    )
     shut = fixed.with_equipment("lathe", state=door.switch.off)
     assert cell_hash(shut) != cell_hash(fixed)
 
@@ -55,7 +57,11 @@ def test_moving_or_switching_a_machine_counts(name: str, what: str, by: float) -
     machine = DEMO.machine(name)
     pose = machine.pose.copy()
     pose[0, 3] += by
-    changed = DEMO.with_equipment(name, pose) if what == "pose" else DEMO.with_equipment(name, enabled=False)
+    changed = (
+        DEMO.with_equipment(name, pose)
+        if what == "pose"
+        else DEMO.with_equipment(name, enabled=False)
+    )
     assert cell_hash(changed) != cell_hash(DEMO)
     back = changed.with_equipment(name, machine.pose, enabled=machine.enabled)
     assert cell_hash(back) == cell_hash(DEMO)

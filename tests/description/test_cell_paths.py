@@ -18,7 +18,7 @@ SEAM = """paths:
       - {line: {xyz: [1.8, 0, 1.2], abc_deg: [0, 90, 0]}}
       - {circle: [{xyz: [1.9, 0.1, 1.2]}, {xyz: [2, 0, 1.2], abc_deg: [10, 80, 0]}], tool_speed: 0.015}
       - {spline: [{xyz: [2.1, 0, 1.2], abc_deg: [0, 90, 0]}, {xyz: [2.1, 0.1, 1.3], abc_deg: [0, 90, 5]}]}
-"""
+"""  # noqa: E501
 
 
 def same(first: CartesianPath, second: CartesianPath) -> bool:
@@ -27,7 +27,12 @@ def same(first: CartesianPath, second: CartesianPath) -> bool:
         for path in (first, second)
     ]
     settings = [
-        [path.tool_speed, path.orientation, path.free_angle, *((p.kind, p.tool_speed) for p in path.segments)]
+        [
+            path.tool_speed,
+            path.orientation,
+            path.free_angle,
+            *((p.kind, p.tool_speed) for p in path.segments),
+        ]
         for path in (first, second)
     ]
     return bool(np.array_equal(*poses)) and settings[0] == settings[1]
@@ -44,7 +49,9 @@ def test_a_path_comes_back_from_the_file_that_is_written() -> None:
 
 def test_a_file_of_its_own_has_the_same_keys() -> None:
     lines = [line[4:] for line in SEAM.splitlines()[2:]]
-    assert same(path_from_yaml("\n".join(lines), "seam.yaml"), cell_from_yaml(HEAD + SEAM).path("seam"))
+    assert same(
+        path_from_yaml("\n".join(lines), "seam.yaml"), cell_from_yaml(HEAD + SEAM).path("seam")
+    )
 
 
 @pytest.mark.parametrize(
@@ -83,11 +90,19 @@ def test_a_path_of_a_machine_moves_with_it_and_keeps_what_it_allows() -> None:
     cell = cell_from_yaml(HEAD + BENCH + TOUCHING + "program: [{path: seam, dwell: 1}]\n")
     again = cell_from_yaml(cell_to_yaml(cell))
     assert again.contacts_at("seam") == cell.contacts_at("seam")
-    assert [(step.kind, step.target, step.dwell) for step in again.program] == [("PATH", "seam", 1.0)]
-    turned = np.array([[0.0, -1.0, 0.0, 1.0], [1.0, 0.0, 0.0, 2.0], [0.0, 0.0, 1.0, 0.0], [0, 0, 0, 1.0]])
+    assert [(step.kind, step.target, step.dwell) for step in again.program] == [
+        ("PATH", "seam", 1.0)
+    ]
+    turned = np.array(
+        [[0.0, -1.0, 0.0, 1.0], [1.0, 0.0, 0.0, 2.0], [0.0, 0.0, 1.0, 0.0], [0, 0, 0, 1.0]]
+    )
     moved = cell.with_equipment("bench", turned)
-    before, after = cell.path("seam"), moved.path("seam")
-    for old, new in ((before.start, after.start), (before.segments[1].poses[0], after.segments[1].poses[0])):
+    before = cell.path("seam")
+    after = moved.path("seam")
+    for old, new in (
+        (before.start, after.start),
+        (before.segments[1].poses[0], after.segments[1].poses[0]),
+    ):
         seen = np.linalg.inv(cell.machine("bench").pose) @ old
         np.testing.assert_allclose(new, turned @ seen, atol=1e-12)
 

@@ -1,4 +1,6 @@
-"""A cell that is read in a process of its own is the one that is read here, and so are the errors."""
+"""A cell that is read in a process of its own is the one that is read here, and so are the
+errors.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,9 @@ def test_a_cell_comes_back_the_same_and_read_only(name: str) -> None:
     back = pickle.loads(cell_process.pickled(cell))
     assert cell_to_yaml(back) == cell_to_yaml(cell)
     assert back.robot is cell.robot
-    arrays = [a for machine in back.equipment for body in machine.bodies for a in (body.pose, body.size)]
+    arrays = [
+        a for machine in back.equipment for body in machine.bodies for a in (body.pose, body.size)
+    ]
     assert arrays
     assert not any(array.flags.writeable for array in (*arrays, back.base_pose, back.park))
 
@@ -57,7 +61,8 @@ def test_long_texts_and_files_are_read_apart(tmp_path: Path) -> None:
     ],
 )
 def test_errors_are_those_of_reading_it_here(text: str, path: str) -> None:
-    apart, here = refusal(lambda: read_cell_apart(text, path)), refusal(lambda: read_here(text, path))
+    apart = refusal(lambda: read_cell_apart(text, path))
+    here = refusal(lambda: read_here(text, path))
     assert str(apart) == str(here)
     assert type(apart) is type(here)
 
@@ -87,8 +92,12 @@ def test_meshes_are_bounded_together() -> None:
     points /= np.linalg.norm(points, axis=1)[:, None]  # of a sphere: each is a corner
     corners = ", ".join(str([round(float(x), 4) for x in point]) for point in points)
     bodies = "\n".join(f"- {{name: b{k}, kind: mesh, vertices: [{corners}]}}" for k in range(52))
-    head = "format: ir_cell/1\nname: x\nrobot: kr210_r2700_extra\nequipment:\n- name: m\n  bodies:\n"
-    with pytest.raises(CellFileError, match=r"one mesh too many: all have 5\d+ corners, at most 50000"):
+    head = (
+        "format: ir_cell/1\nname: x\nrobot: kr210_r2700_extra\nequipment:\n- name: m\n  bodies:\n"
+    )
+    with pytest.raises(
+        CellFileError, match=r"one mesh too many: all have 5\d+ corners, at most 50000"
+    ):
         read_cell_apart(head + "\n".join("  " + line for line in bodies.splitlines()), "")
 
 
@@ -103,11 +112,16 @@ def test_meshes_are_bounded_together() -> None:
 def test_a_process_without_an_answer_says_why(
     dies: str, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its bounds are its own, but for the minute that would be long here; slow imports do not count."""
+    """Its bounds are its own, but for the minute that would be long here; slow imports do not
+    count.
+    """
     program = tmp_path / "reader.py"
     reads = f"cell_process.load_cell = lambda name: exec({dies!r})"
     slow = "import time\nwhile time.process_time() < 1.1: pass"
-    own = f"from ir_description import cell_process\ncell_process.PROCESSOR_SECONDS = 1\n{reads}\n{slow}\n"
+    own = (
+        "from ir_description import cell_process\ncell_process.PROCESSOR_SECONDS = "
+        f"1\n{reads}\n{slow}\n"
+    )
     program.write_text(f"#!{sys.executable}\n{own}cell_process.main()\n", encoding="utf-8")
     program.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(program))

@@ -1,4 +1,6 @@
-"""A cell that is written is read back the same, bit for bit; meshes come from their own folder only."""
+"""A cell that is written is read back the same, bit for bit; meshes come from their own folder
+only.
+"""
 
 from __future__ import annotations
 
@@ -61,7 +63,9 @@ def assert_same(first: Any, second: Any, where: str = "cell") -> None:
             assert_same(*pair, f"{where}[{i}]")
     elif is_dataclass(first):
         for field in fields(first):
-            assert_same(getattr(first, field.name), getattr(second, field.name), f"{where}.{field.name}")
+            assert_same(
+                getattr(first, field.name), getattr(second, field.name), f"{where}.{field.name}"
+            )
     else:
         assert first == second, where
 
@@ -118,13 +122,17 @@ def machines(draw: st.DrawFn, name: str) -> tuple[Equipment, tuple[Station, ...]
         states=states,
         state=draw(st.sampled_from(["door_open", "door_closed"])) if states else "",
         enabled=draw(st.booleans()),
-        switch=draw(st.none() | st.builds(StateSwitch, st.just("ask"), *ENDS, st.floats(0.0, 3600.0)))
+        switch=draw(
+            st.none() | st.builds(StateSwitch, st.just("ask"), *ENDS, st.floats(0.0, 3600.0))
+        )
         if states
         else None,
     )
     contacts = (AllowedContact("gear_held", own[0].name, draw(st.floats(0.0, 1.0))),)
     approach = draw(st.floats(0.0, 5.0))
-    ccd = st.builds(StationSearch, st.just("ccd"), st.integers(1, 10_000), st.sampled_from(["", "tree"]))
+    ccd = st.builds(
+        StationSearch, st.just("ccd"), st.integers(1, 10_000), st.sampled_from(["", "tree"])
+    )
     search = draw(st.just(StationSearch()) | st.just(StationSearch(withdrawal="modified_ga")) | ccd)
     return machine, (station_at(machine, f"at_{name}", draw(poses()), contacts, approach, search),)
 
@@ -134,9 +142,15 @@ def cells(draw: st.DrawFn) -> Cell:
     pairs = [draw(machines(f"machine_{i}")) for i in range(draw(st.integers(1, 2)))]
     stations = tuple(station for _, own in pairs for station in own)
     capsule = Capsule(
-        "gear_held", 6, np.zeros(3), np.array([0.0, draw(st.floats(0, 1)), 0.0]), draw(st.floats(0.01, 1))
+        "gear_held",
+        6,
+        np.zeros(3),
+        np.array([0.0, draw(st.floats(0, 1)), 0.0]),
+        draw(st.floats(0.01, 1)),
     )
-    part_load = Load("gear", "part", 20.0, np.zeros(3), solid_box_inertia(20.0, (0.1, 0.2, 0.3)), (capsule,))
+    part_load = Load(
+        "gear", "part", 20.0, np.zeros(3), solid_box_inertia(20.0, (0.1, 0.2, 0.3)), (capsule,)
+    )
     part = Part(part_load, (draw(bodies("gear_lying")),), draw(poses()), stations[0].name)
     tool = Load(
         "gripper",
@@ -155,7 +169,8 @@ def cells(draw: st.DrawFn) -> Cell:
         name="drawn",
         description=draw(
             st.text(
-                st.characters(codec="utf-8", categories=["L", "N", "P"], include_characters=" "), max_size=30
+                st.characters(codec="utf-8", categories=["L", "N", "P"], include_characters=" "),
+                max_size=30,
             )
         ).strip(),
         robot=ROBOT,
@@ -172,7 +187,11 @@ def cells(draw: st.DrawFn) -> Cell:
             ProgramStep("POSTURE", "home", set_signals=(Signal("ask"),)),
             ProgramStep("STATION", stations[0].name, draw(st.floats(0.0, 10.0)), attach="gear"),
             ProgramStep(
-                "STATION", stations[-1].name, detach="gear", wait_for=(Signal("open", False),), planner="tree"
+                "STATION",
+                stations[-1].name,
+                detach="gear",
+                wait_for=(Signal("open", False),),
+                planner="tree",
             ),
             ProgramStep("PAUSE", dwell=draw(st.floats(0.1, 1000.0)), power_mode="AUTO"),
         ),
@@ -223,8 +242,10 @@ equipment:
   - name: rock
     bodies:
       - {{name: rock, kind: mesh, file: "{file}", scale: 0.001, convex_hull: {hull}, xyz: [3, 0, 0]}}
-"""
-CORNERS = np.array([[x, y, z] for x in (0, 100) for y in (0, 200) for z in (0, 300)], dtype=np.float64)
+"""  # noqa: E501
+CORNERS = np.array(
+    [[x, y, z] for x in (0, 100) for y in (0, 200) for z in (0, 300)], dtype=np.float64
+)
 FACES = [
     (0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1),
     (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3),
@@ -305,13 +326,18 @@ def test_nothing_leads_out_of_the_cell_s_folder(tmp_path: Path, name: str) -> No
         (b"", "neither a binary STL"),
         (b"solid x\nendsolid x", "the mesh has 0 triangles, must have 4 to 200000"),
         (b"solid x\nvertex 1 2 3\nendsolid", "has 1 vertices, must have three to a triangle"),
-        (b"solid x\nvertex a b c\nvertex 1 2 3\nvertex 1 2 3\n", "a vertex that is not three numbers"),
+        (
+            b"solid x\nvertex a b c\nvertex 1 2 3\nvertex 1 2 3\n",
+            "a vertex that is not three numbers",
+        ),
         (binary_stl(np.full((4, 3, 3), np.nan)), "not finite"),
         (binary_stl(np.zeros((4, 3, 3))), "span no volume"),
         (binary_stl(CORNERS[np.array(FACES)])[:-1], "neither a binary STL"),
     ],
 )
-def test_a_broken_mesh_is_answered_by_a_sentence(tmp_path: Path, content: bytes, sentence: str) -> None:
+def test_a_broken_mesh_is_answered_by_a_sentence(
+    tmp_path: Path, content: bytes, sentence: str
+) -> None:
     (tmp_path / "mesh.stl").write_bytes(content)
     with pytest.raises(CellFileError, match=rf"cell.yaml:7: .*{sentence}"):
         load_cell(cell_with(tmp_path, "mesh.stl"))

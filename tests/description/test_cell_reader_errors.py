@@ -1,4 +1,6 @@
-"""Every class of broken cell file is answered by one sentence with its line, value, bound and unit."""
+"""Every class of broken cell file is answered by one sentence with its line, value, bound and
+unit.
+"""
 
 from __future__ import annotations
 
@@ -88,7 +90,11 @@ BROKEN = {
     "control character": ("name: small", "name: sm\x07all", "is not allowed in YAML"),
     "deep nesting": ("floor: true", f"floor: {'[' * 40}{']' * 40}", "nested more than 16 deep"),
     # words
-    "format": ("format: ir_cell/1", "format: ir_cell/9", "is 'ir_cell/9', must be one of ir_cell/1"),
+    "format": (
+        "format: ir_cell/1",
+        "format: ir_cell/9",
+        "is 'ir_cell/9', must be one of ir_cell/1",
+    ),
     "unknown robot": (
         "robot: kr210_r2700_extra",
         "robot: kr3",
@@ -128,17 +134,33 @@ BROKEN = {
     "text": ("  mass: 100", "  mass: 100 kg", "tool.mass is '100 kg', must be a number"),
     "quoted": ("  mass: 100", '  mass: "100"', "tool.mass is '100', must be a number"),
     "negative mass": ("  mass: 100", "  mass: -1", "tool.mass is -1 kg, must be in (0, 2000] kg"),
-    "ten tonnes": ("  mass: 100", "  mass: 10000", "tool.mass is 10000 kg, must be in (0, 2000] kg"),
-    "overload": ("  mass: 100", "  mass: 250", "mass is 250 kg, kr210_r2700_extra carries at most 210 kg"),
+    "ten tonnes": (
+        "  mass: 100",
+        "  mass: 10000",
+        "tool.mass is 10000 kg, must be in (0, 2000] kg",
+    ),
+    "overload": (
+        "  mass: 100",
+        "  mass: 250",
+        "mass is 250 kg, kr210_r2700_extra carries at most 210 kg",
+    ),
     "overload with part": ("mass: 20", "mass: 120", "gripper and gear: mass is 220 kg"),
     "two coordinates": ("xyz: [2, 0, 0]", "xyz: [2, 0]", "pose.xyz has 2 entries, must have 3"),
-    "far away": ("xyz: [2, 0, 0]", "xyz: [2e6, 0, 0]", "pose.xyz[0] is 2e6 m, must be in [-1000, 1000] m"),
+    "far away": (
+        "xyz: [2, 0, 0]",
+        "xyz: [2e6, 0, 0]",
+        "pose.xyz[0] is 2e6 m, must be in [-1000, 1000] m",
+    ),
     "flat inertia": (
         "[0.1, 0.1, 0.1, 0, 0, 0]",
         "[0.1, 0.1, 0.5, 0, 0, 0]",
         "breaks the triangle inequality",
     ),
-    "negative inertia": ("[0.1, 0.1, 0.1, 0, 0, 0]", "[-0.1, 0.1, 0.1, 0, 0, 0]", "must be above 0"),
+    "negative inertia": (
+        "[0.1, 0.1, 0.1, 0, 0, 0]",
+        "[-0.1, 0.1, 0.1, 0, 0, 0]",
+        "must be above 0",
+    ),
     "two inertias": (
         "  inertia_box: [0.4, 0.6, 0.2]",
         "  inertia_box: [1, 1, 1]\n  inertia: [1, 1, 1, 0, 0, 0]",
@@ -149,16 +171,28 @@ BROKEN = {
         "[0, -3, 120,",
         "park: joint_a2 is -3 deg, must be in [-140, -5] deg",
     ),
-    "task out of limits": ("start: [0, -1,", "start: [0, 1,", "start of there: joint_a2 is 57.2958 deg"),
+    "task out of limits": (
+        "start: [0, -1,",
+        "start: [0, 1,",
+        "start of there: joint_a2 is 57.2958 deg",
+    ),
     # orientations
-    "zero quaternion": ("[0, 0, 0, 1]", "[0, 0, 0, 0]", "quaternion has length 0, must be 1 within 0.001"),
+    "zero quaternion": (
+        "[0, 0, 0, 1]",
+        "[0, 0, 0, 0]",
+        "quaternion has length 0, must be 1 within 0.001",
+    ),
     "long quaternion": ("[0, 0, 0, 1]", "[0, 0, 0, 1.1]", "quaternion has length 1.1, must be 1"),
     "two orientations": (
         "abc_deg: [90, 0, 0]",
         "abc_deg: [90, 0, 0], quaternion: [0, 0, 0, 1]",
         "exactly one of",
     ),
-    "mirrored": ("quaternion: [0, 0, 0, 1]", "rotation: [[1, 0, 0], [0, 1, 0], [0, 0, -1]]", "right-handed"),
+    "mirrored": (
+        "quaternion: [0, 0, 0, 1]",
+        "rotation: [[1, 0, 0], [0, 1, 0], [0, 0, -1]]",
+        "right-handed",
+    ),
     "radians for turns": (
         "abc_deg: [90, 0, 0]",
         "abc_deg: [900, 0, 0]",
@@ -170,7 +204,11 @@ BROKEN = {
         "kind: cone",
         "is 'cone', must be one of box, cylinder, sphere, capsule, plane",
     ),
-    "zero size": ("size: [1, 1, 0.5]", "size: [1, 0, 0.5]", "size[1] is 0 m, must be in (0, 1000] m"),
+    "zero size": (
+        "size: [1, 1, 0.5]",
+        "size: [1, 0, 0.5]",
+        "size[1] is 0 m, must be in (0, 1000] m",
+    ),
     "negative radius": (
         "cylinder, radius: 0.1",
         "cylinder, radius: -0.1",
@@ -183,7 +221,11 @@ BROKEN = {
     ),
     "no size": ("kind: box, size: [1, 1, 0.5],", "kind: box,", "has no size; a box has size"),
     "body twice": ("mill_door, kind", "mill_bed, kind", "capsule or body mill_bed is there twice"),
-    "body like a capsule": ("mill_door, kind", "finger, kind", "capsule or body finger is there twice"),
+    "body like a capsule": (
+        "mill_door, kind",
+        "finger, kind",
+        "capsule or body finger is there twice",
+    ),
     "body like a link's": ("mill_door, kind", "l2, kind", "capsule or body l2 is there twice"),
     "body called floor": ("mill_door, kind", "floor, kind", "capsule or body floor is there twice"),
     "mesh by URL": (
@@ -197,9 +239,21 @@ BROKEN = {
         "span no volume",
     ),
     # zones and states
-    "unknown zone": ("kind: CLOSED", "kind: SHUT", "is 'SHUT', must be one of OPEN, SEMI_CLOSED, CLOSED"),
-    "zero zone": ("size: [1, 1, 2]", "size: [1, 1, 0]", "zone.size[2] is 0 m, must be in (0, 10000] m"),
-    "NaN zone": ("size: [1, 1, 2]", "size: [1, .nan, 2]", "zone.size[1] is .nan, which is not finite"),
+    "unknown zone": (
+        "kind: CLOSED",
+        "kind: SHUT",
+        "is 'SHUT', must be one of OPEN, SEMI_CLOSED, CLOSED",
+    ),
+    "zero zone": (
+        "size: [1, 1, 2]",
+        "size: [1, 1, 0]",
+        "zone.size[2] is 0 m, must be in (0, 10000] m",
+    ),
+    "NaN zone": (
+        "size: [1, 1, 2]",
+        "size: [1, .nan, 2]",
+        "zone.size[1] is .nan, which is not finite",
+    ),
     "unknown state": (
         "state: door_open",
         "state: ajar",
@@ -210,8 +264,16 @@ BROKEN = {
         "",
         "has states and must say its state, one of door_open, door_closed",
     ),
-    "state of no body": ("[mill_door]\n", "[door]\n", "body in state door_open of mill 'door' is unknown"),
-    "switch by nobody": ("signal: ask, on", "signal: aks, on", "signal that switches mill 'aks' is unknown"),
+    "state of no body": (
+        "[mill_door]\n",
+        "[door]\n",
+        "body in state door_open of mill 'door' is unknown",
+    ),
+    "switch by nobody": (
+        "signal: ask, on",
+        "signal: aks, on",
+        "signal that switches mill 'aks' is unknown",
+    ),
     "switch to no state": (
         "off: door_closed",
         "off: shut",
@@ -231,24 +293,52 @@ BROKEN = {
         "[mill_door, mill_bed]",
         "has no capsule of robot, tool or part",
     ),
-    "contact with itself": ("[gear_held, mill_bed]", "[gear_held, gear_held]", "pairs gear_held with itself"),
-    "negative contact": ("safety_distance: 0.001", "safety_distance: -1", "is -1 m, must be in [0, 10] m"),
-    "long approach": ("approach_distance: 0.3", "approach_distance: 30", "is 30 m, must be in [0, 5] m"),
+    "contact with itself": (
+        "[gear_held, mill_bed]",
+        "[gear_held, gear_held]",
+        "pairs gear_held with itself",
+    ),
+    "negative contact": (
+        "safety_distance: 0.001",
+        "safety_distance: -1",
+        "is -1 m, must be in [0, 10] m",
+    ),
+    "long approach": (
+        "approach_distance: 0.3",
+        "approach_distance: 30",
+        "is 30 m, must be in [0, 5] m",
+    ),
     "equipment twice": (
         "signals:",
         "  - {name: mill, zone: {kind: OPEN, size: [1, 1, 1]}, bodies: []}\nsignals:",
         "",
     ),
-    "no bodies, no zone": ("signals:", "  - {name: empty, bodies: []}\nsignals:", "has no bodies to enclose"),
+    "no bodies, no zone": (
+        "signals:",
+        "  - {name: empty, bodies: []}\nsignals:",
+        "has no bodies to enclose",
+    ),
     # parts, signals, program
     "part nowhere": (
         "station: pick\n",
         "station: peck\n",
         "station 'peck' is unknown; known are pick, place",
     ),
-    "signal follows nobody": ("follows: ask", "follows: aks", "'aks' is unknown; known are ask, open"),
-    "signal twice": ("{name: open, follows: ask, delay: 1}", "{name: ask}", "signal ask is there twice"),
-    "unknown station": ("station: place, detach", "station: plaice, detach", "station 'plaice' is unknown"),
+    "signal follows nobody": (
+        "follows: ask",
+        "follows: aks",
+        "'aks' is unknown; known are ask, open",
+    ),
+    "signal twice": (
+        "{name: open, follows: ask, delay: 1}",
+        "{name: ask}",
+        "signal ask is there twice",
+    ),
+    "unknown station": (
+        "station: place, detach",
+        "station: plaice, detach",
+        "station 'plaice' is unknown",
+    ),
     "unknown posture": ("posture: home", "posture: house", "is 'house', must be one of home, park"),
     "unknown part": ("attach: gear", "attach: wheel", "part 'wheel' is unknown; known are gear"),
     "attach elsewhere": ("{station: pick, attach", "{station: place, attach", "it lies at pick"),
@@ -280,7 +370,8 @@ def broken(case: str) -> tuple[str, str]:
     entry = BROKEN[case]
     if case == "empty":
         return "", entry[1]
-    old, new = entry[0], entry[1]
+    old = entry[0]
+    new = entry[1]
     assert old in GOOD, old
     return GOOD.replace(old, new, 1), entry[2] if len(entry) > 2 else ""
 
@@ -303,11 +394,17 @@ def test_a_broken_file_is_answered_by_a_sentence_with_its_line(case: str) -> Non
     assert error.line >= 1
     if case not in CHECKED_AS_A_WHOLE:
         changed = 1 + next(
-            i for i, (a, b) in enumerate(zip(GOOD.split("\n"), text.split("\n"), strict=False)) if a != b
+            i
+            for i, (a, b) in enumerate(zip(GOOD.split("\n"), text.split("\n"), strict=False))
+            if a != b
         )
         # the line itself, or the head of the entry it belongs to
         head = max(
-            (i for i, row in enumerate(text.split("\n")[:changed], 1) if re.match(r"(  - )|\S", row)),
+            (
+                i
+                for i, row in enumerate(text.split("\n")[:changed], 1)
+                if re.match(r"(  - )|\S", row)
+            ),
             default=1,
         )
         assert head <= error.line <= changed + 1
@@ -327,7 +424,8 @@ def test_too_many_bodies_are_refused() -> None:
 
 def test_ten_thousand_zones_are_read() -> None:
     machines = "\n".join(
-        f"  - {{name: m{i}, zone: {{kind: OPEN, size: [1, 1, 1], xyz: [0, 0, {i % 900}]}}, bodies: []}}"
+        f"  - {{name: m{i}, zone: {{kind: OPEN, size: [1, 1, 1], xyz: [0, 0, {i % 900}]}}, "
+        "bodies: []}"
         for i in range(9_999)
     )
     cell = cell_from_yaml(GOOD.replace("signals:", f"{machines}\nsignals:", 1))
@@ -392,7 +490,23 @@ def test_an_unknown_name_lists_the_known(name: str) -> None:
     st.one_of(
         st.text(max_size=4),
         st.sampled_from(
-            ["{", "}", "[", "]", ":", "\n", "- ", "&a ", "*a", "!x ", "null", "1e400", ".nan", "\ud800", "\0"]
+            [
+                "{",
+                "}",
+                "[",
+                "]",
+                ":",
+                "\n",
+                "- ",
+                "&a ",
+                "*a",
+                "!x ",
+                "null",
+                "1e400",
+                ".nan",
+                "\ud800",
+                "\0",
+            ]
         ),
     ),
 )

@@ -4,7 +4,8 @@ from ir_description import power_marks, robot_marks
 
 
 def test_every_figure_has_a_mark_under_its_place():
-    robot, power = robot_marks(), power_marks()
+    robot = robot_marks()
+    power = power_marks()
     assert robot["drives.friction_viscous_nms_rad"] == "M"
     assert robot["links.link_2.mass_kg"] == "H"
     assert robot["counterbalance.charge_pressure_pa"] == "M"

@@ -1,4 +1,6 @@
-"""The bundled cells: distances are those of their origin, and the demonstration cell can be worked in."""
+"""The bundled cells: distances are those of their origin, and the demonstration cell can be worked
+in.
+"""
 
 from __future__ import annotations
 
@@ -49,14 +51,19 @@ def withdrawn(station: Station) -> FloatArray:
     return composed(station.pose, pose_of((-station.approach_distance, 0.0, 0.0)))
 
 
-def thresholds(collisions: CollisionModel, station: Station | None, safety_distance: float) -> FloatArray:
+def thresholds(
+    collisions: CollisionModel, station: Station | None, safety_distance: float
+) -> FloatArray:
     """Safety distance per pair (Z,) [m], the station's own for its allowed contacts."""
     allowed = {
         frozenset((c.body_a, c.body_b)): c.safety_distance
         for c in (station.allowed_contacts if station is not None else ())
     }
     return np.array(
-        [allowed.get(frozenset((pair.body_a, pair.body_b)), safety_distance) for pair in collisions.pairs]
+        [
+            allowed.get(frozenset((pair.body_a, pair.body_b)), safety_distance)
+            for pair in collisions.pairs
+        ]
     )
 
 
@@ -93,7 +100,8 @@ def test_nothing_looks_wrong(name: str) -> None:
 @pytest.mark.parametrize("name", CLEARANCE)
 def test_tasks_stand_at_their_stations_with_the_published_clearance(name: str) -> None:
     cell = load_cell(name)
-    chain, collisions = Chain(cell.robot, cell.base_pose, cell.tcp), model(cell)
+    chain = Chain(cell.robot, cell.base_pose, cell.tcp)
+    collisions = model(cell)
     for task in cell.tasks:
         for station, q in zip(task.name.split("->"), (task.start, task.goal), strict=True):
             distance = float(collisions.min_distance(q[None]).distance[0])
@@ -115,7 +123,10 @@ def test_zone_kinds_say_how_closed_a_machine_is() -> None:
 def test_the_demo_has_five_stations_of_which_two_are_semi_closed() -> None:
     cell = load_cell("demo")
     zones = {station.name: station.zone for station in cell.stations}
-    assert [name for name, zone in zones.items() if zone == "SEMI_CLOSED"] == ["lathe_work", "washer_rinse"]
+    assert [name for name, zone in zones.items() if zone == "SEMI_CLOSED"] == [
+        "lathe_work",
+        "washer_rinse",
+    ]
     assert len(zones) == 5
     pauses = [step.power_mode for step in cell.program if step.kind == "PAUSE"]
     assert {"BUS_POWER_OFF", "HIBERNATION"} <= set(pauses)
@@ -138,8 +149,8 @@ def test_the_demo_s_postures_are_free(state: str) -> None:
 
 
 def test_every_station_of_the_demo_but_the_washer_s_can_be_entered_and_left_straight() -> None:
-    """There is a configuration that keeps 30 mm along the whole retraction, allowed contacts apart; in the
-    washer a plate of nozzles is in the path of the blank.
+    """There is a configuration that keeps 30 mm along the whole retraction, allowed contacts apart;
+    in the washer a plate of nozzles is in the path of the blank.
     """
     cell = load_cell("demo")
     chain = Chain(cell.robot, cell.base_pose, cell.tcp)
@@ -160,9 +171,12 @@ def test_every_station_of_the_demo_but_the_washer_s_can_be_entered_and_left_stra
                 free &= collisions.is_free(solutions.q, thresholds(collisions, station, REQUIRED))
             # the same branch all along, e.g. wrist not turned
             branches = [
-                set(solutions.branch[(solutions.pose_index == k) & free].tolist()) for k in range(len(steps))
+                set(solutions.branch[(solutions.pose_index == k) & free].tolist())
+                for k in range(len(steps))
             ]
-            assert bool(set.intersection(*branches)) is (station.name != "washer_rinse"), station.name
+            assert bool(set.intersection(*branches)) is (station.name != "washer_rinse"), (
+                station.name
+            )
             assert branches[-1], station.name
         places = after
 
@@ -171,7 +185,8 @@ def test_every_move_of_the_demo_is_free_straight_or_by_way_of_park() -> None:
     cell = load_cell("demo")
     chain = Chain(cell.robot, cell.base_pose, cell.tcp)
     ik = SphericalWristIk(chain, cell.robot.position_min, cell.robot.position_max)
-    places, here = cell.parts_at_start(), cell.machine_home[None]
+    places = cell.parts_at_start()
+    here = cell.machine_home[None]
     for step in cell.program:
         if step.kind == "PAUSE":
             continue
@@ -187,13 +202,18 @@ def test_every_move_of_the_demo_is_free_straight_or_by_way_of_park() -> None:
             return bool(collisions.is_free(q, SAFETY_DISTANCE).all())
 
         straight = any(connects(a, b) for a in here for b in there)
-        by_park = any(connects(a, cell.park) for a in here) and any(connects(cell.park, b) for b in there)
+        by_park = any(connects(a, cell.park) for a in here) and any(
+            connects(cell.park, b) for b in there
+        )
         assert straight or by_park, step.target
-        places, here = places.after(step), there
+        places = places.after(step)
+        here = there
 
 
 def test_the_demo_s_tool_is_out_of_the_zone_after_the_retraction() -> None:
-    """Every capsule from link_3 to the tool is farther than the safety distance from the zone's box."""
+    """Every capsule from link_3 to the tool is farther than the safety distance from the zone's
+    box.
+    """
     cell = load_cell("demo")
     chain = Chain(cell.robot, cell.base_pose, cell.tcp)
     ik = SphericalWristIk(chain, cell.robot.position_min, cell.robot.position_max)

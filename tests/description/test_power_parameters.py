@@ -1,4 +1,6 @@
-"""Power parameters: the prior of the marks, draws within physics, files that come back as they went."""
+"""Power parameters: the prior of the marks, draws within physics, files that come back as they
+went.
+"""
 
 from dataclasses import replace
 
@@ -29,7 +31,8 @@ def sheet() -> PowerParameters:
 
 
 def test_the_data_sheet_has_the_data_as_its_mean(sheet: PowerParameters) -> None:
-    robot, power = load_robot(), load_power_data()
+    robot = load_robot()
+    power = load_power_data()
     assert np.array_equal(sheet.axis("viscous"), robot.friction_viscous)
     assert np.array_equal(sheet.axis("copper"), robot.copper_loss)
     assert not np.any([sheet.axis(term) for term in ("iron", "inverter", "gear")])
@@ -58,19 +61,23 @@ def test_draws_are_possible_robots_and_follow_the_seed(seed: int, widening: floa
 
 
 def test_draws_at_a_bound_keep_their_correlations(sheet: PowerParameters) -> None:
-    a, b = sheet.index("iron.joint_a1"), sheet.index("viscous.joint_a1")
+    a = sheet.index("iron.joint_a1")
+    b = sheet.index("viscous.joint_a1")
     covariance = sheet.covariance.copy()
     covariance[a, b] = covariance[b, a] = -0.95 * sheet.deviation[a] * sheet.deviation[b]
     draws = replace(sheet, covariance=covariance).draws(4000, 1)
     moved = (draws - sheet.mean) / sheet.deviation
-    normal = np.random.default_rng(2).multivariate_normal([0.0, 0.0], [[1.0, -0.95], [-0.95, 1.0]], 40_000)
+    normal = np.random.default_rng(2).multivariate_normal(
+        [0.0, 0.0], [[1.0, -0.95], [-0.95, 1.0]], 40_000
+    )
     allowed = normal[normal[:, 0] >= 0.0]  # of all normal draws those that physics allows
     np.testing.assert_allclose(moved[:, [a, b]].mean(axis=0), allowed.mean(axis=0), atol=0.05)
     np.testing.assert_allclose(moved[:, [a, b]].std(axis=0), allowed.std(axis=0), atol=0.05)
 
 
 def test_draws_have_the_covariance_where_no_bound_is_near(sheet: PowerParameters) -> None:
-    a, b = sheet.index("viscous.joint_a1"), sheet.index("coulomb.joint_a1")
+    a = sheet.index("viscous.joint_a1")
+    b = sheet.index("coulomb.joint_a1")
     covariance = sheet.covariance.copy()
     covariance[a, b] = covariance[b, a] = -0.8 * sheet.deviation[a] * sheet.deviation[b]
     draws = replace(sheet, covariance=covariance).draws(20_000, 1)
@@ -80,8 +87,10 @@ def test_draws_have_the_covariance_where_no_bound_is_near(sheet: PowerParameters
 
 
 def test_a_file_comes_back_as_it_went(sheet: PowerParameters, tmp_path) -> None:  # type: ignore[no-untyped-def]
-    a, b = sheet.index("viscous.joint_a1"), sheet.index("coulomb.joint_a3")
-    covariance, mean = 0.1 * sheet.covariance, sheet.mean * 1.0
+    a = sheet.index("viscous.joint_a1")
+    b = sheet.index("coulomb.joint_a3")
+    covariance = 0.1 * sheet.covariance
+    mean = sheet.mean * 1.0
     covariance[a, b] = covariance[b, a] = 0.5 * np.sqrt(covariance[a, a] * covariance[b, b])
     mean[sheet.index("iron.joint_a2")] = 12.5
     mean[sheet.index("rectifier_efficiency")] = 0.97
@@ -95,12 +104,19 @@ def test_a_file_comes_back_as_it_went(sheet: PowerParameters, tmp_path) -> None:
     assert read.covariance == pytest.approx(fitted.covariance, rel=1e-5, abs=1e-12)
 
 
-HEAD = "format: ir_description/power_parameters/1\nname: x\nrobot: kr210_r2700_extra\ncontroller: kr_c4\n"
+HEAD = (
+    "format: ir_description/power_parameters/1\nname: x\nrobot: "
+    "kr210_r2700_extra\ncontroller: kr_c4\n"
+)
 
 
-def test_what_a_file_does_not_name_stays_as_the_data_have_it(sheet: PowerParameters, tmp_path) -> None:  # type: ignore[no-untyped-def]
+def test_what_a_file_does_not_name_stays_as_the_data_have_it(
+    sheet: PowerParameters, tmp_path
+) -> None:  # type: ignore[no-untyped-def]
     path = tmp_path / "one.yaml"
-    path.write_text(HEAD + "parameters: [{name: drives_watts, value: 300, deviation: 2}]\n", encoding="utf-8")
+    path.write_text(
+        HEAD + "parameters: [{name: drives_watts, value: 300, deviation: 2}]\n", encoding="utf-8"
+    )
     read = load_power_parameters(str(path))
     k = sheet.index("drives_watts")
     assert (read.mean[k], read.deviation[k], read.sources[k]) == (300.0, 2.0, "file")
@@ -134,7 +150,8 @@ def test_what_a_file_does_not_name_stays_as_the_data_have_it(sheet: PowerParamet
         ),
         ("parameters: []\ncorrelation: {names: [load_mass, link_mass], below: [[1.5]]}", "[-1, 1]"),
         (
-            "parameters: []\ncorrelation: {names: [load_mass, link_mass, tool_watts], below: [[1], [1, -1]]}",
+            "parameters: []\ncorrelation: {names: [load_mass, link_mass, tool_watts], below: "
+            "[[1], [1, -1]]}",
             "negative eigenvalue",
         ),
     ],
@@ -165,7 +182,10 @@ def test_a_file_of_something_else_is_refused_by_name(head: str, named: str, tmp_
 
 def test_what_a_file_leaves_open_is_drawn_within_physics(tmp_path) -> None:  # type: ignore[no-untyped-def]
     path = tmp_path / "open.yaml"
-    rows = ["{name: load_mass, value: 1, deviation: 1e12}", "{name: gear.joint_a1, value: 0, deviation: 1e9}"]
+    rows = [
+        "{name: load_mass, value: 1, deviation: 1e12}",
+        "{name: gear.joint_a1, value: 0, deviation: 1e9}",
+    ]
     below = "correlation: {names: [load_mass, gear.joint_a1], below: [[0.999999]]}\n"
     path.write_text(f"{HEAD}parameters: [{', '.join(rows)}]\n{below}", encoding="utf-8")
     read = load_power_parameters(str(path))
@@ -199,7 +219,9 @@ def test_a_covariance_that_is_none_is_refused(sheet: PowerParameters) -> None:
         replace(sheet, covariance=covariance)
 
 
-def test_an_interval_over_robots_leaves_out_a_twentieth_on_each_side_and_holds_the_nominal_figure() -> None:
+def test_an_interval_over_robots_leaves_out_a_twentieth_on_each_side_and_holds_the_nominal_figure() -> (  # noqa: E501
+    None
+):
     added = np.arange(0.0, 101.0)
     assert interval_over(1000.0, added - 50.0) == (955.0, 1045.0)
     assert interval_over(1000.0, added) == (1000.0, 1095.0)

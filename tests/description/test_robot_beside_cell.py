@@ -37,7 +37,8 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_the_robot_of_a_file_is_that_of_its_data(folder: Path) -> None:
-    robot, bundled = load_cell(folder / "cell.yaml").robot, load_robot("ur10e")
+    robot = load_cell(folder / "cell.yaml").robot
+    bundled = load_robot("ur10e")
     assert robot.name == "my_arm"
     assert np.array_equal(robot.joint_origin, bundled.joint_origin)
     assert robot.marks == bundled.marks
@@ -66,11 +67,15 @@ def test_comments_do_not_change_the_hash_but_figures_do(folder: Path) -> None:
 @pytest.mark.parametrize("name", ["../arm.yaml", "/etc/arm.yaml", "http://host/arm.yaml"])
 def test_a_robot_elsewhere_is_refused(folder: Path, name: str) -> None:
     (folder / "cell.yaml").write_text(CELL.format(robot=f'"{name}"'))
-    with pytest.raises(CellFileError, match=r"cell.yaml:3: robot: file .* must stand beside this file"):
+    with pytest.raises(
+        CellFileError, match=r"cell.yaml:3: robot: file .* must stand beside this file"
+    ):
         load_cell(folder / "cell.yaml")
 
 
-def test_a_link_that_leads_out_is_refused(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_a_link_that_leads_out_is_refused(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     outside = tmp_path_factory.mktemp("outside") / "arm.yaml"
     outside.write_text(TEXT)
     (folder / "own" / "linked.yaml").symlink_to(outside)
@@ -109,7 +114,9 @@ def test_a_missing_robot_file_is_a_sentence(tmp_path: Path) -> None:
         robot_named(str(tmp_path / "nobody.yaml"))
 
 
-def test_the_controller_of_a_robot_is_a_table_beside_it_or_what_is_known_without(folder: Path) -> None:
+def test_the_controller_of_a_robot_is_a_table_beside_it_or_what_is_known_without(
+    folder: Path,
+) -> None:
     file = folder / "own" / "arm.yaml"
     text = file.read_text()
     (folder / "own" / "mine.yaml").write_text(POWER.replace("name: kr_c4", "name: mine", 1))
@@ -128,4 +135,6 @@ def test_a_pause_in_a_mode_that_the_controller_lacks_is_an_error(folder: Path) -
     program = "program: [{pause: 60, power_mode: HIBERNATION}]\n"
     (folder / "cell.yaml").write_text(CELL.format(robot="own/arm.yaml") + program)
     findings = check_cell(load_cell(folder / "cell.yaml"))
-    assert [finding.severity for finding in findings if "HIBERNATION" in finding.sentence] == ["error"]
+    assert [finding.severity for finding in findings if "HIBERNATION" in finding.sentence] == [
+        "error"
+    ]

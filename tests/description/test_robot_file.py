@@ -32,7 +32,8 @@ def robot() -> RobotModel:
 
 def counterbalance_torque(spring: Counterbalance, angle: float) -> float:
     """Torque [Nm] about the joint's positive axis, as the data file writes it down."""
-    c, s = np.cos(angle), np.sin(angle)
+    c = np.cos(angle)
+    s = np.sin(angle)
     x, z = spring.rod_eye
     eye = np.array([c * x + s * z, -s * x + c * z])
     rod = spring.pivot - eye
@@ -45,7 +46,15 @@ def counterbalance_torque(spring: Counterbalance, angle: float) -> float:
 
 @pytest.mark.parametrize(
     ("angle_deg", "torque"),
-    [(-140, 5116), (-120, 3254), (-90, -234), (-60, -3650), (-45, -5023), (-30, -6088), (-5, -7081)],
+    [
+        (-140, 5116),
+        (-120, 3254),
+        (-90, -234),
+        (-60, -3650),
+        (-45, -5023),
+        (-30, -6088),
+        (-5, -7081),
+    ],
 )
 def test_counterbalance_gives_the_published_torques(
     robot: RobotModel, angle_deg: float, torque: float
@@ -62,7 +71,9 @@ def test_the_arm_weighs_what_the_source_says(robot: RobotModel) -> None:
 
 
 def test_the_three_wrist_bodies_are_the_one_of_the_source(robot: RobotModel) -> None:
-    """57.53 kg at 1.1612 m from A3 with 0.71, 1.90, 2.05 kg m^2 (kroshu), and no moment about A5."""
+    """57.53 kg at 1.1612 m from A3 with 0.71, 1.90, 2.05 kg m^2 (kroshu), and no moment about
+    A5.
+    """
     mass = robot.link_mass[4:]
     offset = np.array([0.0, 1.2, 1.2 + 0.215])
     com = robot.link_com[4:, 0] + offset
@@ -84,7 +95,8 @@ def test_inertias_are_those_of_bodies(robot: RobotModel) -> None:
 
 def test_table_2_comes_out_of_the_calibrated_watts(robot: RobotModel) -> None:
     """Table II of the paper: all eight values, from controller, tool, drives and holding torque."""
-    power, tool = load_power_data(), load_cell("demo").tool
+    power = load_power_data()
+    tool = load_cell("demo").tool
     assert tool is not None
     for payload in (0.0, 155.0):
         for mode in power.modes:
@@ -140,7 +152,9 @@ def test_arrays_are_read_only(robot: RobotModel) -> None:
 
 
 def test_an_unknown_robot_lists_the_known() -> None:
-    with pytest.raises(UnknownNameError, match=r"robot 'kr3' is unknown; known are kr210_r2700_extra"):
+    with pytest.raises(
+        UnknownNameError, match=r"robot 'kr3' is unknown; known are kr210_r2700_extra"
+    ):
         load_robot("kr3")
 
 
@@ -172,5 +186,7 @@ def test_a_figure_without_source_or_sense_is_refused(old: str, new: str, sentenc
     assert old in ROBOT_TEXT
     with pytest.raises(RobotFileError, match=r"robot.yaml:\d+: .*" + sentence) as caught:
         robot_from_yaml(ROBOT_TEXT.replace(old, new, 1), "robot.yaml")
-    line = next(i for i, text in enumerate(ROBOT_TEXT.replace(old, new, 1).split("\n"), 1) if new in text)
+    line = next(
+        i for i, text in enumerate(ROBOT_TEXT.replace(old, new, 1).split("\n"), 1) if new in text
+    )
     assert caught.value.line == line

@@ -1,4 +1,6 @@
-"""The URDF is the robot data: PyBullet, which knows nothing else, agrees on kinematics, masses, gravity."""
+"""The URDF is the robot data: PyBullet, which knows nothing else, agrees on kinematics, masses,
+gravity.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,11 @@ pybullet = pytest.importorskip("pybullet")
 POSITION_TOLERANCE = 1e-9  # m; the centre-of-mass frame is kept in double precision
 GRAVITY = 9.80665
 TOOL_155KG = Load(
-    "tool_155kg", "tool", 155.0, np.array([0.24, 0.0, 0.0]), solid_box_inertia(155.0, (0.465, 0.66, 0.22))
+    "tool_155kg",
+    "tool",
+    155.0,
+    np.array([0.24, 0.0, 0.0]),
+    solid_box_inertia(155.0, (0.465, 0.66, 0.22)),
 )
 
 
@@ -72,7 +78,9 @@ class Bullet:
         return np.array(torque)
 
     def dynamics(self, link: str) -> tuple[float, FloatArray]:
-        info = pybullet.getDynamicsInfo(self.body, self.names.index(link) - 1, physicsClientId=self.client)
+        info = pybullet.getDynamicsInfo(
+            self.body, self.names.index(link) - 1, physicsClientId=self.client
+        )
         return info[0], np.array(info[2])
 
 
@@ -99,7 +107,8 @@ def link_poses(robot: RobotModel, q: FloatArray) -> list[FloatArray]:
     """Poses (4, 4) of links 0..n in the base, straight from the chain's definition."""
     poses = [np.eye(4)]
     for i in range(robot.n):
-        axis, angle = robot.joint_axis[i], q[i]
+        axis = robot.joint_axis[i]
+        angle = q[i]
         K = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
         turn = np.eye(4)
         turn[:3, :3] += np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
@@ -113,13 +122,22 @@ def test_every_link_stands_where_the_chain_says(bullet: Bullet, robot: RobotMode
         bullet.place(q)
         for i, pose in enumerate(link_poses(robot, q)[1:], start=1):
             expected = pose[:3, :3] @ robot.link_com[i] + pose[:3, 3]
-            assert np.abs(bullet.com_position(robot.link_names[i]) - expected).max() < POSITION_TOLERANCE
+            assert (
+                np.abs(bullet.com_position(robot.link_names[i]) - expected).max()
+                < POSITION_TOLERANCE
+            )
 
 
-def test_machine_home_puts_the_flange_where_the_data_sheet_says(bullet: Bullet, robot: RobotModel) -> None:
+def test_machine_home_puts_the_flange_where_the_data_sheet_says(
+    bullet: Bullet, robot: RobotModel
+) -> None:
     bullet.place(robot.machine_home)
-    assert bullet.com_position("flange") == pytest.approx([1.765, 0.0, 1.784], abs=POSITION_TOLERANCE)
-    assert bullet.com_position("tool0") == pytest.approx([1.765, 0.0, 1.784], abs=POSITION_TOLERANCE)
+    assert bullet.com_position("flange") == pytest.approx(
+        [1.765, 0.0, 1.784], abs=POSITION_TOLERANCE
+    )
+    assert bullet.com_position("tool0") == pytest.approx(
+        [1.765, 0.0, 1.784], abs=POSITION_TOLERANCE
+    )
 
 
 def test_masses_and_inertias_are_those_of_the_data(bullet: Bullet, robot: RobotModel) -> None:
@@ -137,7 +155,9 @@ def test_every_link_has_a_mass() -> None:
 
 
 def test_gravity_torques_at_machine_home_empty(bullet: Bullet, robot: RobotModel) -> None:
-    """991 Nm at A2 and A3 (check of the machine data); positive A2 lowers the arm, so the sign is -."""
+    """991 Nm at A2 and A3 (check of the machine data); positive A2 lowers the arm, so the sign is
+    -.
+    """
     torque = bullet.gravity(robot.machine_home)
     assert torque[1] == pytest.approx(-991, abs=0.5)
     assert torque[2] == pytest.approx(-991, abs=0.5)
@@ -163,7 +183,9 @@ def test_a_tool_and_a_part_can_be_fixed_together(tmp_path: Path) -> None:
         assert world.dynamics("load_gripper")[0] == pytest.approx(155.0)
         assert world.dynamics("load_gear")[0] == pytest.approx(20.0)
         world.place(cell.robot.machine_home)
-        assert world.com_position("tcp") == pytest.approx([2.185, 0.0, 1.784], abs=POSITION_TOLERANCE)
+        assert world.com_position("tcp") == pytest.approx(
+            [2.185, 0.0, 1.784], abs=POSITION_TOLERANCE
+        )
     finally:
         pybullet.disconnect(physicsClientId=world.client)
 
@@ -196,7 +218,9 @@ def fixed_in_tree(tree: Xml.Element) -> dict[str, tuple[str, FloatArray]]:
     found = {}
     for joint in tree.iter("joint"):
         if joint.get("type") == "fixed":
-            origin, parent, child = joint.find("origin"), joint.find("parent"), joint.find("child")
+            origin = joint.find("origin")
+            parent = joint.find("parent")
+            child = joint.find("child")
             assert origin is not None and parent is not None and child is not None  # noqa: PT018
             pose = np.eye(4)
             pose[:3, 3] = [float(x) for x in origin.get("xyz", "").split()]
@@ -207,10 +231,12 @@ def fixed_in_tree(tree: Xml.Element) -> dict[str, tuple[str, FloatArray]]:
 
 
 def turn(axis: int, angle: float) -> FloatArray:
-    a, b = (axis + 1) % 3, (axis + 2) % 3
+    a = (axis + 1) % 3
+    b = (axis + 2) % 3
     R = np.eye(3)
     R[a, a] = R[b, b] = np.cos(angle)
-    R[b, a], R[a, b] = np.sin(angle), -np.sin(angle)
+    R[b, a] = np.sin(angle)
+    R[a, b] = -np.sin(angle)
     return R
 
 

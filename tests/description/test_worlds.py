@@ -13,7 +13,8 @@ from ir_description import bundled_cells, cell_from_yaml, load_cell
 SHAPE = "<geometry><box><size>1 2 3</size></box></geometry>"
 BOX = f"<collision name='c'><pose>0 0 1 0 0 0</pose>{SHAPE}</collision>"
 MESH = (
-    "<robot><link name='a'><collision><geometry><mesh filename='{}'/></geometry></collision></link></robot>"
+    "<robot><link name='a'><collision><geometry><mesh "
+    "filename='{}'/></geometry></collision></link></robot>"
 )
 
 
@@ -28,17 +29,22 @@ def test_what_is_written_is_read_back_the_same(
         Path(given).write_text(
             "format: ir_cell/1\nname: meshes\nrobot: kr6_r900_2\nequipment:\n"
             "  - {name: wedge_m, pose: {xyz: [1, 0, 0.5], abc_deg: [30, 20, 10]}, bodies: [\n"
-            "      {name: wedge, kind: mesh, vertices: [[0, 0, 0], [0.3, 0, 0], [0, 0.2, 0], [0, 0, 0.2]]},\n"
+            "      {name: wedge, kind: mesh, vertices: [[0, 0, 0], [0.3, 0, 0], [0, 0.2, 0], [0, "
+            "0, 0.2]]},\n"
             "      {name: rod, kind: capsule, radius: 0.1, length: 0.4, abc_deg: [0, 90, 0]}]}\n"
         )
     cell = load_cell(given)
     assert main(["cell", "export", given, str(tmp_path / f"world.{form}")]) == 0
     capsys.readouterr()
-    assert main(["cell", "import", str(tmp_path / f"world.{form}"), "--robot", cell.robot.name]) == 0
+    assert (
+        main(["cell", "import", str(tmp_path / f"world.{form}"), "--robot", cell.robot.name]) == 0
+    )
     out, err = capsys.readouterr()
     back = cell_from_yaml(out)
     assert err == ""
-    assert [machine.name for machine in back.equipment] == [machine.name for machine in cell.equipment]
+    assert [machine.name for machine in back.equipment] == [
+        machine.name for machine in cell.equipment
+    ]
     for machine, other in zip(cell.equipment, back.equipment, strict=True):
         np.testing.assert_allclose(other.pose, machine.pose, atol=1e-9)
         for body, same in zip(machine.present_bodies(), other.bodies, strict=True):
@@ -46,7 +52,9 @@ def test_what_is_written_is_read_back_the_same(
             np.testing.assert_allclose(same.size, body.size, rtol=1e-12)
             np.testing.assert_allclose(same.pose, body.pose, atol=1e-9)
             np.testing.assert_allclose(same.vertices, np.unique(body.vertices, axis=0), atol=0.0)
-    assert main(["cell", "export", given, str(tmp_path / f"world.{form}")]) == 1  # nothing is overwritten
+    assert (
+        main(["cell", "export", given, str(tmp_path / f"world.{form}")]) == 1
+    )  # nothing is overwritten
 
 
 @pytest.mark.parametrize(
@@ -55,10 +63,11 @@ def test_what_is_written_is_read_back_the_same(
         ("<sdf>", "not XML"),
         ("<!DOCTYPE a [<!ENTITY b 'c'>]><sdf/>", "entities"),
         ("<html/>", "must be sdf or robot"),
-        (f"<sdf><model><link>{BOX.replace('1 2 3', '1 2')}</link></model></sdf>", "must be 3 numbers"),
-        (f"<sdf><model><link>{BOX.replace('1 2 3', '1 nan 3')}</link></model></sdf>", "must be 3 numbers"),
+        (f"<sdf><model><link>{BOX.replace('1 2 3', '1 2')}</link></model></sdf>", "must be 3 numbers"),  # noqa: E501
+        (f"<sdf><model><link>{BOX.replace('1 2 3', '1 nan 3')}</link></model></sdf>", "must be 3 numbers"),  # noqa: E501
         (f"<sdf><model><link>{BOX.replace('1 2 3', '1 -2 3')}</link></model></sdf>", "size of c"),
-        (f"<sdf><model><link><pose relative_to='x'>1</pose>{BOX}</link></model></sdf>", "write them"),
+        ("<sdf><model><link><pose "
+f"relative_to='x'>1</pose>{BOX}</link></model></sdf>", "write them"),
         (MESH.format("../a.obj"), "without '..'"),
         (MESH.format("package://b/a.obj"), "folder"),
     ],
@@ -78,7 +87,9 @@ def test_what_moves_or_is_elsewhere_is_left_out_by_name(
     path = tmp_path / "world.sdf"
     arm = f"<model name='arm'><link name='a'>{BOX}</link><joint name='j' type='revolute'/></model>"
     two = f"<model name='2 tables'><link>{BOX}{BOX}</link></model>"
-    path.write_text(f"<sdf><world name='w'>{arm}{two}<include><uri>model://sun</uri></include></world></sdf>")
+    path.write_text(
+        f"<sdf><world name='w'>{arm}{two}<include><uri>model://sun</uri></include></world></sdf>"
+    )
     assert main(["cell", "import", str(path)]) == 0
     out, err = capsys.readouterr()
     assert [body.name for body in cell_from_yaml(out).machine("tables").bodies] == ["c", "tables_c"]
@@ -92,7 +103,8 @@ def test_the_glb_holds_every_body_where_it_stands(tmp_path: Path) -> None:
     path = tmp_path / "demo.glb"
     assert main(["cell", "export", "demo", str(path)]) == 0
     assert main(["cell", "export", "demo", str(path)]) == 1
-    cell, scene = load_cell("demo"), trimesh.load_scene(path)
+    cell = load_cell("demo")
+    scene = trimesh.load_scene(path)
     upright = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
     bodies = [body for machine in cell.equipment for body in machine.world_bodies()]
     assert len(scene.graph.nodes_geometry) == len(bodies)
@@ -103,4 +115,6 @@ def test_the_glb_holds_every_body_where_it_stands(tmp_path: Path) -> None:
         found.append([*points.min(axis=0), *points.max(axis=0)])
     for body in bodies:
         bounds = np.concatenate(body.bounds())
-        assert np.abs(np.array(found) - bounds).max(axis=1).min() < 0.02, body.name  # round ones have corners
+        assert np.abs(np.array(found) - bounds).max(axis=1).min() < 0.02, (
+            body.name
+        )  # round ones have corners

@@ -35,10 +35,16 @@ def make(cell: Cell) -> Callable[..., Simulation]:
 def plan(cell: Cell) -> Callable[..., JointTrajectory]:
     """Rest to rest through points: plan(2.0, q0, q1), or plan([0, 1, 2.5], q0, q1, q2)."""
 
-    def plan_one(times: float | Sequence[float], *points: Any, velocities: bool = True) -> JointTrajectory:
-        stamps = np.linspace(0.0, times, len(points)) if isinstance(times, float) else np.array(times)
+    def plan_one(
+        times: float | Sequence[float], *points: Any, velocities: bool = True
+    ) -> JointTrajectory:
+        stamps = (
+            np.linspace(0.0, times, len(points)) if isinstance(times, float) else np.array(times)
+        )
         rest = np.zeros((len(points), 6)) if velocities else None
-        return JointTrajectory.from_seconds(cell.robot.joint_names, stamps, np.array(points), rest, rest)
+        return JointTrajectory.from_seconds(
+            cell.robot.joint_names, stamps, np.array(points), rest, rest
+        )
 
     return plan_one
 
@@ -47,8 +53,12 @@ def plan(cell: Cell) -> Callable[..., JointTrajectory]:
 def start() -> Callable[..., int]:
     """Vet and execute a trajectory; returns the goal's id."""
 
-    def start_one(simulation: Simulation, trajectory: JointTrajectory, now_ns: int = 0, **more: Any) -> int:
-        return simulation.execute(simulation.vet(TrajectoryGoal(trajectory, **more), now_ns), now_ns)
+    def start_one(
+        simulation: Simulation, trajectory: JointTrajectory, now_ns: int = 0, **more: Any
+    ) -> int:
+        return simulation.execute(
+            simulation.vet(TrajectoryGoal(trajectory, **more), now_ns), now_ns
+        )
 
     return start_one
 

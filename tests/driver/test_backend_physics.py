@@ -44,7 +44,8 @@ def test_centres_of_mass_are_where_the_chain_puts_them(backend, cell):
             position = backend.link_com_position(link)
             com = robot.link_com[link]
             if link == 6:  # one body with its load
-                m, tool = robot.link_mass[link], cell.tool
+                m = robot.link_mass[link]
+                tool = cell.tool
                 com = (m * com + tool.mass * tool.com) / (m + tool.mass)
             expected = poses[link] @ np.append(com, 1.0)
             assert np.abs(position - expected[:3]).max() < POSITION_TOLERANCE
@@ -54,7 +55,10 @@ def test_bias_and_mass_matrix_agree_with_the_kernels(backend, make, cell):
     dynamics = make("ideal").dynamics
     for q in configurations(cell.robot, 20, seed=2):
         backend.reset(q)
-        assert np.abs(backend.bias() - dynamics.bias(q[None], np.zeros((1, 6)))[0]).max() < TORQUE_TOLERANCE
+        assert (
+            np.abs(backend.bias() - dynamics.bias(q[None], np.zeros((1, 6)))[0]).max()
+            < TORQUE_TOLERANCE
+        )
         H = dynamics.mass_matrix(q[None])[0]
         assert np.abs(backend.mass_matrix() - H).max() < 1e-9 * np.abs(H).max()
 
@@ -65,10 +69,16 @@ def test_a_tilted_base_turns_gravity(cell, make):
     tilted[:3, 3] = [0.4, -1.0, 0.2]
     simulation = make_simulation(replace(cell, base_pose=tilted), backend="pybullet")
     q = simulation.backend.q[None]
-    assert np.abs(simulation.backend.bias() - simulation.dynamics.gravity(q)[0]).max() < TORQUE_TOLERANCE
+    assert (
+        np.abs(simulation.backend.bias() - simulation.dynamics.gravity(q)[0]).max()
+        < TORQUE_TOLERANCE
+    )
     position = simulation.backend.link_com_position(5)
     pose = Chain(cell.robot, tilted).link_poses(q)[0, 5]
-    assert np.abs(position - (pose @ np.append(cell.robot.link_com[5], 1.0))[:3]).max() < POSITION_TOLERANCE
+    assert (
+        np.abs(position - (pose @ np.append(cell.robot.link_com[5], 1.0))[:3]).max()
+        < POSITION_TOLERANCE
+    )
 
 
 def test_a_lopsided_load_reaches_the_joints(cell, make):
@@ -81,7 +91,9 @@ def test_a_lopsided_load_reaches_the_joints(cell, make):
         simulation.backend.reset(q)
         expected = dynamics.mass_matrix(q[None])[0]
         assert np.allclose(simulation.backend.mass_matrix(), expected, atol=1e-6)
-        assert np.allclose(simulation.backend.bias(), dynamics.gravity(q[None])[0], atol=TORQUE_TOLERANCE)
+        assert np.allclose(
+            simulation.backend.bias(), dynamics.gravity(q[None])[0], atol=TORQUE_TOLERANCE
+        )
 
 
 def test_counterbalance_has_the_published_torques(cell):
@@ -92,7 +104,8 @@ def test_counterbalance_has_the_published_torques(cell):
 
 
 def test_envelope_and_friction_are_those_of_the_kernels(cell, make):
-    drives, dynamics = Drivetrain(cell.robot), make("ideal").dynamics
+    drives = Drivetrain(cell.robot)
+    dynamics = make("ideal").dynamics
     generator = np.random.default_rng(4)
     qd = generator.uniform(-1.0, 1.0, (50, 6)) * 1.1 * cell.robot.velocity_max
     assert np.allclose([drives.limit(v) for v in qd], dynamics.torque_limit(qd))
@@ -113,7 +126,9 @@ def test_envelope_and_friction_are_those_of_the_kernels(cell, make):
 
 @pytest.mark.parametrize("backend_name", ["pybullet", "ideal"])
 @pytest.mark.parametrize(("load", "payload"), [("cell", 155.0), ("none", 0.0)])
-@pytest.mark.parametrize("mode", ["STAND_ON_MOTORS", "STAND_ON_BRAKES", "BUS_POWER_OFF", "HIBERNATION"])
+@pytest.mark.parametrize(
+    "mode", ["STAND_ON_MOTORS", "STAND_ON_BRAKES", "BUS_POWER_OFF", "HIBERNATION"]
+)
 def test_table_2_at_machine_home(make, backend_name, load, payload, mode):
     simulation = make(backend_name, load, controller=ControllerSettings(start_mode=mode))
     simulation.plc.rest = Mode[mode] if mode in ("BUS_POWER_OFF", "HIBERNATION") else None
@@ -123,10 +138,14 @@ def test_table_2_at_machine_home(make, backend_name, load, payload, mode):
     after = simulation.mains.meter.reading()
     watts = (after.energy - before.energy) / (after.time - before.time)
     assert watts == pytest.approx(load_power_data().measured(payload, mode), rel=0.001)
-    assert simulation.standing_power(Mode[mode]) == pytest.approx(watts, rel=1e-4)  # encoders have steps
+    assert simulation.standing_power(Mode[mode]) == pytest.approx(
+        watts, rel=1e-4
+    )  # encoders have steps
 
 
-def test_a_movement_with_155_kg_is_tracked_and_costs_what_the_model_says(make, plan, start, run_out, cell):
+def test_a_movement_with_155_kg_is_tracked_and_costs_what_the_model_says(
+    make, plan, start, run_out, cell
+):
     q0 = np.array(cell.machine_home)
     there = plan(2.5, q0, q0 + np.array([1.2, 0.4, -0.4, 0.8, -0.5, 1.0]))
     energies = {}
@@ -143,7 +162,9 @@ def test_a_movement_with_155_kg_is_tracked_and_costs_what_the_model_says(make, p
 def test_a_torque_beyond_the_envelope_is_cut_and_the_tool_leaves_its_path(make, cell):
     simulation = make("pybullet")
     q0 = np.array(cell.machine_home)
-    step = 0.02 * np.sin(np.linspace(0.0, np.pi, 30)) ** 2  # 30 ms: far beyond what the motors can do
+    step = (
+        0.02 * np.sin(np.linspace(0.0, np.pi, 30)) ** 2
+    )  # 30 ms: far beyond what the motors can do
     for offset in step:
         simulation.backend.track(q0 + offset)
     work = simulation.backend.work()
@@ -181,12 +202,16 @@ def test_ideal_torques_of_a_batch_equal_those_of_single_steps(cell):
 
 
 def test_bullet_computes_with_every_plant_and_load_and_prints_nothing(cell, capfd):
-    data, generator, home = load_power_data(), np.random.default_rng(7), np.array(cell.machine_home)
+    data = load_power_data()
+    generator = np.random.default_rng(7)
+    home = np.array(cell.machine_home)
     for seed in range(30):
         plant = typical_plant(cell.robot, data, seed)
         spread = generator.normal(size=(3, 3))
         inertia = np.sum(spread**2) * np.eye(3) - spread @ spread.T  # of three points of 1 kg
-        load = Load("lopsided", "tool", 40.0 * generator.random(), generator.normal(size=3), inertia)
+        load = Load(
+            "lopsided", "tool", 40.0 * generator.random(), generator.normal(size=3), inertia
+        )
         arm = BulletArm(plant.robot, 0.001, np.eye(4))
         arm.carry((load,), home.tolist())
         H = DynamicsModel(plant.robot, (load,)).mass_matrix(home[None])[0]

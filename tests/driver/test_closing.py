@@ -18,7 +18,9 @@ SIGNS = [[1.0 if k >> j & 1 else -1.0 for j in range(6)] for k in range(64)]
 @pytest.fixture(scope="module")
 def loaded():
     """Simulations of the demonstration by load."""
-    return {load: make_simulation("demo", load, "ideal") for load in ("none", "cell", "gripper+gear")}
+    return {
+        load: make_simulation("demo", load, "ideal") for load in ("none", "cell", "gripper+gear")
+    }
 
 
 def still(q):
@@ -26,8 +28,11 @@ def still(q):
 
 
 def on(simulation, plan, q, stands):
-    """Route from where the robot stands onto a trajectory that waits at q; None where that is refused."""
-    robot, dynamics = simulation.robot, simulation.dynamics
+    """Route from where the robot stands onto a trajectory that waits at q; None where that is
+    refused.
+    """
+    robot = simulation.robot
+    dynamics = simulation.dynamics
     waiting = plan(1.0, q, q)
     try:
         check_trajectory(waiting, robot, dynamics, SETTINGS)
@@ -60,9 +65,12 @@ def test_at_home_every_direction_of_the_difference_is_closed(loaded, plan, load,
     exponent=st.floats(-11.0, -2.01),
 )
 @example("cell", [0.5, 0.5, 0.5, 0.5, 0.5, 0.5], [1.0, 1.0, -1.0, 1.0, 1.0, 1.0], -4.0)
-def test_wherever_it_stands_the_difference_is_closed_straight(loaded, plan, load, where, shares, exponent):
+def test_wherever_it_stands_the_difference_is_closed_straight(
+    loaded, plan, load, where, shares, exponent
+):
     simulation = loaded[load]
-    low, high = simulation.robot.position_min, simulation.robot.position_max
+    low = simulation.robot.position_min
+    high = simulation.robot.position_max
     q = low + np.array(where) * (high - low)
     stands = np.clip(q + 10.0**exponent * np.array(shares), low, high)
     route = on(simulation, plan, q, stands)

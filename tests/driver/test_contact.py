@@ -104,7 +104,9 @@ def test_a_pair_that_the_station_allows_may_touch_and_no_other(run_out):
     there = make_simulation(cell, backend="ideal")
     started(there, HOME, INTO_THE_PALLET, allow_collision=True, station="infeed_pick")
     contact = run_out(there).contact
-    assert contact.path_time > first.path_time  # until it is deeper than what is allowed, or another pair
+    assert (
+        contact.path_time > first.path_time
+    )  # until it is deeper than what is allowed, or another pair
     with pytest.raises(TrajectoryRefusedError, match="station 'nowhere' is unknown"):
         started(there, HOME, HOME, station="nowhere")
 
@@ -175,7 +177,8 @@ def test_a_part_stays_where_it_was_put_down(run_out):
     simulation.set_load(carried(DEMO, gripper))
     lying = [name for _, _, name in simulation.cell_watch.scene.model.pairs if name == "gear_lying"]
     assert lying
-    part, tcp = DEMO.part("gear"), simulation.tool.chain.tcp_poses(simulation.backend.q[None])[0]
+    part = DEMO.part("gear")
+    tcp = simulation.tool.chain.tcp_poses(simulation.backend.q[None])[0]
     (body,) = part.lying(tcp)
     (there,) = simulation.cell_watch.lying
     np.testing.assert_allclose(there.pose, body.pose)
@@ -186,7 +189,8 @@ def test_a_part_stays_where_it_was_put_down(run_out):
 
 def test_looks_are_rare_where_there_is_room():
     simulation = make_simulation(DEMO, backend="ideal")
-    looks, look = [], simulation.cell_watch.look
+    looks = []
+    look = simulation.cell_watch.look
     simulation.cell_watch.look = lambda *given: (looks.append(1), look(*given))
     started(simulation, HOME, HOME + np.array([1.0, -0.2, 0.0, 0.0, 0.5, 0.0]))
     simulation.run(4.0)
@@ -199,7 +203,8 @@ signals = st.lists(st.tuples(st.booleans(), st.floats(0.0, 3.0)), max_size=12)
 @given(signals)
 @settings(max_examples=50, deadline=None)
 def test_a_machine_ends_in_the_state_of_its_last_signal_in_its_own_time(heard):
-    machines, now = Machines(DEMO), 0.0
+    machines = Machines(DEMO)
+    now = 0.0
     switch = DEMO.machine("lathe").switch
     for level, pause in heard:
         machines.hear("lathe_open_door", level, now)
@@ -212,4 +217,6 @@ def test_a_machine_ends_in_the_state_of_its_last_signal_in_its_own_time(heard):
         machines.step(now)
     machines.step(now + switch.time + 1e-9)
     if heard:
-        assert machines.present(DEMO.machine("lathe")) == (switch.on if heard[-1][0] else switch.off,)
+        assert machines.present(DEMO.machine("lathe")) == (
+            switch.on if heard[-1][0] else switch.off,
+        )

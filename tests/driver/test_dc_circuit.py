@@ -27,7 +27,13 @@ def links(draw: st.DrawFn) -> LinkFigures:
     on = off * draw(st.floats(1.0, 1.2))
     small = st.floats(0.0, 5.0)
     return LinkFigures(
-        draw(st.floats(1e-4, 1e-2)), mains, on, off, draw(st.floats(2.0, 100.0)), draw(small), draw(small)
+        draw(st.floats(1e-4, 1e-2)),
+        mains,
+        on,
+        off,
+        draw(st.floats(2.0, 100.0)),
+        draw(small),
+        draw(small),
     )
 
 
@@ -56,7 +62,8 @@ def test_what_is_supplied_goes_to_axes_resistor_and_capacitor_at_every_step(
 def test_many_steps_at_once_are_the_steps_one_by_one(
     figures: LinkFigures, powers: list[list[float]], regeneration: Regeneration
 ) -> None:
-    once, each = DcCircuit(figures, DT, regeneration), DcCircuit(figures, DT, regeneration)
+    once = DcCircuit(figures, DT, regeneration)
+    each = DcCircuit(figures, DT, regeneration)
     together = once.steps(np.array(powers))
     single = np.array([each.step(row) for row in powers]).sum(axis=0)
     scale = 1.0 + DT * np.abs(powers).sum()
@@ -83,7 +90,11 @@ def test_without_hysteresis_it_is_the_bus_of_the_planner(
 def test_the_chopper_switches_as_in_a_fine_integration(powers: list[float]) -> None:
     """Euler's steps of 1 us of C dU/dt = i_mains - P / U - U / R."""
     figures = LinkFigures(1.33e-3, 560.0, 688.0, 668.0, 11.0, 0.0, 0.0)
-    circuit, voltage, closed, heat, fine = DcCircuit(figures, DT), 560.0, False, 0.0, 1e-6
+    circuit = DcCircuit(figures, DT)
+    voltage = 560.0
+    closed = False
+    heat = 0.0
+    fine = 1e-6
     dissipated = 0.0
     for power in powers:
         for _ in range(round(DT / fine)):
@@ -94,7 +105,9 @@ def test_the_chopper_switches_as_in_a_fine_integration(powers: list[float]) -> N
             voltage = max(voltage, 560.0)
         dissipated += circuit.step((power,)).dissipated
     assert abs(dissipated - heat) < 0.5 + 0.01 * heat  # J; a step of 1 us is up to 0.04 J late
-    assert circuit.voltage == pytest.approx(voltage, abs=21.0)  # the hysteresis: it may switch a step apart
+    assert circuit.voltage == pytest.approx(
+        voltage, abs=21.0
+    )  # the hysteresis: it may switch a step apart
 
 
 def test_the_rectifier_loses_its_drop_and_its_resistance() -> None:

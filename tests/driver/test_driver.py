@@ -1,4 +1,6 @@
-"""The running simulation without ROS: frames, goals checked beside it, outcomes to their senders."""
+"""The running simulation without ROS: frames, goals checked beside it, outcomes to their
+senders.
+"""
 
 from __future__ import annotations
 
@@ -40,9 +42,12 @@ def test_frames_carry_what_is_due(driver):
 
 
 def test_joints_are_handed_out_before_the_meter_is_read(make, monkeypatch):
-    """The meter takes a fifth of a tick at every fifth one: joint states would come that irregularly."""
+    """The meter takes a fifth of a tick at every fifth one: joint states would come that
+    irregularly.
+    """
     simulation = make()
-    driver, happened = Driver(simulation), []
+    driver = Driver(simulation)
+    happened = []
     settle = simulation.mains.settle
     monkeypatch.setattr(simulation.mains, "settle", lambda: (happened.append("meter"), settle())[1])
     for k in range(1, 51):
@@ -82,7 +87,9 @@ def test_outcomes_reach_the_sender_of_their_goal(driver, plan, cell, wait_for):
     outcomes = []
     for target in (home + 0.05, home - 0.05):
         goal = TrajectoryGoal(plan([1.5], target))
-        ended = functools.partial(lambda target, outcome: outcomes.append((target[0], outcome.code)), target)
+        ended = functools.partial(
+            lambda target, outcome: outcomes.append((target[0], outcome.code)), target
+        )
         ticket = driver.submit(2, lambda goal=goal: goal, ended)
         wait_for(lambda ticket=ticket: driver.following(ticket) is not None, what="the goal starts")
         frames(driver, 100)
@@ -93,9 +100,12 @@ def test_outcomes_reach_the_sender_of_their_goal(driver, plan, cell, wait_for):
     ]
 
 
-def test_a_goal_that_is_cancelled_while_it_is_checked_ends_as_cancelled(driver, plan, cell, wait_for):
+def test_a_goal_that_is_cancelled_while_it_is_checked_ends_as_cancelled(
+    driver, plan, cell, wait_for
+):
     home = np.array(cell.machine_home)
-    release, outcomes = threading.Event(), []
+    release = threading.Event()
+    outcomes = []
 
     def slow():
         release.wait(60.0)
@@ -106,7 +116,9 @@ def test_a_goal_that_is_cancelled_while_it_is_checked_ends_as_cancelled(driver, 
     release.set()
     wait_for(lambda: driver.following(ticket) is not None, what="the goal starts")
     frames(driver, 500)
-    assert [(outcome.canceled, outcome.code) for outcome in outcomes] == [(True, ErrorCode.SUCCESSFUL)]
+    assert [(outcome.canceled, outcome.code) for outcome in outcomes] == [
+        (True, ErrorCode.SUCCESSFUL)
+    ]
 
 
 def test_what_a_goal_is_refused_for_reaches_its_sender(driver):
@@ -130,7 +142,8 @@ def test_what_a_goal_is_refused_for_reaches_its_sender(driver):
 
 
 def test_a_flood_of_goals_is_bounded(driver):
-    release, answers = threading.Event(), []
+    release = threading.Event()
+    answers = []
 
     def slow():
         release.wait(60.0)
@@ -151,7 +164,8 @@ def test_a_goal_of_too_many_points_is_refused_before_it_waits(driver):
 
 
 def test_a_check_does_not_hold_up_the_plant(driver):
-    blocking, release = threading.Event(), threading.Event()
+    blocking = threading.Event()
+    release = threading.Event()
 
     def slow():
         blocking.set()

@@ -1,5 +1,5 @@
-"""Generated programs of every bundled cell in the simulated robot: every step, and the whole, costs what was
-planned; the tool goes where it was planned.
+"""Generated programs of every bundled cell in the simulated robot: every step, and the whole, costs
+what was planned; the tool goes where it was planned.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.motion.goal import ErrorCode, TrajectoryGoal
 from ir_sim_driver.plant.loads import carried
 
-STEP_SHARE, STEP_JOULES = 0.01, 10.0  # whichever is larger
+# whichever is larger
+STEP_SHARE = 0.01
+STEP_JOULES = 10.0
 TOTAL_SHARE = 0.01
 TOOL = 0.001  # m
 LONGEST_PAUSE = 2.0  # s: the rest is stepped for nothing
@@ -86,7 +88,9 @@ def drive(simulation: Simulation, movement: PlannedMovement) -> None:
 )
 def test_every_step_and_the_whole_cost_what_was_planned(drawn: Drawn) -> None:
     cell = cell_of(drawn)
-    planner = Planner(itertools.repeat(0.0).__next__)  # its clock stands still: no ceiling cuts the plan
+    planner = Planner(
+        itertools.repeat(0.0).__next__
+    )  # its clock stands still: no ceiling cuts the plan
     planner.set_cell(cell_to_yaml(cell), "")
     plan = planner.plan_program((), 0.0, PlanOptions(seed=0), np.array(cell.park))
     assert plan.status.ok, plan.status.message
@@ -100,10 +104,13 @@ def test_every_step_and_the_whole_cost_what_was_planned(drawn: Drawn) -> None:
         if movement.load != simulation.load.text:
             simulation.set_load(carried(cell, movement.load))
         drive(simulation, movement)
-        measured, planned = simulation.mains.energy() - before, movement.report.energy
+        measured = simulation.mains.energy() - before
+        planned = movement.report.energy
         before += measured
         if abs(measured - planned) > max(STEP_JOULES, STEP_SHARE * planned):
-            wrong.append(f"{movement.kind} {movement.to_station}: {planned:.0f} J planned, {measured:.0f} J")
+            wrong.append(
+                f"{movement.kind} {movement.to_station}: {planned:.0f} J planned, {measured:.0f} J"
+            )
     assert wrong == []
     assert before - begin == pytest.approx(plan.report.energy, rel=TOTAL_SHARE)
     assert len(plan.movements) >= 5

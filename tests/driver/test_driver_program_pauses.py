@@ -1,5 +1,5 @@
-"""Pauses of planned programs as the program runner drives them, without real time: every step and the program
-cost what was planned.
+"""Pauses of planned programs as the program runner drives them, without real time: every step and
+the program cost what was planned.
 """
 
 from __future__ import annotations
@@ -25,7 +25,9 @@ from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.motion.goal import ErrorCode, TrajectoryGoal
 from ir_sim_driver.plant.loads import carried
 
-SHARE, JOULES = 0.03, 20.0  # of a movement or a pause, whichever is larger
+# of a movement or a pause, whichever is larger
+SHARE = 0.03
+JOULES = 20.0
 TOTAL = 0.01  # of the program
 TOOL = 0.001  # m
 
@@ -34,7 +36,8 @@ class Plant:
     """A stepped robot that fulfils a program's requests; what each step took [J], and its note."""
 
     def __init__(self, cell: Cell) -> None:
-        self.cell, self.plant = cell, make_simulation(cell)
+        self.cell = cell
+        self.plant = make_simulation(cell)
         self.plant.backend.reset(np.array(cell.park))
         self.plant.executor.hold(np.array(cell.park))
         self.took: dict[int, float] = {}
@@ -43,18 +46,21 @@ class Plant:
 
     def run(self, program: Program) -> Any:
         steps = program.run()
-        status, modes = Status.success(), ()
+        status = Status.success()
+        modes = ()
         try:
             request = next(steps)
             while True:
                 status, modes = self.fulfil(request)
                 plant = self.plant
-                outcome = ask.Outcome(plant.time, plant.modes.mode, status, modes, plant.mains.energy())
+                outcome = ask.Outcome(
+                    plant.time, plant.modes.mode, status, modes, plant.mains.energy()
+                )
                 request = steps.send(outcome)
         except StopIteration as ended:
             return ended.value
 
-    def fulfil(self, request: ask.Request) -> tuple[Status, tuple[Any, ...]]:
+    def fulfil(self, request: ask.Request) -> tuple[Status, tuple[Any, ...]]:  # noqa: C901
         plant = self.plant
         match request:
             case ask.Announce(index, event, note):
@@ -114,8 +120,12 @@ def with_pauses(cell: Cell, pauses: tuple[tuple[float, str], ...]) -> Cell:
 @pytest.mark.parametrize(
     ("pauses", "modes"),
     [
-        # the first is too short for its mode, but so long that the controller would close its brakes
-        (((22.0, "BUS_POWER_OFF"), (120.0, "AUTO")), ("STAND_ON_BRAKES", "STAND_ON_BRAKES>BUS_POWER_OFF")),
+        # the first is too short for its mode, but so long that the controller would close its
+        # brakes
+        (
+            ((22.0, "BUS_POWER_OFF"), (120.0, "AUTO")),
+            ("STAND_ON_BRAKES", "STAND_ON_BRAKES>BUS_POWER_OFF"),
+        ),
         pytest.param(
             ((30.0, "BUS_POWER_OFF"), (10.0, "STAND_ON_MOTORS")),
             ("BUS_POWER_OFF", "STAND_ON_MOTORS"),

@@ -24,7 +24,9 @@ def test_an_hour_of_shift(make, plan, start, cell):
     home = np.array(cell.machine_home)
     work = home + np.array([1.0, 0.3, -0.3, 0.5, -0.4, 0.6])
     total = last = 0.0
-    at_work, levels, settled = False, set(), 0
+    at_work = False
+    levels = set()
+    settled = 0
     for k in range(1, HOUR):
         within = k % BLOCK
         if within % (MINUTE // 2) == 100 and within < 4 * MINUTE:

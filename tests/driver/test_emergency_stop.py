@@ -1,4 +1,6 @@
-"""Emergency stop: stops at once, says how far off the path, and nothing resumes or jumps afterwards."""
+"""Emergency stop: stops at once, says how far off the path, and nothing resumes or jumps
+afterwards.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +56,9 @@ def test_brakes_take_no_motor_power_and_hold_against_gravity(stopped):
     stopped.run(1.0)
     after = stopped.mains.meter.reading()
     assert np.array_equal(stopped.backend.q, q)
-    assert after.energy - before.energy == pytest.approx(325.0, rel=1e-3)  # Table II, on brakes with 155 kg
+    assert after.energy - before.energy == pytest.approx(
+        325.0, rel=1e-3
+    )  # Table II, on brakes with 155 kg
 
 
 def test_release_alone_does_nothing_and_recover_needs_it(stopped):
@@ -138,14 +142,19 @@ def test_brakes_that_act_at_once_stop_sooner(make, plan, start, home):
         simulation = make("pybullet", supervision=SupervisionSettings(brake_reaction=reaction))
         start(simulation, plan(2.5, home, home + np.array([1.2, 0.0, 0.0, 0.0, 0.0, 0.0])))
         simulation.run(1.25)
-        q, speed = simulation.backend.q[0], simulation.backend.qd[0]
+        q = simulation.backend.q[0]
+        speed = simulation.backend.qd[0]
         simulation.plc.set_bit("emergency_stop", True)
         simulation.run(1.0)
         stops.append(simulation.backend.q[0] - q)
-    assert stops[1] - stops[0] == pytest.approx(0.05 * speed, rel=0.2)  # friction brakes a little meanwhile
+    assert stops[1] - stops[0] == pytest.approx(
+        0.05 * speed, rel=0.2
+    )  # friction brakes a little meanwhile
 
 
-def test_physics_that_fail_stop_the_robot_and_recover_starts_them_again(make, plan, start, home, monkeypatch):
+def test_physics_that_fail_stop_the_robot_and_recover_starts_them_again(
+    make, plan, start, home, monkeypatch
+):
     simulation = make("pybullet")
     start(simulation, plan(2.0, home, home + 0.2))
     simulation.run(0.5)

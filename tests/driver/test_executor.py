@@ -1,4 +1,6 @@
-"""Execution as a table of sample times; scaling, hold, stop and replacement keep path and limits."""
+"""Execution as a table of sample times; scaling, hold, stop and replacement keep path and
+limits.
+"""
 
 from __future__ import annotations
 
@@ -56,12 +58,18 @@ def test_a_goal_ends_when_its_trajectory_does(make, plan, start, run_out, home, 
     simulation = make()
     goal_id = start(simulation, plan(2.0, home, there))
     outcome = run_out(simulation)
-    assert (outcome.goal_id, outcome.code, outcome.canceled) == (goal_id, ErrorCode.SUCCESSFUL, False)
+    assert (outcome.goal_id, outcome.code, outcome.canceled) == (
+        goal_id,
+        ErrorCode.SUCCESSFUL,
+        False,
+    )
     assert simulation.steps == pytest.approx(2000, abs=2)
     assert outcome.energy > 0.0
 
 
-def test_a_first_time_above_zero_leads_in_from_where_the_robot_is(make, plan, start, run_out, home, there):
+def test_a_first_time_above_zero_leads_in_from_where_the_robot_is(
+    make, plan, start, run_out, home, there
+):
     simulation = make()
     trajectory = plan([2.0, 4.0], there, home)
     start(simulation, trajectory)
@@ -91,12 +99,16 @@ def test_a_small_difference_at_the_start_is_closed_before_path_time_runs(
     start(simulation, plan(2.0, home + 0.009, there))
     assert simulation.executor.path_time < 0.0
     q = positions(simulation, 0.5)
-    assert np.abs(np.diff(q, 2, axis=0)).max() / DT**2 < 4.5  # no jump: within the acceleration limits
+    assert (
+        np.abs(np.diff(q, 2, axis=0)).max() / DT**2 < 4.5
+    )  # no jump: within the acceleration limits
     assert run_out(simulation).code == ErrorCode.SUCCESSFUL
 
 
 @pytest.mark.parametrize("factor", [0.5, 0.25])
-def test_speed_scaling_stretches_time_and_keeps_the_path(make, plan, start, run_out, home, there, factor):
+def test_speed_scaling_stretches_time_and_keeps_the_path(
+    make, plan, start, run_out, home, there, factor
+):
     simulation = make()
     trajectory = plan(2.0, home, there)
     simulation.set_speed_scaling(factor)
@@ -144,7 +156,9 @@ def test_a_speed_scaling_that_means_nothing_is_ignored_with_a_warning(make, fact
 
 @settings(max_examples=12, deadline=None)
 @given(at=st.floats(0.0, 2.0), backend=st.sampled_from(["ideal", "pybullet"]))
-def test_a_cancel_at_any_instant_stops_on_the_path_within_the_limits(make, plan, start, cell, at, backend):
+def test_a_cancel_at_any_instant_stops_on_the_path_within_the_limits(
+    make, plan, start, cell, at, backend
+):
     home = np.array(cell.machine_home)
     there = home + np.array([0.8, 0.3, -0.3, 0.5, -0.4, 0.6])
     simulation = make(backend)
@@ -204,7 +218,9 @@ def test_a_hundred_replacements_a_second_end_each_goal_once(make, plan, start, h
     simulation.run(1.6)
     outcomes = simulation.take_outcomes()
     assert [outcome.goal_id for outcome in outcomes] == ids
-    assert [outcome.code for outcome in outcomes] == [ErrorCode.INVALID_GOAL] * 99 + [ErrorCode.SUCCESSFUL]
+    assert [outcome.code for outcome in outcomes] == [ErrorCode.INVALID_GOAL] * 99 + [
+        ErrorCode.SUCCESSFUL
+    ]
 
 
 BOUND = np.array([600.0, 600.0, 600.0, 100.0, 100.0, 100.0])  # Nm, of docs/driver.md
@@ -229,7 +245,9 @@ def test_up_to_the_bound_a_disturbed_tool_stays_within_two_millimetres(load, see
     assert outcomes[0].max_tool_deviation < 0.001
 
 
-def test_a_robot_that_leaves_the_tube_is_stopped_by_the_brakes(make, plan, start, run_out, home, there, cell):
+def test_a_robot_that_leaves_the_tube_is_stopped_by_the_brakes(
+    make, plan, start, run_out, home, there, cell
+):
     simulation = make("pybullet")
     start(simulation, plan(2.0, home, there))
     simulation.run(0.9)
@@ -256,9 +274,13 @@ def test_a_path_tolerance_names_the_joint_and_the_amount(make, plan, start, run_
     assert "joint_a3 position error" in outcome.sentence
 
 
-def test_an_unreached_goal_tolerance_ends_after_the_goal_time(make, plan, start, run_out, home, there):
+def test_an_unreached_goal_tolerance_ends_after_the_goal_time(
+    make, plan, start, run_out, home, there
+):
     simulation = make("pybullet")
-    tight = [JointTolerance(f"joint_a{i}", position=1e-9) for i in range(1, 7)]  # finer than encoders
+    tight = [
+        JointTolerance(f"joint_a{i}", position=1e-9) for i in range(1, 7)
+    ]  # finer than encoders
     start(simulation, plan(2.0, home, there), goal_tolerance=tight, goal_time=0.3)
     simulation.run(1.9)
     simulation.disturb(np.array([300.0, 0.0, 0.0, 0.0, 0.0, 0.0]))

@@ -1,4 +1,6 @@
-"""Any sequence of bits, requests and goals: no illegal transition, jump or crash; energy only grows."""
+"""Any sequence of bits, requests and goals: no illegal transition, jump or crash; energy only
+grows.
+"""
 
 from __future__ import annotations
 
@@ -33,8 +35,20 @@ IDLE = IdleTimes(motors_to_brakes_in_program=0.4, motors_to_brakes_in_command=0.
 M = Mode
 AWAKE = {M.STAND_ON_MOTORS, M.MOVING}
 LEGAL = {
-    M.STAND_ON_MOTORS: {M.MOVING, M.TO_BRAKES, M.TO_BUS_POWER_OFF, M.TO_HIBERNATION, M.FROM_HIBERNATION},
-    M.MOVING: {M.STAND_ON_MOTORS, M.TO_BRAKES, M.TO_BUS_POWER_OFF, M.TO_HIBERNATION, M.FROM_HIBERNATION},
+    M.STAND_ON_MOTORS: {
+        M.MOVING,
+        M.TO_BRAKES,
+        M.TO_BUS_POWER_OFF,
+        M.TO_HIBERNATION,
+        M.FROM_HIBERNATION,
+    },
+    M.MOVING: {
+        M.STAND_ON_MOTORS,
+        M.TO_BRAKES,
+        M.TO_BUS_POWER_OFF,
+        M.TO_HIBERNATION,
+        M.FROM_HIBERNATION,
+    },
     M.TO_BRAKES: {M.STAND_ON_BRAKES},
     M.STAND_ON_BRAKES: {M.FROM_BRAKES, M.TO_BUS_POWER_OFF, M.TO_HIBERNATION, M.FROM_HIBERNATION},
     M.FROM_BRAKES: {M.STAND_ON_MOTORS},
@@ -54,11 +68,13 @@ actions = st.one_of(
     st.tuples(st.just("mode"), st.sampled_from([mode for mode in OperatingMode if mode])),
     st.tuples(st.just("goal"), st.floats(-0.1, 0.1)),
     st.tuples(st.just("scaling"), st.sampled_from([0.0, 0.3, 1.0, -1.0, float("nan")])),
-    st.tuples(st.sampled_from(["wake", "recover", "pause", "end_pause", "cancel", "load"]), st.just(None)),
+    st.tuples(
+        st.sampled_from(["wake", "recover", "pause", "end_pause", "cancel", "load"]), st.just(None)
+    ),
 )
 
 
-def act(simulation, what, value, plan, start):
+def act(simulation, what, value, plan, start):  # noqa: C901
     home = np.array(simulation.cell.machine_home)
     match what:
         case "all":
@@ -109,14 +125,16 @@ def keep_the_laws(make, plan, start, sequence):
         load="none",
         backend="ideal",
     )
-    before, energy = simulation.modes.mode, 0.0
+    before = simulation.modes.mode
+    energy = 0.0
     for (what, value), steps in sequence:
         if simulation.on_the_network or what in ("wake", "all"):
             with contextlib.suppress(DriverError):
                 act(simulation, what, value, plan, start)
         for _ in range(steps):
             pressed = simulation.plc.levels.emergency_stop
-            q, qd = simulation.backend.q, simulation.backend.qd
+            q = simulation.backend.q
+            qd = simulation.backend.qd
             simulation.step()
             now = simulation.modes.mode
             if now is not before:
@@ -132,12 +150,17 @@ def keep_the_laws(make, plan, start, sequence):
         assert reading.energy >= energy
         energy = reading.energy
         parts = (
-            reading.base_energy + reading.axis_energy.sum() + reading.burnt_energy + reading.capacitor_energy
+            reading.base_energy
+            + reading.axis_energy.sum()
+            + reading.burnt_energy
+            + reading.capacitor_energy
         )
         assert reading.energy == pytest.approx(parts, rel=1e-9, abs=1e-6)
 
 
-@pytest.mark.parametrize("seed", [7, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(8, 12))])
+@pytest.mark.parametrize(
+    "seed", [7, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(8, 12))]
+)
 def test_a_hundred_thousand_steps_of_random_bits(make, seed):
     """Bits that a broken PLC might send, 1000 a second."""
     simulation = make(transitions=QUICK, idle=IDLE, load="none")
@@ -155,6 +178,10 @@ def test_a_hundred_thousand_steps_of_random_bits(make, seed):
         simulation.step()
         now = simulation.modes.mode
         seen.add(now)
-        assert now is before or now in LEGAL[before] or (now is M.EMERGENCY_STOP and before in DRIVES_ON)
+        assert (
+            now is before
+            or now in LEGAL[before]
+            or (now is M.EMERGENCY_STOP and before in DRIVES_ON)
+        )
         before = now
     assert len(seen) >= 8

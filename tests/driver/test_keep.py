@@ -1,4 +1,6 @@
-"""Where along a trajectory the contacts of a station are allowed: in its machine's zone, nowhere else."""
+"""Where along a trajectory the contacts of a station are allowed: in its machine's zone, nowhere
+else.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,8 @@ def over_the_zone():
 
 INTO = over_the_zone()
 points = st.lists(
-    st.tuples(st.floats(0.0, 1.3), st.lists(st.floats(-0.4, 0.4), min_size=6, max_size=6)), max_size=3
+    st.tuples(st.floats(0.0, 1.3), st.lists(st.floats(-0.4, 0.4), min_size=6, max_size=6)),
+    max_size=3,
 )
 
 
@@ -68,7 +71,9 @@ def test_the_pieces_are_the_path_and_inside_means_in_the_zone(between, seconds):
 
 
 def test_an_allowed_pair_may_not_touch_far_from_its_station():
-    """Two links that touch at a posture far from the station are allowed to touch, at the station."""
+    """Two links that touch at a posture far from the station are allowed to touch, at the
+    station.
+    """
     rng = np.random.default_rng(1)
     q = rng.uniform(DEMO.robot.position_min, DEMO.robot.position_max, (3000, 6))
     near = SCENE.model.min_distance(q)
@@ -82,14 +87,18 @@ def test_an_allowed_pair_may_not_touch_far_from_its_station():
     )
     simulation = make_simulation(replace(DEMO, stations=stations), backend="ideal")
     rest = np.zeros((2, 6))
-    there = JointTrajectory.from_seconds(DEMO.robot.joint_names, [0.0, 1.0], [q[k], q[k]], rest, rest)
+    there = JointTrajectory.from_seconds(
+        DEMO.robot.joint_names, [0.0, 1.0], [q[k], q[k]], rest, rest
+    )
     with pytest.raises(TrajectoryRefusedError, match=f"{pair.body_a} and {pair.body_b}"):
         simulation.vet(TrajectoryGoal(there, station=STATION), 0)
 
 
 def test_no_state_accelerates_surfaces_harder_than_the_watch_counts_on():
     """By the kernels: random states under the whole envelope, of plants and loads of all kinds."""
-    rng, robot, data = np.random.default_rng(2), DEMO.robot, load_power_data()
+    rng = np.random.default_rng(2)
+    robot = DEMO.robot
+    data = load_power_data()
     tool = DEMO.tool.name
     loads = [carried(DEMO, text).loads for text in ("none", tool, f"{tool}+{DEMO.parts[0].name}")]
     for k, load in enumerate(loads * 2):
@@ -100,5 +109,7 @@ def test_no_state_accelerates_surfaces_harder_than_the_watch_counts_on():
         most = dynamics.torque_limit(np.zeros_like(q))
         a = np.abs(dynamics.forward_dynamics(q, qd, most * rng.choice([-1.0, 0.0, 1.0], (5000, 6))))
         for _, reach in SCENE.groups:
-            assert 2.0 * float(reach @ robot.acceleration_max) < (a @ reach).max()  # a bound of 2 is wrong
+            assert (
+                2.0 * float(reach @ robot.acceleration_max) < (a @ reach).max()
+            )  # a bound of 2 is wrong
             assert (a @ reach).max() < HARDEST / 1.3 * float(reach @ robot.acceleration_max)

@@ -1,4 +1,6 @@
-"""Where the drives barely hold the robot: what was certified is started from every side, and followed."""
+"""Where the drives barely hold the robot: what was certified is started from every side, and
+followed.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,13 @@ from ir_description import load_cell, robot_urdf
 from ir_kernels.dynamics import DynamicsModel
 from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.motion import ErrorCode, ExecutionSettings, Motion, check_trajectory, checked_route
+from ir_sim_driver.motion import (
+    ErrorCode,
+    ExecutionSettings,
+    Motion,
+    check_trajectory,
+    checked_route,
+)
 
 SETTINGS = ExecutionSettings()
 SATURATED = 0.3  # s that a motor may give all it has
@@ -29,12 +37,14 @@ def bare():
 
 
 def weak(bare, share, friction=0.0):
-    """Robot and dynamics whose joint_a3 needs this share of its torque to stand stretched; friction: share of
-    joint_a3's Coulomb friction that is counted in.
+    """Robot and dynamics whose joint_a3 needs this share of its torque to stand stretched;
+    friction: share of joint_a3's Coulomb friction that is counted in.
     """
     cell, loads = bare
     zero = np.zeros((1, 6))
-    holding = DynamicsModel(cell.robot, loads, cell.base_pose).inverse_dynamics(STRETCHED[None], zero, zero)
+    holding = DynamicsModel(cell.robot, loads, cell.base_pose).inverse_dynamics(
+        STRETCHED[None], zero, zero
+    )
     torque = np.array(cell.robot.envelope_torque)
     needed = abs(holding[0, 2]) + friction * cell.robot.friction_coulomb[2]
     torque[2] = needed / share
@@ -61,7 +71,9 @@ def test_a_joint_that_may_rest_where_friction_is_too_much_for_it_does_not_keep_o
     for trajectory in (plan(1.0, STRETCHED, STRETCHED), plan(2.0, STRETCHED, turned(0))):
         check_trajectory(trajectory, robot, dynamics, SETTINGS)
         for signs in SIGNS[::5]:
-            route = checked_route(trajectory, still(STRETCHED + size * signs), robot, dynamics, SETTINGS)
+            route = checked_route(
+                trajectory, still(STRETCHED + size * signs), robot, dynamics, SETTINGS
+            )
             assert route.lead == 1
             assert route.offset < SATURATED
             assert np.abs(route.path.position(route.offset) - STRETCHED).max() < 1e-12
@@ -71,7 +83,9 @@ def test_a_difference_that_the_drives_cant_close_is_refused_with_what_to_do(bare
     robot, dynamics = weak(bare, 0.97)
     trajectory = plan(2.0, STRETCHED, turned(0))
     check_trajectory(trajectory, robot, dynamics, SETTINGS)
-    with pytest.raises(TrajectoryRefusedError, match=r"joint_a3 needs .*plan it again from where it stands"):
+    with pytest.raises(
+        TrajectoryRefusedError, match=r"joint_a3 needs .*plan it again from where it stands"
+    ):
         checked_route(trajectory, still(STRETCHED + 0.005), robot, dynamics, SETTINGS)
 
 
@@ -82,7 +96,9 @@ def test_what_moves_every_joint_at_the_edge_is_reached_within_the_torques(bare, 
     trajectory = plan(60.0, STRETCHED, STRETCHED + np.array([0.1, -0.02, -0.02, 0.1, 0.02, 0.1]))
     check_trajectory(trajectory, robot, dynamics, SETTINGS)
     for signs in SIGNS[::5]:
-        route = checked_route(trajectory, still(STRETCHED + size * signs), robot, dynamics, SETTINGS)
+        route = checked_route(
+            trajectory, still(STRETCHED + size * signs), robot, dynamics, SETTINGS
+        )
         share = torque_share(route, robot, bare[1], bare[0], dynamics)
         assert share.max() <= 1.0 + SETTINGS.limit_slack
 
@@ -105,9 +121,11 @@ def torque_share(route, robot, loads, cell, dynamics):
 def test_every_kind_of_lead_in_keeps_the_torques_by_a_second_opinion(bare, plan, seed):
     """Closing, leading in until a first time above 0, and bridging in motion."""
     cell, loads = bare
-    robot, rng = cell.robot, np.random.default_rng(seed)
+    robot = cell.robot
+    rng = np.random.default_rng(seed)
     dynamics = DynamicsModel(robot, loads, cell.base_pose)
-    low, high = robot.position_min + 0.6, robot.position_max - 0.6
+    low = robot.position_min + 0.6
+    high = robot.position_max - 0.6
     seen = set()
     for _ in range(20):
         q = low + rng.random(6) * (high - low)
@@ -125,14 +143,19 @@ def test_every_kind_of_lead_in_keeps_the_torques_by_a_second_opinion(bare, plan,
             except TrajectoryRefusedError:
                 assert kind != "closing" or torque_share_at(dynamics, q) > 1.0
                 continue
-            assert torque_share(route, robot, loads, cell, dynamics).max() <= 1.0 + SETTINGS.limit_slack
+            assert (
+                torque_share(route, robot, loads, cell, dynamics).max()
+                <= 1.0 + SETTINGS.limit_slack
+            )
             seen.add(kind)
     assert seen == {"closing", "leading", "bridging"}
 
 
 def torque_share_at(dynamics, q):
     zero = np.zeros((1, 6))
-    return float((np.abs(dynamics.inverse_dynamics(q[None], zero, zero)) / dynamics.torque_limit(zero)).max())
+    return float(
+        (np.abs(dynamics.inverse_dynamics(q[None], zero, zero)) / dynamics.torque_limit(zero)).max()
+    )
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

@@ -1,4 +1,6 @@
-"""A load that is not the declared one is noticed by the torque it takes, and a declared one is not."""
+"""A load that is not the declared one is noticed by the torque it takes, and a declared one is
+not.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,13 @@ import pytest
 from ir_description import data_sheet, load_cell, robot_marks
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver import LoadCheckSettings, Outcome, SimulationSettings, TrajectoryGoal, make_simulation
+from ir_sim_driver import (
+    LoadCheckSettings,
+    Outcome,
+    SimulationSettings,
+    TrajectoryGoal,
+    make_simulation,
+)
 from ir_sim_driver.controller.diagnostics import report
 from ir_sim_driver.load_check import Declared, Motion, Uncertainty, weighed
 from ir_sim_driver.notices import Level
@@ -18,13 +26,17 @@ CELL = load_cell("demo")
 
 
 def driven(mass_error: float, load: str = "cell", backend: str = "ideal") -> tuple[Outcome, Level]:
-    """A movement of A2 with a load that is so much heavier than declared, and the executor's level after."""
+    """A movement of A2 with a load that is so much heavier than declared, and the executor's level
+    after.
+    """
     settings = SimulationSettings(load_check=LoadCheckSettings(mass_error=mass_error))
     simulation = make_simulation(CELL, load, backend, settings)
     q = simulation.executor.command
     there = q + np.array([0.0, 0.4, 0.0, 0.0, 0.0, 0.0])
     rest = np.zeros((2, 6))
-    goal = JointTrajectory.from_seconds(simulation.robot.joint_names, [0.0, 1.5], [q, there], rest, rest)
+    goal = JointTrajectory.from_seconds(
+        simulation.robot.joint_names, [0.0, 1.5], [q, there], rest, rest
+    )
     simulation.execute(simulation.vet(TrajectoryGoal(goal, label="up"), 0), 0)
     for _ in range(40):
         simulation.run(0.1)
@@ -36,7 +48,9 @@ def driven(mass_error: float, load: str = "cell", backend: str = "ideal") -> tup
 
 @pytest.mark.parametrize("backend", ["ideal", "pybullet"])
 @pytest.mark.parametrize("error", [0.2, -0.2])
-def test_a_fifth_of_the_load_is_noticed_with_expected_and_found_torque(error: float, backend: str) -> None:
+def test_a_fifth_of_the_load_is_noticed_with_expected_and_found_torque(
+    error: float, backend: str
+) -> None:
     outcome, level = driven(error, backend=backend)
     finding = outcome.load_check
     assert finding is not None
@@ -61,20 +75,25 @@ def test_no_load_is_not_weighed() -> None:
 
 
 def test_the_estimated_mass_is_as_uncertain_as_it_says() -> None:
-    """Robots drawn from the parameters' covariance; what is found is the model of another implementation's
-    draw, without any column of the check.
+    """Robots drawn from the parameters' covariance; what is found is the model of another
+    implementation's draw, without any column of the check.
     """
-    load, marks, generator = carried(CELL, "gripper"), robot_marks(), np.random.default_rng(5)
+    load = carried(CELL, "gripper")
+    marks = robot_marks()
+    generator = np.random.default_rng(5)
     declared = Declared(load, Uncertainty(CELL.robot, data_sheet(), marks, CELL.base_pose))
     z = []
     for seed in range(60):
         s = np.linspace(0.0, 1.0, 24)[:, None]
-        start, delta = generator.uniform(-0.8, 0.8, 6) + CELL.machine_home, generator.uniform(-0.8, 0.8, 6)
+        start = generator.uniform(-0.8, 0.8, 6) + CELL.machine_home
+        delta = generator.uniform(-0.8, 0.8, 6)
         q = start + (10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5) * delta
         qd = (30.0 * s**2 - 60.0 * s**3 + 30.0 * s**4) * delta / 1.5
         qdd = (60.0 * s - 180.0 * s**2 + 120.0 * s**3) * delta / 1.5**2
         drawn = data_sheet().drawn(seed)
-        other = DynamicsModel(drawn.robot_with(CELL.robot), drawn.loads_with(load.loads), CELL.base_pose)
+        other = DynamicsModel(
+            drawn.robot_with(CELL.robot), drawn.loads_with(load.loads), CELL.base_pose
+        )
         finding = weighed(Motion(q, qd, qdd, other.inverse_dynamics(q, qd, qdd)), declared, 3.0)
         assert finding is not None
         z.append(finding.mass / finding.mass_deviation)

@@ -112,7 +112,10 @@ def test_coils_read_back_what_topic_or_service_have_set(make, serve):
     driver, client, _ = serve(make())
     driver.press("service", "drives_off", True)
     levels = client.read_coils(0, count=len(COILS)).bits[: len(COILS)]
-    assert [name for name, level in zip(COILS, levels, strict=True) if level] == ["drives_off", "move_enable"]
+    assert [name for name, level in zip(COILS, levels, strict=True) if level] == [
+        "drives_off",
+        "move_enable",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -246,7 +249,9 @@ def test_five_thousand_connections_don_t_bring_the_server_down(endangered, frame
 
 def survive(endangered, frames, framed):
     driver, port = endangered
-    driver.plc.write_inputs("service", {"hib": False})  # a request may have put the controller to sleep
+    driver.plc.write_inputs(
+        "service", {"hib": False}
+    )  # a request may have put the controller to sleep
     driver.plc.wake()
     # what is no Modbus ends its connection
     with (
@@ -274,4 +279,6 @@ def test_inputs_that_belong_to_the_topic_are_refused_but_the_emergency_stop(make
     run(driver, 0.1)
     assert simulation.modes.mode is Mode.EMERGENCY_STOP
     assert not simulation.plc.raw.ab
-    assert client.write_coil(coil("emergency_stop"), False).exception_code == 3  # released by its owner only
+    assert (
+        client.write_coil(coil("emergency_stop"), False).exception_code == 3
+    )  # released by its owner only

@@ -18,7 +18,11 @@ def by_mode(simulation):
 def test_times_and_numbers_are_those_of_the_controller(make):
     modes = by_mode(make())
     bus = modes[Mode.BUS_POWER_OFF]
-    assert (bus.time_to_pause, bus.regular_time_to_operate, bus.time_min_length_of_stay) == (3.0, 20.0, 2.0)
+    assert (bus.time_to_pause, bus.regular_time_to_operate, bus.time_min_length_of_stay) == (
+        3.0,
+        20.0,
+        2.0,
+    )
     assert bus.time_min_pause == 25.0
     assert modes[Mode.HIBERNATION].time_min_pause == 300.0
     assert [mode.pe_mode_id for mode in modes.values()] == [0xFF, 0x01, 0x02, 0xFE]
@@ -59,7 +63,9 @@ def test_a_mode_costs_what_query_modes_said(make):
     simulation.run(20.1)
     after = simulation.mains.meter.reading()
     assert simulation.modes.mode is Mode.STAND_ON_MOTORS
-    assert after.energy - before.energy == pytest.approx(energy_of(bus, after.time - before.time), rel=5e-3)
+    assert after.energy - before.energy == pytest.approx(
+        energy_of(bus, after.time - before.time), rel=5e-3
+    )
 
 
 def test_a_pause_goes_through_the_modes_that_make_it_cheaper(make):

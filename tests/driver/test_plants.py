@@ -36,7 +36,8 @@ def figures_of(plant):
     """Every number of a plant, by section and name."""
     robot = plant.robot
     found = {
-        name: getattr(robot, name) for name in ("link_mass", "link_com", "link_inertia", "reflected_inertia")
+        name: getattr(robot, name)
+        for name in ("link_mass", "link_com", "link_inertia", "reflected_inertia")
     }
     for section in (plant.drives, plant.gears, plant.link):
         found |= {f.name: getattr(section, f.name) for f in fields(section)}
@@ -48,13 +49,16 @@ def test_a_seed_draws_the_same_plant_again_and_another_one_another(cell, data):
     first, again, other = (typical_plant(cell.robot, data, seed) for seed in (3, 3, 4))
     for name, value in figures_of(first).items():
         assert np.array_equal(value, figures_of(again)[name]), name
-    differs = [not np.array_equal(v, figures_of(other)[name]) for name, v in figures_of(first).items()]
+    differs = [
+        not np.array_equal(v, figures_of(other)[name]) for name, v in figures_of(first).items()
+    ]
     assert np.mean(differs) > 0.9
     assert first.name == "typical:3"
 
 
 def test_typical_figures_stay_as_near_to_the_data_as_their_marks_say(cell, data):
-    nominal, drawn = cell.robot, [typical_plant(cell.robot, data, seed) for seed in range(40)]
+    nominal = cell.robot
+    drawn = [typical_plant(cell.robot, data, seed) for seed in range(40)]
     masses = np.array([plant.robot.link_mass / nominal.link_mass - 1.0 for plant in drawn])
     assert np.abs(masses[:, :4]).max() <= CUT * SPREAD["H"] + 1e-12
     assert masses[:, 1].std() == pytest.approx(SPREAD["H"], rel=0.4)
@@ -75,7 +79,8 @@ def test_a_plant_comes_back_from_its_file_as_it_was(cell, data, text):
 def test_what_a_file_leaves_out_is_nominal(cell, data, tmp_path):
     file = tmp_path / "mine.yaml"
     file.write_text(HEAD + "dc_link: {mains_v: 540}\nwatts: {controller_w: {HIBERNATION: 20}}\n")
-    plant, nominal = plant_named(str(file), cell.robot, data), nominal_plant(cell.robot, data)
+    plant = plant_named(str(file), cell.robot, data)
+    nominal = nominal_plant(cell.robot, data)
     assert plant.link.mains == 540.0
     assert plant.link.capacitance == nominal.link.capacitance
     assert sorted(plant.watts.controller.values()) == [20.0, 115.0, 135.0, 135.0]
@@ -90,7 +95,10 @@ def test_what_a_file_leaves_out_is_nominal(cell, data, tmp_path):
             "start_deg_c[5] is 900 deg C, must be in [0, 150] deg C",
         ),
         ("gears: {friction: 1}", "unknown key 'friction'"),
-        ("links: [{name: link_2, mass_kg: -1}]", "links[0].mass_kg is -1 kg, must be in (0, 100000] kg"),
+        (
+            "links: [{name: link_2, mass_kg: -1}]",
+            "links[0].mass_kg is -1 kg, must be in (0, 100000] kg",
+        ),
         ("dc_link: {mains_v: 700}", "above the mains, 700 V"),
         ("drives: {switching_w: [1, 2]}", "has 2 entries, must have 6"),
         (
@@ -109,8 +117,10 @@ def test_what_a_file_leaves_out_is_nominal(cell, data, tmp_path):
             "gears.heat_capacity_j_per_k[5] is 1e-300 J/K, must be in [0.1, 1e+09] J/K",
         ),
         (
-            "gears: {conductance_w_per_k: [0, 0, 1e5, 0, 0, 0], heat_capacity_j_per_k: [9, 9, 9, 9, 9, 9]}",
-            "gear 3 of 9 J/K and 100000 W/K cools with a time constant of 9e-05 s, must be at least 10 s",
+            "gears: {conductance_w_per_k: [0, 0, 1e5, 0, 0, 0], heat_capacity_j_per_k: [9, 9, 9, "
+            "9, 9, 9]}",
+            "gear 3 of 9 J/K and 100000 W/K cools with a time constant of 9e-05 s, must be at "
+            "least 10 s",
         ),
     ],
 )
@@ -160,7 +170,9 @@ def test_the_parts_of_a_typical_plant_add_up_at_every_instant(plan, start, cell)
         r = simulation.mains.meter.reading()
         axes = r.mechanical_energy + r.copper_energy + r.inverter_energy + r.iron_energy
         assert r.axis_energy == pytest.approx(axes, rel=1e-12)
-        parts = r.base_energy + axes.sum() + r.burnt_energy + r.capacitor_energy + r.rectifier_energy
+        parts = (
+            r.base_energy + axes.sum() + r.burnt_energy + r.capacitor_energy + r.rectifier_energy
+        )
         assert r.energy == pytest.approx(parts, rel=1e-12)
     losses = (r.copper_energy, r.inverter_energy, r.iron_energy)
     assert all((loss > 0.0).all() for loss in losses)
@@ -194,7 +206,8 @@ def test_gears_warm_up_by_their_friction_and_turn_more_easily(cell, data):
     speed = np.full(6, 0.5)
     dry = gears.dry(speed.tolist(), [0.0] * 6)
     cold, _ = gears.friction(speed.tolist(), dry)
-    before, heat = gears.temperature, np.zeros(6)
+    before = gears.temperature
+    heat = np.zeros(6)
     for _ in range(3600):
         friction, _ = gears.friction(speed.tolist(), dry)
         gears.heat(friction, speed)

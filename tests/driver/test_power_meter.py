@@ -35,7 +35,8 @@ def test_the_parts_add_up_to_the_mains(make, plan, start, run_out, cell):
 
 def test_batches_of_any_length_read_the_same(meter, cell):
     generator = np.random.default_rng(1)
-    speed, torque = generator.normal(0.0, 1.0, (200, 6)), generator.normal(0.0, 500.0, (200, 6))
+    speed = generator.normal(0.0, 1.0, (200, 6))
+    torque = generator.normal(0.0, 500.0, (200, 6))
     other = PowerMeter(nominal_plant(cell.robot, load_power_data()), DT)
     for k in range(200):
         meter.add(300.0)
@@ -50,7 +51,8 @@ def test_batches_of_any_length_read_the_same(meter, cell):
 
 def test_braking_lifts_the_bus_voltage_up_to_the_chopper(meter):
     data = load_power_data()
-    speed, torque = np.full((500, 6), 1.0), np.full((500, 6), -500.0)
+    speed = np.full((500, 6), 1.0)
+    torque = np.full((500, 6), -500.0)
     assert meter.reading().bus_voltage == pytest.approx(data.dc_link.voltage)
     for _ in range(500):
         meter.add(0.0)
@@ -71,7 +73,8 @@ def test_base_power_follows_the_level(cell):
     base = BasePower(nominal_plant(cell.robot, load_power_data()).watts)
     base.set_tool(90.0, 100.0)
     watts = [
-        base.of(Mode[mode]) for mode in ("HIBERNATION", "BUS_POWER_OFF", "STAND_ON_BRAKES", "STAND_ON_MOTORS")
+        base.of(Mode[mode])
+        for mode in ("HIBERNATION", "BUS_POWER_OFF", "STAND_ON_BRAKES", "STAND_ON_MOTORS")
     ]
     assert watts == pytest.approx([105.0, 205.0, 325.0, 602.16])
 

@@ -114,7 +114,9 @@ def test_emergency_stop_ends_only_by_recover_and_only_at_rest():
     run(modes, 1.0, Demand(motion=True))
     run(modes, 1.0, Demand(recover=True, standing=False))
     assert modes.mode is Mode.EMERGENCY_STOP
-    assert time_until(modes, Mode.STAND_ON_MOTORS, Demand(recover=True)) == pytest.approx(0.7, abs=2 * STEP)
+    assert time_until(modes, Mode.STAND_ON_MOTORS, Demand(recover=True)) == pytest.approx(
+        0.7, abs=2 * STEP
+    )
 
 
 def test_an_emergency_stop_that_is_pressed_while_the_bus_comes_up_counts():

@@ -22,8 +22,11 @@ class Day:
     """A grid that is looked at on clocks of our own; ticks: (wall, stamp), gaps: (wall, reason)."""
 
     def __init__(self, policy: ClockPolicy = SYSTEM, tick_cost: int = PERIOD // 10) -> None:
-        self.grid, self.policy, self.cost = Grid(PERIOD), policy, tick_cost
-        self.wall, self.clock = 0, START
+        self.grid = Grid(PERIOD)
+        self.policy = policy
+        self.cost = tick_cost
+        self.wall = 0
+        self.clock = START
         self.ticks: list[tuple[int, int]] = []
         self.gaps: list[str] = []
         self.worst_lag = 0.0
@@ -54,7 +57,8 @@ class Day:
 
 def fastest(day: Day, window: float) -> float:
     """Largest share of plant time in real time over windows of so many seconds."""
-    best, first = 0.0, 0
+    best = 0.0
+    first = 0
     for wall, stamp in day.ticks:
         while wall - day.ticks[first][0] > window * NS:
             first += 1
@@ -91,17 +95,23 @@ def test_a_delay_is_made_up_for_at_twice_the_speed_without_a_gap() -> None:
     assert day.grid.lag < 0.002
     late = Day()
     late.ticks = day.ticks[before:]
-    assert fastest(late, 0.5) < 2.0 + 0.1 / 0.5 + 0.01  # a tenth of a second at once, then twice the speed
+    assert (
+        fastest(late, 0.5) < 2.0 + 0.1 / 0.5 + 0.01
+    )  # a tenth of a second at once, then twice the speed
 
 
 @pytest.mark.parametrize("seconds", [2.1, 5.0, 3600.0])
-def test_a_process_that_was_suspended_has_one_announced_gap_and_catches_up_nothing(seconds: float) -> None:
+def test_a_process_that_was_suspended_has_one_announced_gap_and_catches_up_nothing(
+    seconds: float,
+) -> None:
     day = Day()
     day.live(0.1)
     before = len(day.ticks)
     day.pass_by(round(seconds * NS))
     day.live(1.0)
-    assert day.gaps == [f"the process was suspended for {seconds:.3f} s"] or "suspended" in day.gaps[0]
+    assert (
+        day.gaps == [f"the process was suspended for {seconds:.3f} s"] or "suspended" in day.gaps[0]
+    )
     assert len(day.gaps) == 1
     assert sum(step != PERIOD for step in day.steps) == 1
     assert len(day.ticks) - before in range(498, 502)
@@ -120,7 +130,9 @@ def test_a_loaded_machine_lags_for_minutes_and_never_has_a_gap() -> None:
     assert fastest(day, 1.0) < 2.2
 
 
-@pytest.mark.parametrize(("jump", "words"), [(-3.0, "jumped back by 3.0"), (20.0, "jumped ahead by 20.0")])
+@pytest.mark.parametrize(
+    ("jump", "words"), [(-3.0, "jumped back by 3.0"), (20.0, "jumped ahead by 20.0")]
+)
 def test_a_clock_that_is_set_starts_the_grid_anew(jump: float, words: str) -> None:
     day = Day()
     day.live(0.1)
@@ -163,7 +175,9 @@ slices = st.lists(st.tuples(st.integers(0, 980), st.integers(5, 60)), min_size=1
 
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(slices=slices)
-def test_no_load_makes_a_gap_or_drives_faster_than_twice_the_clock(slices: list[tuple[int, int]]) -> None:
+def test_no_load_makes_a_gap_or_drives_faster_than_twice_the_clock(
+    slices: list[tuple[int, int]],
+) -> None:
     """The thread is kept waiting for up to 0.99 s, then gets some time, again and again."""
     day = Day()
     day.live(0.05)
@@ -188,14 +202,17 @@ class Clock:
     """A clock that shows what is set; every reading lets it pass `rate` ns."""
 
     def __init__(self, start: int, rate: int) -> None:
-        self.now, self.rate = start, rate
+        self.now = start
+        self.rate = rate
 
     def __call__(self) -> int:
         self.now += self.rate
         return self.now
 
 
-def thread_on(clock: Clock, tick: Callable[[int], None], failed: Callable[[Exception], None]) -> GridThread:
+def thread_on(
+    clock: Clock, tick: Callable[[int], None], failed: Callable[[Exception], None]
+) -> GridThread:
     return GridThread(PERIOD, clock, lambda: OWN, tick, lambda gap: None, failed)
 
 
@@ -216,7 +233,8 @@ def test_the_thread_ticks_on_the_grid() -> None:
 
 
 def test_a_clock_that_has_not_started_or_stands_still_makes_no_ticks() -> None:
-    clock, ticked = Clock(0, 0), threading.Event()
+    clock = Clock(0, 0)
+    ticked = threading.Event()
     thread = thread_on(clock, lambda stamp: ticked.set(), lambda error: None)
     thread.start()
     assert not ticked.wait(0.05)
@@ -237,7 +255,9 @@ def test_what_a_tick_raises_is_reported_and_ends_the_thread() -> None:
         if len(stamps) == 3:
             raise RuntimeError("boom")
 
-    thread = thread_on(Clock(1, PERIOD), tick, lambda error: (failures.append(error), failed.set())[0])
+    thread = thread_on(
+        Clock(1, PERIOD), tick, lambda error: (failures.append(error), failed.set())[0]
+    )
     thread.start()
     assert failed.wait(60.0)
     thread.close()

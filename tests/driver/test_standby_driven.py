@@ -1,4 +1,5 @@
-"""What standby advice predicts is what the simulated controller measures, stepped without real time.
+"""What standby advice predicts is what the simulated controller measures, stepped without real
+time.
 
 Modes, postures, loads, lengths and times of the controller are drawn by seed. The prediction is the
 planner's, the measurement the plant's meter: two codes that share the data files alone.
@@ -24,9 +25,12 @@ from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.power import IdleTimes
 
-CELL, POWER = load_cell("demo"), load_power_data()
+CELL = load_cell("demo")
+POWER = load_power_data()
 LOADS = (NO_LOAD, CELL.tool.name, f"{CELL.tool.name}+{CELL.parts[0].name}")
-SHARE, JOULES = 0.03, 20.0  # whichever is larger
+# whichever is larger
+SHARE = 0.03
+JOULES = 20.0
 DT = 0.01  # s: nothing moves, and no time of the controller is shorter
 DEBOUNCE = 0.02  # s: how long a level has to stay
 BITS = {"STAND_ON_BRAKES": "drives_off", "BUS_POWER_OFF": "ab", "HIBERNATION": "hib"}
@@ -53,7 +57,8 @@ class Case:
         self.timer = 20.0
         if seed % 2:
             drawn = {name: float(round(rng.uniform(0.05, 40.0), 2)) for name in vars(self.times)}
-            self.times, self.timer = TransitionTimes(**drawn), float(round(rng.uniform(1.0, 40.0), 2))
+            self.times = TransitionTimes(**drawn)
+            self.timer = float(round(rng.uniform(1.0, 40.0), 2))
         power = replace(POWER, motors_to_brakes_in_program=self.timer)
         self.scene = scene_with(CELL, load, power)
         idle = IdleTimes(motors_to_brakes_in_program=self.timer)
@@ -99,7 +104,9 @@ def test_a_pause_of_known_length_costs_what_was_planned(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(24, 60))
 def test_a_policy_costs_what_was_planned_whenever_the_pause_ends(seed: int) -> None:
-    """A PLC asks for each mode at its switch time, while the pause is on, and wakes the robot at its end."""
+    """A PLC asks for each mode at its switch time, while the pause is on, and wakes the robot at
+    its end.
+    """
     case = Case(seed)
     samples = np.round(10.0 ** case.rng.uniform(-0.5, 2.6, 12), 2)
     planned = advice(lengths_of(0.0, samples), case.q, case.scene, case.times)
@@ -117,9 +124,12 @@ def test_a_policy_costs_what_was_planned_whenever_the_pause_ends(seed: int) -> N
 
 
 def followed(case: Case, steps: tuple[Step, ...], pause: float) -> tuple[float, float]:
-    """Energy [J] and delay [s] of the plant when a PLC sets its bits at the switch times and at the end."""
+    """Energy [J] and delay [s] of the plant when a PLC sets its bits at the switch times and at the
+    end.
+    """
     plant = case.plant
-    begun, bits = plant.mains.energy(), [BITS[step.rest.name] for step in steps if step.at < pause]
+    begun = plant.mains.energy()
+    bits = [BITS[step.rest.name] for step in steps if step.at < pause]
     for k, bit in enumerate(bits):
         plant.run(steps[k].at - plant.time)
         plant.plc.set_bit(bit, True)

@@ -1,4 +1,6 @@
-"""The planner's cell in the driver: taken while the robot stands; what was planned elsewhere is refused."""
+"""The planner's cell in the driver: taken while the robot stands; what was planned elsewhere is
+refused.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,8 @@ from ir_sim_driver.motion.goal import ErrorCode, Outcome, TrajectoryGoal
 from ir_sim_driver.node.announcements import announced
 from ir_sim_driver.plant import carried, custom_load
 
-OPEN, DEMO = load_cell("open"), load_cell("demo")
+OPEN = load_cell("open")
+DEMO = load_cell("demo")
 
 
 def planned(cell):
@@ -63,8 +66,11 @@ def test_bodies_that_are_placed_are_not_placed_again_while_the_plant_waits(make,
     for machine in DEMO.equipment:
         machine.world_bodies()
     simulation.surroundings.offer(planned(DEMO))
-    placed, place = [], Body.placed
-    monkeypatch.setattr(Body, "placed", lambda body, pose: (placed.append(body.name), place(body, pose))[1])
+    placed = []
+    place = Body.placed
+    monkeypatch.setattr(
+        Body, "placed", lambda body, pose: (placed.append(body.name), place(body, pose))[1]
+    )
     take_offered_cell(simulation)
     assert simulation.cell is DEMO
     of_parts = {body.name for part in DEMO.parts for body in part.lying(np.eye(4))}
@@ -99,7 +105,8 @@ def test_a_trajectory_of_another_load_is_refused_with_both_loads(load, plan, mak
     simulation.surroundings.offer(planned(DEMO))
     take_offered_cell(simulation)
     own = custom_load(DEMO, 20.0, np.array((0.0, 0.0, 0.1)), np.zeros(0), 0.0, 0.0)
-    tool, part = DEMO.tool.name, DEMO.parts[0].name
+    tool = DEMO.tool.name
+    part = DEMO.parts[0].name
     names = {"none": "none", "gripper+part": f"{part}+{tool}", "custom": "custom"}
     simulation.set_load(own if load == "custom" else carried(DEMO, names[load]))
     trajectory = movement(plan, simulation)
@@ -115,7 +122,9 @@ def test_a_trajectory_of_another_load_is_refused_with_both_loads(load, plan, mak
 def test_a_cell_of_another_robot_or_another_mounting_is_not_taken(make):
     simulation = make()
     robot = replace(DEMO.robot, name="other")
-    assert "its robot is 'other'" in simulation.surroundings.offer(planned(replace(DEMO, robot=robot)))
+    assert "its robot is 'other'" in simulation.surroundings.offer(
+        planned(replace(DEMO, robot=robot))
+    )
     tilted = np.diag([1.0, -1.0, -1.0, 1.0])
     assert "inclination" in simulation.surroundings.offer(planned(replace(DEMO, base_pose=tilted)))
     take_offered_cell(simulation)

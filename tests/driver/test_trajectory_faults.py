@@ -1,4 +1,6 @@
-"""Bad trajectories: each is refused with its code and a sentence, and the robot's state is unchanged."""
+"""Bad trajectories: each is refused with its code and a sentence, and the robot's state is
+unchanged.
+"""
 
 from __future__ import annotations
 
@@ -73,22 +75,33 @@ def test_stamps_of_the_past_and_of_the_far_future(standing, start, plan, home):
         now_ns=now,
         stamp_ns=now - 2 * 10**9,
     )
-    refused(start, standing, trajectory, INVALID, "at most 10 s", now_ns=now, stamp_ns=now + 11 * 10**9)
+    refused(
+        start, standing, trajectory, INVALID, "at most 10 s", now_ns=now, stamp_ns=now + 11 * 10**9
+    )
 
 
 @pytest.mark.parametrize("excess", [1e-3, 10.0])
-def test_a_position_beyond_its_limit_is_named_with_the_excess(standing, start, plan, cell, home, excess):
+def test_a_position_beyond_its_limit_is_named_with_the_excess(
+    standing, start, plan, cell, home, excess
+):
     beyond = home.copy()
     beyond[1] = cell.robot.position_max[1] + excess
-    refused(start, standing, plan([20.0], beyond), INVALID, "joint_a2", "limits are", f"{excess:.3g} rad")
+    refused(
+        start,
+        standing,
+        plan([20.0], beyond),
+        INVALID,
+        "joint_a2",
+        "limits are",
+        f"{excess:.3g} rad",
+    )
 
 
 def test_a_position_a_billionth_beyond_is_within_the_slack(make, start, run_out, plan, cell, home):
     touching = home.copy()
-    touching[1], touching[2] = (
-        cell.robot.position_max[1] + 1e-9,
-        0.0,
-    )  # A2 at its limit, the arm above the floor
+    # A2 at its limit, the arm above the floor
+    touching[1] = cell.robot.position_max[1] + 1e-9
+    touching[2] = 0.0
     simulation = make(load="none")
     start(simulation, plan([20.0], touching))
     assert run_out(simulation).code == ErrorCode.SUCCESSFUL
@@ -96,7 +109,9 @@ def test_a_position_a_billionth_beyond_is_within_the_slack(make, start, run_out,
 
 def test_too_fast_too_hard_and_too_heavy_are_distinguished(standing, start, plan, home):
     turn = np.array([1.5, 0.0, 0.0, 0.0, 0.0, 0.0])
-    refused(start, standing, plan(1.0, home, home + turn), INVALID, "joint_a1", "rad/s at", "exceeded")
+    refused(
+        start, standing, plan(1.0, home, home + turn), INVALID, "joint_a1", "rad/s at", "exceeded"
+    )
     refused(start, standing, plan(0.2, home, home + 0.1 * turn), INVALID, "joint_a1", "rad/s^2")
     lift = np.array([0.0, 0.0, -0.5, 0.0, 0.0, 0.0])
     refused(start, standing, plan(1.05, home, home + lift), INVALID, "joint_a3", "Nm")
@@ -115,9 +130,18 @@ def test_a_last_velocity_that_is_not_zero_is_refused(standing, start, cell, home
     refused(start, standing, trajectory, INVALID, "point 1", "last velocity")
 
 
-def test_lines_that_kink_too_sharply_are_refused_and_gentle_ones_run(make, start, run_out, plan, home):
+def test_lines_that_kink_too_sharply_are_refused_and_gentle_ones_run(
+    make, start, run_out, plan, home
+):
     simulation = make("pybullet")
-    refused(start, simulation, plan(1.0, home, home + 0.3, velocities=False), INVALID, "corners", "rad/s^2")
+    refused(
+        start,
+        simulation,
+        plan(1.0, home, home + 0.3, velocities=False),
+        INVALID,
+        "corners",
+        "rad/s^2",
+    )
     sharp = plan([1.0, 2.0, 3.0], home, home + 0.2, home, velocities=False)
     refused(start, simulation, sharp, INVALID, "corners", "give the points velocities")
     start(simulation, plan([1.0, 2.0, 3.0], home, home + 0.01, home + 0.02, velocities=False))
@@ -184,7 +208,8 @@ def test_no_goal_in_manual_mode_without_the_enabling_switch(make, start, plan, h
 def test_with_the_enabling_switch_t1_creeps(make, start, run_out, plan, home):
     simulation = make(controller=ControllerSettings(operating_mode="T1", enabling_switch=True))
     start(simulation, plan(1.2, home, home + np.array([0.4, 0.0, 0.0, 0.0, 0.0, 0.0])))
-    fastest, before = 0.0, simulation.tool.position(simulation.backend.q)
+    fastest = 0.0
+    before = simulation.tool.position(simulation.backend.q)
     while not simulation.take_outcomes():
         simulation.step()
         now = simulation.tool.position(simulation.backend.q)

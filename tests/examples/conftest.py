@@ -13,5 +13,7 @@ sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # _pages.py
 
 @pytest.fixture(autouse=True)
 def no_plan_is_cut(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Offline commands plan as long as it takes: what their clock cuts on a busy machine is another plan."""
+    """Offline commands plan as long as it takes: what their clock cuts on a busy machine is another
+    plan.
+    """
     monkeypatch.setattr("ir_cli.offline.asking.time", SimpleNamespace(monotonic=lambda: 0.0))

@@ -74,6 +74,8 @@ def test_the_example_uses_public_faces_only(path: Path) -> None:
 
 def test_the_examples_need_no_ros() -> None:
     imports = "; ".join(f"import {name}" for name in ("ir_planner", "ir_recorder"))
-    code = f"import sys; {imports}; print([name for name in sys.modules if name.startswith('rclpy')])"
+    code = (
+        f"import sys; {imports}; print([name for name in sys.modules if name.startswith('rclpy')])"
+    )
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == "[]"

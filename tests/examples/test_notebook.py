@@ -15,7 +15,9 @@ NOTEBOOK = Path(__file__).resolve().parents[2] / "examples" / "what_if.ipynb"
 def code_cells() -> list[str]:
     cells = json.loads(NOTEBOOK.read_text("utf-8"))["cells"]
     assert all(cell["cell_type"] in ("code", "markdown") for cell in cells)
-    assert all(not cell["outputs"] for cell in cells if cell["cell_type"] == "code"), "kept without outputs"
+    assert all(not cell["outputs"] for cell in cells if cell["cell_type"] == "code"), (
+        "kept without outputs"
+    )
     return ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
 
 
@@ -32,7 +34,9 @@ def test_it_runs_and_finds_what_it_says(monkeypatch: pytest.MonkeyPatch) -> None
     with contextlib.redirect_stdout(io.StringIO()) as out:
         for cell in code_cells():
             exec(cell, names)
-    payload, cycle, place = names["payload"], names["cycle"], names["place"]
+    payload = names["payload"]
+    cycle = names["cycle"]
+    place = names["place"]
     assert [row["certified"] for row in payload] == [True, True, True, False]
     assert payload[0]["joules"] < payload[2]["joules"]
     assert "carries at most" in str(payload[3]["sentence"])

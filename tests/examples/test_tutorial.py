@@ -1,4 +1,6 @@
-"""docs/tutorial.md, followed to the letter: every command, every line typed, and the cell that comes out."""
+"""docs/tutorial.md, followed to the letter: every command, every line typed, and the cell that
+comes out.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ def test_who_follows_the_tutorial_gets_a_cell_that_plans(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    typed, said, count = Path("first_cell.yaml"), "", 0
+    typed = Path("first_cell.yaml")
+    said = ""
+    count = 0
     typed.write_text("")
     for snippet in snippets("tutorial.md"):
         if snippet.language == "yaml":

@@ -35,11 +35,15 @@ def long_movement() -> JointTrajectory:
 def test_a_movement_whose_client_has_gone_is_stopped_though_others_are_there(
     ros_context: Any, ros_executor: Any, ros_node: Any, ros_domain_id: int, wait_for: Any
 ) -> None:
-    """As the program runner's, which is always there. A context is a participant, as a process is."""
+    """As the program runner's, which is always there. A context is a participant, as a process
+    is.
+    """
     given = {"cell": "open", "backend": "ideal", "wake_port": 0, "client_timeout": 0.3}
     overrides = [Parameter(name, value=value) for name, value in given.items()]
     driver = ros_executor.add_node(SimDriver(context=ros_context, parameter_overrides=overrides))
-    another = ros_executor.run(lambda: ActionClient(ros_node, ExecuteTrajectory, names.EXECUTE_TRAJECTORY))
+    another = ros_executor.run(
+        lambda: ActionClient(ros_node, ExecuteTrajectory, names.EXECUTE_TRAJECTORY)
+    )
     wait_for(another.server_is_ready)
     context = Context()
     rclpy.init(context=context, domain_id=ros_domain_id)
@@ -64,7 +68,8 @@ def test_a_movement_whose_client_has_gone_is_stopped_though_others_are_there(
 
 
 def test_a_client_counts_by_its_process_once_that_is_known() -> None:
-    own, other = b"p" * 12, b"q" * 12
+    own = b"p" * 12
+    other = b"q" * 12
     watch = ClientWatch(1e-9, own)
     assert not watch.gone([other + b"feed"])  # its own has not been discovered yet
     assert not watch.gone([other + b"feed", own + b"feed"])

@@ -1,4 +1,6 @@
-"""Every press of the emergency stop counts: however short, in every mode, whoever writes a 0 afterwards."""
+"""Every press of the emergency stop counts: however short, in every mode, whoever writes a 0
+afterwards.
+"""
 
 from __future__ import annotations
 
@@ -63,7 +65,9 @@ class Cell:
             if self.simulation.modes.mode is mode:
                 return
             self.run(0.002)
-        raise AssertionError(f"{mode.name} has not come, the mode is {self.simulation.modes.mode.name}")
+        raise AssertionError(
+            f"{mode.name} has not come, the mode is {self.simulation.modes.mode.name}"
+        )
 
     def bring_into(self, mode: Mode) -> None:
         """By the shortest route from standing on motors."""
@@ -84,10 +88,14 @@ class Cell:
             else:
                 self.driver.press(SERVICE, "ab", False)
         if mode is Mode.MOVING:
-            q, rest = self.simulation.backend.q, np.zeros((2, 6))
-            home, names = np.array(self.simulation.cell.machine_home), self.simulation.robot.joint_names
+            q = self.simulation.backend.q
+            rest = np.zeros((2, 6))
+            home = np.array(self.simulation.cell.machine_home)
+            names = self.simulation.robot.joint_names
             target = home + (-0.3 if np.abs(q - home).max() < 0.15 else 0.0)
-            goal = TrajectoryGoal(JointTrajectory.from_seconds(names, [0.0, 2.0], [q, target], rest, rest))
+            goal = TrajectoryGoal(
+                JointTrajectory.from_seconds(names, [0.0, 2.0], [q, target], rest, rest)
+            )
             self.simulation.execute(self.simulation.vet(goal, 0), 0)
             self.run(0.5)
         self.until(mode)
@@ -102,7 +110,9 @@ class Cell:
         self.run(0.5)
 
     def settle(self) -> None:
-        """Whatever it was doing, until it stands on motors or in the emergency stop, all levels at 0."""
+        """Whatever it was doing, until it stands on motors or in the emergency stop, all levels at
+        0.
+        """
         for _ in range(20):
             self.driver.plc.write_all_inputs(TOPIC, PlcInputs())
             self.driver.plc.wake()
@@ -209,7 +219,9 @@ def test_who_does_not_own_the_inputs_presses_all_the_same(cell: Cell) -> None:
     assert cell.simulation.modes.mode is Mode.EMERGENCY_STOP
 
 
-def test_a_modbus_client_that_writes_1_and_0_while_asleep_is_answered_and_latched(cell: Cell) -> None:
+def test_a_modbus_client_that_writes_1_and_0_while_asleep_is_answered_and_latched(
+    cell: Cell,
+) -> None:
     cell.bring_into(Mode.HIBERNATION)
     server = ModbusTcp(modbus=True, modbus_port=0).open(cell.driver.plc)
     client = ModbusTcpClient("127.0.0.1", port=server.port, timeout=60)
@@ -227,7 +239,8 @@ def test_a_modbus_client_that_writes_1_and_0_while_asleep_is_answered_and_latche
 
 def by_modbus_pulse(driver: Driver) -> None:
     """As a field bus writes: 1, and 0 in the next request."""
-    tables, coil = ControllerTables(driver.plc, 2.0), COILS.index("emergency_stop")
+    tables = ControllerTables(driver.plc, 2.0)
+    coil = COILS.index("emergency_stop")
     assert answered(struct.pack(">BHH", 5, coil, 0xFF00), tables)[0] == 5
     answered(struct.pack(">BHH", 5, coil, 0), tables)
 
@@ -242,13 +255,18 @@ def traffic(driver: Driver, writer: str) -> None:
 
 
 def lost(presses: int, seed: int) -> list[str]:
-    """Presses in every mode at random instants amid a PLC's traffic, and those that were not latched."""
+    """Presses in every mode at random instants amid a PLC's traffic, and those that were not
+    latched.
+    """
     generator = np.random.default_rng(seed)
-    cell, missing = Cell(), []
+    cell = Cell()
+    missing = []
     every = (*PRESSES, by_modbus_pulse)
     for k in range(presses):
-        mode, press = MODES[k % len(MODES)], every[int(generator.integers(len(every)))]
-        rate, writer = int(generator.choice([20, 100, 250])), str(generator.choice([TOPIC, MODBUS]))
+        mode = MODES[k % len(MODES)]
+        press = every[int(generator.integers(len(every)))]
+        rate = int(generator.choice([20, 100, 250]))
+        writer = str(generator.choice([TOPIC, MODBUS]))
         cell.bring_into(mode)
         at = int(generator.integers(20))
         for tick in range(at + 26):

@@ -54,7 +54,8 @@ def test_whatever_is_raised_is_a_status(error: Exception) -> None:
 
     said: list[str] = []
     broken = SimpleNamespace(press=fail, start_pause=fail, warn=said.append)
-    request, response = SetPlcInput.Request(name="ab"), SetPlcInput.Response()
+    request = SetPlcInput.Request(name="ab")
+    response = SetPlcInput.Response()
     status = services(broken).set_plc_input(request, response).status
     assert status.code == StatusCode.FAILURE
     assert type(error).__name__ in status.message
@@ -100,7 +101,9 @@ def without_descriptors(work: Callable[[], Any]) -> Any:
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
-def test_without_descriptors_a_load_is_refused_and_the_robot_carries_what_it_did(driver: Driver) -> None:
+def test_without_descriptors_a_load_is_refused_and_the_robot_carries_what_it_did(
+    driver: Driver,
+) -> None:
     before = driver._simulation.load
     request = SetLoad.Request(load="custom", mass=10.0, inertia=[0.1, 0.0, 0.0, 0.1, 0.0, 0.1])
     answers = services(driver)
@@ -125,7 +128,8 @@ def test_a_robot_needs_no_temporary_folder(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_a_callback_that_fails_does_not_end_the_node(ros_context: Any, ros_node: Node) -> None:
-    executor, spinning = SingleThreadedExecutor(context=ros_context), Spinning()
+    executor = SingleThreadedExecutor(context=ros_context)
+    spinning = Spinning()
     other = Node("victim", context=ros_context)
     executor.add_node(other)
     calls: list[int] = []

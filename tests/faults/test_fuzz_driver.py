@@ -50,7 +50,9 @@ SHORT = TransitionTimes(
     }
 )
 
-BARE = replace(load_cell("open"), floor=False, equipment=(), stations=(), parts=(), program=(), tasks=())
+BARE = replace(
+    load_cell("open"), floor=False, equipment=(), stations=(), parts=(), program=(), tasks=()
+)
 
 
 def neighbour(name: str) -> ModuleType:
@@ -74,7 +76,9 @@ class Fuzz:
         self, generator: np.random.Generator, backend: str = "ideal", cell: str | Cell = BARE
     ) -> None:
         self.random = generator
-        settings = SimulationSettings(transitions=SHORT, controller=ControllerSettings(enabling_switch=True))
+        settings = SimulationSettings(
+            transitions=SHORT, controller=ControllerSettings(enabling_switch=True)
+        )
         self.simulation = make_simulation(cell, backend=backend, settings=settings)
         self.driver = Driver(self.simulation, steps=1)
         self.tables = ControllerTables(self.driver.plc, 2.0)
@@ -87,7 +91,9 @@ class Fuzz:
         for _ in range(steps):
             self._stamp += PERIOD
             frame = self.driver.tick(self._stamp)
-            braking = self.simulation.modes.mode is Mode.EMERGENCY_STOP  # recovered while it still rolls
+            braking = (
+                self.simulation.modes.mode is Mode.EMERGENCY_STOP
+            )  # recovered while it still rolls
             self.judge.see(frame.joints.q, self.simulation.stopped, braking)
 
     def case(self) -> None:
@@ -141,19 +147,24 @@ def goal(fuzz: Fuzz) -> None:
 
 def harmless_goal(fuzz: Fuzz) -> None:
     """One that is taken where a movement may start, so that something moves; up to an hour long."""
-    names, rest = fuzz.simulation.robot.joint_names, np.zeros((1, 6))
+    names = fuzz.simulation.robot.joint_names
+    rest = np.zeros((1, 6))
     target = np.array(fuzz.simulation.cell.machine_home) + fuzz.random.uniform(-0.4, 0.4, 6)
     duration = fuzz.some(1.5, 2.0, 3.0, 60.0, 3599.0)
     kinds = ((), (rest,), (rest, rest))
-    trajectory = JointTrajectory.from_seconds(names, [duration], target[None], *fuzz.some(*kinds[1:]))
+    trajectory = JointTrajectory.from_seconds(
+        names, [duration], target[None], *fuzz.some(*kinds[1:])
+    )
     fuzz.execute(TrajectoryGoal(trajectory))
 
 
 def colliding_goal(fuzz: Fuzz) -> None:
     """One that may touch something, said to be known; within the limits, and driven."""
-    names, home = fuzz.simulation.robot.joint_names, np.array(fuzz.simulation.cell.machine_home)
+    names = fuzz.simulation.robot.joint_names
+    home = np.array(fuzz.simulation.cell.machine_home)
     reach = np.array([2.0, 0.9, 0.9, 2.0, 1.5, 2.0])
-    target, rest = home + fuzz.random.uniform(-reach, reach), np.zeros((1, 6))
+    target = home + fuzz.random.uniform(-reach, reach)
+    rest = np.zeros((1, 6))
     path = JointTrajectory.from_seconds(names, [fuzz.some(2.5, 4.0)], target[None], rest, rest)
     fuzz.execute(TrajectoryGoal(path, allow_collision=True))
     fuzz.ride(int(fuzz.random.integers(1, 4_000)))
@@ -161,28 +172,38 @@ def colliding_goal(fuzz: Fuzz) -> None:
 
 def machine_signal(fuzz: Fuzz) -> None:
     """A machine that closes onto the robot, or opens; a name that nobody has."""
-    switches = [each.switch.signal for each in fuzz.simulation.cell.equipment if each.switch is not None]
-    fuzz.driver.cell_side.hear_signal(fuzz.some("", "x" * 100_000, *switches), bool(fuzz.random.integers(2)))
+    switches = [
+        each.switch.signal for each in fuzz.simulation.cell.equipment if each.switch is not None
+    ]
+    fuzz.driver.cell_side.hear_signal(
+        fuzz.some("", "x" * 100_000, *switches), bool(fuzz.random.integers(2))
+    )
 
 
 def broken_message(fuzz: Fuzz) -> None:
     """A goal as a message, with one field that nobody should send."""
-    q, rest = fuzz.simulation.executor.command, np.zeros((2, 6))
+    q = fuzz.simulation.executor.command
+    rest = np.zeros((2, 6))
     names = fuzz.simulation.robot.joint_names
     path = JointTrajectory.from_seconds(names, [0.0, 2.0], [q, q + 0.05], rest, rest)
     message = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(path))
     points = message.trajectory.points
-    point, extreme = points[int(fuzz.random.integers(2))], fuzz.some(1e308, -1e308, float("nan"), 1e-308)
+    point = points[int(fuzz.random.integers(2))]
+    extreme = fuzz.some(1e308, -1e308, float("nan"), 1e-308)
     field = fuzz.some("positions", "velocities", "accelerations", "effort")
     match int(fuzz.random.integers(8)):
         case 0:
-            getattr(point, field)[:] = type(point.positions)("d", [extreme] * len(getattr(point, field)))
+            getattr(point, field)[:] = type(point.positions)(
+                "d", [extreme] * len(getattr(point, field))
+            )
         case 1:
             setattr(point, field, [extreme] * int(fuzz.random.integers(0, 12)))
         case 2:
             point.time_from_start.sec = int(fuzz.some(-(2**31), -1, 0, 2**31 - 1))
         case 3:
-            message.trajectory.joint_names[0] = fuzz.some("", "joint_a2", "\0\n\x1b[2J", "j" * 10_000)
+            message.trajectory.joint_names[0] = fuzz.some(
+                "", "joint_a2", "\0\n\x1b[2J", "j" * 10_000
+            )
         case 4:
             message.trajectory.joint_names = list(fuzz.random.permutation(names))
         case 5:
@@ -218,7 +239,9 @@ def press(fuzz: Fuzz) -> None:
 
 def bit(fuzz: Fuzz) -> None:
     name = fuzz.some(*(name for name in BITS if name not in ("emergency_stop", "conf_mess")))
-    fuzz.driver.plc.write_inputs(fuzz.some(SERVICE, MODBUS, TOPIC), {name: bool(fuzz.random.integers(2))})
+    fuzz.driver.plc.write_inputs(
+        fuzz.some(SERVICE, MODBUS, TOPIC), {name: bool(fuzz.random.integers(2))}
+    )
 
 
 def switch(fuzz: Fuzz) -> None:
@@ -228,8 +251,11 @@ def switch(fuzz: Fuzz) -> None:
 
 
 def modbus(fuzz: Fuzz) -> None:
-    """Any bytes, most of them with a function that there is; none that presses or resets the stop."""
-    function, words = int(fuzz.random.integers(0, 17)), fuzz.random.integers(0, 12, 3)
+    """Any bytes, most of them with a function that there is; none that presses or resets the
+    stop.
+    """
+    function = int(fuzz.random.integers(0, 17))
+    words = fuzz.random.integers(0, 12, 3)
     request = struct.pack(">B3H", function, *map(int, words)) + fuzz.random.bytes(4)
     if function not in (5, 15):
         assert 1 < len(answered(request, fuzz.tables)) < 260
@@ -241,7 +267,9 @@ def load(fuzz: Fuzz) -> None:
     inertia = np.diag(np.abs(fuzz.random.normal(size=3)) * scale)[np.triu_indices(3)]
     cell = fuzz.simulation.cell
     fuzz.driver.set_load(
-        fuzz.some(lambda c: custom_load(cell, scale, com, inertia, 0.0, 0.0), lambda c: carried(c, "none"))
+        fuzz.some(
+            lambda c: custom_load(cell, scale, com, inertia, 0.0, 0.0), lambda c: carried(c, "none")
+        )
     )
 
 
@@ -258,7 +286,10 @@ def sleep_and_wake(fuzz: Fuzz) -> None:
 
 def parameters(fuzz: Fuzz) -> None:
     """As the node does: only while nothing moves."""
-    wanted = {"stop_time": fuzz.some(0.05, 0.3, 2.0, -1.0), "blend_time": fuzz.some(0.001, 0.02, 0.1, 1e308)}
+    wanted = {
+        "stop_time": fuzz.some(0.05, 0.3, 2.0, -1.0),
+        "blend_time": fuzz.some(0.001, 0.02, 0.1, 1e308),
+    }
     try:
         settings = ExecutionSettings(**wanted)
     except ValueError:
@@ -269,8 +300,8 @@ def parameters(fuzz: Fuzz) -> None:
 
 Act = Callable[[Fuzz], None]
 RATES: dict[Act, float] = {
-    goal: 25, harmless_goal: 15, broken_message: 10, cancel: 5, scale: 6, press: 6, bit: 8, switch: 4,
-    modbus: 6, load: 5, pause: 3, sleep_and_wake: 2, parameters: 4, colliding_goal: 4, machine_signal: 3,
+    goal: 25, harmless_goal: 15, broken_message: 10, cancel: 5, scale: 6, press: 6, bit: 8, switch: 4,  # noqa: E501
+    modbus: 6, load: 5, pause: 3, sleep_and_wake: 2, parameters: 4, colliding_goal: 4, machine_signal: 3,  # noqa: E501
 }  # fmt: skip
 ACTS = list(RATES)
 WEIGHTS = np.array(list(RATES.values())) / sum(RATES.values())
@@ -280,7 +311,9 @@ def attacked(
     cases: int, seed: int, backend: str = "ideal", cell: str | Cell = BARE
 ) -> tuple[Counter[str], list[str]]:
     """Counts of what was done and refused, and what broke a law."""
-    generator, done, wrong = np.random.default_rng(seed), Counter[str](), []
+    generator = np.random.default_rng(seed)
+    done = Counter[str]()
+    wrong = []
     for first in range(0, cases, 250):
         fuzz = Fuzz(generator, backend, cell)
         for case in range(first, min(first + 250, cases)):
@@ -296,7 +329,9 @@ def test_three_hundred_hostile_requests_break_no_law() -> None:
     done, wrong = attacked(300, seed=1)
     assert wrong == []
     assert {act.__name__ for act in ACTS} == {name.removesuffix(" refused") for name in done}
-    assert min(done[name] for name in ("goal", "harmless_goal", "broken_message", "press", "load")) > 0
+    assert (
+        min(done[name] for name in ("goal", "harmless_goal", "broken_message", "press", "load")) > 0
+    )
 
 
 @pytest.mark.long

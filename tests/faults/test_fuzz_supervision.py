@@ -1,7 +1,8 @@
-"""Deviations in every mode: holding, moving, stopping, braking, standing on brakes, asleep, after a stop.
+"""Deviations in every mode: holding, moving, stopping, braking, standing on brakes, asleep, after a
+stop.
 
-Whoever leaves the tube around its command or its range is stopped by the brakes, and the fault is shown until
-somebody recovers; who stays inside goes on.
+Whoever leaves the tube around its command or its range is stopped by the brakes, and the fault is
+shown until somebody recovers; who stays inside goes on.
 """
 
 from __future__ import annotations
@@ -29,18 +30,25 @@ SHORT = TransitionTimes(
     }
 )
 
-BARE = replace(load_cell("open"), floor=False, equipment=(), stations=(), parts=(), program=(), tasks=())
+BARE = replace(
+    load_cell("open"), floor=False, equipment=(), stations=(), parts=(), program=(), tasks=()
+)
 SITUATIONS = ("holding", "moving", "stopping", "drives_off", "ab", "hib", "emergency_stop")
 
 
 def brought_into(situation: str, steps: int) -> Simulation:
     """An ideal robot, so many steps after what brings it into a situation."""
-    simulation = make_simulation(BARE, backend="ideal", settings=SimulationSettings(transitions=SHORT))
+    simulation = make_simulation(
+        BARE, backend="ideal", settings=SimulationSettings(transitions=SHORT)
+    )
     simulation.run(0.1)
     if situation in ("moving", "stopping", "emergency_stop"):
-        q, rest = simulation.backend.q, np.zeros((2, 6))
+        q = simulation.backend.q
+        rest = np.zeros((2, 6))
         names = simulation.robot.joint_names
-        goal = TrajectoryGoal(JointTrajectory.from_seconds(names, [0.0, 3.0], [q, q + 0.4], rest, rest))
+        goal = TrajectoryGoal(
+            JointTrajectory.from_seconds(names, [0.0, 3.0], [q, q + 0.4], rest, rest)
+        )
         simulation.execute(simulation.vet(goal, 0), 0)
         simulation.run(1.0)
     if situation == "stopping":
@@ -80,7 +88,11 @@ def recovered(simulation: Simulation) -> bool:
     for _ in range(40):
         simulation.wake()
         simulation.run(0.05)
-        if simulation.modes.mode in (Mode.EMERGENCY_STOP, Mode.STAND_ON_MOTORS, Mode.STAND_ON_BRAKES):
+        if simulation.modes.mode in (
+            Mode.EMERGENCY_STOP,
+            Mode.STAND_ON_MOTORS,
+            Mode.STAND_ON_BRAKES,
+        ):
             break
     simulation.recover()
     simulation.plc.set_bit("drives_on", True)
@@ -89,16 +101,23 @@ def recovered(simulation: Simulation) -> bool:
 
 
 def unseen(cases: int, seed: int) -> tuple[int, list[str]]:
-    """How many large ones were made, and what was stopped though it was small, or was not though large."""
-    generator, large, wrong = np.random.default_rng(seed), 0, []
+    """How many large ones were made, and what was stopped though it was small, or was not though
+    large.
+    """
+    generator = np.random.default_rng(seed)
+    large = 0
+    wrong = []
     for case in range(cases):
         situation = SITUATIONS[case % len(SITUATIONS)]
         simulation = brought_into(situation, int(generator.integers(0, 600)))
-        mode, tube = simulation.modes.mode, simulation.settings.execution.tube
+        mode = simulation.modes.mode
+        tube = simulation.settings.execution.tube
         by = generator.normal(size=6) * 10.0 ** generator.uniform(-5.0, 0.5)
         off = deviation(simulation, by)
         moves = bool(simulation.backend.qd.any())
-        q, robot, slack = simulation.backend.q + by, simulation.robot, 0.02
+        q = simulation.backend.q + by
+        robot = simulation.robot
+        slack = 0.02
         outside = bool(((q > robot.position_max + slack) | (q < robot.position_min - slack)).any())
         expected = outside or off > 2.0 * tube
         if not expected and (moves or off > 0.5 * tube):
@@ -119,7 +138,9 @@ def unseen(cases: int, seed: int) -> tuple[int, list[str]]:
             if not (is_shown(simulation) and np.array_equal(simulation.backend.q, stood)):
                 wrong.append(f"{label}: not stopped, or not shown")
             elif not recovered(simulation):
-                wrong.append(f"{label}: not recovered, {simulation.modes.mode.name}: {simulation.fault}")
+                wrong.append(
+                    f"{label}: not recovered, {simulation.modes.mode.name}: {simulation.fault}"
+                )
     return large, wrong
 
 

@@ -1,4 +1,6 @@
-"""Loads that the wrist cannot carry or that no body can have: refused with value and bound; the rest runs."""
+"""Loads that the wrist cannot carry or that no body can have: refused with value and bound; the
+rest runs.
+"""
 
 from __future__ import annotations
 
@@ -23,11 +25,17 @@ def custom(cell: Cell, mass: float, com: tuple[float, float, float], *inertia: f
 
 
 def test_the_rated_load_point_is_carried_and_a_little_more_is_not(cell: Cell) -> None:
-    """210 kg at 0.24 m in front of the flange and 0.27 m beside it: an estimate, not used to build it."""
+    """210 kg at 0.24 m in front of the flange and 0.27 m beside it: an estimate, not used to build
+    it.
+    """
     custom(cell, 210.0, (0.24, 0.27 - MILLIMETRE, 0.0), 105.0, 0.0, 0.0, 105.0, 0.0, 105.0)
-    with pytest.raises(RequestRefusedError, match=r"moment of .* Nm about the last axis.* at most 556 Nm"):
+    with pytest.raises(
+        RequestRefusedError, match=r"moment of .* Nm about the last axis.* at most 556 Nm"
+    ):
         custom(cell, 210.0, (0.1, 0.28, 0.0))
-    with pytest.raises(RequestRefusedError, match=r"moment of .* Nm about the wrist's centre.* at most 1090"):
+    with pytest.raises(
+        RequestRefusedError, match=r"moment of .* Nm about the wrist's centre.* at most 1090"
+    ):
         custom(cell, 210.0, (0.33, 0.0, 0.0))
 
 
@@ -57,10 +65,13 @@ def test_what_no_body_can_have_is_refused(cell: Cell, inertia: tuple[float, ...]
 
 
 def survivors(cell: Cell, cases: int, seed: int) -> tuple[int, list[str]]:
-    """Random loads of all sizes and shapes on the physics: how many were carried, and what went wrong."""
+    """Random loads of all sizes and shapes on the physics: how many were carried, and what went
+    wrong.
+    """
     generator = np.random.default_rng(seed)
     simulation = make_simulation(cell, backend="pybullet")
-    carried, wrong = 0, []
+    carried = 0
+    wrong = []
     for case in range(cases):
         mass = 10.0 ** generator.uniform(-9.0, 2.32)
         com = generator.normal(size=3) * 10.0 ** generator.uniform(-6.0, 0.0)
@@ -81,7 +92,9 @@ def survivors(cell: Cell, cases: int, seed: int) -> tuple[int, list[str]]:
     return carried, wrong
 
 
-def test_forty_random_loads_are_carried_or_refused(cell: Cell, capfd: pytest.CaptureFixture[str]) -> None:
+def test_forty_random_loads_are_carried_or_refused(
+    cell: Cell, capfd: pytest.CaptureFixture[str]
+) -> None:
     carried, wrong = survivors(cell, 40, seed=0)
     assert wrong == []
     assert carried > 10
@@ -97,8 +110,11 @@ def needle(generator: np.random.Generator) -> np.ndarray:
 
 
 def test_what_is_taken_as_a_load_can_be_scaled_and_weighed(cell: Cell) -> None:
-    """The load check compares with heavier loads in proportion, whose inertia rounding turned negative."""
-    generator, simulation = np.random.default_rng(0), make_simulation(cell, backend="ideal")
+    """The load check compares with heavier loads in proportion, whose inertia rounding turned
+    negative.
+    """
+    generator = np.random.default_rng(0)
+    simulation = make_simulation(cell, backend="ideal")
     for _ in range(60):
         with contextlib.suppress(RequestRefusedError):
             load = custom_load(cell, 10.0, np.array([0.1, 0.0, 0.0]), needle(generator), 0.0, 0.0)

@@ -1,9 +1,11 @@
-"""Hostile requests to every service of the planner: a status with a sentence, and nothing has changed.
+"""Hostile requests to every service of the planner: a status with a sentence, and nothing has
+changed.
 
-Each case is a request that makes sense, with one to four of its fields replaced by what somebody could send.
-The judge looks at the answer alone: it converts, no figure of a SUCCESS is NaN (inf is no pair to be near to,
-or a mode that the pause is too short for), a refusal has a sentence that can be printed, and the cell is the
-one of before.
+Each case is a request that makes sense, with one to four of its fields replaced by what somebody
+could send.
+The judge looks at the answer alone: it converts, no figure of a SUCCESS is NaN (inf is no pair to
+be near to, or a mode that the pause is too short for), a refusal has a sentence that can be
+printed, and the cell is the one of before.
 """
 
 from __future__ import annotations
@@ -31,14 +33,30 @@ from ir_planner.planner import Planner
 from ir_planner.settings import PlannerSettings
 
 HOME = [0.0, -math.pi / 2, math.pi / 2, 0.0, 0.0, 0.0]
-NUMBERS = (math.nan, math.inf, -math.inf, 1e308, -1e308, 5e-324, -1.0, 0.0, -0.0, 1.0, 1e-9, 3.2, 1e6)
+NUMBERS = (
+    math.nan,
+    math.inf,
+    -math.inf,
+    1e308,
+    -1e308,
+    5e-324,
+    -1.0,
+    0.0,
+    -0.0,
+    1.0,
+    1e-9,
+    3.2,
+    1e6,
+)
 WHOLE = (0, 1, 2, 1000, 2**31 - 1, 2**32 - 1, 2**63, 2**64 - 1)
 TEXTS = (
-    "", "\0", "a\0b", "‮\U0001f9be", "<script>alert(1)</script>", "\x1b[31m", "a\nb\r", "../../etc/passwd",
-    "/etc/shadow", "/dev/zero", "x" * 300, "x" * 10_000_000, "none", "gripper", "gripper+gripper", "demo",
-    "open", "lathe", "lathe_work", "infeed_pick", "home", "park", "A1 0 A2 -90 A3 90 A4 0 A5 0 A6 0",
-    "A1 nan", "X 1e308 Y 0 Z 0 A 0 B 0 C 0", "X 1.8 Y 0 Z 1.2 A 0 B 90 C 0", "X", "%s%n{0}", "exit", "entry",
-    "ccd", "genetic", "movement_cost", "time", "asynchronous", "cell", "base_link", "world", "a: &x [*x, *x]",
+    "", "\0", "a\0b", "‮\U0001f9be", "<script>alert(1)</script>", "\x1b[31m", "a\nb\r", "../../etc/passwd",  # noqa: E501
+    "/etc/shadow", "/dev/zero", "x" * 300, "x" * 10_000_000, "none", "gripper", "gripper+gripper", "demo",  # noqa: E501
+    "open", "lathe", "lathe_work", "infeed_pick", "home", "park", "A1 0 A2 -90 A3 90 A4 0 A5 0 "
+"A6 0",
+    "A1 nan", "X 1e308 Y 0 Z 0 A 0 B 0 "
+"C 0", "X 1.8 Y 0 Z 1.2 A 0 B 90 C 0", "X", "%s%n{0}", "exit", "entry",
+    "ccd", "genetic", "movement_cost", "time", "asynchronous", "cell", "base_link", "world", "a: &x [*x, *x]",  # noqa: E501
     "format: ir_cell/1\nname: x\nrobot: kr210_r2700_extra", "[" * 5000, "joint_a1",
 )  # fmt: skip
 QUICK = PlanOptions(planning_time=0.2, max_iterations=30)
@@ -72,13 +90,16 @@ REQUESTS: dict[str, Any] = {
     "plan_standby": srv.PlanStandby.Request(pause=60.0, state=state()),
     "evaluate_trajectory": srv.EvaluateTrajectory.Request(trajectory=line()),
     "plan_regional": srv.PlanRegionalMovement.Request(start=state(), goal="home", options=QUICK),
-    "plan_service": srv.PlanServiceMovement.Request(station="lathe_work", max_candidates=1, options=QUICK),
+    "plan_service": srv.PlanServiceMovement.Request(
+        station="lathe_work", max_candidates=1, options=QUICK
+    ),
     "plan_trajectory": srv.PlanTrajectory.Request(reference=line(), options=QUICK),
     "optimize_trajectory": srv.OptimizeTrajectory.Request(trajectory=line(), options=QUICK),
     "plan_program": srv.PlanProgram.Request(stations=["home"], savings=False, options=QUICK),
 }
 RESPONSES = {
-    name: getattr(srv, type(request).__name__.split("_")[0]).Response for name, request in REQUESTS.items()
+    name: getattr(srv, type(request).__name__.split("_")[0]).Response
+    for name, request in REQUESTS.items()
 }
 CHANGES = ("set_cell", "set_equipment")
 
@@ -100,8 +121,14 @@ def hostile(kind: str, present: Any, rng: np.random.Generator) -> Any:
         inner = kind[len("sequence<") : -1]
         if "/" in inner:
             return list(present)[: rng.integers(0, 3)] * int(rng.choice([0, 1, 2, 1200]))
-        count = int(rng.choice([0, 1, 2, 5, 6, 7, 12, 20_000], p=[0.1, 0.1, 0.1, 0.1, 0.4, 0.1, 0.09, 0.01]))
-        values = list(present) if rng.random() < 0.5 and len(present) else [hostile(inner, 0, rng)] * count
+        count = int(
+            rng.choice([0, 1, 2, 5, 6, 7, 12, 20_000], p=[0.1, 0.1, 0.1, 0.1, 0.4, 0.1, 0.09, 0.01])
+        )
+        values = (
+            list(present)
+            if rng.random() < 0.5 and len(present)
+            else [hostile(inner, 0, rng)] * count
+        )
         if values and rng.random() < 0.7:
             values[int(rng.integers(len(values)))] = hostile(inner, 0, rng)
         return values
@@ -112,16 +139,21 @@ def hostile(kind: str, present: Any, rng: np.random.Generator) -> Any:
     if kind in ("double", "float"):
         return float(rng.choice(NUMBERS))
     bits = int(kind.removeprefix("u").removeprefix("int"))
-    low, high = (0, 2**bits - 1) if kind.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    low, high = (
+        (0, 2**bits - 1) if kind.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    )
     return min(max(int(WHOLE[rng.integers(len(WHOLE))]) * int(rng.choice([1, -1])), low), high)
 
 
 def disturbed(request: Any, rng: np.random.Generator) -> tuple[Any, str]:
     """The request with one to four fields replaced, and which."""
-    request, names = deepcopy(request), []
+    request = deepcopy(request)
+    names = []
     for _ in range(int(rng.integers(1, 5))):
         simple = [
-            (owner, name, kind) for owner, name, kind in places(request) if "/" not in kind or "<" in kind
+            (owner, name, kind)
+            for owner, name, kind in places(request)
+            if "/" not in kind or "<" in kind
         ]
         if not simple:
             break
@@ -170,7 +202,13 @@ class Asked:
         known.take(np.array(HOME), 0.0)
         self.logged: list[str] = []
         self.requests = Requests(
-            self.planner, known, lambda: 0.0, lambda: None, lambda _: None, lambda: 1, self.logged.append
+            self.planner,
+            known,
+            lambda: 0.0,
+            lambda: None,
+            lambda _: None,
+            lambda: 1,
+            self.logged.append,
         )
 
     def answer(self, name: str, request: Any) -> Any:
@@ -179,8 +217,11 @@ class Asked:
 
 
 def judged(cases: int, seed: int) -> list[str]:
-    """What was wrong with the answers to so many hostile requests: case, service, fields, sentence."""
-    asked, found = Asked(), []
+    """What was wrong with the answers to so many hostile requests: case, service, fields,
+    sentence.
+    """
+    asked = Asked()
+    found = []
     rng = np.random.default_rng(seed)
     for case in range(cases):
         name = list(REQUESTS)[case % len(REQUESTS)]
@@ -193,7 +234,11 @@ def judged(cases: int, seed: int) -> list[str]:
         if warned and not problem:
             problem = f"{warned[0].filename}:{warned[0].lineno} {warned[0].message}"
         changed = asked.planner.cell is not before
-        if changed and not (name in CHANGES and response.status.code == Status.SUCCESS) and not problem:
+        if (
+            changed
+            and not (name in CHANGES and response.status.code == Status.SUCCESS)
+            and not problem
+        ):
             problem = "the cell has changed"
         if problem:
             found.append(f"case {case} {name}({said}): {problem}")
@@ -216,16 +261,24 @@ def test_each_request_makes_sense_before_it_is_disturbed(name: str) -> None:
 
 
 def found_before() -> list[tuple[str, Any, str]]:
-    """Requests that this generator found: proofs for hours, overflows, and programs without a movement."""
-    far, fast = line(), line()
+    """Requests that this generator found: proofs for hours, overflows, and programs without a
+    movement.
+    """
+    far = line()
+    fast = line()
     far.points[1].positions[2] = 1e6
     fast.points[1].velocities[2] = 1e308
     huge = state([1e308, *HOME[1:]])
     program = {"stations": ["home"], "savings": False, "options": QUICK}
-    evaluate, standing = srv.EvaluateTrajectory.Request, srv.PlanProgram.Request
+    evaluate = srv.EvaluateTrajectory.Request
+    standing = srv.PlanProgram.Request
     return [
         ("evaluate_trajectory", evaluate(trajectory=far), "1e+06 rad: it must be within 100 rad"),
-        ("evaluate_trajectory", evaluate(trajectory=fast), "1e+308 rad/s: it must be within 10000 rad/s"),
+        (
+            "evaluate_trajectory",
+            evaluate(trajectory=fast),
+            "1e+308 rad/s: it must be within 10000 rad/s",
+        ),
         ("check_state", srv.CheckState.Request(state=huge), "it must be within 100 rad"),
         ("compute_ik", srv.ComputeIk.Request(goal="home", near=huge), "it must be within 100 rad"),
         (

@@ -1,4 +1,6 @@
-"""Modbus clients by the hundred, silent, pipelining, half heard: bounded, answered, nothing logged."""
+"""Modbus clients by the hundred, silent, pipelining, half heard: bounded, answered, nothing
+logged.
+"""
 
 from __future__ import annotations
 
@@ -76,7 +78,8 @@ def connected(port: int) -> socket.socket:
 def test_a_hundred_silent_clients_leave_a_place_and_no_line_in_the_log(
     open_port: Opened, driver: Driver, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    port, before = open_port(modbus_connections=4), threading.active_count()
+    port = open_port(modbus_connections=4)
+    before = threading.active_count()
     silent = [connected(port) for _ in range(100)]
     for _ in range(100):  # who was not silent for a second keeps its place
         if is_served(port):
@@ -101,12 +104,11 @@ def test_a_hundred_silent_clients_leave_a_place_and_no_line_in_the_log(
 
 def test_who_asks_keeps_its_place_among_silent_ones(driver: Driver) -> None:
     """On a clock of the server's own: a busy machine would keep the PLC silent as well."""
-    server, now = (
-        ModbusServer("127.0.0.1", 0, ControllerTables(driver.plc, 2.0), Limits(connections=2)),
-        [0.0],
-    )
+    server = ModbusServer("127.0.0.1", 0, ControllerTables(driver.plc, 2.0), Limits(connections=2))
+    now = [0.0]
     server._loop.time = lambda: now[0]  # type: ignore[method-assign]
-    plc, silent = connected(server.port), connected(server.port)
+    plc = connected(server.port)
+    silent = connected(server.port)
 
     def asks() -> bool:
         plc.sendall(frame(READ_ALL_COILS))
@@ -152,7 +154,9 @@ def test_what_is_no_modbus_ends_its_connection(open_port: Opened, header: tuple[
     assert is_served(port)
 
 
-def test_several_registers_are_written_together_or_not_at_all(open_port: Opened, driver: Driver) -> None:
+def test_several_registers_are_written_together_or_not_at_all(
+    open_port: Opened, driver: Driver
+) -> None:
     """No step of the plant sees the half: the mode switch at T1 would stop a movement."""
     seen: list[OperatingMode] = []
     client = ModbusTcpClient("127.0.0.1", port=open_port(), timeout=60)
@@ -231,7 +235,9 @@ def test_coils_are_written_as_the_specification_packs_them() -> None:
     assert wall.written == (0x13, [True, False, True, True, False, False, True, True, True, False])
 
 
-def test_an_error_of_the_drivers_own_is_answered_and_logged_once(caplog: pytest.LogCaptureFixture) -> None:
+def test_an_error_of_the_drivers_own_is_answered_and_logged_once(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     server = ModbusServer("127.0.0.1", 0, Wall())
     try:
         with connected(server.port) as link:
@@ -242,14 +248,19 @@ def test_an_error_of_the_drivers_own_is_answered_and_logged_once(caplog: pytest.
             assert received(link, 13)[7:] == bytes.fromhex("03 04 0007 0008")
     finally:
         server.close()
-    assert [record.exc_info[0] for record in caplog.records if record.exc_info] == [ZeroDivisionError]
+    assert [record.exc_info[0] for record in caplog.records if record.exc_info] == [
+        ZeroDivisionError
+    ]
 
 
 def test_what_the_event_loop_complains_of_is_not_logged(caplog: pytest.LogCaptureFixture) -> None:
     """Without descriptors it would be a traceback each second."""
     server = ModbusServer("127.0.0.1", 0, Wall())
     try:
-        complaint = {"message": "socket.accept() out of system resource", "exception": OSError(24, "full")}
+        complaint = {
+            "message": "socket.accept() out of system resource",
+            "exception": OSError(24, "full"),
+        }
         server._loop.call_soon_threadsafe(server._loop.call_exception_handler, complaint)
         with connected(server.port) as link:  # heard after the complaint
             link.sendall(frame(struct.pack(">BHH", 3, 0, 2)))

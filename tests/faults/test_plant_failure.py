@@ -1,4 +1,6 @@
-"""When the plant's thread ends: requests are refused, goals end, and the process exits with a code."""
+"""When the plant's thread ends: requests are refused, goals end, and the process exits with a
+code.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,14 @@ import pytest
 
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver import Driver, ErrorCode, Outcome, RequestRefusedError, TrajectoryGoal, make_simulation
+from ir_sim_driver import (
+    Driver,
+    ErrorCode,
+    Outcome,
+    RequestRefusedError,
+    TrajectoryGoal,
+    make_simulation,
+)
 from ir_sim_driver.notices import Level
 from ir_sim_driver.plc import SERVICE
 
@@ -16,8 +25,10 @@ from ir_sim_driver.plc import SERVICE
 def broken(monkeypatch: pytest.MonkeyPatch) -> tuple[Driver, list[Outcome]]:
     """A driver whose plant has failed in the middle of a goal."""
     simulation = make_simulation("open", backend="ideal")
-    driver, outcomes = Driver(simulation), []
-    q, rest = simulation.backend.q, np.zeros((2, 6))
+    driver = Driver(simulation)
+    outcomes = []
+    q = simulation.backend.q
+    rest = np.zeros((2, 6))
     names = simulation.robot.joint_names
     goal = TrajectoryGoal(JointTrajectory.from_seconds(names, [0.0, 2.0], [q, q + 0.2], rest, rest))
     ticket = driver.submit(2, lambda: goal, outcomes.append)

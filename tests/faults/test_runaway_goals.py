@@ -1,4 +1,6 @@
-"""Goals that would make the robot run away: refused, or executed within its limits. An independent judge."""
+"""Goals that would make the robot run away: refused, or executed within its limits. An independent
+judge.
+"""
 
 from __future__ import annotations
 
@@ -10,25 +12,40 @@ import pytest
 
 from ir_description import load_cell
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver import DriverError, ExecutionSettings, Simulation, TrajectoryGoal, make_simulation
+from ir_sim_driver import (
+    DriverError,
+    ExecutionSettings,
+    Simulation,
+    TrajectoryGoal,
+    make_simulation,
+)
 from ir_sim_driver.motion.rounding import rounded
 
-BARE = replace(load_cell("open"), floor=False, equipment=(), stations=(), parts=(), program=(), tasks=())
+BARE = replace(
+    load_cell("open"), floor=False, equipment=(), stations=(), parts=(), program=(), tasks=()
+)
 
-SLACK = 0.02  # share: a command is judged by differences over a step, the limits hold for its derivatives
+# share: a command is judged by differences over a step, the limits hold for its derivatives
+SLACK = 0.02
 STEP_NOISE = 1e-3  # rad/s^2: differences of positions to 1e-16 rad, and interpolation of path time
 
 
 def excesses(positions: list[np.ndarray], simulation: Simulation) -> dict[str, float]:
-    """Largest use of the limits by finite differences of executed positions (K, n), one per step of dt."""
-    q, robot, dt = np.array(positions), simulation.robot, simulation.settings.dt
+    """Largest use of the limits by finite differences of executed positions (K, n), one per step of
+    dt.
+    """
+    q = np.array(positions)
+    robot = simulation.robot
+    dt = simulation.settings.dt
     speed = np.diff(q, axis=0) / dt
     change = np.diff(speed, axis=0) / dt
     beyond = np.maximum(q - robot.position_max, robot.position_min - q)
     return {
         "position": float(beyond.max()),
         "velocity": float((np.abs(speed) / robot.velocity_max).max(initial=0.0)),
-        "acceleration": float(((np.abs(change) - STEP_NOISE) / robot.acceleration_max).max(initial=0.0)),
+        "acceleration": float(
+            ((np.abs(change) - STEP_NOISE) / robot.acceleration_max).max(initial=0.0)
+        ),
     }
 
 
@@ -58,7 +75,9 @@ def simulation() -> Simulation:
     return make_simulation(BARE, backend="ideal")
 
 
-def trajectory(simulation: Simulation, times: Any, points: Any, *derivatives: Any) -> JointTrajectory:
+def trajectory(
+    simulation: Simulation, times: Any, points: Any, *derivatives: Any
+) -> JointTrajectory:
     return JointTrajectory.from_seconds(simulation.robot.joint_names, times, points, *derivatives)
 
 
@@ -67,20 +86,27 @@ def trajectory(simulation: Simulation, times: Any, points: Any, *derivatives: An
 def test_a_radian_in_a_millisecond_is_refused_however_it_is_interpolated(
     simulation: Simulation, length: float, kind: str
 ) -> None:
-    q, rest = simulation.backend.q, np.zeros((2, 6))
+    q = simulation.backend.q
+    rest = np.zeros((2, 6))
     more = {"linear": (), "cubic": (rest,), "quintic": (rest, rest)}[kind]
     assert not execute(simulation, trajectory(simulation, [0.0, length], [q, q + 1.0], *more))
     assert within(excesses(ride(simulation, 0.05), simulation))
 
 
 @pytest.mark.parametrize("joint", range(6))
-def test_five_percent_more_than_an_axis_may_accelerate_is_refused(simulation: Simulation, joint: int) -> None:
-    q, rest, angle = simulation.backend.q, np.zeros((2, 6)), 0.2
+def test_five_percent_more_than_an_axis_may_accelerate_is_refused(
+    simulation: Simulation, joint: int
+) -> None:
+    q = simulation.backend.q
+    rest = np.zeros((2, 6))
+    angle = 0.2
     most = 1.05 * simulation.robot.acceleration_max[joint]
     time = (10.0 / np.sqrt(3.0) * angle / most) ** 0.5  # of a quintic from rest to rest
     there = q + angle * np.eye(6)[joint]
     with pytest.raises(DriverError, match=r"needs .* rad/s\^2"):
-        simulation.vet(TrajectoryGoal(trajectory(simulation, [0.0, time], [q, there], rest, rest)), 1)
+        simulation.vet(
+            TrajectoryGoal(trajectory(simulation, [0.0, time], [q, there], rest, rest)), 1
+        )
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -88,16 +114,23 @@ def test_five_percent_more_than_an_axis_may_accelerate_is_refused(simulation: Si
 def test_five_percent_more_than_an_axis_may_turn_is_refused_in_either_direction(
     simulation: Simulation, joint: int, sign: float
 ) -> None:
-    q, rest, angle = simulation.backend.q, np.zeros((2, 6)), 0.2
-    time = 1.875 * angle / (1.05 * simulation.robot.velocity_max[joint])  # of a quintic from rest to rest
+    q = simulation.backend.q
+    rest = np.zeros((2, 6))
+    angle = 0.2
+    time = (
+        1.875 * angle / (1.05 * simulation.robot.velocity_max[joint])
+    )  # of a quintic from rest to rest
     there = q + sign * angle * np.eye(6)[joint]
     with pytest.raises(DriverError, match=r"needs .* rad/s at"):
-        simulation.vet(TrajectoryGoal(trajectory(simulation, [0.0, time], [q, there], rest, rest)), 1)
+        simulation.vet(
+            TrajectoryGoal(trajectory(simulation, [0.0, time], [q, there], rest, rest)), 1
+        )
 
 
 def test_what_leads_in_keeps_the_limits_too(simulation: Simulation) -> None:
     """A trajectory of one point is nothing but its lead-in."""
-    q, rest = simulation.backend.q, np.zeros((1, 6))
+    q = simulation.backend.q
+    rest = np.zeros((1, 6))
     assert not execute(simulation, trajectory(simulation, [0.1], [q + 0.3], rest, rest))
     assert execute(simulation, trajectory(simulation, [2.0], [q + 0.3], rest, rest))
     assert within(excesses(ride(simulation, 2.2), simulation))
@@ -113,7 +146,8 @@ def test_what_happens_between_milliseconds_is_seen(simulation: Simulation) -> No
 
 
 def test_long_paths_are_checked_as_finely_as_short_ones(simulation: Simulation) -> None:
-    q, rest = simulation.backend.q, np.zeros((4, 6))
+    q = simulation.backend.q
+    rest = np.zeros((4, 6))
     points = [q, q + 0.1, q + 0.13, q + 0.13]  # 30 mrad in 4 ms, in the middle of an hour
     assert not execute(
         simulation, trajectory(simulation, [0.0, 1800.0, 1800.004, 3600.0], points, rest, rest)
@@ -122,7 +156,8 @@ def test_long_paths_are_checked_as_finely_as_short_ones(simulation: Simulation) 
 
 def test_many_small_jumps_are_bounded_in_rate(simulation: Simulation) -> None:
     """Each corner alone is allowed; a zigzag of them every millisecond is not."""
-    q, limit = simulation.backend.q, simulation.robot.acceleration_max
+    q = simulation.backend.q
+    limit = simulation.robot.acceleration_max
     step = 0.45 * 0.02 * limit * 1e-3
     points = [q + (k % 2) * step * (k > 0) + 0.6 * step * k for k in range(200)]
     zigzag = trajectory(simulation, 1e-3 * np.arange(200.0), points)
@@ -152,7 +187,8 @@ def test_rounded_corners_are_the_mean_over_the_blend_time(simulation: Simulation
 
 
 def test_a_first_velocity_at_rest_is_reached_by_a_bridge(simulation: Simulation) -> None:
-    q, allowed = simulation.backend.q, 0.019 * simulation.robot.acceleration_max
+    q = simulation.backend.q
+    allowed = 0.019 * simulation.robot.acceleration_max
     v = np.array([allowed, np.zeros(6)])
     points = [q, q + 0.5 * allowed]
     assert execute(simulation, trajectory(simulation, [0.0, 1.0], points, v))
@@ -160,15 +196,19 @@ def test_a_first_velocity_at_rest_is_reached_by_a_bridge(simulation: Simulation)
 
 
 def test_a_first_velocity_at_rest_beyond_the_bridge_is_refused(simulation: Simulation) -> None:
-    q, v = simulation.backend.q, np.zeros((2, 6))
+    q = simulation.backend.q
+    v = np.zeros((2, 6))
     v[0] = 0.021 * simulation.robot.acceleration_max
     goal = TrajectoryGoal(trajectory(simulation, [0.0, 1.0], [q, q + 0.5 * v[0]], v))
     with pytest.raises(DriverError, match="against the command"):
         simulation.execute(simulation.vet(goal, 1), 1)
 
 
-def test_a_movement_that_is_replaced_by_a_later_one_does_not_stop_dead(simulation: Simulation) -> None:
-    q, rest = simulation.backend.q, np.zeros((2, 6))
+def test_a_movement_that_is_replaced_by_a_later_one_does_not_stop_dead(
+    simulation: Simulation,
+) -> None:
+    q = simulation.backend.q
+    rest = np.zeros((2, 6))
     assert execute(simulation, trajectory(simulation, [0.0, 2.0], [q, q + 0.5], rest, rest))
     positions = ride(simulation, 1.0)
     later = trajectory(simulation, [2.0], [q], rest[:1])
@@ -179,8 +219,12 @@ def test_a_movement_that_is_replaced_by_a_later_one_does_not_stop_dead(simulatio
     assert np.abs(simulation.backend.q - q).max() < 1e-9
 
 
-def random_goal(simulation: Simulation, generator: np.random.Generator) -> tuple[JointTrajectory, int]:
-    """Goals of all kinds: spacings from a nanosecond to minutes, every interpolation, lead-ins, stamps."""
+def random_goal(
+    simulation: Simulation, generator: np.random.Generator
+) -> tuple[JointTrajectory, int]:
+    """Goals of all kinds: spacings from a nanosecond to minutes, every interpolation, lead-ins,
+    stamps.
+    """
     count = int(generator.integers(1, 8))
     spacing = 10.0 ** generator.uniform(-9.0, 1.5, count)
     times = np.cumsum(spacing) + 1e-9 * np.arange(count)
@@ -190,13 +234,18 @@ def random_goal(simulation: Simulation, generator: np.random.Generator) -> tuple
     points = simulation.executor.command + scale * generator.normal(size=(count, 6))
     if generator.random() < 0.6:  # timed so that some are accepted
         times = (
-            times[0] + np.concatenate(([0.0], np.cumsum(np.abs(np.diff(points, axis=0)).max(axis=1)))) * 3.0
+            times[0]
+            + np.concatenate(([0.0], np.cumsum(np.abs(np.diff(points, axis=0)).max(axis=1)))) * 3.0
         )
         times = times + 0.2 * np.arange(count)
         points[0] = simulation.executor.command if times[0] == 0.0 else points[0]
-    velocities = 10.0 ** generator.uniform(-6.0, 0.5, (count, 1)) * generator.normal(size=(count, 6))
+    velocities = 10.0 ** generator.uniform(-6.0, 0.5, (count, 1)) * generator.normal(
+        size=(count, 6)
+    )
     velocities[-1] = 0.0
-    accelerations = 10.0 ** generator.uniform(-6.0, 1.0, (count, 1)) * generator.normal(size=(count, 6))
+    accelerations = 10.0 ** generator.uniform(-6.0, 1.0, (count, 1)) * generator.normal(
+        size=(count, 6)
+    )
     quiet = generator.random() < 0.5
     more: list[Any] = [None, None]
     kind = int(generator.integers(3))
@@ -212,7 +261,8 @@ def judged(cases: int, seed: int) -> tuple[int, list[str]]:
     """Accepted goals, and what the judge found beyond a limit."""
     generator = np.random.default_rng(seed)
     settings = ExecutionSettings()
-    accepted, beyond = 0, []
+    accepted = 0
+    beyond = []
     simulation = make_simulation(BARE, backend="ideal")
     positions = [simulation.backend.q.copy()]
     for case in range(cases):
@@ -226,9 +276,9 @@ def judged(cases: int, seed: int) -> tuple[int, list[str]]:
         if not execute(simulation, goal, stamp_ns=stamp):
             continue
         accepted += 1
-        positions += ride(simulation, min(2.0, settings.stop_time + generator.uniform(0.0, goal.duration)))[
-            1:
-        ]
+        positions += ride(
+            simulation, min(2.0, settings.stop_time + generator.uniform(0.0, goal.duration))
+        )[1:]
         simulation.set_speed_scaling(float(generator.choice([0.0, 0.3, 1.0, 1.0])))
         positions += ride(simulation, 0.3)[1:]
         simulation.set_speed_scaling(1.0)

@@ -1,4 +1,6 @@
-"""Supervision never sleeps: whoever leaves range, tube, speed or acceleration is stopped until recovered."""
+"""Supervision never sleeps: whoever leaves range, tube, speed or acceleration is stopped until
+recovered.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ from ir_sim_driver.controller.supervision import Command, Supervision, Supervisi
 from ir_sim_driver.notices import Level
 from ir_sim_driver.plant import Backend
 
-BARE = replace(load_cell("open"), floor=False, equipment=(), stations=(), parts=(), program=(), tasks=())
+BARE = replace(
+    load_cell("open"), floor=False, equipment=(), stations=(), parts=(), program=(), tasks=()
+)
 
 
 def start(simulation: Simulation, times: list[float], points: list[np.ndarray]) -> None:
@@ -56,7 +60,8 @@ def pushed(torque: float) -> np.ndarray:
 
 def seen(looks: list[tuple[np.ndarray, np.ndarray, bool]], deviation: float = 0.0) -> str:
     """What the supervision alone says of positions, speeds (n,) and saturation, look by look."""
-    watch, fault = Supervision(BARE.robot, 1e-3, SupervisionSettings()), None
+    watch = Supervision(BARE.robot, 1e-3, SupervisionSettings())
+    fault = None
     for q, qd, saturated in looks:
         backend = cast(Backend, SimpleNamespace(q=q.copy(), qd=qd, saturated=saturated))
         fault = fault or watch.look(backend, Command(q, deviation, 5e-3), braking=False)
@@ -66,9 +71,14 @@ def seen(looks: list[tuple[np.ndarray, np.ndarray, bool]], deviation: float = 0.
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("share", [0.99, 1.01])
 def test_each_bound_of_the_supervision_counts_alone(sign: float, share: float) -> None:
-    """One percent within and beyond 0.02 rad, 10 %, twice the acceleration over 20 ms, 5 mm and 0.3 s."""
-    robot, home, rest = BARE.robot, np.array(BARE.machine_home), np.zeros(6)
-    one, beyond = sign * np.eye(6)[3], share > 1.0
+    """One percent within and beyond 0.02 rad, 10 %, twice the acceleration over 20 ms, 5 mm and 0.3
+    s.
+    """
+    robot = BARE.robot
+    home = np.array(BARE.machine_home)
+    rest = np.zeros(6)
+    one = sign * np.eye(6)[3]
+    beyond = share > 1.0
     edge = home.copy()
     edge[3] = (robot.position_max if sign > 0 else robot.position_min)[3] + share * 0.02 * sign
     fast = share * 1.1 * robot.velocity_max[3] * one
@@ -97,7 +107,9 @@ def test_a_robot_that_is_pushed_away_while_it_holds_is_stopped(simulation: Simul
     assert report(simulation, 0.0)[0].level is Level.OK
 
 
-def test_a_robot_that_is_pushed_while_it_stops_along_its_path_is_stopped(simulation: Simulation) -> None:
+def test_a_robot_that_is_pushed_while_it_stops_along_its_path_is_stopped(
+    simulation: Simulation,
+) -> None:
     q = simulation.backend.q
     start(simulation, [0.0, 2.0], [q, q + 0.4])
     simulation.run(1.0)
@@ -128,10 +140,12 @@ def moved_to(simulation: Simulation, q: np.ndarray) -> None:
 def test_a_lead_in_that_swings_farther_out_first_is_refused() -> None:
     """Its ends are allowed; to arrive with that speed it would begin outwards."""
     simulation = make_simulation(BARE, backend="ideal")
-    robot, outside = simulation.robot, simulation.backend.q.copy()
+    robot = simulation.robot
+    outside = simulation.backend.q.copy()
     outside[0] = robot.position_max[0] + 0.01  # within what the supervision allows
     moved_to(simulation, outside)
-    points, speeds = np.array([outside, outside]), np.zeros((2, 6))
+    points = np.array([outside, outside])
+    speeds = np.zeros((2, 6))
     points[:, 0] -= 0.1, 0.6
     speeds[0, 0] = -0.5
     names = robot.joint_names
@@ -157,7 +171,8 @@ def test_beyond_a_limit_it_is_stopped_and_can_only_be_driven_back(beyond: float)
     assert simulation.modes.mode is Mode.STAND_ON_MOTORS
     assert simulation.fault == ""
 
-    farther, inside = outside.copy(), outside.copy()
+    farther = outside.copy()
+    inside = outside.copy()
     farther[0] += 0.01
     inside[0] = robot.position_max[0] - 0.05
     with pytest.raises(TrajectoryRefusedError, match="joint_a1"):
@@ -174,7 +189,8 @@ def test_a_command_that_jumps_is_stopped_whoever_made_it(monkeypatch: pytest.Mon
     """A bug in the executor: the second look is independent of the first."""
     simulation = make_simulation(BARE, backend="ideal")
     simulation.run(0.1)
-    q, steps = simulation.backend.q, 0
+    q = simulation.backend.q
+    steps = 0
 
     def runs_away(scaling: float, ready: bool = True) -> np.ndarray:
         nonlocal steps
@@ -195,7 +211,9 @@ def test_what_is_allowed_is_never_stopped(simulation: Simulation) -> None:
     for target in (home + np.array([0.6, 0.2, -0.2, 0.4, 0.3, 0.5]), home):
         start(simulation, [2.0], [target])
         for _ in range(20):
-            simulation.disturb(np.array([600.0] * 3 + [100.0] * 3) * generator.choice([-1.0, 1.0], 6))
+            simulation.disturb(
+                np.array([600.0] * 3 + [100.0] * 3) * generator.choice([-1.0, 1.0], 6)
+            )
             simulation.run(0.15)
         simulation.disturb(None)
     assert simulation.fault == ""

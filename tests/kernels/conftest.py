@@ -1,7 +1,8 @@
-"""Literals shared by the kernels' tests (robots.py, geometry_cases.py), run on every build that is here.
+"""Literals shared by the kernels' tests (robots.py, geometry_cases.py), run on every build that is
+here.
 
-Set-up builds the core for this processor alone. The portable one is built by the test of colcon's build,
-which runs these tests on it.
+Set-up builds the core for this processor alone. The portable one is built by the test of colcon's
+build, which runs these tests on it.
 """
 
 import sys
@@ -21,7 +22,9 @@ def _built() -> dict[str, Any]:
     """The compiled modules that are here: `native` where it runs, `baseline` where it was built."""
     found = {}
     for name in ("native", "baseline"):
-        with suppress(ImportError):  # a machine without a compiler, or not the one that built `native`
+        with suppress(
+            ImportError
+        ):  # a machine without a compiler, or not the one that built `native`
             found[name] = compiled.load(name)[1]
     return found
 
@@ -45,5 +48,7 @@ def compiled_core(request: pytest.FixtureRequest) -> Any:
 def baseline() -> Any:
     """The portable module, to be compared with the native one."""
     if len(BUILT) < 2:
-        pytest.skip(f"built here: {', '.join(BUILT) or 'nothing'}; the test of colcon's build runs this")
+        pytest.skip(
+            f"built here: {', '.join(BUILT) or 'nothing'}; the test of colcon's build runs this"
+        )
     return BUILT["baseline"]

@@ -1,5 +1,5 @@
-"""A KR 210 with its tool, and cells, as small literals: the kernels are tested without the description
-package.
+"""A KR 210 with its tool, and cells, as small literals: the kernels are tested without the
+description package.
 """
 
 from dataclasses import dataclass, field
@@ -38,14 +38,18 @@ class Body:
 
 def shift(xyz: tuple[float, float, float], yaw: float = 0.0) -> FloatArray:
     pose = np.eye(4)
-    c, s = np.cos(yaw), np.sin(yaw)
+    c = np.cos(yaw)
+    s = np.sin(yaw)
     pose[:2, :2] = [[c, -s], [s, c]]
     pose[:3, 3] = xyz
     return pose
 
 
 def box(
-    name: str, position: tuple[float, float, float], size: tuple[float, float, float], yaw: float = 0.0
+    name: str,
+    position: tuple[float, float, float],
+    size: tuple[float, float, float],
+    yaw: float = 0.0,
 ) -> Body:
     return Body(name, "box", shift(position, yaw), np.array(size))
 
@@ -59,10 +63,19 @@ KR210 = Robot(
     joint_origin=np.array(
         [
             shift(xyz)
-            for xyz in [(0, 0, 0.675), (0.35, 0, 0), (1.15, 0, 0), (0, 0, -0.041), (1.2, 0, 0), (0.215, 0, 0)]
+            for xyz in [
+                (0, 0, 0.675),
+                (0.35, 0, 0),
+                (1.15, 0, 0),
+                (0, 0, -0.041),
+                (1.2, 0, 0),
+                (0.215, 0, 0),
+            ]
         ]
     ),
-    joint_axis=np.array([[0, 0, -1], [0, 1, 0], [0, 1, 0], [-1, 0, 0], [0, 1, 0], [-1, 0, 0]], dtype=float),
+    joint_axis=np.array(
+        [[0, 0, -1], [0, 1, 0], [0, 1, 0], [-1, 0, 0], [0, 1, 0], [-1, 0, 0]], dtype=float
+    ),
     position_min=np.deg2rad([-185.0, -140, -120, -350, -125, -350]),
     position_max=np.deg2rad([185.0, -5, 155, 350, 125, 350]),
 )

@@ -1,6 +1,8 @@
-"""Robots as literals for the tests of the kernels: the KR 210 R2700 extra, and random serial chains.
+"""Robots as literals for the tests of the kernels: the KR 210 R2700 extra, and random serial
+chains.
 
-Masses, drives and counterbalance of the KR 210: machine data of the KR C4 and kroshu/kuka_robot_descriptions.
+Masses, drives and counterbalance of the KR 210: machine data of the KR C4 and
+kroshu/kuka_robot_descriptions.
 """
 
 from dataclasses import dataclass, field
@@ -68,9 +70,18 @@ def _translations(offsets: list[list[float]]) -> FloatArray:
 
 def kr210() -> RobotLiteral:
     """KR 210 R2700 extra, bare, KUKA's signs."""
-    offsets = [[0, 0, 0.675], [0.35, 0, 0], [1.15, 0, 0], [0, 0, -0.041], [1.2, 0, 0], [0.215, 0, 0]]
+    offsets = [
+        [0, 0, 0.675],
+        [0.35, 0, 0],
+        [1.15, 0, 0],
+        [0, 0, -0.041],
+        [1.2, 0, 0],
+        [0.215, 0, 0],
+    ]
     gear = np.array([219.031, 235.368, 241.0, 151.226, 156.674, 123.041])
-    stall = np.minimum([7290, 8100, 5291, 2182, 1282, 825], np.array([33, 55, 55, 18, 18, 18]) * gear)
+    stall = np.minimum(
+        [7290, 8100, 5291, 2182, 1282, 825], np.array([33, 55, 55, 18, 18, 18]) * gear
+    )
     envelope = np.array(
         [
             [[1.33, 5988], [1.81, 4503], [2.07, 2891], [2.16, 1215]],
@@ -81,7 +92,9 @@ def kr210() -> RobotLiteral:
             [[2.37, 767], [3.22, 702], [3.68, 630], [3.83, 556]],
         ]
     )
-    limits = np.radians([[-185, 185], [-140, -5], [-120, 155], [-350, 350], [-125, 125], [-350, 350]])
+    limits = np.radians(
+        [[-185, 185], [-140, -5], [-120, 155], [-350, 350], [-125, 125], [-350, 350]]
+    )
     diagonals = [
         [20, 20, 20],
         [13, 31, 29.4],
@@ -96,7 +109,9 @@ def kr210() -> RobotLiteral:
         joint_names=tuple(f"joint_a{i}" for i in range(1, 7)),
         link_names=("base_link", *(f"link_{i}" for i in range(1, 7))),
         joint_origin=_translations(offsets),
-        joint_axis=np.array([[0, 0, -1], [0, 1, 0], [0, 1, 0], [-1, 0, 0], [0, 1, 0], [-1, 0, 0]], float),
+        joint_axis=np.array(
+            [[0, 0, -1], [0, 1, 0], [0, 1, 0], [-1, 0, 0], [0, 1, 0], [-1, 0, 0]], float
+        ),
         position_min=limits[:, 0],
         position_max=limits[:, 1],
         velocity_max=np.radians([123, 115, 112, 179, 172, 219]),
@@ -173,9 +188,12 @@ def random_chain(rng: np.random.Generator, n: int) -> RobotLiteral:
     )
 
 
-def power_gradients(model: DynamicsModel, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> Gradients:
+def power_gradients(
+    model: DynamicsModel, q: FloatArray, qd: FloatArray, qdd: FloatArray
+) -> Gradients:
     """Derivatives (N, n, n) of the axes' power at the DC bus along a motion (N, n)."""
-    torque, of = model.inverse_dynamics(q, qd, qdd), model.torque_gradients(q, qd, qdd)
+    torque = model.inverse_dynamics(q, qd, qdd)
+    of = model.torque_gradients(q, qd, qdd)
     data = model.data
     per_torque = (qd + 2.0 * data.copper_loss / data.gear_ratio**2 * torque)[:, :, None]
     return Gradients(

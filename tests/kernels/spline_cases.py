@@ -44,15 +44,20 @@ def kr210_cost(
     core: Any, bodies: tuple[Body, ...] = COLUMNS, *, few: bool = False, **changes: Any
 ) -> SplineCost:
     collision, dynamics = kr210_models(bodies, few=few)
-    return SplineCost(collision, dynamics, terms(kr210(), len(collision.pairs), **changes), core=core)
+    return SplineCost(
+        collision, dynamics, terms(kr210(), len(collision.pairs), **changes), core=core
+    )
 
 
 def chain_models(seed: int, n: int) -> tuple[RobotLiteral, CollisionModel, DynamicsModel]:
-    """A random chain without a counterbalance, a capsule on each link, among bodies of all kinds."""
+    """A random chain without a counterbalance, a capsule on each link, among bodies of all
+    kinds.
+    """
     rng = np.random.default_rng(seed)
     robot = random_chain(rng, n)
     capsules = [
-        Capsule(f"c{k}", k, rng.normal(0.0, 0.2, 3), rng.normal(0.0, 0.2, 3), 0.05) for k in range(1, n + 1)
+        Capsule(f"c{k}", k, rng.normal(0.0, 0.2, 3), rng.normal(0.0, 0.2, 3), 0.05)
+        for k in range(1, n + 1)
     ]
     own = [(f"c{k}", f"c{k + 2}") for k in range(1, n - 1)]
     collision = CollisionModel(Chain(robot), capsules, every_kind(rng), own)
@@ -64,15 +69,19 @@ def motion(
 ) -> FloatArray:
     """Control points (K, n) that swing slowly and shake a little."""
     rng = np.random.default_rng(seed)
-    phase, u = rng.uniform(0.0, 2.0 * np.pi, n), np.arange(K)[:, None] / K
-    control: FloatArray = around + size * (0.7 * np.sin(4.0 * u + phase) + rng.normal(0.0, 0.02, (K, n)))
+    phase = rng.uniform(0.0, 2.0 * np.pi, n)
+    u = np.arange(K)[:, None] / K
+    control: FloatArray = around + size * (
+        0.7 * np.sin(4.0 * u + phase) + rng.normal(0.0, 0.02, (K, n))
+    )
     return control
 
 
 def at_rest(control: FloatArray) -> FloatArray:
     """The same motion with three equal points at both ends."""
     still = control.copy()
-    still[:3], still[-3:] = control[0], control[-1]
+    still[:3] = control[0]
+    still[-3:] = control[-1]
     return still
 
 

@@ -25,10 +25,14 @@ HALF = np.full(6, np.pi)
 
 
 def arm(points: FloatArray, axis: FloatArray) -> SimpleNamespace:
-    """A chain by points (6, 3) and directions (6, 3) of its axes at q = 0, in frames parallel to the base."""
+    """A chain by points (6, 3) and directions (6, 3) of its axes at q = 0, in frames parallel to
+    the base.
+    """
     origin = np.tile(np.eye(4), (6, 1, 1))
     origin[:, :3, 3] = np.diff(np.vstack([np.zeros(3), points]), axis=0)
-    return SimpleNamespace(joint_origin=origin, joint_axis=axis / np.linalg.norm(axis, axis=1)[:, None])
+    return SimpleNamespace(
+        joint_origin=origin, joint_axis=axis / np.linalg.norm(axis, axis=1)[:, None]
+    )
 
 
 def three_parallel(rng: np.random.Generator, meet: bool) -> SimpleNamespace:
@@ -63,9 +67,12 @@ def other_wrist(meet: bool) -> SimpleNamespace:
 
 def placed(robot: SimpleNamespace, seed: int) -> Chain:
     rng = np.random.default_rng(seed)
-    base, tcp = np.eye(4), np.eye(4)
-    base[:3, :3], base[:3, 3] = random_rotation(rng), [1.0, -2.0, 0.5]
-    tcp[:3, :3], tcp[:3, 3] = random_rotation(rng), [0.1, 0.05, 0.2]
+    base = np.eye(4)
+    tcp = np.eye(4)
+    base[:3, :3] = random_rotation(rng)
+    base[:3, 3] = [1.0, -2.0, 0.5]
+    tcp[:3, :3] = random_rotation(rng)
+    tcp[:3, 3] = [0.1, 0.05, 0.2]
     return Chain(robot, base, tcp)
 
 
@@ -98,11 +105,14 @@ def test_any_other_wrist_is_solved_by_a_search(meet: bool) -> None:
 
 def test_the_search_finds_what_the_closed_form_of_a_spherical_wrist_finds() -> None:
     robot = kr210()
-    chain, limits = placed(robot, 5), (robot.position_min, robot.position_max)
+    chain = placed(robot, 5)
+    limits = (robot.position_min, robot.position_max)
     poses = chain.tcp_poses(np.random.default_rng(3).uniform(*limits, (20, 6)))
-    expected, found = SphericalWristIk(chain, *limits).solve(poses), SearchedIk(chain, *limits).solve(poses)
+    expected = SphericalWristIk(chain, *limits).solve(poses)
+    found = SearchedIk(chain, *limits).solve(poses)
     for k in range(len(poses)):
-        own, other = expected.of_pose(k), found.of_pose(k)
+        own = expected.of_pose(k)
+        other = found.of_pose(k)
         apart = np.abs(own[:, None] - other[None]).max(axis=2)
         assert len(own) == len(other), k
         assert apart.min(axis=1).max() < NEAR, k

@@ -1,4 +1,6 @@
-"""Cyclic coordinate descent (eqs. 2 and 3): each joint takes its best value, and the search arrives."""
+"""Cyclic coordinate descent (eqs. 2 and 3): each joint takes its best value, and the search
+arrives.
+"""
 
 from typing import Any
 
@@ -15,14 +17,25 @@ TOOL = np.eye(4)
 TOOL[:3, 3] = [0.42, 0.0, 0.0]
 
 
-def truncated_normal(rng: np.random.Generator, low: FloatArray, high: FloatArray, count: int) -> FloatArray:
+def truncated_normal(
+    rng: np.random.Generator, low: FloatArray, high: FloatArray, count: int
+) -> FloatArray:
     """Starts of eq. 1."""
     return np.clip(rng.normal((low + high) / 2.0, (high - low) / 6.0, (count, len(low))), low, high)
 
 
-def problem_of(chain: Chain, pose: FloatArray, low: FloatArray, high: FloatArray) -> reference.Problem:
+def problem_of(
+    chain: Chain, pose: FloatArray, low: FloatArray, high: FloatArray
+) -> reference.Problem:
     return reference.Problem(
-        chain.joint_origin, chain.joint_axis, chain.base_pose, chain.tcp, pose, low, high, rotation_length=0.5
+        chain.joint_origin,
+        chain.joint_axis,
+        chain.base_pose,
+        chain.tcp,
+        pose,
+        low,
+        high,
+        rotation_length=0.5,
     )
 
 
@@ -32,7 +45,8 @@ def test_closed_form_of_each_joint_is_the_minimum_over_a_scan(n: int) -> None:
     rng = np.random.default_rng(n)
     chain = Chain(random_chain(rng, n))
     pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = random_rotation(rng), rng.normal(size=3)
+    pose[:3, :3] = random_rotation(rng)
+    pose[:3, 3] = rng.normal(size=3)
     low, high = np.sort(rng.uniform(-3.0, 3.0, (2, n)), axis=0)
     problem = problem_of(chain, pose, low, high)
     q = rng.uniform(low, high, (4, n))
@@ -53,7 +67,8 @@ def test_psi_is_eq_2_and_never_grows(core: Any) -> None:
     robot = kr210()
     chain = Chain(robot, None, TOOL)
     rng = np.random.default_rng(0)
-    low, high = robot.position_min, robot.position_max
+    low = robot.position_min
+    high = robot.position_max
     pose = chain.tcp_poses(rng.uniform(low, high, (1, 6)))[0]
     starts = rng.uniform(low, high, (9, 6))
     before = np.full(9, np.inf)
@@ -76,13 +91,16 @@ def test_compiled_core_walks_like_the_reference(core: Any, newton_steps: int) ->
     robot = kr210()
     chain = Chain(robot, None, TOOL)
     rng = np.random.default_rng(1)
-    low, high = robot.position_min, robot.position_max
+    low = robot.position_min
+    high = robot.position_max
     pose = chain.tcp_poses(rng.uniform(low, high, (1, 6)))[0]
     starts = truncated_normal(rng, low, high, 11)
     settings = CcdSettings(max_sweeps=30, newton_steps=newton_steps)
     one = ccd(chain, pose, starts, low, high, settings, core=core)
     other = ccd(chain, pose, starts, low, high, settings, core=None)
-    assert np.abs(one.q - other.q).max() < 1e-6  # near singularities a Newton step amplifies rounding
+    assert (
+        np.abs(one.q - other.q).max() < 1e-6
+    )  # near singularities a Newton step amplifies rounding
     assert (one.sweeps == other.sweeps).all()
 
 
@@ -91,11 +109,14 @@ def test_newton_finish_arrives_where_sweeps_slow_down(core: Any) -> None:
     robot = kr210()
     chain = Chain(robot, None, TOOL)
     rng = np.random.default_rng(2)
-    low, high = robot.position_min, robot.position_max
+    low = robot.position_min
+    high = robot.position_max
     settings = CcdSettings(max_sweeps=30, newton_steps=20)
     poses = chain.tcp_poses(rng.uniform(low, high, (10, 6)))
     for pose in poses:
-        result = ccd(chain, pose, truncated_normal(rng, low, high, 32), low, high, settings, core=core)
+        result = ccd(
+            chain, pose, truncated_normal(rng, low, high, 32), low, high, settings, core=core
+        )
         assert result.reached().any()
         assert result.position_error[result.reached()].min() < 1e-9
         assert ((result.q >= low) & (result.q <= high)).all()
@@ -105,7 +126,8 @@ def test_a_start_ends_the_same_in_any_batch(core: Any) -> None:
     robot = random_chain(np.random.default_rng(3), 7)
     chain = Chain(robot)
     rng = np.random.default_rng(4)
-    low, high = robot.position_min, robot.position_max
+    low = robot.position_min
+    high = robot.position_max
     pose = chain.tcp_poses(rng.uniform(low, high, (1, 7)))[0]
     starts = rng.uniform(low, high, (10, 7))
     settings = CcdSettings(max_sweeps=20, newton_steps=10)

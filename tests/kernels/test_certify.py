@@ -1,4 +1,6 @@
-"""A verdict is a proof: what is called free stays free however finely it is sampled, what collides does."""
+"""A verdict is a proof: what is called free stays free however finely it is sampled, what collides
+does.
+"""
 
 import numpy as np
 import pytest
@@ -30,7 +32,9 @@ def kr210(bodies: tuple[Body, ...]) -> CollisionModel:
     return CollisionModel(Chain(KR210, tcp=TCP), CAPSULES, bodies, SELF_PAIRS)
 
 
-def edges(rng: np.random.Generator, count: int, length: float = 0.8) -> tuple[FloatArray, FloatArray]:
+def edges(
+    rng: np.random.Generator, count: int, length: float = 0.8
+) -> tuple[FloatArray, FloatArray]:
     start = sample(rng, count)
     step = rng.uniform(-1.0, 1.0, (count, 6))
     return start, start + length * step / np.abs(step).max(axis=1, keepdims=True)
@@ -80,7 +84,9 @@ def test_compiled_verdicts_are_those_of_the_reference(bodies: tuple[Body, ...]) 
     model = kr210(bodies)
     q0, q1 = edges(np.random.default_rng(4), 25)
     ours = model.certify_edges(q0, q1, SAFETY)
-    verdict, t0, t1, _ = Model(model._geometry).certify_edges(q0, q1, np.full(len(model.pairs), SAFETY))
+    verdict, t0, t1, _ = Model(model._geometry).certify_edges(
+        q0, q1, np.full(len(model.pairs), SAFETY)
+    )
     assert (ours.verdict == verdict).all()
     np.testing.assert_allclose(ours.t0, t0, atol=0.02)
     np.testing.assert_allclose(ours.t1, t1, atol=0.02)
@@ -112,7 +118,8 @@ def test_a_thin_plate_between_two_samples_is_found() -> None:
     plate = box("plate", (1.6, 0.0, 1.5), (1.5, 0.001, 3.0))
     model = CollisionModel(Chain(KR210, tcp=TCP), CAPSULES[-1:], [plate], ())
     turn = np.array([0.8, 0.0, 0.0, 0.0, 0.0, 0.0])
-    q0, q1 = HOME - turn, HOME + turn
+    q0 = HOME - turn
+    q1 = HOME + turn
     assert model.is_free(np.array([q0, q1]), 0.0).all()
     found = model.certify_edges(q0[None], q1[None], 0.0)
     assert found.verdict[0] == COLLIDES
@@ -123,9 +130,11 @@ def quintics(rng: np.random.Generator, count: int) -> tuple[FloatArray, FloatArr
     """A smooth trajectory of `count` segments from home."""
     durations = rng.uniform(0.2, 0.6, count)
     coefficients = np.zeros((count, 6, 6))
-    position, speed = HOME.copy(), np.zeros(6)
+    position = HOME.copy()
+    speed = np.zeros(6)
     for k, T in enumerate(durations):
-        coefficients[k, :, 0], coefficients[k, :, 1] = position, speed
+        coefficients[k, :, 0] = position
+        coefficients[k, :, 1] = speed
         coefficients[k, :, 2:] = rng.normal(0.0, 0.4, (6, 4)) / T ** np.arange(4)
         powers = T ** np.arange(6)
         position = coefficients[k] @ powers
@@ -138,7 +147,8 @@ def test_dense_samples_of_a_trajectory_contradict_no_verdict(seed: int) -> None:
     model = kr210(OPEN)
     coefficients, durations = quintics(np.random.default_rng(seed), 4)
     found = model.certify_trajectory(coefficients, durations, SAFETY)
-    begin, lowest = 0.0, np.inf
+    begin = 0.0
+    lowest = np.inf
     for c, duration in zip(coefficients, durations, strict=True):
         t = np.linspace(0.0, duration, 400)
         q = np.ascontiguousarray(np.polynomial.polynomial.polyval(t, c.T).T)

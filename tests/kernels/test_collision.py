@@ -47,7 +47,8 @@ def test_compiled_and_reference_agree(bodies: tuple[Body, ...]) -> None:
     q = sample(np.random.default_rng(1), 20)
     np.testing.assert_allclose(model.distances(q), plain.distances(q), atol=EXACT)
     zero = np.zeros(len(model.pairs))
-    near, expected = model.min_distance(q), plain.min_distance(q, zero)
+    near = model.min_distance(q)
+    expected = plain.min_distance(q, zero)
     np.testing.assert_allclose(near.distance, expected[0], atol=IN_FLOATS)
     clear = np.abs(expected[0] - 0.05) > IN_FLOATS
     assert (model.is_free(q, 0.05) == plain.is_free(q, zero + 0.05))[clear].all()
@@ -63,7 +64,9 @@ def test_points_normal_and_distance_fit_together(bodies: tuple[Body, ...]) -> No
     q = sample(np.random.default_rng(2), 64)
     near = model.min_distance(q)
     np.testing.assert_allclose(np.linalg.norm(near.normal, axis=1), 1.0, atol=EXACT)
-    np.testing.assert_allclose(near.point_a - near.point_b, near.distance[:, None] * near.normal, atol=1e-8)
+    np.testing.assert_allclose(
+        near.point_a - near.point_b, near.distance[:, None] * near.normal, atol=1e-8
+    )
     np.testing.assert_allclose(near.distance, model.distances(q).min(axis=1), atol=IN_FLOATS)
 
 
@@ -75,7 +78,11 @@ def test_gradients_agree_with_finite_differences(bodies: tuple[Body, ...]) -> No
     pair = rng.integers(0, len(model.pairs), len(q))
     step = 1e-6 * np.eye(6)
     difference = np.stack(
-        [model.witnesses(q + h, pair).distance - model.witnesses(q - h, pair).distance for h in step], axis=1
+        [
+            model.witnesses(q + h, pair).distance - model.witnesses(q - h, pair).distance
+            for h in step
+        ],
+        axis=1,
     )
     error = np.abs(model.gradients(q, pair) - difference / 2e-6).max(axis=1)
     assert np.median(error) < 1e-8
@@ -96,7 +103,8 @@ def test_a_lane_does_not_depend_on_its_neighbours(bodies: tuple[Body, ...]) -> N
 
 def test_moving_robot_and_scene_together_changes_no_distance() -> None:
     rng = np.random.default_rng(5)
-    bodies, moved = every_kind(rng), random_pose(rng)
+    bodies = every_kind(rng)
+    moved = random_pose(rng)
     here = CollisionModel(Chain(KR210, tcp=TCP), CAPSULES, bodies, SELF_PAIRS)
     carried = [Body(b.name, b.kind, moved @ b.pose, b.size, b.vertices) for b in bodies]
     there = CollisionModel(Chain(KR210, moved, TCP), CAPSULES, carried, SELF_PAIRS)
@@ -106,10 +114,14 @@ def test_moving_robot_and_scene_together_changes_no_distance() -> None:
 
 def test_thousands_of_boxes_give_what_all_pairs_give() -> None:
     rng = np.random.default_rng(6)
-    bodies = [Body(f"b{k}", "box", random_pose(rng, 3.0), rng.uniform(0.02, 0.3, 3)) for k in range(1500)]
+    bodies = [
+        Body(f"b{k}", "box", random_pose(rng, 3.0), rng.uniform(0.02, 0.3, 3)) for k in range(1500)
+    ]
     model = CollisionModel(Chain(KR210, tcp=TCP), CAPSULES, bodies, SELF_PAIRS)
     q = sample(rng, 40)
-    np.testing.assert_allclose(model.min_distance(q).distance, model.distances(q).min(axis=1), atol=IN_FLOATS)
+    np.testing.assert_allclose(
+        model.min_distance(q).distance, model.distances(q).min(axis=1), atol=IN_FLOATS
+    )
     lowest = model.distances(q).min(axis=1)
     for threshold in (-0.3, -0.1, 0.0):
         decided = np.abs(lowest - threshold) > IN_FLOATS
@@ -123,7 +135,9 @@ def test_a_hall_too_large_for_floats_is_computed_in_doubles() -> None:
     )
     model = CollisionModel(Chain(KR210, tcp=TCP), CAPSULES, bodies, ())
     q = sample(np.random.default_rng(9), 50)
-    np.testing.assert_allclose(model.min_distance(q).distance, model.distances(q).min(axis=1), atol=EXACT)
+    np.testing.assert_allclose(
+        model.min_distance(q).distance, model.distances(q).min(axis=1), atol=EXACT
+    )
 
 
 @settings(max_examples=15, deadline=None)
@@ -135,7 +149,8 @@ def test_no_translation_shorter_than_the_depth_parts_two_bodies(seed: int) -> No
         p0, p1 = centre + rng.normal(0.0, 0.15, (2, 3))
         radius = float(rng.uniform(0.0, 0.1))
         near = probe(p0, p1, radius, body).witnesses(AT_ZERO, [0])
-        depth, normal = -float(near.distance[0]), near.normal[0]
+        depth = -float(near.distance[0])
+        normal = near.normal[0]
         if depth <= 1e-6:
             continue
 
@@ -160,7 +175,9 @@ def test_a_threshold_per_pair_counts_for_its_pair_only() -> None:
     assert (model.is_free(q, threshold) == (d > threshold).all(axis=1)).mean() == 1.0
     near = model.min_distance(q, threshold)
     rows = np.arange(len(q))
-    np.testing.assert_allclose((d - threshold)[rows, near.pair], (d - threshold).min(axis=1), atol=IN_FLOATS)
+    np.testing.assert_allclose(
+        (d - threshold)[rows, near.pair], (d - threshold).min(axis=1), atol=IN_FLOATS
+    )
     np.testing.assert_allclose(near.distance, d[rows, near.pair], atol=EXACT)
 
 
@@ -177,7 +194,11 @@ def test_without_a_pair_that_counts_there_is_no_nearest() -> None:
 
 def test_the_base_and_ignored_pairs_are_not_kept() -> None:
     model = CollisionModel(
-        Chain(KR210), CAPSULES, OPEN, SELF_PAIRS, [("t_part", "rack"), ("rack", "t_bar"), ("l4", "base")]
+        Chain(KR210),
+        CAPSULES,
+        OPEN,
+        SELF_PAIRS,
+        [("t_part", "rack"), ("rack", "t_bar"), ("l4", "base")],
     )
     names = {pair[1:] for pair in model.pairs}
     assert not any(pair.kind == "ENVIRONMENT" and pair.body_a == "base" for pair in model.pairs)
@@ -193,8 +214,11 @@ def test_a_chain_of_any_axes_agrees_with_the_product_of_transforms() -> None:
     rng = np.random.default_rng(12)
     axis = rng.normal(size=(7, 3))
     axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-    robot = Robot(np.array([random_pose(rng, 0.5) for _ in range(7)]), axis, np.zeros(7), np.zeros(7))
-    base, tcp = random_pose(rng), random_pose(rng, 0.3)
+    robot = Robot(
+        np.array([random_pose(rng, 0.5) for _ in range(7)]), axis, np.zeros(7), np.zeros(7)
+    )
+    base = random_pose(rng)
+    tcp = random_pose(rng, 0.3)
     chain = Chain(robot, base, tcp)
     q = rng.uniform(-9.0, 9.0, (21, 7))
     q[3] = 3e5  # far beyond any joint, still an angle
@@ -208,7 +232,9 @@ def test_a_chain_of_any_axes_agrees_with_the_product_of_transforms() -> None:
         np.testing.assert_allclose(jacobian[:, :3, j], moved[:, :3, 3] / (2 * h), atol=1e-7)
         turn = moved[:, :3, :3] @ chain.tcp_poses(q[4:])[:, :3, :3].transpose(0, 2, 1) / (2 * h)
         np.testing.assert_allclose(
-            jacobian[:, 3:, j], np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], 1), atol=1e-7
+            jacobian[:, 3:, j],
+            np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], 1),
+            atol=1e-7,
         )
 
 

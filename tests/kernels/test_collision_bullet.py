@@ -17,7 +17,8 @@ def test_distances_from_meshes_agree_with_pybullet(seed: int) -> None:
         pybullet.GEOM_MESH, vertices=body.vertices.tolist(), physicsClientId=client
     )
     mesh = place(client, shape, body.pose)
-    radius, half = 0.05, 0.2
+    radius = 0.05
+    half = 0.2
     rod = pybullet.createCollisionShape(
         pybullet.GEOM_CAPSULE, radius=radius, height=2.0 * half, physicsClientId=client
     )
@@ -25,7 +26,9 @@ def test_distances_from_meshes_agree_with_pybullet(seed: int) -> None:
         for _ in range(20):
             pose = random_pose(rng, 2.0)
             end = half * pose[:3, 2]
-            ours = probe(pose[:3, 3] - end, pose[:3, 3] + end, radius, body).distances(AT_ZERO)[0, 0]
+            ours = probe(pose[:3, 3] - end, pose[:3, 3] + end, radius, body).distances(AT_ZERO)[
+                0, 0
+            ]
             other = place(client, rod, pose)
             points = pybullet.getClosestPoints(mesh, other, 10.0, physicsClientId=client)
             pybullet.removeBody(other, physicsClientId=client)

@@ -20,7 +20,9 @@ def test_distances_agree_with_coal_and_so_do_their_signs(bodies: tuple[Body, ...
     q = sample(np.random.default_rng(7), 40)
     ours = model.distances(q)
     poses = chain.link_poses(q)
-    expected = np.array([[theirs.distance(*pair, links) for pair in model.pairs] for links in poses])
+    expected = np.array(
+        [[theirs.distance(*pair, links) for pair in model.pairs] for links in poses]
+    )
     apart = expected > 0.0
     np.testing.assert_allclose(ours[apart], expected[apart], rtol=0.0, atol=AGREEMENT)
     assert not ((ours > AGREEMENT) & (expected < -AGREEMENT)).any()

@@ -11,13 +11,18 @@ from setuptools import Distribution
 SETUP = Path(__file__).resolve().parents[2] / "src" / "ir_kernels" / "setup.py"
 
 
-def test_a_rebuilt_core_replaces_the_old_one_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_rebuilt_core_replaces_the_old_one_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     command = runpy.run_path(str(SETUP), run_name="setup")["BuildVariants"](Distribution())
-    old, new = b"old" * 5000, b"newer" * 4000
-    built, place = tmp_path / "built.so", tmp_path / "core.so"
+    old = b"old" * 5000
+    new = b"newer" * 4000
+    built = tmp_path / "built.so"
+    place = tmp_path / "core.so"
     built.write_bytes(new)
     place.write_bytes(old)
-    replace, seen = os.replace, []
+    replace = os.replace
+    seen = []
 
     def watched(source: str, target: str) -> None:
         seen.append((Path(source).read_bytes(), Path(target).read_bytes()))

@@ -1,11 +1,21 @@
-"""Dynamics: the checks of the machine data, laws that hold for every robot, agreement with Pinocchio."""
+"""Dynamics: the checks of the machine data, laws that hold for every robot, agreement with
+Pinocchio.
+"""
 
 from typing import Any
 
 import numpy as np
 import pinocchio
 import pytest
-from robots import LoadLiteral, RobotLiteral, kr210, power_gradients, random_chain, random_rotation, tool_155
+from robots import (
+    LoadLiteral,
+    RobotLiteral,
+    kr210,
+    power_gradients,
+    random_chain,
+    random_rotation,
+    tool_155,
+)
 
 from ir_kernels import Chain, DynamicsModel, InputError
 from ir_kernels.reference import dynamics as reference
@@ -46,7 +56,15 @@ def test_gravity_at_machine_home_is_that_of_the_machine_data(
 
 @pytest.mark.parametrize(
     ("angle_deg", "torque"),
-    [(-140, 5116), (-120, 3254), (-90, -234), (-60, -3650), (-45, -5023), (-30, -6088), (-5, -7081)],
+    [
+        (-140, 5116),
+        (-120, 3254),
+        (-90, -234),
+        (-60, -3650),
+        (-45, -5023),
+        (-30, -6088),
+        (-5, -7081),
+    ],
 )
 def test_counterbalance_gives_the_table_of_the_machine_data(
     core: Any, angle_deg: float, torque: float
@@ -57,14 +75,20 @@ def test_counterbalance_gives_the_table_of_the_machine_data(
     assert (np.delete(about, 1) == 0.0).all()
 
 
-def pinocchio_model(robot: RobotLiteral, loads: tuple[LoadLiteral, ...], base: FloatArray) -> pinocchio.Model:
+def pinocchio_model(
+    robot: RobotLiteral, loads: tuple[LoadLiteral, ...], base: FloatArray
+) -> pinocchio.Model:
     model = pinocchio.Model()
     model.gravity.linear = base[:3, :3].T @ np.array([0.0, 0.0, -9.80665])
     parent = 0
     for i, (origin, axis) in enumerate(zip(robot.joint_origin, robot.joint_axis, strict=True)):
         placement = pinocchio.SE3(origin[:3, :3], origin[:3, 3])
-        parent = model.addJoint(parent, pinocchio.JointModelRevoluteUnaligned(axis), placement, f"joint_{i}")
-        own = pinocchio.Inertia(robot.link_mass[i + 1], robot.link_com[i + 1], robot.link_inertia[i + 1])
+        parent = model.addJoint(
+            parent, pinocchio.JointModelRevoluteUnaligned(axis), placement, f"joint_{i}"
+        )
+        own = pinocchio.Inertia(
+            robot.link_mass[i + 1], robot.link_com[i + 1], robot.link_inertia[i + 1]
+        )
         model.appendBodyToJoint(parent, own, pinocchio.SE3.Identity())
     for load in loads:
         inertia = pinocchio.Inertia(load.mass, load.com, load.inertia)
@@ -78,21 +102,29 @@ def pinocchio_model(robot: RobotLiteral, loads: tuple[LoadLiteral, ...], base: F
 def test_arm_agrees_with_pinocchio(core: Any, case: str) -> None:
     loads = (tool_155(),) if "tool" in case else ()
     base = tilted(5) if "kr210" not in case or "tilted" in case else np.eye(4)
-    robot = kr210() if "kr210" in case else random_chain(np.random.default_rng(7), int(case.split()[1]))
+    robot = (
+        kr210() if "kr210" in case else random_chain(np.random.default_rng(7), int(case.split()[1]))
+    )
     model = DynamicsModel(robot, loads, base, core=core)
     q, qd, qdd = batch(1, model.n)
     peer = pinocchio_model(robot, loads, base)
     data = peer.createData()
-    rnea = np.array([pinocchio.rnea(peer, data, *sample) for sample in zip(q, qd, qdd, strict=True)])
+    rnea = np.array(
+        [pinocchio.rnea(peer, data, *sample) for sample in zip(q, qd, qdd, strict=True)]
+    )
     motors = (
-        robot.reflected_inertia * qdd + robot.friction_viscous * qd + robot.friction_coulomb * np.sign(qd)
+        robot.reflected_inertia * qdd
+        + robot.friction_viscous * qd
+        + robot.friction_coulomb * np.sign(qd)
     )
     arm = model.inverse_dynamics(q, qd, qdd) - motors + model.counterbalance(q)
     assert relative(arm, rnea) < AGREEMENT
     crba = np.array([pinocchio.crba(peer, data, sample) for sample in q])
     crba = np.triu(crba) + np.swapaxes(np.triu(crba, 1), 1, 2)
     assert relative(model.mass_matrix(q), crba) < AGREEMENT
-    bias = np.array([pinocchio.nonLinearEffects(peer, data, *sample) for sample in zip(q, qd, strict=True)])
+    bias = np.array(
+        [pinocchio.nonLinearEffects(peer, data, *sample) for sample in zip(q, qd, strict=True)]
+    )
     assert relative(model.bias(q, qd), bias) < AGREEMENT
 
 
@@ -100,7 +132,10 @@ def test_compiled_core_agrees_with_the_reference(core: Any) -> None:
     model = DynamicsModel(kr210(), (tool_155(),), tilted(2), core=core)
     q, qd, qdd = batch(3, 6, 37)  # not a multiple of any number of lanes
     data = model.data
-    assert relative(model.inverse_dynamics(q, qd, qdd), reference.inverse_dynamics(data, q, qd, qdd)) < FITTED
+    assert (
+        relative(model.inverse_dynamics(q, qd, qdd), reference.inverse_dynamics(data, q, qd, qdd))
+        < FITTED
+    )
     assert relative(model.counterbalance(q), reference.counterbalance(data, q)) < FITTED
     assert relative(model.axis_power(qd, qdd), reference.axis_power(data, qd, qdd)) < 1e-14
     assert relative(model.torque_limit(4.0 * qd), reference.torque_limit(data, 4.0 * qd)) < 1e-14
@@ -120,7 +155,9 @@ def test_every_sample_is_on_its_own(core: Any) -> None:
     model = DynamicsModel(kr210(), core=core)
     q, qd, qdd = batch(5, 6, 21)
     together = model.inverse_dynamics(q, qd, qdd)
-    alone = np.array([model.inverse_dynamics(*(x[k : k + 1] for x in (q, qd, qdd)))[0] for k in range(21)])
+    alone = np.array(
+        [model.inverse_dynamics(*(x[k : k + 1] for x in (q, qd, qdd)))[0] for k in range(21)]
+    )
     assert (together == alone).all()
 
 
@@ -141,7 +178,8 @@ def test_lagrange_form_equals_newton_euler(core: Any) -> None:
 
     def potential(x: FloatArray) -> FloatArray:
         links = chain.link_poses(x)[:, 1:]
-        mass, com = np.array(model.data.mass), np.array(model.data.com)
+        mass = np.array(model.data.mass)
+        com = np.array(model.data.com)
         height = np.einsum("nij,ij->ni", links[:, :, 2, :3], com) + links[:, :, 2, 3]
         return np.asarray(9.80665 * height @ mass)
 
@@ -150,7 +188,9 @@ def test_lagrange_form_equals_newton_euler(core: Any) -> None:
 
     eps = 1e-5
     H_dot = (model.mass_matrix(q + eps * qd) - model.mass_matrix(q - eps * qd)) / (2.0 * eps)
-    lagrange = np.einsum("nij,nj->ni", model.mass_matrix(q), qdd) + np.einsum("nij,nj->ni", H_dot, qd)
+    lagrange = np.einsum("nij,nj->ni", model.mass_matrix(q), qdd) + np.einsum(
+        "nij,nj->ni", H_dot, qd
+    )
     for j in range(6):
         step = np.zeros(6)
         step[j] = eps
@@ -161,7 +201,9 @@ def test_lagrange_form_equals_newton_euler(core: Any) -> None:
 
 
 def test_free_motion_without_friction_keeps_its_energy(core: Any) -> None:
-    """Energy of arm, rotors and gas is constant when no motor works (fourth-order Runge-Kutta, 0.5 s)."""
+    """Energy of arm, rotors and gas is constant when no motor works (fourth-order Runge-Kutta, 0.5
+    s).
+    """
     robot = kr210()
     still = type(robot)(
         **{
@@ -181,16 +223,25 @@ def test_free_motion_without_friction_keeps_its_energy(core: Any) -> None:
         height = np.einsum("ij,ij->i", links[:, 2, :3], np.array(model.data.com)) + links[:, 2, 3]
         return float(0.5 * qd[0] @ inertia @ qd[0] + 9.80665 * np.array(model.data.mass) @ height)
 
-    q, qd, dt = HOME.copy(), np.array([[0.5, 0.3, -0.4, 1.0, 0.6, -1.0]]), 0.005
+    q = HOME.copy()
+    qd = np.array([[0.5, 0.3, -0.4, 1.0, 0.6, -1.0]])
+    dt = 0.005
     before = energy(q, qd)
     for _ in range(100):
-        v1, a1 = qd, model.forward_dynamics(q, qd, zero)
-        v2, a2 = qd + 0.5 * dt * a1, model.forward_dynamics(q + 0.5 * dt * v1, qd + 0.5 * dt * a1, zero)
-        v3, a3 = qd + 0.5 * dt * a2, model.forward_dynamics(q + 0.5 * dt * v2, qd + 0.5 * dt * a2, zero)
-        v4, a4 = qd + dt * a3, model.forward_dynamics(q + dt * v3, qd + dt * a3, zero)
-        q, qd = q + dt / 6 * (v1 + 2 * v2 + 2 * v3 + v4), qd + dt / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+        v1 = qd
+        a1 = model.forward_dynamics(q, qd, zero)
+        v2 = qd + 0.5 * dt * a1
+        a2 = model.forward_dynamics(q + 0.5 * dt * v1, qd + 0.5 * dt * a1, zero)
+        v3 = qd + 0.5 * dt * a2
+        a3 = model.forward_dynamics(q + 0.5 * dt * v2, qd + 0.5 * dt * a2, zero)
+        v4 = qd + dt * a3
+        a4 = model.forward_dynamics(q + dt * v3, qd + dt * a3, zero)
+        q = q + dt / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
+        qd = qd + dt / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
     assert np.abs(q - HOME).max() > 0.1
-    assert energy(q, qd) == pytest.approx(before, abs=1e-3)  # J, of some 10 kJ: error of the integration
+    assert energy(q, qd) == pytest.approx(
+        before, abs=1e-3
+    )  # J, of some 10 kJ: error of the integration
 
 
 @pytest.mark.parametrize("of", ["torque", "power"])
@@ -199,7 +250,9 @@ def test_gradients_agree_with_finite_differences(core: Any, of: str) -> None:
     names = ("q", "qd", "qdd")
     values = dict(zip(names, batch(8, 6, 20), strict=True))
     function = model.inverse_dynamics if of == "torque" else model.drive_power
-    gradients = model.torque_gradients(**values) if of == "torque" else power_gradients(model, **values)
+    gradients = (
+        model.torque_gradients(**values) if of == "torque" else power_gradients(model, **values)
+    )
     eps = 1e-6
     for name in names:
         exact = getattr(gradients, name)
@@ -209,7 +262,10 @@ def test_gradients_agree_with_finite_differences(core: Any, of: str) -> None:
             up = function(**{**values, name: values[name] + step})
             down = function(**{**values, name: values[name] - step})
             difference = (up - down) / (2.0 * eps)
-            assert np.abs(difference - exact[:, :, j]).max() < 1e-6 * np.abs(exact).max() + 1e-3, (name, j)
+            assert np.abs(difference - exact[:, :, j]).max() < 1e-6 * np.abs(exact).max() + 1e-3, (
+                name,
+                j,
+            )
 
 
 def test_a_load_is_a_part_of_the_last_link(core: Any) -> None:
@@ -227,7 +283,9 @@ def test_torque_limit_steps_down_then_falls_linearly() -> None:
     model = DynamicsModel(kr210())
     speeds = np.zeros((6, 6))
     speeds[:, 0] = [0.0, 1.329, 1.33, -1.57, 2.16, 9.0]
-    assert model.torque_limit(speeds)[:, 0] == pytest.approx([7228.023, 7228.023, 5988, 5245.5, 1215, 1215])
+    assert model.torque_limit(speeds)[:, 0] == pytest.approx(
+        [7228.023, 7228.023, 5988, 5245.5, 1215, 1215]
+    )
 
 
 @pytest.mark.parametrize(

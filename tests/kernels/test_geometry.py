@@ -1,4 +1,6 @@
-"""What makes no sense is refused with a message that names the argument; which build runs is decided once."""
+"""What makes no sense is refused with a message that names the argument; which build runs is
+decided once.
+"""
 
 import os
 import re
@@ -78,7 +80,12 @@ def test_other_bad_arguments_are_refused_by_name(call: Callable[[], object], nam
 
 
 def model(**changes: Any) -> CollisionModel:
-    parts: dict[str, Any] = {"capsules": CAPSULES, "bodies": OPEN, "self_pairs": SELF_PAIRS, **changes}
+    parts: dict[str, Any] = {
+        "capsules": CAPSULES,
+        "bodies": OPEN,
+        "self_pairs": SELF_PAIRS,
+        **changes,
+    }
     return CollisionModel(Chain(KR210), **parts)
 
 
@@ -94,7 +101,10 @@ def model(**changes: Any) -> CollisionModel:
             {"capsules": [Capsule("c", 7, np.zeros(3), np.zeros(3), 0.1)], "self_pairs": ()},
             "has links 0 to 6",
         ),
-        ({"capsules": [Capsule("c", 6, np.zeros(3), np.zeros(3), -0.1)], "self_pairs": ()}, "radius -0.1 m"),
+        (
+            {"capsules": [Capsule("c", 6, np.zeros(3), np.zeros(3), -0.1)], "self_pairs": ()},
+            "radius -0.1 m",
+        ),
         ({"bodies": [box("flat", (0, 0, 0), (1.0, 0.0, 1.0))]}, "a box needs 3 positive lengths"),
         ({"bodies": [Body("b", "cone", np.eye(4), np.ones(3))]}, "known kinds are box, cylinder"),
         ({"bodies": [Body("b", "box", shift((np.nan, 0, 0)), np.ones(3))]}, "b'.pose"),
@@ -113,7 +123,11 @@ def test_bad_models_are_refused_with_what_is_wrong(changes: dict[str, Any], word
 def run(code: str, choice: str, *flags: str) -> subprocess.CompletedProcess[str]:
     environment = {**os.environ, "IR_KERNELS": choice}
     return subprocess.run(
-        [sys.executable, *flags, "-c", code], env=environment, capture_output=True, text=True, check=False
+        [sys.executable, *flags, "-c", code],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
     )
 
 
@@ -165,4 +179,6 @@ def test_baseline_and_native_agree(baseline: Any) -> None:
     finally:
         compiled.MODULE = own
     np.testing.assert_allclose(other.distances(q), native, atol=1e-12)
-    np.testing.assert_allclose(other.min_distance(q).distance, MODEL.min_distance(q).distance, atol=2e-6)
+    np.testing.assert_allclose(
+        other.min_distance(q).distance, MODEL.min_distance(q).distance, atol=2e-6
+    )

@@ -1,4 +1,6 @@
-"""Closed-form inverse kinematics: exact, complete, within the limits, and honest about arms it can't do."""
+"""Closed-form inverse kinematics: exact, complete, within the limits, and honest about arms it
+can't do.
+"""
 
 from typing import Any
 
@@ -14,26 +16,38 @@ EXACT = 1e-9  # m and entries of rotations
 
 def placed(robot: RobotLiteral) -> Chain:
     rng = np.random.default_rng(11)
-    base, tcp = np.eye(4), np.eye(4)
-    base[:3, :3], base[:3, 3] = random_rotation(rng), [1.0, -2.0, 0.5]
-    tcp[:3, :3], tcp[:3, 3] = random_rotation(rng), [0.42, 0.1, -0.2]
+    base = np.eye(4)
+    tcp = np.eye(4)
+    base[:3, :3] = random_rotation(rng)
+    base[:3, 3] = [1.0, -2.0, 0.5]
+    tcp[:3, :3] = random_rotation(rng)
+    tcp[:3, 3] = [0.42, 0.1, -0.2]
     return Chain(robot, base, tcp)
 
 
 def shifted_arm() -> RobotLiteral:
-    """A spherical-wrist arm unlike the KR 210: other zero, lateral offset, an axis that points in the
-    opposite direction.
+    """A spherical-wrist arm unlike the KR 210: other zero, lateral offset, an axis that points in
+    the opposite direction.
     """
     robot = kr210()
     origin = robot.joint_origin.copy()
     origin[1, :3, 3] = [0.2, 0.13, 0.1]
-    origin[2, :3, :3] = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]  # drawn with the forearm turned by 90 degrees
+    origin[2, :3, :3] = [
+        [0, 0, 1],
+        [0, 1, 0],
+        [-1, 0, 0],
+    ]  # drawn with the forearm turned by 90 degrees
     origin[3, :3, 3] = [0.0, 0.05, 0.1]
     axis = robot.joint_axis.copy()
     axis[2] = [0, -1, 0]
     axis[5] = [1, 0, 0]
     limits = np.radians([180.0, 180.0, 180.0, 180.0, 180.0, 180.0])
-    changed = {"joint_origin": origin, "joint_axis": axis, "position_min": -limits, "position_max": limits}
+    changed = {
+        "joint_origin": origin,
+        "joint_axis": axis,
+        "position_min": -limits,
+        "position_max": limits,
+    }
     return RobotLiteral(**{**vars(robot), **changed})
 
 
@@ -56,7 +70,9 @@ def test_the_configuration_a_pose_was_made_from_is_found(core: Any, robot: Robot
     q = np.random.default_rng(1).uniform(robot.position_min, robot.position_max, (500, 6))
     found = ik.solve(chain.tcp_poses(q))
     for k, made in enumerate(q):
-        assert np.abs(found.of_pose(k) - made).max(axis=1).min() < 1e-6, k  # an angle near a singularity
+        assert np.abs(found.of_pose(k) - made).max(axis=1).min() < 1e-6, (
+            k
+        )  # an angle near a singularity
 
 
 def test_no_branch_is_missing_beside_a_numerical_search(core: Any) -> None:
@@ -72,7 +88,11 @@ def test_no_branch_is_missing_beside_a_numerical_search(core: Any) -> None:
         current = chain.tcp_poses(q)
         turn = pose[0, :3, :3] @ np.swapaxes(current[:, :3, :3], 1, 2)
         vector = 0.5 * np.stack(
-            [turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]],
+            [
+                turn[:, 2, 1] - turn[:, 1, 2],
+                turn[:, 0, 2] - turn[:, 2, 0],
+                turn[:, 1, 0] - turn[:, 0, 1],
+            ],
             axis=1,
         )
         error = np.concatenate([pose[0, :3, 3] - current[:, :3, 3], vector], axis=1)
@@ -92,10 +112,16 @@ def test_solutions_come_sorted_and_all_turns_are_there(core: Any) -> None:
     ik = SphericalWristIk(chain, robot.position_min, robot.position_max, core=core)
     q = np.random.default_rng(3).uniform(robot.position_min, robot.position_max, (50, 6))
     found = ik.solve(chain.tcp_poses(q))
-    keys = [(int(p), int(b), *row) for p, b, row in zip(found.pose_index, found.branch, found.q, strict=True)]
+    keys = [
+        (int(p), int(b), *row)
+        for p, b, row in zip(found.pose_index, found.branch, found.q, strict=True)
+    ]
     assert keys == sorted(keys)
     assert len(set(keys)) == len(keys)
-    for joint in (3, 5):  # +-350 degrees: each angle has its other turn, but for those within 10 degrees of 0
+    for joint in (
+        3,
+        5,
+    ):  # +-350 degrees: each angle has its other turn, but for those within 10 degrees of 0
         turned = found.q.copy()
         turned[:, joint] -= np.sign(turned[:, joint]) * 2.0 * np.pi
         inside = np.abs(turned[:, joint]) <= robot.position_max[joint]
@@ -180,7 +206,9 @@ def with_axis(joint: int, axis: list[float]) -> RobotLiteral:
         (with_axis(4, [0.6, 0.8, 0.0]), "axes 4 and 5 are not perpendicular"),
     ],
 )
-def test_an_arm_of_another_kind_is_refused_with_the_reason(robot: RobotLiteral, message: str) -> None:
+def test_an_arm_of_another_kind_is_refused_with_the_reason(
+    robot: RobotLiteral, message: str
+) -> None:
     with pytest.raises(InputError, match=message):
         SphericalWristIk(Chain(robot), robot.position_min, robot.position_max)
 

@@ -30,11 +30,14 @@ def rest_to_rest(
 
 
 def sampled(model: DynamicsModel, c: FloatArray, T: FloatArray, count: int) -> FloatArray:
-    """Largest |tau| / limit per joint on a grid that is open at the ends (at rest friction has no sign)."""
+    """Largest |tau| / limit per joint on a grid that is open at the ends (at rest friction has no
+    sign).
+    """
     worst = np.zeros(6)
     for segment, duration in zip(c, T, strict=True):
         t = duration * (np.arange(count)[:, None] + 0.5) / count
-        motion, p = [], segment
+        motion = []
+        p = segment
         for _ in range(3):
             motion.append(np.ascontiguousarray(evaluate(p, np.broadcast_to(t, (count, 6)).T).T))
             p = derivative(p)
@@ -43,13 +46,16 @@ def sampled(model: DynamicsModel, c: FloatArray, T: FloatArray, count: int) -> F
     return worst
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])  # a module, the same for all examples
+@settings(
+    suppress_health_check=[HealthCheck.function_scoped_fixture]
+)  # a module, the same for all examples
 @given(st.integers(0, 10**6), st.integers(0, 4), st.integers(1, 6))
 def test_nothing_between_the_samples_is_beyond_the_extremes(
     core: Any, seed: int, order: int, terms: int
 ) -> None:
     rng = np.random.default_rng(seed)
-    c, T = rng.normal(size=(3, 2, terms)) * 10.0 ** rng.integers(-3, 3), rng.uniform(0.01, 5.0, 3)
+    c = rng.normal(size=(3, 2, terms)) * 10.0 ** rng.integers(-3, 3)
+    T = rng.uniform(0.01, 5.0, 3)
     extrema = polynomial_extrema(c, T, order, core=core)
     p = c
     for _ in range(order):
@@ -71,8 +77,8 @@ def test_double_roots_of_the_derivative_are_found(core: Any) -> None:
 
 
 def test_extremes_of_rest_to_rest_are_the_textbook_ones() -> None:
-    """Quintic from rest to rest: speed 15/8 D/T at T/2, acceleration 10/sqrt(3) D/T^2, jerk 60 D/T^3 at
-    the ends.
+    """Quintic from rest to rest: speed 15/8 D/T at T/2, acceleration 10/sqrt(3) D/T^2, jerk 60
+    D/T^3 at the ends.
     """
     c, T = rest_to_rest(2.0)
     extrema = motion_extrema(c, T)
@@ -101,9 +107,11 @@ def test_bounds_enclose_a_fine_sampling_and_are_sharp(core: Any, duration: float
     assert (fine <= bounds.upper).all()
     assert (bounds.sampled <= bounds.upper).all()
     assert (
-        bounds.upper - np.maximum(fine, bounds.sampled) <= 0.01 * np.maximum(bounds.sampled, 1.0) + 1e-9
+        bounds.upper - np.maximum(fine, bounds.sampled)
+        <= 0.01 * np.maximum(bounds.sampled, 1.0) + 1e-9
     ).all()
-    within, exceeds = bounds.verdict == WITHIN, bounds.verdict == EXCEEDS
+    within = bounds.verdict == WITHIN
+    exceeds = bounds.verdict == EXCEEDS
     assert (fine[within] <= 1.0).all()
     assert (bounds.sampled[exceeds] > 1.0).all()
     assert not (bounds.verdict == UNDECIDED).any()
@@ -143,7 +151,9 @@ def test_a_spent_budget_leaves_undecided_rather_than_a_guess(core: Any) -> None:
 
 
 @given(st.floats(-3.0, 3.0), st.floats(0.0, 3.5), st.floats(0.0, 1.0))
-def test_intervals_of_sine_and_cosine_hold_all_their_values(low: float, width: float, inside: float) -> None:
+def test_intervals_of_sine_and_cosine_hold_all_their_values(
+    low: float, width: float, inside: float
+) -> None:
     x = interval(np.array([low]))
     wide = type(x)(np.array([low]), np.array([low + width]))
     s, c = sine_cosine(wide)
@@ -172,6 +182,9 @@ def test_dual_numbers_carry_derivatives() -> None:
     ],
 )
 def test_a_bad_argument_is_named(change: dict[str, Any], message: str) -> None:
-    arguments: dict[str, Any] = {"coefficients": np.zeros((1, 6, 6)), "durations": np.ones(1)} | change
+    arguments: dict[str, Any] = {
+        "coefficients": np.zeros((1, 6, 6)),
+        "durations": np.ones(1),
+    } | change
     with pytest.raises(InputError, match=message):
         DynamicsModel(kr210()).torque_bounds(**arguments)

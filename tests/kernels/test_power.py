@@ -22,7 +22,9 @@ def test_mains_are_axes_plus_dissipated_plus_the_change_of_the_capacitor(
     axis_power = np.array(powers)
     bus = dc_bus(axis_power, dt, DcBusParameters(CAPACITY, regeneration), stored)
     change = np.diff(bus.stored, prepend=stored)
-    assert bus.mains * dt == pytest.approx((axis_power.sum(axis=1) + bus.dissipated) * dt + change, abs=1e-6)
+    assert bus.mains * dt == pytest.approx(
+        (axis_power.sum(axis=1) + bus.dissipated) * dt + change, abs=1e-6
+    )
     assert (bus.stored >= 0.0).all()
     assert (bus.stored <= CAPACITY).all()
     assert (bus.dissipated >= 0.0).all()
@@ -39,7 +41,11 @@ def test_mains_are_axes_plus_dissipated_plus_the_change_of_the_capacitor(
     ],
 )
 def test_a_surplus_goes_to_the_axes_then_the_capacitor_then_the_rest(
-    core: Any, regeneration: Regeneration, mains: list[float], dissipated: list[float], stored: list[float]
+    core: Any,
+    regeneration: Regeneration,
+    mains: list[float],
+    dissipated: list[float],
+    stored: list[float],
 ) -> None:
     axis_power = np.array([[50.0, -150.0], [0.0, -100.0], [100.0, 0.0], [50.0, 50.0]])
     bus = dc_bus(axis_power, 1.0, DcBusParameters(CAPACITY, regeneration), core=core)
@@ -50,7 +56,8 @@ def test_a_surplus_goes_to_the_axes_then_the_capacitor_then_the_rest(
 
 def test_steps_one_by_one_are_the_scan(core: Any) -> None:
     rng = np.random.default_rng(0)
-    axis_power, parameters = rng.normal(0.0, 1e3, (50, 6)), DcBusParameters(CAPACITY)
+    axis_power = rng.normal(0.0, 1e3, (50, 6))
+    parameters = DcBusParameters(CAPACITY)
     whole = dc_bus(axis_power, 0.01, parameters, 20.0, core=core)
     stored = 20.0
     for k in range(50):
@@ -68,7 +75,9 @@ def test_drive_energy_is_mechanical_work_plus_copper() -> None:
     tau = model.inverse_dynamics(q, qd, qdd)
     copper = kr210().copper_loss * (tau / kr210().gear_ratio) ** 2
     assert energy.axes == pytest.approx(((tau * qd + copper) * dt[:, None]).sum(axis=0))
-    assert energy.mains == pytest.approx(energy.axes.sum() + energy.dissipated + energy.capacitor_change)
+    assert energy.mains == pytest.approx(
+        energy.axes.sum() + energy.dissipated + energy.capacitor_change
+    )
     assert energy.peak > 0.0
 
 

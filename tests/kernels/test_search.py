@@ -1,5 +1,5 @@
-"""Two trees: what they call a path is one, however they are asked; and a request that makes no sense is
-refused by name.
+"""Two trees: what they call a path is one, however they are asked; and a request that makes no
+sense is refused by name.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -8,7 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 from coal_scene import CoalScene
-from geometry_cases import CAPSULES, COLUMNS, FLOOR, HOME, KR210, SELF_PAIRS, TCP, Body, FloatArray, box
+from geometry_cases import (
+    CAPSULES,
+    COLUMNS,
+    FLOOR,
+    HOME,
+    KR210,
+    SELF_PAIRS,
+    TCP,
+    Body,
+    FloatArray,
+    box,
+)
 
 from ir_kernels import FREE, Chain, CollisionModel, InputError, compiled
 from ir_kernels.search import BidirectionalTree
@@ -17,7 +28,8 @@ SAFETY = 0.02
 SCALE = np.array([1.0, 0.85, 0.75, 0.68, 0.63, 0.62])
 BUDGET = 50_000
 COAL = 1e-5  # [m] its distances of cylinders are iterated
-# A column between both ends and a beam over them: neither the straight path nor one over the top is free.
+# A column between both ends and a beam over them: neither the straight path nor one over the top is
+# free.
 GATE = (
     box("column", (2.0, 0.0, 1.2), (0.3, 0.3, 2.4)),
     box("beam", (2.0, 0.0, 2.6), (0.4, 2.0, 0.3)),
@@ -46,7 +58,8 @@ def turned(angle: float, stretched: bool = True) -> FloatArray:
 def tree(
     collision: CollisionModel, start: FloatArray, goals: FloatArray, seed: int = 0, **more: Any
 ) -> BidirectionalTree:
-    low, high = KR210.position_min, KR210.position_max
+    low = KR210.position_min
+    high = KR210.position_max
     return BidirectionalTree(collision, start, goals, SAFETY, low, high, SCALE, seed, **more)
 
 
@@ -56,7 +69,8 @@ def grown(*arguments: Any, **more: Any) -> BidirectionalTree:
     return found
 
 
-LEFT, RIGHT = turned(-60.0), turned(100.0)
+LEFT = turned(-60.0)
+RIGHT = turned(100.0)
 
 
 @pytest.fixture
@@ -81,11 +95,14 @@ def test_a_path_joins_the_ends_exactly_and_every_step_is_proved(
     assert (path >= KR210.position_min).all()
     assert (path <= KR210.position_max).all()
     assert (np.abs(np.diff(path, axis=0)).max(axis=1) > 0.0).all()
-    assert (collision.certify_edges(path[:-1].copy(), path[1:].copy(), SAFETY).verdict == FREE).all()
+    assert (
+        collision.certify_edges(path[:-1].copy(), path[1:].copy(), SAFETY).verdict == FREE
+    ).all()
 
 
 def test_coal_finds_nothing_too_near_on_a_path() -> None:
-    collision, coal = model(COLUMNS), CoalScene(COLUMNS)
+    collision = model(COLUMNS)
+    coal = CoalScene(COLUMNS)
     for seed in range(2):
         path = grown(collision, LEFT, RIGHT[None], seed).path
         share = np.linspace(0.0, 1.0, 8)[:, None, None]
@@ -116,11 +133,14 @@ def test_the_same_seed_gives_the_same_path_and_another_one_another(of_core: Any)
 @pytest.mark.parametrize("size", [1, 7, 64])
 def test_slices_give_the_path_of_one_call(of_core: Any, size: int) -> None:
     collision = model(GATE, of_core)
-    whole, sliced = grown(collision, LEFT, RIGHT[None], 5), tree(collision, LEFT, RIGHT[None], 5)
+    whole = grown(collision, LEFT, RIGHT[None], 5)
+    sliced = tree(collision, LEFT, RIGHT[None], 5)
     granted = 0
     while not sliced.grow(size):
         granted += size
-        assert sliced.edges == granted, "no less, or a caller would wait for ever; no more than is allowed"
+        assert sliced.edges == granted, (
+            "no less, or a caller would wait for ever; no more than is allowed"
+        )
         assert granted < whole.edges
     assert np.array_equal(sliced.path, whole.path)
     assert sliced.edges == whole.edges
@@ -135,7 +155,8 @@ def test_where_no_path_leads_the_budget_is_spent_and_the_gap_stated(of_core: Any
         "behind", (0.0, 0.0, 2.0), (0.2, 1.1, 8.0)
     )  # a tool without an arm could pass over the robot
     collision = model(WALLS if of_core == CAPSULES else (*WALLS, behind), of_core)
-    start, goal = turned(0.0, stretched=False), turned(180.0, stretched=False)
+    start = turned(0.0, stretched=False)
+    goal = turned(180.0, stretched=False)
     search = tree(collision, start, goal[None])
     straight = search.gap
     assert straight == pytest.approx(np.linalg.norm((goal - start) * SCALE), rel=1e-6)
@@ -153,7 +174,8 @@ def test_where_no_path_leads_the_budget_is_spent_and_the_gap_stated(of_core: Any
 
 def test_of_several_goals_one_that_can_be_reached_is_named(of_core: Any) -> None:
     collision = model(WALLS, of_core)
-    start, near = turned(0.0, stretched=False), turned(4.0, stretched=False)
+    start = turned(0.0, stretched=False)
+    near = turned(4.0, stretched=False)
     inside = turned(15.0)
     across = turned(180.0, stretched=False)
     assert not collision.is_free(inside[None], SAFETY)[0]
@@ -171,24 +193,31 @@ def test_lines_become_branches_as_far_as_they_are_free(of_core: Any) -> None:
     assert given.nodes[0] > 1
     assert given.nodes[1] >= len(a) - 1
     assert given.edges < 100, "the goal's line passes the gate: what is left is short"
-    blocked = tree(collision, LEFT, RIGHT[None], 2, start_line=RIGHT[None], goal_lines=[np.empty((0, 6))])
+    blocked = tree(
+        collision, LEFT, RIGHT[None], 2, start_line=RIGHT[None], goal_lines=[np.empty((0, 6))]
+    )
     assert blocked.grow(BUDGET)
     path = blocked.path
     assert np.array_equal(path[[0, -1]], [LEFT, RIGHT])
-    assert (collision.certify_edges(path[:-1].copy(), path[1:].copy(), SAFETY).verdict == FREE).all()
+    assert (
+        collision.certify_edges(path[:-1].copy(), path[1:].copy(), SAFETY).verdict == FREE
+    ).all()
 
 
 def test_threads_give_the_paths_of_one_thread() -> None:
     collision = model(COLUMNS)
     alone = [grown(collision, LEFT, RIGHT[None], seed).path for seed in range(8)]
     with ThreadPoolExecutor(2) as pool:
-        beside = list(pool.map(lambda seed: grown(collision, LEFT, RIGHT[None], seed).path, range(8)))
+        beside = list(
+            pool.map(lambda seed: grown(collision, LEFT, RIGHT[None], seed).path, range(8))
+        )
     assert all(np.array_equal(a, b) for a, b in zip(alone, beside, strict=True))
 
 
 def test_one_search_may_be_grown_by_two_threads_one_after_the_other() -> None:
     collision = model(COLUMNS)
-    whole, shared = grown(collision, LEFT, RIGHT[None], 1), tree(collision, LEFT, RIGHT[None], 1)
+    whole = grown(collision, LEFT, RIGHT[None], 1)
+    shared = tree(collision, LEFT, RIGHT[None], 1)
     with ThreadPoolExecutor(2) as pool:
         list(pool.map(lambda _: shared.grow(20), range(whole.edges // 20 + 2)))
     assert np.array_equal(shared.path, whole.path)
@@ -203,7 +232,9 @@ def test_the_model_lives_as_long_as_its_search() -> None:
     assert np.array_equal(search.path, expected)
 
 
-FIRST, GOALS, NAN = LEFT, RIGHT[None], np.full(6, np.nan)
+FIRST = LEFT
+GOALS = RIGHT[None]
+NAN = np.full(6, np.nan)
 FOLDED = turned(0.0) + np.deg2rad([0.0, 50.0, 0.0, 0.0, 0.0, 0.0])  # into the floor
 
 

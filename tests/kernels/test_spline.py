@@ -1,4 +1,6 @@
-"""The cost of a motion along a spline: against its definition by other means, and its derivatives."""
+"""The cost of a motion along a spline: against its definition by other means, and its
+derivatives.
+"""
 
 from dataclasses import replace
 from typing import Any
@@ -31,14 +33,21 @@ from ir_kernels import (
 from ir_kernels.power import REGENERATIONS, Regeneration
 from ir_msgs_py.arrays import FloatArray, IntArray
 
-FREE: dict[str, Any] = {"penalty": 0.0, "clearance_penalty": 0.0, "time_value": 0.0, "travel": np.zeros(6)}
+FREE: dict[str, Any] = {
+    "penalty": 0.0,
+    "clearance_penalty": 0.0,
+    "time_value": 0.0,
+    "travel": np.zeros(6),
+}
 
 
 def plain(robot: RobotLiteral) -> RobotLiteral:
     """Without what the cost smoothes: Coulomb friction, and the step of the envelope."""
     torque = robot.envelope_torque.copy()
     torque[:, 0] = torque[:, 1]
-    return replace(robot, friction_coulomb=np.zeros_like(robot.friction_coulomb), envelope_torque=torque)
+    return replace(
+        robot, friction_coulomb=np.zeros_like(robot.friction_coulomb), envelope_torque=torque
+    )
 
 
 def by_definition(
@@ -49,8 +58,11 @@ def by_definition(
     interval: float,
     row: IntArray,
 ) -> float:
-    """The cost from the public kernels along scipy's spline, for robots without friction and step."""
-    K, step = len(control), interval / 2.0
+    """The cost from the public kernels along scipy's spline, for robots without friction and
+    step.
+    """
+    K = len(control)
+    step = interval / 2.0
     at = sample_times(K, interval)
     q, qd, qdd = (np.ascontiguousarray(along(control, interval, at, order)) for order in range(3))
     torque = dynamics.inverse_dynamics(q, qd, qdd)
@@ -64,9 +76,12 @@ def by_definition(
 
     cost += squares(np.abs(qd) / t.velocity, t.penalty * step)
     cost += squares(np.abs(torque) / (t.torque_share * dynamics.torque_limit(qd)), t.penalty * step)
-    knots, middles = np.arange(K - 2) * interval, (np.arange(K - 3) + 0.5) * interval
+    knots = np.arange(K - 2) * interval
+    middles = (np.arange(K - 3) + 0.5) * interval
     inside = np.clip(knots, 1e-12, knots[-1] - 1e-12)  # scipy's spline ends there
-    cost += squares(np.abs(along(control, interval, inside, 2)) / t.acceleration, t.penalty * interval)
+    cost += squares(
+        np.abs(along(control, interval, inside, 2)) / t.acceleration, t.penalty * interval
+    )
     cost += squares(np.abs(along(control, interval, middles, 3)) / t.jerk, t.penalty * interval)
     over = np.maximum(np.maximum(t.low - control, control - t.high), 0.0)
     cost += t.penalty * interval * float(((100.0 * over) ** 2).sum())
@@ -84,9 +99,12 @@ def test_the_cost_is_what_it_says(core: Any, seed: int, regeneration: Regenerati
     rows = np.stack(
         [np.full(len(collision.pairs), 0.02), rng.choice([-np.inf, 0.0, 0.2], len(collision.pairs))]
     )
-    t = terms(robot, len(collision.pairs), threshold=rows, regeneration=regeneration, energy_value=0.7)
+    t = terms(
+        robot, len(collision.pairs), threshold=rows, regeneration=regeneration, energy_value=0.7
+    )
     cost = SplineCost(collision, dynamics, t, core=core)
-    control, row = motion(seed, 16, around=MIDDLE, size=1.5), rng.integers(0, 2, 13)
+    control = motion(seed, 16, around=MIDDLE, size=1.5)
+    row = rng.integers(0, 2, 13)
     for interval in (0.06, 0.5):  # much too fast; nearly within the limits
         expected = by_definition(collision, dynamics, t, control, interval, row)
         assert cost.value(control, interval, row).value == pytest.approx(expected, rel=1e-9)
@@ -98,7 +116,8 @@ def test_the_cost_of_other_robots_is_what_it_says(core: Any, n: int) -> None:
     robot = plain(robot)
     dynamics = DynamicsModel(robot)
     t = terms(robot, len(collision.pairs), threshold=np.full((1, len(collision.pairs)), 0.1))
-    control, row = motion(n, 9, n), np.zeros(6, int)
+    control = motion(n, 9, n)
+    row = np.zeros(6, int)
     expected = by_definition(collision, dynamics, t, control, 0.2, row)
     assert SplineCost(collision, dynamics, t, core=core).value(control, 0.2).value == pytest.approx(
         expected, rel=1e-9
@@ -107,14 +126,19 @@ def test_the_cost_of_other_robots_is_what_it_says(core: Any, n: int) -> None:
 
 @pytest.mark.parametrize("capacity", [0.0, 106.0, 5000.0])
 @pytest.mark.parametrize("regeneration", REGENERATIONS)
-def test_energy_is_that_of_the_drives(core: Any, regeneration: Regeneration, capacity: float) -> None:
-    control, interval = motion(4, 20, around=WORKING), 0.15
+def test_energy_is_that_of_the_drives(
+    core: Any, regeneration: Regeneration, capacity: float
+) -> None:
+    control = motion(4, 20, around=WORKING)
+    interval = 0.15
     for robot, tolerance in (
         (plain(kr210()), 1e-11),
         (kr210(), 0.01),
     ):  # smoothed below 0.01 rad/s: less than 1 %
         collision, dynamics = kr210_models((), few=True, robot=robot)
-        t = terms(robot, 0, regeneration=regeneration, capacity_energy=capacity, energy_value=3.0, **FREE)
+        t = terms(
+            robot, 0, regeneration=regeneration, capacity_energy=capacity, energy_value=3.0, **FREE
+        )
         found = SplineCost(collision, dynamics, t, core=core).value(control, interval)
         at = sample_times(20, interval)
         power = dynamics.drive_power(
@@ -126,10 +150,15 @@ def test_energy_is_that_of_the_drives(core: Any, regeneration: Regeneration, cap
 
 
 @pytest.mark.parametrize("regeneration", REGENERATIONS)
-def test_a_rounded_bus_costs_more_and_nears_the_exact_one(core: Any, regeneration: Regeneration) -> None:
-    control, interval = motion(4, 20, around=WORKING), 0.15
+def test_a_rounded_bus_costs_more_and_nears_the_exact_one(
+    core: Any, regeneration: Regeneration
+) -> None:
+    control = motion(4, 20, around=WORKING)
+    interval = 0.15
     exact, *rounded = (
-        kr210_cost(core, (), few=True, regeneration=regeneration, smoothing=watts).value(control, interval)
+        kr210_cost(core, (), few=True, regeneration=regeneration, smoothing=watts).value(
+            control, interval
+        )
         for watts in (0.0, 1e-3, 30.0, 300.0)
     )
     energies = [value.energy for value in rounded]
@@ -142,14 +171,19 @@ def test_a_rounded_bus_costs_more_and_nears_the_exact_one(core: Any, regeneratio
 def test_torque_adjoint_is_the_transpose_of_the_torque_gradients(core: Any, n: int) -> None:
     """With every axis for itself the gradient is that of the axis powers, sample by sample."""
     if n == 6:
-        collision, dynamics = kr210_models((), few=True, robot=plain(kr210()))  # with a counterbalance
+        collision, dynamics = kr210_models(
+            (), few=True, robot=plain(kr210())
+        )  # with a counterbalance
         robot = plain(kr210())
     else:
         robot, collision, _ = chain_models(n, n)
         dynamics = DynamicsModel(plain(robot))
     free = {**FREE, "travel": np.zeros(n), "regeneration": "none"}
-    t = terms(robot, len(collision.pairs), threshold=np.full((1, len(collision.pairs)), -np.inf), **free)
-    control, interval = motion(n, 10, n), 0.3
+    t = terms(
+        robot, len(collision.pairs), threshold=np.full((1, len(collision.pairs)), -np.inf), **free
+    )
+    control = motion(n, 10, n)
+    interval = 0.3
     found = SplineCost(collision, dynamics, t, core=core).value(control, interval)
     at = sample_times(10, interval)
     motions = [np.ascontiguousarray(along(control, interval, at, k)) for k in range(3)]
@@ -157,16 +191,24 @@ def test_torque_adjoint_is_the_transpose_of_the_torque_gradients(core: Any, n: i
     drawn = np.where(dynamics.drive_power(*motions) > 0.0, interval / 2.0, 0.0)
     weights = [along(np.eye(10), interval, at, k) for k in range(3)]
     parts = [
-        np.einsum("kc,ki,kij->cj", w, drawn, g) for w, g in zip(weights, (of.q, of.qd, of.qdd), strict=True)
+        np.einsum("kc,ki,kij->cj", w, drawn, g)
+        for w, g in zip(weights, (of.q, of.qd, of.qdd), strict=True)
     ]
     expected = sum(parts)
     np.testing.assert_allclose(found.gradient, expected, atol=1e-10 * np.abs(expected).max())
 
 
 def check_derivatives(
-    cost: SplineCost, control: FloatArray, interval: float, row: IntArray, seed: int, directions: int
+    cost: SplineCost,
+    control: FloatArray,
+    interval: float,
+    row: IntArray,
+    seed: int,
+    directions: int,
 ) -> None:
-    """Central differences along random directions, along single control points, and by the interval."""
+    """Central differences along random directions, along single control points, and by the
+    interval.
+    """
     found = cost.value(control, interval, row)
     rng = np.random.default_rng(seed)
     K, n = control.shape
@@ -175,7 +217,8 @@ def check_derivatives(
         single = np.zeros((K, n))
         single[rng.integers(K), rng.integers(n)] = 1.0
         chosen.append(single)
-    h, scale = 1e-6, float(np.abs(found.gradient).max())
+    h = 1e-6
+    scale = float(np.abs(found.gradient).max())
     for d in chosen:
         ahead, behind = (cost.value(control + s * h * d, interval, row).value for s in (1.0, -1.0))
         error = (ahead - behind) / (2.0 * h) - float((found.gradient * d).sum())
@@ -186,7 +229,9 @@ def check_derivatives(
 
 
 def directions(core: Any) -> int:
-    """How many of each kind; the reference, a hundred times slower, is held against the others too."""
+    """How many of each kind; the reference, a hundred times slower, is held against the others
+    too.
+    """
     return 2 if core is None else 8
 
 
@@ -198,8 +243,12 @@ def test_derivatives_are_those_of_differences(
 ) -> None:
     collision, _ = kr210_models(few=core is None)
     rng = np.random.default_rng(seed)
-    rows = np.stack([np.full(len(collision.pairs), 0.02), rng.choice([-np.inf, 0.1], len(collision.pairs))])
-    cost = kr210_cost(core, few=core is None, regeneration=regeneration, smoothing=smoothing, threshold=rows)
+    rows = np.stack(
+        [np.full(len(collision.pairs), 0.02), rng.choice([-np.inf, 0.1], len(collision.pairs))]
+    )
+    cost = kr210_cost(
+        core, few=core is None, regeneration=regeneration, smoothing=smoothing, threshold=rows
+    )
     control = motion(seed, 12, around=MIDDLE, size=1.5)
     check_derivatives(cost, control, interval, rng.integers(0, 2, 9), seed, directions(core))
 
@@ -212,15 +261,23 @@ def test_derivatives_of_other_robots_are_those_of_differences(core: Any, n: int)
     check_derivatives(cost, motion(n, 8, n), 0.2, np.zeros(5, int), n, directions(core))
 
 
-@pytest.mark.parametrize("bodies", [COLUMNS, OPEN, (box("far", (60.0, 0.0, 0.0), (100.0, 1.0, 3.0)),), ()])
-def test_compiled_cores_agree_with_the_reference(compiled_core: Any, bodies: tuple[Body, ...]) -> None:
+@pytest.mark.parametrize(
+    "bodies", [COLUMNS, OPEN, (box("far", (60.0, 0.0, 0.0), (100.0, 1.0, 3.0)),), ()]
+)
+def test_compiled_cores_agree_with_the_reference(
+    compiled_core: Any, bodies: tuple[Body, ...]
+) -> None:
     """One scene is so large that lanes of doubles choose the pairs."""
     control = motion(7, 13, around=WORKING)
-    found, expected = (kr210_cost(one, bodies).value(control, 0.15) for one in (compiled_core, None))
+    found, expected = (
+        kr210_cost(one, bodies).value(control, 0.15) for one in (compiled_core, None)
+    )
     assert found.value == pytest.approx(expected.value, rel=1e-11)
     assert found.energy == pytest.approx(expected.energy, rel=1e-11)
     assert found.of_interval == pytest.approx(expected.of_interval, rel=1e-9)
-    np.testing.assert_allclose(found.gradient, expected.gradient, atol=1e-9 * np.abs(expected.gradient).max())
+    np.testing.assert_allclose(
+        found.gradient, expected.gradient, atol=1e-9 * np.abs(expected.gradient).max()
+    )
 
 
 def test_native_agrees_with_baseline(baseline: Any) -> None:
@@ -240,7 +297,9 @@ def test_pairs_that_lack_less_than_a_float_can_resolve_count(core: Any, lack: fl
     q = np.tile(WORKING, (4, 1))
     threshold = collision.distances(q[:1]) + lack  # what every pair lacks, all the time
     t = terms(kr210(), len(collision.pairs), **{**FREE, "threshold": threshold})
-    t = replace(t, energy_value=0.0, clearance_margin=0.0, clearance_scale=lack, clearance_penalty=1.0)
+    t = replace(
+        t, energy_value=0.0, clearance_margin=0.0, clearance_scale=lack, clearance_penalty=1.0
+    )
     found = SplineCost(collision, dynamics, t, core=core).value(q, 2.0)
     assert found.value == pytest.approx(2.0 * len(collision.pairs), rel=1e-7)
 
@@ -269,7 +328,9 @@ def test_the_smoothed_envelope_stays_below_the_true_one(core: Any) -> None:
     first = robot.envelope_speed[0, 0]
     for share, exact in ((0.5, True), (0.949, True), (0.97, False), (0.999, False), (1.1, True)):
         control = np.tile(WORKING, (4, 1))
-        control[:, 0] = share * first * np.arange(4) * 0.01  # only the first axis moves, at one speed
+        control[:, 0] = (
+            share * first * np.arange(4) * 0.01
+        )  # only the first axis moves, at one speed
         at = sample_times(4, 0.01)
         q, qd, qdd = (np.ascontiguousarray(along(control, 0.01, at, k)) for k in range(3))
         use = np.abs(dynamics.inverse_dynamics(q, qd, qdd)) / (1e-3 * dynamics.torque_limit(qd))
@@ -284,7 +345,8 @@ def test_an_envelope_that_falls_from_standstill_on_has_no_step(core: Any) -> Non
     speed[:, 0] = 0.0
     robot = replace(plain(robot), envelope_speed=speed)
     collision, dynamics = kr210_models(few=True, robot=robot)
-    t, control = terms(robot, len(collision.pairs)), motion(3, 10, around=WORKING)
+    t = terms(robot, len(collision.pairs))
+    control = motion(3, 10, around=WORKING)
     expected = by_definition(collision, dynamics, t, control, 0.1, np.zeros(7, int))
     assert SplineCost(collision, dynamics, t, core=core).value(control, 0.1).value == pytest.approx(
         expected, rel=1e-9

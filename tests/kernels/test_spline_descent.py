@@ -1,4 +1,6 @@
-"""The descent along a spline: down, with its ends still, the same every time; and what is refused by name."""
+"""The descent along a spline: down, with its ends still, the same every time; and what is refused
+by name.
+"""
 
 import gc
 import re
@@ -13,15 +15,34 @@ import numpy as np
 import pytest
 from geometry_cases import CAPSULES, KR210, box
 from robots import kr210, random_chain
-from spline_cases import along, at_rest, chain_models, kr210_cost, kr210_models, motion, swing, terms
+from spline_cases import (
+    along,
+    at_rest,
+    chain_models,
+    kr210_cost,
+    kr210_models,
+    motion,
+    swing,
+    terms,
+)
 
-from ir_kernels import Chain, CollisionModel, DynamicsModel, InputError, SplineCost, SplineDescent, compiled
+from ir_kernels import (
+    Chain,
+    CollisionModel,
+    DynamicsModel,
+    InputError,
+    SplineCost,
+    SplineDescent,
+    compiled,
+)
 from ir_msgs_py.arrays import FloatArray
 
 BLOCK = (box("block", (1.9, 0.35, 1.1), (0.3, 0.3, 2.2)),)  # obstructs `swing`
 
 
-def descended(core: Any, evaluations: int, **options: Any) -> tuple[SplineCost, FloatArray, SplineDescent]:
+def descended(
+    core: Any, evaluations: int, **options: Any
+) -> tuple[SplineCost, FloatArray, SplineDescent]:
     cost = kr210_cost(core, BLOCK, few=True)
     control = swing(16)
     return cost, control, cost.descend(control, 0.15, evaluations=evaluations, **options)
@@ -42,13 +63,17 @@ def test_the_descent_lowers_the_cost_and_reports_it_truly(core: Any) -> None:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_no_pair_is_left_out_that_was_far_some_evaluations_before(compiled_core: Any, seed: int) -> None:
+def test_no_pair_is_left_out_that_was_far_some_evaluations_before(
+    compiled_core: Any, seed: int
+) -> None:
     robot, collision, dynamics = chain_models(seed, 4 + seed % 4)
     control = at_rest(motion(seed, 40, dynamics.n))
     cost = SplineCost(collision, dynamics, terms(robot, len(collision.pairs)), core=compiled_core)
     for evaluations in range(1, 120, 7):
         found = cost.descend(control, 0.2, evaluations=evaluations, tolerance=0.0)
-        assert found.value == cost.value(found.control, found.interval).value  # which remembers nothing
+        assert (
+            found.value == cost.value(found.control, found.interval).value
+        )  # which remembers nothing
 
 
 def test_ends_stay_where_they_are_and_still(core: Any) -> None:
@@ -124,15 +149,21 @@ def test_threads_share_one_object(core: Any) -> None:
     alone = [cost.descend(start, 0.15, evaluations=most) for start in starts]
     with ThreadPoolExecutor(4) as pool:
         for _ in range(rounds):
-            together = list(pool.map(lambda start: cost.descend(start, 0.15, evaluations=most), starts))
+            together = list(
+                pool.map(lambda start: cost.descend(start, 0.15, evaluations=most), starts)
+            )
             assert all(same(a, b) for a, b in zip(alone, together, strict=True))
 
 
 def test_other_threads_run_meanwhile() -> None:
-    """No thread is preempted here: this one gets its turn before the descent ends, as that yields."""
+    """No thread is preempted here: this one gets its turn before the descent ends, as that
+    yields.
+    """
     if compiled.MODULE is None:
         pytest.skip("nothing compiled")
-    cost, ready, ended = kr210_cost(compiled.MODULE, BLOCK, few=True), threading.Event(), []
+    cost = kr210_cost(compiled.MODULE, BLOCK, few=True)
+    ready = threading.Event()
+    ended = []
 
     def work() -> None:
         ready.set()
@@ -232,10 +263,16 @@ def test_other_bad_arguments_are_refused_by_name(call: Callable[[], object], nam
 
 
 def bad_terms() -> list[Any]:
-    six, pairs = np.ones(6), len(kr210_models(BLOCK, few=True)[0].pairs)
+    six = np.ones(6)
+    pairs = len(kr210_models(BLOCK, few=True)[0].pairs)
     cases: list[tuple[str, Any]] = []
     for name in ("velocity", "acceleration", "jerk", "low", "high", "travel"):
-        cases += [(name, np.ones(5)), (name, np.full(6, np.nan)), (name, np.full(6, np.inf)), (name, 1.0)]
+        cases += [
+            (name, np.ones(5)),
+            (name, np.full(6, np.nan)),
+            (name, np.full(6, np.inf)),
+            (name, 1.0),
+        ]
     cases += [(name, -six) for name in ("velocity", "acceleration", "jerk", "travel")]
     cases += [("velocity", 0.0 * six), ("low", 100.0 * six)]
     cases += [("threshold", np.zeros(pairs)), ("threshold", np.zeros((0, pairs)))]

@@ -1,4 +1,6 @@
-"""Descents from starts along paths and along a fixed path: the compiled ones are those of the reference."""
+"""Descents from starts along paths and along a fixed path: the compiled ones are those of the
+reference.
+"""
 
 from typing import Any
 
@@ -19,7 +21,8 @@ def detours(seed: int, count: int) -> list[FloatArray]:
     """Paths (M, 6) of two to four configurations from WORKING."""
     rng = np.random.default_rng(seed)
     return [
-        np.concatenate([WORKING[None], WORKING + rng.normal(0.0, 0.5, (1 + k % 3, 6))]) for k in range(count)
+        np.concatenate([WORKING[None], WORKING + rng.normal(0.0, 0.5, (1 + k % 3, 6))])
+        for k in range(count)
     ]
 
 
@@ -49,7 +52,8 @@ def test_descents_along_paths_are_those_of_the_reference(compiled_core: Any) -> 
 
 
 def test_a_path_is_descended_from_alone_as_among_others(compiled_core: Any) -> None:
-    cost, paths = kr210_cost(compiled_core), detours(2, 4)
+    cost = kr210_cost(compiled_core)
+    paths = detours(2, 4)
     together = cost.descend_along(paths, STARTS, evaluations=EVALUATIONS)
     for path, found in zip(paths, together, strict=True):
         (alone,) = cost.descend_along([path], STARTS, evaluations=EVALUATIONS)
@@ -59,7 +63,9 @@ def test_a_path_is_descended_from_alone_as_among_others(compiled_core: Any) -> N
 
 def test_a_requested_duration_stays(compiled_core: Any) -> None:
     starts = SplineStarts(0.1, 1.3, 8, 12, duration=3.0)
-    for found in kr210_cost(compiled_core).descend_along(detours(3, 2), starts, evaluations=EVALUATIONS):
+    for found in kr210_cost(compiled_core).descend_along(
+        detours(3, 2), starts, evaluations=EVALUATIONS
+    ):
         assert found.interval * (len(found.control) - 3) == pytest.approx(3.0)
 
 
@@ -78,15 +84,18 @@ def test_the_profile_along_a_path_is_that_of_the_reference(compiled_core: Any, f
 
 
 def test_a_profile_gets_cheaper_with_work(compiled_core: Any) -> None:
-    cost, (path, s) = kr210_cost(compiled_core, few=True), passed(12)
+    cost = kr210_cost(compiled_core, few=True)
+    (path, s) = passed(12)
     values = [
-        cost.descend_profile(path, s, 0.6, evaluations=most, tolerance=0.0).value for most in (1, 20, 80)
+        cost.descend_profile(path, s, 0.6, evaluations=most, tolerance=0.0).value
+        for most in (1, 20, 80)
     ]
     assert values[2] < values[1] < values[0]
 
 
 def test_what_makes_no_sense_is_refused(compiled_core: Any) -> None:
-    cost, (path, s) = kr210_cost(compiled_core, few=True), passed()
+    cost = kr210_cost(compiled_core, few=True)
+    (path, s) = passed()
     with pytest.raises(InputError, match="no length"):
         cost.descend_along([np.repeat(WORKING[None], 2, axis=0)], STARTS, evaluations=5)
     with pytest.raises(InputError, match="at least 4"):
@@ -97,7 +106,8 @@ def test_what_makes_no_sense_is_refused(compiled_core: Any) -> None:
 
 def test_samples_are_those_of_the_reference(compiled_core: Any) -> None:
     rng = np.random.default_rng(4)
-    c, T = rng.normal(size=(5, 6, 6)), rng.uniform(0.1, 0.5, 5)
+    c = rng.normal(size=(5, 6, 6))
+    T = rng.uniform(0.1, 0.5, 5)
     begins = np.concatenate([[0.2], 0.2 + np.cumsum(T)[:-1]])
     times = np.concatenate([begins, rng.uniform(0.0, 3.0, 40), [-1.0, 9.0]])
     found = polynomial_samples(c, T, begins, times, core=compiled_core)

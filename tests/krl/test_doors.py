@@ -18,7 +18,9 @@ def out_of_the_lathe() -> tuple[Planner, PlannedMovement]:
     planner = Planner(lambda: 0.0)
     planner.set_cell("", "demo")
     planner.set_equipment("lathe", None, True, "door_open")
-    found = planner.plan_service("lathe_work", "exit", None, planner.cell.machine_home, 1, PlanOptions())
+    found = planner.plan_service(
+        "lathe_work", "exit", None, planner.cell.machine_home, 1, PlanOptions()
+    )
     trajectory = found.candidates[0].trajectory
     assert trajectory is not None
     planner.set_equipment("lathe", None, True, "door_closed")
@@ -35,7 +37,11 @@ def out_of_the_lathe() -> tuple[Planner, PlannedMovement]:
 
 @pytest.mark.parametrize(
     ("asked", "awaited", "certified"),
-    [((), (), False), (("lathe_open_door",), (), False), (("lathe_open_door",), ("lathe_door_open",), True)],
+    [
+        ((), (), False),
+        (("lathe_open_door",), (), False),
+        (("lathe_open_door",), ("lathe_door_open",), True),
+    ],
     ids=["the door is closed", "the door sweeps", "the door is open"],
 )
 def test_doors_are_as_the_signals_before_a_movement_have_them(
@@ -45,7 +51,9 @@ def test_doors_are_as_the_signals_before_a_movement_have_them(
     certified: bool,
 ) -> None:
     planner, step = out_of_the_lathe
-    pause = PlannedMovement(kind=MovementKind.PAUSE, to_station="lathe_work", duration=0.1, set_signals=asked)
+    pause = PlannedMovement(
+        kind=MovementKind.PAUSE, to_station="lathe_work", duration=0.1, set_signals=asked
+    )
     steps = (pause, replace(step, wait_for=awaited))
     judge = judge_of(steps, planner.cell, planner.scene("").power, planner.settings.drives, 0.02)
     assert step.trajectory is not None

@@ -31,7 +31,11 @@ def frame_text(arm: Arm, q: np.ndarray) -> str:
 
 def steps_of(program: Followed, planner: Planner) -> list[np.ndarray]:
     scene = planner.scene("none")
-    return [step.trajectory for step in drive(program, scene, planner.cell.machine_home)[0] if step.moves]
+    return [
+        step.trajectory
+        for step in drive(program, scene, planner.cell.machine_home)[0]
+        if step.moves
+    ]
 
 
 @given(st.integers(0, 10**9))
@@ -132,7 +136,9 @@ def test_a_base_moves_its_points(planner: Planner, followed: Follow, home: np.nd
     assert moved[:3, 3] - taught[:3, 3] == pytest.approx([0.0, 0.1, 0.0], abs=1e-6)
 
 
-def test_approximation_is_faster_and_stays_near_the_corner(planner: Planner, followed: Follow) -> None:
+def test_approximation_is_faster_and_stays_near_the_corner(
+    planner: Planner, followed: Follow
+) -> None:
     lines = "PTP {{A1 20,A3 100}}{}\nPTP {{A1 40}}"
     stopping = steps_of(followed(START + lines.format("")), planner)
     blended = steps_of(followed(START + "$APO.CPTP=50\n" + lines.format(" C_PTP")), planner)
@@ -150,13 +156,17 @@ def test_an_output_ends_an_approximation(planner: Planner, followed: Follow) -> 
 @given(st.integers(0, 10**9))
 @settings(max_examples=12, deadline=None)
 def test_what_is_driven_keeps_the_limits(planner: Planner, seed: int) -> None:
-    """Law: what is driven keeps speed, acceleration, jerk and torque of every axis, blends included."""
+    """Law: what is driven keeps speed, acceleration, jerk and torque of every axis, blends
+    included.
+    """
     rng = np.random.default_rng(seed)
     turns = rng.uniform([-60, -110, 60, -60, 20, -60], [60, -60, 110, 60, 80, 60], (3, 6))
     points = [", ".join(f"A{j + 1} {angle:.3f}" for j, angle in enumerate(one)) for one in turns]
-    speed, share = rng.uniform(30, 100), rng.uniform(0, 100)
+    speed = rng.uniform(30, 100)
+    share = rng.uniform(0, 100)
     text = (
-        f"DEF T( )\nPTP XHOME\n$VEL_AXIS[1]={speed:.1f}\n$APO.CPTP={share:.1f}\nPTP {{{points[0]}}} C_PTP\n"
+        f"DEF T( )\nPTP XHOME\n$VEL_AXIS[1]={speed:.1f}\n$APO.CPTP={share:.1f}\nPTP "
+        f"{{{points[0]}}} C_PTP\n"
         f"PTP {{{points[1]}}} C_PTP\nPTP {{{points[2]}}}\nLIN_REL {{Z 60}}\nEND\n"
     )
     cell = planner.cell
@@ -177,7 +187,10 @@ REFUSED = {
     "out of reach": ("PTP {X 9000,Y 0,Z 0,A 0,B 0,C 0}", "is out of reach"),
     "past an axis limit": ("PTP {A2 20}", "A2 20 deg is not within -140 to -5 deg"),
     "no such configuration": ("PTP {X 1500,Y 0,Z 1500,A 0,B 90,C 0,S 1,T 63}", "has S 1, T 63"),
-    "a line that leaves the reach": ("LIN_REL {X 3000}", "the path leaves the reach or an axis limit"),
+    "a line that leaves the reach": (
+        "LIN_REL {X 3000}",
+        "the path leaves the reach or an axis limit",
+    ),
     "a circle of points on a line": ("CIRC_REL {X 10},{X 20}", "lie on a line"),
 }
 

@@ -29,7 +29,9 @@ from _tool_path_judge import seen
 def planned() -> tuple[Planner, object]:
     planner = Planner(lambda: 0.0)
     planner.set_cell("", "demo")
-    plan = planner.plan_program(("gauge_measure", "home"), 0.0, PlanOptions(), planner.cell.posture("park"))
+    plan = planner.plan_program(
+        ("gauge_measure", "home"), 0.0, PlanOptions(), planner.cell.posture("park")
+    )
     return planner, plan
 
 
@@ -48,12 +50,16 @@ def test_an_exported_program_is_certified_and_near_the_plan(planned) -> None:
     assert "gauge_measure" in again.stations
     for step, movement in zip(driven, moving, strict=True):
         for end in (0, -1):
-            away = np.degrees(step.step.trajectory.positions[end] - movement.trajectory.positions[end])
+            away = np.degrees(
+                step.step.trajectory.positions[end] - movement.trajectory.positions[end]
+            )
             assert np.abs(away).max() < 1e-4
 
 
 def test_a_controller_would_take_the_files(planned) -> None:
-    """After the language's documentation: names of 24 characters, lines of 471, no values for other lists."""
+    """After the language's documentation: names of 24 characters, lines of 471, no values for other
+    lists.
+    """
     planner, plan = planned
     export = export_krl(planner, plan.movements, "visit")
     declared = re.findall(r"DECL \w+ (\w+)=", export.data)
@@ -74,7 +80,8 @@ def test_a_controller_would_take_the_files(planned) -> None:
 def test_points_are_passed_within_the_limits_and_hardly_later(planned) -> None:
     planner, plan = planned
     movements = [step.trajectory for step in plan.movements if step.trajectory is not None]
-    scene, movement = planner.scene(), min(movements, key=lambda one: one.duration)
+    scene = planner.scene()
+    movement = min(movements, key=lambda one: one.duration)
     even = np.linspace(0.0, movement.duration, 13)
     points = movement.sample(even).q
     jerk = np.abs(resting_spline(even, points).derivative(3)(np.linspace(0.0, even[-1], 2001)))
@@ -109,10 +116,13 @@ def bench() -> Planner:
 
 
 def test_a_path_of_the_tool_is_a_spline_at_its_speed(bench: Planner) -> None:
-    cell, path = bench.cell, replace(bench.cell.path("bead"), free_angle=0.0)
+    cell = bench.cell
+    path = replace(bench.cell.path("bead"), free_angle=0.0)
     own = replace(cell.own_path("bead"), path=path)
     export = export_krl(bench, [path_movement(bench, "bead", own)], "bead")
-    assert export.source.count("$VEL.CP=0.1000") == export.source.count("ENDSPLINE") == 3  # two corners
+    assert (
+        export.source.count("$VEL.CP=0.1000") == export.source.count("ENDSPLINE") == 3
+    )  # two corners
     assert export.exported.certified
     assert export.exported.duration == pytest.approx(export.planned.duration, rel=0.05)
     texts = [parse(export.source, "bead.src"), parse(export.data, "bead.dat")]
@@ -143,7 +153,9 @@ def test_asynchronous_movements_are_refused(planned) -> None:
         export_krl(planner, plan.movements, "visit", PlanOptions(timing="asynchronous"))
 
 
-@pytest.mark.parametrize("name", ["", "1st", "has space", "x" * 25, "semi;colon", "línea", "Spline"])
+@pytest.mark.parametrize(
+    "name", ["", "1st", "has space", "x" * 25, "semi;colon", "línea", "Spline"]
+)
 def test_names_that_a_controller_does_not_take(planned, name: str) -> None:
     planner, plan = planned
     with pytest.raises(RequestError, match="the program's name is"):
@@ -179,7 +191,9 @@ def test_written_signals_are_read_back(planner: Planner) -> None:
     signals = WrittenSignals((("part there", True),), (("wait", True), ("Door-Open", False)))
     source, data = written("SPEAKS", planner.cell.machine_home, [signals], tool, [])
     program = follow(
-        [parse(source, "speaks.src"), parse(data, "speaks.dat")], planner.cell.machine_home, np.eye(4)
+        [parse(source, "speaks.src"), parse(data, "speaks.dat")],
+        planner.cell.machine_home,
+        np.eye(4),
     )
     assert [one.value for one in program.commands if isinstance(one, SetOutput)] == [True, False]
     assert "WAIT FOR PART_THERE" in source
@@ -190,23 +204,33 @@ def test_the_commands_of_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixt
     source = tmp_path / "visit.src"
     assert main(["krl", "export", "open", "-o", str(source), "--stations", "p1", "home"]) == 0
     assert "certified" in capsys.readouterr().out
-    assert main(["krl", "import", str(source), str(source.with_suffix(".dat")), "--cell", "open"]) == 0
+    assert (
+        main(["krl", "import", str(source), str(source.with_suffix(".dat")), "--cell", "open"]) == 0
+    )
     shown = capsys.readouterr().out
     assert "stations: p1" in shown
     assert "free of violations" in shown
-    assert main(["krl", "export", "open", "-o", str(source)]) == 2  # never over a file that is there
+    assert (
+        main(["krl", "export", "open", "-o", str(source)]) == 2
+    )  # never over a file that is there
     assert "is there already" in capsys.readouterr().err
 
 
-def test_a_complaint_names_file_line_and_column(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_complaint_names_file_line_and_column(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     broken = tmp_path / "old.src"
     broken.write_text("DEF OLD( )\nPTP XHOME\nLIN NOBODY\nEND\n")
     assert main(["krl", "import", str(broken), "--cell", "open"]) == 2
     assert "old.src:3:5: NOBODY has no value" in capsys.readouterr().err
 
 
-def test_one_station_is_nothing_to_plan_between(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_one_station_is_nothing_to_plan_between(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     source = tmp_path / "old.src"
     source.write_text("DEF OLD( )\nPTP XHOME\nPTP {A1 3}\nPTP XHOME\nEND\n")
     assert main(["krl", "import", str(source), "--cell", "open", "--compare"]) == 2
-    assert "stations recognised: home; --compare plans between at least two" in capsys.readouterr().err
+    assert (
+        "stations recognised: home; --compare plans between at least two" in capsys.readouterr().err
+    )

@@ -25,7 +25,8 @@ def turned(axis: np.ndarray, angle: float) -> np.ndarray:
 
 def tool_in_foot(planner: Planner, q: np.ndarray) -> np.ndarray:
     """The tcp in the robot's foot, link by link."""
-    robot, pose = planner.cell.robot, np.eye(4)
+    robot = planner.cell.robot
+    pose = np.eye(4)
     for origin, axis, angle in zip(robot.joint_origin, robot.joint_axis, q, strict=True):
         pose = pose @ origin @ turned(axis, angle)
     return pose @ planner.cell.tcp
@@ -42,14 +43,17 @@ def frame(x: float, y: float, z: float, a: float, b: float, c: float) -> np.ndar
 
 
 def least_time(distance: float, v: float, a: float, j: float) -> float:
-    """Of a movement from rest to rest over a distance with bounds of speed, acceleration and jerk."""
+    """Of a movement from rest to rest over a distance with bounds of speed, acceleration and
+    jerk.
+    """
 
     def ramp(peak: float) -> float:
         return peak / a + a / j if peak * j >= a * a else 2.0 * np.sqrt(peak / j)
 
     if v * ramp(v) <= distance:
         return ramp(v) + distance / v
-    low, high = 0.0, v
+    low = 0.0
+    high = v
     for _ in range(80):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if middle * ramp(middle) <= distance else (low, middle)
@@ -58,31 +62,44 @@ def least_time(distance: float, v: float, a: float, j: float) -> float:
 
 def moves(program: Followed, planner: Planner) -> list:
     scene = planner.scene("none")
-    return [one.trajectory for one in drive(program, scene, planner.cell.machine_home)[0] if one.moves]
+    return [
+        one.trajectory for one in drive(program, scene, planner.cell.machine_home)[0] if one.moves
+    ]
 
 
 def test_frames_are_reached_by_kinematics_of_ones_own(planner: Planner, followed: Follow) -> None:
     rng = np.random.default_rng(4)
-    low, high = [1400, -300, 1000, -15, 80, -15], [1600, 300, 1300, 15, 100, 15]
-    lines, targets = [], rng.uniform(low, high, (8, 6))
+    low = [1400, -300, 1000, -15, 80, -15]
+    high = [1600, 300, 1300, 15, 100, 15]
+    lines = []
+    targets = rng.uniform(low, high, (8, 6))
     for row in targets:
         values = (f"{name} {value:.6f}" for name, value in zip("XYZABC", row, strict=True))
         lines.append(f"PTP {{{','.join(values)}}}")
-    driven = moves(followed("PTP {A1 0,A2 -90,A3 90,A4 0,A5 30,A6 0}\n" + "\n".join(lines)), planner)
+    driven = moves(
+        followed("PTP {A1 0,A2 -90,A3 90,A4 0,A5 30,A6 0}\n" + "\n".join(lines)), planner
+    )
     for one, row in zip(driven, targets, strict=True):
-        reached, wanted = tool_in_foot(planner, one.positions[-1]), frame(*row)
+        reached = tool_in_foot(planner, one.positions[-1])
+        wanted = frame(*row)
         assert 1e3 * np.linalg.norm(reached[:3, 3] - wanted[:3, 3]) < 1e-3
         assert reached[:3, :3] == pytest.approx(wanted[:3, :3], abs=2e-6)  # 1e-4 deg
 
 
 @pytest.mark.parametrize("share", [15, 40])
-def test_a_ptp_takes_the_time_of_its_slowest_axis(planner: Planner, followed: Follow, share: int) -> None:
-    """Law: one seven-phase law for all axes, each within its share of speed, acceleration and jerk."""
+def test_a_ptp_takes_the_time_of_its_slowest_axis(
+    planner: Planner, followed: Follow, share: int
+) -> None:
+    """Law: one seven-phase law for all axes, each within its share of speed, acceleration and
+    jerk.
+    """
     rng = np.random.default_rng(share)
     limits = planner.scene("none").limits
     goals = rng.uniform([-50, -115, 60, -50, 20, -50], [50, -65, 110, 50, 70, 50], (6, 6))
     shares = "\n".join(f"$VEL_AXIS[{k}]={share}\n$ACC_AXIS[{k}]={share}" for k in range(1, 7))
-    lines = ["PTP {" + ",".join(f"A{k + 1} {v:.6f}" for k, v in enumerate(row)) + "}" for row in goals]
+    lines = [
+        "PTP {" + ",".join(f"A{k + 1} {v:.6f}" for k, v in enumerate(row)) + "}" for row in goals
+    ]
     driven = moves(followed("\n".join([lines[0], shares, *lines[1:]])), planner)
     part = share / 100.0
     for one, before, after in zip(driven, goals[:-1], goals[1:], strict=True):

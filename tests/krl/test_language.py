@@ -38,19 +38,34 @@ WAITS = {  # statements that end in WAIT SEC of what they compute
     "a REAL stays one": ("DECL REAL R=7\nWAIT SEC R/2", 3.5),
     "case doesn't count": ("decl int i=4\nwait sec I", 4.0),
     "FOR up": ("DECL INT I\nDECL INT N=0\nFOR I=1 TO 4\nN=N+I\nENDFOR\nWAIT SEC N", 10.0),
-    "FOR down": ("DECL INT I\nDECL INT N=0\nFOR I=4 TO 1 STEP -2\nN=N*10+I\nENDFOR\nWAIT SEC N", 42.0),
-    "FOR that doesn't run": ("DECL INT I\nDECL INT N=5\nFOR I=2 TO 1\nN=0\nENDFOR\nWAIT SEC N", 5.0),
+    "FOR down": (
+        "DECL INT I\nDECL INT N=0\nFOR I=4 TO 1 STEP -2\nN=N*10+I\nENDFOR\nWAIT SEC N",
+        42.0,
+    ),
+    "FOR that doesn't run": (
+        "DECL INT I\nDECL INT N=5\nFOR I=2 TO 1\nN=0\nENDFOR\nWAIT SEC N",
+        5.0,
+    ),
     "WHILE": ("DECL INT N=1\nWHILE N<100\nN=N*3\nENDWHILE\nWAIT SEC N", 243.0),
     "REPEAT": ("DECL INT N=0\nREPEAT\nN=N+1\nUNTIL N>=3\nWAIT SEC N", 3.0),
-    "LOOP with EXIT": ("DECL INT N=0\nLOOP\nN=N+1\nIF N==5 THEN\nEXIT\nENDIF\nENDLOOP\nWAIT SEC N", 5.0),
+    "LOOP with EXIT": (
+        "DECL INT N=0\nLOOP\nN=N+1\nIF N==5 THEN\nEXIT\nENDIF\nENDLOOP\nWAIT SEC N",
+        5.0,
+    ),
     "EXIT leaves the inner loop": (
         "DECL INT N=0\nDECL INT I\nFOR I=1 TO 3\nLOOP\nEXIT\nENDLOOP\nN=N+1\nENDFOR\nWAIT SEC N",
         3.0,
     ),
     "IF and ELSE": ("IF 1>2 THEN\nWAIT SEC 1\nELSE\nWAIT SEC 2\nENDIF", 2.0),
-    "SWITCH": ("SWITCH 3\nCASE 1,2\nWAIT SEC 1\nCASE 3\nWAIT SEC 3\nDEFAULT\nWAIT SEC 9\nENDSWITCH", 3.0),
+    "SWITCH": (
+        "SWITCH 3\nCASE 1,2\nWAIT SEC 1\nCASE 3\nWAIT SEC 3\nDEFAULT\nWAIT SEC 9\nENDSWITCH",
+        3.0,
+    ),
     "DEFAULT": ("SWITCH 8\nCASE 1\nWAIT SEC 1\nDEFAULT\nWAIT SEC 9\nENDSWITCH", 9.0),
-    "SWITCH of an enumeration": ("SWITCH #B\nCASE #A\nWAIT SEC 1\nCASE #B\nWAIT SEC 2\nENDSWITCH", 2.0),
+    "SWITCH of an enumeration": (
+        "SWITCH #B\nCASE #A\nWAIT SEC 1\nCASE #B\nWAIT SEC 2\nENDSWITCH",
+        2.0,
+    ),
     "arrays": ("DECL REAL A[3]\nA[2]=1.5\nWAIT SEC A[2]*2", 3.0),
     "arrays of two indices": ("DECL INT A[2,2]\nA[1,2]=6\nWAIT SEC A[1,2]", 6.0),
     "components": ("DECL FRAME F={X 1,Y 2,Z 3,A 0,B 0,C 0}\nF.Y=5\nWAIT SEC F.X+F.Y", 6.0),
@@ -102,7 +117,11 @@ REFUSED = {
         "1:4",
         "$IN[4] decides something here",
     ),
-    "an output of number 0": ("$OUT[0]=TRUE", "1:1", "$OUT[0]: outputs have whole numbers from 1 to 8192"),
+    "an output of number 0": (
+        "$OUT[0]=TRUE",
+        "1:1",
+        "$OUT[0]: outputs have whole numbers from 1 to 8192",
+    ),
     "an output beyond the last": ("PULSE($OUT[9000],TRUE,0.5)", None, "$OUT[9000]: outputs have"),
     "a wait without end": ("WAIT SEC 1E30", "1:1", "a wait is read up to 604800 s, a week"),
     "an output that isn't a truth value": ("$OUT[1]=5", "1:1", "$OUT[1] is set to the number 5"),
@@ -111,18 +130,42 @@ REFUSED = {
     "a speed of nothing": ("$VEL.CP=0\nLIN {X 1}", "2:1", "$VEL.CP is 0; it must be above 0"),
     "a share above all": ("$VEL_AXIS[2]=120\nPTP {A1 0}", "2:1", "$VEL_AXIS is 120 %"),
     "an unknown command of BAS": ("BAS(#NOBODY,1)", "1:1", "BAS(#NOBODY) isn't known"),
-    "a tool that stands in the cell": ("$IPO_MODE=#TCP", "1:1", "a tool that stands in the cell isn't read"),
+    "a tool that stands in the cell": (
+        "$IPO_MODE=#TCP",
+        "1:1",
+        "a tool that stands in the cell isn't read",
+    ),
     "EXIT outside of a loop": ("EXIT", None, "EXIT stands outside of a loop"),
     "a REAL beyond its range": ("WAIT SEC 1E400", "1:10", "a REAL is at most"),
     "an INT beyond its range": ("WAIT SEC 99999*99999", "1:10", "an INT is at most 2147483647"),
     "an INT of many digits": ("WAIT SEC " + "9" * 6000, "1:10", "6000 digits"),
     "a loop that squares": ("X=2\nWHILE TRUE\nX=X*X\nENDWHILE", None, "an INT is at most"),
-    "a component that no position has": ("PTP {A1 0,A7 5}", "1:5", "A7 is no component of a position"),
-    "an external axis that moves": ("PTP {A1 0,E1 0}\nPTP {A1 5,E1 500}", "2:5", "E1 moves from 0 to 500"),
+    "a component that no position has": (
+        "PTP {A1 0,A7 5}",
+        "1:5",
+        "A7 is no component of a position",
+    ),
+    "an external axis that moves": (
+        "PTP {A1 0,E1 0}\nPTP {A1 5,E1 500}",
+        "2:5",
+        "E1 moves from 0 to 500",
+    ),
     "an external axis by steps": ("PTP_REL {E1 10,A1 0}", "1:9", "E1 moves from 0 to 10"),
-    "a condition of an unknown name": ("WAIT FOR $IN[1] OR PART_THER", "1:20", "PART_THER isn't declared"),
-    "a system variable": ("IF $MODE_OP==#EX THEN\nENDIF", "1:4", "$MODE_OP has no value: it is known on"),
-    "a group that can't hold a number": ("SIGNAL G $OUT[1] TO $OUT[2]\nG=4", "2:1", "it can't hold 4"),
+    "a condition of an unknown name": (
+        "WAIT FOR $IN[1] OR PART_THER",
+        "1:20",
+        "PART_THER isn't declared",
+    ),
+    "a system variable": (
+        "IF $MODE_OP==#EX THEN\nENDIF",
+        "1:4",
+        "$MODE_OP has no value: it is known on",
+    ),
+    "a group that can't hold a number": (
+        "SIGNAL G $OUT[1] TO $OUT[2]\nG=4",
+        "2:1",
+        "it can't hold 4",
+    ),
     "a group of inputs that is set": ("SIGNAL G $IN[1] TO $IN[2]\nG=1", "2:1", "it can't be set"),
     "a group that ends before it begins": (
         "SIGNAL G $OUT[4] TO $OUT[2]",
@@ -134,7 +177,11 @@ REFUSED = {
         "2:8",
         "$IN[1]",
     ),
-    "a routine of another file": ("OTHER()", "1:1", "there is no routine OTHER in the files that are given"),
+    "a routine of another file": (
+        "OTHER()",
+        "1:1",
+        "there is no routine OTHER in the files that are given",
+    ),
     "a component twice": ("PTP {A1 0,A1 1}", "1:11", "component A1 is given twice"),
 }
 
@@ -146,7 +193,9 @@ def test_what_cannot_be_followed_is_named_with_its_place(name: str, followed: Fo
         followed(lines)
     if place is not None:
         line, column = place.split(":")
-        assert str(refused.value).startswith(f"test.src:{int(line) + 1}:{column}: ")  # DEF is line 1
+        assert str(refused.value).startswith(
+            f"test.src:{int(line) + 1}:{column}: "
+        )  # DEF is line 1
     assert words is None or words in str(refused.value)
 
 
@@ -172,7 +221,11 @@ def test_what_is_no_krl_is_named_with_line_and_column(name: str) -> None:
 
 @pytest.mark.parametrize(
     "lines",
-    ["IF TRUE THEN\n" * 2000 + "ENDIF\n" * 2000, "WAIT SEC " + "-" * 3000 + "1", "WAIT SEC 1" + "+1" * 3000],
+    [
+        "IF TRUE THEN\n" * 2000 + "ENDIF\n" * 2000,
+        "WAIT SEC " + "-" * 3000 + "1",
+        "WAIT SEC 1" + "+1" * 3000,
+    ],
 )
 def test_what_is_nested_too_deeply_ends_with_a_sentence(lines: str, followed: Follow) -> None:
     with pytest.raises((KrlSyntaxError, KrlRunError), match="nested too deeply"):
@@ -189,7 +242,8 @@ def test_files_are_read_as_editors_leave_them(ends: str) -> None:
 def test_damaged_programs_end_with_a_sentence() -> None:
     """Law: whatever a text holds, it is followed or refused with a KrlError."""
     whole = (
-        "DEF T( )\nDECL INT I\nBAS(#INITMOV,0)\nPTP XHOME\nFOR I=1 TO 3\nLIN_REL {Z 10} C_DIS\nENDFOR\n"
+        "DEF T( )\nDECL INT I\nBAS(#INITMOV,0)\nPTP XHOME\nFOR I=1 TO 3\nLIN_REL {Z 10} "
+        "C_DIS\nENDFOR\n"
         "IF (I>2) AND NOT $IN[3] THEN\n$OUT[2]=TRUE\nENDIF\n"
         "SPTP {A1 5} WITH $VEL_AXIS[1]=SVEL_JOINT(50)\nEND\n"
     )
@@ -223,7 +277,8 @@ def test_a_routine_that_calls_itself_ends_with_a_sentence() -> None:
 def test_inline_forms(followed: Follow) -> None:
     program = followed(
         ";FOLD PTP P1 CONT Vel=50 % PDAT1 Tool[1] Base[2]\n"
-        "$BWDSTART=FALSE\nPDAT_ACT=PPDAT1\nFDAT_ACT=FP1\nBAS(#PTP_PARAMS,50)\nPTP XP1 C_PTP\n;ENDFOLD\n"
+        "$BWDSTART=FALSE\nPDAT_ACT=PPDAT1\nFDAT_ACT=FP1\nBAS(#PTP_PARAMS,50)\nPTP XP1 "
+        "C_PTP\n;ENDFOLD\n"
         ";FOLD LIN P2 Vel=0.3 m/s CPDAT1 Tool[1] Base[2]\n"
         "$BWDSTART=FALSE\nLDAT_ACT=LCPDAT1\nFDAT_ACT=FP1\nBAS(#CP_PARAMS,0.3)\n"
         "LIN XP2 C_DIS C_DIS\n;ENDFOLD\n"
@@ -282,7 +337,8 @@ def test_outputs_waits_triggers_and_pulses(followed: Follow) -> None:
 
 def test_spline_blocks_and_time_blocks(followed: Follow) -> None:
     (block,) = followed(
-        "PTP_SPLINE\nTIME_BLOCK START\nSPTP {A1 1}\nTIME_BLOCK PART=25\nSPTP {A1 2}\nTIME_BLOCK END=3.5\n"
+        "PTP_SPLINE\nTIME_BLOCK START\nSPTP {A1 1}\nTIME_BLOCK PART=25\nSPTP {A1 2}\nTIME_BLOCK "
+        "END=3.5\n"
         "ENDSPLINE C_SPL"
     ).commands
     assert isinstance(block, SplineBlock)
@@ -321,10 +377,14 @@ def test_triggers_of_a_spline_switch_around_it(followed: Follow) -> None:
         "TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE\nSPLINE\nSPL {X 1}\n"
         "TRIGGER WHEN PATH=0 DELAY=0 DO $OUT[2]=TRUE\nSPL {X 2}\n"
         "TRIGGER WHEN PATH=0 DELAY=0 DO $OUT[2]=FALSE\n"
-        "TRIGGER WHEN PATH=0 DELAY=0 DO $OUT[3]=FALSE\nTRIGGER WHEN PATH=0 DELAY=0 DO $OUT[3]=TRUE\n"
+        "TRIGGER WHEN PATH=0 DELAY=0 DO $OUT[3]=FALSE\nTRIGGER WHEN PATH=0 DELAY=0 DO "
+        "$OUT[3]=TRUE\n"
         "SPL {X 3}\nENDSPLINE\nPTP {A1 0}"
     )
-    found = [(one.number, one.value) if isinstance(one, SetOutput) else "moves" for one in program.commands]
+    found = [
+        (one.number, one.value) if isinstance(one, SetOutput) else "moves"
+        for one in program.commands
+    ]
     assert found == [(1, True), (2, True), "moves", (2, False), (3, False), (3, True), "moves"]
 
 
@@ -351,7 +411,8 @@ def test_signals_decide_as_they_are_given(followed: Follow) -> None:
 
 def test_what_is_not_modelled_is_noted(followed: Follow) -> None:
     notes = [
-        note.text for note in followed("$FRICTION=1\nHALT\nINTERRUPT DECL 5 WHEN TRUE DO STOPIT()").notes
+        note.text
+        for note in followed("$FRICTION=1\nHALT\nINTERRUPT DECL 5 WHEN TRUE DO STOPIT()").notes
     ]
     assert len(notes) == 3
     assert "$FRICTION isn't modelled" in notes

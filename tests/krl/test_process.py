@@ -1,4 +1,6 @@
-"""Which motions are a process: judged by the sentence that defines it, on generated sequences of commands."""
+"""Which motions are a process: judged by the sentence that defines it, on generated sequences of
+commands.
+"""
 
 from __future__ import annotations
 
@@ -58,7 +60,9 @@ SPLINE = "SPLINE\nSLIN_REL {X -20,Y 5}\nSLIN_REL {X -20,Z 10}\nENDSPLINE"
 def test_segments_draw_what_the_tool_draws(
     planner: Planner, followed: Callable[..., Followed], motions: str
 ) -> None:
-    """Poses of the segments lie on the driven path, the speed is the one that the override leaves."""
+    """Poses of the segments lie on the driven path, the speed is the one that the override
+    leaves.
+    """
     program = followed(f"PTP XHOME\nPTP {{A1 30,A5 30}}\n$VEL.CP=0.2\n$OV_PRO=50\n{motions}")
     scene = planner.scene("")
     steps, _ = drive(program, scene, planner.cell.machine_home)
@@ -72,4 +76,6 @@ def test_segments_draw_what_the_tool_draws(
         assert near.min(axis=1).max() < 2e-4
         for k, place in ((0, 0), (-1, -1)):
             assert tcp[k] == pytest.approx(poses[place], abs=1e-4)
-        assert [one.tool_speed for one in drawn.segments] == pytest.approx([0.1] * len(drawn.segments))
+        assert [one.tool_speed for one in drawn.segments] == pytest.approx(
+            [0.1] * len(drawn.segments)
+        )

@@ -1,4 +1,6 @@
-"""Programs as shops have them: each is read, followed and driven as its first comments expect, or refused."""
+"""Programs as shops have them: each is read, followed and driven as its first comments expect, or
+refused.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 from _shop_corpus import programs, read, round_trip
 
 PROGRAMS = programs()
-POINT_DEG, POINT_MM = 1e-4, 1e-3  # that a point may be off when it has been written and read
+# that a point may be off when it has been written and read
+POINT_DEG = 1e-4
+POINT_MM = 1e-3
 
 
 def expected(text: str, pattern: str) -> list[str]:
@@ -25,7 +29,8 @@ def expected(text: str, pattern: str) -> list[str]:
 
 @pytest.mark.parametrize("path", PROGRAMS, ids=lambda path: path.stem)
 def test_a_program_does_what_its_comments_expect(path: Path, planner: Planner) -> None:
-    cell, text = planner.cell, path.read_text(encoding="utf-8")
+    cell = planner.cell
+    text = path.read_text(encoding="utf-8")
     refused = re.search(r";refused ?(.*)", text)
 
     if refused:

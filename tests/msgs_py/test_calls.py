@@ -1,4 +1,6 @@
-"""Law: what a node was asked and answered reaches a recorder as it was, within a bound, and nobody else."""
+"""Law: what a node was asked and answered reaches a recorder as it was, within a bound, and nobody
+else.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +24,11 @@ def asked(ros_context: Any, ros_executor: Any) -> Any:
     """A node that answers a service and an action; both change their request meanwhile."""
     node = ros_executor.add_node(rclpy.create_node("asked", context=ros_context))
 
-    def set_input(request: SetPlcInput.Request, response: SetPlcInput.Response) -> SetPlcInput.Response:
-        response.status.message, request.name = f"{request.name} is set", ""
+    def set_input(
+        request: SetPlcInput.Request, response: SetPlcInput.Response
+    ) -> SetPlcInput.Response:
+        response.status.message = f"{request.name} is set"
+        request.name = ""
         return response
 
     def run(goal: Any) -> RunProgram.Result:
@@ -41,15 +46,22 @@ def asked(ros_context: Any, ros_executor: Any) -> Any:
 def heard(asked: Any, ros_executor: Any, ros_node: Any, wait_for: Any) -> list[RecordedCall]:
     """Calls as a recorder hears them."""
     found: list[RecordedCall] = []
-    ros_executor.run(lambda: ros_node.create_subscription(RecordedCall, "/asked/calls", found.append, 100))
-    wait_for(lambda: Calls.of(asked)._publisher.get_subscription_count(), what="the recorder is discovered")
+    ros_executor.run(
+        lambda: ros_node.create_subscription(RecordedCall, "/asked/calls", found.append, 100)
+    )
+    wait_for(
+        lambda: Calls.of(asked)._publisher.get_subscription_count(),
+        what="the recorder is discovered",
+    )
     return found
 
 
 def ask(ros_executor: Any, ros_node: Any, wait_for: Any) -> str:
     client = ros_executor.run(lambda: ros_node.create_client(SetPlcInput, "/asked/set"))
     wait_for(client.service_is_ready, what="the service is offered")
-    future = ros_executor.run(lambda: client.call_async(SetPlcInput.Request(name="hib", value=True)))
+    future = ros_executor.run(
+        lambda: client.call_async(SetPlcInput.Request(name="hib", value=True))
+    )
     wait_for(future.done, what="it answers")
     return str(future.result().status.message)
 
@@ -60,7 +72,11 @@ def test_a_service_is_recorded_as_it_was_asked_and_answered(
     assert ask(ros_executor, ros_node, wait_for) == "hib is set"
     wait_for(lambda: heard, what="the call is heard")
     call = heard[0]
-    assert (call.node, call.service, call.type) == ("/asked", "/asked/set", "ir_msgs/srv/SetPlcInput")
+    assert (call.node, call.service, call.type) == (
+        "/asked",
+        "/asked/set",
+        "ir_msgs/srv/SetPlcInput",
+    )
     request = deserialize_message(bytes(call.request), SetPlcInput.Request)
     response = deserialize_message(bytes(call.response), SetPlcInput.Response)
     assert (request.name, request.value, response.status.message) == ("hib", True, "hib is set")
@@ -90,7 +106,9 @@ def test_where_nobody_listens_nothing_is_copied(
     assert copied == []
 
 
-def test_a_message_beyond_the_bound_is_left_out_before_it_is_copied(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_message_beyond_the_bound_is_left_out_before_it_is_copied(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     most = GetCell.Response(cell_yaml="x" * (MOST_BYTES - 2000))
     assert MOST_BYTES - 2000 < len(calls._bounded(most)) <= MOST_BYTES
     monkeypatch.setattr(calls, "serialize_message", lambda message: pytest.fail("it was copied"))

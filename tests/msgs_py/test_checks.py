@@ -1,4 +1,6 @@
-"""What people typed may stand in a sentence, but never as a control character, and never without a bound."""
+"""What people typed may stand in a sentence, but never as a control character, and never without a
+bound.
+"""
 
 from __future__ import annotations
 

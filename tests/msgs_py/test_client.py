@@ -35,7 +35,11 @@ class FakeCell(Node):
         self.create_service(SetCell, "ir_planner/set_cell", self.set_cell)
         self.create_service(GetTrajectory, "ir_planner/get_trajectory", self.get_trajectory)
         self.runner = ActionServer(
-            self, RunProgram, "ir_program_runner/run_program", self.run_program, cancel_callback=self.cancel
+            self,
+            RunProgram,
+            "ir_program_runner/run_program",
+            self.run_program,
+            cancel_callback=self.cancel,
         )
         ActionServer(self, ExecuteTrajectory, "ir_sim_driver/execute_trajectory", self.execute)
         kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -43,7 +47,9 @@ class FakeCell(Node):
 
     def set_cell(self, request, response):
         known = request.cell_file == "demo" or "\n" in request.cell_yaml
-        response.status = Status(code=1) if known else Status(code=-19, message='cell "mars": known are demo')
+        response.status = (
+            Status(code=1) if known else Status(code=-19, message='cell "mars": known are demo')
+        )
         response.stations = [Station(name="lathe"), Station(name="table")]
         return response
 
@@ -141,18 +147,24 @@ def test_a_program_is_run_with_its_progress(client):
 
 
 def test_a_goal_that_takes_too_long_is_canceled(client, cell):
-    with pytest.raises(CallTimedOutError, match=r"had no result within 0.1 s: the goal was canceled"):
+    with pytest.raises(
+        CallTimedOutError, match=r"had no result within 0.1 s: the goal was canceled"
+    ):
         client.run_program("endless", timeout=0.1)
     assert cell.canceled.is_set()
 
 
 def test_a_goal_whose_node_dies_is_given_up(client, cell, ros_executor, monkeypatch):
     monkeypatch.setattr(goals, "GONE", 0.1)
-    with pytest.raises(ServiceUnavailableError, match=r"that ran ir_program_runner/run_program has gone"):
+    with pytest.raises(
+        ServiceUnavailableError, match=r"that ran ir_program_runner/run_program has gone"
+    ):
         client.run_program("endless", progress=lambda at: ros_executor.run(cell.runner.destroy))
 
 
-def test_a_failing_progress_callback_reaches_the_script_and_cancels_the_goal(client, cell, wait_for):
+def test_a_failing_progress_callback_reaches_the_script_and_cancels_the_goal(
+    client, cell, wait_for
+):
     def fail(at):
         raise KeyError("my own mistake")
 
@@ -164,7 +176,9 @@ def test_a_failing_progress_callback_reaches_the_script_and_cancels_the_goal(cli
 def test_a_trajectory_is_driven_or_refused(client):
     assert client.execute(TRAJECTORY).max_tool_deviation == 0.001
     other = JointTrajectory(JOINT_NAMES, [0, 2 * 10**9], np.zeros((2, 6)))
-    with pytest.raises(RequestRefusedError, match="point 0 joint 0 position is not finite") as caught:
+    with pytest.raises(
+        RequestRefusedError, match="point 0 joint 0 position is not finite"
+    ) as caught:
         client.execute(other)
     assert caught.value.code == -1
 

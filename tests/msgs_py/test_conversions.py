@@ -1,4 +1,6 @@
-"""Every value survives the conversion into a message and back; what a message can't mean is named."""
+"""Every value survives the conversion into a message and back; what a message can't mean is
+named.
+"""
 
 from __future__ import annotations
 
@@ -98,7 +100,9 @@ seconds = st.floats(0.0, 604_800.0)
 timers = st.builds(
     announced.ControllerTimers,
     seconds,
-    st.builds(TransitionTimes, **{field.name: seconds for field in dataclasses.fields(TransitionTimes)}),
+    st.builds(
+        TransitionTimes, **{field.name: seconds for field in dataclasses.fields(TransitionTimes)}
+    ),
 )
 loads = st.builds(
     announced.CarriedLoad,
@@ -217,7 +221,9 @@ sentences = texts.filter(str.isprintable)  # control characters are escaped in m
 statuses = st.builds(Status, st.sampled_from(StatusCode) | st.just(7), sentences, texts)
 plc_inputs = st.builds(plc.PlcInputs, *[bits] * 8, operating_modes)
 plc_outputs = st.builds(plc.PlcOutputs, stamps, *[bits] * 6, operating_modes)
-pointless = (movements | pauses).map(lambda movement: dataclasses.replace(movement, trajectory=None))
+pointless = (movements | pauses).map(
+    lambda movement: dataclasses.replace(movement, trajectory=None)
+)
 program_states = st.builds(
     program.ProgramState,
     stamp_ns=stamps,
@@ -320,7 +326,10 @@ def test_a_cell_comes_back_with_its_machines(T, text, enabled):
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"modes": [2, 3], "enter": [1.0], "stay": [1.0], "leave": [1.0]}, "have 2, 1, 1, 1 values"),
+        (
+            {"modes": [2, 3], "enter": [1.0], "stay": [1.0], "leave": [1.0]},
+            "have 2, 1, 1, 1 values",
+        ),
         (
             {"modes": [2], "enter": [1.0], "stay": [1.0], "leave": [1.0]},
             "BUS_POWER_OFF, HIBERNATION are miss",
@@ -369,7 +378,12 @@ def test_a_configuration_without_names_is_in_the_robots_order():
         (["a", "x"], [0.0, 0.0], JointNamesError, "unknown joint 'x': expected are a, b"),
         (["a"], [0.0], JointNamesError, "joint 'b' is missing"),
         (["a", "b"], [0.0], InvalidValueError, "position has 1 values: 2 joints"),
-        (["a", "b"], [0.0, float("nan")], InvalidValueError, r"position\[1\] is nan: it must be finite"),
+        (
+            ["a", "b"],
+            [0.0, float("nan")],
+            InvalidValueError,
+            r"position\[1\] is nan: it must be finite",
+        ),
     ],
 )
 def test_a_bad_configuration_is_named(names, position, error, sentence):
@@ -392,7 +406,9 @@ def test_a_pose_in_a_known_frame_is_given_in_the_cell():
 
 def test_an_unknown_frame_lists_the_known_ones():
     msg = conversions.stamped_pose_to_msg(np.eye(4), "moon")
-    with pytest.raises(PoseError, match='unknown frame "moon": known are cell, base_link') as caught:
+    with pytest.raises(
+        PoseError, match='unknown frame "moon": known are cell, base_link'
+    ) as caught:
         conversions.stamped_pose_from_msg(msg, {"base_link": np.eye(4)})
     assert caught.value.code == StatusCode.FRAME_TRANSFORM_FAILURE
 
@@ -437,7 +453,10 @@ def test_bad_trajectory_messages_are_named_by_point():
         (spoil("accelerations", [0.0, 0.0]), "point 0 has 0 accelerations for 2 joints"),
         (spoil("effort", [0.0, 0.0]), "point 1 has effort"),
         (spoil("positions", [0.0, float("nan")]), "point 1 joint 1 position is not finite"),
-        (nanosec, "point 1: nanosec of time_from_start is 1500000000: it must be below 1000000000 ns"),
+        (
+            nanosec,
+            "point 1: nanosec of time_from_start is 1500000000: it must be below 1000000000 ns",
+        ),
         (backwards, "point 1: time -3.0"),
         (type(nanosec)(joint_names=["a"]), "no points"),
         (type(nanosec)(points=nanosec.points), "no joint names"),

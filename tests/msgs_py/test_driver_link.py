@@ -17,7 +17,8 @@ class Link:
     """A driver link whose time and meter the test has."""
 
     def __init__(self, node: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.now, self.reading = 100.0, False
+        self.now = 100.0
+        self.reading = False
         monkeypatch.setattr(driver, "time", SimpleNamespace(monotonic=lambda: self.now))
         self.driver = driver.Driver(node, Waiting(node), "ir_sim_driver", silence_timeout=2.0)
         meter = SimpleNamespace(take=lambda: Received(PowerState(), 0.0) if self.reading else None)
@@ -45,7 +46,9 @@ def test_a_driver_falls_silent_when_nothing_comes_for_the_timeout(link: Link) ->
 
 
 @pytest.mark.parametrize("stopped", [1.9, 60.0])
-def test_a_process_that_was_stopped_takes_nobody_for_silent_at_once(link: Link, stopped: float) -> None:
+def test_a_process_that_was_stopped_takes_nobody_for_silent_at_once(
+    link: Link, stopped: float
+) -> None:
     """Nor when that took a little less than the timeout: the meter is heard a moment later."""
     link.reading = True
     assert not link.silent_after(0.0)

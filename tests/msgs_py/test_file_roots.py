@@ -1,4 +1,6 @@
-"""Files stay below their folders, whatever a path says; what is there is replaced only where it is known."""
+"""Files stay below their folders, whatever a path says; what is there is replaced only where it is
+known.
+"""
 
 from __future__ import annotations
 
@@ -44,9 +46,14 @@ def test_a_folder_with_the_same_beginning_is_another_one(roots: FileRoots, tmp_p
         roots.inside(tmp_path / "inside" / "a")
 
 
-def test_fifos_folders_and_devices_are_refused_without_waiting(roots: FileRoots, tmp_path: Path) -> None:
+def test_fifos_folders_and_devices_are_refused_without_waiting(
+    roots: FileRoots, tmp_path: Path
+) -> None:
     os.mkfifo(tmp_path / "in" / "pipe")
-    for path, allowed in ((tmp_path / "in" / "pipe", roots), (Path("/dev/zero"), FileRoots((Path("/"),)))):
+    for path, allowed in (
+        (tmp_path / "in" / "pipe", roots),
+        (Path("/dev/zero"), FileRoots((Path("/"),))),
+    ):
         with pytest.raises(FileRefusedError, match="not a regular file"):
             allowed.open_to_read(path)
     with pytest.raises((FileRefusedError, IsADirectoryError)):

@@ -45,5 +45,7 @@ def test_what_the_columns_say() -> None:
 
 def test_an_unknown_number_lists_the_known() -> None:
     assert checked_mode(4) is Mode.HIBERNATION
-    with pytest.raises(InvalidValueError, match="power mode is 7: known are 0 STAND_ON_MOTORS, 1 MOVING"):
+    with pytest.raises(
+        InvalidValueError, match="power mode is 7: known are 0 STAND_ON_MOTORS, 1 MOVING"
+    ):
         checked_mode(7)

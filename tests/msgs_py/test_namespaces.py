@@ -17,7 +17,9 @@ NODE_NAMES = st.sampled_from(NODES) | st.from_regex(r"[a-z][a-z0-9_]{0,8}", full
 
 
 @given(NAMESPACES, NODE_NAMES, NAMESPACES)
-def test_a_node_owns_what_it_says_and_nobody_else_does(namespace: str, node: str, other: str) -> None:
+def test_a_node_owns_what_it_says_and_nobody_else_does(
+    namespace: str, node: str, other: str
+) -> None:
     status = diagnostic_name(namespace, f"{node}: plant 1/2")
     full = re.sub("^/+", "/", f"{namespace}/{node}")
     logger = full.strip("/").replace("/", ".")
@@ -31,7 +33,9 @@ def test_a_node_owns_what_it_says_and_nobody_else_does(namespace: str, node: str
 
 
 def other_could_be_meant(other: str, logger: str) -> bool:
-    """A dot parts namespaces and loggers alike: "ir_planner.x" is a logger of the planner, or a node's."""
+    """A dot parts namespaces and loggers alike: "ir_planner.x" is a logger of the planner, or a
+    node's.
+    """
     rest = logger.removeprefix("".join(f"{part}." for part in other.split("/") if part))
     return rest.partition(".")[0] in NODES
 

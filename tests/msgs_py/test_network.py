@@ -12,12 +12,16 @@ import pytest
 from ir_msgs_py.errors import ParameterError
 from ir_msgs_py.ros.network import CHOICES, apply_network, network_variables
 
-RANGE, PEERS, PROFILES = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "FASTRTPS_DEFAULT_PROFILES_FILE"
+RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+PEERS = "ROS_STATIC_PEERS"
+PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 LOOPBACK = ("0100007F", "00000000000000000000000001000000")  # of /proc/net/udp and udp6
 MULTICAST = "EF"  # 239.255.0.1: a group that is joined, on the interfaces of the transport
 
 
-@pytest.mark.parametrize("asked", ["SUBNET", "SYSTEM_DEFAULT", "", "LOCALHOST", "localhost", "nonsense"])
+@pytest.mark.parametrize(
+    "asked", ["SUBNET", "SYSTEM_DEFAULT", "", "LOCALHOST", "localhost", "nonsense"]
+)
 def test_whatever_the_range_says_discovery_stays_here(asked: str) -> None:
     environment = {RANGE: asked, PEERS: "192.0.2.7", PROFILES: "/somewhere/open.xml"}
     apply_network(environment)
@@ -51,7 +55,9 @@ def test_secure_asks_for_security() -> None:
 
 
 def test_insecure_leaves_ros_s_own_variables() -> None:
-    variables, removed = network_variables({"IR_NETWORK": "insecure", RANGE: "SUBNET", PEERS: "192.0.2.7"})
+    variables, removed = network_variables(
+        {"IR_NETWORK": "insecure", RANGE: "SUBNET", PEERS: "192.0.2.7"}
+    )
     assert RANGE not in variables
     assert removed == ()
     assert set(CHOICES) == {"loopback", "secure", "insecure"}
@@ -90,7 +96,9 @@ run_node("listed", Listed, sys.argv, goes_on=lambda node: node.looks < 6)
 def test_a_node_started_without_any_preparation_listens_on_loopback_only(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ros_domain_id: int
 ) -> None:
-    """Sockets at the ports of RTPS take data; those at ephemeral ports only send, and nothing reads them."""
+    """Sockets at the ports of RTPS take data; those at ephemeral ports only send, and nothing reads
+    them.
+    """
     for name in (RANGE, PEERS, PROFILES):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv(RANGE, "SUBNET")

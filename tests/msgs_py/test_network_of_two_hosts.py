@@ -1,4 +1,6 @@
-"""A foreign host on the same cable sees and reaches no node, also where it names this host as a peer."""
+"""A foreign host on the same cable sees and reaches no node, also where it names this host as a
+peer.
+"""
 
 from __future__ import annotations
 
@@ -50,16 +52,21 @@ print("found:", found)
 
 
 def from_the_other_host(folder: Path, network: str) -> str:
-    node, client = folder / "node.py", folder / "client.py"
+    node = folder / "node.py"
+    client = folder / "client.py"
     node.write_text(NODE, encoding="utf-8")
-    patience = "60.0" if network == "insecure" else "10.0"  # s; the client itself doesn't know of the network
+    patience = (
+        "60.0" if network == "insecure" else "10.0"
+    )  # s; the client itself doesn't know of the network
     client.write_text(CLIENT.replace("PATIENCE", patience), encoding="utf-8")
     SCRIPT.chmod(SCRIPT.stat().st_mode | stat.S_IXUSR)
     root = [] if os.geteuid() == 0 else ["--user", "--map-root-user"]
     command = ["unshare", *root, "--net", str(SCRIPT), sys.executable, str(node), str(client)]
     environment = {**os.environ, "IR_NETWORK": network, "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
     environment.pop("FASTRTPS_DEFAULT_PROFILES_FILE", None)
-    run = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, env=environment)
+    run = subprocess.run(
+        command, capture_output=True, text=True, timeout=300, check=False, env=environment
+    )
     assert "found:" in run.stdout, run.stderr
     return run.stdout
 

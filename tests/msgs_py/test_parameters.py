@@ -1,4 +1,6 @@
-"""A settings class as ROS parameters: a bad change is refused with its reason and nothing changes."""
+"""A settings class as ROS parameters: a bad change is refused with its reason and nothing
+changes.
+"""
 
 from __future__ import annotations
 
@@ -99,7 +101,9 @@ def test_what_the_class_refuses_as_a_whole_is_refused(node):
 
 def test_a_change_can_be_refused_for_the_moment(node):
     moving = ["the robot moves: speed can be changed when it stands"]
-    parameters = Parameters(node, Search, refuse=lambda names: moving[0] if "speed" in names else "")
+    parameters = Parameters(
+        node, Search, refuse=lambda names: moving[0] if "speed" in names else ""
+    )
     assert node.set_parameters([Parameter("speed", value=1.0)])[0].reason == moving[0]
     assert node.set_parameters([Parameter("samples", value=7)])[0].successful
     assert parameters.value == Search(samples=7)
@@ -154,6 +158,8 @@ def test_a_value_of_no_type_is_refused_and_what_was_set_before_it_is_said(ask):
 def test_ten_megabytes_are_refused_in_a_sentence(ask):
     text = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value="x" * 10_000_000)
     for name in ("method", "x" * 10_000_000):
-        (result,) = ask(SetParameters, "set_parameters", [ParameterMsg(name=name, value=text)]).results
+        (result,) = ask(
+            SetParameters, "set_parameters", [ParameterMsg(name=name, value=text)]
+        ).results
         assert not result.successful
         assert len(result.reason) < 5_000

@@ -34,7 +34,9 @@ def points(draw: st.DrawFn, least: int = 0) -> FloatArray:
 @st.composite
 def withdrawals(draw: st.DrawFn) -> WithdrawalLog:
     kept = draw(points(1))
-    parents = np.array([draw(st.integers(0, max(k - 1, 0))) for k in range(len(kept))], dtype=np.int64)
+    parents = np.array(
+        [draw(st.integers(0, max(k - 1, 0))) for k in range(len(kept))], dtype=np.int64
+    )
     whole = (draw(st.integers(0, 99)), draw(st.integers(0, 9999)))
     distance = (draw(numbers), draw(numbers))
     names = ("a station", "gripper+gear", "modified_ga")
@@ -91,7 +93,14 @@ def _same(first: object, second: object) -> None:
         assert first == second
 
 
-LOOP = {"station": "s", "load": "", "method": "m", "generations": 1, "candidates": 1, "rejected": []}
+LOOP = {
+    "station": "s",
+    "load": "",
+    "method": "m",
+    "generations": 1,
+    "candidates": 1,
+    "rejected": [],
+}
 WALK = {"distance": [1, 2], "kept": [[0, 0, 0], [1, 1, 1]], "dropped": [], "path": []}
 
 

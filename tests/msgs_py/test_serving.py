@@ -25,14 +25,16 @@ from ir_msgs_py.ros.serving import (
 )
 from ir_msgs_py.status import StatusCode
 
-MOST, SENT = 50, 400
+MOST = 50
+SENT = 400
 
 
 def test_every_request_of_a_burst_is_answered_in_its_order_or_refused(
     ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any
 ) -> None:
     """The first request holds the server up until all others have come."""
-    held, go_on = threading.Event(), threading.Event()
+    held = threading.Event()
+    go_on = threading.Event()
     seen: list[str] = []
 
     def handler(request: Any, response: Any) -> Any:
@@ -73,7 +75,9 @@ class Middleware:
     """Drops the first `lost` responses, each after waiting for the client's reader."""
 
     def __init__(self, lost: int) -> None:
-        self.lost, self.sent, self.now = lost, 0, 0.0
+        self.lost = lost
+        self.sent = 0
+        self.now = 0.0
 
     def clock(self) -> float:
         return self.now
@@ -107,7 +111,9 @@ def test_a_client_that_is_never_discovered_costs_a_second_and_no_more() -> None:
 
 @pytest.fixture
 def late_discovery(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
-    """The middleware's first two responses of each kind are lost, as rclpy says it; counts by kind."""
+    """The middleware's first two responses of each kind are lost, as rclpy says it; counts by
+    kind.
+    """
     sent: dict[str, int] = {}
 
     def loses(kind: str) -> None:
@@ -128,7 +134,11 @@ def late_discovery(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
 
 
 def test_a_goal_is_executed_though_its_client_is_discovered_late(
-    late_discovery: dict[str, int], ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any
+    late_discovery: dict[str, int],
+    ros_context: Any,
+    ros_executor: Any,
+    ros_node: Any,
+    wait_for: Any,
 ) -> None:
     """And the client hears that it was taken, that it will end, and what became of it."""
     canceled = Future()
@@ -206,7 +216,8 @@ def test_whatever_a_handler_does_its_client_is_answered_and_the_next_one_too(
         )
         wait_for(client.service_is_ready, what="the service is offered")
         futures = [
-            ros_executor.run(lambda: client.call_async(SetPlcInput.Request(name="0"))) for _ in range(2)
+            ros_executor.run(lambda: client.call_async(SetPlcInput.Request(name="0")))
+            for _ in range(2)
         ]
         wait_for(lambda: all(future.done() for future in futures), what="both are answered")
     finally:

@@ -1,4 +1,6 @@
-"""The fixtures that users get: waiting for conditions, nodes that spin, failures that are not lost."""
+"""The fixtures that users get: waiting for conditions, nodes that spin, failures that are not
+lost.
+"""
 
 from __future__ import annotations
 
@@ -46,6 +48,8 @@ def test_a_coroutine_waits_for_a_condition_or_its_timeout(ros_node, ros_executor
     ros_node.create_timer(0.005, lambda: arrived.append(True))
 
     async def wait():
-        return await waiting.until(lambda: bool(arrived), 60.0), await waiting.until(lambda: False, 0.01)
+        return await waiting.until(lambda: bool(arrived), 60.0), await waiting.until(
+            lambda: False, 0.01
+        )
 
     assert ros_executor.run(wait) == (True, False)

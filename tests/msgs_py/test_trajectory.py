@@ -1,4 +1,6 @@
-"""A trajectory means one interpolant, knows its content's hash, and says what is wrong with bad points."""
+"""A trajectory means one interpolant, knows its content's hash, and says what is wrong with bad
+points.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,9 @@ from ir_msgs_py.trajectory import JointTrajectory
 ROUNDING = 1e-9
 
 
-def random_trajectory(seed: int, points: int = 4, velocities: bool = True, accelerations: bool = True):
+def random_trajectory(
+    seed: int, points: int = 4, velocities: bool = True, accelerations: bool = True
+):
     rng = np.random.default_rng(seed)
     times = np.cumsum(rng.uniform(0.2, 1.5, points)) - 0.2
     shape = (points, 6)
@@ -110,9 +114,15 @@ def test_the_id_is_the_hash_of_the_exact_content():
     nudged[2, 3] = np.nextafter(nudged[2, 3], 9.0)
     others = [
         JointTrajectory(
-            JOINT_NAMES, trajectory.times_ns, nudged, trajectory.velocities, trajectory.accelerations
+            JOINT_NAMES,
+            trajectory.times_ns,
+            nudged,
+            trajectory.velocities,
+            trajectory.accelerations,
         ),
-        JointTrajectory(JOINT_NAMES, trajectory.times_ns + 1, trajectory.positions, trajectory.velocities),
+        JointTrajectory(
+            JOINT_NAMES, trajectory.times_ns + 1, trajectory.positions, trajectory.velocities
+        ),
         JointTrajectory(JOINT_NAMES, trajectory.times_ns, trajectory.positions),
     ]
     assert len({other.trajectory_id for other in [trajectory, *others]}) == 4
@@ -150,7 +160,8 @@ def test_foreign_joint_names_list_the_expected_ones(names, sentence):
         trajectory.reordered(JOINT_NAMES[:2])
 
 
-NAN, INF = float("nan"), float("inf")
+NAN = float("nan")
+INF = float("inf")
 
 
 @pytest.mark.parametrize(
@@ -168,7 +179,10 @@ NAN, INF = float("nan"), float("inf")
         (([0, NAN], [[0, 0]] * 2), "point 1: time nan s is not a duration"),
         (([0, 1e12], [[0, 0]] * 2), "point 1: time 1000000000000.0 s is not a duration"),
         (([], np.zeros((0, 2))), "the trajectory has no points"),
-        (([0], [[0, 0, 0]]), r"position values have shape \(1, 3\): 1 points of 2 joints are \(1, 2\)"),
+        (
+            ([0], [[0, 0, 0]]),
+            r"position values have shape \(1, 3\): 1 points of 2 joints are \(1, 2\)",
+        ),
         (([0], [[0, 0]], None, [[0, 0]]), "accelerations are given without velocities"),
     ],
 )

@@ -19,20 +19,44 @@ NAN = float("nan")
         (lambda: PlanOptions(planning_time=0.0), "planning_time is 0 s: it must be more than 0 s"),
         (lambda: PlanOptions(planning_time=-1.0), "planning_time is -1 s"),
         (lambda: PlanOptions(planning_time=NAN), "planning_time is nan s: it must be finite"),
-        (lambda: PlanOptions(safety_distance=-0.1), "safety_distance is -0.1 m: it must be at least 0 m"),
-        (lambda: PlanOptions(objective="fun"), 'objective is "fun": known are movement_cost, time, energy'),
-        (lambda: PlanOptions(velocity_scaling=0.0), r"velocity_scaling is 0: it must be in \(0, 1\]"),
+        (
+            lambda: PlanOptions(safety_distance=-0.1),
+            "safety_distance is -0.1 m: it must be at least 0 m",
+        ),
+        (
+            lambda: PlanOptions(objective="fun"),
+            'objective is "fun": known are movement_cost, time, energy',
+        ),
+        (
+            lambda: PlanOptions(velocity_scaling=0.0),
+            r"velocity_scaling is 0: it must be in \(0, 1\]",
+        ),
         (lambda: PlanOptions(seed=-1), "seed is -1: it must be in 0"),
-        (lambda: report.PlannedMovement(kind="jump"), 'kind of movement is "jump": known are service_exit'),
+        (
+            lambda: report.PlannedMovement(kind="jump"),
+            'kind of movement is "jump": known are service_exit',
+        ),
         (
             lambda: report.PlannedMovement(kind="pause", power_mode="NAP"),
             "power mode 'NAP' of the pause is unknown: known",
         ),
-        (lambda: report.PlannedMovement(kind="regional", power_mode="HIBERNATION"), "only a pause has one"),
-        (lambda: report.PlannedMovement(kind="pause", trajectory_id="ab"), "a pause has no trajectory"),
-        (lambda: report.PlannedMovement(kind="pause", duration=-1.0), "duration of the movement is -1 s"),
+        (
+            lambda: report.PlannedMovement(kind="regional", power_mode="HIBERNATION"),
+            "only a pause has one",
+        ),
+        (
+            lambda: report.PlannedMovement(kind="pause", trajectory_id="ab"),
+            "a pause has no trajectory",
+        ),
+        (
+            lambda: report.PlannedMovement(kind="pause", duration=-1.0),
+            "duration of the movement is -1 s",
+        ),
         (lambda: report.TrajectoryReport(energy=NAN), "energy is nan: it must be finite"),
-        (lambda: report.TrajectoryReport(min_clearance=NAN), "min_clearance is nan m: it must be a number"),
+        (
+            lambda: report.TrajectoryReport(min_clearance=NAN),
+            "min_clearance is nan m: it must be a number",
+        ),
         (
             lambda: report.TrajectoryReport(joint_energy=np.zeros(6), torque_ratio=np.zeros(5)),
             "torque_ratio has 5 joints: joint_energy has 6",
@@ -55,7 +79,10 @@ NAN = float("nan")
             lambda: power.PowerMode(mode=modes.Mode.MOVING, time_to_pause=-1.0),
             "time_to_pause of MOVING is -1 s",
         ),
-        (lambda: power.PowerMode(mode=modes.Mode.MOVING, break_even=NAN), "break_even of MOVING is nan"),
+        (
+            lambda: power.PowerMode(mode=modes.Mode.MOVING, break_even=NAN),
+            "break_even of MOVING is nan",
+        ),
         (lambda: plc.Signal("", True), "name of a signal is ''"),
         (lambda: plc.Signal("a\nb", True), "1 to 256 printable characters"),
         (lambda: plc.Signal.parse("door=2"), 'signal "door=2" has level "2": known are 0, 1'),
@@ -103,9 +130,13 @@ def test_a_program_sets_and_clears_signals_by_text():
     assert plc.Signal.parse("clamp") == plc.Signal("clamp", True)
     assert plc.Signal.parse("clamp=1") == plc.Signal("clamp", True)
     assert plc.Signal("clamp", False).text == "not clamp"
-    assert plc.Signal.parse("clamp=0") == plc.Signal.parse("not clamp") == plc.Signal("clamp", False)
+    assert (
+        plc.Signal.parse("clamp=0") == plc.Signal.parse("not clamp") == plc.Signal("clamp", False)
+    )
 
 
 def test_one_bit_changes_and_the_others_stay():
     inputs = plc.PlcInputs(emergency_stop=True).with_bit("ab", True).with_bit("EXT", True)
-    assert inputs == plc.PlcInputs(emergency_stop=True, ab=True, operating_mode=plc.OperatingMode.EXT)
+    assert inputs == plc.PlcInputs(
+        emergency_stop=True, ab=True, operating_mode=plc.OperatingMode.EXT
+    )

@@ -18,9 +18,13 @@ class Waits:
     """Waits whose time passes as the test says."""
 
     def __init__(self, node: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.now, self.met, self.ended = 100.0, False, list[bool]()
+        self.now = 100.0
+        self.met = False
+        self.ended = list[bool]()
         monkeypatch.setattr(waiting, "time", SimpleNamespace(monotonic=lambda: self.now))
-        node = SimpleNamespace(create_timer=lambda *_, **__: SimpleNamespace(cancel=_nothing, reset=_nothing))
+        node = SimpleNamespace(
+            create_timer=lambda *_, **__: SimpleNamespace(cancel=_nothing, reset=_nothing)
+        )
         self.waiting = Waiting(node, PERIOD)
         self._coroutine: Coroutine[Any, Any, bool] | None = None
 

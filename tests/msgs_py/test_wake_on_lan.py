@@ -15,7 +15,9 @@ def test_the_magic_packet_is_six_ff_and_the_mac_sixteen_times() -> None:
 
 
 @pytest.mark.parametrize("password", [b"", b"four", b"sixsix"])
-def test_a_packet_wakes_the_controller_it_is_for_with_or_without_a_password(password: bytes) -> None:
+def test_a_packet_wakes_the_controller_it_is_for_with_or_without_a_password(
+    password: bytes,
+) -> None:
     assert wakes(magic_packet("02-00-00-c4-02-10") + password, MAC)
     assert not wakes(magic_packet(MAC) + password, "02:00:00:c4:02:11")
 

@@ -28,7 +28,8 @@ def test_missing_fields_keep_their_defaults():
 def test_nested_messages_and_arrays_are_filled():
     request = message_from_yaml(
         PlanTrajectory.Request,
-        "{reference: {joint_names: [a, b], points: [{positions: [0, -1.5e0]}, {time_from_start: {sec: 2}}]}}",
+        "{reference: {joint_names: [a, b], points: [{positions: [0, -1.5e0]}, {time_from_start: "
+        "{sec: 2}}]}}",
     )
     assert request.reference.joint_names == ["a", "b"]
     assert list(request.reference.points[0].positions) == [0.0, -1.5]
@@ -49,16 +50,28 @@ def test_a_scalar_is_taken_by_the_type_of_its_field():
     ("message_type", "text", "sentence"),
     [
         (SetLoad.Request, "{weight: 3}", 'unknown field "weight": known are load, mass'),
-        (SetLoad.Request, "{center_of_mass: {q: 1}}", 'unknown field "center_of_mass.q": known are x, y, z'),
+        (
+            SetLoad.Request,
+            "{center_of_mass: {q: 1}}",
+            'unknown field "center_of_mass.q": known are x, y, z',
+        ),
         (SetLoad.Request, "{mass: heavy}", 'mass is "heavy": it must be a double'),
         (SetLoad.Request, "{mass: [1]}", "mass is ['1']: it must be a single value"),
         (SetLoad.Request, "{inertia: 3}", "inertia is '3': it must be a list"),
-        (SetLoad.Request, "{center_of_mass: 3}", "center_of_mass is '3': it must be fields, of x, y, z"),
+        (
+            SetLoad.Request,
+            "{center_of_mass: 3}",
+            "center_of_mass is '3': it must be fields, of x, y, z",
+        ),
         (SetLoad.Request, "[1, 2]", "the message is ['1', '2']: it must be fields"),
         (SetLoad.Request, "{mass: 1", "the text is not YAML"),
         (PlanOptions, "{seed: -1}", "seed is -1: it must be in 0 .. 18446744073709551615"),
         (PlanOptions, "{seed: 1.5}", 'seed is "1.5": it must be a uint64'),
-        (PlanOptions, "{include_points: maybe}", 'include_points is "maybe": it must be true or false'),
+        (
+            PlanOptions,
+            "{include_points: maybe}",
+            'include_points is "maybe": it must be true or false',
+        ),
     ],
 )
 def test_text_that_is_not_the_message_is_named(message_type, text, sentence):
@@ -75,14 +88,18 @@ def test_a_message_is_written_as_block_yaml_in_the_order_of_its_fields():
 
 
 def test_what_is_written_can_be_read_back():
-    report = TrajectoryReport(energy=1234.5678901234567, joint_energy=[1e-300, float("inf")], certified=True)
+    report = TrajectoryReport(
+        energy=1234.5678901234567, joint_energy=[1e-300, float("inf")], certified=True
+    )
     assert message_from_yaml(TrajectoryReport, message_to_yaml(report)) == report
 
 
 @pytest.mark.parametrize("path", sorted(SRV_FOLDER.glob("*.srv")), ids=lambda path: path.stem)
 def test_the_pasteable_line_of_every_service_is_its_request(path):
     line = path.read_text().splitlines()[0]
-    _, name, type_text, text = re.fullmatch(r'# ros2 service call ((\S+)) (\S+) "(.*)"', line).groups()
+    _, name, type_text, text = re.fullmatch(
+        r'# ros2 service call ((\S+)) (\S+) "(.*)"', line
+    ).groups()
     assert yaml.safe_load(text) is not None
     service = interface_type(type_text, "srv")
     assert service.__name__ == path.stem
@@ -106,8 +123,16 @@ def test_types_are_found_by_the_names_that_people_type():
     ("message_type", "text", "sentence"),
     [
         (PlanOptions, "{seed: 1, seed: 2}", 'field "seed" stands twice, in line 1'),
-        (SetLoad.Request, "mass: 1\nload: a\nmass: 2", 'field "mass" stands twice, in line 1 and line 3'),
-        (SetLoad.Request, "{center_of_mass: {x: 1, y: 2, x: 1}}", 'field "x" stands twice, in line 1'),
+        (
+            SetLoad.Request,
+            "mass: 1\nload: a\nmass: 2",
+            'field "mass" stands twice, in line 1 and line 3',
+        ),
+        (
+            SetLoad.Request,
+            "{center_of_mass: {x: 1, y: 2, x: 1}}",
+            'field "x" stands twice, in line 1',
+        ),
         (SetLoad.Request, '{mass: 1, "mass": 1}', 'field "mass" stands twice, in line 1'),
     ],
 )

@@ -28,7 +28,8 @@ def cell_name() -> str:
 def planner_node(ros_context: Any, cell_name: str) -> Iterator[PlannerNode]:
     """The node with a cell, spun by an executor of its own threads as in production."""
     node = PlannerNode(
-        context=ros_context, parameter_overrides=[Parameter("cell", Parameter.Type.STRING, cell_name)]
+        context=ros_context,
+        parameter_overrides=[Parameter("cell", Parameter.Type.STRING, cell_name)],
     )
     executor = MultiThreadedExecutor(num_threads=4, context=ros_context)
     executor.add_node(node)
@@ -47,14 +48,19 @@ def planner_node(ros_context: Any, cell_name: str) -> Iterator[PlannerNode]:
 
 @pytest.fixture
 def call(planner_node: PlannerNode, ros_node: Any, ros_executor: Any, wait_for: Any) -> Call:
-    """Call a service of the planner by its type, name and request; no plan is cut by its usual time."""
+    """Call a service of the planner by its type, name and request; no plan is cut by its usual
+    time.
+    """
 
     def ask(kind: Any, name: str, /, timeout: float = PATIENT, **fields: Any) -> Any:
         client = ros_executor.run(lambda: ros_node.create_client(kind, f"/ir_planner/{name}"))
         wait_for(client.service_is_ready, what=f"{name} is offered")
         request = kind.Request(**fields)
         options = getattr(request, "options", None)
-        if isinstance(options, PlanOptions) and options.planning_time == PlanOptions().planning_time:
+        if (
+            isinstance(options, PlanOptions)
+            and options.planning_time == PlanOptions().planning_time
+        ):
             options.planning_time = PATIENT
         future = ros_executor.run(lambda: client.call_async(request))
         wait_for(future.done, timeout=timeout, what=f"{name} answers")

@@ -12,7 +12,13 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rosidl_parser.definition import AbstractNestedType, AbstractString, Array, BasicType, NamespacedType
+from rosidl_parser.definition import (
+    AbstractNestedType,
+    AbstractString,
+    Array,
+    BasicType,
+    NamespacedType,
+)
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -43,7 +49,9 @@ class Case(NamedTuple):
         """A copy of the request with the value in its place."""
         owner = request = deepcopy(request)
         for name in request.get_fields_and_field_types():
-            if name.endswith("_id") and name != self.path[0]:  # what is asked about is in the request itself
+            if (
+                name.endswith("_id") and name != self.path[0]
+            ):  # what is asked about is in the request itself
                 setattr(request, name, "")
         for name in self.path[:-1]:
             owner = _entered(owner, name)
@@ -75,7 +83,9 @@ def _values(kind: Any) -> tuple[Any, ...]:
         return ()
     if kind.typename in ("double", "float"):
         return NUMBERS
-    bits = {"octet": 8, "byte": 8, "char": 8}.get(kind.typename) or int(re.sub(r"\D", "", kind.typename))
+    bits = {"octet": 8, "byte": 8, "char": 8}.get(kind.typename) or int(
+        re.sub(r"\D", "", kind.typename)
+    )
     signed = kind.typename.startswith("int")
     return (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
 
@@ -91,7 +101,8 @@ def _class_of(kind: NamespacedType) -> Any:
 
 def _entered(owner: Any, name: str) -> Any:
     """The message in a field, or the first of a sequence, which is made where there is none."""
-    kind, value = _kind_of(owner, name), getattr(owner, name)
+    kind = _kind_of(owner, name)
+    value = getattr(owner, name)
     if not isinstance(kind, AbstractNestedType):
         return value
     if not isinstance(kind, Array) and not len(value):
@@ -101,7 +112,9 @@ def _entered(owner: Any, name: str) -> Any:
 
 
 def example(interface: str, part: Any) -> Any:
-    """The request or goal that the file of an interface ("srv/SetCell") begins with, little work to plan."""
+    """The request or goal that the file of an interface ("srv/SetCell") begins with, little work to
+    plan.
+    """
     file = next(INTERFACES.glob(f"{interface}.*"), None)
     line = LINE.match(file.read_text(encoding="utf-8")) if file is not None else None
     return filled(message_from_yaml(part, line[1] if line is not None else ""))
@@ -110,14 +123,17 @@ def example(interface: str, part: Any) -> Any:
 def filled(message: Any) -> Any:
     """The message with its empty states and trajectories at home, and what a plan may take."""
     if isinstance(message, JointState) and not message.position:
-        message.name, message.position = list(JOINT_NAMES), HOME
+        message.name = list(JOINT_NAMES)
+        message.position = HOME
     elif isinstance(message, JointTrajectory) and not message.points:
-        message.joint_names, message.points = list(JOINT_NAMES), [_standing(0.1), _standing(0.2)]
+        message.joint_names = list(JOINT_NAMES)
+        message.points = [_standing(0.1), _standing(0.2)]
     elif isinstance(message, PlannedMovement):
         message.kind = PlannedMovement.REGIONAL
         filled(message.trajectory)
     elif isinstance(message, PlanOptions):
-        message.planning_time, message.max_iterations = 0.2, 10
+        message.planning_time = 0.2
+        message.max_iterations = 10
     else:
         for name in message.get_fields_and_field_types():
             if hasattr(getattr(message, name), "get_fields_and_field_types"):

@@ -22,5 +22,7 @@ def test_a_cells_stations_go_out_with_pose_zone_and_contacts() -> None:
         assert msg.zone.upper() == station.zone
         np.testing.assert_allclose(stamped_pose_from_msg(msg.pose), station.pose, atol=ROUNDING)
         contacts = [(c.body_a, c.body_b, c.safety_distance) for c in msg.allowed_contacts]
-        assert contacts == [(c.body_a, c.body_b, c.safety_distance) for c in station.allowed_contacts]
+        assert contacts == [
+            (c.body_a, c.body_b, c.safety_distance) for c in station.allowed_contacts
+        ]
     assert any(msg.allowed_contacts for msg in messages)

@@ -45,7 +45,9 @@ def test_a_goal_within_the_bound_is_whole() -> None:
     assert list(request.goal_id.uuid) == list(range(16))
 
 
-@pytest.mark.parametrize(("points", "multi_dof"), [(MOST + 1, 0), (5000, 0), (2, MOST + 1), (0, 5000)])
+@pytest.mark.parametrize(
+    ("points", "multi_dof"), [(MOST + 1, 0), (5000, 0), (2, MOST + 1), (0, 5000)]
+)
 def test_beyond_it_all_but_the_points_are_there(points: int, multi_dof: int) -> None:
     for _ in range(3):  # the points are freed, too
         request, left_out = taken(goal(points, multi_dof), MOST)
@@ -56,7 +58,11 @@ def test_beyond_it_all_but_the_points_are_there(points: int, multi_dof: int) -> 
 
 
 def test_the_driver_refuses_it_with_the_count_and_forgets_it_soon(
-    ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any, monkeypatch: pytest.MonkeyPatch
+    ros_context: Any,
+    ros_executor: Any,
+    ros_node: Any,
+    wait_for: Any,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     assert node._RESULT_KEPT <= 60
     monkeypatch.setattr(node, "_RESULT_KEPT", 1)
@@ -69,8 +75,11 @@ def test_the_driver_refuses_it_with_the_count_and_forgets_it_soon(
         )
     )
     wait_for(client.server_is_ready, what="execute_trajectory is offered")
-    most, server = bounded_goals._CLIENTS_KEPT, driver._actions[0]
-    server._clients.update({k.to_bytes(16, "big"): b"" for k in range(most)})  # of goals that never ran
+    most = bounded_goals._CLIENTS_KEPT
+    server = driver._actions[0]
+    server._clients.update(
+        {k.to_bytes(16, "big"): b"" for k in range(most)}
+    )  # of goals that never ran
     sent = ros_executor.run(lambda: client.send_goal_async(goal(3000)))
     wait_for(sent.done, what="the goal is taken")
     result = ros_executor.run(lambda: sent.result().get_result_async())

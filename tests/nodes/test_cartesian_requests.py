@@ -1,4 +1,6 @@
-"""Requests for a path as nobody should send them: each is answered by a sentence with value and bound."""
+"""Requests for a path as nobody should send them: each is answered by a sentence with value and
+bound.
+"""
 
 from __future__ import annotations
 
@@ -34,12 +36,16 @@ SEAM = """paths:
 def requests() -> Requests:
     planner = Planner(lambda: 0.0)
     planner.set_cell(cell_to_yaml(load_cell("open")) + SEAM, "")
-    return Requests(planner, LastState(), time.monotonic, lambda: None, lambda _: None, lambda: 7, print)
+    return Requests(
+        planner, LastState(), time.monotonic, lambda: None, lambda _: None, lambda: 7, print
+    )
 
 
 def pose(x: float, y: float, z: float, turn: tuple[float, ...] = DOWN) -> Pose:
     found = Pose()
-    found.position.x, found.position.y, found.position.z = x, y, z
+    found.position.x = x
+    found.position.y = y
+    found.position.z = z
     q = found.orientation
     q.x, q.y, q.z, q.w = turn
     return found
@@ -51,7 +57,8 @@ def part(kind: str, *poses: Pose) -> CartesianSegment:
 
 def asked(*segments: CartesianSegment, frame: str = "cell", **fields: Any) -> Any:
     request = PlanCartesianMovement.Request(segments=list(segments), **fields)
-    request.start_pose.header.frame_id, request.start_pose.pose = frame, pose(1.8, -0.3, 1.2)
+    request.start_pose.header.frame_id = frame
+    request.start_pose.pose = pose(1.8, -0.3, 1.2)
     return request
 
 
@@ -68,9 +75,15 @@ REFUSED = {
     "no end": (asked(part("line")), "a line has 0 poses: it must have 1"),
     "zero length": (asked(part("line", pose(1.8, -0.3, 1.2))), "is 0 m from the pose before it"),
     "collinear": (asked(part("circle", pose(1.8, 0.0, 1.2), pose(1.8, 0.3, 1.2))), "lie on a line"),
-    "there and back": (asked(part("circle", pose(1.6, 0.0, 1.2), pose(1.8, -0.3, 1.2))), "one place"),
+    "there and back": (
+        asked(part("circle", pose(1.6, 0.0, 1.2), pose(1.8, -0.3, 1.2))),
+        "one place",
+    ),
     "opposite": (asked(part("line", pose(1.8, 0.3, 1.2, BACK))), "at most 179 deg"),
-    "not a number": (asked(part("line", pose(NAN, 0.3, 1.2))), "segments[0].poses[0]: position is (nan"),
+    "not a number": (
+        asked(part("line", pose(NAN, 0.3, 1.2))),
+        "segments[0].poses[0]: position is (nan",
+    ),
     "no speed": (asked(LINE, tool_speed=NAN), "tool_speed is nan m/s"),
     "standing": (asked(LINE, tool_speed=0.0), "it must be in [0.0001, 10] m/s"),
     "a day": (asked(LINE, tool_speed=1e-4), "it must be at most 3600 s"),
@@ -88,12 +101,17 @@ REFUSED = {
         "m/s: speed_tolerance 1",
     ),
     "beyond": (
-        asked(LINE, start=JointState(name=[f"joint_a{k}" for k in range(1, 7)], position=[7.0] * 6)),
+        asked(
+            LINE, start=JointState(name=[f"joint_a{k}" for k in range(1, 7)], position=[7.0] * 6)
+        ),
         "joint_a2 of start is 401.07 deg: it must be in [-140, -5] deg",
     ),
     "corner": (asked(*TWO), "at 0.300 m the path has a corner of 90.0 deg"),
     "turning corner": (asked(*TWO, orientation="tangent", speed_tolerance=1.0), "can't follow it"),
-    "along the axis": (asked(part("line", pose(1.8, -0.3, 1.0)), orientation="tangent"), "at 0.000 m"),
+    "along the axis": (
+        asked(part("line", pose(1.8, -0.3, 1.0)), orientation="tangent"),
+        "at 0.000 m",
+    ),
     "tiny approach": (asked(LINE, approach=1e-9), "approach is 1e-09 m"),
     "start": (
         asked(
@@ -122,7 +140,9 @@ def test_a_radius_longer_than_the_segments_is_half_of_them(requests: Requests) -
     assert response.tool_error <= 1e-4
 
 
-def test_a_path_of_the_cell_keeps_its_settings_but_for_those_of_the_request(requests: Requests) -> None:
+def test_a_path_of_the_cell_keeps_its_settings_but_for_those_of_the_request(
+    requests: Requests,
+) -> None:
     named = answer(requests, PlanCartesianMovement.Request(path="seam"))
     faster = answer(requests, PlanCartesianMovement.Request(path="seam", tool_speed=0.25))
     assert named.status.code == faster.status.code == StatusCode.SUCCESS
@@ -142,7 +162,9 @@ def test_t1_keeps_250_mm_per_second(requests: Requests) -> None:
 def test_what_a_path_of_the_cell_allows_to_touch_holds_for_it_alone() -> None:
     planner = Planner(lambda: 0.0)
     planner.set_cell("", "kr6_bench")
-    own = Requests(planner, LastState(), time.monotonic, lambda: None, lambda _: None, lambda: 7, print)
+    own = Requests(
+        planner, LastState(), time.monotonic, lambda: None, lambda _: None, lambda: 7, print
+    )
     found = answer(own, PlanCartesianMovement.Request(path="bead"))
     assert found.status.code == StatusCode.SUCCESS, found.status.message
     assert [pair.body_b for pair in found.report.contacts] == ["tray_out_top"]
@@ -153,7 +175,9 @@ def test_what_a_path_of_the_cell_allows_to_touch_holds_for_it_alone() -> None:
 def test_a_program_drives_a_path_that_is_named_as_a_stop() -> None:
     planner = Planner(lambda: 0.0)
     planner.set_cell("", "kr6_bench")
-    own = Requests(planner, LastState(), time.monotonic, lambda: None, lambda _: None, lambda: 7, print)
+    own = Requests(
+        planner, LastState(), time.monotonic, lambda: None, lambda _: None, lambda: 7, print
+    )
     request = PlanProgram.Request(stations=["bead"])
     found = own.guarded(own.plan_program)(request, PlanProgram.Response())
     assert found.status.code == StatusCode.SUCCESS, found.status.message

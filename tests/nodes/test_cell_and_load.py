@@ -1,4 +1,6 @@
-"""Cell, load and timers don't drift apart: planner and driver as nodes, in one graph and a namespace each."""
+"""Cell, load and timers don't drift apart: planner and driver as nodes, in one graph and a
+namespace each.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,14 @@ from rclpy.parameter import Parameter
 
 from ir_description import cell_hash, load_cell
 from ir_msgs.msg import CarriedLoad, CellState, ControllerTimers, MachineStates, Signal
-from ir_msgs.srv import CheckState, GetTrajectory, PlanRegionalMovement, PlanStandby, SetEquipment, SetLoad
+from ir_msgs.srv import (
+    CheckState,
+    GetTrajectory,
+    PlanRegionalMovement,
+    PlanStandby,
+    SetEquipment,
+    SetLoad,
+)
 from ir_msgs_py import names
 from ir_msgs_py.errors import RequestRefusedError
 from ir_msgs_py.ros.background import BackgroundExecutor
@@ -30,10 +39,18 @@ DEMO = load_cell("demo")
 @pytest.fixture
 def make_driver(ros_context: Any, ros_executor: Any) -> Callable[..., SimDriver]:
     def make(namespace: str = "", executor: Any = ros_executor, **parameters: Any) -> SimDriver:
-        values = {"cell": "demo", "backend": "ideal", "wake_port": 0, "modbus_port": 0, **parameters}
+        values = {
+            "cell": "demo",
+            "backend": "ideal",
+            "wake_port": 0,
+            "modbus_port": 0,
+            **parameters,
+        }
         overrides = [Parameter(name, value=value) for name, value in values.items()]
         node: SimDriver = executor.add_node(
-            SimDriver(context=ros_context, namespace=namespace or None, parameter_overrides=overrides)
+            SimDriver(
+                context=ros_context, namespace=namespace or None, parameter_overrides=overrides
+            )
         )
         return node
 
@@ -51,7 +68,9 @@ def planned(client: Client, goal: str = "A1 20 A2 -90 A3 90 A4 0 A5 0 A6 0") -> 
     request = PlanRegionalMovement.Request(goal=goal)
     request.start.position = [float(value) for value in DEMO.machine_home]
     answer = client.ask(names.PLAN_REGIONAL_MOVEMENT, request)
-    found = client.ask(names.GET_TRAJECTORY, GetTrajectory.Request(trajectory_id=answer.trajectory_id))
+    found = client.ask(
+        names.GET_TRAJECTORY, GetTrajectory.Request(trajectory_id=answer.trajectory_id)
+    )
     return report_from_msg(answer.report), trajectory_from_msg(found.trajectory)
 
 
@@ -80,7 +99,8 @@ def test_of_a_flood_of_cells_the_newest_is_read_and_none_waits(
         go_on.wait(60.0)
         raise MemoryError(text)
 
-    driver, warnings = make_driver(), []
+    driver = make_driver()
+    warnings = []
     monkeypatch.setattr(announcements, "cell_from_yaml", slow)
     monkeypatch.setattr(driver._driver, "warn", warnings.append)
     driver._announcements._heard(CellState(cell_yaml="first"))
@@ -96,7 +116,12 @@ def test_of_a_flood_of_cells_the_newest_is_read_and_none_waits(
 
 @pytest.mark.parametrize("latched", [True, False])
 def test_a_signal_that_was_sent_before_the_driver_started_counts(
-    make_driver: Any, ros_context: Any, ros_executor: Any, client: Client, wait_for: Any, latched: bool
+    make_driver: Any,
+    ros_context: Any,
+    ros_executor: Any,
+    client: Client,
+    wait_for: Any,
+    latched: bool,
 ) -> None:
     plc = ros_executor.add_node(Node("plc", context=ros_context))
     quality = COMMANDS[0] if latched else COMMANDS[1]
@@ -125,7 +150,9 @@ def test_a_machine_that_moves_makes_old_trajectories_void_and_new_ones_run(
     report, trajectory = planned(client)
     assert report.cell_hash == cell_hash(DEMO)
     assert report.load == DEMO.tool.name
-    client.ask(names.SET_EQUIPMENT, SetEquipment.Request(name=DEMO.equipment[-1].name, enabled=False))
+    client.ask(
+        names.SET_EQUIPMENT, SetEquipment.Request(name=DEMO.equipment[-1].name, enabled=False)
+    )
     now = client.next_message(names.CELL, CellState)
     assert now.hash == cell_hash(DEMO.with_equipment(DEMO.equipment[-1].name, enabled=False))
     assert list(now.equipment) == [machine.name for machine in DEMO.equipment]
@@ -154,7 +181,9 @@ def test_the_planner_plans_with_what_the_driver_carries(
     assert carried.mass == pytest.approx(DEMO.tool.mass + DEMO.part(part).load.mass)
 
     client.ask(names.SET_LOAD, SetLoad.Request(load="custom", mass=17.5))
-    wait_for(lambda: planner_node.planner.heard.load.text == "custom", what="the custom load is heard")
+    wait_for(
+        lambda: planner_node.planner.heard.load.text == "custom", what="the custom load is heard"
+    )
     request = CheckState.Request()
     request.state.position = [float(value) for value in DEMO.machine_home]
     with pytest.raises(RequestRefusedError, match=r"'custom' \(17.5 kg\)") as refused:
@@ -177,7 +206,9 @@ def test_the_drivers_timers_count_while_there_is_a_driver(
         published = client.next_message(names.CONTROLLER_TIMERS, ControllerTimers)
         assert published.brakes_after == 7.0
         wait_for(lambda: planner_node.planner.heard.timers is not None, what="the timers are heard")
-        wait_for(lambda: planner_node.planner.heard.machines is not None, what="the machines are heard")
+        wait_for(
+            lambda: planner_node.planner.heard.machines is not None, what="the machines are heard"
+        )
         answer = client.ask(names.PLAN_STANDBY, PlanStandby.Request(pause=60.0))
         assert (answer.timers, answer.controller_timer) == ("driver", 7.0)
         assert answer.alternatives[1].regular_time_to_operate == 1.25
@@ -192,7 +223,9 @@ def test_a_driver_hears_the_planner_of_its_own_namespace_alone(
 ) -> None:
     make_driver("other", cell="open")
     mine = make_driver(cell="open")
-    wait_for(lambda: mine._driver._simulation.cell.name == "demo", what="the planner's cell is taken")
+    wait_for(
+        lambda: mine._driver._simulation.cell.name == "demo", what="the planner's cell is taken"
+    )
     heard: list[Any] = []
     ros_node.create_subscription(CarriedLoad, f"other/{names.CARRIED_LOAD}", heard.append, LATCHED)
     wait_for(lambda: bool(heard), what="the other driver's load")
@@ -203,5 +236,9 @@ def test_a_driver_hears_the_planner_of_its_own_namespace_alone(
         load = planner_node.planner.heard.load
         return "" if load is None else load.text
 
-    wait_for(lambda: heard_load() == mine._driver.carried.text, what="the load in the planner's cell")
-    np.testing.assert_allclose(mine._driver.carried.mass, DEMO.tool.mass if tool is not None else 0.0)
+    wait_for(
+        lambda: heard_load() == mine._driver.carried.text, what="the load in the planner's cell"
+    )
+    np.testing.assert_allclose(
+        mine._driver.carried.mass, DEMO.tool.mass if tool is not None else 0.0
+    )

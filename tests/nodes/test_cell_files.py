@@ -1,4 +1,6 @@
-"""set_cell reads files below its roots only, and an answer never shows what a refused file holds."""
+"""set_cell reads files below its roots only, and an answer never shows what a refused file
+holds.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,8 @@ def test_a_file_below_the_roots_is_read(root: Path, call: Callable[..., Any]) ->
 
 
 @pytest.mark.parametrize(
-    "path", ["../secret.yaml", "link.yaml", "fifo.yaml", "../../../../../../etc/shadow", ".", "none.yaml"]
+    "path",
+    ["../secret.yaml", "link.yaml", "fifo.yaml", "../../../../../../etc/shadow", ".", "none.yaml"],
 )
 def test_other_files_are_refused_without_their_content(
     root: Path, call: Callable[..., Any], path: str

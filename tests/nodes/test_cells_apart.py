@@ -1,4 +1,6 @@
-"""Two cells in one graph: what they say carries their namespace, and they don't take each other's port."""
+"""Two cells in one graph: what they say carries their namespace, and they don't take each other's
+port.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,8 @@ def taken_port():
 def start_driver(ros_context, ros_executor):
     def start(namespace, wake_port):
         overrides = [
-            Parameter(name, value=value) for name, value in {**QUICK, "wake_port": wake_port}.items()
+            Parameter(name, value=value)
+            for name, value in {**QUICK, "wake_port": wake_port}.items()
         ]
         node = SimDriver(context=ros_context, namespace=namespace, parameter_overrides=overrides)
         return ros_executor.add_node(node)
@@ -82,14 +85,20 @@ def test_a_driver_that_can_be_woken_hibernates(start_driver, ros_context, wait_f
         answer = client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="hib", value=True))
         assert answer.status.message == ""
         wait_for(
-            lambda: "off the network" in client.call(names.QUERY_MODES, QueryModes.Request()).status.message
+            lambda: (
+                "off the network"
+                in client.call(names.QUERY_MODES, QueryModes.Request()).status.message
+            )
         )
 
 
 def test_diagnostics_say_which_cell_they_are_of(start_driver, ros_node, wait_for):
     heard = set()
     ros_node.create_subscription(
-        DiagnosticArray, names.DIAGNOSTICS, lambda msg: heard.update(status.name for status in msg.status), 10
+        DiagnosticArray,
+        names.DIAGNOSTICS,
+        lambda msg: heard.update(status.name for status in msg.status),
+        10,
     )
     start_driver("cell_1", 0)
     start_driver(None, 0)
@@ -99,7 +108,9 @@ def test_diagnostics_say_which_cell_they_are_of(start_driver, ros_node, wait_for
 
 def test_two_nodes_of_one_name_say_so(ros_context, ros_executor, ros_node, wait_for):
     heard = []
-    ros_node.create_subscription(DiagnosticArray, names.DIAGNOSTICS, lambda msg: heard.extend(msg.status), 10)
+    ros_node.create_subscription(
+        DiagnosticArray, names.DIAGNOSTICS, lambda msg: heard.extend(msg.status), 10
+    )
     node = ros_executor.add_node(Node("ir_sim_driver", context=ros_context, namespace="cell_1"))
     ros_executor.add_node(Node("ir_sim_driver", context=ros_context, namespace="cell_2"))
     diagnostics = ros_executor.run(lambda: Diagnostics(node))

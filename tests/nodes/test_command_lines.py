@@ -1,4 +1,6 @@
-"""The executables answer --help and words that make no sense by a sentence, and start nothing then."""
+"""The executables answer --help and words that make no sense by a sentence, and start nothing
+then.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,9 @@ def run(name: str, *words: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize("name", MODULES)
-def test_help_helps(name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_helps(
+    name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Read before anything starts, so that it can be asked for in this process."""
     monkeypatch.setattr(sys, "argv", [name, "--help"])
     switched = sys.getswitchinterval()  # which the driver chooses for itself
@@ -74,7 +78,9 @@ def test_what_ros_cannot_read_is_a_sentence(name: str, words: list[str], sentenc
     assert ended.stderr.splitlines()[-1].startswith(f"{name}: ")
 
 
-@pytest.mark.parametrize("name", [pytest.param("ir_planner", marks=pytest.mark.long), "ir_program_runner"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("ir_planner", marks=pytest.mark.long), "ir_program_runner"]
+)
 def test_a_parameter_of_another_type_is_one_line(name: str) -> None:
     ended = run(name, "--ros-args", "-p", "cell:=5")
     assert ended.returncode == 1

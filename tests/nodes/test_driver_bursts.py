@@ -1,4 +1,6 @@
-"""Bursts over ROS: a press that is taken back at once counts, and every request and goal is answered."""
+"""Bursts over ROS: a press that is taken back at once counts, and every request and goal is
+answered.
+"""
 
 from __future__ import annotations
 
@@ -64,8 +66,10 @@ def test_a_press_does_not_come_behind_old_levels_nor_with_a_mode_that_is_none(
     ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any
 ) -> None:
     """A node that gets no processor for a while takes all that have come in one turn."""
-    driver, server = Heard(), BackgroundExecutor(ros_context)
-    held, go_on = threading.Event(), threading.Event()
+    driver = Heard()
+    server = BackgroundExecutor(ros_context)
+    held = threading.Event()
+    go_on = threading.Event()
     try:
         node = server.add_node(rclpy.create_node("busy", context=ros_context))
         server.run(lambda: PlcTopic(node, driver))  # type: ignore[arg-type]
@@ -83,7 +87,9 @@ def test_a_press_does_not_come_behind_old_levels_nor_with_a_mode_that_is_none(
         wait_for(held.is_set, what="the node is busy")
         messages = [RELEASED] * 300 + [PRESSED] + [RELEASED] * 100
         ros_executor.run(lambda: [publisher.publish(each) for each in messages])
-        ros_executor.run(lambda: publisher.publish(PlcInputs(emergency_stop=True, operating_mode=99)))
+        ros_executor.run(
+            lambda: publisher.publish(PlcInputs(emergency_stop=True, operating_mode=99))
+        )
         wait_for(lambda: publisher.wait_for_all_acked(), what="all have come")
         go_on.set()
         wait_for(lambda: driver.pressed, what="the last one is taken")
@@ -98,7 +104,9 @@ def test_a_press_does_not_come_behind_old_levels_nor_with_a_mode_that_is_none(
     assert "99" in driver.said[0]
 
 
-@pytest.mark.parametrize("durability", [DurabilityPolicy.TRANSIENT_LOCAL, DurabilityPolicy.VOLATILE])
+@pytest.mark.parametrize(
+    "durability", [DurabilityPolicy.TRANSIENT_LOCAL, DurabilityPolicy.VOLATILE]
+)
 def test_a_press_by_topic_that_is_taken_back_at_once_is_latched(
     modes: list[int], ros_node: Any, ros_executor: Any, wait_for: Any, durability: DurabilityPolicy
 ) -> None:
@@ -124,7 +132,9 @@ def test_a_press_by_service_counts_in_a_burst_and_all_are_answered(
     modes: list[int], ros_node: Any, ros_executor: Any, wait_for: Any
 ) -> None:
     client = ros_executor.run(
-        lambda: ros_node.create_client(SetPlcInput, "/ir_sim_driver/set_plc_input", qos_profile=SERVICE)
+        lambda: ros_node.create_client(
+            SetPlcInput, "/ir_sim_driver/set_plc_input", qos_profile=SERVICE
+        )
     )
     wait_for(client.service_is_ready, what="set_plc_input is offered")
     requests = [SetPlcInput.Request(name="emergency_stop", value=k == 0) for k in range(200)]
@@ -138,7 +148,9 @@ def test_more_requests_than_may_wait_are_all_answered(
     modes: list[int], ros_node: Any, ros_executor: Any, wait_for: Any
 ) -> None:
     client = ros_executor.run(
-        lambda: ros_node.create_client(QueryModes, "/ir_sim_driver/query_modes", qos_profile=SERVICE)
+        lambda: ros_node.create_client(
+            QueryModes, "/ir_sim_driver/query_modes", qos_profile=SERVICE
+        )
     )
     wait_for(client.service_is_ready, what="query_modes is offered")
     sent = range(REQUESTS_WAITING + 200)
@@ -151,11 +163,17 @@ def test_more_requests_than_may_wait_are_all_answered(
 def test_a_goal_that_is_cancelled_before_it_begins_is_cancelled() -> None:
     """A thread may take the cancel before the goal's own coroutine runs."""
     cancelled: list[int] = []
-    driver = SimpleNamespace(max_points=10, submit=lambda points, read, ended: 7, cancel=cancelled.append)
-    node = SimpleNamespace(future=lambda: asyncio.Future(loop=loop), every=lambda seconds, call: lambda: None)
+    driver = SimpleNamespace(
+        max_points=10, submit=lambda points, read, ended: 7, cancel=cancelled.append
+    )
+    node = SimpleNamespace(
+        future=lambda: asyncio.Future(loop=loop), every=lambda seconds, call: lambda: None
+    )
     loop = asyncio.new_event_loop()
     goals = Executions(cast(Any, driver), cast(Any, node), ExecuteTrajectory, "execute", 0.0)
-    handle = SimpleNamespace(goal_id=SimpleNamespace(uuid=range(16)), request=ExecuteTrajectory.Goal())
+    handle = SimpleNamespace(
+        goal_id=SimpleNamespace(uuid=range(16)), request=ExecuteTrajectory.Goal()
+    )
     goals.cancel(handle)
     assert cancelled == []
     running = goals.execute(handle)
@@ -174,7 +192,9 @@ def test_forty_goals_are_all_answered_with_a_result(
         )
     )
     wait_for(client.server_is_ready, what="execute_trajectory is offered")
-    sent = ros_executor.run(lambda: [client.send_goal_async(ExecuteTrajectory.Goal()) for _ in range(40)])
+    sent = ros_executor.run(
+        lambda: [client.send_goal_async(ExecuteTrajectory.Goal()) for _ in range(40)]
+    )
     wait_for(lambda: all(future.done() for future in sent), what="all goals are taken")
     goals = [future.result() for future in sent]
     results = ros_executor.run(lambda: [goal.get_result_async() for goal in goals if goal.accepted])

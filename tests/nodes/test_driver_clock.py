@@ -1,4 +1,6 @@
-"""The driver on somebody else's /clock: late start, freeze, a hundred times faster, back and ahead."""
+"""The driver on somebody else's /clock: late start, freeze, a hundred times faster, back and
+ahead.
+"""
 
 from __future__ import annotations
 
@@ -23,24 +25,26 @@ from ir_sim_driver.node import SimDriver
 
 NS = 1_000_000_000
 PERIOD = 2_000_000
-DEPTH = 4_000  # messages that wait for a listener; beyond 5,000 within a process Fast DDS gives no more, ever
+# messages that wait for a listener; beyond 5,000 within a process Fast DDS gives no more, ever
+DEPTH = 4_000
 TICK = 5_000_000  # ns of real time between two messages of the clock
-CREEP = (
-    0.01  # of its speed, while the plant of a busy machine is a second behind; at five the grid begins anew
-)
+# of its speed, while the plant of a busy machine is a second behind; at five the grid begins anew
+CREEP = 0.01
 
 
 class ClockSource:
-    """Publishes /clock every 5 ms from a thread of its own, `rate` [s/s] times as fast as real time.
+    """Publishes /clock every 5 ms from a thread of its own, `rate` [s/s] times as fast as real
+    time.
 
-    A rate of up to 1 is for a plant that follows: where its joint states, `stamps`, are behind, it is waited
-    for.
+    A rate of up to 1 is for a plant that follows: where its joint states, `stamps`, are behind, it
+    is waited for.
     """
 
     def __init__(self, node, stamps):
         self._stamps = stamps
         self._publisher = node.create_publisher(Clock, "/clock", 10)
-        self.now, self._rate = 0, 1.0
+        self.now = 0
+        self._rate = 1.0
         self._changing = threading.Lock()
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -112,14 +116,18 @@ def movement(step=0.05, duration=0.5):
     cell = load_cell("open")
     q = np.array(cell.machine_home)
     rest = np.zeros((2, 6))
-    return JointTrajectory.from_seconds(cell.robot.joint_names, [0.0, duration], [q, q + step], rest, rest)
+    return JointTrajectory.from_seconds(
+        cell.robot.joint_names, [0.0, duration], [q, q + step], rest, rest
+    )
 
 
 def gaps(stamps):
     return [b - a for a, b in pairwise(stamps)]
 
 
-def test_before_the_clock_starts_nothing_passes_and_then_the_grid_begins(driver, clock, stamps, wait_for):
+def test_before_the_clock_starts_nothing_passes_and_then_the_grid_begins(
+    driver, clock, stamps, wait_for
+):
     wait_for(lambda: clock._publisher.get_subscription_count() > 0)
     assert driver._joints is None  # nothing was stepped
     assert not stamps
@@ -187,12 +195,16 @@ def lead_in():
     return ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(trajectory))
 
 
-def test_a_hundred_times_faster_stamps_stay_on_the_grid_and_go_forward(client, clock, stamps, wait_for):
+def test_a_hundred_times_faster_stamps_stay_on_the_grid_and_go_forward(
+    client, clock, stamps, wait_for
+):
     clock.start(10 * NS)
     wait_for(lambda: len(stamps) > 100)
     clock.run_at(100.0)
     wait_for(lambda: stamps[-1] > 20 * NS)
-    clock.run_at(0.3)  # a busy machine may not follow even at the speed of real time, a frozen clock nobody
+    clock.run_at(
+        0.3
+    )  # a busy machine may not follow even at the speed of real time, a frozen clock nobody
     wait_for(lambda: clock.now - stamps[-1] < NS)
     clock.run_at(1.0)
     assert min(gaps(stamps)) >= PERIOD
@@ -212,7 +224,10 @@ def test_the_clock_is_not_changed_while_the_robot_moves(client, driver, clock, s
 
     clock.run_at(0.2)  # a busy machine must not reach the end before the feedback comes
     goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(0.1, 1.0)))
-    assert client.send_goal(names.EXECUTE_TRAJECTORY, goal, feedback=change, timeout=120.0).error_code == 0
+    assert (
+        client.send_goal(names.EXECUTE_TRAJECTORY, goal, feedback=change, timeout=120.0).error_code
+        == 0
+    )
     assert not answers[0].successful
     assert "the robot moves" in answers[0].reason
     assert driver.get_parameter("use_sim_time").value is True
@@ -222,8 +237,11 @@ def test_the_clock_is_not_changed_while_the_robot_moves(client, driver, clock, s
 def test_its_own_clock_is_published_100_to_125_times_a_second(
     ros_context, ros_executor, ros_node, wait_for, factor
 ):
-    ticks, states = [], []
-    ros_node.create_subscription(Clock, "/clock", lambda msg: ticks.append(stamp_of(msg.clock)), DEPTH)
+    ticks = []
+    states = []
+    ros_node.create_subscription(
+        Clock, "/clock", lambda msg: ticks.append(stamp_of(msg.clock)), DEPTH
+    )
     ros_node.create_subscription(
         JointState, names.JOINT_STATES, lambda msg: states.append(stamp_of(msg.header.stamp)), DEPTH
     )

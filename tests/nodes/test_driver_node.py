@@ -50,7 +50,9 @@ QUICK = {
 @pytest.fixture
 def make_driver(ros_context, ros_executor):
     def make(**parameters):
-        overrides = [Parameter(name, value=value) for name, value in {**QUICK, **parameters}.items()]
+        overrides = [
+            Parameter(name, value=value) for name, value in {**QUICK, **parameters}.items()
+        ]
         return ros_executor.add_node(SimDriver(context=ros_context, parameter_overrides=overrides))
 
     return make
@@ -109,8 +111,11 @@ def test_power_state_is_the_derivative_of_its_energy(make_driver, listen, wait_f
 
 def test_joint_states_are_published_before_the_meter_is_read(make_driver, wait_for, monkeypatch):
     happened = []
-    fill, settle = streams.fill_joint_state, Mains.settle
-    monkeypatch.setattr(streams, "fill_joint_state", lambda *a: (happened.append("joints"), fill(*a))[1])
+    fill = streams.fill_joint_state
+    settle = Mains.settle
+    monkeypatch.setattr(
+        streams, "fill_joint_state", lambda *a: (happened.append("joints"), fill(*a))[1]
+    )
     monkeypatch.setattr(Mains, "settle", lambda mains: (happened.append("meter"), settle(mains))[1])
     make_driver()
     wait_for(lambda: happened.count("meter") >= 20)
@@ -120,7 +125,9 @@ def test_joint_states_are_published_before_the_meter_is_read(make_driver, wait_f
     assert set(rounds) == {"jjjjj"}
 
 
-def test_the_plant_is_named_by_the_meter_and_published_with_its_figures(make_driver, listen, wait_for):
+def test_the_plant_is_named_by_the_meter_and_published_with_its_figures(
+    make_driver, listen, wait_for
+):
     make_driver(backend="pybullet", plant="typical:9")
     readings = listen(names.POWER_STATE, PowerState)
     plants = listen(names.PLANT, String, latched=True)
@@ -140,7 +147,9 @@ def test_a_trajectory_is_executed_to_its_end(make_driver, cell_client, listen, w
     execution = cell_client.execute(trajectory, feedback=feedback.append, timeout=120.0)
     assert execution.max_tool_deviation < 0.001
     assert execution.energy > 0.0
-    wait_for(lambda: states and np.allclose(states[-1].position, trajectory.positions[-1], atol=1e-6))
+    wait_for(
+        lambda: states and np.allclose(states[-1].position, trajectory.positions[-1], atol=1e-6)
+    )
 
 
 def test_a_bad_trajectory_is_aborted_with_a_sentence(make_driver, cell_client):
@@ -167,14 +176,19 @@ def test_bus_power_off_by_bits_and_back(make_driver, cell_client, listen, wait_f
 def test_a_bit_that_is_ignored_says_so_in_the_answer(make_driver, cell_client):
     make_driver()
     assert (
-        cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="T1", value=True)).status.message == ""
+        cell_client.ask(
+            names.SET_PLC_INPUT, SetPlcInput.Request(name="T1", value=True)
+        ).status.message
+        == ""
     )
     answer = cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="ab", value=True))
     assert answer.inputs.ab
     assert answer.status.message == "PLC bit AB is 1 but ignored: operating mode is T1, must be EXT"
 
 
-def test_levels_in_force_are_published_whoever_sets_them(make_driver, cell_client, listen, wait_for):
+def test_levels_in_force_are_published_whoever_sets_them(
+    make_driver, cell_client, listen, wait_for
+):
     driver = make_driver(modbus=True, modbus_port=0)
     in_force = listen(names.PLC_INPUTS_IN_FORCE, PlcInputs, latched=True)
     wait_for(lambda: in_force)
@@ -224,7 +238,9 @@ def test_only_wake_on_lan_ends_hibernation(make_driver, cell_client, listen, wai
     states = listen(names.JOINT_STATES, JointState)
     power = listen(names.POWER_STATE, PowerState)
     publisher = ros_node.create_publisher(
-        PlcInputs, names.PLC_INPUTS, QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        PlcInputs,
+        names.PLC_INPUTS,
+        QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL),
     )
     publisher.publish(PlcInputs(hib=True))
     wait_for(lambda: power and power[-1].mode == PowerMode.HIBERNATION)
@@ -235,11 +251,14 @@ def test_only_wake_on_lan_ends_hibernation(make_driver, cell_client, listen, wai
     with pytest.raises(RequestRefusedError, match="HIBERNATION"):
         cell_client.execute(movement(), timeout=120.0)
     wait_for(lambda: len(power) > asleep_from + 20)
-    # what was sent before may arrive late; the stamp says when it was sent, the meter looks every 10 ms
+    # what was sent before may arrive late; the stamp says when it was sent, the meter looks every
+    # 10 ms
     assert max(stamp_of(state) for state in states) <= asleep + 0.01
     silent = len(states)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        sender.sendto(magic_packet("02:00:00:c4:02:11"), ("127.0.0.1", driver.port_of("wake_on_lan")))
+        sender.sendto(
+            magic_packet("02:00:00:c4:02:11"), ("127.0.0.1", driver.port_of("wake_on_lan"))
+        )
         sender.sendto(magic_packet(MAC), ("127.0.0.1", driver.port_of("wake_on_lan")))
     wait_for(lambda: power[-1].mode == PowerMode.STAND_ON_MOTORS)
     wait_for(lambda: len(states) > silent + 10)
@@ -267,12 +286,18 @@ def test_loads_and_their_refusals(make_driver, cell_client):
     ):
         with pytest.raises(RequestRefusedError):
             cell_client.ask(names.SET_LOAD, request)
-    assert cell_client.ask(names.SET_LOAD, SetLoad.Request(load="custom", mass=50.0)).total_mass == 50.0
+    assert (
+        cell_client.ask(names.SET_LOAD, SetLoad.Request(load="custom", mass=50.0)).total_mass
+        == 50.0
+    )
 
 
-def test_emergency_stop_aborts_and_recover_does_not_resume(make_driver, cell_client, listen, wait_for):
+def test_emergency_stop_aborts_and_recover_does_not_resume(
+    make_driver, cell_client, listen, wait_for
+):
     make_driver(backend="pybullet")
-    states, power = listen(names.JOINT_STATES, JointState), listen(names.POWER_STATE, PowerState)
+    states = listen(names.JOINT_STATES, JointState)
+    power = listen(names.POWER_STATE, PowerState)
     button = cell_client.node.create_client(SetPlcInput, names.SET_PLC_INPUT)
     wait_for(lambda: states and power and button.service_is_ready())
     pressed = []
@@ -318,7 +343,9 @@ def test_faster_than_real_time_the_driver_is_the_clock(make_driver, listen, wait
 
     wait_for(lambda: len(states) > 500 and len(ticks_among_states()) > 20, what="both are heard")
     stamps = np.array([stamp_ns(msg) for msg in states])
-    gaps = np.diff(stamps)  # 2,000 messages in a second: a loaded machine may lose some, none leaves the grid
+    gaps = np.diff(
+        stamps
+    )  # 2,000 messages in a second: a loaded machine may lose some, none leaves the grid
     assert (gaps > 0).all()
     assert (gaps % 2_000_000 == 0).all()
     assert all((tick - stamps[0]) % 2_000_000 == 0 for tick in ticks_among_states())
@@ -329,7 +356,9 @@ def test_a_movement_whose_client_has_gone_is_stopped_on_its_path(
 ):
     driver = make_driver(client_timeout=0.3)
     diagnostics = listen(names.DIAGNOSTICS, DiagnosticArray)
-    client = ros_executor.run(lambda: ActionClient(ros_node, ExecuteTrajectory, names.EXECUTE_TRAJECTORY))
+    client = ros_executor.run(
+        lambda: ActionClient(ros_node, ExecuteTrajectory, names.EXECUTE_TRAJECTORY)
+    )
     wait_for(client.server_is_ready)
     goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(step=-0.4, duration=200.0)))
     power = listen(names.POWER_STATE, PowerState)

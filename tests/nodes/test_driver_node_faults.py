@@ -1,4 +1,6 @@
-"""What a client can send the driver by mistake: an answer with a sentence, and a node that lives on."""
+"""What a client can send the driver by mistake: an answer with a sentence, and a node that lives
+on.
+"""
 
 from __future__ import annotations
 
@@ -121,7 +123,8 @@ def strange_tolerance(goal):
 def many_points(goal):
     point = goal.trajectory.points[0]
     goal.trajectory.points = [
-        JointTrajectoryPoint(positions=point.positions, velocities=point.velocities) for _ in range(20_001)
+        JointTrajectoryPoint(positions=point.positions, velocities=point.velocities)
+        for _ in range(20_001)
     ]
 
 
@@ -193,7 +196,9 @@ def test_a_trajectory_on_the_topic_runs_and_overrides_the_action(client, ros_nod
     wait_for(lambda: publisher.get_subscription_count() > 0)
     cell = load_cell("open")
     target = np.array(cell.machine_home) - 0.02
-    override = JointTrajectory.from_seconds(cell.robot.joint_names, [2.0], target[None], np.zeros((1, 6)))
+    override = JointTrajectory.from_seconds(
+        cell.robot.joint_names, [2.0], target[None], np.zeros((1, 6))
+    )
     sent = []
 
     def send_once(feedback):
@@ -213,17 +218,22 @@ def test_a_cancelled_goal_comes_back_canceled(client, ros_node, wait_for):
     action = ActionClient(client.node, ExecuteTrajectory, names.EXECUTE_TRAJECTORY)
     run = client._executor.run
     wait_for(action.server_is_ready)
-    handles, results = [], []
+    handles = []
+    results = []
     goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(0.2, 60.0)))
 
     def send():
-        action.send_goal_async(goal).add_done_callback(lambda future: handles.append(future.result()))
+        action.send_goal_async(goal).add_done_callback(
+            lambda future: handles.append(future.result())
+        )
 
     run(send)
     wait_for(lambda: handles)
     run(
         lambda: (
-            handles[0].get_result_async().add_done_callback(lambda future: results.append(future.result()))
+            handles[0]
+            .get_result_async()
+            .add_done_callback(lambda future: results.append(future.result()))
         )
     )
     run(lambda: handles[0].cancel_goal_async())
@@ -258,7 +268,9 @@ def test_any_speed_scaling_is_survived(client, ros_node, wait_for, factor):
     assert client.execute(movement(), timeout=120.0).energy > 0.0
 
 
-def test_an_unknown_bit_lists_the_known_and_an_unknown_mode_changes_nothing(client, ros_node, wait_for):
+def test_an_unknown_bit_lists_the_known_and_an_unknown_mode_changes_nothing(
+    client, ros_node, wait_for
+):
     with pytest.raises(RequestRefusedError, match=r"known are .*emergency_stop"):
         client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="turbo", value=True))
     publisher = ros_node.create_publisher(PlcInputs, names.PLC_INPUTS, LATCHED)

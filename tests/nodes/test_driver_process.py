@@ -1,4 +1,6 @@
-"""The driver as a process: it says what is wrong with its parameters, and it ends when it is asked to."""
+"""The driver as a process: it says what is wrong with its parameters, and it ends when it is asked
+to.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,9 @@ def command(**parameters):
     ],
 )
 def test_a_parameter_that_makes_no_sense_ends_the_process_with_a_sentence(parameters, sentence):
-    answer = subprocess.run(command(**parameters), capture_output=True, text=True, timeout=180, check=False)
+    answer = subprocess.run(
+        command(**parameters), capture_output=True, text=True, timeout=180, check=False
+    )
     assert answer.returncode == 1
     assert sentence in answer.stderr
     assert "\x1b" not in answer.stderr
@@ -50,7 +54,9 @@ def test_a_parameter_that_makes_no_sense_ends_the_process_with_a_sentence(parame
         ("load", "anvil", "anvil"),
     ],
 )
-def test_a_parameter_that_makes_no_sense_is_a_refusal_of_the_node(ros_context, name, value, sentence):
+def test_a_parameter_that_makes_no_sense_is_a_refusal_of_the_node(
+    ros_context, name, value, sentence
+):
     """One of those that end the process as above."""
     values = {"cell": "open", "backend": "ideal", "wake_port": 0, name: value}
     overrides = [Parameter(key, value=each) for key, each in values.items()]
@@ -70,7 +76,9 @@ def test_signals_end_it_cleanly_also_two(signals, wait_for):
     executor.add_node(node)
     heard = []
     node.create_subscription(PowerState, names.POWER_STATE, heard.append, 10)
-    process = subprocess.Popen(command(modbus="true", modbus_port=0), stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        command(modbus="true", modbus_port=0), stderr=subprocess.PIPE, text=True
+    )
     try:
 
         def power():

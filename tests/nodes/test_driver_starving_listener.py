@@ -17,7 +17,8 @@ from ir_sim_driver.node import SimDriver
 
 COUNT = 1_500
 STARVED = 2.0  # s of real time
-LONGEST = 3.0  # s: a busy machine may leave it stopped for longer, and who is not heard for 5 s is forgotten
+# s: a busy machine may leave it stopped for longer, and who is not heard for 5 s is forgotten
+LONGEST = 3.0
 MOST = 1_800  # joint states that it may miss meanwhile: 2,000 are kept for it
 TRIES = 20
 LISTENER = """
@@ -52,13 +53,16 @@ def stamp_of(msg):
 
 
 def starve(listener, published, wait_for):
-    """What the listener says after two seconds without a processor; "" where it was too long without."""
+    """What the listener says after two seconds without a processor; "" where it was too long
+    without.
+    """
     with listener:
         try:
             assert listener.stdout is not None
             assert listener.stdout.readline() == "hears\n"
             listener.send_signal(signal.SIGSTOP)
-            begin, before = time.monotonic(), published[-1]
+            begin = time.monotonic()
+            before = published[-1]
             wait_for(lambda: time.monotonic() - begin >= STARVED)
             listener.send_signal(signal.SIGCONT)
             missed = sum(stamp > before for stamp in list(published))
@@ -85,7 +89,10 @@ def test_two_seconds_without_a_processor_lose_nothing(
     )
     published = []
     ros_node.create_subscription(
-        JointState, names.JOINT_STATES, lambda msg: published.append(stamp_of(msg)), QoSProfile(depth=4000)
+        JointState,
+        names.JOINT_STATES,
+        lambda msg: published.append(stamp_of(msg)),
+        QoSProfile(depth=4000),
     )
     wait_for(lambda: published, what="the driver publishes")
     words = [sys.executable, "-c", LISTENER.replace("COUNT", str(COUNT))]

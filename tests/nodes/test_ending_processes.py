@@ -1,4 +1,6 @@
-"""Every node as a process: SIGINT or SIGTERM, once or twice, ends it with exit code 0 and no traceback."""
+"""Every node as a process: SIGINT or SIGTERM, once or twice, ends it with exit code 0 and no
+traceback.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +17,21 @@ from ir_msgs_py import names
 
 MODULES = {
     names.PLANNER: ["ir_planner.node"],
-    names.SIM_DRIVER: ["ir_sim_driver.node", "--ros-args", "-p", "cell:=open", "-p", "wake_port:=0"],
+    names.SIM_DRIVER: [
+        "ir_sim_driver.node",
+        "--ros-args",
+        "-p",
+        "cell:=open",
+        "-p",
+        "wake_port:=0",
+    ],
     names.PROGRAM_RUNNER: ["ir_program_runner.node"],
     names.RECORDER: ["ir_recorder.node"],
     "ir_record": ["ir_recorder.node", "FILE", "--root", "/"],
     "ir_play": ["ir_recorder.play.node", "FILE", "--root", "/", "--loop", "--delay", "60"],
 }
-INT, TERM = signal.SIGINT, signal.SIGTERM
+INT = signal.SIGINT
+TERM = signal.SIGTERM
 
 
 @pytest.fixture(scope="module")
@@ -53,15 +63,21 @@ def watcher(monkeypatch):
 
 
 QUICK = [(names.PLANNER, [TERM, INT]), (names.RECORDER, [INT]), ("ir_play", [TERM, INT])]
-"""Of the others test_driver_process.py, test_runner_process.py and test_recorder_node.py show some."""
-EVERY = [(name, signals) for name in MODULES for signals in ([INT], [TERM], [INT, INT], [TERM, INT])]
+"""Of the others test_driver_process.py, test_runner_process.py and test_recorder_node.py show
+some.
+"""
+EVERY = [
+    (name, signals) for name in MODULES for signals in ([INT], [TERM], [INT, INT], [TERM, INT])
+]
 
 
 @pytest.mark.parametrize(
     ("name", "signals"),
     [*QUICK, *(pytest.param(*each, marks=pytest.mark.long) for each in EVERY if each not in QUICK)],
 )
-def test_a_node_that_is_asked_to_end_ends_well(name, signals, recording, tmp_path, watcher, wait_for):
+def test_a_node_that_is_asked_to_end_ends_well(
+    name, signals, recording, tmp_path, watcher, wait_for
+):
     file = recording if name == "ir_play" else tmp_path / "new.mcap"
     words = [str(file) if word == "FILE" else word for word in MODULES[name]]
     process = subprocess.Popen([sys.executable, "-m", *words], stderr=subprocess.PIPE, text=True)

@@ -1,7 +1,10 @@
-"""Every number and text of every service and action of the four nodes, as NaN, inf, 1e308, empty or 10 MB.
+"""Every number and text of every service and action of the four nodes, as NaN, inf, 1e308, empty or
+10 MB.
 
-Services and actions are those that the nodes offer, their fields those of the definitions (fields.py). The
-judge looks from outside: each request is answered, a refusal says why, no process has ended or grown.
+Services and actions are those that the nodes offer, their fields those of the definitions
+(fields.py). The
+judge looks from outside: each request is answered, a refusal says why, no process has ended or
+grown.
 """
 
 from __future__ import annotations
@@ -33,7 +36,9 @@ from ir_recorder.node import RecorderNode
 from ir_sim_driver.node import SimDriver
 
 DRIVER = {"backend": "ideal", "wake_port": 0}
-SAMPLED, SAMPLED_HUGE = 2, 4  # of each service and action; of all
+# of each service and action; of all
+SAMPLED = 2
+SAMPLED_HUGE = 4
 ANSWERED = 60.0  # s; 10 MB take a loaded machine long
 RUNS = 0.5  # s; a goal that makes sense after all is canceled then
 ENOUGH = 5  # that went wrong: each may have taken a minute
@@ -81,7 +86,9 @@ class Attack:
 
         wait_for(all_offered, what="all services and actions are offered")
         self.offers = [offer for node in NODES for offer in offers_of(client, node)]
-        self.cases = [(offer, case) for offer in self.offers for case in fields.cases_of(_part(offer))]
+        self.cases = [
+            (offer, case) for offer in self.offers for case in fields.cases_of(_part(offer))
+        ]
 
     def put(self, cases: Sequence[tuple[Offer, Any]]) -> None:
         """One case after the other."""
@@ -116,9 +123,11 @@ def wrong(answer: Any) -> str:
     if answer == "":
         return "no answer"
     if hasattr(answer, "status"):
-        sentence, refused = answer.status.message, answer.status.code != Status.SUCCESS
+        sentence = answer.status.message
+        refused = answer.status.code != Status.SUCCESS
     elif hasattr(answer, "error_string"):
-        sentence, refused = answer.error_string, answer.error_code != 0
+        sentence = answer.error_string
+        refused = answer.error_code != 0
     else:  # of a node's parameters, which are ROS's own, or of a goal that was canceled
         return ""
     if refused and not (sentence and sentence.isprintable() and len(sentence) <= SENTENCE_MAX):
@@ -139,7 +148,11 @@ def sampled(cases: Sequence[tuple[Offer, Any]], seed: int) -> list[tuple[Offer, 
 
 @pytest.mark.usefixtures("planner_node")
 def test_a_sample_of_all_fields_is_answered(
-    ros_context: Any, ros_executor: Any, wait_for: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ros_context: Any,
+    ros_executor: Any,
+    wait_for: Any,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(client_module, "_CANCEL_GRACE", ANSWERED)
@@ -156,7 +169,9 @@ def test_a_sample_of_all_fields_is_answered(
 def memory(nodes: NodeProcesses) -> dict[str, float]:
     """Resident memory of each process [MB]."""
     kept = {name: Path(f"/proc/{pid}/statm").read_text() for name, pid in nodes.ids().items()}
-    return {name: int(text.split()[1]) * resource.getpagesize() / 2**20 for name, text in kept.items()}
+    return {
+        name: int(text.split()[1]) * resource.getpagesize() / 2**20 for name, text in kept.items()
+    }
 
 
 @pytest.mark.long

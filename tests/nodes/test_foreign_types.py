@@ -1,4 +1,6 @@
-"""A foreign process that has our names with other types: sentences without our node, no harm beside it."""
+"""A foreign process that has our names with other types: sentences without our node, no harm beside
+it.
+"""
 
 from __future__ import annotations
 
@@ -57,9 +59,13 @@ def test_a_foreign_type_is_named_where_our_node_is_missing_and_ignored_where_it_
         topic = f"/{names.POWER_STATE}"
         wait_for(lambda: name in client.graph.services(), what="the foreign service is seen")
         wait_for(lambda: topic in client.graph.topics(), what="the foreign topic is seen")
-        with pytest.raises(ServiceUnavailableError, match=r"has it as diagnostic_msgs/srv/SelfTest$"):
+        with pytest.raises(
+            ServiceUnavailableError, match=r"has it as diagnostic_msgs/srv/SelfTest$"
+        ):
             client.call(names.QUERY_MODES, QueryModes.Request(), timeout=0.5)
-        with pytest.raises(CallTimedOutError, match=r"has it as diagnostic_msgs/msg/DiagnosticArray$"):
+        with pytest.raises(
+            CallTimedOutError, match=r"has it as diagnostic_msgs/msg/DiagnosticArray$"
+        ):
             client.next_message(names.POWER_STATE, PowerState, timeout=0.5)
         values = {"cell": "open", "backend": "ideal", "wake_port": 0}
         overrides = [Parameter(key, value=value) for key, value in values.items()]
@@ -67,5 +73,10 @@ def test_a_foreign_type_is_named_where_our_node_is_missing_and_ignored_where_it_
         answer = client.ask(names.QUERY_MODES, QueryModes.Request(), timeout=60.0)
         assert answer.status.code == StatusCode.SUCCESS
         assert client.next_message(names.POWER_STATE, PowerState, timeout=60.0).energy > 0.0
-        wait_for(lambda: client.graph.services()[name] == "ir_msgs/srv/QueryModes", what="its type counts")
-        wait_for(lambda: client.graph.topics()[topic] == "ir_msgs/msg/PowerState", what="its type counts")
+        wait_for(
+            lambda: client.graph.services()[name] == "ir_msgs/srv/QueryModes",
+            what="its type counts",
+        )
+        wait_for(
+            lambda: client.graph.topics()[topic] == "ir_msgs/msg/PowerState", what="its type counts"
+        )

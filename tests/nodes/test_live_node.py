@@ -1,4 +1,6 @@
-"""`ir live` and a real driver: what it says reaches a browser, a browser's buttons reach its PLC."""
+"""`ir live` and a real driver: what it says reaches a browser, a browser's buttons reach its
+PLC.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,8 @@ class Browser:
     """Reads the events of a live view in a thread: all values now, and the records that came."""
 
     def __init__(self, port: int, token: str) -> None:
-        self._port, self._token = port, token
+        self._port = port
+        self._token = token
         self.state: dict[str, Any] = {}
         self.records: list[dict[str, Any]] = []
         connection = HTTPConnection("127.0.0.1", port, timeout=60.0)
@@ -108,7 +111,9 @@ def test_a_driver_is_seen_obeys_the_buttons_and_may_go_and_come(
     publish("/ir_planner/cell", CellState(name="demo", cell_yaml=cell_to_yaml(load_cell("demo"))))
     with a_driver(ros_context):
         wait_for(lambda: state["heard"]["driver"], what="the driver is heard")
-        wait_for(lambda: state.get("q") and state.get("near"), what="the robot and its nearest pair")
+        wait_for(
+            lambda: state.get("q") and state.get("near"), what="the robot and its nearest pair"
+        )
         assert [part["name"] for part in browser.scene()["parts"]] == ["gear"]
         wait_for(lambda: state.get("plant") == "ideal" and state.get("load") == "gripper")
         wait_for(lambda: state.get("in", {}).get("move_enable") is True)
@@ -130,24 +135,34 @@ def test_strange_messages_become_bounded_values_and_a_flood_twenty_records_a_sec
     browser: Browser, publish: Any, wait_for: Any
 ) -> None:
     names = [f"{EVIL}{k}" for k in range(1000)]
-    publish("/ir_sim_driver/machine_states", MachineStates(equipment=names, states=names, next=names))
+    publish(
+        "/ir_sim_driver/machine_states", MachineStates(equipment=names, states=names, next=names)
+    )
     publish("/ir_planner/cell", CellState(cell_yaml=EVIL))
     publish("/ir_sim_driver/contacts", Contact(speed=float("nan"), depth=float("inf")))
     odd = ProgramState(event="started", index=7, total=3, note=EVIL * 1000)
-    odd.movement.kind, odd.movement.from_station = "regional", EVIL * 1000
+    odd.movement.kind = "regional"
+    odd.movement.from_station = EVIL * 1000
     publish("/ir_program_runner/program_state", odd)
     publish("/ir_program_runner/program_state", ProgramState(event=EVIL))
     wait_for(
-        lambda: "contact" in browser.state and browser.state.get("machines") and browser.state.get("step")
+        lambda: (
+            "contact" in browser.state
+            and browser.state.get("machines")
+            and browser.state.get("step")
+        )
     )
     assert len(browser.state["machines"]) == 100
     assert all(len(text) <= 200 for text in browser.state["step"].values() if isinstance(text, str))
     wait_for(lambda: "can't be read" in browser.state.get("problem", ""))
-    before, first = len(browser.records), browser.state["t"]
+    before = len(browser.records)
+    first = browser.state["t"]
     for k in range(3000):
         nan = float("nan")
         publish("/joint_states", JointState(name=["a", "b"], position=[nan, float(k)]))
-        publish("/ir_sim_driver/power_state", PowerState(power=nan if k % 2 else float(k), mode=200))
+        publish(
+            "/ir_sim_driver/power_state", PowerState(power=nan if k % 2 else float(k), mode=200)
+        )
     wait_for(lambda: browser.state.get("mode") == "mode 200")
     assert len(browser.records) - before <= 25.0 * (browser.state["t"] - first) + 5
     assert browser.state.get("q") is None

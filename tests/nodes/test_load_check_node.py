@@ -34,14 +34,19 @@ def test_a_load_that_is_not_the_declared_one_is_said_to_everybody(
     def connect() -> ActionClient:
         ros_node.create_subscription(LoadCheck, f"/{names.LOAD_CHECK}", heard.append, LATCHED)
         ros_node.create_subscription(DiagnosticArray, names.DIAGNOSTICS, diagnosed, 10)
-        return ActionClient(ros_node, ExecuteTrajectory, f"/{names.EXECUTE_TRAJECTORY}", **ACTION_SERVICES)
+        return ActionClient(
+            ros_node, ExecuteTrajectory, f"/{names.EXECUTE_TRAJECTORY}", **ACTION_SERVICES
+        )
 
     client = ros_executor.run(connect)
     wait_for(client.server_is_ready, what="execute_trajectory is offered")
     cell = load_cell("demo")
-    q, rest = np.array(cell.machine_home), np.zeros((2, 6))
+    q = np.array(cell.machine_home)
+    rest = np.zeros((2, 6))
     there = q + np.array([0.0, 0.2, 0.0, 0.0, 0.0, 0.0])
-    trajectory = JointTrajectory.from_seconds(cell.robot.joint_names, [0.0, 1.5], [q, there], rest, rest)
+    trajectory = JointTrajectory.from_seconds(
+        cell.robot.joint_names, [0.0, 1.5], [q, there], rest, rest
+    )
     goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(trajectory), trajectory_id="up")
     sent = ros_executor.run(lambda: client.send_goal_async(goal))
     wait_for(sent.done, what="the goal is taken")
@@ -54,4 +59,6 @@ def test_a_load_that_is_not_the_declared_one_is_said_to_everybody(
     assert (found.trajectory_id, found.load) == ("up", "gripper")
     assert found.sentence in result.error_string
     wait_for(lambda: heard and heard[-1].sentence == found.sentence, what="the topic says the same")
-    wait_for(lambda: any(found.sentence in text for text in warned), what="the diagnostics say the same")
+    wait_for(
+        lambda: any(found.sentence in text for text in warned), what="the diagnostics say the same"
+    )

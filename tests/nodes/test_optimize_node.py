@@ -34,7 +34,9 @@ def client(planner_node: PlannerNode, ros_context: Any) -> Iterator[Client]:
 
 def slow(velocities: bool = True) -> JointTrajectory:
     rest = np.zeros((2, 6)) if velocities else None
-    return JointTrajectory.from_seconds(JOINT_NAMES, [0.0, 20.0], np.stack([HOME, AWAY]), rest, rest)
+    return JointTrajectory.from_seconds(
+        JOINT_NAMES, [0.0, 20.0], np.stack([HOME, AWAY]), rest, rest
+    )
 
 
 def test_points_in_any_order_of_joints_become_a_stored_and_published_trajectory(
@@ -43,7 +45,9 @@ def test_points_in_any_order_of_joints_become_a_stored_and_published_trajectory(
     heard: list[JointTrajectoryMsg] = []
     latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     ros_executor.run(
-        lambda: ros_node.create_subscription(JointTrajectoryMsg, PLANNED_TRAJECTORY, heard.append, latched)
+        lambda: ros_node.create_subscription(
+            JointTrajectoryMsg, PLANNED_TRAJECTORY, heard.append, latched
+        )
     )
     found = client.optimize(slow().reordered(JOINT_NAMES[::-1]), LITTLE)
     assert found.trajectory is None
@@ -69,7 +73,9 @@ def test_a_planned_trajectory_is_taken_by_its_id_and_points_come_where_they_are_
     start = JointState(name=list(JOINT_NAMES), position=HOME.tolist())
     request = PlanRegionalMovement.Request(start=start, goal="A1 60 A2 -90 A3 100 A4 0 A5 20 A6 0")
     planned = client.ask("/ir_planner/plan_regional_movement", request)
-    options = PlanOptions(objective="time", include_points=True, planning_time=60.0, max_iterations=60_000)
+    options = PlanOptions(
+        objective="time", include_points=True, planning_time=60.0, max_iterations=60_000
+    )
     found = client.optimize(planned.trajectory_id, options)
     assert found.trajectory is not None
     assert found.trajectory.trajectory_id == found.trajectory_id
@@ -79,7 +85,9 @@ def test_a_planned_trajectory_is_taken_by_its_id_and_points_come_where_they_are_
 
 
 def test_what_makes_no_sense_is_answered_by_a_sentence(client: Client) -> None:
-    def refused(trajectory: JointTrajectory | str, options: PlanOptions = LITTLE) -> RequestRefusedError:
+    def refused(
+        trajectory: JointTrajectory | str, options: PlanOptions = LITTLE
+    ) -> RequestRefusedError:
         with pytest.raises(RequestRefusedError) as caught:
             client.optimize(trajectory, options)
         return caught.value

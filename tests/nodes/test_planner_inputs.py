@@ -17,7 +17,8 @@ from ir_planner.scene.motion_limits import STILL
 
 
 def test_a_standing_robot_is_one_start_however_its_measurement_trembles() -> None:
-    home, rng = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]), np.random.default_rng(1)
+    home = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
+    rng = np.random.default_rng(1)
     state = LastState()
     seen = set()
     for _ in range(100):
@@ -39,10 +40,13 @@ def test_no_state_and_an_old_one_are_distinguished() -> None:
 
 
 class Busy:
-    """A machine on which a driver is heard only after so many looks; time passes while somebody sleeps."""
+    """A machine on which a driver is heard only after so many looks; time passes while somebody
+    sleeps.
+    """
 
     def __init__(self, after: int, offered: bool = True) -> None:
-        self.looks, self.now = 0, 100.0
+        self.looks = 0
+        self.now = 100.0
         self._after = after
         self.state = LastState(self._look, lambda: offered)
 
@@ -83,7 +87,10 @@ def test_a_driver_that_stays_silent_and_one_that_is_not_there_are_said() -> None
 def test_a_moving_robot_is_no_start_but_a_state() -> None:
     state = LastState()
     state.take(np.zeros(6), 0.0, np.array([0.0, 0.0, -0.3, 0.001, 0.0, 0.0]))
-    sentence = r"the robot is moving: joint_a3 has a velocity of -0\.3 rad/s, it must be 0 rad/s within 0\.01"
+    sentence = (
+        r"the robot is moving: joint_a3 has a velocity of -0\.3 rad/s, it must be 0 rad/s "
+        r"within 0\.01"
+    )
     with pytest.raises(RequestError, match=sentence) as caught:
         state.fresh(0.0, 1.0, JOINT_NAMES)
     assert caught.value.status.code == StatusCode.START_STATE_INVALID
@@ -101,7 +108,9 @@ def test_a_moving_robot_is_no_start_but_a_state() -> None:
     ("velocity", "stated"),
     [([0.1] * 6, True), ([], False), ([float("nan")] * 6, False), ([0.1] * 5, False)],
 )
-def test_joint_states_without_velocities_do_not_state_them(velocity: list[float], stated: bool) -> None:
+def test_joint_states_without_velocities_do_not_state_them(
+    velocity: list[float], stated: bool
+) -> None:
     message = JointState(name=list(JOINT_NAMES), position=[0.0] * 6, velocity=velocity)
     measured = measured_velocity(message, JOINT_NAMES)
     assert (measured is not None) == stated
@@ -117,7 +126,10 @@ def given(**fields: list[float]) -> JointState:
 @pytest.mark.parametrize(
     ("message", "sentence"),
     [
-        (given(velocity=[0.0, float("nan"), 0.0, 0.0, 0.0, 0.0]), r"velocity\[1\] is nan: it must be finite"),
+        (
+            given(velocity=[0.0, float("nan"), 0.0, 0.0, 0.0, 0.0]),
+            r"velocity\[1\] is nan: it must be finite",
+        ),
         (given(velocity=[float("inf")] * 6), r"velocity\[0\] is inf"),
         (given(velocity=[0.0]), "velocity has 1 values: it must have none or as many as 6 joints"),
         (given(position=[], name=[], velocity=[0.0] * 6), "position has 0 values"),
@@ -130,8 +142,11 @@ def test_velocities_of_a_state_are_looked_at(message: JointState, sentence: str)
         assert caught.value.status.code == code
 
 
-def test_a_start_or_goal_that_moves_is_refused_and_a_state_that_moves_is_none_the_less_a_state() -> None:
-    names, position = list(JOINT_NAMES)[::-1], list(CELL.park)[::-1]
+def test_a_start_or_goal_that_moves_is_refused_and_a_state_that_moves_is_none_the_less_a_state() -> (  # noqa: E501
+    None
+):
+    names = list(JOINT_NAMES)[::-1]
+    position = list(CELL.park)[::-1]
     message = given(name=names, position=position, velocity=[0.5, 0.0, 0.0, 0.0, 0.0, 0.0])
     sentence = r"start: joint_a6 has a velocity of 0\.5 rad/s, it must be 0 rad/s within 0\.01"
     with pytest.raises(RequestError, match=sentence):

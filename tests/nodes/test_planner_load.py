@@ -1,4 +1,6 @@
-"""Many requests at once: each is answered, quick ones at once, and what is too much is refused in words."""
+"""Many requests at once: each is answered, quick ones at once, and what is too much is refused in
+words.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,9 @@ def send(
     planner_node: PlannerNode, ros_node: Any, ros_executor: Any, wait_for: Any
 ) -> Callable[[int], list[Any]]:
     """Send goals of the plan action; their accepted handles."""
-    client = ros_executor.run(lambda: ActionClient(ros_node, Plan, "/ir_planner/plan", **ACTION_SERVICES))
+    client = ros_executor.run(
+        lambda: ActionClient(ros_node, Plan, "/ir_planner/plan", **ACTION_SERVICES)
+    )
     wait_for(client.server_is_ready, what="plan is offered")
 
     def goals(count: int) -> list[Any]:
@@ -45,7 +49,8 @@ def send(
 @pytest.fixture
 def go_on(planner_node: PlannerNode, monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     """Plans begin when this is set: what a test does before comes before their end."""
-    event, plan = threading.Event(), planner_node.planner.plan_program
+    event = threading.Event()
+    plan = planner_node.planner.plan_program
 
     def later(*arguments: Any, **more: Any) -> Any:
         *_, cancelled = arguments
@@ -123,10 +128,15 @@ def test_a_thousand_cancels_are_all_answered(
 
 
 def test_a_large_cell_holds_up_no_quick_request(
-    planner_node: PlannerNode, ros_node: Any, ros_executor: Any, wait_for: Any, call: Callable[..., Any]
+    planner_node: PlannerNode,
+    ros_node: Any,
+    ros_executor: Any,
+    wait_for: Any,
+    call: Callable[..., Any],
 ) -> None:
     """Nor when reading it takes for ever."""
-    read, go_on = planner_node.planner._current._read, threading.Event()
+    read = planner_node.planner._current._read
+    go_on = threading.Event()
 
     def held_up(text: str, name: str) -> Cell:
         cell = read(text, name)
@@ -136,7 +146,9 @@ def test_a_large_cell_holds_up_no_quick_request(
     planner_node.planner._current._read = held_up
     client = ros_executor.run(lambda: ros_node.create_client(SetCell, "/ir_planner/set_cell"))
     wait_for(client.service_is_ready, what="set_cell is offered")
-    loading = ros_executor.run(lambda: client.call_async(SetCell.Request(cell_yaml=large_cell(3000))))
+    loading = ros_executor.run(
+        lambda: client.call_async(SetCell.Request(cell_yaml=large_cell(3000)))
+    )
     for _ in range(3):
         assert call(CheckState, "check_state", state=STATE).status.code == Status.SUCCESS
     assert not loading.done()
@@ -148,9 +160,14 @@ def test_a_large_cell_holds_up_no_quick_request(
 
 def large_cell(bodies: int) -> str:
     """A cell of many small boxes, two metres before the robot."""
-    head = "format: ir_cell/1\nname: large\nrobot: kr210_r2700_extra\nequipment:\n- name: m\n  bodies:\n"
+    head = (
+        "format: ir_cell/1\nname: large\nrobot: kr210_r2700_extra\nequipment:\n- name: m\n  "
+        "bodies:\n"
+    )
     row = "  - {{name: b{0}, kind: box, size: [0.01, 0.01, 0.01], xyz: [{1:.2f}, {2:.2f}, 0.02]}}"
-    return head + "\n".join(row.format(k, 3.0 + 0.02 * (k % 100), 0.02 * (k // 100)) for k in range(bodies))
+    return head + "\n".join(
+        row.format(k, 3.0 + 0.02 * (k % 100), 0.02 * (k // 100)) for k in range(bodies)
+    )
 
 
 def test_as_many_calls_at_once_as_may_wait_are_all_answered(
@@ -158,7 +175,9 @@ def test_as_many_calls_at_once_as_may_wait_are_all_answered(
 ) -> None:
     clients = [
         ros_executor.run(
-            lambda: ros_node.create_client(CheckState, "/ir_planner/check_state", qos_profile=SERVICE)
+            lambda: ros_node.create_client(
+                CheckState, "/ir_planner/check_state", qos_profile=SERVICE
+            )
         )
         for _ in range(20)
     ]

@@ -1,4 +1,6 @@
-"""The planner's node over ROS: every service answers what the core answers, and lives through bad input."""
+"""The planner's node over ROS: every service answers what the core answers, and lives through bad
+input.
+"""
 
 from __future__ import annotations
 
@@ -57,7 +59,9 @@ def alive(call: Call) -> bool:
 def pose(x: float, y: float, z: float, frame: str = "cell", w: float = 1.0) -> PoseStamped:
     msg = PoseStamped()
     msg.header.frame_id = frame
-    msg.pose.position.x, msg.pose.position.y, msg.pose.position.z = x, y, z
+    msg.pose.position.x = x
+    msg.pose.position.y = y
+    msg.pose.position.z = z
     msg.pose.orientation.w = w
     return msg
 
@@ -106,7 +110,9 @@ def test_compute_ik_ranks_by_cost_and_reaches_the_pose(call: Call) -> None:
     assert all(solution.clearance > 0.02 - 1e-6 for solution in answer.solutions)
 
 
-def test_the_same_request_gives_the_same_trajectory_and_its_points_can_be_fetched(call: Call) -> None:
+def test_the_same_request_gives_the_same_trajectory_and_its_points_can_be_fetched(
+    call: Call,
+) -> None:
     request = {"start": state(HOME), "goal": "A1 30 A2 -90 A3 90 A4 0 A5 0 A6 0"}
     first = call(PlanRegionalMovement, "plan_regional_movement", **request)
     second = call(PlanRegionalMovement, "plan_regional_movement", **request)
@@ -164,7 +170,10 @@ def test_plan_trajectory_passes_the_reference_points(call: Call) -> None:
         joint_names=list(JOINT_NAMES), points=[JointTrajectoryPoint(positions=q) for q in points]
     )
     answer = call(
-        PlanTrajectory, "plan_trajectory", reference=reference, options=PlanOptions(include_points=True)
+        PlanTrajectory,
+        "plan_trajectory",
+        reference=reference,
+        options=PlanOptions(include_points=True),
     )
     assert answer.status.code == Status.SUCCESS, answer.status.message
     trajectory = trajectory_from_msg(answer.trajectory)
@@ -173,7 +182,9 @@ def test_plan_trajectory_passes_the_reference_points(call: Call) -> None:
     options = PlanOptions(planner_id="genetic")
     notes = [
         s.note
-        for s in call(PlanTrajectory, "plan_trajectory", reference=reference, options=options).info.stages
+        for s in call(
+            PlanTrajectory, "plan_trajectory", reference=reference, options=options
+        ).info.stages
     ]
     assert "planner_id genetic is not used: nothing is searched between given points" in notes
 
@@ -205,9 +216,13 @@ def test_plan_program_and_get_program(call: Call) -> None:
     answer = call(PlanProgram, "plan_program")
     assert answer.status.code == Status.SUCCESS, answer.status.message
     assert all(movement.report.certified for movement in answer.movements)
-    assert sum(movement.report.energy for movement in answer.movements) == pytest.approx(answer.report.energy)
+    assert sum(movement.report.energy for movement in answer.movements) == pytest.approx(
+        answer.report.energy
+    )
     stored = call(GetProgram, "get_program", program_id=answer.program_id, include_points=True)
-    assert [m.trajectory_id for m in stored.movements] == [m.trajectory_id for m in answer.movements]
+    assert [m.trajectory_id for m in stored.movements] == [
+        m.trajectory_id for m in answer.movements
+    ]
     moves = [movement for movement in stored.movements if movement.trajectory_id]
     assert all(movement.trajectory.points for movement in moves)
 
@@ -229,7 +244,9 @@ def test_a_program_comes_with_its_savings_and_its_front(
     assert 0.0 <= answer.gap < 100.0
     compared = call(GetProgram, "get_program", program_id=savings.program_id)
     assert compared.report.energy == pytest.approx(savings.total.planned)
-    assert [point.cycle_time for point in answer.front] == sorted(p.cycle_time for p in answer.front)
+    assert [point.cycle_time for point in answer.front] == sorted(
+        p.cycle_time for p in answer.front
+    )
     assert len(answer.front) == 3
     for point in answer.front:
         stored = call(GetProgram, "get_program", program_id=point.program_id)
@@ -255,7 +272,11 @@ def test_plan_standby_wakes_in_time(call: Call) -> None:
 
 def test_plan_standby_takes_a_length_that_nobody_knows_and_postures(call: Call) -> None:
     answer = call(
-        PlanStandby, "plan_standby", pause_samples=[5.0, 200.0, 4000.0], postures=["park", "home"], pause=0.0
+        PlanStandby,
+        "plan_standby",
+        pause_samples=[5.0, 200.0, 4000.0],
+        postures=["park", "home"],
+        pause=0.0,
     )
     assert answer.status.code == Status.SUCCESS, answer.status.message
     assert answer.clairvoyant <= answer.expected == answer.energy <= answer.worst
@@ -303,7 +324,8 @@ def test_the_action_plans_the_program_with_feedback(
 def test_a_cancelled_plan_stops_and_quick_services_answer_meanwhile(
     plan_action: Any, call: Call, ros_executor: Any, wait_for: Any, planner_node: PlannerNode
 ) -> None:
-    entered, release = threading.Event(), threading.Event()
+    entered = threading.Event()
+    release = threading.Event()
     plan = planner_node.planner.plan_program
 
     def slow(*args: Any, **asked: Any) -> Any:
@@ -351,8 +373,13 @@ def test_late_listeners_get_markers_and_trajectory_and_diagnostics_come(
             )
         )
     wait_for(lambda: len(heard) == 3, what="markers, trajectory and diagnostics")
-    assert trajectory_from_msg(heard["/ir_planner/planned_trajectory"]).trajectory_id == plan.trajectory_id
-    assert {"lathe", "zones", "stations"} <= {marker.ns for marker in heard["/ir_planner/markers"].markers}
+    assert (
+        trajectory_from_msg(heard["/ir_planner/planned_trajectory"]).trajectory_id
+        == plan.trajectory_id
+    )
+    assert {"lathe", "zones", "stations"} <= {
+        marker.ns for marker in heard["/ir_planner/markers"].markers
+    }
     assert heard["/diagnostics"].status[0].name == "ir_planner"
 
 
@@ -369,7 +396,14 @@ BAD: list[tuple[str, Any, str, dict[str, Any], int, str]] = [
         -16,
         "exactly one",
     ),
-    ("no goal", PlanRegionalMovement, "plan_regional_movement", {"start": state(HOME)}, -16, "exactly one"),
+    (
+        "no goal",
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        {"start": state(HOME)},
+        -16,
+        "exactly one",
+    ),
     (
         "unknown goal",
         PlanRegionalMovement,
@@ -418,7 +452,14 @@ BAD: list[tuple[str, Any, str, dict[str, Any], int, str]] = [
         -27,
         "goal_state: joint_a1",
     ),
-    ("nan velocity of a state", CheckState, "check_state", {"state": moving(NAN)}, -17, "velocity[0] is nan"),
+    (
+        "nan velocity of a state",
+        CheckState,
+        "check_state",
+        {"state": moving(NAN)},
+        -17,
+        "velocity[0] is nan",
+    ),
     (
         "nan velocity of near",
         ComputeIk,
@@ -551,7 +592,14 @@ BAD: list[tuple[str, Any, str, dict[str, Any], int, str]] = [
         "shortest",
     ),
     ("unknown cell", SetCell, "set_cell", {"cell_file": "atlantis"}, -19, "demo"),
-    ("broken cell", SetCell, "set_cell", {"cell_yaml": "format: ir_cell/1\nname: [1"}, -16, "<text>:3"),
+    (
+        "broken cell",
+        SetCell,
+        "set_cell",
+        {"cell_yaml": "format: ir_cell/1\nname: [1"},
+        -16,
+        "<text>:3",
+    ),
     ("no cell given", SetCell, "set_cell", {}, -16, "neither"),
     ("unknown machine", SetEquipment, "set_equipment", {"name": "crane"}, -19, "lathe"),
     (
@@ -562,7 +610,14 @@ BAD: list[tuple[str, Any, str, dict[str, Any], int, str]] = [
         -19,
         "door_open",
     ),
-    ("state of five joints", CheckState, "check_state", {"state": JointState(position=HOME[:5])}, -17, "5"),
+    (
+        "state of five joints",
+        CheckState,
+        "check_state",
+        {"state": JointState(position=HOME[:5])},
+        -17,
+        "5",
+    ),
     (
         "unknown station of a state",
         CheckState,
@@ -580,7 +635,14 @@ BAD: list[tuple[str, Any, str, dict[str, Any], int, str]] = [
         -16,
         "analytic",
     ),
-    ("unknown trajectory", GetTrajectory, "get_trajectory", {"trajectory_id": "feedbeef"}, -19, "feedbeef"),
+    (
+        "unknown trajectory",
+        GetTrajectory,
+        "get_trajectory",
+        {"trajectory_id": "feedbeef"},
+        -19,
+        "feedbeef",
+    ),
     ("unknown program", GetProgram, "get_program", {"program_id": "feedbeef"}, -19, "feedbeef"),
     ("no trajectory", EvaluateTrajectory, "evaluate_trajectory", {}, -16, "exactly one"),
     ("empty reference", PlanTrajectory, "plan_trajectory", {}, -2, "joint names"),
@@ -613,11 +675,22 @@ BAD: list[tuple[str, Any, str, dict[str, Any], int, str]] = [
         "reference of wrong joints",
         PlanTrajectory,
         "plan_trajectory",
-        {"reference": JointTrajectory(joint_names=["x"], points=[JointTrajectoryPoint(positions=[0.0])])},
+        {
+            "reference": JointTrajectory(
+                joint_names=["x"], points=[JointTrajectoryPoint(positions=[0.0])]
+            )
+        },
         -2,
         "joint_a1",
     ),
-    ("unknown station in a program", PlanProgram, "plan_program", {"stations": ["moon"]}, -19, "lathe_work"),
+    (
+        "unknown station in a program",
+        PlanProgram,
+        "plan_program",
+        {"stations": ["moon"]},
+        -19,
+        "lathe_work",
+    ),
     (
         "nan cycle time",
         PlanProgram,

@@ -1,4 +1,6 @@
-"""The paper's planners over ROS: the bytes of the library, or a sentence that says how to install OMPL."""
+"""The paper's planners over ROS: the bytes of the library, or a sentence that says how to install
+OMPL.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ from ir_planner import Goal, Planner
 from ir_planner.search import SEARCHES, repeatable
 from ir_planner.search.with_ompl import host
 
-SEED, WORK = 11, 3000  # checks: enough for this task
+# checks: enough for this task
+SEED = 11
+WORK = 3000
 CHEAP = ("sbl", "kpiece", "rrt_connect")
 OTHERS = ("bkpiece", "lbkpiece", "prm", "rrt", "aorrtc")
 
@@ -37,7 +41,13 @@ def over_ros(call: Callable[..., Any], task: Task, name: str) -> Any:
     names = [f"joint_a{k}" for k in range(1, 7)]
     start, goal = (JointState(name=names, position=list(q)) for q in (task.start, task.goal))
     options = PlanOptions(planner_id=name, seed=SEED, max_iterations=WORK)
-    return call(PlanRegionalMovement, "plan_regional_movement", start=start, goal_state=goal, options=options)
+    return call(
+        PlanRegionalMovement,
+        "plan_regional_movement",
+        start=start,
+        goal_state=goal,
+        options=options,
+    )
 
 
 def check(call: Callable[..., Any], names: tuple[str, ...]) -> None:

@@ -65,7 +65,10 @@ def test_a_loop_ends_when_it_is_asked_to(
     heard: list[Any] = []
     ros_node.create_subscription(Float64, "/value", heard.append, 100)
     player = PlayNode(
-        recorded(tmp_path / "a.mcap"), PlaySettings(rate=50.0, loop=True), delay=0.0, context=ros_context
+        recorded(tmp_path / "a.mcap"),
+        PlaySettings(rate=50.0, loop=True),
+        delay=0.0,
+        context=ros_context,
     )
     ros_executor.add_node(player)
     player.start()
@@ -89,7 +92,11 @@ def test_commands_are_left_out_unless_they_are_named(
     ros_context: Any, ros_executor: Any, wait_for: Any, tmp_path: Path
 ) -> None:
     recording = with_commands(tmp_path / "a.mcap")
-    for topics, count in (((), 5), (("/ir_sim_driver/*",), 0), (("/ir_sim_driver/speed_scaling",), 5)):
+    for topics, count in (
+        ((), 5),
+        (("/ir_sim_driver/*",), 0),
+        (("/ir_sim_driver/speed_scaling",), 5),
+    ):
         player = PlayNode(recording, PlaySettings(topics=topics), delay=0.0, context=ros_context)
         player.start()
         wait_for(lambda player=player: not player.playing)

@@ -128,7 +128,9 @@ def test_only_the_recorders_own_cell_is_recorded(
     wait_for: Any,
     tmp_path: Path,
 ) -> None:
-    recorder = ros_executor.add_node(RecorderNode(settings, context=ros_context, namespace="cell_1"))
+    recorder = ros_executor.add_node(
+        RecorderNode(settings, context=ros_context, namespace="cell_1")
+    )
     ros_executor.run(lambda: recorder.start(str(tmp_path / "own.mcap")))
     diagnostics = ros_node.create_publisher(DiagnosticArray, "/diagnostics", 10)
     rosout = ros_node.create_publisher(Log, "/rosout", LATCHED)
@@ -149,7 +151,9 @@ def test_only_the_recorders_own_cell_is_recorded(
     rosout.publish(Log(name="cell_1.ir_planner", msg="last"))
 
     def own_have_come() -> bool:
-        """The last word, and of each other topic the cell's own message, which comes when it likes."""
+        """The last word, and of each other topic the cell's own message, which comes when it
+        likes.
+        """
         ends = {"/rosout": b"last", "/diagnostics": b"cell_1/", "/parameter_events": b"/cell_1/"}
         return all(
             any(end in message for message in so_far(tmp_path / "own.mcap", topic))
@@ -164,7 +168,10 @@ def test_only_the_recorders_own_cell_is_recorded(
     assert {s.name.partition("/")[0] for message in said for s in message.status} == {"cell_1"}
     logs = [deserialize_message(m, Log).name for m in raw.channel("/rosout").messages]
     assert {name.partition(".")[0] for name in logs} == {"cell_1"}
-    nodes = [deserialize_message(m, ParameterEvent).node for m in raw.channel("/parameter_events").messages]
+    nodes = [
+        deserialize_message(m, ParameterEvent).node
+        for m in raw.channel("/parameter_events").messages
+    ]
     assert {name.split("/")[1] for name in nodes} == {"cell_1"}
 
 
@@ -229,7 +236,9 @@ def test_wanted_topics_that_nobody_publishes_are_named_and_recorded_when_they_co
     assert stopped.status.message.endswith("no publisher was seen of /elsewhere/*")
 
 
-def test_a_missing_directory_is_named_and_not_made(recorder: RecorderNode, call: Any, tmp_path: Path) -> None:
+def test_a_missing_directory_is_named_and_not_made(
+    recorder: RecorderNode, call: Any, tmp_path: Path
+) -> None:
     refused = start(call, tmp_path / "no" / "such" / "a.mcap")
     assert refused.status.code == StatusCode.FAILURE
     assert f"there is no directory {tmp_path / 'no' / 'such'}" in refused.status.message
@@ -269,7 +278,12 @@ def test_a_request_writes_only_below_the_roots_and_replaces_only_recordings(
 
 
 def test_parameters_of_the_nodes_are_attached(
-    recorder: RecorderNode, ros_context: Any, ros_executor: Any, call: Any, wait_for: Any, tmp_path: Path
+    recorder: RecorderNode,
+    ros_context: Any,
+    ros_executor: Any,
+    call: Any,
+    wait_for: Any,
+    tmp_path: Path,
 ) -> None:
     planner = Node("ir_planner", context=ros_context)
     planner.declare_parameter("safety_distance", 0.031)
@@ -335,7 +349,8 @@ def test_the_planners_cell_is_attached(
 ) -> None:
     def answer(request: GetCell.Request, response: GetCell.Response) -> GetCell.Response:
         response.status.code = int(StatusCode.SUCCESS)
-        response.cell_yaml, response.robot_description = "name: here", "<robot/>"
+        response.cell_yaml = "name: here"
+        response.robot_description = "<robot/>"
         return response
 
     ros_node.create_service(GetCell, "/ir_planner/get_cell", answer)
@@ -348,13 +363,17 @@ def test_the_planners_cell_is_attached(
     assert "ir_planner" in raw.fact("packages")
 
 
-def test_an_unknown_cell_is_refused_before_a_file_is_made(recorder: RecorderNode, tmp_path: Path) -> None:
+def test_an_unknown_cell_is_refused_before_a_file_is_made(
+    recorder: RecorderNode, tmp_path: Path
+) -> None:
     with pytest.raises(PathError, match="nowhere"):
         recorder.start(str(tmp_path / "d.mcap"), cell="nowhere")
     assert not (tmp_path / "d.mcap").exists()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)]
+)
 def test_ir_record_finishes_its_file_on_signals(number: int, tmp_path: Path, wait_for: Any) -> None:
     path = tmp_path / "signals.mcap"
     environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}
@@ -384,7 +403,9 @@ def test_ir_record_finishes_its_file_on_signals(number: int, tmp_path: Path, wai
 def test_ir_record_ends_with_1_when_the_disk_is_full(
     tmp_path: Path, ros_domain_id: int, wait_for: Any
 ) -> None:
-    """A limit on the size of files stands for the full disk; what the middleware shares is smaller."""
+    """A limit on the size of files stands for the full disk; what the middleware shares is
+    smaller.
+    """
     path = tmp_path / "full.mcap"
     environment = {
         **os.environ,
@@ -439,10 +460,14 @@ def test_recordings_leave_no_objects_behind(
     recorder: RecorderNode, ros_node: Any, ros_executor: Any, wait_for: Any, tmp_path: Path
 ) -> None:
     topics = [f"/ir_planner/talk_{k}" for k in range(5)]
-    publishers = ros_executor.run(lambda: [ros_node.create_publisher(String, topic, 1) for topic in topics])
+    publishers = ros_executor.run(
+        lambda: [ros_node.create_publisher(String, topic, 1) for topic in topics]
+    )
 
     def record() -> int:
-        ros_executor.run(lambda: recorder.start(str(tmp_path / "s.mcap"), overwrite=True, topics=topics))
+        ros_executor.run(
+            lambda: recorder.start(str(tmp_path / "s.mcap"), overwrite=True, topics=topics)
+        )
         wait_for(lambda: all(each.get_subscription_count() for each in publishers))
         ros_executor.run(recorder.finish)
         gc.collect()
@@ -453,7 +478,11 @@ def test_recordings_leave_no_objects_behind(
 
 
 def test_a_command_beside_the_recorder_has_a_name_of_its_own_and_offers_no_services(
-    recorder: RecorderNode, settings: RecorderSettings, ros_context: Any, ros_executor: Any, ros_node: Any
+    recorder: RecorderNode,
+    settings: RecorderSettings,
+    ros_context: Any,
+    ros_executor: Any,
+    ros_node: Any,
 ) -> None:
     command = ros_executor.add_node(RecorderNode(settings, name=COMMAND_NODE, context=ros_context))
     assert command.get_name() != recorder.get_name()
@@ -462,5 +491,8 @@ def test_a_command_beside_the_recorder_has_a_name_of_its_own_and_offers_no_servi
         found = ros_node.get_service_names_and_types_by_node(node, "/")
         return {types[0] for _, types in found if types[0].startswith("ir_msgs/")}
 
-    assert offered(recorder.get_name()) == {"ir_msgs/srv/StartRecording", "ir_msgs/srv/StopRecording"}
+    assert offered(recorder.get_name()) == {
+        "ir_msgs/srv/StartRecording",
+        "ir_msgs/srv/StopRecording",
+    }
     assert offered(command.get_name()) == set()

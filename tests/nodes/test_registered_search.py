@@ -1,4 +1,6 @@
-"""A search that is registered is planned with over ROS, refused by name when misspelt, and documented."""
+"""A search that is registered is planned with over ROS, refused by name when misspelt, and
+documented.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 class OverTheTop:
     """The arm is lifted at both ends, then the first joint turns."""
 
-    lift: float = setting(0.3, "How far joint 2 lifts the arm.", unit="rad", minimum=0.0, maximum=1.0)
+    lift: float = setting(
+        0.3, "How far joint 2 lifts the arm.", unit="rad", minimum=0.0, maximum=1.0
+    )
 
     def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
         up = np.array([0.0, -self.lift, 0.0, 0.0, 0.0, 0.0])
@@ -44,7 +48,9 @@ def ask(call: Callable[..., Any], planner_id: str) -> Any:
     start = JointState(name=[f"joint_a{k}" for k in range(1, 7)], position=list(HOME))
     options = PlanOptions(planner_id=planner_id)
     goal = "A1 30 A2 -100 A3 100 A4 0 A5 20 A6 0"
-    return call(PlanRegionalMovement, "plan_regional_movement", start=start, goal=goal, options=options)
+    return call(
+        PlanRegionalMovement, "plan_regional_movement", start=start, goal=goal, options=options
+    )
 
 
 def test_it_is_planned_with(call: Callable[..., Any]) -> None:

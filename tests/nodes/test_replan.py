@@ -1,5 +1,5 @@
-"""Law: what a recording holds is enough to plan the same again: start states that were known, seeds that were
-drawn, parameters and cells that were changed meanwhile.
+"""Law: what a recording holds is enough to plan the same again: start states that were known, seeds
+that were drawn, parameters and cells that were changed meanwhile.
 """
 
 from __future__ import annotations
@@ -48,9 +48,13 @@ def recording(
     ros_executor.run(lambda: planner_node.set_parameters(patient))
     calls = f"/{names.PLANNER}/{names.CALLS}"
     wait_for(lambda: recorder.cell_attached, what="the cell is attached")
-    wait_for(lambda: recorder.attached("ir_planner.parameters.yaml"), what="the parameters are attached")
+    wait_for(
+        lambda: recorder.attached("ir_planner.parameters.yaml"), what="the parameters are attached"
+    )
     wait_for(lambda: ros_node.count_subscribers(calls), what="the recorder listens to the calls")
-    wait_for(lambda: ros_node.count_subscribers(names.JOINT_STATES) >= 2, what="both listen to the robot")
+    wait_for(
+        lambda: ros_node.count_subscribers(names.JOINT_STATES) >= 2, what="both listen to the robot"
+    )
     joints = list(cell.robot.joint_names)
     message = JointState(name=joints, position=STATE.tolist(), velocity=[0.0] * 6)
 
@@ -67,16 +71,26 @@ def recording(
     machine = cell.equipment[0]
     call(SetEquipment, "set_equipment", name=machine.name, enabled=False, state=machine.state or "")
     ros_executor.run(
-        lambda: planner_node.set_parameters([Parameter("torque_reserve", Parameter.Type.DOUBLE, 0.2)])
+        lambda: planner_node.set_parameters(
+            [Parameter("torque_reserve", Parameter.Type.DOUBLE, 0.2)]
+        )
     )
     wait_for(standing, what="the robot stands still")
     call(PlanRegionalMovement, "plan_regional_movement", goal="park", options=drawn)
     station = cell.stations[-1].name
-    call(PlanServiceMovement, "plan_service_movement", station=station, direction="exit", max_candidates=1)
+    call(
+        PlanServiceMovement,
+        "plan_service_movement",
+        station=station,
+        direction="exit",
+        max_candidates=1,
+    )
 
     def arrived() -> int:
         channel = read_raw(tmp_path / "a.mcap").channel(calls)
-        kinds = [deserialize_message(m, RecordedCall).type for m in channel.messages] if channel else []
+        kinds = (
+            [deserialize_message(m, RecordedCall).type for m in channel.messages] if channel else []
+        )
         return sum("Plan" in kind or "Optimize" in kind for kind in kinds)
 
     wait_for(lambda: arrived() == 4, what="all calls are in the file")

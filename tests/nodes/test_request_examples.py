@@ -29,10 +29,15 @@ LINE = re.compile(r'# ros2 service call (\S+) (\S+) "(.*)"')
 PROGRAM = "PlanProgram"  # with its savings it takes as long as all others together
 UNKNOWN = "0123456789abcdef"  # the id that examples give
 LATER: set[str] = set()  # defined before a node offers it
-DRIVER = {"cell": "demo", "backend": "ideal", "wake_port": 0, "transitions.stand_on_brakes_minimum_stay": 0.1}
+DRIVER = {
+    "cell": "demo",
+    "backend": "ideal",
+    "wake_port": 0,
+    "transitions.stand_on_brakes_minimum_stay": 0.1,
+}
 
-# in this order: a pause ends before a bit is set, a recording starts before it stops; code and a word of the
-# sentence
+# in this order: a pause ends before a bit is set, a recording starts before it stops; code and a
+# word of the sentence
 EXPECTED: dict[str, tuple[int, str]] = {
     "SetCell": (Status.SUCCESS, ""),
     "GetCell": (Status.SUCCESS, ""),
@@ -97,7 +102,9 @@ def test_the_examples_are_answered_as_they_should(
     overrides = [Parameter(name, value=value) for name, value in DRIVER.items()]
     ros_executor.add_node(SimDriver(context=ros_context, parameter_overrides=overrides))
     ros_executor.add_node(RecorderNode(RecorderSettings(), context=ros_context))
-    player = PlayNode(recorded(tmp_path / "played.mcap"), PlaySettings(loop=True), context=ros_context)
+    player = PlayNode(
+        recorded(tmp_path / "played.mcap"), PlaySettings(loop=True), context=ros_context
+    )
     ros_executor.add_node(player).start()
     wait_for(lambda: ros_node.count_publishers(f"/{names.JOINT_STATES}"), what="joint_states come")
 
@@ -111,7 +118,9 @@ def test_the_examples_are_answered_as_they_should(
     for name, (code, word) in asked.items():
         service, type_text, text = example(name)
         kind = interface_type(type_text, "srv")
-        client = ros_executor.run(lambda kind=kind, service=service: ros_node.create_client(kind, service))
+        client = ros_executor.run(
+            lambda kind=kind, service=service: ros_node.create_client(kind, service)
+        )
         wait_for(client.service_is_ready, what=f"{service} is ready")
         request = message_from_yaml(kind.Request, text)
         future = ros_executor.run(lambda client=client, request=request: client.call_async(request))

@@ -1,4 +1,6 @@
-"""The SROS 2 policy: of the form that its schema asks for, and no more or less than what the nodes open."""
+"""The SROS 2 policy: of the form that its schema asks for, and no more or less than what the nodes
+open.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +49,9 @@ NOT_OPEN_HERE = {
 
 @pytest.fixture(scope="module")
 def tool() -> Any:
-    spec = importlib.util.spec_from_file_location("security_policy", ROOT / "tools" / "security_policy.py")
+    spec = importlib.util.spec_from_file_location(
+        "security_policy", ROOT / "tools" / "security_policy.py"
+    )
     assert spec is not None
     assert spec.loader is not None
     module = sys.modules["security_policy"] = importlib.util.module_from_spec(spec)
@@ -56,7 +60,9 @@ def tool() -> Any:
 
 
 def check_form(element: Xml.Element) -> None:
-    """Raise AssertionError where the schema does not allow the element, its attributes or its children."""
+    """Raise AssertionError where the schema does not allow the element, its attributes or its
+    children.
+    """
     if element.tag in RIGHTS:
         assert element.attrib
         assert set(element.attrib) <= RIGHTS[element.tag]
@@ -72,7 +78,9 @@ def check_form(element: Xml.Element) -> None:
         check_form(child)
 
 
-def test_the_installed_policy_is_what_the_names_say_and_has_the_form_of_the_schema(tool: Any) -> None:
+def test_the_installed_policy_is_what_the_names_say_and_has_the_form_of_the_schema(
+    tool: Any,
+) -> None:
     text = tool.FILE.read_text(encoding="utf-8")
     assert text == tool.policy()
     for policy in (text, tool.policy("/cell_1")):

@@ -1,4 +1,6 @@
-"""plan_service_movement and compute_ik by ccd over ROS: candidates, ids, markers, and every refusal."""
+"""plan_service_movement and compute_ik by ccd over ROS: candidates, ids, markers, and every
+refusal.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,9 @@ def test_exit_and_entry_are_certified_and_their_points_can_be_fetched(call: Call
 
 def test_the_same_seed_gives_the_same_trajectory_id(call: Call) -> None:
     request = {"station": "lathe_work", "options": PlanOptions(seed=7), "max_candidates": 1}
-    ids = {call(PlanServiceMovement, SERVICE, **request).candidates[0].trajectory_id for _ in range(2)}
+    ids = {
+        call(PlanServiceMovement, SERVICE, **request).candidates[0].trajectory_id for _ in range(2)
+    }
     assert len(ids) == 1
 
 
@@ -48,7 +52,9 @@ def test_markers_show_the_zone_the_candidates_and_their_closest_pairs(
     seen: list[MarkerArray] = []
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     ros_executor.run(
-        lambda: ros_node.create_subscription(MarkerArray, "/ir_planner/markers", seen.append, latched)
+        lambda: ros_node.create_subscription(
+            MarkerArray, "/ir_planner/markers", seen.append, latched
+        )
     )
     answer = call(PlanServiceMovement, SERVICE, station="lathe_work", max_candidates=2)
     wanted = {"service_zone", "service_candidates", "service_closest", "zones"}
@@ -79,7 +85,11 @@ def test_ccd_finds_what_the_closed_form_has(call: Call) -> None:
     [
         ({"station": "nowhere"}, Status.INVALID_OBJECT_NAME, "lathe_work"),
         ({"station": "lathe_work", "direction": "up"}, Status.INVALID_GOAL_CONSTRAINTS, "entry"),
-        ({"station": "lathe_work", "max_candidates": 0}, Status.INVALID_GOAL_CONSTRAINTS, "max_candidates"),
+        (
+            {"station": "lathe_work", "max_candidates": 0},
+            Status.INVALID_GOAL_CONSTRAINTS,
+            "max_candidates",
+        ),
         (
             {"station": "lathe_work", "options": PlanOptions(planner_id="magic")},
             Status.INVALID_GOAL_CONSTRAINTS,
@@ -88,7 +98,9 @@ def test_ccd_finds_what_the_closed_form_has(call: Call) -> None:
         (
             {
                 "station": "lathe_work",
-                "configuration": JointState(name=list(JOINT_NAMES), position=[9.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+                "configuration": JointState(
+                    name=list(JOINT_NAMES), position=[9.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+                ),
             },
             Status.INVALID_ROBOT_STATE,
             "deg",

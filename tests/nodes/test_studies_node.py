@@ -1,4 +1,6 @@
-"""The node of studies over ROS: settings of the command, progress, cancel, files below its folder."""
+"""The node of studies over ROS: settings of the command, progress, cancel, files below its
+folder.
+"""
 
 from __future__ import annotations
 
@@ -77,7 +79,9 @@ def send(client: Any, ros_executor: Any, wait_for: Any) -> Goal:
             if feedback is not None:
                 feedback.append(message.feedback)
 
-        request = RunStudy.Goal(**{"kind": "layout", "settings": SETTINGS, "output_folder": "a", **fields})
+        request = RunStudy.Goal(
+            **{"kind": "layout", "settings": SETTINGS, "output_folder": "a", **fields}
+        )
         future = ros_executor.run(lambda: client.send_goal_async(request, feedback_callback=heard))
         wait_for(future.done, what="the goal is accepted")
         return future.result()
@@ -111,7 +115,10 @@ def test_a_study_is_made_with_progress_and_its_files_lie_below_the_output(
     assert list(result.files) == ["table.csv", "best_1.yaml", "index.html"]
     assert all((tmp_path / "out" / "a" / name).is_file() for name in result.files)
     assert result.table.startswith("rank,placement,")
-    wait_for(lambda: any(one.phase.startswith("error bars") for one in feedback), what="the last progress")
+    wait_for(
+        lambda: any(one.phase.startswith("error bars") for one in feedback),
+        what="the last progress",
+    )
     assert all(one.done <= one.total for one in feedback)
 
 
@@ -124,13 +131,22 @@ def test_a_study_is_made_with_progress_and_its_files_lie_below_the_output(
         ({"settings": "{["}, "is no YAML"),
         ({"settings": "!!python/object/apply:os.system [id]"}, "is no YAML"),
         ({"settings": SETTINGS + "a: &a [1]\nb: *a\n"}, "aliases are not read"),
-        ({"settings": SETTINGS.replace("demo", "/etc/passwd")}, "outside of the folders that may be used"),
-        ({"settings": SETTINGS.replace("demo", "../x.yaml")}, "outside of the folders that may be used"),
+        (
+            {"settings": SETTINGS.replace("demo", "/etc/passwd")},
+            "outside of the folders that may be used",
+        ),
+        (
+            {"settings": SETTINGS.replace("demo", "../x.yaml")},
+            "outside of the folders that may be used",
+        ),
         (
             {"kind": "statistics", "settings": PLANT.format("/etc/passwd")},
             "outside of the folders that may be",
         ),
-        ({"kind": "statistics", "settings": PLANT.format("../x.yaml")}, "outside of the folders that may be"),
+        (
+            {"kind": "statistics", "settings": PLANT.format("../x.yaml")},
+            "outside of the folders that may be",
+        ),
         ({"settings": SETTINGS.replace("20", "1000000000")}, "placements is 1000000000"),
         ({"output_folder": "/etc"}, "outside of the folders that may be used"),
         ({"output_folder": "../b"}, "outside of the folders that may be used"),

@@ -1,4 +1,6 @@
-"""The frames on tf and tf_static; tf2_msgs has no wheel, so messages and publishers are stand-ins here."""
+"""The frames on tf and tf_static; tf2_msgs has no wheel, so messages and publishers are stand-ins
+here.
+"""
 
 from __future__ import annotations
 
@@ -31,11 +33,13 @@ class Listener:
     """A node that keeps what its publishers publish, by topic."""
 
     def __init__(self):
-        self.heard, self.qualities = {}, {}
+        self.heard = {}
+        self.qualities = {}
 
     def create_publisher(self, message_type, topic, quality):
         assert message_type is Frames
-        self.heard[topic], self.qualities[topic] = [], quality
+        self.heard[topic] = []
+        self.qualities[topic] = quality
         return self.Publisher(self.heard[topic])
 
     class Publisher:
@@ -55,7 +59,8 @@ def tree(*messages):
     found = {}
     for message in messages:
         for each in message.transforms:
-            place, turned = each.transform.translation, each.transform.rotation
+            place = each.transform.translation
+            turned = each.transform.rotation
             pose = np.eye(4)
             pose[:3, 3] = place.x, place.y, place.z
             pose[:3, :3] = Rotation.from_quat((turned.x, turned.y, turned.z, turned.w)).as_matrix()

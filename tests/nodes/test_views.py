@@ -1,6 +1,8 @@
-"""The Foxglove layout and the RViz configuration show what a cell's nodes publish, and that can be drawn.
+"""The Foxglove layout and the RViz configuration show what a cell's nodes publish, and that can be
+drawn.
 
-Form of a layout: that which Foxglove exports (configById, layout, and the panels' own settings); of a
+Form of a layout: that which Foxglove exports (configById, layout, and the panels' own settings); of
+a
 configuration: rviz_common's displays with the type of message that each takes.
 """
 
@@ -53,7 +55,11 @@ def topics(ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any) ->
     made(PlannerNode, cell="demo")
     made(SimDriver, cell="demo", backend="ideal", wake_port=0)
     made(ProgramRunnerNode)
-    wait_for(lambda: {"ir_planner", "ir_sim_driver", "ir_program_runner"} <= set(ros_node.get_node_names()))
+    wait_for(
+        lambda: (
+            {"ir_planner", "ir_sim_driver", "ir_program_runner"} <= set(ros_node.get_node_names())
+        )
+    )
     return {
         name: types[0]
         for name, types in ros_node.get_topic_names_and_types()
@@ -157,7 +163,9 @@ def test_robot_and_cell_can_be_drawn(
             heard[topic] = message
 
         qos = QoSProfile(depth=1) if "robot_markers" in topic else LATCHED
-        ros_executor.run(lambda k=kind, t=topic, c=take, q=qos: ros_node.create_subscription(k, t, c, q))
+        ros_executor.run(
+            lambda k=kind, t=topic, c=take, q=qos: ros_node.create_subscription(k, t, c, q)
+        )
     wait_for(lambda: len(heard) == 3, what="markers of cell and robot, and the URDF")
     for topic in ("/ir_planner/markers", "/ir_sim_driver/robot_markers"):
         markers = [m for m in heard[topic].markers if m.action == Marker.ADD]
@@ -166,13 +174,17 @@ def test_robot_and_cell_can_be_drawn(
         for marker in markers:
             check_drawable(marker)
     root = Xml.fromstring(heard["/robot_description"].data)
-    links, children = {x.get("name") for x in root.iter("link")}, {x.get("link") for x in root.iter("child")}
+    links = {x.get("name") for x in root.iter("link")}
+    children = {x.get("link") for x in root.iter("child")}
     assert links - children == {WORLD_FRAME}
 
 
 def check_drawable(marker: Any) -> None:
-    """What RViz and Foxglove ask of a marker: a frame, a rotation, a size, a colour that is seen."""
-    turn, size = marker.pose.orientation, marker.scale
+    """What RViz and Foxglove ask of a marker: a frame, a rotation, a size, a colour that is
+    seen.
+    """
+    turn = marker.pose.orientation
+    size = marker.scale
     assert marker.header.frame_id == WORLD_FRAME
     assert math.hypot(turn.x, turn.y, turn.z, turn.w) == pytest.approx(1.0, abs=1e-6)
     assert marker.color.a > 0.0 or (marker.colors and all(c.a > 0.0 for c in marker.colors))

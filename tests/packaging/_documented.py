@@ -1,4 +1,6 @@
-"""The command lines of `ir` in README and docs, and which of them are not run by the walk through a page."""
+"""The command lines of `ir` in README and docs, and which of them are not run by the walk through a
+page.
+"""
 
 from __future__ import annotations
 
@@ -18,15 +20,20 @@ ABSENT = ("[", "…", "...", "COMMAND")  # of lines that show a pattern, not a c
 NODES = "needs running nodes"
 NOT_RUN = {
     r"(up|demo)\b.*": "starts nodes: tests/system/test_readme.py, tests/system/test_demo.py",
-    r"(call|echo|list|send_goal|front|live)\b.*": f"{NODES}: tests/system/test_readme.py, tests/system",
+    r"(call|echo|list|send_goal|front|live)\b.*": f"{NODES}: tests/system/test_readme.py, "
+    "tests/system",
     r"view\b.*": "waits for a browser until Ctrl-C: tests/cli/test_view.py",
     r"study .* --scheduler .*": "needs a cluster: tests/studies",
-    r"(study layout layout|study statistics statistics|arena arena).yaml -o .*": "minutes: tests/studies",
+    r"(study layout layout|study statistics statistics|arena arena).yaml -o "
+    r".*": "minutes: tests/studies",
     r"arena --quick": "two minutes: tests/cli/test_arena_command.py, tests/studies",
-    r"energy fit (run\.mcap|joints\.csv) .*": "needs a meter: tests/recorder/test_measuring_page.py",
+    r"energy fit (run\.mcap|joints\.csv) "
+    r".*": "needs a meter: tests/recorder/test_measuring_page.py",
     r"energy excite .*": "takes minutes: tests/recorder/test_measuring_page.py, shorter",
-    r"energy (drive|fit) out/excitation.*": "follows from excite: tests/recorder/test_measuring_page.py",
-    r".* --power-parameters out/press_line_2.yaml": "follows from fit: tests/recorder/test_measuring_page.py",
+    r"energy (drive|fit) "
+    r"out/excitation.*": "follows from excite: tests/recorder/test_measuring_page.py",
+    r".* --power-parameters "
+    r"out/press_line_2.yaml": "follows from fit: tests/recorder/test_measuring_page.py",
 }
 """Command lines that the walk leaves out, as patterns, and why: where they are tried instead."""
 
@@ -59,7 +66,10 @@ class Line:
         """Why it is not run; empty: it is."""
         texts = [" ".join(words) for words in self.commands]
         found = (
-            why for pattern, why in NOT_RUN.items() for text in texts if re.fullmatch(pattern, text, re.S)
+            why
+            for pattern, why in NOT_RUN.items()
+            for text in texts
+            if re.fullmatch(pattern, text, re.S)
         )
         return next(found, "")
 
@@ -70,7 +80,8 @@ def lines(page: Path) -> Iterator[Line]:
     rest = iter(page.read_text("utf-8").splitlines())
     for line in rest:
         if line.startswith("```"):
-            fenced, shell = not fenced, FENCE.match(line) is not None
+            fenced = not fenced
+            shell = FENCE.match(line) is not None
         found = LINE.match(line)
         if found is None or (fenced and not shell) or not (fenced or line.startswith("    ")):
             continue

@@ -43,7 +43,9 @@ def parsed(module: Path) -> ast.Module:
 
 
 def imports(tree: ast.AST) -> Iterator[tuple[str, int]]:
-    """Names that a module imports, also inside functions and under TYPE_CHECKING, each with its line."""
+    """Names that a module imports, also inside functions and under TYPE_CHECKING, each with its
+    line.
+    """
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from ((alias.name, node.lineno) for alias in node.names)
@@ -54,13 +56,19 @@ def imports(tree: ast.AST) -> Iterator[tuple[str, int]]:
 def is_ros(name: str) -> bool:
     """True for rclpy and generated messages, ir_msgs among them."""
     top = name.partition(".")[0]
-    return top in ("rclpy", "ir_msgs", "std_srvs", "builtin_interfaces", "rcl_interfaces") or top.endswith(
-        "_msgs"
-    )
+    return top in (
+        "rclpy",
+        "ir_msgs",
+        "std_srvs",
+        "builtin_interfaces",
+        "rcl_interfaces",
+    ) or top.endswith("_msgs")
 
 
 def may_know_ros(package: str, module: Path) -> bool:
-    """Nodes and their rooms, parameters, the ROS side of the vocabulary; the command line knows all."""
+    """Nodes and their rooms, parameters, the ROS side of the vocabulary; the command line knows
+    all.
+    """
     inside = module.relative_to(SRC / package / package)
     if package == "ir_cli":
         return True
@@ -147,7 +155,10 @@ def test_the_walk_sees_circles_through_functions_faces_and_modules() -> None:
 
 @pytest.mark.parametrize("package", sorted(PROJECT))
 def test_ros_appears_only_in_nodes_and_parameters(package: str) -> None:
-    assert violations(package, lambda module, name: is_ros(name) and not may_know_ros(package, module)) == []
+    assert (
+        violations(package, lambda module, name: is_ros(name) and not may_know_ros(package, module))
+        == []
+    )
 
 
 @pytest.mark.parametrize("package", sorted(PROJECT))
@@ -163,9 +174,12 @@ def test_pybullet_appears_in_one_file(package: str) -> None:
 @pytest.mark.parametrize("package", sorted(CORE_READS_NO_CLOCK))
 def test_the_core_is_handed_time_and_randomness(package: str) -> None:
     def forbidden(module: Path, name: str) -> bool:
-        return name.partition(".")[0] in ("time", "datetime", "random", "secrets") and not may_know_ros(
-            package, module
-        )
+        return name.partition(".")[0] in (
+            "time",
+            "datetime",
+            "random",
+            "secrets",
+        ) and not may_know_ros(package, module)
 
     assert violations(package, forbidden) == []
 
@@ -186,5 +200,8 @@ def test_nobody_draws_from_the_global_generator(package: str) -> None:
 
 
 def test_the_walk_sees_imports_in_functions_and_under_type_checking() -> None:
-    source = "import a.b\nfrom c import d\ndef f():\n    from e.f import g\nif TYPE_CHECKING:\n    import h\n"
+    source = (
+        "import a.b\nfrom c import d\ndef f():\n    from e.f import g\nif TYPE_CHECKING:\n  "
+        "  import h\n"
+    )
     assert [name for name, _ in imports(ast.parse(source))] == ["a.b", "c", "e.f", "h"]

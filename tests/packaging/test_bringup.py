@@ -45,13 +45,21 @@ class Stand:
     """Stands for whatever the launch file makes: it keeps the arguments."""
 
     def __init__(self, *values: Any, **named: Any) -> None:
-        self.values, self.named = values, named
+        self.values = values
+        self.named = named
 
 
 def launched(**given: str) -> list[dict[str, Any]]:
-    """Arguments of the nodes that the launch file starts, with stand-ins for launch and launch_ros."""
+    """Arguments of the nodes that the launch file starts, with stand-ins for launch and
+    launch_ros.
+    """
     modules = {name: ModuleType(name) for name in ("launch", "launch_ros")}
-    for name in ("launch.actions", "launch.substitutions", "launch_ros.actions", "launch_ros.substitutions"):
+    for name in (
+        "launch.actions",
+        "launch.substitutions",
+        "launch_ros.actions",
+        "launch_ros.substitutions",
+    ):
         modules[name] = ModuleType(name)
     for module in modules.values():
         module.__getattr__ = lambda name: Stand  # type: ignore[method-assign]
@@ -115,7 +123,10 @@ def leaves(block: dict[str, object], prefix: str = "") -> Iterator[tuple[str, ob
 
 SETTINGS = {
     "ir_planner": {"": (PlannerSettings,)},
-    "ir_sim_driver": {"": (NodeSettings, ControllerSettings, *LINKS), "execution.": (ExecutionSettings,)},
+    "ir_sim_driver": {
+        "": (NodeSettings, ControllerSettings, *LINKS),
+        "execution.": (ExecutionSettings,),
+    },
     "ir_program_runner": {"": (ProgramSettings, LinkSettings)},
     "ir_recorder": {"": (RecorderSettings,)},
 }
@@ -145,7 +156,9 @@ def test_views_show_topics_of_the_cell() -> None:
     assert names.ROBOT_DESCRIPTION in shown
     layout = json.loads((BRINGUP / "foxglove" / "cell.json").read_text(encoding="utf-8"))
     for panel in layout["configById"].values():
-        shown |= {path["value"].partition(".")[0].removeprefix("/") for path in panel.get("paths", ())}
+        shown |= {
+            path["value"].partition(".")[0].removeprefix("/") for path in panel.get("paths", ())
+        }
         shown |= {topic.removeprefix("/") for topic in panel.get("topics", ())}
     assert shown
     assert shown <= TOPICS
@@ -154,7 +167,9 @@ def test_views_show_topics_of_the_cell() -> None:
 def test_docker_installs_the_pinned_versions() -> None:
     pins = set((ROOT / "requirements" / "constraints.txt").read_text().splitlines())
     wanted = [
-        line for line in (ROOT / "docker" / "requirements.txt").read_text().splitlines() if "==" in line
+        line
+        for line in (ROOT / "docker" / "requirements.txt").read_text().splitlines()
+        if "==" in line
     ]
     assert wanted
     assert set(wanted) <= pins

@@ -1,4 +1,6 @@
-"""`colcon build` in ros_ws builds the sources that pip builds: colcon and ROS 2 come from the environment."""
+"""`colcon build` in ros_ws builds the sources that pip builds: colcon and ROS 2 come from the
+environment.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,8 @@ def colcon(*arguments: str, log_base: Path) -> subprocess.CompletedProcess[str]:
         "PATH": f"{bin_folder}{os.pathsep}{os.environ.get('PATH', os.defpath)}",
         "AMENT_PREFIX_PATH": sys.prefix,
         "CMAKE_PREFIX_PATH": sys.prefix,
-        "IR_KERNELS_VARIANTS": "baseline",  # one variant of the core is enough to know that it builds
+        # one variant of the core is enough to know that it builds
+        "IR_KERNELS_VARIANTS": "baseline",
         "MAKEFLAGS": "-j2",
     }
     for inherited in ("MAKELEVEL", "MFLAGS", "PYTHONPATH"):
@@ -60,12 +63,17 @@ def test_colcon_finds_both_source_trees_and_nothing_else(tmp_path: Path) -> None
 def test_colcon_builds_the_python_packages(tmp_path: Path) -> None:
     prefix = build(tmp_path, "--packages-ignore", "ir_msgs")
     for node in NODES:
-        assert os.access(prefix / "lib" / node / node, os.X_OK), f"ros2 run {node} {node} has nothing to run"
+        assert os.access(prefix / "lib" / node / node, os.X_OK), (
+            f"ros2 run {node} {node} has nothing to run"
+        )
         assert (prefix / "share" / "ament_index" / "resource_index" / "packages" / node).is_file()
     assert (prefix / "share" / "ir_bringup" / "launch" / "cell.launch.py").is_file()
 
     site = next((prefix / "lib").glob("python3.*/site-packages"))
-    program = "import ir_description, ir_kernels; print(ir_description.__file__); ir_description.load_robot()"
+    program = (
+        "import ir_description, ir_kernels; print(ir_description.__file__); "
+        "ir_description.load_robot()"
+    )
     ran = subprocess.run(
         [sys.executable, "-c", program],
         env={**os.environ, "PYTHONPATH": str(site)},
@@ -81,7 +89,9 @@ def test_colcon_builds_the_python_packages(tmp_path: Path) -> None:
 
 
 def assert_the_portable_core_passes_its_tests(site: Path) -> None:
-    """Set-up doesn't build it. Here it is compared with the reference and the build for this processor."""
+    """Set-up doesn't build it. Here it is compared with the reference and the build for this
+    processor.
+    """
     for build in (ROOT / "src" / "ir_kernels" / "ir_kernels").glob("_[np]*.so"):
         (site / "ir_kernels" / build.name).symlink_to(build)
     environment = {**os.environ, "PYTHONPATH": str(site)}

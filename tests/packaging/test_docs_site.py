@@ -60,7 +60,9 @@ def test_it_is_built_without_a_warning(site: tuple[Path, list[str]]) -> None:
 
 
 @pytest.mark.long
-def test_every_link_leads_to_a_file_of_the_site_and_to_its_anchor(site: tuple[Path, list[str]]) -> None:
+def test_every_link_leads_to_a_file_of_the_site_and_to_its_anchor(
+    site: tuple[Path, list[str]],
+) -> None:
     read: dict[Path, _Reader] = {}
     for path in site[0].rglob("*.html"):
         read[path] = _Reader()
@@ -73,7 +75,9 @@ def test_every_link_leads_to_a_file_of_the_site_and_to_its_anchor(site: tuple[Pa
                 continue
             name, _, anchor = unquote(link).partition("#")
             target = (path.parent / name).resolve() if name else path
-            there = target.is_file() and (not anchor or target not in read or anchor in read[target].anchors)
+            there = target.is_file() and (
+                not anchor or target not in read or anchor in read[target].anchors
+            )
             broken += [] if there else [f"{path.name}: {link}"]
     assert broken == []
 

@@ -44,7 +44,9 @@ def name_of(page: Path) -> str:
 def anchors(page: Path) -> set[str]:
     """Anchors of a page's headings, as GitHub makes them."""
     headings = re.findall(r"^#+ (.+)$", text_of(page), re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in headings}
+    return {
+        re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in headings
+    }
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
@@ -86,7 +88,9 @@ def exists(dotted: str) -> bool:
 
 
 def dotted_names(page: Path) -> Iterator[str]:
-    """`package.module.function` in the page; `.function` continues the name before it in the same line."""
+    """`package.module.function` in the page; `.function` continues the name before it in the same
+    line.
+    """
     for line in text_of(page).splitlines():
         module = ""
         for code in CODE.findall(line):
@@ -116,7 +120,8 @@ def texts_by_file() -> dict[str, str]:
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_tests_that_are_named_exist(page: Path) -> None:
     """`file.py::test`; `::test` continues the file of the test before it."""
-    missing, file = [], ""
+    missing = []
+    file = ""
     for code in code_spans(page):
         match = TEST.match(code)
         if match is None or not (match[1] or match[2]):
@@ -152,7 +157,11 @@ def test_files_that_are_named_exist(page: Path) -> None:
     missing = []
     for code in code_spans(page):
         name = code.split()[0]
-        if not FILE.match(name) or "NAME" in name or name.startswith(("out/", ".venv/", "ros_ws/install")):
+        if (
+            not FILE.match(name)
+            or "NAME" in name
+            or name.startswith(("out/", ".venv/", "ros_ws/install"))
+        ):
             continue
         top = name.partition("/")[0]
         if "/" not in name:
@@ -208,22 +217,34 @@ def test_the_citation_names_version_and_licence_of_the_packages() -> None:
 def commands() -> set[str]:
     """What a user can type: console scripts with a hyphen, subcommands of `ir`, targets of make."""
     setups = "".join(path.read_text("utf-8") for path in (ROOT / "src").glob("*/setup.py"))
-    targets = re.findall(r"^\.PHONY: (.*)", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE)[0].split()
+    targets = re.findall(r"^\.PHONY: (.*)", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE)[
+        0
+    ].split()
     scripts = re.findall(r'"(ir-\w+) = ', setups)
-    return {*scripts, *(f"ir {name}" for name in COMMAND_MODULES), *(f"make {name}" for name in targets)}
+    return {
+        *scripts,
+        *(f"ir {name}" for name in COMMAND_MODULES),
+        *(f"make {name}" for name in targets),
+    }
 
 
 @pytest.mark.parametrize("page", [*PAGES, *sorted((ROOT / "examples").glob("*.py"))], ids=name_of)
 def test_commands_that_are_named_exist(page: Path) -> None:
-    spans = re.findall(r"```.*?```|`[^`\n]+`|^ {4}.*?$", page.read_text("utf-8"), re.DOTALL | re.MULTILINE)
-    named = re.findall(r"(?<![\w-])((?:ir|make) [a-z][\w-]*|ir(?:-\w+)+)(?![\w/-])", "\n".join(spans))
+    spans = re.findall(
+        r"```.*?```|`[^`\n]+`|^ {4}.*?$", page.read_text("utf-8"), re.DOTALL | re.MULTILINE
+    )
+    named = re.findall(
+        r"(?<![\w-])((?:ir|make) [a-z][\w-]*|ir(?:-\w+)+)(?![\w/-])", "\n".join(spans)
+    )
     assert set(named) - commands() == set()
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_interfaces_that_are_named_exist(page: Path) -> None:
     """`srv/Name`, `msg/Name`, `action/Name`, also after `ir_msgs/`; not those of other packages."""
-    named = re.findall(r"(?:(?<![\w/])|ir_msgs/)((?:srv|msg|action)/[A-Z]\w+)", page.read_text("utf-8"))
+    named = re.findall(
+        r"(?:(?<![\w/])|ir_msgs/)((?:srv|msg|action)/[A-Z]\w+)", page.read_text("utf-8")
+    )
     files = (ROOT / "ros_ws" / "src" / "ir_msgs").glob("*/*.*")
     assert set(named) <= {f"{path.parent.name}/{path.stem}" for path in files}
 

@@ -1,4 +1,6 @@
-"""Every command line of `ir` in README and docs is one that `ir` understands, and is run somewhere."""
+"""Every command line of `ir` in README and docs is one that `ir` understands, and is run
+somewhere.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""The commands and snippets of README and docs do what their pages promise: run, in the order of the page.
+"""The commands and snippets of README and docs do what their pages promise: run, in the order of
+the page.
 
-A page is walked in an empty folder that holds what its reader would have: a cell, a KUKA program, a trace,
-prices, recordings. What is not run, and why, is `NOT_RUN` in `_documented.py`.
+A page is walked in an empty folder that holds what its reader would have: a cell, a KUKA program, a
+trace, prices, recordings. What is not run, and why, is `NOT_RUN` in `_documented.py`.
 """
 
 from __future__ import annotations
@@ -48,7 +49,9 @@ def costs(folder: Path) -> None:
 
 def trace(folder: Path) -> None:
     for ending in ("csv", "yaml"):
-        shutil.copy(ROOT / "examples" / "traces" / f"kuka_trace.{ending}", folder / f"trace.{ending}")
+        shutil.copy(
+            ROOT / "examples" / "traces" / f"kuka_trace.{ending}", folder / f"trace.{ending}"
+        )
 
 
 def recordings(folder: Path) -> None:
@@ -112,7 +115,9 @@ def shell(folder: Path, line: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("page", [page for page in PAGES if walked(page)], ids=lambda page: page.name)
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if walked(page)], ids=lambda page: page.name
+)
 def test_the_commands_of_a_page_run_in_their_order(page: Path, tmp_path: Path) -> None:
     for prepare in PREPARED.get(page.name, ()):
         prepare(tmp_path)

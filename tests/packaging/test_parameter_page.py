@@ -36,7 +36,9 @@ DECLARE: dict[str, Callable[[Node], object]] = {
 def test_the_page_lists_what_the_node_declares(name: str, ros_node: Node) -> None:
     before = set(ros_node._parameters)
     DECLARE[name](ros_node)
-    declared = {each: ros_node.describe_parameter(each) for each in set(ros_node._parameters) - before}
+    declared = {
+        each: ros_node.describe_parameter(each) for each in set(ros_node._parameters) - before
+    }
     section = PAGE.read_text("utf-8").partition(f"## {name}\n")[2].partition("\n## ")[0]
     rows = dict(re.findall(r"^\| `([\w.]+)` \|(.*)$", section, re.MULTILINE))
     assert set(rows) == set(declared)

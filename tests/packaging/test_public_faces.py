@@ -1,4 +1,6 @@
-"""What users of a package may import: the names of its `__all__`, sorted, all there, and none forgotten."""
+"""What users of a package may import: the names of its `__all__`, sorted, all there, and none
+forgotten.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,9 @@ def imported(package: str) -> set[str]:
 
 
 def test_base_and_core_packages_have_a_face() -> None:
-    assert {"ir_description", "ir_kernels", "ir_msgs_py", "ir_planner", "ir_recorder"} <= set(PACKAGES)
+    assert {"ir_description", "ir_kernels", "ir_msgs_py", "ir_planner", "ir_recorder"} <= set(
+        PACKAGES
+    )
 
 
 @pytest.mark.parametrize("package", PACKAGES)

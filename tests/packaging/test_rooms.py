@@ -1,4 +1,6 @@
-"""Sub-packages ("rooms") know each other in one direction, through their public faces, without a cycle."""
+"""Sub-packages ("rooms") know each other in one direction, through their public faces, without a
+cycle.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +12,13 @@ import pytest
 
 SRC = Path(__file__).resolve().parents[2] / "src"
 
-# From the ground up: a room knows only those before it. A name without a folder is a module of the package.
+# From the ground up: a room knows only those before it. A name without a folder is a module of the
+# package.
 ROOMS = {
     "ir_planner": (
-        "errors", "curves", "scene", "request", "checks", "configurations", "timing", "search", "optimize",
+        "errors", "curves", "scene", "request", "checks", "configurations", "timing", "search", "optimize",  # noqa: E501
         "cartesian", "regional", "trajectories", "service", "settings", "program", "store", "heard",
-        "current_cell", "certificates", "asked_states", "trips", "planner", "krl", "before_after", "what_if",
+        "current_cell", "certificates", "asked_states", "trips", "planner", "krl", "before_after", "what_if",  # noqa: E501
         "node",
     ),
     "ir_description": (
@@ -29,7 +32,9 @@ ROOMS = {
 
 
 def imported(package: str, module: Path) -> list[tuple[str, str, int]]:
-    """Rooms of the package that a module imports: room, what follows its name ("": its face), line."""
+    """Rooms of the package that a module imports: room, what follows its name ("": its face),
+    line.
+    """
     found = []
     for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
         names = [node.module] if isinstance(node, ast.ImportFrom) and node.level == 0 else []
@@ -45,7 +50,9 @@ def imported(package: str, module: Path) -> list[tuple[str, str, int]]:
 def modules(package: str) -> list[tuple[str, Path]]:
     """Every module of the package with its room; the package's own face is above all rooms."""
     base = SRC / package / package
-    inside = [(path, path.relative_to(base).parts[0].removesuffix(".py")) for path in base.rglob("*.py")]
+    inside = [
+        (path, path.relative_to(base).parts[0].removesuffix(".py")) for path in base.rglob("*.py")
+    ]
     return sorted((room, path) for path, room in inside if room != "__init__")
 
 
@@ -82,7 +89,9 @@ def test_modules_of_one_room_form_no_cycle(package: str) -> None:
     knows: dict[str, set[str]] = {}
     for room, path in modules(package):
         here = f"{room}.{path.stem}"
-        knows[here] = {f"{other}.{inner}" for other, inner, _ in imported(package, path) if other == room}
+        knows[here] = {
+            f"{other}.{inner}" for other, inner, _ in imported(package, path) if other == room
+        }
     while knows:
         ground = {module for module, others in knows.items() if not others & knows.keys()}
         assert ground, f"a cycle runs through {sorted(knows)}"
@@ -96,7 +105,9 @@ def test_every_face_says_what_it_is_and_names_what_it_offers(package: str) -> No
             continue
         face = importlib.import_module(f"{package}.{room}")
         assert face.__doc__, room
-        assert face.__doc__.splitlines()[0].endswith("."), f"{package}.{room}: the first line is a sentence"
+        assert face.__doc__.splitlines()[0].endswith("."), (
+            f"{package}.{room}: the first line is a sentence"
+        )
         assert sorted(set(face.__all__)) == sorted(face.__all__), room
         for name in face.__all__:
             assert hasattr(face, name), f"{package}.{room} has no {name}"

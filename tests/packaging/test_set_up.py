@@ -1,4 +1,6 @@
-"""Set-up: an interpreter that really runs, sentences that say what to install, work only for what changed."""
+"""Set-up: an interpreter that really runs, sentences that say what to install, work only for what
+changed.
+"""
 
 from __future__ import annotations
 
@@ -75,7 +77,9 @@ def test_python_3_11_comes_first(tmp_path: Path) -> None:
     assert find_python(tmp_path, f"{tmp_path}/bin").stdout.strip().endswith("/python3.11")
 
 
-def test_without_an_interpreter_a_sentence_says_what_to_install_and_what_was_seen(tmp_path: Path) -> None:
+def test_without_an_interpreter_a_sentence_says_what_to_install_and_what_was_seen(
+    tmp_path: Path,
+) -> None:
     shim = executable(tmp_path / "shims" / "python3.11", SHIM)
     for tool in ("head", "cat"):
         (tmp_path / "shims" / tool).symlink_to(f"/usr/bin/{tool}")
@@ -92,7 +96,8 @@ def test_an_interpreter_may_be_named(tmp_path: Path) -> None:
 
 def test_an_unfit_interpreter_says_why(tmp_path: Path) -> None:
     old = executable(
-        tmp_path / "old", f'#!/bin/sh\nexec "{sys.executable}" -c "import sys; sys.exit(\'is Python 3.8\')"\n'
+        tmp_path / "old",
+        f'#!/bin/sh\nexec "{sys.executable}" -c "import sys; sys.exit(\'is Python 3.8\')"\n',
     )
     found = find_python(tmp_path, "/usr/bin:/bin", PYTHON=str(old))
     assert found.returncode == 1
@@ -138,14 +143,17 @@ def distribution(site: Path, name: str, version: str, url: str = "") -> Path:
     folder = site / f"{name}-{version}.dist-info"
     folder.mkdir(parents=True)
     if url:
-        (folder / "direct_url.json").write_text(json.dumps({"url": url, "dir_info": {"editable": True}}))
+        (folder / "direct_url.json").write_text(
+            json.dumps({"url": url, "dir_info": {"editable": True}})
+        )
     return folder
 
 
 def test_a_wheel_that_is_gone_or_of_another_version_is_noticed(
     distributions: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    constraints, run = tmp_path / "constraints.txt", tmp_path / "run.txt"
+    constraints = tmp_path / "constraints.txt"
+    run = tmp_path / "run.txt"
     constraints.write_text("# pins\nnumpy==2.0\nRuamel.yaml==0.1\nempy==4.2\nelsewhere==1.0\n")
     run.write_text("-c constraints.txt\nnumpy\nruamel-yaml[extra]\n")
     monkeypatch.setattr(distributions, "CONSTRAINTS", constraints)
@@ -220,7 +228,10 @@ def test_a_stage_begins_when_those_that_it_needs_are_done(
 
     first = stage("first", "Path('made').touch(exist_ok=False)", "done before")
     second = stage("second", "Path('made').unlink()", "first")
-    assert [done.name for done, _ in set_up.side_by_side([first, second], tmp_path)] == ["first", "second"]
+    assert [done.name for done, _ in set_up.side_by_side([first, second], tmp_path)] == [
+        "first",
+        "second",
+    ]
     bad = stage("bad", "raise SystemExit('no compiler')")
     needs_it = stage("needs it", "Path('ran').touch()", "bad")
     with pytest.raises(set_up.SetupError, match="no compiler"):
@@ -258,10 +269,14 @@ def test_every_requirement_is_pinned_in_one_version() -> None:
         for line in (ROOT / "requirements" / "constraints.txt").read_text().splitlines()
         if line[:1] not in ("", "#")
     ]
-    assert [pin for pin in pins if not re.fullmatch(r"[A-Za-z0-9._-]+==[0-9][0-9A-Za-z.]*", pin)] == []
+    assert [
+        pin for pin in pins if not re.fullmatch(r"[A-Za-z0-9._-]+==[0-9][0-9A-Za-z.]*", pin)
+    ] == []
     pinned = names("constraints.txt")
     assert len(pinned) == len(set(pinned))
-    assert {*names("tools.txt"), *names("build.txt"), *names("run.txt"), *names("dev.txt")} <= set(pinned)
+    assert {*names("tools.txt"), *names("build.txt"), *names("run.txt"), *names("dev.txt")} <= set(
+        pinned
+    )
 
 
 def test_the_interface_package_names_the_pinned_versions() -> None:

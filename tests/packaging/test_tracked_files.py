@@ -1,4 +1,6 @@
-"""The repository stands alone: no paths of somebody's machine, no package index of somebody's choice."""
+"""The repository stands alone: no paths of somebody's machine, no package index of somebody's
+choice.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 # the empty groups keep this file from finding itself
-MACHINE_PATH = re.compile(r"(?<![\w.$}])/(?:)(work|root|home|farm|Users)/\w|\.py(?:)env/(versions|shims)")
+MACHINE_PATH = re.compile(
+    r"(?<![\w.$}])/(?:)(work|root|home|farm|Users)/\w|\.py(?:)env/(versions|shims)"
+)
 INDEX_HOST = re.compile(
     r"py(?:)pi\.org|python(?:)hosted\.org|--(extra-)?(?:)index-url|--trusted-(?:)host|file:/(?:)//"
 )
@@ -65,7 +69,9 @@ def test_built_and_written_things_are_ignored() -> None:
         "ros_ws/log/x",
         "src/ir_kernels/ir_kernels/_n.so",
     ]
-    ignored = subprocess.run(["git", "check-ignore", *names], cwd=ROOT, capture_output=True, text=True)
+    ignored = subprocess.run(
+        ["git", "check-ignore", *names], cwd=ROOT, capture_output=True, text=True
+    )
     if ignored.returncode == 128:
         pytest.skip("not a git checkout")
     assert ignored.stdout.split() == names

@@ -1,4 +1,6 @@
-"""The supported versions stand in requirements/supported.toml; what must repeat them says the same."""
+"""The supported versions stand in requirements/supported.toml; what must repeat them says the
+same.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +15,17 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-TABLE: dict[str, Any] = tomllib.loads((ROOT / "requirements" / "supported.toml").read_text(encoding="utf-8"))
+TABLE: dict[str, Any] = tomllib.loads(
+    (ROOT / "requirements" / "supported.toml").read_text(encoding="utf-8")
+)
 SETUPS = sorted((ROOT / "src").glob("*/setup.py"))
 
 
 @pytest.fixture(scope="module")
 def oldest() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("oldest_versions", ROOT / "tools" / "oldest_versions.py")
+    spec = importlib.util.spec_from_file_location(
+        "oldest_versions", ROOT / "tools" / "oldest_versions.py"
+    )
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -39,7 +45,9 @@ def keyword(setup: Path, name: str) -> Any:
 def test_packages_ask_for_no_newer_python_than_the_first_supported(setup: Path) -> None:
     asked = keyword(setup, "python_requires") or ">=0"
     wanted = tuple(int(part) for part in asked.removeprefix(">=").split("."))
-    assert wanted <= min(tuple(int(part) for part in version.split(".")) for version in TABLE["python"])
+    assert wanted <= min(
+        tuple(int(part) for part in version.split(".")) for version in TABLE["python"]
+    )
 
 
 @pytest.mark.parametrize("setup", SETUPS, ids=lambda setup: setup.parent.name)
@@ -54,9 +62,13 @@ def test_the_readme_and_the_interfaces_name_the_supported_versions() -> None:
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     for version in TABLE["python"]:
         assert version in readme
-    interfaces = tomllib.loads((ROOT / "ros_ws/src/ir_msgs/pyproject.toml").read_text(encoding="utf-8"))
+    interfaces = tomllib.loads(
+        (ROOT / "ros_ws/src/ir_msgs/pyproject.toml").read_text(encoding="utf-8")
+    )
     assert interfaces["project"]["requires-python"] == f">={TABLE['python'][0]}"
-    assert f"FROM ros:{TABLE['ros']}" in (ROOT / "docker" / "Dockerfile").read_text(encoding="utf-8")
+    assert f"FROM ros:{TABLE['ros']}" in (ROOT / "docker" / "Dockerfile").read_text(
+        encoding="utf-8"
+    )
 
 
 def test_docker_installs_what_the_constraints_pin() -> None:
@@ -76,7 +88,9 @@ def test_the_oldest_versions_replace_those_of_the_constraints(oldest: ModuleType
     assert "numpy" in changed["requirements/run.txt"]
 
 
-def test_the_oldest_versions_are_tested_with_the_core_the_planner_and_its_node(oldest: ModuleType) -> None:
+def test_the_oldest_versions_are_tested_with_the_core_the_planner_and_its_node(
+    oldest: ModuleType,
+) -> None:
     files = oldest.tests(ROOT)
     for name in (
         "kernels/test_certify",
@@ -92,6 +106,8 @@ def test_the_oldest_versions_are_tested_with_the_core_the_planner_and_its_node(o
 
 
 def test_test_long_runs_them() -> None:
-    rule = re.search(r"^test-long:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M)
+    rule = re.search(
+        r"^test-long:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M
+    )
     assert rule is not None
     assert "tools/oldest_versions.py" in rule[1]

@@ -20,4 +20,6 @@ def planned(
     work: Work,
     searches: Mapping[str, Search] = SEARCHES,
 ) -> MovementPlan:
-    return plan_regional(start, goals, Context(scene, options, Journal(work, options.seed)), searches)
+    return plan_regional(
+        start, goals, Context(scene, options, Journal(work, options.seed)), searches
+    )

@@ -1,4 +1,6 @@
-"""Cells, scenes and budgets that the planner's tests share; scenes never change: one per session will do."""
+"""Cells, scenes and budgets that the planner's tests share; scenes never change: one per session
+will do.
+"""
 
 from __future__ import annotations
 

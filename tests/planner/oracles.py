@@ -43,7 +43,8 @@ def torque_available(robot: RobotModel, qd: FloatArray) -> FloatArray:
     """The envelope (N, n) Nm as the data describe it."""
     result = np.empty_like(qd)
     for j in range(qd.shape[1]):
-        speed, torque = robot.envelope_speed[j], robot.envelope_torque[j]
+        speed = robot.envelope_speed[j]
+        torque = robot.envelope_torque[j]
         fast = np.interp(np.abs(qd[:, j]), speed, torque[1:])
         result[:, j] = np.where(np.abs(qd[:, j]) < speed[0], torque[0], fast)
     return result

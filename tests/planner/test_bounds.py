@@ -1,4 +1,6 @@
-"""Lower bounds of movements: below what the planner finds, and below the simplest movement there is."""
+"""Lower bounds of movements: below what the planner finds, and below the simplest movement there
+is.
+"""
 
 from __future__ import annotations
 
@@ -36,14 +38,17 @@ def asked(scene: PlanningScene, options: PlanOptions) -> Context:
 
 def configurations(rng: np.random.Generator, count: int) -> np.ndarray:
     """Free ones, with the arm raised."""
-    low, high = ROBOT.position_min, ROBOT.position_max
+    low = ROBOT.position_min
+    high = ROBOT.position_max
     drawn = rng.uniform(low, high, (4000, ROBOT.n))
     free = drawn[SCENE.collision.is_free(drawn, SCENE.thresholds(0.02))]
     return np.ascontiguousarray(free[:count])
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("rates", [Rates(1.0, 500.0), Rates(1.0, 5000.0), Rates(0.0, 1.0), Rates(1.0, 0.0)])
+@pytest.mark.parametrize(
+    "rates", [Rates(1.0, 500.0), Rates(1.0, 5000.0), Rates(0.0, 1.0), Rates(1.0, 0.0)]
+)
 def test_no_movement_of_the_planner_costs_less(seed: int, rates: Rates) -> None:
     a, b = configurations(np.random.default_rng(seed), 2)
     options = PlanOptions(safety_distance=0.0, time_value=rates.second if rates.joule else 500.0)
@@ -73,7 +78,8 @@ def test_potential_energy_is_the_work_against_the_static_torque_on_any_path(seed
 
 def test_least_seconds_are_those_of_a_bang_bang_law() -> None:
     limits = SCENE.limits
-    speed, acceleration = limits.velocity[0], limits.acceleration[0]
+    speed = limits.velocity[0]
+    acceleration = limits.acceleration[0]
     ramp = speed**2 / acceleration  # rad, up and down
     distance = np.zeros((3, ROBOT.n))
     distance[:, 0] = 0.25 * ramp, ramp, 3.0 * ramp

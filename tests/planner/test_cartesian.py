@@ -1,4 +1,6 @@
-"""Paths of the tool: what is certified keeps to the path and its speed; what can't be names the place."""
+"""Paths of the tool: what is certified keeps to the path and its speed; what can't be names the
+place.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,8 @@ def demo() -> Planner:
 
 def pose(x: float, y: float, z: float, rotation: Rotation = DOWN) -> FloatArray:
     T = np.eye(4)
-    T[:3, :3], T[:3, 3] = rotation.as_matrix(), (x, y, z)
+    T[:3, :3] = rotation.as_matrix()
+    T[:3, 3] = (x, y, z)
     return T
 
 
@@ -55,7 +58,9 @@ def planned(planner: Planner, path: CartesianPath, **more: object) -> CartesianP
 TILTED = Rotation.from_euler("yz", (75.0, 20.0), degrees=True)
 PATHS = {
     "line": CartesianPath(pose(1.8, -0.3, 1.2), line(pose(1.8, 0.3, 1.2)), tool_speed=0.25),
-    "turning": CartesianPath(pose(1.7, -0.2, 1.2), line(pose(1.9, 0.3, 1.4, TILTED)), tool_speed=0.4),
+    "turning": CartesianPath(
+        pose(1.7, -0.2, 1.2), line(pose(1.9, 0.3, 1.4, TILTED)), tool_speed=0.4
+    ),
     "circle": CartesianPath(
         pose(1.8, -0.3, 1.2),
         (CartesianSegment("circle", (pose(1.6, 0.0, 1.2), pose(1.8, 0.3, 1.2))),),
@@ -63,11 +68,18 @@ PATHS = {
     ),
     "spline": CartesianPath(
         pose(1.8, -0.3, 1.2),
-        (CartesianSegment("spline", (pose(1.7, 0.0, 1.3), pose(1.8, 0.2, 1.2), pose(1.9, 0.4, 1.2))),),
+        (
+            CartesianSegment(
+                "spline", (pose(1.7, 0.0, 1.3), pose(1.8, 0.2, 1.2), pose(1.9, 0.4, 1.2))
+            ),
+        ),
         tool_speed=0.2,
     ),
     "corner": CartesianPath(
-        pose(1.7, -0.2, 1.2), line(pose(1.7, 0.2, 1.2), pose(1.9, 0.2, 1.2)), 0.15, blending_radius=0.08
+        pose(1.7, -0.2, 1.2),
+        line(pose(1.7, 0.2, 1.2), pose(1.9, 0.2, 1.2)),
+        0.15,
+        blending_radius=0.08,
     ),
 }
 
@@ -92,7 +104,8 @@ def test_the_tool_keeps_to_its_path_and_its_speed(planner: Planner, name: str) -
 
 def judged(planner: Planner, seed: int) -> None:
     """A random path is kept as the answer says, or refused where no oracle drives it."""
-    scene, rng = planner.scene(), np.random.default_rng(seed)
+    scene = planner.scene()
+    rng = np.random.default_rng(seed)
     path = random_path(rng, scene)
     plan = planned(planner, path)
     if plan.trajectory is None:
@@ -100,7 +113,9 @@ def judged(planner: Planner, seed: int) -> None:
         assert not oracle(path, scene, rng), plan.status.message
         return
     found = seen(plan.trajectory, path, scene)
-    assert found.error <= plan.tool_error + 1e-6, "a place of the judge lies between two of its polyline"
+    assert found.error <= plan.tool_error + 1e-6, (
+        "a place of the judge lies between two of its polyline"
+    )
     assert found.speed <= path.speed_tolerance
 
 
@@ -125,7 +140,9 @@ def test_a_path_that_begins_near_a_singularity_is_driven_slowly_there() -> None:
         pytest.param(20135, id="ramps_as_long_as_the_line"),
     ],
 )
-def test_what_passes_near_a_singularity_or_needs_long_ramps_is_driven(demo: Planner, seed: int) -> None:
+def test_what_passes_near_a_singularity_or_needs_long_ramps_is_driven(
+    demo: Planner, seed: int
+) -> None:
     path = random_path(np.random.default_rng(seed), demo.scene())
     plan = demo.plan_cartesian(path, PlanOptions(safety_distance=MARGIN))
     assert plan.trajectory is not None, plan.status.message
@@ -142,7 +159,9 @@ def test_where_no_configuration_leads_on_the_axis_is_named(demo: Planner) -> Non
     assert "free_angle" in refused
 
 
-@pytest.mark.parametrize("seeds", [range(4), pytest.param(range(4, 40), marks=pytest.mark.long)], ids=str)
+@pytest.mark.parametrize(
+    "seeds", [range(4), pytest.param(range(4, 40), marks=pytest.mark.long)], ids=str
+)
 def test_random_paths_are_kept_or_refused_with_their_place(planner: Planner, seeds: range) -> None:
     for seed in seeds:
         judged(planner, seed)
@@ -153,7 +172,8 @@ def test_random_paths_are_kept_or_refused_with_their_place(planner: Planner, see
 def test_no_judge_objects_to_what_is_certified(cell: str) -> None:
     planner = Planner(lambda: 0.0)
     planner.set_cell("", cell)
-    scene, judge = planner.scene(), SecondOpinion(planner.scene())
+    scene = planner.scene()
+    judge = SecondOpinion(planner.scene())
     for seed in range(10):
         plan = planned(planner, random_path(np.random.default_rng(seed), scene))
         if plan.trajectory is not None:
@@ -174,7 +194,8 @@ def test_approach_and_retract_lead_along_the_axis_of_the_tool(planner: Planner) 
 def test_a_free_angle_serves_and_stays_within_its_bound(planner: Planner) -> None:
     ends = pose(1.8, -0.3, 1.2), pose(1.8, 0.3, 1.2)
     fixed, free = (
-        planned(planner, CartesianPath(ends[0], line(ends[1]), 0.2, free_angle=angle)) for angle in (0.0, 0.4)
+        planned(planner, CartesianPath(ends[0], line(ends[1]), 0.2, free_angle=angle))
+        for angle in (0.0, 0.4)
     )
     assert fixed.trajectory is not None
     assert free.trajectory is not None
@@ -187,7 +208,9 @@ def test_a_free_angle_serves_and_stays_within_its_bound(planner: Planner) -> Non
 
 def test_a_line_too_short_for_its_speed_says_how_fast_it_is(planner: Planner) -> None:
     line_of_600_mm = line(pose(1.8, 0.3, 1.2))
-    plan = planned(planner, CartesianPath(pose(1.8, -0.3, 1.2), line_of_600_mm, 10.0, speed_tolerance=1.0))
+    plan = planned(
+        planner, CartesianPath(pose(1.8, -0.3, 1.2), line_of_600_mm, 10.0, speed_tolerance=1.0)
+    )
     assert plan.status.ok
     notes = [stage.note for stage in plan.info.stages if stage.name == "speed"]
     assert len(notes) == 1
@@ -201,7 +224,8 @@ def test_poses_that_are_none_are_refused_at_the_door() -> None:
 
 
 def test_the_same_path_gives_the_same_bytes(planner: Planner) -> None:
-    first, second = planned(planner, PATHS["line"]), planned(planner, PATHS["line"])
+    first = planned(planner, PATHS["line"])
+    second = planned(planner, PATHS["line"])
     assert first.trajectory == second.trajectory
     assert first.trajectory is not None
 
@@ -210,7 +234,9 @@ def test_what_cannot_be_driven_names_its_place(planner: Planner) -> None:
     far = planned(planner, CartesianPath(pose(1.8, 0.0, 1.2), line(pose(3.8, 0.0, 1.2))))
     assert far.status.code == StatusCode.NO_IK_SOLUTION
     assert " m: " in far.status.message
-    fast = planned(planner, CartesianPath(pose(1.8, -0.3, 1.2), line(pose(1.8, 0.3, 1.2)), tool_speed=5.0))
+    fast = planned(
+        planner, CartesianPath(pose(1.8, -0.3, 1.2), line(pose(1.8, 0.3, 1.2)), tool_speed=5.0)
+    )
     assert fast.status.code == StatusCode.INVALID_MOTION_PLAN
     assert "tool_speed" in fast.status.message
     corner = planned(

@@ -64,8 +64,13 @@ def wandering(scene: PlanningScene, seed: int) -> JointTrajectory:
     return JointTrajectory(robot.joint_names, times - times[0], points, speeds, zero)
 
 
-@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(cell=st.sampled_from(["demo", "cnc_door", "table_columns", "deep_box"]), seed=st.integers(0, 10_000))
+@settings(
+    max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(
+    cell=st.sampled_from(["demo", "cnc_door", "table_columns", "deep_box"]),
+    seed=st.integers(0, 10_000),
+)
 def test_no_distance_is_below_the_bound(cell: str, seed: int, scene_of: SceneOf) -> None:
     scene = scene_of(cell)
     trajectory = wandering(scene, seed)
@@ -87,7 +92,9 @@ def test_a_certified_movement_reports_no_less_than_its_safety_distance(
     home = np.array(demo_scene.cell.park)
     still = np.stack([home, home])
     zero = np.zeros_like(still)
-    trajectory = JointTrajectory(demo_scene.cell.robot.joint_names, np.array([0, 10**9]), still, zero, zero)
+    trajectory = JointTrajectory(
+        demo_scene.cell.robot.joint_names, np.array([0, 10**9]), still, zero, zero
+    )
     distance = float(demo_scene.collision.distances(home[None]).min())
     report = evaluate_trajectory(trajectory, demo_scene, margin or distance).report
     assert report.certified

@@ -1,8 +1,9 @@
 """Laws of a program's energy over its cycle time, on programs drawn in several cells.
 
-E(T + d) <= E(T) + the cheapest wait of d. The drives' energy never rises with T while the wait at the end
-stays in its mode: where a wait gets long enough for a deeper one, hurrying into it is cheaper at the mains,
-which costs the drives more.
+E(T + d) <= E(T) + the cheapest wait of d. The drives' energy never rises with T while the wait at
+the end
+stays in its mode: where a wait gets long enough for a deeper one, hurrying into it is cheaper at
+the mains, which costs the drives more.
 """
 
 from __future__ import annotations
@@ -64,7 +65,9 @@ def wait_mode(plan: ProgramPlan) -> str:
 
 def drive_energy(plan: ProgramPlan) -> float:
     """Joules of the drives while the program moves."""
-    return sum(step.report.energy - step.report.base_energy for step in plan.movements if not step.is_pause)
+    return sum(
+        step.report.energy - step.report.base_energy for step in plan.movements if not step.is_pause
+    )
 
 
 @pytest.mark.long
@@ -95,13 +98,17 @@ def test_energies_of_drawn_cycle_times_keep_the_law(cell: str) -> None:
 def test_a_movement_at_a_value_costs_no_more_than_known_ones_slowed(
     scene_of: Callable[[str], PlanningScene],
 ) -> None:
-    """Whatever they were searched for: the fastest one may be in a better class than the one of little J."""
+    """Whatever they were searched for: the fastest one may be in a better class than the one of
+    little J.
+    """
     scene = scene_of("table_columns")
     rng = np.random.default_rng(3)
     for task in rng.choice(np.array(scene.cell.tasks, dtype=object), 2, replace=False):
         known = [searched(scene, task, objective) for objective in ("time", "time_and_energy")]
         for value in np.exp(rng.uniform(np.log(300.0), np.log(16_000.0), 2)):
-            asked = replace(known[0].context.options, objective="time_and_energy", time_value=float(value))
+            asked = replace(
+                known[0].context.options, objective="time_and_energy", time_value=float(value)
+            )
             context = replace(known[0].context, options=asked)
             found = optimised_near(known, context)
             assert found is not None

@@ -1,4 +1,6 @@
-"""A cycle time is a constraint: seconds go where they save most, judged by enumeration and by laws."""
+"""A cycle time is a constraint: seconds go where they save most, judged by enumeration and by
+laws.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,8 @@ class Invented:
     fixed_time = False
 
     def __init__(self, seconds: float, joules: float) -> None:
-        self.seconds, self.joules = seconds, joules
+        self.seconds = seconds
+        self.joules = joules
         base = BASE * seconds
         self.trajectory = self
         self.duration = seconds
@@ -66,7 +69,9 @@ class Values:
 
     def slower(self, movement: Movement, seconds: float) -> Movement | None:
         """On the front between its points, flat beyond the slowest."""
-        front = next(front for front in self.fronts().values() if any(p.movement is movement for p in front))
+        front = next(
+            front for front in self.fronts().values() if any(p.movement is movement for p in front)
+        )
         joules = np.interp(seconds, [p.seconds for p in front], [p.joules for p in front])
         return invented(seconds, float(joules))
 
@@ -105,10 +110,13 @@ def test_no_choice_of_points_with_a_wait_costs_less(
 
 @given(invented_fronts())
 @settings(deadline=None)
-def test_a_front_is_convex_and_nothing_lies_below_it(fronts: list[list[tuple[float, float]]]) -> None:
+def test_a_front_is_convex_and_nothing_lies_below_it(
+    fronts: list[list[tuple[float, float]]],
+) -> None:
     for points in fronts:
         front = convex_front([Point.of(invented(*point)) for point in points])
-        t, e = np.array([p.seconds for p in front]), np.array([p.joules for p in front])
+        t = np.array([p.seconds for p in front])
+        e = np.array([p.joules for p in front])
         assert (np.diff(t) > 0.0).all()
         assert (np.diff(e) < 0.0).all()
         assert (np.diff(np.diff(e) / np.diff(t)) >= -1e-9).all()
@@ -141,13 +149,16 @@ class Rung:
 class Rungs:
     """A ladder whose movement at one rung, `poor`, takes three times the joules."""
 
-    first, improvement = 2, 0
+    first = 2
+    improvement = 0
 
     def __init__(self, poor: int) -> None:
         self.rungs = [
-            Rung(3.0 - 0.1 * k, (1000.0 + 50.0 * k) * (3.0 if k == poor else 1.0)) for k in range(FASTEST + 1)
+            Rung(3.0 - 0.1 * k, (1000.0 + 50.0 * k) * (3.0 if k == poor else 1.0))
+            for k in range(FASTEST + 1)
         ]
-        self.own, self.asked = self.rungs[self.first], dict[int, Movement]()
+        self.own = self.rungs[self.first]
+        self.asked = dict[int, Movement]()
         self.better = invented(self.rungs[poor].found.trajectory.duration, 1.0)
 
     def at(self, rung: int) -> Rung:
@@ -162,7 +173,9 @@ class Rungs:
 
 
 @pytest.mark.parametrize("poor", [1, 3, 7, FASTEST - 1])
-def test_a_poor_movement_beside_the_cycle_time_is_optimised_again_from_a_better_one(poor: int) -> None:
+def test_a_poor_movement_beside_the_cycle_time_is_optimised_again_from_a_better_one(
+    poor: int,
+) -> None:
     ladder = Rungs(poor)
     values = TimeValues(cast(Ladder, ladder), [ACROSS_PART])
     assert values.bracket(3.0 - 0.1 * poor + 0.05) == poor
@@ -180,7 +193,8 @@ def planned(demo_cell: Cell, power: PowerData) -> Callable[[float], ProgramPlan]
 
     def plan(cycle_time: float) -> ProgramPlan:
         if cycle_time not in known:
-            start, options = np.array(demo_cell.machine_home), PlanOptions(planning_time=60.0)
+            start = np.array(demo_cell.machine_home)
+            options = PlanOptions(planning_time=60.0)
             request = ProgramRequest(demo_cell, power, STATIONS, start, options, cycle_time)
             work = Work(1_200_000, 1.0, lambda: 0.0)
             known[cycle_time] = plan_program(request, work)
@@ -200,9 +214,12 @@ def test_a_little_less_time_costs_little_more(planned: Callable[[float], Program
 def test_energy_over_cycle_time_keeps_the_law_of_waiting(
     planned: Callable[[float], ProgramPlan], demo_cell: Cell, power: PowerData
 ) -> None:
-    """E(T + d) <= E(T) + the cheapest wait of d; E of the drives never rises while nothing waits."""
+    """E(T + d) <= E(T) + the cheapest wait of d; E of the drives never rises while nothing
+    waits.
+    """
     free = planned(0.0).report.duration
-    scene, park = scene_with(demo_cell, load_text(demo_cell), power), np.array(demo_cell.park)
+    scene = scene_with(demo_cell, load_text(demo_cell), power)
+    park = np.array(demo_cell.park)
     times = [0.97 * free, free, 1.1 * free, 1.3 * free, 2.0 * free, 40.0 * free]
     energies = []
     for cycle_time in times:
@@ -230,13 +247,20 @@ POINTS = 9
 def test_the_front_of_a_program_keeps_the_law_of_waiting(demo_cell: Cell, power: PowerData) -> None:
     park = np.array(demo_cell.park)
     request = ProgramRequest(
-        demo_cell, power, ("home", "park"), park, PlanOptions(planning_time=60.0), front_points=POINTS
+        demo_cell,
+        power,
+        ("home", "park"),
+        park,
+        PlanOptions(planning_time=60.0),
+        front_points=POINTS,
     )
     front = plan_program(request, Work(2_000_000, 1.0, lambda: 0.0)).front
     assert len(front) == POINTS
     assert len({plan.program_id for plan in front}) == POINTS
     assert all(plan.report.certified for plan in front)
-    seconds, energy = ([getattr(plan.report, name) for plan in front] for name in ("duration", "energy"))
+    seconds, energy = (
+        [getattr(plan.report, name) for plan in front] for name in ("duration", "energy")
+    )
     assert seconds == sorted(seconds)
     assert energy[0] > 1.05 * min(energy)  # hurrying costs
     scene = scene_with(demo_cell, load_text(demo_cell), power)
@@ -248,13 +272,15 @@ def test_the_front_of_a_program_keeps_the_law_of_waiting(demo_cell: Cell, power:
 def test_without_a_cycle_time_objective_energy_says_that_it_is_slow() -> None:
     planner = Planner(lambda: 0.0)
     planner.set_cell("", "demo")
-    stops, start = ("infeed_pick", "park"), np.array(planner.cell.park)
+    stops = ("infeed_pick", "park")
+    start = np.array(planner.cell.park)
 
     def plan(objective: str, cycle_time: float) -> ProgramPlan:
         options = PlanOptions(objective=objective, planning_time=100.0)
         return planner.plan_program(stops, cycle_time, options, start)
 
-    slow, usual = plan("energy", 0.0), plan("time_and_energy", 0.0)
+    slow = plan("energy", 0.0)
+    usual = plan("time_and_energy", 0.0)
     assert f"the movements take {slow.report.duration:.1f} s" in slow.status.message
     assert usual.status.message == ""
     short = plan("energy", usual.report.duration)
@@ -267,16 +293,23 @@ def test_without_a_cycle_time_objective_energy_says_that_it_is_slow() -> None:
     ("cell", "stops", "seed"),
     [
         ("table_columns", ("mid", "tR", "side2", "park"), 16),
-        pytest.param("cnc_door", ("cnc", "pal", "cncL", "press", "park"), 10, marks=pytest.mark.long),
         pytest.param(
-            "table_columns", ("side2", "side1", "mid", "tL", "tR", "park"), 21, marks=pytest.mark.long
+            "cnc_door", ("cnc", "pal", "cncL", "press", "park"), 10, marks=pytest.mark.long
+        ),
+        pytest.param(
+            "table_columns",
+            ("side2", "side1", "mid", "tL", "tR", "park"),
+            21,
+            marks=pytest.mark.long,
         ),
     ],
 )
 def test_no_cycle_time_that_the_fastest_program_keeps_is_refused(
     cell: str, stops: tuple[str, ...], seed: int
 ) -> None:
-    """The cheapest chain may be too slow, and the one for time alone is not the fastest at all values."""
+    """The cheapest chain may be too slow, and the one for time alone is not the fastest at all
+    values.
+    """
     planner = Planner(lambda: 0.0)
     planner.set_cell("", cell)
 

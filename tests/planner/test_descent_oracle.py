@@ -1,4 +1,6 @@
-"""The descent of eqs. (2) and (3) against one that knows nothing but Pinocchio's pose of the tool."""
+"""The descent of eqs. (2) and (3) against one that knows nothing but Pinocchio's pose of the
+tool.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,8 @@ def psi_of(scene: PlanningScene, pose: FloatArray) -> Callable[[FloatArray], flo
     """Eq. (2) as written, lambda = 0.5 m/rad."""
     cell = scene.cell
     model = pinocchio.buildModelFromXML(robot_urdf(cell.robot, scene.loads, cell.tcp))
-    data, tcp = model.createData(), model.getFrameId("tcp")
+    data = model.createData()
+    tcp = model.getFrameId("tcp")
     goal = np.linalg.inv(cell.base_pose) @ pose
 
     def psi(q: FloatArray) -> float:
@@ -35,8 +38,12 @@ def psi_of(scene: PlanningScene, pose: FloatArray) -> Callable[[FloatArray], flo
     return psi
 
 
-def swept(q: FloatArray, psi: Callable[[FloatArray], float], low: FloatArray, high: FloatArray) -> FloatArray:
-    """One sweep, tool to base: Psi over one angle is a + b cos + c sin, which three of its values fix."""
+def swept(
+    q: FloatArray, psi: Callable[[FloatArray], float], low: FloatArray, high: FloatArray
+) -> FloatArray:
+    """One sweep, tool to base: Psi over one angle is a + b cos + c sin, which three of its values
+    fix.
+    """
     q = q.copy()
     for i in reversed(range(len(q))):
 
@@ -56,8 +63,10 @@ def test_every_sweep_of_the_descent_is_that_of_three_values_per_joint(
     scene_of: Callable[[str], PlanningScene], budget: Work
 ) -> None:
     scene = scene_of("cnc_door")
-    pose, robot = scene.station("press").pose, scene.cell.robot
-    low, high = robot.position_min, robot.position_max
+    pose = scene.station("press").pose
+    robot = scene.cell.robot
+    low = robot.position_min
+    high = robot.position_max
     starts = random_starts(low, high, 8, "uniform", np.random.default_rng(3))
     chosen = InteractionSettings(set_back="none", newton_steps=0, sweeps=SWEEPS, xi=1e-16)
     found = descend(pose, starts, scene, scene.thresholds(0.02, "press"), chosen, budget)

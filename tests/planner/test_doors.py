@@ -1,4 +1,6 @@
-"""Doors along a program: the planner counts on no state that the driver's machines might not be in."""
+"""Doors along a program: the planner counts on no state that the driver's machines might not be
+in.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,8 @@ from ir_planner.request import Work, parse_goal
 from ir_sim_driver.controller.machines import Machines
 
 DEMO = load_cell("demo")
-OPEN, IS_OPEN = "lathe_open_door", "lathe_door_open"
+OPEN = "lathe_open_door"
+IS_OPEN = "lathe_door_open"
 
 steps = st.builds(
     ProgramStep,
@@ -49,7 +52,9 @@ def test_the_driver_s_machine_is_in_the_planned_states_however_long_movements_ta
     heard = Heard(TransitionTimes)
     heard.machines = Machines(cell).states(0.0)
     along = doors_along(file, program, heard.doors(file))
-    machines, lathe, now = Machines(cell), cell.machine("lathe"), 0.0
+    machines = Machines(cell)
+    lathe = cell.machine("lathe")
+    now = 0.0
     delay = next(signal.delay for signal in cell.signals if signal.name == IS_OPEN)
     due: tuple[float, bool] = (-1.0, not shut)  # when the answer comes, and which
     for step, (before, after), moving in zip(program, along, seconds, strict=False):
@@ -80,10 +85,15 @@ def test_the_driver_s_machine_is_in_the_planned_states_however_long_movements_ta
             MachineState("lathe", "door_closed"),
             f"lathe is door_closed, as signal {OPEN} has it; {OPEN} turns it",
         ),
-        (MachineState("lathe", "door_closed", "door_open", 0.7), f"to door_open: wait for signal {IS_OPEN}"),
+        (
+            MachineState("lathe", "door_closed", "door_open", 0.7),
+            f"to door_open: wait for signal {IS_OPEN}",
+        ),
     ],
 )
-def test_a_door_that_the_driver_says_is_not_open_refuses_the_visit_and_names_the_signal(said, sentence):
+def test_a_door_that_the_driver_says_is_not_open_refuses_the_visit_and_names_the_signal(
+    said, sentence
+):
     planner = Planner(lambda: 0.0)
     planner.set_cell("", "demo")
     start = np.array(planner.cell.machine_home)
@@ -92,7 +102,8 @@ def test_a_door_that_the_driver_says_is_not_open_refuses_the_visit_and_names_the
     assert plan.status.code in (StatusCode.GOAL_IN_COLLISION, StatusCode.PLANNING_FAILED)
     assert sentence in plan.status.message
     assert [
-        "at the start, as the driver says: lathe door_closed" in each.note for each in plan.info.stages
+        "at the start, as the driver says: lathe door_closed" in each.note
+        for each in plan.info.stages
     ].count(True) == 1
     planner.heard.machines = (MachineState("lathe", "door_open"),)
     again = planner.plan_program(("lathe_work",), 0.0, PlanOptions(), start)
@@ -104,7 +115,9 @@ def test_a_door_that_the_driver_says_is_not_open_refuses_the_visit_and_names_the
 
 def planned(*program: ProgramStep) -> ProgramPlan:
     cell = replace(DEMO.with_equipment("lathe", state="door_closed"), program=program)
-    request = ProgramRequest(cell, load_power_data(), (), np.array(cell.machine_home), PlanOptions())
+    request = ProgramRequest(
+        cell, load_power_data(), (), np.array(cell.machine_home), PlanOptions()
+    )
     return plan_program(request, Work(100_000, 1.0, lambda: 0.0))
 
 
@@ -115,7 +128,10 @@ HOME = ProgramStep("POSTURE", "home")
 def test_a_movement_through_a_door_that_may_be_closed_is_refused_with_the_signal_to_wait_for():
     plan = planned(OPENED, ProgramStep("STATION", "lathe_work"), HOME)
     assert plan.status.code in (StatusCode.GOAL_IN_COLLISION, StatusCode.PLANNING_FAILED)
-    assert f"lathe changes from door_closed to door_open: wait for signal {IS_OPEN}" in plan.status.message
+    assert (
+        f"lathe changes from door_closed to door_open: wait for signal {IS_OPEN}"
+        in plan.status.message
+    )
 
 
 @pytest.mark.parametrize("wait", [Signal(IS_OPEN, True), None])
@@ -146,7 +162,8 @@ SHUT = "lathe is door_closed, as signal lathe_open_door has it; lathe_open_door 
 
 def test_single_movements_and_states_count_with_doors_as_the_driver_says_and_name_them():
     planner = planner_that_hears(MachineState("lathe", "door_open"))
-    home, options = np.array(planner.cell.machine_home), PlanOptions()
+    home = np.array(planner.cell.machine_home)
+    options = PlanOptions()
     there = parse_goal("lathe_work", planner.cell)
     found = planner.plan_regional(home, there, options)
     assert found.trajectory is not None
@@ -166,5 +183,6 @@ def test_single_movements_and_states_count_with_doors_as_the_driver_says_and_nam
     assert away.info.stages[-1].name == "doors"
     planner.heard.machines = None
     assert (
-        planner.plan_regional(home, there, options).trajectory.trajectory_id == found.trajectory.trajectory_id
+        planner.plan_regional(home, there, options).trajectory.trajectory_id
+        == found.trajectory.trajectory_id
     )

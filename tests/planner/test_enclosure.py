@@ -23,7 +23,8 @@ from ir_planner.search import Ends
 
 SceneOf = Callable[[str], PlanningScene]
 S_M = 0.02
-HOME, PARK = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]), np.radians([0.0, -125.0, 120.0, 0.0, 80.0, 0.0])
+HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
+PARK = np.radians([0.0, -125.0, 120.0, 0.0, 80.0, 0.0])
 WALL = 0.05  # m
 SIDES = [(axis, side) for axis in range(3) for side in (-1.0, 1.0)]
 
@@ -32,8 +33,12 @@ def work() -> Work:
     return Work(400_000, 1.0, lambda: 0.0)
 
 
-def walls(pose: np.ndarray, size: np.ndarray, missing: tuple[int, float] | None = None) -> Equipment:
-    """A room: six walls around a box of inner `size` (3,) at a pose (4, 4), one of them left out."""
+def walls(
+    pose: np.ndarray, size: np.ndarray, missing: tuple[int, float] | None = None
+) -> Equipment:
+    """A room: six walls around a box of inner `size` (3,) at a pose (4, 4), one of them left
+    out.
+    """
     bodies = []
     for axis, side in SIDES:
         if (axis, side) == missing:
@@ -53,7 +58,9 @@ def bare(cell: Cell, room: Equipment) -> PlanningScene:
 
 
 def around_tool(scene: PlanningScene, q: np.ndarray, shift: np.ndarray, turn: float) -> np.ndarray:
-    """Pose (4, 4) of a room about the middle of the tool at q, moved and turned about the vertical axis."""
+    """Pose (4, 4) of a room about the middle of the tool at q, moved and turned about the vertical
+    axis.
+    """
     link = scene.chain.link_poses(q[None])[0, -1]
     points = [link[:3, :3] @ p + link[:3, 3] for c in scene.loads[0].capsules for p in (c.p0, c.p1)]
     pose = np.eye(4)
@@ -63,11 +70,18 @@ def around_tool(scene: PlanningScene, q: np.ndarray, shift: np.ndarray, turn: fl
 
 
 @settings(max_examples=4)
-@given(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.floats(-3.1, 3.1), st.booleans())
+@given(
+    st.floats(-0.1, 0.1),
+    st.floats(-0.1, 0.1),
+    st.floats(-0.1, 0.1),
+    st.floats(-3.1, 3.1),
+    st.booleans(),
+)
 def test_an_end_in_a_closed_room_is_recognised(
     scene_of: SceneOf, x: float, y: float, z: float, turn: float, at_start: bool
 ) -> None:
-    # the load stands in a room of its own: as if the flange reached through a wall that the load can't pass
+    # the load stands in a room of its own: as if the flange reached through a wall that the load
+    # can't pass
     scene = scene_of("open")
     pose = around_tool(scene, HOME, np.array([x, y, z]), turn)
     closed = bare(scene.cell, walls(pose, np.array([1.2, 1.2, 1.2])))
@@ -82,7 +96,9 @@ def test_an_end_in_a_closed_room_is_recognised(
 
 
 @pytest.mark.parametrize("missing", SIDES)
-def test_a_room_without_a_wall_encloses_nothing(scene_of: SceneOf, missing: tuple[int, float]) -> None:
+def test_a_room_without_a_wall_encloses_nothing(
+    scene_of: SceneOf, missing: tuple[int, float]
+) -> None:
     scene = scene_of("open")
     pose = around_tool(scene, HOME, np.zeros(3), 0.3)
     room = bare(scene.cell, walls(pose, np.array([1.2, 1.2, 1.2]), missing))
@@ -148,7 +164,9 @@ def test_a_slot_for_the_arm_lets_a_thicker_load_out_or_not(half: float) -> None:
     st.lists(st.floats(-2.0, 2.0), min_size=3, max_size=3),
     st.lists(st.floats(0.05, 1.0), min_size=3, max_size=3),
 )
-def test_lengths_are_at_least_the_distance(kind: str, point: list[float], size: list[float]) -> None:
+def test_lengths_are_at_least_the_distance(
+    kind: str, point: list[float], size: list[float]
+) -> None:
     used = {"box": 3, "cylinder": 2, "sphere": 1, "capsule": 2, "plane": 0, "mesh": 0}[kind]
     corners = np.array(np.meshgrid([-0.3, 0.4], [-0.2, 0.5], [-0.1, 0.2])).reshape(3, -1).T
     vertices = corners if kind == "mesh" else np.zeros((0, 3))
@@ -171,7 +189,9 @@ def _points_of(body: Body) -> np.ndarray:
     """Points within a body, densely."""
     rng = np.random.default_rng(1)
     local = (
-        rng.uniform(-2.5, 2.5, (200_000, 3)) if body.kind == "plane" else rng.uniform(-1.6, 1.6, (60_000, 3))
+        rng.uniform(-2.5, 2.5, (200_000, 3))
+        if body.kind == "plane"
+        else rng.uniform(-1.6, 1.6, (60_000, 3))
     )
     x, y, z = local.T
     radius, length, _ = body.size

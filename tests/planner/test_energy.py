@@ -1,4 +1,6 @@
-"""Joules at the mains: the balance closes for every movement, and standing still costs what Table II says."""
+"""Joules at the mains: the balance closes for every movement, and standing still costs what Table
+II says.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ Degrees = Callable[..., Any]
 @pytest.fixture
 def fast(demo_scene: PlanningScene, degrees: Degrees, budget: Work) -> JointTrajectory:
     path = np.stack([degrees(0, -50, 60, 0, 0, 0), degrees(80, -110, 120, 0, 30, 0)])
-    return straight_steps(path, Context.of(demo_scene, PlanOptions(objective="time"), budget)).trajectory
+    return straight_steps(
+        path, Context.of(demo_scene, PlanOptions(objective="time"), budget)
+    ).trajectory
 
 
 @pytest.mark.parametrize("regeneration", REGENERATIONS)
@@ -45,7 +49,8 @@ def test_sharing_the_bus_costs_no_more_than_burning_and_no_less_than_feeding_bac
     fast: JointTrajectory, demo_scene: PlanningScene
 ) -> None:
     total = {
-        kind: movement_energy(fast, replace(demo_scene, drives=Drives(kind))).total for kind in REGENERATIONS
+        kind: movement_energy(fast, replace(demo_scene, drives=Drives(kind))).total
+        for kind in REGENERATIONS
     }
     assert total["fed_back"] < total["shared"] < total["none"]
 
@@ -73,7 +78,8 @@ def test_lowering_a_load_gives_energy_back_on_the_bus(
     down = movement_energy(slow, demo_scene)
     back = movement_energy(
         straight_steps(
-            path[::-1], Context.of(demo_scene, PlanOptions(duration=4.0, safety_distance=0.0), budget)
+            path[::-1],
+            Context.of(demo_scene, PlanOptions(duration=4.0, safety_distance=0.0), budget),
         ).trajectory,
         demo_scene,
     )
@@ -87,7 +93,9 @@ def test_many_durations_at_once_cost_what_each_costs_alone(
 ) -> None:
     scene = replace(demo_scene, drives=Drives(regeneration))
     factors = np.array([1.0, 1.3, 2.2])
-    together = stretched_costs(fast, factors, Context.of(scene, PlanOptions(objective="energy"), budget))
+    together = stretched_costs(
+        fast, factors, Context.of(scene, PlanOptions(objective="energy"), budget)
+    )
     for factor, joules in zip(factors, together, strict=True):
         alone = movement_energy(stretched(fast, factor), scene)
         assert joules == pytest.approx(alone.total - alone.base, rel=2e-3)
@@ -102,7 +110,8 @@ def test_the_objective_trades_time_for_joules(
 
     assert factor("time") == 1.0
     assert factor("movement_cost") == 1.0
-    both, frugal = factor("time_and_energy"), factor("energy")
+    both = factor("time_and_energy")
+    frugal = factor("energy")
     assert 1.0 <= both <= frugal
     slow = movement_energy(stretched(fast, frugal), demo_scene)
     assert slow.total < movement_energy(fast, demo_scene).total

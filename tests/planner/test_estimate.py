@@ -21,9 +21,12 @@ def context_of(scene: PlanningScene) -> Context:
 
 
 @pytest.mark.parametrize("name", FREE)
-def test_it_is_near_the_certified_answer(scene_of: Callable[[str], PlanningScene], name: str) -> None:
+def test_it_is_near_the_certified_answer(
+    scene_of: Callable[[str], PlanningScene], name: str
+) -> None:
     scene = scene_of("open")
-    task, refinement = scene.cell.task(name), Refinement(context_of(scene))
+    task = scene.cell.task(name)
+    refinement = Refinement(context_of(scene))
     segment = np.stack([task.start, task.goal])
     found = estimate([segment], refinement)
     answer = refinement.refined(refinement.coarse(segment, THOROUGH.coarse), segment, THOROUGH)
@@ -34,9 +37,12 @@ def test_it_is_near_the_certified_answer(scene_of: Callable[[str], PlanningScene
 
 def test_a_dearer_path_beside_it_changes_nothing(scene_of: Callable[[str], PlanningScene]) -> None:
     scene = scene_of("open")
-    task, context = scene.cell.task("home->p1"), context_of(scene)
+    task = scene.cell.task("home->p1")
+    context = context_of(scene)
     segment = np.stack([task.start, task.goal])
-    detour = np.stack([task.start, task.start + np.array([1.5, 0.0, 0.0, 0.0, 0.0, 0.0]), task.goal])
+    detour = np.stack(
+        [task.start, task.start + np.array([1.5, 0.0, 0.0, 0.0, 0.0, 0.0]), task.goal]
+    )
     alone = estimate([segment, segment], Refinement(context))
     beside = estimate([detour, segment], Refinement(context))
     assert beside.cost == alone.cost

@@ -22,7 +22,9 @@ def choice_with(waiting: float) -> Choice:
     bus = SimpleNamespace(capacity_energy=CAPACITY, regeneration="shared")
     scene = SimpleNamespace(base_watts=BASE, dc_bus=bus)
     movements = SimpleNamespace(context=SimpleNamespace(scene=scene))
-    return cast(Choice, SimpleNamespace(movements=movements, waiting=lambda seconds: waiting * seconds))
+    return cast(
+        Choice, SimpleNamespace(movements=movements, waiting=lambda seconds: waiting * seconds)
+    )
 
 
 @given(st.integers(0, 2**32), st.floats(100.0, 900.0), st.floats(50.0, 5000.0), st.floats(0.0, 3.0))
@@ -33,7 +35,10 @@ def test_no_program_within_a_cycle_costs_less_than_its_bound(
     """Three chains of three movements, each at four speeds: all of them, one by one."""
     rng = np.random.default_rng(seed)
     chains = [
-        [list(zip(rng.uniform(0.8, 3.0, 4), rng.uniform(300.0, 4000.0, 4), strict=True)) for _ in range(3)]
+        [
+            list(zip(rng.uniform(0.8, 3.0, 4), rng.uniform(300.0, 4000.0, 4), strict=True))
+            for _ in range(3)
+        ]
         for _ in range(3)
     ]
     programs = [

@@ -1,4 +1,6 @@
-"""The genetic correction: what collides gets vias, what is free stays, and what leaves is proved."""
+"""The genetic correction: what collides gets vias, what is free stays, and what leaves is
+proved.
+"""
 
 from __future__ import annotations
 
@@ -66,7 +68,9 @@ def clearance(path: FloatArray, scene: PlanningScene) -> float:
 
 
 @pytest.mark.parametrize(("cell", "task", "flip"), TASKS)
-@pytest.mark.parametrize("seeds", [range(5), pytest.param(range(5, 30), marks=pytest.mark.long)], ids=str)
+@pytest.mark.parametrize(
+    "seeds", [range(5), pytest.param(range(5, 30), marks=pytest.mark.long)], ids=str
+)
 def test_every_task_of_the_open_cells_is_corrected_with_every_seed(
     cell: str, task: str, flip: bool, seeds: range, scene_of: SceneOf
 ) -> None:
@@ -121,7 +125,8 @@ def test_only_the_stretch_that_collides_is_taken_out(scene_of: SceneOf) -> None:
         assert np.allclose(q, start + at * (goal - start))
         return at
 
-    begin, end = share(before[-1]), share(after[0])
+    begin = share(before[-1])
+    end = share(after[0])
     dense = start + np.linspace(0.0, 1.0, 20_001)[:, None] * (goal - start)
     collides = np.flatnonzero(scene.collision.distances(dense).min(axis=1) <= S_M) / 20_000
     spacing = 0.02 / np.abs(goal - start).max()
@@ -252,7 +257,9 @@ def test_the_planner_genetic_answers_with_a_certified_movement_and_the_same_byte
             start, goal, scene, replace(options, planner_id="genetic", seed=seed), a_budget(60_000)
         )
 
-    first, second, other = plan(5), plan(5), plan(6)
+    first = plan(5)
+    second = plan(5)
+    other = plan(6)
     assert first.status.ok, first.status.message
     assert first.report.certified
     assert first.info.planner_id == "genetic"
@@ -292,11 +299,14 @@ equipment:
 def caged(budget: Work, degrees: Any, options: PlanOptions) -> Any:
     cell = cell_from_yaml(CAGE)
     scene = scene_with(cell, load_text(cell), load_power_data())
-    home, across = degrees(0, -90, 90, 0, 0, 0), degrees(180, -90, 90, 0, 0, 0)
+    home = degrees(0, -90, 90, 0, 0, 0)
+    across = degrees(180, -90, 90, 0, 0, 0)
     return planned(home, across, scene, replace(options, planner_id="genetic"), budget)
 
 
-def test_a_failure_says_how_near_it_came_and_which_pair_blocks(degrees: Any, options: PlanOptions) -> None:
+def test_a_failure_says_how_near_it_came_and_which_pair_blocks(
+    degrees: Any, options: PlanOptions
+) -> None:
     plan = caged(a_budget(60_000), degrees, options)
     assert plan.status.code == StatusCode.PLANNING_FAILED
     sentence = plan.status.message.partition("genetic (")[2].partition(")")[0]
@@ -308,8 +318,12 @@ def test_a_failure_says_how_near_it_came_and_which_pair_blocks(degrees: Any, opt
 
 
 @pytest.mark.parametrize("most", [1, 2, 5, 50, 100, 300, 1000, 3333])
-def test_work_is_charged_and_never_more_than_there_is(most: int, degrees: Any, options: PlanOptions) -> None:
-    generation = SETTINGS.population * SETTINGS.samples // 40 + SETTINGS.islands * (SETTINGS.vias + 1)
+def test_work_is_charged_and_never_more_than_there_is(
+    most: int, degrees: Any, options: PlanOptions
+) -> None:
+    generation = SETTINGS.population * SETTINGS.samples // 40 + SETTINGS.islands * (
+        SETTINGS.vias + 1
+    )
     plan = caged(a_budget(most), degrees, options)
     assert plan.status.code == StatusCode.PLANNING_FAILED
     assert most - SETTINGS.first * generation <= plan.info.iterations <= most
@@ -330,11 +344,19 @@ def test_a_cancel_is_heard_between_generations(degrees: Any, options: PlanOption
             {"population": 8, "islands": 4},
             "elite is 2: it must be less than population / islands, which is 2",
         ),
-        ({"spread_least": 2.0}, "spread_least is 2 rad: it must be at most spread_most, which is 1.2 rad"),
-        ({"mutation": 0.005}, "mutation_least is 0.01 rad: it must be at most mutation, which is 0.005 rad"),
+        (
+            {"spread_least": 2.0},
+            "spread_least is 2 rad: it must be at most spread_most, which is 1.2 rad",
+        ),
+        (
+            {"mutation": 0.005},
+            "mutation_least is 0.01 rad: it must be at most mutation, which is 0.005 rad",
+        ),
         ({"margin": float("nan")}, "margin is nan: it must be finite"),
     ],
 )
-def test_settings_that_make_no_sense_are_refused_with_a_sentence(values: Any, sentence: str) -> None:
+def test_settings_that_make_no_sense_are_refused_with_a_sentence(
+    values: Any, sentence: str
+) -> None:
     with pytest.raises(ParameterError, match=sentence.replace(".", r"\.")):
         Genetic(**values)

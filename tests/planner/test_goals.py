@@ -39,7 +39,9 @@ def test_postures_have_names(text: str, posture: str) -> None:
     ],
 )
 def test_joint_values_are_degrees_in_any_order(text: str) -> None:
-    assert np.degrees(parse_goal(text, CELL).configuration) == pytest.approx([10, -90, 90, 0, -5, 0])  # type: ignore[arg-type]
+    assert np.degrees(parse_goal(text, CELL).configuration) == pytest.approx(
+        [10, -90, 90, 0, -5, 0]
+    )  # type: ignore[arg-type]
 
 
 def test_a_pose_is_metres_and_kukas_angles() -> None:
@@ -57,7 +59,11 @@ def test_a_pose_is_metres_and_kukas_angles() -> None:
         ("A1 10 A1 10 A3 90 A4 0 A5 -5 A6 0", StatusCode.INVALID_GOAL_CONSTRAINTS, "once"),
         ("A1 ten A2 -90 A3 90 A4 0 A5 -5 A6 0", StatusCode.INVALID_GOAL_CONSTRAINTS, "'ten'"),
         ("A1 nan A2 -90 A3 90 A4 0 A5 -5 A6 0", StatusCode.INVALID_GOAL_CONSTRAINTS, "finite"),
-        ("A1 190 A2 -90 A3 90 A4 0 A5 -5 A6 0", StatusCode.GOAL_STATE_INVALID, "joint_a1 is 190 deg"),
+        (
+            "A1 190 A2 -90 A3 90 A4 0 A5 -5 A6 0",
+            StatusCode.GOAL_STATE_INVALID,
+            "joint_a1 is 190 deg",
+        ),
         ("X 1 Y 2 Z", StatusCode.INVALID_GOAL_CONSTRAINTS, "X Y Z A B C"),
         ("X 1e9 Y 0 Z 1 A 0 B 0 C 0", StatusCode.INVALID_GOAL_CONSTRAINTS, "100"),
         ("home\n", None, ""),
@@ -80,7 +86,9 @@ def test_exactly_one_form_is_taken() -> None:
     for text, q, pose in (("", None, None), ("home", home, None), ("", home, np.eye(4))):
         with pytest.raises(RequestError, match="exactly one"):
             one_goal(text, q, pose, CELL)
-    with pytest.raises(RequestError, match="exactly one of goal and goal_pose must be given, it is none"):
+    with pytest.raises(
+        RequestError, match="exactly one of goal and goal_pose must be given, it is none"
+    ):
         one_goal("", None, None, CELL, ("goal", "goal_pose"))
 
 

@@ -41,7 +41,8 @@ def test_guesses_lead_from_start_to_goal_within_the_limits(
 
 
 def test_joints_beyond_the_fifth_stay_where_the_straight_segment_has_them() -> None:
-    start, goal = np.zeros(6), np.full(6, 0.4)
+    start = np.zeros(6)
+    goal = np.full(6, 0.4)
     for path in guesses(start, goal, np.zeros(6), LOW - 9.0, HIGH + 9.0)[4:]:
         assert set(np.round(path[1:-1, 5], 9)) <= {0.1, 0.2, 0.3}
 
@@ -53,9 +54,13 @@ def test_the_seed_makes_little_difference(cell: str, scene_of: SceneOf) -> None:
         costs = []
         for seed in (1, 2, 3):
             work = Work(400_000, 1.0, lambda: 0.0)
-            plan = planned(np.array(task.start), np.array(task.goal), scene, PlanOptions(seed=seed), work)
+            plan = planned(
+                np.array(task.start), np.array(task.goal), scene, PlanOptions(seed=seed), work
+            )
             assert plan.status.ok, plan.status.message
-            costs.append(plan.report.energy - plan.report.base_energy + 500.0 * plan.report.duration)
+            costs.append(
+                plan.report.energy - plan.report.base_energy + 500.0 * plan.report.duration
+            )
         assert max(costs) <= (1.0 + SPREAD) * min(costs), task.name
 
 
@@ -65,7 +70,9 @@ def test_straight_steps_along_a_free_curve_are_free(scene_of: SceneOf) -> None:
     space = FreeSpace.of(scene, 0.01, work)
     followed = 0
     for task in scene.cell.tasks:
-        paths = guesses(np.array(task.start), np.array(task.goal), scene.cell.park, space.low, space.high)
+        paths = guesses(
+            np.array(task.start), np.array(task.goal), scene.cell.park, space.low, space.high
+        )
         for path in paths:
             points = along_path(path, 40, 1.0).samples(6)[0]
             free = space.certificates(points[:-1], points[1:]).verdict == FREE

@@ -1,4 +1,6 @@
-"""Stage one: random starts, metric distances and set-back, acceptance and rejection (eqs. 1 to 6)."""
+"""Stage one: random starts, metric distances and set-back, acceptance and rejection (eqs. 1 to
+6).
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,8 @@ distances = st.floats(0.0201, 1.0)
 
 
 def test_starts_of_eq_1_fill_the_joint_range_as_a_truncated_normal() -> None:
-    low, high = np.array([-3.0, 0.0]), np.array([3.0, 1.0])
+    low = np.array([-3.0, 0.0])
+    high = np.array([3.0, 1.0])
     starts = random_starts(low, high, 20_000, "truncated_normal", np.random.default_rng(0))
     assert (starts >= low).all()
     assert (starts <= high).all()
@@ -41,20 +44,26 @@ def test_starts_of_eq_1_fill_the_joint_range_as_a_truncated_normal() -> None:
 
 
 def test_uniform_starts_are_an_option_and_seeds_repeat() -> None:
-    low, high = np.zeros(6), np.ones(6)
-    first, second = (random_starts(low, high, 500, "uniform", np.random.default_rng(4)) for _ in range(2))
+    low = np.zeros(6)
+    high = np.ones(6)
+    first, second = (
+        random_starts(low, high, 500, "uniform", np.random.default_rng(4)) for _ in range(2)
+    )
     assert np.array_equal(first, second)
     assert abs(first.std() - 1.0 / np.sqrt(12.0)) < 0.01
 
 
 def test_eq_4_is_the_gain_of_every_metric_distance() -> None:
-    before, after = np.array([[0.1, -0.02]]), np.array([[0.07, 0.01]])
+    before = np.array([[0.1, -0.02]])
+    after = np.array([[0.07, 0.01]])
     np.testing.assert_allclose(increments(before, after), [[-0.03, 0.03]])
 
 
 @given(d=distances, loss=st.floats(1e-3, 2.0))
 @settings(max_examples=200, deadline=None)
-def test_the_secant_step_of_eq_5_ends_at_the_safety_distance_or_beyond(d: float, loss: float) -> None:
+def test_the_secant_step_of_eq_5_ends_at_the_safety_distance_or_beyond(
+    d: float, loss: float
+) -> None:
     margin = 0.02
     after = d - loss
     share = shares_back(np.array([[d]]), np.array([[after]]), np.array([margin]), SECANT, 0.05)[0]
@@ -69,19 +78,23 @@ def test_the_secant_step_of_eq_5_ends_at_the_safety_distance_or_beyond(d: float,
 def test_the_work_of_a_search_is_its_sweeps_of_all_starts(
     starts: int, scene_of: Callable[[str], PlanningScene]
 ) -> None:
-    """At a pose out of reach no start arrives or collides there, so that all of them take every sweep."""
+    """At a pose out of reach no start arrives or collides there, so that all of them take every
+    sweep.
+    """
     scene = scene_of("open")
     pose = np.eye(4)
     pose[:3, 3] = 50.0, 0.0, 1.0
     budget = Work(10_000, np.inf, lambda: 0.0)
-    chosen, nothing = InteractionSettings(sweeps=2), np.full(len(scene.collision.pairs), -np.inf)
+    chosen = InteractionSettings(sweeps=2)
+    nothing = np.full(len(scene.collision.pairs), -np.inf)
     searched_configurations(pose, scene, nothing, HOME, starts, 0, chosen, budget)
     assert budget.iterations == 2 * starts
 
 
 def test_a_search_ends_when_its_work_is_spent(scene_of: Callable[[str], PlanningScene]) -> None:
     scene = scene_of("demo")
-    pose, threshold = scene.station("lathe_work").pose, scene.thresholds(0.02, "lathe_work")
+    pose = scene.station("lathe_work").pose
+    threshold = scene.thresholds(0.02, "lathe_work")
     budget = Work(30, np.inf, lambda: 0.0)
     searched_configurations(pose, scene, threshold, HOME, 32, 1, InteractionSettings(), budget)
     assert budget.iterations == 30
@@ -108,14 +121,17 @@ def test_the_search_finds_a_part_of_the_complete_set(
     cell: str, station: str, set_back: str, scene_of: Callable[[str], PlanningScene], budget: Work
 ) -> None:
     scene = scene_of(cell)
-    pose, threshold = scene.station(station).pose, scene.thresholds(0.02, station)
+    pose = scene.station(station).pose
+    threshold = scene.thresholds(0.02, station)
     complete = free_configurations(pose, scene, threshold, HOME)
     chosen = InteractionSettings(set_back=set_back)
     found = searched_configurations(pose, scene, threshold, HOME, 32, 1, chosen, budget)
     assert len(found.q) > 0
     for q, branch in zip(found.q, found.branch, strict=True):
         same = np.abs(complete.q - q).max(axis=1)
-        assert same.min() < 1e-5  # Newton's steps end at rounding; wrists near singular take more of it
+        assert (
+            same.min() < 1e-5
+        )  # Newton's steps end at rounding; wrists near singular take more of it
         assert complete.branch[int(np.argmin(same))] == branch
     costs = np.abs(found.q - HOME) @ scene.weights
     assert (np.diff(costs) > -1e-5).all()
@@ -124,12 +140,18 @@ def test_the_search_finds_a_part_of_the_complete_set(
 def test_without_the_set_back_bodies_are_in_no_step_and_sorted_out_at_the_pose(
     scene_of: Callable[[str], PlanningScene], budget: Work
 ) -> None:
-    """Against the secant with nothing to keep: the same descents, of which the free ones are left."""
+    """Against the secant with nothing to keep: the same descents, of which the free ones are
+    left.
+    """
     scene = scene_of("deep_box")
-    pose, threshold = np.array(scene.station("bin").pose), scene.thresholds(0.02)
+    pose = np.array(scene.station("bin").pose)
+    threshold = scene.thresholds(0.02)
     pose[:3, 3] += 0.3, 0.0, 0.0  # a finger in the wall: what arrives collides
-    nothing, robot = np.full(len(threshold), -1e3), scene.cell.robot
-    starts = random_starts(robot.position_min, robot.position_max, 40, "uniform", np.random.default_rng(1))
+    nothing = np.full(len(threshold), -1e3)
+    robot = scene.cell.robot
+    starts = random_starts(
+        robot.position_min, robot.position_max, 40, "uniform", np.random.default_rng(1)
+    )
     through = descend(pose, starts, scene, nothing, InteractionSettings(), budget)
     sorted_out = descend(pose, starts, scene, threshold, InteractionSettings(set_back=NONE), budget)
     free = through.q[scene.collision.is_free(through.q, threshold)]
@@ -141,9 +163,12 @@ def test_the_same_seed_gives_the_same_configurations(
     scene_of: Callable[[str], PlanningScene], budget: Work
 ) -> None:
     scene = scene_of("cnc_door")
-    pose, threshold = scene.station("press").pose, scene.thresholds(0.02, "press")
+    pose = scene.station("press").pose
+    threshold = scene.thresholds(0.02, "press")
     first, second = (
-        searched_configurations(pose, scene, threshold, HOME, 32, 5, InteractionSettings(), budget).q
+        searched_configurations(
+            pose, scene, threshold, HOME, 32, 5, InteractionSettings(), budget
+        ).q
         for _ in range(2)
     )
     assert np.array_equal(first, second)
@@ -153,15 +178,20 @@ def test_every_start_is_accepted_or_rejected_with_a_reason(
     scene_of: Callable[[str], PlanningScene], budget: Work
 ) -> None:
     scene = scene_of("deep_box")
-    pose, threshold = scene.station("bin").pose, scene.thresholds(0.02, "bin")
-    found = searched_configurations(pose, scene, threshold, HOME, 40, 2, InteractionSettings(), budget)
+    pose = scene.station("bin").pose
+    threshold = scene.thresholds(0.02, "bin")
+    found = searched_configurations(
+        pose, scene, threshold, HOME, 40, 2, InteractionSettings(), budget
+    )
     at_the_pose = sum(n for reason, n in found.rejected.items() if reason.startswith("at the pose"))
     assert found.reached - at_the_pose + sum(found.rejected.values()) == 40
     assert any("too near bin_" in reason for reason in found.rejected)
 
 
 def test_a_pose_out_of_reach_has_no_solution_and_says_so(planner: Planner) -> None:
-    far = planner.compute_ik(parse_goal("X 5 Y 0 Z 1 A 0 B 90 C 0", planner.cell), "ccd", 0.02, HOME, "")
+    far = planner.compute_ik(
+        parse_goal("X 5 Y 0 Z 1 A 0 B 90 C 0", planner.cell), "ccd", 0.02, HOME, ""
+    )
     assert not far.solutions
     assert "not converged" in " ".join(rejection.reason for rejection in far.info.rejected)
 
@@ -192,7 +222,10 @@ def test_branches_are_those_of_the_closed_form(scene_of: Callable[[str], Plannin
 def test_a_budget_that_is_spent_ends_the_search(scene_of: Callable[[str], PlanningScene]) -> None:
     scene = scene_of("cnc_door")
     spent = Work(10, time.monotonic() - 1.0, time.monotonic)
-    pose, threshold = scene.station("press").pose, scene.thresholds(0.02, "press")
-    found = searched_configurations(pose, scene, threshold, HOME, 8, 0, InteractionSettings(), spent)
+    pose = scene.station("press").pose
+    threshold = scene.thresholds(0.02, "press")
+    found = searched_configurations(
+        pose, scene, threshold, HOME, 8, 0, InteractionSettings(), spent
+    )
     assert len(found.q) == 0
     assert spent.truncated

@@ -1,4 +1,6 @@
-"""Intervals of energies: against drawn robots that are computed one by one, closed forms, and laws."""
+"""Intervals of energies: against drawn robots that are computed one by one, closed forms, and
+laws.
+"""
 
 from dataclasses import replace
 from functools import cache
@@ -37,7 +39,9 @@ def movement(task: str) -> JointTrajectory:
     """A planned movement of it."""
     wanted = planner().cell.task(task)
     options = PlanOptions(safety_distance=0.005)
-    found = planner().plan_regional(wanted.start, Goal(configuration=wanted.goal, text=task), options)
+    found = planner().plan_regional(
+        wanted.start, Goal(configuration=wanted.goal, text=task), options
+    )
     assert found.trajectory is not None, found.status.message
     return found.trajectory
 
@@ -83,8 +87,11 @@ def test_where_only_constant_watts_are_unsure_the_interval_is_the_normal_one() -
 
 @settings(max_examples=8, deadline=None)
 @given(factor=st.floats(0.05, 0.9), task=st.sampled_from(["home->p1", "p1->p2"]))
-def test_intervals_hold_the_nominal_and_shrink_with_the_covariance(factor: float, task: str) -> None:
-    trajectory, nominal = movement(task), 1000.0
+def test_intervals_hold_the_nominal_and_shrink_with_the_covariance(
+    factor: float, task: str
+) -> None:
+    trajectory = movement(task)
+    nominal = 1000.0
     smaller = replace(SHEET, covariance=SHEET.covariance * factor**2)
     spreads = [movement_spread(trajectory, scene(parameters)) for parameters in (SHEET, smaller)]
     whole, part = (interval(nominal, added) for added in spreads)
@@ -118,14 +125,19 @@ AT_ZERO = ("iron", "inverter", "gear", "idle_watts")  # in the data sheet
 )
 def test_slopes_are_those_of_the_energy(name: str) -> None:
     """Central differences of the energy itself, one-sided at a bound."""
-    trajectory, at = movement("p1b->cab"), SHEET.value(name)
+    trajectory = movement("p1b->cab")
+    at = SHEET.value(name)
     step = 0.02 * SHEET.deviation[SHEET.index(name)]
     below = at if at in (0.0, 1.0) and name.partition(".")[0] in AT_ZERO else at - step
     above = min(at + step, 1.0) if name == "rectifier_efficiency" else at + step
-    energies = [movement_energy(trajectory, scene(with_value(name, v))).total for v in (below, above)]
+    energies = [
+        movement_energy(trajectory, scene(with_value(name, v))).total for v in (below, above)
+    ]
     slope = energy_and_slope(Sampled.of(trajectory), scene())[1][SHEET.index(name)]
     difference = (energies[1] - energies[0]) / (above - below)
-    assert slope == pytest.approx(difference, rel=0.05, abs=1e-3 * movement_energy(trajectory, scene()).total)
+    assert slope == pytest.approx(
+        difference, rel=0.05, abs=1e-3 * movement_energy(trajectory, scene()).total
+    )
 
 
 def test_holding_slopes_are_those_of_holding_watts() -> None:
@@ -133,7 +145,9 @@ def test_holding_slopes_are_those_of_holding_watts() -> None:
     slope = holding_slope(q, scene())
     rest = JointTrajectory(SCENE_NAMES, [0, 10**9], np.stack([q, q]))
     for name in ("copper.joint_a2", "inverter.joint_a5", "link_mass", "idle_watts", "drives_watts"):
-        more = scene(with_value(name, SHEET.value(name) + 0.01 * SHEET.deviation[SHEET.index(name)]))
+        more = scene(
+            with_value(name, SHEET.value(name) + 0.01 * SHEET.deviation[SHEET.index(name)])
+        )
         watts = movement_energy(rest, more).total - movement_energy(rest, scene()).total
         expected = watts / (0.01 * SHEET.deviation[SHEET.index(name)])
         assert slope[SHEET.index(name)] == pytest.approx(expected, rel=0.02)
@@ -145,7 +159,8 @@ SCENE_NAMES = planner().cell.robot.joint_names
 def test_more_losses_never_cost_less_and_peak_power_still_bounds() -> None:
     trajectory = movement("p1b->cab")
     robot = SHEET.drawn(3)
-    lossy, plain = movement_energy(trajectory, scene(robot)), movement_energy(trajectory, scene())
+    lossy = movement_energy(trajectory, scene(robot))
+    plain = movement_energy(trajectory, scene())
     assert plain.watts.max() <= peak_power(trajectory, scene()) * (1.0 + 1e-9)
     assert lossy.watts.max() <= peak_power(trajectory, scene(robot))
     for name in ("iron.joint_a1", "inverter.joint_a2", "gear.joint_a3"):
@@ -154,11 +169,13 @@ def test_more_losses_never_cost_less_and_peak_power_still_bounds() -> None:
 
 def test_a_saving_of_a_pause_has_an_interval_of_its_own() -> None:
     """Of a long pause it is the difference of two modes' watts that counts, not their sum."""
-    q, times = np.array(planner().cell.machine_home), PlannerSettings().transitions
+    q = np.array(planner().cell.machine_home)
+    times = PlannerSettings().transitions
     bare = replace(scene(), loads=())
     found = plan_standby(3600.0, q, bare, times)
     assert found.saving_low < found.saving < found.saving_high
-    brakes, deep = SHEET.index("watts.STAND_ON_BRAKES"), SHEET.index("watts.HIBERNATION")
+    brakes = SHEET.index("watts.STAND_ON_BRAKES")
+    deep = SHEET.index("watts.HIBERNATION")
     sigma = np.hypot(SHEET.deviation[brakes], SHEET.deviation[deep]) * 3600.0
     assert found.saving_high - found.saving == pytest.approx(Z90 * sigma, rel=0.15)
     assert "90 % interval" in found.sentence
@@ -180,9 +197,12 @@ def test_an_interval_holds_the_energy_that_it_is_of(energy: float, added: FloatA
 
 def test_every_answer_lies_within_its_own_interval() -> None:
     asked = planner()
-    cell, start = asked.cell, np.array(asked.cell.park)
+    cell = asked.cell
+    start = np.array(asked.cell.park)
     name = cell.stations[0].name
-    plan = asked.plan_program((name, "park"), 0.0, PlanOptions(), start, savings=True, front_points=3)
+    plan = asked.plan_program(
+        (name, "park"), 0.0, PlanOptions(), start, savings=True, front_points=3
+    )
     assert plan.compared is not None
     programs = (plan, plan.compared, *plan.front)
     reports = [step.report for program in programs for step in program.movements]

@@ -1,5 +1,5 @@
-"""Movements of least energy: near the best that another method finds, never dearer than a shorter one
-stretched, and the fastest where time is asked for.
+"""Movements of least energy: near the best that another method finds, never dearer than a shorter
+one stretched, and the fastest where time is asked for.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ from ir_planner.timing import stretched
 
 SceneOf = Callable[[str], PlanningScene]
 CLEAR = 0.05  # m: of both ends
-SHALLOW = 1.01  # so little do joules depend on the duration near the best one that a descent may end there
+# so little do joules depend on the duration near the best one that a descent may end there
+SHALLOW = 1.01
 NEAR_THE_BEST = 1.01  # times what IPOPT finds
 FREE = (  # in the open cell: ends, durations [s] with the drive energy [J] that IPOPT finds
     (
@@ -73,7 +74,8 @@ def asked(q0: FloatArray, q1: FloatArray, scene: PlanningScene, **options: objec
 
 def ends(scene: PlanningScene, seed: int) -> tuple[FloatArray, FloatArray]:
     """Two free configurations near each other or far apart."""
-    robot, rng = scene.cell.robot, np.random.default_rng(seed)
+    robot = scene.cell.robot
+    rng = np.random.default_rng(seed)
     while True:
         q0, far = rng.uniform(0.7 * robot.position_min, 0.7 * robot.position_max, (2, robot.n))
         q1 = q0 + rng.uniform(0.1, 1.0) * (far - q0)
@@ -85,7 +87,9 @@ def ends(scene: PlanningScene, seed: int) -> tuple[FloatArray, FloatArray]:
 def test_short_movements_cost_little_more_than_the_best_known(
     q0: list[float], q1: list[float], known: tuple[tuple[float, float], ...], scene_of: SceneOf
 ) -> None:
-    """Most of their joules depend on when the bus' power passes zero: up to 58 % were missed there."""
+    """Most of their joules depend on when the bus' power passes zero: up to 58 % were missed
+    there.
+    """
     scene = scene_of("open")
     for duration, joules in known:
         report = asked(np.array(q0), np.array(q1), scene, duration=duration).report
@@ -94,9 +98,12 @@ def test_short_movements_cost_little_more_than_the_best_known(
 
 
 @pytest.mark.parametrize(
-    ("cell", "seed"), [("open", 2), ("demo", 2), ("deep_box", 3), ("table_columns", 1), ("table_columns", 6)]
+    ("cell", "seed"),
+    [("open", 2), ("demo", 2), ("deep_box", 3), ("table_columns", 1), ("table_columns", 6)],
 )
-def test_no_answer_costs_more_than_a_shorter_one_stretched(cell: str, seed: int, scene_of: SceneOf) -> None:
+def test_no_answer_costs_more_than_a_shorter_one_stretched(
+    cell: str, seed: int, scene_of: SceneOf
+) -> None:
     scene = scene_of(cell)
     q0, q1 = ends(scene, seed)
     fastest = asked(q0, q1, scene, objective="time").report.duration
@@ -110,7 +117,9 @@ def test_no_answer_costs_more_than_a_shorter_one_stretched(cell: str, seed: int,
 
 
 @pytest.mark.parametrize(("cell", "seed"), [("open", 1), ("deep_box", 2), ("open", 4), ("demo", 6)])
-def test_no_duration_takes_less_than_the_least_energy(cell: str, seed: int, scene_of: SceneOf) -> None:
+def test_no_duration_takes_less_than_the_least_energy(
+    cell: str, seed: int, scene_of: SceneOf
+) -> None:
     """What controller and tool draw doesn't count: a second costs nothing by itself."""
     scene = scene_of(cell)
     q0, q1 = ends(scene, seed)
@@ -120,7 +129,9 @@ def test_no_duration_takes_less_than_the_least_energy(cell: str, seed: int, scen
         assert drives(least) <= SHALLOW * drives(other)
 
 
-def test_a_longer_cycle_with_the_wait_at_its_end_is_filled_with_the_least_energy(demo_cell: Cell) -> None:
+def test_a_longer_cycle_with_the_wait_at_its_end_is_filled_with_the_least_energy(
+    demo_cell: Cell,
+) -> None:
     """The objective energy of a program counts the controller too: a whole cycle is paid for."""
     program = partial(asked_program, demo_cell, ("infeed_pick", "home"))
     free = program(objective="energy")
@@ -131,7 +142,9 @@ def test_a_longer_cycle_with_the_wait_at_its_end_is_filled_with_the_least_energy
 
 @pytest.mark.parametrize("cell", ["open", "demo"])
 @pytest.mark.parametrize("seed", [3, 4])
-def test_time_is_the_fastest_that_any_objective_finds(cell: str, seed: int, scene_of: SceneOf) -> None:
+def test_time_is_the_fastest_that_any_objective_finds(
+    cell: str, seed: int, scene_of: SceneOf
+) -> None:
     scene = scene_of(cell)
     q0, q1 = ends(scene, seed)
     fastest = asked(q0, q1, scene, objective="time").report.duration

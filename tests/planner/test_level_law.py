@@ -1,5 +1,5 @@
-"""Laws whose ramps step down in levels: exact at both ends, within their bounds, and shorter where torque
-binds.
+"""Laws whose ramps step down in levels: exact at both ends, within their bounds, and shorter where
+torque binds.
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ def test_a_law_of_levels_arrives_at_rest_and_integrates(
     speed: float, up: list[float], down: list[float], jerk: float
 ) -> None:
     laws = level_laws(np.array([speed]), np.array([up]), np.array([down]), jerk)
-    law = LevelLaw(tuple(int(k) for k in laws.steps[0]), tuple(float(a) for a in laws.accelerations[0]))
+    law = LevelLaw(
+        tuple(int(k) for k in laws.steps[0]), tuple(float(a) for a in laws.accelerations[0])
+    )
     s, sd, sdd = law.at(np.arange(law.total + 1))
     assert (s[0], sd[0], sdd[0]) == (0.0, 0.0, 0.0)
     assert (s[-1], sd[-1], sdd[-1]) == (1.0, 0.0, 0.0)
@@ -49,8 +51,10 @@ def test_a_law_of_levels_arrives_at_rest_and_integrates(
 def test_levels_are_faster_where_torque_falls_with_speed(
     start: Any, goal: Any, demo_scene: PlanningScene, degrees: Callable[..., Any]
 ) -> None:
-    a, b = degrees(*start), degrees(*goal)
-    limits, dynamics = demo_scene.limits, demo_scene.dynamics
+    a = degrees(*start)
+    b = degrees(*goal)
+    limits = demo_scene.limits
+    dynamics = demo_scene.dynamics
     law = fastest(a, b, limits, dynamics)
     assert law.total < 0.97 * fastest_law(a, b, limits, dynamics).total
     s, sd, sdd = (x[:, None] for x in law.at(np.arange(law.total + 1)))
@@ -63,6 +67,7 @@ def test_levels_are_faster_where_torque_falls_with_speed(
 def test_a_load_beyond_the_torque_has_no_levels(
     demo_scene: PlanningScene, degrees: Callable[..., Any]
 ) -> None:
-    a, b = degrees(0, -90, 90, 0, 0, 0), degrees(0, -40, 40, 0, 0, 0)
+    a = degrees(0, -90, 90, 0, 0, 0)
+    b = degrees(0, -40, 40, 0, 0, 0)
     bounds = path_limits(b - a, demo_scene.limits)
     assert fastest_levels(a, b - a, bounds, 0.01, demo_scene.dynamics) is None

@@ -1,4 +1,6 @@
-"""More work never turns an answer into a refusal and never makes it cost more; a refusal says why."""
+"""More work never turns an answer into a refusal and never makes it cost more; a refusal says
+why.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +44,8 @@ def test_more_work_never_refuses_and_never_costs_more_in_any_cell(cell: str, lon
 def keeps_its_answers(cell: str, longer: float) -> None:
     """longer: cycle time over the shortest; 0: free."""
     planner, stops, shortest = asked(cell)
-    found, least = False, np.inf
+    found = False
+    least = np.inf
     for most in WORK:
         options = PlanOptions(max_iterations=most, planning_time=100.0)
         plan = planned(planner, stops, longer * shortest, options)
@@ -56,11 +59,15 @@ def keeps_its_answers(cell: str, longer: float) -> None:
             assert cost(plan, options, longer) <= least * (1.0 + SAME)
             least = cost(plan, options, longer)
     assert found
-    assert longer or np.isfinite(least)  # a cycle hardly longer than the shortest may use all the work
+    assert longer or np.isfinite(
+        least
+    )  # a cycle hardly longer than the shortest may use all the work
 
 
 @pytest.mark.parametrize(("cell", "seed"), [("deep_box", 84), ("cnc_door", 3)])
-def test_no_budget_is_exceeded_and_none_refuses_what_a_smaller_one_planned(cell: str, seed: int) -> None:
+def test_no_budget_is_exceeded_and_none_refuses_what_a_smaller_one_planned(
+    cell: str, seed: int
+) -> None:
     keeps_its_budgets(cell, seed, 5)
 
 
@@ -79,7 +86,9 @@ def keeps_its_budgets(cell: str, seed: int, count: int) -> None:
     names = [station.name for station in planner.cell.stations]
     stops = (*(str(name) for name in rng.choice(names, min(2, len(names)), replace=False)), "park")
     found = False
-    for most in np.sort(np.exp(rng.uniform(np.log(20.0), np.log(3_000.0), count))).astype(int).tolist():
+    for most in (
+        np.sort(np.exp(rng.uniform(np.log(20.0), np.log(3_000.0), count))).astype(int).tolist()
+    ):
         options = PlanOptions(max_iterations=most, planning_time=1000.0, seed=seed)
         plan = planner.plan_program(stops, 0.0, options, np.array(planner.cell.park))
         assert plan.info.iterations <= most * len(stops)
@@ -100,7 +109,9 @@ def test_own_laws_of_the_joints_make_no_program_slower_in_any_cell(cell: str, se
 
 
 def no_slower_with_own_laws(cell: str, seed: int) -> None:
-    """The fastest program of stations that are drawn, among them those that a withdrawal leads out of."""
+    """The fastest program of stations that are drawn, among them those that a withdrawal leads out
+    of.
+    """
     planner = Planner(lambda: 0.0)
     planner.set_cell("", cell)
     rng = np.random.default_rng([seed, *cell.encode()])
@@ -108,7 +119,10 @@ def no_slower_with_own_laws(cell: str, seed: int) -> None:
     stops = (*(str(name) for name in rng.choice(names, min(2, len(names)), replace=False)), "park")
     plans = [
         planned(
-            planner, stops, 0.0, PlanOptions(objective="time", timing=timing, seed=seed, planning_time=100.0)
+            planner,
+            stops,
+            0.0,
+            PlanOptions(objective="time", timing=timing, seed=seed, planning_time=100.0),
         )
         for timing in ("synchronous", "asynchronous")
     ]
@@ -139,7 +153,9 @@ def cost(plan: ProgramPlan, options: PlanOptions, longer: float) -> float:
 
 
 def test_a_program_is_planned_with_little_work_and_takes_no_more_than_allowed() -> None:
-    """Service lines, known without any work, leave it to the movements and the searches of stations."""
+    """Service lines, known without any work, leave it to the movements and the searches of
+    stations.
+    """
     planner = Planner(lambda: 0.0)
     planner.set_cell("", "demo")
     options = PlanOptions(max_iterations=1_500, planning_time=100.0)

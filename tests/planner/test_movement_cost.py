@@ -17,7 +17,10 @@ WEIGHTS = movement_weights(ROBOT.link_mass, ROBOT.velocity_max)
 def test_weights_are_the_sum_from_the_joint_to_the_tool() -> None:
     n = len(ROBOT.velocity_max)
     for i in range(n):
-        total = sum(ROBOT.link_mass[link] * ROBOT.velocity_max[link - 1] ** 2 for link in range(i + 1, n + 1))
+        total = sum(
+            ROBOT.link_mass[link] * ROBOT.velocity_max[link - 1] ** 2
+            for link in range(i + 1, n + 1)
+        )
         assert WEIGHTS[i] == pytest.approx(0.5 * total, rel=1e-14)
 
 
@@ -33,4 +36,6 @@ def test_a_stop_between_never_makes_a_movement_cheaper(values: list[float]) -> N
     through = path_cost(WEIGHTS, np.stack([a, via, b]))
     assert through >= float(movement_cost(WEIGHTS, a, b)) - 1e-9
     inside = np.clip(via, np.minimum(a, b), np.maximum(a, b))
-    assert path_cost(WEIGHTS, np.stack([a, inside, b])) == pytest.approx(float(movement_cost(WEIGHTS, a, b)))
+    assert path_cost(WEIGHTS, np.stack([a, inside, b])) == pytest.approx(
+        float(movement_cost(WEIGHTS, a, b))
+    )

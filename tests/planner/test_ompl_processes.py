@@ -1,4 +1,6 @@
-"""The processes of OMPL under attack: stopped, killed, left behind; a request ends, and leaves nothing."""
+"""The processes of OMPL under attack: stopped, killed, left behind; a request ends, and leaves
+nothing.
+"""
 
 from __future__ import annotations
 
@@ -78,7 +80,9 @@ def gone(process: int) -> bool:
 
 
 def opened() -> Counter[str]:
-    """What this process has open; of what tests before have left, some may be closed at any time."""
+    """What this process has open; of what tests before have left, some may be closed at any
+    time.
+    """
     found = Counter[str]()
     for number in os.listdir("/proc/self/fd"):
         with suppress(FileNotFoundError):
@@ -131,7 +135,9 @@ def test_a_stopped_host_costs_a_request_its_time_and_no_more(
     assert space.work.truncated
 
 
-def test_a_request_to_a_stopped_host_can_be_cancelled(scene_of: SceneOf, stopped_host: host.Host) -> None:
+def test_a_request_to_a_stopped_host_can_be_cancelled(
+    scene_of: SceneOf, stopped_host: host.Host
+) -> None:
     looks = itertools.count()
     work = Work(10_000_000, 1.0, lambda: 0.0, lambda: next(looks) > 3)
     ends, space = a_task(scene_of("table_columns"), work)
@@ -210,9 +216,12 @@ def test_many_requests_leave_no_process_and_no_descriptor(
 def test_a_search_that_is_stopped_answers_what_it_has_found(
     scene_of: SceneOf, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """AORRTC goes on improving its path until its checks are spent; here it is stopped long before."""
+    """AORRTC goes on improving its path until its checks are spent; here it is stopped long
+    before.
+    """
     ours, theirs = Pipe()
-    affordable, stopped_at = worker._Counted._affordable, 3_000
+    affordable = worker._Counted._affordable
+    stopped_at = 3_000
     sent: list[str] = []
 
     def stopping(counted: worker._Counted, states: int) -> bool:
@@ -225,13 +234,17 @@ def test_a_search_that_is_stopped_answers_what_it_has_found(
     ends, space = a_task(scene_of("table_columns"), free_work())
     parameters = Parameters("AORRTC", SEARCHES["aorrtc"].parameters())
     goals = ends.goals
-    problem = Problem(space.scene, space.threshold, ends.start, goals, parameters, 1, 1_000_000, 60.0)
+    problem = Problem(
+        space.scene, space.threshold, ends.start, goals, parameters, 1, 1_000_000, 60.0
+    )
     outcome = worker.solved(problem, theirs)
     assert outcome.path is not None
     assert stopped_at < outcome.edges < 2 * stopped_at
 
 
-def test_at_the_end_of_the_work_the_process_is_asked_for_its_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_at_the_end_of_the_work_the_process_is_asked_for_its_answer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(host, "_LAST_LOOKS", 24_000)  # two minutes, on a machine that is busy
     ours, theirs = Pipe()
     said: list[str] = []
@@ -283,7 +296,9 @@ SEARCHES[sys.argv[1]].find(Ends(np.array(task.start), beyond), space, 1, space.w
 
 @pytest.mark.parametrize("stopped", [False, True])
 def test_what_a_planner_that_is_killed_leaves_ends(stopped: bool) -> None:
-    asking = subprocess.Popen([sys.executable, "-c", ASKING, "rrt"], stdout=subprocess.PIPE, text=True)
+    asking = subprocess.Popen(
+        [sys.executable, "-c", ASKING, "rrt"], stdout=subprocess.PIPE, text=True
+    )
     assert asking.stdout is not None
     loaded, process = map(int, asking.stdout.readline().split())
     assert not gone(process)
@@ -308,7 +323,8 @@ def test_two_threads_get_the_paths_that_each_gets_alone(scene_of: SceneOf) -> No
     alone = [paths(seed) for seed in (1, 2)]
     beside: dict[int, list[bytes]] = {}
     threads = [
-        threading.Thread(target=lambda seed=seed: beside.update({seed: paths(seed)})) for seed in (2, 1)
+        threading.Thread(target=lambda seed=seed: beside.update({seed: paths(seed)}))
+        for seed in (2, 1)
     ]
     for thread in threads:
         thread.start()

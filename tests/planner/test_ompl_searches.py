@@ -1,4 +1,6 @@
-"""OMPL's planners as searches: late ones are killed, blocked paths repaired, a missing OMPL named."""
+"""OMPL's planners as searches: late ones are killed, blocked paths repaired, a missing OMPL
+named.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +56,9 @@ def test_ompl_that_is_installed_but_broken_is_no_search_that_found_nothing(
     monkeypatch.setattr(host, "_host", None)  # as it was, afterwards
     ends, space = a_blocked_task(scene_of, Work(1000, 1.0, lambda: 0.0))
     try:
-        with pytest.raises(RequestError, match=r"'rrt': OMPL is installed but can't be loaded: libompl.so"):
+        with pytest.raises(
+            RequestError, match=r"'rrt': OMPL is installed but can't be loaded: libompl.so"
+        ):
             SEARCHES["rrt"].find(ends, space, 1, space.work)
     finally:
         if host._host is not None:
@@ -80,7 +84,9 @@ os._exit(0)  # without destructors, as the worker
 
 
 def test_a_roadmap_to_several_goals_is_checked_in_one_thread(scene_of: SceneOf) -> None:
-    """Checks are made with Python's lock: in a second thread they can wait for the first for ever."""
+    """Checks are made with Python's lock: in a second thread they can wait for the first for
+    ever.
+    """
     ends, space = a_blocked_task(scene_of, Work(1000, 1.0, lambda: 0.0))
     goals = np.concatenate([ends.goals, ends.goals - 0.05, ends.goals + 0.05])
     parameters = Parameters("PRM", reverse=with_ompl.Prm.reverse)
@@ -105,7 +111,9 @@ def test_at_the_ceiling_it_is_killed(scene_of: SceneOf) -> None:
     """The clock reaches the deadline while OMPL searches; RRT would need minutes for its checks."""
     ticks: Iterator[float] = itertools.count(0.0, 0.1)
     ends, space = a_blocked_task(scene_of, Work(10_000_000, 1.0, ticks.__next__))
-    ends = Ends(ends.start, ends.goals + np.array([0.0, 0.0, 0.0, 0.0, 0.0, 50.0]))  # beyond every range
+    ends = Ends(
+        ends.start, ends.goals + np.array([0.0, 0.0, 0.0, 0.0, 0.0, 50.0])
+    )  # beyond every range
     found = SEARCHES["rrt"].find(ends, space, 1, space.work)
     assert found.paths == []
     assert space.work.truncated
@@ -153,7 +161,9 @@ def test_a_process_that_dies_is_an_answer_without_a_path(
     assert "AttributeError" in found.note
 
 
-def test_a_path_that_is_blocked_between_its_points_is_repaired_or_refused(scene_of: SceneOf) -> None:
+def test_a_path_that_is_blocked_between_its_points_is_repaired_or_refused(
+    scene_of: SceneOf,
+) -> None:
     ends, space = a_blocked_task(scene_of, Work(100_000, 1.0, lambda: 0.0))
     straight = np.stack([ends.start, ends.goals[0]])
     assert space.certificates(straight[:1], straight[1:]).verdict[0] != FREE

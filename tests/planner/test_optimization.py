@@ -1,5 +1,5 @@
-"""Any trajectory becomes cheaper between its end points: certified, as requested, with its trade of time for
-energy.
+"""Any trajectory becomes cheaper between its end points: certified, as requested, with its trade of
+time for energy.
 """
 
 from __future__ import annotations
@@ -66,8 +66,12 @@ def swung(points: FloatArray, joint: int, by: float) -> FloatArray:
     return np.asarray(path)
 
 
-def check_movement(trajectory: JointTrajectory | None, ends: FloatArray, scene: PlanningScene) -> None:
-    """Ends, rest, limits and clearance, from samples and differences of the points that are sent."""
+def check_movement(
+    trajectory: JointTrajectory | None, ends: FloatArray, scene: PlanningScene
+) -> None:
+    """Ends, rest, limits and clearance, from samples and differences of the points that are
+    sent.
+    """
     assert trajectory is not None
     assert np.array_equal(trajectory.positions[[0, -1]], ends)
     assert trajectory.velocities is not None
@@ -133,7 +137,9 @@ def test_what_breaks_limits_is_reported_before_and_certified_after(scene: Planni
     check_movement(plan.trajectory, ends_of(scene, TASK), scene)
 
 
-def test_a_thousand_trembling_points_become_smooth(detour: JointTrajectory, scene: PlanningScene) -> None:
+def test_a_thousand_trembling_points_become_smooth(
+    detour: JointTrajectory, scene: PlanningScene
+) -> None:
     times = np.linspace(0.0, 30.0, 1000)
     q = detour.sample(times).q
     q[1:-1] += np.random.default_rng(0).normal(0.0, 0.01, q[1:-1].shape)
@@ -209,7 +215,9 @@ def test_the_answer_is_never_worse_than_a_certified_original(
         "time": lambda report: report.duration,
         "energy": lambda report: report.energy - report.base_energy,
         "movement_cost": lambda report: report.movement_cost,
-        "time_and_energy": lambda report: report.energy - report.base_energy + 500.0 * report.duration,
+        "time_and_energy": lambda report: (
+            report.energy - report.base_energy + 500.0 * report.duration
+        ),
     }
     assert full.trajectory is not None
     options = replace(OPTIONS, objective=objective)
@@ -231,7 +239,9 @@ def test_an_original_that_is_best_is_given_back_with_a_note(
     best = full.front[-1].trajectory
     options = replace(OPTIONS, objective="energy", max_iterations=1)
     plan = optimized(best, scene, options)
-    assert plan.after.energy - plan.after.base_energy <= plan.before.energy - plan.before.base_energy
+    assert (
+        plan.after.energy - plan.after.base_energy <= plan.before.energy - plan.before.base_energy
+    )
     if plan.trajectory == best:
         assert "the original is kept" in plan.info.stages[-1].note
 
@@ -239,7 +249,9 @@ def test_an_original_that_is_best_is_given_back_with_a_note(
 # -- as requested
 
 
-def test_a_requested_duration_is_kept_and_gets_cheaper(detour: JointTrajectory, scene: PlanningScene) -> None:
+def test_a_requested_duration_is_kept_and_gets_cheaper(
+    detour: JointTrajectory, scene: PlanningScene
+) -> None:
     energies = []
     for duration in (1.0, 1.3):
         plan = optimized(detour, scene, replace(OPTIONS, duration=duration))
@@ -313,7 +325,9 @@ def test_the_front_leads_from_the_fastest_to_the_least_energy(
     assert durations[0] <= 1.02 * fastest.after.duration
     planner.set_cell("", "open")
     with pytest.raises(RequestError, match="shortest"):
-        planner.optimize_trajectory(full.front[0].trajectory, replace(OPTIONS, duration=0.9 * durations[0]))
+        planner.optimize_trajectory(
+            full.front[0].trajectory, replace(OPTIONS, duration=0.9 * durations[0])
+        )
 
 
 def test_between_its_ends_the_front_costs_less_than_slowing_the_fastest(
@@ -371,13 +385,17 @@ def test_a_cancel_is_heard(after: int, detour: JointTrajectory, scene: PlanningS
     asked = iter(range(10_000))
     options = PlanOptions(planning_time=600.0)
     with pytest.raises(CancelledError):
-        optimize_trajectory(detour, scene, options, budget(options, lambda: next(asked) >= after), SEARCHES)
+        optimize_trajectory(
+            detour, scene, options, budget(options, lambda: next(asked) >= after), SEARCHES
+        )
 
 
 def test_the_answer_and_its_front_are_kept_by_id(detour: JointTrajectory, power: PowerData) -> None:
     planner = Planner(lambda: 0.0, power=power)
     planner.set_cell("", "open")
-    plan = planner.optimize_trajectory(detour, PlanOptions(planning_time=600.0, max_iterations=60_000))
+    plan = planner.optimize_trajectory(
+        detour, PlanOptions(planning_time=600.0, max_iterations=60_000)
+    )
     assert plan.trajectory is not None
     for trajectory in (plan.trajectory, *(point.trajectory for point in plan.front)):
         assert planner.trajectories.get(trajectory.trajectory_id) == trajectory
@@ -458,7 +476,9 @@ def test_other_joints_are_refused(planner: Planner) -> None:
 def test_a_spline_through_points_is_taken_as_it_is_planned(planner: Planner) -> None:
     planner.set_cell("", "open")
     ends = ends_of(planner.scene(), TASK)
-    through = planner.plan_trajectory(Reference(swung(ends, 1, -0.2)[::4]), PlanOptions(planning_time=60.0))
+    through = planner.plan_trajectory(
+        Reference(swung(ends, 1, -0.2)[::4]), PlanOptions(planning_time=60.0)
+    )
     assert through.trajectory is not None
     plan = planner.optimize_trajectory(through.trajectory, OPTIONS)
     assert plan.after.certified

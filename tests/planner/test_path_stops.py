@@ -1,4 +1,6 @@
-"""Programs with paths of the tool as stops: driven at their speed, in the configurations that cost least."""
+"""Programs with paths of the tool as stops: driven at their speed, in the configurations that cost
+least.
+"""
 
 from __future__ import annotations
 
@@ -100,11 +102,15 @@ def test_the_robot_drives_it(planner: Planner, plan: ProgramPlan) -> None:
 def test_a_cycle_time_leaves_its_duration(planner: Planner, plan: ProgramPlan) -> None:
     along = plan.movements[1]
     longer = planned(planner, 1.5 * plan.report.duration)
-    assert [step.duration for step in longer.movements if step.kind == "cartesian"] == [along.duration]
+    assert [step.duration for step in longer.movements if step.kind == "cartesian"] == [
+        along.duration
+    ]
 
 
 @pytest.mark.long
-def test_a_cycle_that_only_the_path_would_fill_is_refused(planner: Planner, plan: ProgramPlan) -> None:
+def test_a_cycle_that_only_the_path_would_fill_is_refused(
+    planner: Planner, plan: ProgramPlan
+) -> None:
     with pytest.raises(RequestError, match="the shortest is"):
         planned(planner, plan.movements[1].duration)
 
@@ -120,14 +126,18 @@ def test_savings_are_over_a_common_program_that_drives_the_same_path(plan: Progr
 
 
 @pytest.mark.long
-def test_no_other_configuration_along_the_path_costs_less(planner: Planner, plan: ProgramPlan) -> None:
+def test_no_other_configuration_along_the_path_costs_less(
+    planner: Planner, plan: ProgramPlan
+) -> None:
     cell = planner.cell
     start = np.array(cell.machine_home)
     options = PlanOptions(planning_time=60.0)
     request = ProgramRequest(cell, cell.robot.controller, STOPS, start, options)
     work = Work(200_000, 1.0, lambda: 0.0)
     route, context = prepared(request, Journal(work, 0))
-    layers = layers_of(route, start, context, exit_searches(PlannerSettings().withdrawal), lambda *_: None)
+    layers = layers_of(
+        route, start, context, exit_searches(PlannerSettings().withdrawal), lambda *_: None
+    )
     assert len(layers[2]) >= 8
     movements = Movements(route, layers, context, PlannerSettings().searches)
     rates = rates_of(context)
@@ -135,7 +145,9 @@ def test_no_other_configuration_along_the_path_costs_less(planner: Planner, plan
     for k in range(len(layers[2])):
         parts = [Part(1, ACROSS, 0, k), Part(1, ENTER, -1, k), Part(2, ACROSS, k, 0)]
         found = movements.plan(parts, 2_500)
-        costs.append(sum(cost_of(one.report, rates) if hasattr(one, "report") else np.inf for one in found))
+        costs.append(
+            sum(cost_of(one.report, rates) if hasattr(one, "report") else np.inf for one in found)
+        )
     paid = sum(cost_of(step.report, rates) for step in plan.movements)
     assert paid <= min(costs) * 1.005
     assert paid < np.median(costs)  # the choice matters

@@ -1,4 +1,6 @@
-"""Time scaling of a fixed path: faster than by rules, near TOPP-RA, within limits, through the points."""
+"""Time scaling of a fixed path: faster than by rules, near TOPP-RA, within limits, through the
+points.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +50,8 @@ def scene(scene_of: Callable[[str], PlanningScene]) -> PlanningScene:
 def waved(scene: PlanningScene, count: int, by: float = 0.25) -> FloatArray:
     """Points of a smooth free path that turns."""
     task = scene.cell.task("home->p1")
-    start, goal = np.array(task.start), np.array(task.goal)
+    start = np.array(task.start)
+    goal = np.array(task.goal)
     share = np.linspace(0.0, 1.0, count)[:, None]
     points = start + share * (goal - start)
     points[:, 2] += by * np.sin(2.0 * np.pi * share[:, 0])
@@ -68,10 +71,13 @@ def planned(points: FloatArray, scene: PlanningScene, options: PlanOptions = TIM
 
 
 def deviation(trajectory: JointTrajectory, path: JointTrajectory) -> float:
-    """Largest distance [rad] of samples of a trajectory from a polyline of many samples of the path."""
+    """Largest distance [rad] of samples of a trajectory from a polyline of many samples of the
+    path.
+    """
     q = trajectory.sample(np.linspace(0.0, trajectory.duration, 700)).q
     corners = path.sample(np.linspace(0.0, path.duration, 3000)).q
-    first, step = corners[:-1], np.diff(corners, axis=0)
+    first = corners[:-1]
+    step = np.diff(corners, axis=0)
     length = np.maximum((step**2).sum(axis=1), 1e-18)
     worst = 0.0
     for one in q:
@@ -132,10 +138,14 @@ def test_the_objective_counts_at_a_free_duration(scene: PlanningScene) -> None:
     ]
     durations = [report.duration for report in plans]
     energies = [report.energy - report.base_energy for report in plans]
-    sums = [energy + 500.0 * report.duration for energy, report in zip(energies, plans, strict=True)]
+    sums = [
+        energy + 500.0 * report.duration for energy, report in zip(energies, plans, strict=True)
+    ]
     assert all(report.certified for report in plans)
     assert durations[0] < 0.95 * min(durations[1:])
-    assert energies[1] <= 1.005 * energies[2] < 0.95 * energies[0]  # descents end a little above the least
+    assert (
+        energies[1] <= 1.005 * energies[2] < 0.95 * energies[0]
+    )  # descents end a little above the least
     assert sums[2] <= min(1.005 * sums[1], 0.95 * sums[0])
 
 
@@ -159,7 +169,9 @@ def test_without_work_left_the_rules_time_it_and_a_cancel_is_heard(scene: Planni
     points = waved(scene, 5)
     plan = plan_through(Reference(points), scene, TIME, budget(work=0))
     limits = (scene.limits.with_torque_share(share) for share in TORQUE_SHARES[:2])
-    timed = [time_spline(points, scene.cell.robot.joint_names, one, scene.dynamics) for one in limits]
+    timed = [
+        time_spline(points, scene.cell.robot.joint_names, one, scene.dynamics) for one in limits
+    ]
     assert plan.trajectory in timed
     asked = iter(range(1000))
     with pytest.raises(CancelledError):
@@ -175,7 +187,9 @@ def test_the_same_request_gives_the_same_bytes(scene: PlanningScene) -> None:
 def test_near_the_time_of_toppra_that_needs_no_jerk_limit(
     count: int, by: float, scene: PlanningScene
 ) -> None:
-    """TOPP-RA on the same path with bounds that the true limits imply is faster than any answer can be."""
+    """TOPP-RA on the same path with bounds that the true limits imply is faster than any answer can
+    be.
+    """
     points = waved(scene, count, by)
     rules = by_rules(points, scene)
     bound = toppra_seconds(rules, scene)
@@ -193,13 +207,14 @@ def rescaled(rules: JointTrajectory, points: FloatArray, scene: PlanningScene) -
 
 
 def toppra_seconds(path: JointTrajectory, scene: PlanningScene) -> float:
-    """Duration by TOPP-RA [s]: speed, acceleration, and torque of the rigid body within the largest torque at
-    any speed and friction beside it.
+    """Duration by TOPP-RA [s]: speed, acceleration, and torque of the rigid body within the largest
+    torque at any speed and friction beside it.
     """
     toppra = pytest.importorskip("toppra")
     from toppra import algorithm, constraint
 
-    robot, dynamics = scene.cell.robot, scene.dynamics
+    robot = scene.cell.robot
+    dynamics = scene.dynamics
     times = np.linspace(0.0, path.duration, 800)
     q = path.sample(times).q
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(q, axis=0), axis=1))])
@@ -215,7 +230,9 @@ def toppra_seconds(path: JointTrajectory, scene: PlanningScene) -> float:
     limits = [
         constraint.JointVelocityConstraint(robot.velocity_max),
         constraint.JointAccelerationConstraint(scene.limits.acceleration),
-        constraint.JointTorqueConstraint(rigid, np.column_stack([-largest, largest]), np.zeros(robot.n)),
+        constraint.JointTorqueConstraint(
+            rigid, np.column_stack([-largest, largest]), np.zeros(robot.n)
+        ),
     ]
     grid = np.linspace(*geometry.path_interval, 201)
     instance = algorithm.TOPPRA(limits, geometry, gridpoints=grid, solver_wrapper="seidel")
@@ -225,7 +242,9 @@ def toppra_seconds(path: JointTrajectory, scene: PlanningScene) -> float:
 
 
 def test_a_path_is_made_of_a_motion_that_passes_none_of_its_points(scene: PlanningScene) -> None:
-    """Also where it has fewer points itself: a line in which clearance asked for a motion beside it."""
+    """Also where it has fewer points itself: a line in which clearance asked for a motion beside
+    it.
+    """
     for few in (2, 3, 5, 12):
         given = by_rules(waved(scene, few, 0.2), scene)
         path = FixedPath(given, waved(scene, 12))
@@ -264,14 +283,17 @@ def test_a_correction_passes_the_points_and_keeps_the_ends(scene: PlanningScene)
     points = np.concatenate([knots[:1], wanted, knots[-1:]])
     passing = Passing.of(spline, at, points)
     corrected = passing.corrected(spline)
-    assert np.array_equal(corrected.control[[0, 1, 2, -3, -2, -1]], spline.control[[0, 1, 2, -3, -2, -1]])
+    assert np.array_equal(
+        corrected.control[[0, 1, 2, -3, -2, -1]], spline.control[[0, 1, 2, -3, -2, -1]]
+    )
     trajectory, exact = passing.sent(corrected, scene.cell.robot.joint_names)
     for point in points:
         assert np.abs(trajectory.positions - point).max(axis=1).min() < 1e-12
     assert len(trajectory.times_ns) > exact.intervals + 1
     plain = exact.trajectory(scene.cell.robot.joint_names)
     for times in (np.linspace(0.0, plain.duration, 999),):
-        a, b = trajectory.sample(times), plain.sample(times)
+        a = trajectory.sample(times)
+        b = plain.sample(times)
         assert a.q == pytest.approx(b.q, abs=1e-12)
         assert a.qdd == pytest.approx(b.qdd, abs=1e-6)
         assert a.qddd == pytest.approx(b.qddd, rel=1e-3, abs=1e-2)

@@ -1,4 +1,6 @@
-"""Reported maxima are never below the true ones: judged at 20 kHz, with Pinocchio and a bus of its own."""
+"""Reported maxima are never below the true ones: judged at 20 kHz, with Pinocchio and a bus of its
+own.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,8 @@ GENERATED = settings(
 
 def generated(scene: PlanningScene, seed: int) -> JointTrajectory:
     """Quintics through a few configurations near the park posture, from rest to rest."""
-    rng, robot = np.random.default_rng(seed), scene.cell.robot
+    rng = np.random.default_rng(seed)
+    robot = scene.cell.robot
     count = int(rng.integers(2, 6))
     q = np.array(scene.cell.park) + rng.uniform(-0.5, 0.5, (count, robot.n))
     q = np.clip(q, robot.position_min + 0.1, robot.position_max - 0.1)
@@ -36,13 +39,17 @@ def generated(scene: PlanningScene, seed: int) -> JointTrajectory:
     qd[[0, -1]] = qdd[[0, -1]] = 0.0
     if rng.random() < 0.3:  # a joint that rests
         still = int(rng.integers(robot.n))
-        q[:, still], qd[:, still], qdd[:, still] = q[0, still], 0.0, 0.0
+        q[:, still] = q[0, still]
+        qd[:, still] = 0.0
+        qdd[:, still] = 0.0
     times = np.concatenate([[0], np.cumsum(rng.integers(200_000_000, 900_000_000, count - 1))])
     return JointTrajectory(robot.joint_names, times.astype(np.int64), q, qd, qdd)
 
 
 def dense(trajectory: JointTrajectory) -> tuple[FloatArray, ...]:
-    """q, qd, qdd and jerk (N, n) in the middles of 1 / RATE s, by polynomials fitted to the points anew."""
+    """q, qd, qdd and jerk (N, n) in the middles of 1 / RATE s, by polynomials fitted to the points
+    anew.
+    """
     motion: list[list[FloatArray]] = [[], [], [], []]
     times = trajectory.times_ns * 1e-9
     for k, T in enumerate(np.diff(times)):
@@ -65,11 +72,13 @@ def dense(trajectory: JointTrajectory) -> tuple[FloatArray, ...]:
 
 def mains_peak(scene: PlanningScene, qd: FloatArray, torque: FloatArray, charge: float) -> float:
     """Largest power at the mains [W], the bus stepped at RATE."""
-    robot, power = scene.cell.robot, scene.power
+    robot = scene.cell.robot
+    power = scene.power
     axes = torque * qd + robot.copper_loss * (torque / robot.gear_ratio) ** 2
     if scene.drives.regeneration == "none":
         return scene.base_watts + float(np.maximum(axes, 0.0).sum(axis=1).max())
-    stored, peak = charge, 0.0
+    stored = charge
+    peak = 0.0
     for wanted in axes.sum(axis=1) / RATE:
         stored -= wanted
         peak = max(peak, -stored * RATE)
@@ -98,8 +107,11 @@ def test_no_instant_takes_more_than_the_reported_peak(
 
 @GENERATED
 @given(seed=st.integers(0, 10**6))
-def test_no_instant_uses_more_of_a_limit_than_reported(seed: int, demo_scene: PlanningScene) -> None:
-    robot, trajectory = demo_scene.cell.robot, generated(demo_scene, seed)
+def test_no_instant_uses_more_of_a_limit_than_reported(
+    seed: int, demo_scene: PlanningScene
+) -> None:
+    robot = demo_scene.cell.robot
+    trajectory = generated(demo_scene, seed)
     q, qd, qdd, jerk = dense(trajectory)
     torque = np.abs(torques(demo_scene, q, qd, qdd)) / torque_available(robot, qd)
     used = [qd / robot.velocity_max, qdd / robot.acceleration_max, jerk / robot.jerk_max, torque]

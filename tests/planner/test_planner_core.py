@@ -84,13 +84,17 @@ def test_every_configuration_reaches_the_pose_with_its_branch_and_turns(planner:
 
 
 def test_an_unreachable_pose_and_an_occupied_one_are_distinguished(planner: Planner) -> None:
-    far = planner.compute_ik(parse_goal("X 5 Y 0 Z 1 A 0 B 90 C 0", planner.cell), "analytic", 0.02, HOME, "")
+    far = planner.compute_ik(
+        parse_goal("X 5 Y 0 Z 1 A 0 B 90 C 0", planner.cell), "analytic", 0.02, HOME, ""
+    )
     assert far.status.code == StatusCode.NO_IK_SOLUTION
     inside = parse_goal("X 1.88 Y 0.5 Z 0.4 A 0 B 90 C 0", planner.cell)
     occupied = planner.compute_ik(inside, "analytic", 0.02, HOME, "")
     assert occupied.status.code == StatusCode.GOAL_IN_COLLISION
     assert "gauge_table" in occupied.status.message
-    assert re.search(r"come to -?[\d.]+ mm, they must keep more than 20.0 mm", occupied.status.message)
+    assert re.search(
+        r"come to -?[\d.]+ mm, they must keep more than 20.0 mm", occupied.status.message
+    )
     assert occupied.info.rejected
 
 
@@ -98,7 +102,9 @@ def test_service_lines_follow_the_approach_axis_in_one_branch(planner: Planner) 
     scene = planner.scene()
     station = scene.station("lathe_work")
     poses = line_poses(station)
-    assert np.linalg.norm(poses[-1, :3, 3] - poses[0, :3, 3]) == pytest.approx(station.approach_distance)
+    assert np.linalg.norm(poses[-1, :3, 3] - poses[0, :3, 3]) == pytest.approx(
+        station.approach_distance
+    )
     work = scene.inverse_kinematics.solve(np.asarray(station.pose)[None]).q
     rejected: Counter[str] = Counter()
     context = Context(scene, PlanOptions(), Journal(Work(1000, np.inf, lambda: 0.0), 0))
@@ -121,14 +127,22 @@ def test_a_pose_goal_takes_the_cheapest_configuration_that_can_be_reached(planne
 
 
 def test_a_long_planning_time_is_capped_and_said(planner: Planner) -> None:
-    plan = planner.plan_regional(HOME, parse_goal("park", planner.cell), PlanOptions(planning_time=1e9))
+    plan = planner.plan_regional(
+        HOME, parse_goal("park", planner.cell), PlanOptions(planning_time=1e9)
+    )
     assert plan.status.ok
-    assert plan.info.stages[-1].note == f"planning_time 1e+09 s is capped to {PLANNING_TIME_MAX:g} s"
+    assert (
+        plan.info.stages[-1].note == f"planning_time 1e+09 s is capped to {PLANNING_TIME_MAX:g} s"
+    )
 
 
 @pytest.mark.parametrize("times", [None, np.array([0.0, 3.0, 4.0, 7.0])])
-def test_reference_points_are_passed_with_the_requested_proportions(planner: Planner, times: Any) -> None:
-    points = HOME + np.radians([[0] * 6, [10, 5, 5, 0, 10, 0], [30, 0, 5, 0, 0, 10], [40, 0, 0, 0, 0, 0]])
+def test_reference_points_are_passed_with_the_requested_proportions(
+    planner: Planner, times: Any
+) -> None:
+    points = HOME + np.radians(
+        [[0] * 6, [10, 5, 5, 0, 10, 0], [30, 0, 5, 0, 0, 10], [40, 0, 0, 0, 0, 0]]
+    )
     plan = planner.plan_trajectory(Reference(points, times), PlanOptions())
     assert plan.status.ok, plan.status.message
     trajectory = plan.trajectory
@@ -164,10 +178,14 @@ def test_the_bound_of_an_allowed_contact_is_its_own(planner: Planner) -> None:
     station = scene.station("lathe_work")
     contact = station.allowed_contacts[0]
     closer = np.array(station.pose)
-    closer[:3, 3] += closer[:3, 0] * 0.0045  # towards the spindle: 0.5 mm are left where 1 mm must be
+    closer[:3, 3] += (
+        closer[:3, 0] * 0.0045
+    )  # towards the spindle: 0.5 mm are left where 1 mm must be
     q = scene.inverse_kinematics.solve(closer[None]).q
     space = FreeSpace.of(scene, 0.02, Work(1, 1.0, lambda: 0.0), "lathe_work")
-    sentences = [too_near(at, space, "start", 0.02) for at in q if not space.states_free(at[None])[0]]
+    sentences = [
+        too_near(at, space, "start", 0.02) for at in q if not space.states_free(at[None])[0]
+    ]
     own = [text for text in sentences if contact.body_a in text and contact.body_b in text]
     assert own
     assert all(text.endswith("it must be more than 1.0 mm") for text in own)
@@ -197,7 +215,9 @@ def test_a_planner_named_for_a_trajectory_through_points_is_said_to_be_unused(
 
 def test_an_unknown_planner_of_a_trajectory_through_points_is_refused(planner: Planner) -> None:
     with pytest.raises(RequestError, match=r"planner_id 'rrt_conect' is unknown.*rrt_connect"):
-        planner.plan_trajectory(Reference(np.stack([HOME, HOME + 0.1])), PlanOptions(planner_id="rrt_conect"))
+        planner.plan_trajectory(
+            Reference(np.stack([HOME, HOME + 0.1])), PlanOptions(planner_id="rrt_conect")
+        )
 
 
 def test_a_state_that_is_not_free_names_the_pair(planner: Planner) -> None:
@@ -211,7 +231,9 @@ def test_a_state_that_is_not_free_names_the_pair(planner: Planner) -> None:
 
 def test_the_store_forgets_the_oldest_and_says_so() -> None:
     store = trajectory_store(2, megabytes=1)
-    ids = [store.add(JointTrajectory(("a",), np.array([0]), np.array([[float(k)]]))) for k in range(3)]
+    ids = [
+        store.add(JointTrajectory(("a",), np.array([0]), np.array([[float(k)]]))) for k in range(3)
+    ]
     assert len(store) == 2
     assert store.get(ids[2]).positions[0, 0] == 2.0
     with pytest.raises(RequestError, match="the last 2 are kept, at most 2 and 1 MB"):
@@ -220,9 +242,14 @@ def test_the_store_forgets_the_oldest_and_says_so() -> None:
 
 def test_the_memory_of_trajectories_is_bounded_in_bytes_too() -> None:
     store = trajectory_store(500, megabytes=1)
-    rng, count = np.random.default_rng(1), 1000  # of points: 55 numbers with the polynomials, 0.44 MB
+    # of points: 55 numbers with the polynomials, 0.44 MB
+    rng = np.random.default_rng(1)
+    count = 1000
     times = np.arange(count)
-    ids = [store.add(JointTrajectory(JOINT_NAMES, times, rng.normal(size=(count, 6)))) for _ in range(5)]
+    ids = [
+        store.add(JointTrajectory(JOINT_NAMES, times, rng.normal(size=(count, 6))))
+        for _ in range(5)
+    ]
     assert len(store) == 2
     store.add(store.get(ids[4]))  # the same again takes no more
     assert len(store) == 2
@@ -246,7 +273,11 @@ def test_the_demo_of_two_planners_is_the_same() -> None:
         planner = Planner(lambda: 0.0)
         planner.set_cell("", "demo")
         if warm:
-            planner.plan_regional(HOME, parse_goal("gauge_measure", planner.cell), PlanOptions(seed=9))
-        plan = planner.plan_regional(HOME, parse_goal("lathe_work", load_cell("demo")), PlanOptions())
+            planner.plan_regional(
+                HOME, parse_goal("gauge_measure", planner.cell), PlanOptions(seed=9)
+            )
+        plan = planner.plan_regional(
+            HOME, parse_goal("lathe_work", load_cell("demo")), PlanOptions()
+        )
         ids.append(plan.trajectory.trajectory_id if plan.trajectory else plan.status.message)
     assert ids[0] == ids[1]

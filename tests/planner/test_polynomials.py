@@ -16,7 +16,8 @@ from ir_planner.curves.polynomials import extremes
 @settings(max_examples=60, deadline=None)
 def test_extremes_are_those_of_dense_samples(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    segments, joints = 4, 3
+    segments = 4
+    joints = 3
     times = np.cumsum(rng.uniform(0.05, 1.0, segments + 1))
     q, qd, qdd = rng.normal(size=(3, segments + 1, joints))
     trajectory = JointTrajectory.from_seconds([f"j{i}" for i in range(joints)], times, q, qd, qdd)
@@ -36,7 +37,11 @@ def test_extremes_are_those_of_dense_samples(seed: int) -> None:
                 (found.velocity[s, j], found.acceleration[s, j], found.jerk[s, j]),
                 strict=True,
             ):
-                assert np.abs(values).max() * (1 - 1e-9) <= top <= np.abs(values).max() * (1 + 1e-3) + 1e-9
+                assert (
+                    np.abs(values).max() * (1 - 1e-9)
+                    <= top
+                    <= np.abs(values).max() * (1 + 1e-3) + 1e-9
+                )
             assert found.travel[s, j] == pytest.approx(np.abs(np.diff(samples[0])).sum(), rel=1e-4)
 
 

@@ -1,4 +1,6 @@
-"""The demonstration program: all movements certified, parts in hand where they should be, one id."""
+"""The demonstration program: all movements certified, parts in hand where they should be, one
+id.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +54,11 @@ def demo(demo_cell: Cell, power: PowerData) -> ProgramPlan:
 
 def test_an_answer_names_its_timing(demo: ProgramPlan, demo_cell: Cell, power: PowerData) -> None:
     assert demo.info.timing == "synchronous"
-    alone = {"timing": "asynchronous", "planner_id": "direct", "load": "none"}  # torque for laws of their own
+    alone = {
+        "timing": "asynchronous",
+        "planner_id": "direct",
+        "load": "none",
+    }  # torque for laws of their own
     own = planned(demo_cell, power, "home", "park", "home", **alone)
     assert own.info.timing == "asynchronous"
 
@@ -67,8 +73,12 @@ def test_every_movement_is_certified_and_costs_joules(demo: ProgramPlan) -> None
         assert movement.trajectory_id == movement.trajectory.trajectory_id
         assert movement.duration == movement.trajectory.duration
     assert demo.report.certified
-    assert demo.report.energy == pytest.approx(sum(movement.report.energy for movement in demo.movements))
-    assert demo.report.duration == pytest.approx(sum(movement.duration for movement in demo.movements))
+    assert demo.report.energy == pytest.approx(
+        sum(movement.report.energy for movement in demo.movements)
+    )
+    assert demo.report.duration == pytest.approx(
+        sum(movement.duration for movement in demo.movements)
+    )
 
 
 def test_each_movement_starts_where_the_last_one_ended(demo: ProgramPlan, demo_cell: Cell) -> None:
@@ -100,7 +110,12 @@ def test_stations_are_entered_and_left_in_a_straight_line_with_their_contacts_na
 ) -> None:
     kinds = (MovementKind.SERVICE_ENTRY, MovementKind.SERVICE_EXIT)
     service = [m for m in demo.movements if m.kind in kinds and m.to_station != "washer_rinse"]
-    assert {m.to_station for m in service} == {"infeed_pick", "lathe_work", "gauge_measure", "outfeed_place"}
+    assert {m.to_station for m in service} == {
+        "infeed_pick",
+        "lathe_work",
+        "gauge_measure",
+        "outfeed_place",
+    }
     for movement in service:
         station = demo_scene.station(movement.to_station)
         assert movement.trajectory is not None
@@ -118,7 +133,11 @@ def test_stations_are_entered_and_left_in_a_straight_line_with_their_contacts_na
 
 def test_signals_and_pauses_stand_where_the_program_says(demo: ProgramPlan) -> None:
     texts = [(m.wait_for, m.set_signals) for m in demo.movements]
-    assert [wait for wait, _ in texts if wait] == [("lathe_door_open",), ("lathe_done",), ("conveyor_free",)]
+    assert [wait for wait, _ in texts if wait] == [
+        ("lathe_door_open",),
+        ("lathe_done",),
+        ("conveyor_free",),
+    ]
     assert ("lathe_open_door=0", "lathe_start=0") in [signals for _, signals in texts]
     rests = [(m.duration, m.power_mode) for m in demo.movements if m.power_mode]
     assert rests == [(180.0, "BUS_POWER_OFF"), (1800.0, "HIBERNATION")]
@@ -132,7 +151,9 @@ def test_reports_say_the_safety_distance_that_was_planned_with(demo: ProgramPlan
     assert moving == {demo.report.safety_distance} == {PlanOptions().safety_distance}
 
 
-def test_the_same_program_has_the_same_id(demo: ProgramPlan, demo_cell: Cell, power: PowerData) -> None:
+def test_the_same_program_has_the_same_id(
+    demo: ProgramPlan, demo_cell: Cell, power: PowerData
+) -> None:
     again = planned(load_cell("demo"), power)
     assert again.program_id == demo.program_id
     assert planned(demo_cell, power, velocity_scaling=0.5).program_id != demo.program_id
@@ -153,11 +174,15 @@ def test_progress_gives_the_cost_of_the_chain_to_the_end(demo_cell: Cell, power:
         Work(100_000, 1.0, lambda: 0.0),
         lambda phase, done, total, cost: heard.setdefault(phase, []).append(cost),
     )
-    assert heard["movements"] == pytest.approx([heard["station graph"][-1]] * len(heard["movements"]))
+    assert heard["movements"] == pytest.approx(
+        [heard["station graph"][-1]] * len(heard["movements"])
+    )
     assert heard["movements"][0] > 0.0
 
 
-def test_a_station_that_nobody_reaches_fails_with_its_name(demo_cell: Cell, power: PowerData) -> None:
+def test_a_station_that_nobody_reaches_fails_with_its_name(
+    demo_cell: Cell, power: PowerData
+) -> None:
     shut = demo_cell.with_equipment("lathe", state="door_closed")
     plan = planned(shut, power, "lathe_work")
     assert plan.status.code in (StatusCode.GOAL_IN_COLLISION, StatusCode.PLANNING_FAILED)
@@ -184,18 +209,23 @@ def test_automatic_pauses_take_the_cheapest_mode(power: PowerData) -> None:
 
     text = cell_to_yaml(load_cell("demo"))
     assert "power_mode: BUS_POWER_OFF" in text
-    plan = planned(cell_from_yaml(text.replace("power_mode: BUS_POWER_OFF", "power_mode: AUTO")), power)
+    plan = planned(
+        cell_from_yaml(text.replace("power_mode: BUS_POWER_OFF", "power_mode: AUTO")), power
+    )
     chosen = [movement.power_mode for movement in plan.movements if movement.duration == 180.0]
     assert chosen == ["STAND_ON_BRAKES>BUS_POWER_OFF"]
 
 
 @pytest.mark.parametrize("cut", [1, 2])
-def test_a_program_is_truncated_when_time_runs_out_before_its_movements_are_planned(cut: int) -> None:
+def test_a_program_is_truncated_when_time_runs_out_before_its_movements_are_planned(
+    cut: int,
+) -> None:
     """Time stands until the graph has been looked at `cut` times, then the ceiling has passed."""
     now = [0.0]
     planner = Planner(lambda: now[0])
     planner.set_cell("", "demo")
-    stations, start = ("park", "home", "park"), np.array(planner.cell.machine_home)
+    stations = ("park", "home", "park")
+    start = np.array(planner.cell.machine_home)
 
     def plan(last: int) -> ProgramPlan:
         heard: list[str] = []
@@ -206,7 +236,9 @@ def test_a_program_is_truncated_when_time_runs_out_before_its_movements_are_plan
             now[0] = 1000.0 if heard.count("station graph") >= last else 0.0
 
         now[0] = 0.0
-        return planner.plan_program(stations, 0.0, PlanOptions(planning_time=300.0), start, progress)
+        return planner.plan_program(
+            stations, 0.0, PlanOptions(planning_time=300.0), start, progress
+        )
 
     whole = plan(1000)
     assert not whole.info.truncated
@@ -238,12 +270,17 @@ def test_the_chain_is_the_cheapest_of_all_that_the_planner_can_move_along(
     layers = layers_of(route, home, asked(route.arriving(0)), EXIT_SEARCHES, no_progress)
     total = {-1: 0.0}  # of the cheapest chain to each configuration of a stop
     for hop in range(2):
-        scene, cheapest = route.arriving(hop), {}
+        scene = route.arriving(hop)
+        cheapest = {}
         for b, there in enumerate(layers[hop + 1]):
-            entry = timed_service(there.line, True, asked(scene).at(stations[hop])).evaluation.report
+            entry = timed_service(
+                there.line, True, asked(scene).at(stations[hop])
+            ).evaluation.report
             for a, before in total.items():
                 here = layers[hop][max(a, 0)]
-                across = plan_regional(here.departure, there.arrival[None], asked(scene), registered())
+                across = plan_regional(
+                    here.departure, there.arrival[None], asked(scene), registered()
+                )
                 chain = before + cost(across.report) + cost(entry)
                 if hop:
                     line = timed_service(here.line, False, asked(scene).at(stations[hop - 1]))
@@ -255,12 +292,17 @@ def test_the_chain_is_the_cheapest_of_all_that_the_planner_can_move_along(
     assert min(total.values()) < 0.9 * max(total.values())  # choosing mattered
 
 
-def test_with_movement_cost_the_chain_is_the_shortest_path_of_eq_9(demo_cell: Cell, power: PowerData) -> None:
+def test_with_movement_cost_the_chain_is_the_shortest_path_of_eq_9(
+    demo_cell: Cell, power: PowerData
+) -> None:
     plan = planned(demo_cell, power, "gauge_measure", "park", objective="movement_cost")
     assert plan.status.ok, plan.status.message
     scene = scene_with(demo_cell, load_text(demo_cell), power, PlannerSettings().drives)
-    home, park = np.array(demo_cell.machine_home), np.array(demo_cell.park)
-    steps = placed_steps(demo_cell, steps_of(demo_cell, ("gauge_measure",)), demo_cell.parts_at_start())
+    home = np.array(demo_cell.machine_home)
+    park = np.array(demo_cell.park)
+    steps = placed_steps(
+        demo_cell, steps_of(demo_cell, ("gauge_measure",)), demo_cell.parts_at_start()
+    )
     route = Route.over(steps, Scenes(demo_cell, power, PlannerSettings().drives))
     context = Context(scene, PlanOptions(), Journal(Work(10**7, np.inf, lambda: 0.0), 0))
     nodes = layers_of(route, home, context, EXIT_SEARCHES, no_progress)[1]
@@ -273,7 +315,9 @@ def test_with_movement_cost_the_chain_is_the_shortest_path_of_eq_9(demo_cell: Ce
     ]
     entry = next(m for m in plan.movements if m.kind == MovementKind.SERVICE_ENTRY)
     assert entry.trajectory is not None
-    at = np.array([np.abs(node.interaction - entry.trajectory.positions[-1]).max() for node in nodes])
+    at = np.array(
+        [np.abs(node.interaction - entry.trajectory.positions[-1]).max() for node in nodes]
+    )
     assert costs[int(np.argmin(at))] == pytest.approx(min(costs))
 
 
@@ -291,7 +335,8 @@ def test_a_program_has_the_work_of_one_movement_for_each_of_its_steps(demo_cell:
     """Each movement goes on while its own work lasts, and what the program reports is the sum."""
     planner = Planner(lambda: 0.0)
     planner.set_cell("", "demo")
-    start, most = np.array(demo_cell.machine_home), 20_000
+    start = np.array(demo_cell.machine_home)
+    most = 20_000
     one, three = (
         planner.plan_program(stations, 0.0, PlanOptions(max_iterations=most), start).info.iterations
         for stations in (("park",), ("park", "home", "park"))

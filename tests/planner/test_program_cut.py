@@ -1,4 +1,6 @@
-"""planning_time cuts a program, its savings and its front at once; cancel is asked for all the time."""
+"""planning_time cuts a program, its savings and its front at once; cancel is asked for all the
+time.
+"""
 
 from __future__ import annotations
 
@@ -30,8 +32,11 @@ def planned(seconds: float, *, savings: bool, front_points: int) -> tuple[Progra
     clock = Ticking()
     planner = Planner(clock)
     planner.set_cell("", "demo")
-    start, options = np.array(planner.cell.machine_home), PlanOptions(planning_time=seconds / len(STOPS))
-    plan = planner.plan_program(STOPS, 0.0, options, start, savings=savings, front_points=front_points)
+    start = np.array(planner.cell.machine_home)
+    options = PlanOptions(planning_time=seconds / len(STOPS))
+    plan = planner.plan_program(
+        STOPS, 0.0, options, start, savings=savings, front_points=front_points
+    )
     return plan, clock.now
 
 
@@ -72,7 +77,9 @@ def test_a_program_is_cancelled_at_any_time() -> None:
             return heard >= until
 
         with contextlib.suppress(CancelledError):
-            planner.plan_program(STOPS, 0.0, PlanOptions(), start, cancelled=cancelled, savings=True)
+            planner.plan_program(
+                STOPS, 0.0, PlanOptions(), start, cancelled=cancelled, savings=True
+            )
         return heard
 
     asked = plan(np.inf)

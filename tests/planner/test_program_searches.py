@@ -1,4 +1,6 @@
-"""Cells ask for searches of the paper at stations and steps; what these did travels with the plan."""
+"""Cells ask for searches of the paper at stations and steps; what these did travels with the
+plan.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,14 @@ from ir_kernels import Chain
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind
-from ir_msgs_py.search_log import LOG, ConfigurationLog, CorrectionLog, SearchLog, WithdrawalLog, log_of
+from ir_msgs_py.search_log import (
+    LOG,
+    ConfigurationLog,
+    CorrectionLog,
+    SearchLog,
+    WithdrawalLog,
+    log_of,
+)
 from ir_msgs_py.status import StatusCode
 from ir_planner import PlannerSettings
 from ir_planner.errors import RequestError
@@ -37,14 +46,20 @@ PLACE = "{station: place, dwell: 0.5}"
 ROUNDED = 2e-3  # m: positions in a log are whole millimetres, in three axes
 S_M = PlanOptions().safety_distance
 FINE = 0.002  # rad between configurations that Coal is asked about
-A_STEP = 0.02  # m: the tool in a hundredth of a radian of each joint, at its reach, and the rounding
+A_STEP = (
+    0.02  # m: the tool in a hundredth of a radian of each joint, at its reach, and the rounding
+)
 AT_THE_POSE = 1e-3  # m: Psi below xi (1e-8 m^2), and the rounding
 
 
 def bench(at_pick: str = "", to_place: str = "") -> str:
     """The bench with more keys at its first station and its second step."""
-    text = BENCH.replace(PICK, PICK.replace("}, app", f"}}, {at_pick} app"), 1) if at_pick else BENCH
-    return text.replace(PLACE, f"{{station: place, {to_place} dwell: 0.5}}", 1) if to_place else text
+    text = (
+        BENCH.replace(PICK, PICK.replace("}, app", f"}}, {at_pick} app"), 1) if at_pick else BENCH
+    )
+    return (
+        text.replace(PLACE, f"{{station: place, {to_place} dwell: 0.5}}", 1) if to_place else text
+    )
 
 
 def planned(cell: Cell, power: PowerData, *stations: str, seed: int = 0) -> ProgramPlan:
@@ -78,7 +93,8 @@ def one(plan: ProgramPlan, kind: type[Log]) -> Log:
 
 
 def test_a_station_that_asks_for_a_withdrawal_is_left_by_it(plan: ProgramPlan, asked: Cell) -> None:
-    log, station = one(plan, WithdrawalLog), asked.station("pick")
+    log = one(plan, WithdrawalLog)
+    station = asked.station("pick")
     assert (log.station, log.method, log.load) == ("pick", "modified_ga", "gripper")
     assert (log.asked, log.blocked) == (True, "")  # a straight line is free there
     for places in (log.path, log.kept):
@@ -86,7 +102,9 @@ def test_a_station_that_asks_for_a_withdrawal_is_left_by_it(plan: ProgramPlan, a
     assert (log.parents[1:] < np.arange(1, len(log.parents))).all()
     assert len(log.kept) - 1 + sum(count for _, count in log.rejected) == log.candidates
     assert log.distance[1] > log.distance[0]
-    (out,) = [m for m in plan.movements if m.kind == MovementKind.SERVICE_EXIT and m.to_station == "pick"]
+    (out,) = [
+        m for m in plan.movements if m.kind == MovementKind.SERVICE_EXIT and m.to_station == "pick"
+    ]
     assert out.trajectory is not None
     chain = Chain(asked.robot, asked.base_pose, asked.tcp)
     tcp = chain.tcp_poses(out.trajectory.positions[[0, -1]])[:, :3, 3]
@@ -99,8 +117,11 @@ def test_a_station_may_name_the_trees(power: PowerData) -> None:
     assert len(log.path) > 1
 
 
-def test_configurations_of_a_station_come_from_counted_starts(plan: ProgramPlan, asked: Cell) -> None:
-    log, reached = one(plan, ConfigurationLog), asked.station("pick").pose[:3, 3]
+def test_configurations_of_a_station_come_from_counted_starts(
+    plan: ProgramPlan, asked: Cell
+) -> None:
+    log = one(plan, ConfigurationLog)
+    reached = asked.station("pick").pose[:3, 3]
     assert (log.station, log.starts) == ("pick", 40)
     assert log.accepted + sum(count for _, count in log.rejected) == log.starts == len(log.tracks)
     assert 1 <= log.distinct <= log.accepted
@@ -153,7 +174,9 @@ def _least_distance(cell: Cell, q: FloatArray) -> float:
             shape = coal.Capsule(capsule.radius, float(np.linalg.norm(capsule.p1 - capsule.p0)))
             asked = coal.DistanceRequest(), coal.DistanceResult()
             found.append(
-                coal.distance(shape, _placed(here), solid(body), _placed(np.asarray(body.pose)), *asked)
+                coal.distance(
+                    shape, _placed(here), solid(body), _placed(np.asarray(body.pose)), *asked
+                )
             )
     return float(min(found))
 
@@ -170,7 +193,10 @@ def test_lines_out_of_the_washer_are_blocked_about_the_tool_s_axis() -> None:
         for load in cell.loads("gear")
         for c in load.capsules
     ]
-    washer = [(solid(body), _placed(np.asarray(body.pose))) for body in cell.machine("washer").world_bodies()]
+    washer = [
+        (solid(body), _placed(np.asarray(body.pose)))
+        for body in cell.machine("washer").world_bodies()
+    ]
 
     def free(direction: FloatArray) -> bool:
         for share in np.linspace(0.0, 1.0, 101):
@@ -184,7 +210,8 @@ def test_lines_out_of_the_washer_are_blocked_about_the_tool_s_axis() -> None:
         return True
 
     k = np.arange(600) + 0.5
-    height, turn = 1.0 - 2.0 * k / len(k), np.pi * (1.0 + np.sqrt(5.0)) * k
+    height = 1.0 - 2.0 * k / len(k)
+    turn = np.pi * (1.0 + np.sqrt(5.0)) * k
     flat = np.sqrt(1.0 - height**2)
     directions = np.column_stack([flat * np.cos(turn), flat * np.sin(turn), height])
     angle = np.degrees(np.arccos(np.clip(directions @ -station.pose[:3, 0], -1.0, 1.0)))
@@ -200,7 +227,10 @@ def test_a_withdrawal_that_is_asked_for_and_found_by_nobody_is_refused(power: Po
     asked = ProgramRequest(cell, power, ("pick",), start, PlanOptions(), settings=settings)
     refused = plan_program(asked, Work(100_000, 1.0, lambda: 0.0)).status
     assert refused.code == StatusCode.PLANNING_FAILED
-    assert "station pick: the withdrawal modified_ga that it asks for leads out of none of" in refused.message
+    assert (
+        "station pick: the withdrawal modified_ga that it asks for leads out of none of"
+        in refused.message
+    )
     assert "without `withdrawal: modified_ga`" in refused.message
     assert "straight lines are free" in refused.message
 

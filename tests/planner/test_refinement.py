@@ -1,4 +1,6 @@
-"""Path and time scaling, optimised together: better than what they came from, within every bound."""
+"""Path and time scaling, optimised together: better than what they came from, within every
+bound.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,9 @@ def random_spline(count: int = 9, interval: float = 0.07) -> UniformSpline:
     rng = np.random.default_rng(3)
     ends = rng.uniform(-1.0, 1.0, (2, 6))
     inner = rng.uniform(-1.0, 1.0, (count, 6))
-    control = np.concatenate([np.repeat(ends[:1], 3, axis=0), inner, np.repeat(ends[1:], 3, axis=0)])
+    control = np.concatenate(
+        [np.repeat(ends[:1], 3, axis=0), inner, np.repeat(ends[1:], 3, axis=0)]
+    )
     return UniformSpline(control, interval)
 
 
@@ -92,23 +96,31 @@ def test_a_spline_along_a_path_stays_near_it_and_rests_at_its_ends() -> None:
 def test_refined_is_better_than_the_same_path_in_straight_steps(
     objective: str, demo_scene: PlanningScene
 ) -> None:
-    path = np.radians([[0, -125, 120, 0, 80, 0], [40, -100, 100, 20, 60, 0], [70, -90, 80, 0, 40, 30]])
+    path = np.radians(
+        [[0, -125, 120, 0, 80, 0], [40, -100, 100, 20, 60, 0], [70, -90, 80, 0, 40, 30]]
+    )
     options = PlanOptions(objective=objective, safety_distance=0.0)
     refined = movement_over(path, Context.of(demo_scene, options, unhurried()))
     straight = straight_steps(path, Context.of(demo_scene, options, unhurried()))
     assert refined.violation is None
-    value, before = (objective_value(m.report, objective, options.time_value) for m in (refined, straight))
+    value, before = (
+        objective_value(m.report, objective, options.time_value) for m in (refined, straight)
+    )
     assert value < before
     assert coarse_cost(refined.trajectory, refined.context) == pytest.approx(value, rel=0.01)
 
 
 def test_j_counts_the_drives_and_not_the_base_load(demo_scene: PlanningScene) -> None:
     path = np.radians([[0, -90, 90, 0, 0, 0], [30, -100, 100, 0, 20, 0]])
-    report = movement_over(path, Context.of(demo_scene, PlanOptions(safety_distance=0.0), unhurried())).report
+    report = movement_over(
+        path, Context.of(demo_scene, PlanOptions(safety_distance=0.0), unhurried())
+    ).report
     drives = float(np.sum(report.joint_energy)) + report.burnt_energy
     value = objective_value(report, "time_and_energy", 500.0)
     assert value == pytest.approx(report.energy - report.base_energy + 500.0 * report.duration)
-    assert value - 500.0 * report.duration >= drives - 1e-6  # what is left in the capacitor is not credited
+    assert (
+        value - 500.0 * report.duration >= drives - 1e-6
+    )  # what is left in the capacitor is not credited
 
 
 def test_a_movement_at_the_joint_limits_stays_within_them(scene_of: SceneOf) -> None:
@@ -116,8 +128,10 @@ def test_a_movement_at_the_joint_limits_stays_within_them(scene_of: SceneOf) -> 
     robot = scene.cell.robot
     start = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
     goal = np.radians([20.0, -100.0, 100.0, 0.0, 0.0, 0.0])
-    start[3], goal[3] = robot.position_max[3], robot.position_max[3]
-    start[5], goal[5] = robot.position_min[5], robot.position_min[5]
+    start[3] = robot.position_max[3]
+    goal[3] = robot.position_max[3]
+    start[5] = robot.position_min[5]
+    goal[5] = robot.position_min[5]
     plan = planned(start, goal, scene, PlanOptions(safety_distance=0.0), unhurried())
     assert plan.status.ok, plan.status.message
     assert plan.trajectory is not None
@@ -140,7 +154,9 @@ def test_joules_fall_with_the_requested_duration_and_it_is_met(demo_scene: Plann
         joules.append(report.energy - report.base_energy)
     assert joules == sorted(joules, reverse=True)
     with pytest.raises(RequestError, match="the shortest within the limits is"):
-        movement_over(path, Context.of(demo_scene, replace(options, duration=0.7 * fastest), unhurried()))
+        movement_over(
+            path, Context.of(demo_scene, replace(options, duration=0.7 * fastest), unhurried())
+        )
 
 
 def test_a_coarse_solution_costs_no_more_with_more_work(demo_scene: PlanningScene) -> None:

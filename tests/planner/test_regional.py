@@ -1,4 +1,6 @@
-"""Regional movements: straight where it is free, round where it is not, a sentence where nothing is found."""
+"""Regional movements: straight where it is free, round where it is not, a sentence where nothing is
+found.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,9 @@ TASKS = [
 
 def clearance_along(trajectory: Any, scene: PlanningScene, step: float = 5e-4) -> float:
     return float(
-        scene.collision.distances(trajectory.sample(np.arange(0.0, trajectory.duration, step)).q).min()
+        scene.collision.distances(
+            trajectory.sample(np.arange(0.0, trajectory.duration, step)).q
+        ).min()
     )
 
 
@@ -90,9 +94,13 @@ def test_the_same_request_gives_the_same_bytes_and_the_seed_is_echoed(
     def plan(seed: int) -> Any:
         budget = Work(60_000, 1.0, lambda: 0.0)
         fresh = scene_with(scene.cell, scene.load_text, scene.power)
-        return planned(np.array(task.start), np.array(task.goal), fresh, replace(options, seed=seed), budget)
+        return planned(
+            np.array(task.start), np.array(task.goal), fresh, replace(options, seed=seed), budget
+        )
 
-    first, second, other = plan(5), plan(5), plan(6)
+    first = plan(5)
+    second = plan(5)
+    other = plan(6)
     assert first.trajectory.trajectory_id == second.trajectory.trajectory_id
     assert first.report.energy == second.report.energy
     assert (first.info.seed, other.info.seed) == (5, 6)
@@ -110,7 +118,8 @@ def test_an_end_in_collision_is_named_with_pair_and_depth(
     budget: Work,
     options: PlanOptions,
 ) -> None:
-    home, inside = np.array(demo_scene.cell.machine_home), degrees(0, -20, 60, 0, 0, 0)
+    home = np.array(demo_scene.cell.machine_home)
+    inside = degrees(0, -20, 60, 0, 0, 0)
     start, goal = (inside, home) if which == "start" else (home, inside)
     plan = planned(start, goal, demo_scene, options, budget)
     assert plan.status.code == code
@@ -137,7 +146,9 @@ equipment:
 """
 
 
-def test_a_search_that_misses_a_free_straight_movement_is_named(scene_of: SceneOf, budget: Work) -> None:
+def test_a_search_that_misses_a_free_straight_movement_is_named(
+    scene_of: SceneOf, budget: Work
+) -> None:
     class Blind:
         """Finds nothing."""
 
@@ -151,7 +162,8 @@ def test_a_search_that_misses_a_free_straight_movement_is_named(scene_of: SceneO
     plan = planned(np.array(task.start), np.array(task.goal), scene, options, budget, searches)
     assert plan.status.code == StatusCode.PLANNING_FAILED
     assert plan.status.message == (
-        "no path found, though the straight movement is free: tried: blind (nothing free, looked away)"
+        "no path found, though the straight movement is free: tried: blind (nothing free, looked "
+        "away)"
     )
 
 
@@ -161,7 +173,8 @@ def test_where_no_path_leads_the_pair_the_place_and_what_was_tried_are_named(
     cell = cell_from_yaml(CAGE)
     scene = scene_with(cell, load_text(cell), load_power_data())
     budget = Work(2000, 1.0, lambda: 0.0)
-    home, across = degrees(0, -90, 90, 0, 0, 0), degrees(180, -90, 90, 0, 0, 0)
+    home = degrees(0, -90, 90, 0, 0, 0)
+    across = degrees(180, -90, 90, 0, 0, 0)
     plan = planned(home, across, scene, options, budget)
     assert plan.status.code == StatusCode.PLANNING_FAILED
     assert "tree (nothing free, the trees came within" in plan.status.message
@@ -170,26 +183,38 @@ def test_where_no_path_leads_the_pair_the_place_and_what_was_tried_are_named(
     assert not plan.info.truncated
 
 
-def test_a_blocked_path_says_what_was_tried(demo_scene: PlanningScene, options: PlanOptions) -> None:
+def test_a_blocked_path_says_what_was_tried(
+    demo_scene: PlanningScene, options: PlanOptions
+) -> None:
     cell = load_cell("open")
     scene = scene_with(cell, load_text(cell), demo_scene.power)
     task = cell.task("p1->p2")
     budget = Work(60_000, 1.0, lambda: 0.0)
     plan = planned(
-        np.array(task.start), np.array(task.goal), scene, replace(options, planner_id="direct"), budget
+        np.array(task.start),
+        np.array(task.goal),
+        scene,
+        replace(options, planner_id="direct"),
+        budget,
     )
     assert plan.status.code == StatusCode.PLANNING_FAILED
     for word in ("come to", "% of it", "they must keep", "tried: direct", "may help"):
         assert word in plan.status.message
 
 
-def test_planning_time_cuts_a_search_and_says_truncated(scene_of: SceneOf, options: PlanOptions) -> None:
+def test_planning_time_cuts_a_search_and_says_truncated(
+    scene_of: SceneOf, options: PlanOptions
+) -> None:
     scene = scene_of("open")
     task = scene.cell.task("p1->p2")
     clock = iter(range(10_000))
     budget = Work(60_000, 0.5, lambda: float(next(clock)))
     plan = planned(
-        np.array(task.start), np.array(task.goal), scene, replace(options, planner_id="tree"), budget
+        np.array(task.start),
+        np.array(task.goal),
+        scene,
+        replace(options, planner_id="tree"),
+        budget,
     )
     assert plan.status.code == StatusCode.PLANNING_FAILED
     assert "within planning_time" in plan.status.message
@@ -211,14 +236,20 @@ def test_a_safety_distance_of_zero_is_taken_literally(
     scene = scene_of("table_columns")
     task = scene.cell.task("tL->tR")
     plan = planned(
-        np.array(task.start), np.array(task.goal), scene, replace(options, safety_distance=0.0), budget
+        np.array(task.start),
+        np.array(task.goal),
+        scene,
+        replace(options, safety_distance=0.0),
+        budget,
     )
     assert plan.status.ok
     assert plan.report.certified
     assert plan.report.min_clearance > -PROOF_TOLERANCE
 
 
-def test_what_is_free_at_once_is_found_without_any_work(scene_of: SceneOf, options: PlanOptions) -> None:
+def test_what_is_free_at_once_is_found_without_any_work(
+    scene_of: SceneOf, options: PlanOptions
+) -> None:
     """A program's last movements may have no work left: a free straight one needs none."""
     scene = scene_of("open")
     home = np.array(scene.cell.machine_home)

@@ -1,4 +1,6 @@
-"""Which movements of a program rely on the door: those that come too near to the closed one, by samples."""
+"""Which movements of a program rely on the door: those that come too near to the closed one, by
+samples.
+"""
 
 from __future__ import annotations
 

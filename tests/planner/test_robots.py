@@ -1,4 +1,6 @@
-"""The cells of the bundled robots: programs are planned and certified, pauses as the controllers allow."""
+"""The cells of the bundled robots: programs are planned and certified, pauses as the controllers
+allow.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ def test_its_program_is_planned_and_certified(name: str) -> None:
     options = PlanOptions(planning_time=600.0)
     plan = planner.plan_program((), 0.0, options, planner.cell.posture("park"))
     assert plan.status.ok, plan.status.message
-    assert all(movement.report.certified for movement in plan.movements if movement.trajectory is not None)
+    assert all(
+        movement.report.certified for movement in plan.movements if movement.trajectory is not None
+    )
 
 
 def test_without_a_table_a_pause_stays_on_motors() -> None:

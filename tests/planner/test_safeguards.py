@@ -44,8 +44,8 @@ def free_ends(scene: PlanningScene, seed: int) -> FloatArray:
 
 
 def s_curve(count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """s, s', s'' (count, 1) over one second of a seven-phase law whose ramps take all of it: three eighths of
-    it for each, a quarter of constant speed; by integrating its jerk.
+    """s, s', s'' (count, 1) over one second of a seven-phase law whose ramps take all of it: three
+    eighths of it for each, a quarter of constant speed; by integrating its jerk.
     """
     jerk = np.repeat([1.0, 0.0, -1.0, 0.0, -1.0, 0.0, 1.0], [2, 2, 2, 4, 2, 2, 2])
     fine = np.repeat(jerk, 2000)
@@ -58,18 +58,23 @@ def s_curve(count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def drive_joules(scene: PlanningScene, ends: FloatArray, duration: float) -> float:
-    """Joules of the drives for the straight segment by a seven-phase S-curve, without sharing on the bus
+    """Joules of the drives for the straight segment by a seven-phase S-curve, without sharing on
+    the bus
     losses of the brake resistor: braking energy is lost where nobody takes it.
     """
     s, speed, acceleration = s_curve(2000)
     delta = ends[1] - ends[0]
-    q, qd, qdd = ends[0] + s * delta, speed * delta / duration, acceleration * delta / duration**2
+    q = ends[0] + s * delta
+    qd = speed * delta / duration
+    qdd = acceleration * delta / duration**2
     torque = torques(scene, q, qd, qdd)
     power = scene.dynamics.axis_power(qd, torque).sum(axis=1)
     return float(np.maximum(power, 0.0).sum() * duration / len(s))
 
 
-@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(cell=CELLS, seed=st.integers(0, 10_000), factor=st.floats(1.3, 4.0))
 def test_no_answer_costs_more_than_an_s_curve_at_its_duration(
     cell: str, seed: int, factor: float, scene_of: SceneOf
@@ -87,7 +92,9 @@ def test_no_answer_costs_more_than_an_s_curve_at_its_duration(
     assert drives <= 1.02 * drive_joules(scene, ends, duration) + scene.dc_bus.capacity_energy
 
 
-@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(cell=CELLS, seed=st.integers(0, 10_000))
 def test_every_duration_from_the_fastest_on_is_met(cell: str, seed: int, scene_of: SceneOf) -> None:
     scene = scene_of(cell)
@@ -101,7 +108,9 @@ def test_every_duration_from_the_fastest_on_is_met(cell: str, seed: int, scene_o
         assert plan.report.duration == pytest.approx(duration, rel=2e-6)
 
 
-def test_a_movement_to_where_it_starts_takes_the_requested_duration(demo_scene: PlanningScene) -> None:
+def test_a_movement_to_where_it_starts_takes_the_requested_duration(
+    demo_scene: PlanningScene,
+) -> None:
     home = np.array(demo_scene.cell.park)
     plan = ask(demo_scene, np.stack([home, home]), PlanOptions(duration=2.5))
     assert plan.status.ok
@@ -109,7 +118,9 @@ def test_a_movement_to_where_it_starts_takes_the_requested_duration(demo_scene: 
     assert ask(demo_scene, np.stack([home, home]), PlanOptions()).report.duration < 0.01
 
 
-@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(cell=CELLS, seed=st.integers(0, 10_000), planner_id=st.sampled_from(["", "direct"]))
 def test_asynchronous_joints_never_take_longer_and_the_answer_names_its_timing(
     cell: str, seed: int, planner_id: str, scene_of: SceneOf

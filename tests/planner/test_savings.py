@@ -64,14 +64,20 @@ def planned(request_: ProgramRequest) -> Callable[[float], ProgramPlan]:
     return plan
 
 
-def test_what_programs_are_compared_by_is_what_they_are_reported_with(common: CommonProgram) -> None:
+def test_what_programs_are_compared_by_is_what_they_are_reported_with(
+    common: CommonProgram,
+) -> None:
     """Durations and energies, carried charge included, are known without the rest of a report."""
     for until in (0.0, 120.0):
         full, brief = (
-            each(common.found, until=until) for each in (common.choice.steps, common.choice.energies)
+            each(common.found, until=until)
+            for each in (common.choice.steps, common.choice.energies)
         )
         costs = [
-            [(step.duration, step.report.energy, step.report.base_energy, step.power_mode) for step in steps]
+            [
+                (step.duration, step.report.energy, step.report.base_energy, step.power_mode)
+                for step in steps
+            ]
             for steps in (full, brief)
         ]
         assert costs[0] == costs[1]
@@ -80,7 +86,9 @@ def test_what_programs_are_compared_by_is_what_they_are_reported_with(common: Co
             assert getattr(movement.report, name) == value
 
 
-def test_the_common_program_goes_to_the_nearest_configuration_every_time(movements: Movements) -> None:
+def test_the_common_program_goes_to_the_nearest_configuration_every_time(
+    movements: Movements,
+) -> None:
     chosen = nearest_chain(movements).chosen
     here = movements.layers[0][0].departure
     for hop, k in enumerate(chosen[1:]):
@@ -104,20 +112,25 @@ def test_a_movement_of_the_common_program_is_a_straight_segment_at_full_speed(
         share = (q - q[0]) @ along / (along @ along)
         assert np.abs(q - q[0] - share[:, None] * along).max() < 1e-6  # all joints at once
         most = 1.0 - PlannerSettings().torque_reserve
-        assert 0.93 * most < np.max(movement.report.torque_ratio) <= most  # the share is 0.98 of it, or 0.95
+        assert (
+            0.93 * most < np.max(movement.report.torque_ratio) <= most
+        )  # the share is 0.98 of it, or 0.95
 
 
 def test_both_programs_last_equally_long_and_the_planned_one_costs_less(
     planned: Callable[[float], ProgramPlan], common: CommonProgram
 ) -> None:
     plan = planned(0.0)
-    savings, compared = plan.savings, plan.compared
+    savings = plan.savings
+    compared = plan.compared
     assert savings.available
     assert compared is not None
     assert savings.program_id == compared.program_id != plan.program_id
     seconds = sum(step.duration for step in common.steps())
     assert compared.report.duration == pytest.approx(seconds, abs=1e-4)
-    assert savings.movements.common == pytest.approx(sum(step.report.energy for step in common.steps()))
+    assert savings.movements.common == pytest.approx(
+        sum(step.report.energy for step in common.steps())
+    )
     assert savings.total.planned == pytest.approx(compared.report.energy)
     assert 0.0 < savings.total.share < 0.4
     assert compared.report.certified
@@ -149,7 +162,9 @@ def test_a_cycle_that_the_common_program_cannot_keep_is_compared_in_its_own_time
 
 
 def test_savings_that_nobody_asked_for_say_so(request_: ProgramRequest) -> None:
-    plan = plan_program(replace(request_, stations=("home", "park")), Work(200_000, np.inf, lambda: 0.0))
+    plan = plan_program(
+        replace(request_, stations=("home", "park")), Work(200_000, np.inf, lambda: 0.0)
+    )
     assert plan.status.ok
     assert not plan.savings.available
     assert "not asked for" in plan.savings.sentence
@@ -165,7 +180,8 @@ def test_the_three_figures_are_kept_apart() -> None:
             report=TrajectoryReport(duration=seconds, energy=joules),
         )
 
-    pause, regional = MovementKind.PAUSE, MovementKind.REGIONAL
+    pause = MovementKind.PAUSE
+    regional = MovementKind.REGIONAL
     common = (step(regional, 2.0, 3000.0), step(pause, 60.0, 28_000.0), step(regional, 1.0, 1000.0))
     planned = (
         step(regional, 1.5, 2000.0),
@@ -174,7 +190,9 @@ def test_the_three_figures_are_kept_apart() -> None:
         step(pause, 0.5, 300.0),  # the wait at the end belongs to the movements' time
     )
     program = CommonProgram(cast(Choice, None), {}, 1)
-    share = np.random.default_rng(0).normal(0.0, 0.1, ROBOTS)  # of every step's joules: all are wrong alike
+    share = np.random.default_rng(0).normal(
+        0.0, 0.1, ROBOTS
+    )  # of every step's joules: all are wrong alike
 
     def added(steps: Sequence[PlannedMovement]) -> list[FloatArray]:
         return [step.report.energy * share for step in steps]
@@ -192,15 +210,25 @@ def test_the_three_figures_are_kept_apart() -> None:
     assert astuple(savings.pauses) == pytest.approx(saving(28_000.0, 20_000.0, 60.0))
     assert astuple(savings.total) == pytest.approx(saving(32_000.0, 23_000.0, 63.0))
     assert (savings.across, savings.around) == (0, 1)
-    longer = savings_of((*common, step(pause, 10.0, 5000.0)), planned, 1, program, added)  # both wait
-    assert (longer.movements.common, longer.movements.planned, longer.movements.seconds) == (9e3, 3e3, 13.0)
+    longer = savings_of(
+        (*common, step(pause, 10.0, 5000.0)), planned, 1, program, added
+    )  # both wait
+    assert (longer.movements.common, longer.movements.planned, longer.movements.seconds) == (
+        9e3,
+        3e3,
+        13.0,
+    )
     assert longer.pauses == savings.pauses
 
 
-def test_programs_and_savings_are_the_same_on_one_core_and_on_two(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_programs_and_savings_are_the_same_on_one_core_and_on_two(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     answers = []
     for cores in ({0}, {0, 1}):
-        monkeypatch.setattr("ir_planner.program.parallel.os.sched_getaffinity", lambda _, c=cores: c)
+        monkeypatch.setattr(
+            "ir_planner.program.parallel.os.sched_getaffinity", lambda _, c=cores: c
+        )
         planner = Planner(lambda: 0.0)  # no ceiling cuts the plan
         planner.set_cell("", "open")
         park = np.array(planner.cell.park)

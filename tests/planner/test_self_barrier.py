@@ -1,4 +1,6 @@
-"""A joint value at which an arm always meets itself parts its configurations, and nothing else does."""
+"""A joint value at which an arm always meets itself parts its configurations, and nothing else
+does.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,9 @@ def space_of(scene: PlanningScene, safety_distance: float) -> FreeSpace:
 @pytest.mark.parametrize("name", CELLS)
 def test_no_distance_changes_more_than_is_said_while_one_joint_stays(name: str) -> None:
     scene = scene_of(name)
-    robot, spread, rng = scene.cell.robot, spreads(scene), np.random.default_rng(4)
+    robot = scene.cell.robot
+    spread = spreads(scene)
+    rng = np.random.default_rng(4)
     known = np.flatnonzero(np.isfinite(spread).any(axis=1))
     assert len(known) > 0
     for joint in known:
@@ -46,7 +50,8 @@ def test_an_offset_wrist_that_always_meets_itself_between_two_ends_is_a_proof() 
     assert found is not None
     assert found.joint == "wrist_2_joint"
     assert "wrist_2_joint would have to pass 180 deg" in refused(found).message
-    robot, rng = scene.cell.robot, np.random.default_rng(5)
+    robot = scene.cell.robot
+    rng = np.random.default_rng(5)
     q = rng.uniform(robot.position_min, robot.position_max, (1000, 6))
     q[:, 4] = found.value
     names = [{pair.body_a, pair.body_b} for pair in scene.collision.pairs]

@@ -1,4 +1,6 @@
-"""Stage two: withdrawal by eq. (7) from every station in a zone, certified, ranked, with reasons."""
+"""Stage two: withdrawal by eq. (7) from every station in a zone, certified, ranked, with
+reasons.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +56,9 @@ def asked(scene: PlanningScene, work: Work, options: PlanOptions | None = None) 
     return Context(scene, options, Journal(work, options.seed))
 
 
-def planned(scene: PlanningScene, station: str, direction: str = "exit", **choices: Any) -> ServicePlan:
+def planned(
+    scene: PlanningScene, station: str, direction: str = "exit", **choices: Any
+) -> ServicePlan:
     configuration = choices.pop("configuration", None)
     wanted = choices.pop("max_candidates", 2)
     options = PlanOptions(**{"planning_time": 60.0, **choices})
@@ -83,7 +87,8 @@ def test_mass_accumulates_from_the_tool_to_the_joint(demo_scene: PlanningScene) 
 
 def test_literal_weights_grow_towards_the_base_and_inverse_ones_towards_the_tool() -> None:
     mass = np.array([100.0, 300.0, 200.0, 50.0])
-    literal, inverse = step_weights(mass, 10.0, "literal"), step_weights(mass, 10.0, "inverse")
+    literal = step_weights(mass, 10.0, "literal")
+    inverse = step_weights(mass, 10.0, "inverse")
     assert (np.diff(literal) < 0.0).all()
     assert (np.diff(inverse) > 0.0).all()
     assert literal.mean() == pytest.approx(1.0)
@@ -111,7 +116,9 @@ def test_the_modified_ga_leaves_over_certified_steps_while_d_grows(
 
 def test_a_walk_whose_candidates_all_collide_ends_without_a_path(demo_scene: PlanningScene) -> None:
     problem = problem_at(demo_scene, "lathe_work", a_budget())
-    nowhere = replace(problem, inside=FreeSpace.of(demo_scene, 100.0, problem.inside.work, "lathe_work"))
+    nowhere = replace(
+        problem, inside=FreeSpace.of(demo_scene, 100.0, problem.inside.work, "lathe_work")
+    )
     walk = withdraw(nowhere, ModifiedGa(generations=3), np.random.default_rng(0), 1)
     assert walk.paths == []
     assert walk.candidates == sum(walk.rejected.values())
@@ -175,10 +182,14 @@ def test_candidates_are_certified_distinct_and_ranked(
         assert np.abs(outer[:k] - outer[k]).max(axis=1).min() > 0.05
 
 
-def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_path(scene_of: SceneOf) -> None:
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_path(
+    scene_of: SceneOf,
+) -> None:
     scene = scene_of("cnc_door")
     ids = [
-        tuple(candidate.trajectory_id for candidate in planned(scene, "press", seed=seed).candidates)
+        tuple(
+            candidate.trajectory_id for candidate in planned(scene, "press", seed=seed).candidates
+        )
         for seed in (3, 3, 4)
     ]
     assert ids[0] == ids[1]
@@ -186,7 +197,9 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_path(scene_
 
 
 @pytest.mark.parametrize(("cell", "station"), IN_ZONES)
-def test_the_tree_finds_a_path_where_it_is_asked_to(cell: str, station: str, scene_of: SceneOf) -> None:
+def test_the_tree_finds_a_path_where_it_is_asked_to(
+    cell: str, station: str, scene_of: SceneOf
+) -> None:
     plan = planned(scene_of(cell), station, planner_id="tree", max_candidates=1)
     assert plan.status.ok, plan.status.message
     assert plan.candidates[0].method == plan.info.planner_id == "tree"
@@ -212,7 +225,9 @@ def test_a_configuration_of_the_request_is_where_the_movement_starts(scene_of: S
     assert all(np.array_equal(candidate.work, free.q[-1]) for candidate in plan.candidates)
 
 
-def test_outside_the_zone_already_the_tool_goes_by_the_approach_distance(demo_scene: PlanningScene) -> None:
+def test_outside_the_zone_already_the_tool_goes_by_the_approach_distance(
+    demo_scene: PlanningScene,
+) -> None:
     station = demo_scene.station("gauge_measure")
     plan = planned(demo_scene, station.name)
     assert plan.status.ok, plan.status.message
@@ -221,7 +236,9 @@ def test_outside_the_zone_already_the_tool_goes_by_the_approach_distance(demo_sc
         assert np.linalg.norm(ends[1] - ends[0]) >= station.approach_distance - 1e-9
 
 
-def test_a_machine_that_is_switched_off_has_no_zone_to_leave(demo_cell: Cell, power: PowerData) -> None:
+def test_a_machine_that_is_switched_off_has_no_zone_to_leave(
+    demo_cell: Cell, power: PowerData
+) -> None:
     cell = demo_cell.with_equipment("lathe", enabled=False)
     scene = scene_with(cell, load_text(cell), power)
     plan = planned(scene, "lathe_work", max_candidates=1)
@@ -232,8 +249,11 @@ def test_a_machine_that_is_switched_off_has_no_zone_to_leave(demo_cell: Cell, po
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_limits_hold_at_10_khz_and_distances_between_the_points(seed: int, scene_of: SceneOf) -> None:
-    scene, robot = scene_of("cnc_door"), scene_of("cnc_door").cell.robot
+def test_limits_hold_at_10_khz_and_distances_between_the_points(
+    seed: int, scene_of: SceneOf
+) -> None:
+    scene = scene_of("cnc_door")
+    robot = scene_of("cnc_door").cell.robot
     plan = planned(scene, "cncL", seed=seed, max_candidates=1)
     trajectory = plan.candidates[0].trajectory
     assert trajectory is not None
@@ -254,9 +274,12 @@ def test_limits_hold_at_10_khz_and_distances_between_the_points(seed: int, scene
 
 @pytest.fixture(scope="module")
 def boxed(power: PowerData) -> PlanningScene:
-    """The press with plates before its opening: the hole that is left takes the wrist, not the tool."""
+    """The press with plates before its opening: the hole that is left takes the wrist, not the
+    tool.
+    """
     cell = load_cell("cnc_door")
-    machine, hole = cell.machine("press"), 0.26
+    machine = cell.machine("press")
+    hole = 0.26
 
     def plate(name: str, size: tuple[float, float, float], y: float, z: float) -> Body:
         pose = np.eye(4)
@@ -294,7 +317,9 @@ def test_a_pose_out_of_reach_is_no_ik_solution(demo_scene: PlanningScene) -> Non
     station = demo_scene.station("gauge_measure")
     pose = np.array(station.pose)
     pose[:3, 3] += [3.0, 0.0, 0.0]
-    request = ServiceRequest(replace(station, pose=pose), "exit", None, np.array(demo_scene.cell.park))
+    request = ServiceRequest(
+        replace(station, pose=pose), "exit", None, np.array(demo_scene.cell.park)
+    )
     plan = plan_service(request, asked(demo_scene, a_budget()))
     assert plan.status.code == StatusCode.NO_IK_SOLUTION
     assert "gauge_measure" in plan.status.message
@@ -344,7 +369,10 @@ def test_unknown_choices_list_the_known(planner: Planner) -> None:
         (("nowhere", "exit", None, park, 3, PlanOptions()), "lathe_work"),
         (("lathe_work", "sideways", None, park, 3, PlanOptions()), "exit, entry"),
         (("lathe_work", "exit", None, park, 0, PlanOptions()), r"\[1, 20\]"),
-        (("lathe_work", "exit", None, park, 3, PlanOptions(planner_id="magic")), "modified_ga, tree"),
+        (
+            ("lathe_work", "exit", None, park, 3, PlanOptions(planner_id="magic")),
+            "modified_ga, tree",
+        ),
     ):
         with pytest.raises(RequestError, match=word):
             planner.plan_service(*fields)
@@ -353,7 +381,9 @@ def test_unknown_choices_list_the_known(planner: Planner) -> None:
 # -- in a program
 
 
-def test_a_program_withdraws_where_the_straight_line_does_not_leave_the_zone(power: PowerData) -> None:
+def test_a_program_withdraws_where_the_straight_line_does_not_leave_the_zone(
+    power: PowerData,
+) -> None:
     cell = load_cell("cnc_door")
     request = ProgramRequest(
         cell, power, ("cncL", "pal"), np.array(cell.park), PlanOptions(planning_time=60.0)

@@ -1,4 +1,6 @@
-"""A motion is slowed down to its limits wherever an even slow-down keeps them, hardly more than needed."""
+"""A motion is slowed down to its limits wherever an even slow-down keeps them, hardly more than
+needed.
+"""
 
 from __future__ import annotations
 
@@ -29,18 +31,22 @@ def use(spline: UniformSpline, limits: MotionLimits, scene: PlanningScene) -> fl
 def test_a_load_near_the_envelope_is_slowed_down_as_little_as_needed(
     seed: int, scene_of: Callable[[str], PlanningScene]
 ) -> None:
-    scene, rng = scene_of("demo"), np.random.default_rng(seed)
+    scene = scene_of("demo")
+    rng = np.random.default_rng(seed)
     robot = scene.cell.robot
     ends = np.array(scene.cell.park) + rng.uniform(-0.6, 0.6, (2, robot.n))
     path = np.clip(ends, robot.position_min, robot.position_max)
     least = fewest_seconds(path, scene.limits.velocity, scene.limits.acceleration)
     spline = along_path(path, 24, least * rng.uniform(1.0, 1.5))
     weight = torque_use(scene.dynamics, *UniformSpline(spline.control, SLOWEST).samples(6)).max()
-    limits = replace(scene.limits, torque_share=float(weight * (1.0 + 10.0 ** rng.uniform(-3.0, -0.5))))
+    limits = replace(
+        scene.limits, torque_share=float(weight * (1.0 + 10.0 ** rng.uniform(-3.0, -0.5)))
+    )
     found = slowed_to_limits(spline, limits, scene)
     assert found is not None
     assert use(found, limits, scene) <= 1.0 + 1e-12
-    low, high = spline.interval, max(found.interval, spline.interval)
+    low = spline.interval
+    high = max(found.interval, spline.interval)
     for _ in range(50):
         middle = 0.5 * (low + high)
         within = use(UniformSpline(spline.control, middle), limits, scene) <= 1.0

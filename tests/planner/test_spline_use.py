@@ -1,4 +1,6 @@
-"""What rounds of timing ask of the spline of eq. (10) is what holds for the trajectory that is sent."""
+"""What rounds of timing ask of the spline of eq. (10) is what holds for the trajectory that is
+sent.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ def sent_use(points: np.ndarray, milliseconds: np.ndarray, scene: PlanningScene)
     spline = spline_through(points, at, knots * 1e-3)
     values = spline.positions, spline.velocities, spline.accelerations
     trajectory = JointTrajectory(NAMES, knots * 1_000_000, *values)
-    largest, limits, use = extremes(*trajectory.coefficients()), scene.limits, np.zeros(len(points) - 1)
+    largest = extremes(*trajectory.coefficients())
+    limits = scene.limits
+    use = np.zeros(len(points) - 1)
     for k, (begin, end) in enumerate(pairwise(knots)):
         motion = trajectory.sample(np.linspace(begin, end, 9) * 1e-3)
         torque = torque_use(scene.dynamics, motion.q, motion.qd, motion.qdd).max()

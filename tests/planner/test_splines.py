@@ -20,23 +20,23 @@ duration = st.floats(0.05, 4.0)
 
 
 def first_segment(q0: float, q1: float, v0: float, a0: float, t1: float) -> FloatArray:
-    """Coefficients (4,) in u, lowest first, of the cubic from q0 with speed v0 and acceleration a0 to q1 in
-    t1 s.
+    """Coefficients (4,) in u, lowest first, of the cubic from q0 with speed v0 and acceleration a0
+    to q1 in t1 s.
     """
     delta = q1 - q0
     return np.array([q0, v0 * t1, a0 * t1**2 / 2, delta - v0 * t1 - a0 * t1**2 / 2])
 
 
 def middle_segment(q0: float, q1: float, v0: float, a0: float, t: float) -> FloatArray:
-    """Coefficients (4,) of a middle cubic: it takes over speed v0 and acceleration a0 of the segment
-    before.
+    """Coefficients (4,) of a middle cubic: it takes over speed v0 and acceleration a0 of the
+    segment before.
     """
     return first_segment(q0, q1, v0, a0, t)
 
 
 def last_segment(q0: float, qf: float, vf: float, af: float, tn: float) -> FloatArray:
-    """Coefficients (4,) of the cubic from q0 to qf, where it ends with speed vf and acceleration af after
-    tn s.
+    """Coefficients (4,) of the cubic from q0 to qf, where it ends with speed vf and acceleration af
+    after tn s.
     """
     delta = qf - q0
     return np.array(
@@ -52,7 +52,11 @@ def last_segment(q0: float, qf: float, vf: float, af: float, tn: float) -> Float
 def end_state(coefficients: FloatArray, t: float) -> tuple[float, float, float]:
     """Position, speed and acceleration at the end (u = 1) of a segment that lasts t s."""
     c = coefficients
-    return float(c.sum()), float((c[1] + 2 * c[2] + 3 * c[3]) / t), float((2 * c[2] + 6 * c[3]) / t**2)
+    return (
+        float(c.sum()),
+        float((c[1] + 2 * c[2] + 3 * c[3]) / t),
+        float((2 * c[2] + 6 * c[3]) / t**2),
+    )
 
 
 @given(number, number, number, number, duration)
@@ -79,10 +83,13 @@ def test_the_first_segment_meets_its_start_conditions(
 
 
 def test_five_cubics_of_the_equation_are_the_spline() -> None:
-    """First, three middle and last segment in normalised time give the curve that the solver gives."""
+    """First, three middle and last segment in normalised time give the curve that the solver
+    gives.
+    """
     points = np.array([[0.2], [0.5], [-0.4], [1.1]])
     times = np.array([0.0, 0.8, 1.5, 2.6])
-    start, end = (np.array([0.3]), np.array([-0.5])), (np.array([0.1]), np.array([0.7]))
+    start = (np.array([0.3]), np.array([-0.5]))
+    end = (np.array([0.1]), np.array([0.7]))
     knots = virtual_knots(times)
     spline = spline_through(points, times, knots, start, end)
     q = spline.positions[:, 0]
@@ -93,7 +100,9 @@ def test_five_cubics_of_the_equation_are_the_spline() -> None:
         segment = build(q[k], q[k + 1], *state, t[k])
         _, *state_after = end_state(segment, t[k])
         state = (state_after[0], state_after[1])
-        assert state == pytest.approx((spline.velocities[k + 1, 0], spline.accelerations[k + 1, 0]), abs=1e-9)
+        assert state == pytest.approx(
+            (spline.velocities[k + 1, 0], spline.accelerations[k + 1, 0]), abs=1e-9
+        )
     last = last_segment(q[4], q[5], 0.1, 0.7, t[4])
     assert last[1] / t[4] == pytest.approx(state[0], abs=1e-9)
     assert 2 * last[2] / t[4] ** 2 == pytest.approx(state[1], abs=1e-8)
@@ -115,7 +124,9 @@ def test_many_points_are_passed_at_rest_at_both_ends_and_c2(count: int, seed: in
 
 
 @given(st.integers(2, 12), st.integers(2, 40), st.integers(0, 10_000))
-def test_evenly_spaced_points_lie_on_the_path_at_even_lengths(corners: int, count: int, seed: int) -> None:
+def test_evenly_spaced_points_lie_on_the_path_at_even_lengths(
+    corners: int, count: int, seed: int
+) -> None:
     path = np.random.default_rng(seed).uniform(-1.0, 1.0, (corners, 3))
     points = evenly_spaced(path, count)
     assert (points[[0, -1]] == path[[0, -1]]).all()
@@ -124,7 +135,9 @@ def test_evenly_spaced_points_lie_on_the_path_at_even_lengths(corners: int, coun
 
 
 @given(st.integers(2, 12), st.integers(0, 3), st.integers(0, 10_000))
-def test_shares_of_a_path_are_interpolated_joint_by_joint(corners: int, stops: int, seed: int) -> None:
+def test_shares_of_a_path_are_interpolated_joint_by_joint(
+    corners: int, stops: int, seed: int
+) -> None:
     rng = np.random.default_rng(seed)
     path = rng.uniform(-1.0, 1.0, (corners, 3))
     path = np.insert(path, rng.integers(0, corners, stops), path[rng.integers(0, corners)], axis=0)
@@ -136,4 +149,6 @@ def test_shares_of_a_path_are_interpolated_joint_by_joint(corners: int, stops: i
 
 def test_times_that_do_not_increase_are_refused() -> None:
     with pytest.raises(ValueError, match="increase"):
-        spline_through(np.zeros((3, 1)), np.array([0.0, 1.0, 1.0]), np.array([0.0, 0.5, 1.0, 1.0, 1.0]))
+        spline_through(
+            np.zeros((3, 1)), np.array([0.0, 1.0, 1.0]), np.array([0.0, 0.5, 1.0, 1.0, 1.0])
+        )

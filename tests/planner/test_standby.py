@@ -1,4 +1,6 @@
-"""A pause in, a power mode out: break-even figures of the data, and never a mode that costs more."""
+"""A pause in, a power mode out: break-even figures of the data, and never a mode that costs
+more.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,13 @@ from ir_description import load_cell, load_power_data
 from ir_msgs_py.transitions import TransitionTimes
 from ir_planner.errors import RequestError
 from ir_planner.program.pause_lengths import lengths_of
-from ir_planner.program.standby import break_even, late_start, mode_watts, pause_energy, plan_standby
+from ir_planner.program.standby import (
+    break_even,
+    late_start,
+    mode_watts,
+    pause_energy,
+    plan_standby,
+)
 from ir_planner.program.waiting import Trip, best_posture
 from ir_planner.scene.planning_scene import load_text, scene_with
 from ir_sim_driver.controller.assembly import make_simulation
@@ -68,7 +76,9 @@ def test_no_mode_alone_costs_less_and_the_robot_is_ready_in_time(pause: float) -
 
 
 def test_longer_pauses_go_deeper() -> None:
-    chosen = [plan_standby(pause, HOME, SCENE, TIMES).chosen.name for pause in (0.5, 10.0, 200.0, 3000.0)]
+    chosen = [
+        plan_standby(pause, HOME, SCENE, TIMES).chosen.name for pause in (0.5, 10.0, 200.0, 3000.0)
+    ]
     assert chosen == ["STAND_ON_MOTORS", "STAND_ON_BRAKES", "BUS_POWER_OFF", "HIBERNATION"]
 
 
@@ -82,7 +92,9 @@ TIMER = POWER.motors_to_brakes_in_program
 
 
 @pytest.mark.parametrize("pause", [1.0, TIMER - 0.5, TIMER + 0.1, TIMER + 0.8, TIMER + 5.0, 60.0])
-def test_a_pause_that_the_controller_is_left_to_costs_what_the_driver_measures(pause: float) -> None:
+def test_a_pause_that_the_controller_is_left_to_costs_what_the_driver_measures(
+    pause: float,
+) -> None:
     """The simulated controller stands, and after the pause a movement asks for motors."""
     start = SimulationSettings(controller=ControllerSettings(start_mode="STAND_ON_MOTORS"))
     simulation = make_simulation("demo", backend="ideal", settings=start, data=POWER)
@@ -111,7 +123,9 @@ def test_a_minute_is_not_spent_on_motors() -> None:
 
 
 def test_hibernation_is_entered_through_the_modes_before_it() -> None:
-    """While a mode is entered the power is that of the mode before: a minute of it, not on motors."""
+    """While a mode is entered the power is that of the mode before: a minute of it, not on
+    motors.
+    """
     standby = plan_standby(1800.0, HOME, SCENE, TIMES)
     assert standby.modes == ("STAND_ON_BRAKES", "BUS_POWER_OFF", "HIBERNATION")
     assert standby.switch_times == pytest.approx((0.0, 1.3, 6.3))
@@ -120,17 +134,27 @@ def test_hibernation_is_entered_through_the_modes_before_it() -> None:
 
 
 def test_where_to_wait_counts_moving_there_and_back() -> None:
-    """On motors for a minute, so that holding torque matters: a posture that needs none is worth a trip."""
-    times = replace(TIMES, stand_on_brakes_enter=500.0, bus_power_off_enter=500.0, hibernation_enter=500.0)
+    """On motors for a minute, so that holding torque matters: a posture that needs none is worth a
+    trip.
+    """
+    times = replace(
+        TIMES, stand_on_brakes_enter=500.0, bus_power_off_enter=500.0, hibernation_enter=500.0
+    )
     scene = replace(SCENE, power=replace(POWER, motors_to_brakes_in_program=1e5))
     arm = np.radians([0.0, -20.0, 60.0, 0.0, 60.0, 0.0])
-    watts = {name: mode_watts("STAND_ON_MOTORS", q, scene) for name, q in (("home", HOME), ("arm", arm))}
+    watts = {
+        name: mode_watts("STAND_ON_MOTORS", q, scene) for name, q in (("home", HOME), ("arm", arm))
+    }
     assert watts["arm"] < watts["home"]
-    pause, stays = 60.0, watts["arm"] * 55.0
-    there, back = (2.0, 900.0), (3.0, 1000.0)
+    pause = 60.0
+    stays = watts["arm"] * 55.0
+    there = (2.0, 900.0)
+    back = (3.0, 1000.0)
     worth = watts["home"] * pause - stays
     for factor, best in ((0.9, "arm"), (1.1, "")):
-        scaled = tuple((seconds, joules * factor * worth / 1900.0) for seconds, joules in (there, back))
+        scaled = tuple(
+            (seconds, joules * factor * worth / 1900.0) for seconds, joules in (there, back)
+        )
         trips = (Trip("arm", arm, *scaled), Trip("lathe", HOME, problem="not free"))
         found = best_posture(lengths_of(pause), HOME, trips, scene, times)
         assert found.posture == best

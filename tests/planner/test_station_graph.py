@@ -15,7 +15,9 @@ from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Hop, Part, Se
 
 @dataclass
 class World:
-    """True costs of the parts of every hop; inf: impossible. `share`: how much of them a bound says."""
+    """True costs of the parts of every hop; inf: impossible. `share`: how much of them a bound
+    says.
+    """
 
     leave: list[np.ndarray]
     across: list[np.ndarray]
@@ -27,7 +29,8 @@ class World:
         """Bounds; what is impossible looks cheap at first."""
         parts = (self.leave, self.across, self.enter)
         bounds = [
-            [self.share * np.where(np.isfinite(a), a, 1.0) for a in hop] for hop in zip(*parts, strict=True)
+            [self.share * np.where(np.isfinite(a), a, 1.0) for a in hop]
+            for hop in zip(*parts, strict=True)
         ]
         return [Hop(*hop) for hop in bounds]
 
@@ -46,7 +49,11 @@ class World:
             self.asked.append(part)
             halfway = part.kind == ACROSS and not again and np.isfinite(self.cost(part))
             found.append(
-                Settled(self.cost(part) * (0.95 if halfway else 1.0), exact=not halfway, proved=not halfway)
+                Settled(
+                    self.cost(part) * (0.95 if halfway else 1.0),
+                    exact=not halfway,
+                    proved=not halfway,
+                )
             )
         return found
 
@@ -99,7 +106,9 @@ def test_the_chain_is_the_cheapest_of_all(world: World) -> None:
 @given(worlds(), st.integers(0, 5))
 @settings(deadline=None)
 def test_a_stated_gap_is_true_where_the_work_ends_first(world: World, most: int) -> None:
-    chain = StationGraph(world.hops(), world.settle, may_go_on=lambda: len(world.asked) < most).solve()
+    chain = StationGraph(
+        world.hops(), world.settle, may_go_on=lambda: len(world.asked) < most
+    ).solve()
     best = world.enumerated()
     assert chain.proved <= chain.bound <= best + 1e-9
     if np.isfinite(best):
@@ -112,7 +121,10 @@ def test_a_bound_that_is_only_measured_is_not_in_the_proved_one(world: World, mo
     """Measured bounds that are wrong by a fifth spoil the bound, but not the proved one."""
 
     def settle(parts: list[Part]) -> list[Settled]:
-        return [s if s.exact else Settled(1.2 * s.cost, False, proved=False) for s in world.settle(parts)]
+        return [
+            s if s.exact else Settled(1.2 * s.cost, False, proved=False)
+            for s in world.settle(parts)
+        ]
 
     chain = StationGraph(world.hops(), settle, may_go_on=lambda: len(world.asked) < most).solve()
     best = world.enumerated()
@@ -131,7 +143,8 @@ def test_the_answer_is_within_the_tolerance(world: World, tolerance: float) -> N
 
 def test_good_bounds_leave_most_parts_alone() -> None:
     rng = np.random.default_rng(0)
-    count, stops = 12, 6
+    count = 12
+    stops = 6
     world = World(
         [rng.uniform(1.0, 2.0, count) for _ in range(stops)],
         [rng.uniform(1.0, 10.0, (count, count)) for _ in range(stops)],
@@ -152,7 +165,9 @@ def test_the_cost_of_the_best_chain_is_reported() -> None:
 @given(worlds(), st.integers(0, 5))
 @settings(deadline=None)
 def test_a_search_that_must_end_knows_a_chain_or_none(world: World, most: int) -> None:
-    chain = StationGraph(world.hops(), world.settle, must_end=lambda: len(world.asked) >= most).solve()
+    chain = StationGraph(
+        world.hops(), world.settle, must_end=lambda: len(world.asked) >= most
+    ).solve()
     best = world.enumerated()
     assert chain.cost == pytest.approx(best) or chain.cost == np.inf
     if np.isfinite(chain.cost):
@@ -162,4 +177,6 @@ def test_a_search_that_must_end_knows_a_chain_or_none(world: World, most: int) -
 def parts_of(chosen: list[int]) -> list[Part]:
     """All parts of a chain."""
     kinds = (LEAVE, ACROSS, ENTER)
-    return [Part(k, kind, a, b) for k, (a, b) in enumerate(itertools.pairwise(chosen)) for kind in kinds]
+    return [
+        Part(k, kind, a, b) for k, (a, b) in enumerate(itertools.pairwise(chosen)) for kind in kinds
+    ]

@@ -7,7 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_planner.timing.time_law import GRID_S, LawLimits, TimeLaw, law_states, phase_steps, reached_speed
+from ir_planner.timing.time_law import (
+    GRID_S,
+    LawLimits,
+    TimeLaw,
+    law_states,
+    phase_steps,
+    reached_speed,
+)
 
 positive = st.floats(0.05, 20.0)
 
@@ -36,13 +43,17 @@ def test_a_law_arrives_at_rest_within_its_limits(
 
 @given(positive, positive, st.floats(1.0, 500.0))
 @settings(max_examples=100, deadline=None)
-def test_the_reached_speed_fills_the_distance(speed: float, acceleration: float, jerk: float) -> None:
+def test_the_reached_speed_fills_the_distance(
+    speed: float, acceleration: float, jerk: float
+) -> None:
     bounds = limits(speed, acceleration, acceleration, jerk)
     reached = float(reached_speed(bounds)[0])
 
     def ramp(v: float) -> float:
         return (
-            v / acceleration + acceleration / jerk if v * jerk >= acceleration**2 else 2 * np.sqrt(v / jerk)
+            v / acceleration + acceleration / jerk
+            if v * jerk >= acceleration**2
+            else 2 * np.sqrt(v / jerk)
         )
 
     assert reached <= speed

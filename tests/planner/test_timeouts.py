@@ -1,4 +1,6 @@
-"""Sequences and timeout policies of a pause against exhaustive search, which simulates each by itself."""
+"""Sequences and timeout policies of a pause against exhaustive search, which simulates each by
+itself.
+"""
 
 from __future__ import annotations
 
@@ -30,8 +32,9 @@ NOT_GIVEN = np.zeros(0)
 def simulated(
     rests: Rests, plan: tuple[tuple[int, float], ...], end: float, wake: float
 ) -> tuple[float, float]:
-    """Energy [J] until the robot is ready, and when [s]: mode plan[i][0] is asked for at plan[i][1], motors
-    at `wake`, and they are needed at `end`. An automaton of its own, event by event.
+    """Energy [J] until the robot is ready, and when [s]: mode plan[i][0] is asked for at
+    plan[i][1], motors at `wake`, and they are needed at `end`. An automaton of its own, event by
+    event.
     """
     watts = [rests.motors, *(mode.watts for mode in rests.modes)]
     orders = [(at, k + 1) for k, at in plan if at < wake]
@@ -47,7 +50,8 @@ def simulated(
         energy += watts[mode] * (start - now)
         rest = rests.modes[k - 1]
         energy += watts[mode] * rest.enter + watts[k] * rest.stay
-        now, mode = start + rest.enter + rest.stay, k
+        now = start + rest.enter + rest.stay
+        mode = k
     if mode:
         leave = rests.modes[mode - 1].leave
         energy += watts[mode] * max(wake - now, 0.0) + watts[0] * leave
@@ -57,7 +61,9 @@ def simulated(
 
 
 def plans(rests: Rests, grid: list[float]) -> Iterator[tuple[tuple[int, float], ...]]:
-    """All sequences of deeper modes with switch times on a grid, and as soon as the mode before allows."""
+    """All sequences of deeper modes with switch times on a grid, and as soon as the mode before
+    allows.
+    """
     for count in range(len(rests.modes) + 1):
         for chosen in itertools.combinations(range(len(rests.modes)), count):
             yield from _timed(rests, chosen, grid, ())
@@ -89,7 +95,9 @@ def controllers(draw: st.DrawFn) -> Rests:
     return Rests(watts[0], draw(st.floats(0.5, 60.0)), modes)
 
 
-@pytest.mark.parametrize("pause", [0.5, 1.9, 2.1, 8.0, 20.5, 60.0, 97.0, 240.0, 400.0, 900.0, 1800.0, 7200.0])
+@pytest.mark.parametrize(
+    "pause", [0.5, 1.9, 2.1, 8.0, 20.5, 60.0, 97.0, 240.0, 400.0, 900.0, 1800.0, 7200.0]
+)
 def test_no_sequence_with_timers_costs_less_than_the_planned_one(pause: float) -> None:
     rests = rests_at(HOME, SCENE, TIMES)
     grid = [float(t) for t in np.linspace(0.0, min(pause, 300.0), 6)]
@@ -104,9 +112,13 @@ def test_no_sequence_with_timers_costs_less_than_the_planned_one(pause: float) -
 
 
 def test_the_shortest_pause_may_end_with_the_controllers_timer() -> None:
-    brakes, deeper = (5.0, 0.0, 1.0, 2.0), (5.0, 0.0, 0.0, 1.0)
-    modes = tuple(Rest(name, *times) for name, times in zip(NAMES, (brakes, deeper, deeper), strict=True))
-    rests, lengths = Rests(5.0, 1.0, modes), np.array([1.0, 2.0])
+    brakes = (5.0, 0.0, 1.0, 2.0)
+    deeper = (5.0, 0.0, 0.0, 1.0)
+    modes = tuple(
+        Rest(name, *times) for name, times in zip(NAMES, (brakes, deeper, deeper), strict=True)
+    )
+    rests = Rests(5.0, 1.0, modes)
+    lengths = np.array([1.0, 2.0])
     steps = Timeouts(rests, lengths).best()
     least = np.mean([simulated(rests, ((1, 1.0),), pause, pause)[0] for pause in lengths])
     assert np.mean([rests.cost(steps, pause)[0] for pause in lengths]) == pytest.approx(least)
@@ -123,16 +135,22 @@ def test_no_timeout_policy_on_a_grid_has_a_lower_expectation(
     more = data.draw(st.lists(st.floats(0.0, float(lengths[-1])), max_size=3))
     grid = sorted({0.0, *samples, *more})
     least = min(
-        np.mean([simulated(rests, plan, pause, pause)[0] for pause in samples]) for plan in plans(rests, grid)
+        np.mean([simulated(rests, plan, pause, pause)[0] for pause in samples])
+        for plan in plans(rests, grid)
     )
     assert expected <= least * (1.0 + 1e-9) + 1e-6
     own = tuple((NAMES.index(step.rest.name), step.at) for step in steps)
     again = [simulated(rests, own, pause, pause) for pause in samples]
     assert expected == pytest.approx(float(np.mean([energy for energy, _ in again])))
-    assert [ready for _, ready in again] == pytest.approx([p + rests.cost(steps, p)[1] for p in samples])
+    assert [ready for _, ready in again] == pytest.approx(
+        [p + rests.cost(steps, p)[1] for p in samples]
+    )
 
 
-@given(st.lists(st.floats(0.1, 7200.0), min_size=1, max_size=40), st.sampled_from(["samples", "quantiles"]))
+@given(
+    st.lists(st.floats(0.1, 7200.0), min_size=1, max_size=40),
+    st.sampled_from(["samples", "quantiles"]),
+)
 @settings(deadline=None, max_examples=30)
 def test_more_information_never_costs_more(values: list[float], form: str) -> None:
     given_ = np.sort(np.array(values))
@@ -145,7 +163,9 @@ def test_more_information_never_costs_more(values: list[float], form: str) -> No
     assert found.worst >= found.expected - rounding
     assert found.saving >= -rounding
     rests = rests_at(HOME, SCENE, TIMES)
-    assert found.clairvoyant == pytest.approx(np.mean([rests.clairvoyant(float(p)) for p in lengths.likely]))
+    assert found.clairvoyant == pytest.approx(
+        np.mean([rests.clairvoyant(float(p)) for p in lengths.likely])
+    )
     for pause in lengths.likely[:: max(1, len(lengths.likely) // 20)]:
         known = plan_standby(float(pause), HOME, SCENE, TIMES).energy
         assert rests.clairvoyant(float(pause)) <= known * (1.0 + 1e-9)
@@ -164,10 +184,20 @@ def test_quantiles_are_what_many_samples_between_them_are() -> None:
 @pytest.mark.parametrize(
     ("pause", "samples", "quantiles", "sentence"),
     [
-        (0.0, [3.0, float("nan")], [], r"pause_samples\[1\] is nan s: it must be in \(0, 604800\] s"),
+        (
+            0.0,
+            [3.0, float("nan")],
+            [],
+            r"pause_samples\[1\] is nan s: it must be in \(0, 604800\] s",
+        ),
         (0.0, [-1.0], [], r"pause_samples\[0\] is -1 s"),
         (0.0, [], [0.0, 1.0], r"pause_quantiles\[0\] is 0 s"),
-        (0.0, [], [1.0, 7.0, 5.0], r"pause_quantiles\[2\] is 5 s: it must be at least the one before, 7 s"),
+        (
+            0.0,
+            [],
+            [1.0, 7.0, 5.0],
+            r"pause_quantiles\[2\] is 5 s: it must be at least the one before, 7 s",
+        ),
         (0.0, [], [1.0], "at least 2 are needed"),
         (0.0, [1.0] * (SAMPLES_MAX + 1), [], "has 10001 values: at most 10000"),
         (60.0, [1.0], [], r"pause \(60 s\) and pause_samples \(1 values\) are given: exactly one"),

@@ -1,4 +1,6 @@
-"""Movements keep speed, acceleration, jerk and torque at 10 kHz, and are as fast as one of them allows."""
+"""Movements keep speed, acceleration, jerk and torque at 10 kHz, and are as fast as one of them
+allows.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,9 @@ from ir_planner.timing.spline_timing import time_spline
 from ir_planner.timing.straight_steps import straight_steps
 from ir_planner.timing.time_law import StepLaws, TimeLaw
 
-_spec = importlib.util.spec_from_file_location("planner_oracles", Path(__file__).parent / "oracles.py")
+_spec = importlib.util.spec_from_file_location(
+    "planner_oracles", Path(__file__).parent / "oracles.py"
+)
 assert _spec is not None
 assert _spec.loader is not None
 oracles = importlib.util.module_from_spec(_spec)
@@ -71,11 +75,14 @@ def test_a_ptp_keeps_all_limits_and_uses_one_of_them_up(
     }
     largest = {name: float(values.max()) for name, values in share.items()}
     assert max(largest.values()) <= 1.0 + 1e-6, largest
-    # the jerk is at its limit by construction, unless torque slowed the ramps: then torque is near its share
+    # the jerk is at its limit by construction, unless torque slowed the ramps: then torque is near
+    # its share
     assert max(largest["velocity"], largest["acceleration"], largest["torque"]) > 0.93, largest
     report = movement.report
     assert report.certified
-    assert (report.torque_ratio >= share["torque"].max(axis=0) - 1e-6).all(), "the bound is no bound"
+    assert (report.torque_ratio >= share["torque"].max(axis=0) - 1e-6).all(), (
+        "the bound is no bound"
+    )
 
 
 def test_torques_of_the_planner_are_those_of_pinocchio(demo_scene: PlanningScene) -> None:
@@ -90,13 +97,16 @@ def test_torques_of_the_planner_are_those_of_pinocchio(demo_scene: PlanningScene
 
 
 def test_a_heavier_load_takes_longer(demo_scene: PlanningScene, degrees: Degrees) -> None:
-    a, b = degrees(0, -50, 50, 0, 40, 0), degrees(0, -110, 110, 0, 0, 0)
+    a = degrees(0, -50, 50, 0, 40, 0)
+    b = degrees(0, -110, 110, 0, 0, 0)
     empty = replace(demo_scene, loads=())
     with_tool = fastest_law(a, b, demo_scene.limits, demo_scene.dynamics).total
     assert fastest_law(a, b, empty.limits, empty.dynamics).total < with_tool
 
 
-def test_scaling_limits_what_it_says(demo_scene: PlanningScene, degrees: Degrees, budget: Work) -> None:
+def test_scaling_limits_what_it_says(
+    demo_scene: PlanningScene, degrees: Degrees, budget: Work
+) -> None:
     path = np.stack([degrees(0, -90, 90, 0, 0, 0), degrees(90, -60, 60, 30, 30, 0)])
     options = PlanOptions(
         objective="time", velocity_scaling=0.3, acceleration_scaling=0.5, safety_distance=0.0
@@ -149,7 +159,8 @@ def test_corners_are_cut_within_the_limits_and_save_time(
     options = PlanOptions(objective="time")
     movement = straight_steps(path, Context.of(demo_scene, options, budget))
     laws = tuple(
-        StepLaws((fastest_law(a, b, demo_scene.limits, demo_scene.dynamics),)) for a, b in pairwise(path)
+        StepLaws((fastest_law(a, b, demo_scene.limits, demo_scene.dynamics),))
+        for a, b in pairwise(path)
     )
     stopping = blended(TimedPath(path, laws, (0,)), NAMES)
     assert movement.trajectory.duration < stopping.duration - 0.05
@@ -190,14 +201,21 @@ def test_hours_keep_their_nanoseconds() -> None:
     assert slow.times_ns.tolist() == [2_000_000 * t for t in fast.times_ns.tolist()]
 
 
-@pytest.mark.parametrize(("scaling", "says"), [(1e-5, "at most 3600 s"), (1e-9, "velocity_scaling is 1e-09")])
-def test_a_movement_that_would_take_hours_is_refused(scaling: float, says: str, planner: Planner) -> None:
-    home, park = np.array(planner.cell.machine_home), Goal(configuration=np.array(planner.cell.park))
+@pytest.mark.parametrize(
+    ("scaling", "says"), [(1e-5, "at most 3600 s"), (1e-9, "velocity_scaling is 1e-09")]
+)
+def test_a_movement_that_would_take_hours_is_refused(
+    scaling: float, says: str, planner: Planner
+) -> None:
+    home = np.array(planner.cell.machine_home)
+    park = Goal(configuration=np.array(planner.cell.park))
     with pytest.raises(RequestError, match=says):
         planner.plan_regional(home, park, PlanOptions(velocity_scaling=scaling))
 
 
-def test_a_goal_that_is_the_start_takes_a_millisecond(demo_scene: PlanningScene, budget: Work) -> None:
+def test_a_goal_that_is_the_start_takes_a_millisecond(
+    demo_scene: PlanningScene, budget: Work
+) -> None:
     home = np.array(demo_scene.cell.machine_home)
     movement = straight_steps(np.stack([home, home]), Context.of(demo_scene, PlanOptions(), budget))
     assert movement.trajectory == standing(home, NAMES)
@@ -205,9 +223,11 @@ def test_a_goal_that_is_the_start_takes_a_millisecond(demo_scene: PlanningScene,
     assert movement.report.energy == pytest.approx(movement.report.duration * 735.0, rel=0.01)
 
 
-def test_a_spline_through_points_keeps_its_limits(demo_scene: PlanningScene, degrees: Degrees) -> None:
+def test_a_spline_through_points_keeps_its_limits(
+    demo_scene: PlanningScene, degrees: Degrees
+) -> None:
     points = np.stack(
-        [degrees(0, -90, 90, 0, 0, 0), degrees(20, -80, 85, 10, 20, 0), degrees(50, -85, 95, 0, 30, 40),
+        [degrees(0, -90, 90, 0, 0, 0), degrees(20, -80, 85, 10, 20, 0), degrees(50, -85, 95, 0, 30, 40),  # noqa: E501
          degrees(60, -90, 90, 0, 0, 0)]
     )  # fmt: skip
     limits = demo_scene.limits

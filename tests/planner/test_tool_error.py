@@ -1,4 +1,6 @@
-"""Bounds of how the tool keeps to its path hold at every instant: by differences, far finer than samples."""
+"""Bounds of how the tool keeps to its path hold at every instant: by differences, far finer than
+samples.
+"""
 
 from __future__ import annotations
 
@@ -61,7 +63,8 @@ def test_the_tool_keeps_within_the_bounds_of_its_path(planner: Planner) -> None:
         pose[:3, :3] = start[:3, :3] @ Rotation.from_rotvec([0.0, 0.1 * k, 0.15 * k]).as_matrix()
     path = CartesianPath(start, (CartesianSegment("spline", tuple(poses)),), tool_speed=0.2)
     plan = planner.plan_cartesian(path, PlanOptions())
-    trajectory, scene = plan.trajectory, planner.scene()
+    trajectory = plan.trajectory
+    scene = planner.scene()
     assert trajectory is not None, plan.status.message
     times = np.arange(0.0, trajectory.duration, 5e-5)
     tcp = scene.chain.tcp_poses(trajectory.sample(times).q)

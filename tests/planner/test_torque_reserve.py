@@ -1,4 +1,6 @@
-"""The torque that plans leave to the feedback: kept at every instant, said in every report, paid in time."""
+"""The torque that plans leave to the feedback: kept at every instant, said in every report, paid in
+time.
+"""
 
 from dataclasses import replace
 from functools import cache

@@ -1,4 +1,6 @@
-"""Every kind of violation is found between the points too, and named with place, limit and excess."""
+"""Every kind of violation is found between the points too, and named with place, limit and
+excess.
+"""
 
 from __future__ import annotations
 
@@ -86,7 +88,9 @@ def test_a_collision_between_two_points_is_found() -> None:
     scene = scene_with(cell, load_text(cell), load_power_data())
     task = cell.task("p1->p2")
     rest = np.zeros((2, 6))
-    trajectory = JointTrajectory.from_seconds(NAMES, [0.0, 8.0], [task.start, task.goal], rest, rest)
+    trajectory = JointTrajectory.from_seconds(
+        NAMES, [0.0, 8.0], [task.start, task.goal], rest, rest
+    )
     assert scene.collision.is_free(trajectory.positions, 0.02).all()
     violation = verify(trajectory, scene, 0.02).violation
     assert violation is not None
@@ -94,7 +98,9 @@ def test_a_collision_between_two_points_is_found() -> None:
     assert violation.pair is not None
     assert violation.excess == pytest.approx(0.02 - violation.pair.distance)
     early = trajectory.sample(np.linspace(0.0, violation.time * 0.999, 400)).q
-    assert (scene.collision.distances(early).min(axis=1) > 0.02 - 1e-6).all(), "not the first violation"
+    assert (scene.collision.distances(early).min(axis=1) > 0.02 - 1e-6).all(), (
+        "not the first violation"
+    )
 
 
 def test_missing_velocities_jump_and_are_no_motion_for_a_robot(demo_scene: PlanningScene) -> None:
@@ -102,7 +108,9 @@ def test_missing_velocities_jump_and_are_no_motion_for_a_robot(demo_scene: Plann
     violation = verify(line, demo_scene, 0.0).violation
     assert violation is not None
     assert violation.what == "velocity at rest"
-    cubic = JointTrajectory.from_seconds(NAMES, [0.0, 1.0, 2.0], [HOME, HOME + 0.01, HOME], np.zeros((3, 6)))
+    cubic = JointTrajectory.from_seconds(
+        NAMES, [0.0, 1.0, 2.0], [HOME, HOME + 0.01, HOME], np.zeros((3, 6))
+    )
     assert not verify(cubic, demo_scene, 0.0).certified
 
 
@@ -125,7 +133,8 @@ def test_an_allowed_contact_holds_at_its_station_only(demo_cell: Any, power: Any
     scene = scene_with(demo_cell, "gripper", power)
     station = scene.station("infeed_pick")
     allowed = {frozenset((c.body_a, c.body_b)) for c in station.allowed_contacts}
-    here, elsewhere = scene.thresholds(0.02, "infeed_pick"), scene.thresholds(0.02)
+    here = scene.thresholds(0.02, "infeed_pick")
+    elsewhere = scene.thresholds(0.02)
     for z, pair in enumerate(scene.collision.pairs):
         assert elsewhere[z] == 0.02
         assert (here[z] < 0.02) == (frozenset((pair.body_a, pair.body_b)) in allowed)
@@ -152,7 +161,9 @@ def test_allowed_contacts_hold_only_while_the_tcp_is_in_the_zone(
     cell = demo_scene.cell
     infeed = cell.machine("infeed")
     low = replace(infeed.zone_in_equipment, size=np.array([0.8, 1.2, 0.2]))
-    machines = tuple(replace(m, zone_in_equipment=low) if m.name == "infeed" else m for m in cell.equipment)
+    machines = tuple(
+        replace(m, zone_in_equipment=low) if m.name == "infeed" else m for m in cell.equipment
+    )
     shrunk = replace(demo_scene, cell=replace(cell, equipment=machines))
     violation = verify(entry, shrunk, 0.02, "infeed_pick").violation
     assert violation is not None
@@ -165,7 +176,8 @@ def test_a_cut_trajectory_is_the_same_motion(demo_scene: PlanningScene, budget: 
     trajectory = straight_steps(
         path, Context.of(demo_scene, PlanOptions(safety_distance=0.0), budget)
     ).trajectory
-    begin, end = 0.21 * trajectory.duration, 0.77 * trajectory.duration
+    begin = 0.21 * trajectory.duration
+    end = 0.77 * trajectory.duration
     coefficients, durations = polynomials_between(trajectory, begin, end)
     assert durations.sum() == pytest.approx(end - begin)
     at = begin

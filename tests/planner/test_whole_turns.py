@@ -77,9 +77,13 @@ def test_from_a_start_near_a_limit_the_axis_turns_back_or_the_tool_does(planner:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_a_chain_is_turned_into_the_limits_wherever_some_turns_are(planner: Planner, seed: int) -> None:
-    scene, rng = planner.scene(), np.random.default_rng(seed)
-    robot, turning = scene.cell.robot, scene.turning
+def test_a_chain_is_turned_into_the_limits_wherever_some_turns_are(
+    planner: Planner, seed: int
+) -> None:
+    scene = planner.scene()
+    rng = np.random.default_rng(seed)
+    robot = scene.cell.robot
+    turning = scene.turning
     steps = rng.uniform(-0.3, 0.3, (40, 6)) + 0.02 * seed * np.eye(6)[seed % 6]
     whole = np.cumsum(steps, axis=0) + rng.uniform(-3.0, 3.0, 6)
     whole[:, ~turning] = np.clip(whole[:, ~turning], robot.position_min[2], robot.position_max[2])
@@ -93,7 +97,8 @@ def test_a_chain_is_turned_into_the_limits_wherever_some_turns_are(planner: Plan
     if found is not None:
         np.testing.assert_allclose(np.diff(found, axis=0), np.diff(whole, axis=0), atol=1e-9)
         least = [
-            min(np.abs(c + TURN * k).max() for k in ks) for c, ks in zip(whole.T[turning], fits, strict=True)
+            min(np.abs(c + TURN * k).max() for k in ks)
+            for c, ks in zip(whole.T[turning], fits, strict=True)
         ]
         np.testing.assert_allclose(np.abs(found[:, turning]).max(axis=0), least, atol=1e-9)
     as_begun = turned_into_limits(whole, turning, scene, fixed=True)
@@ -102,12 +107,16 @@ def test_a_chain_is_turned_into_the_limits_wherever_some_turns_are(planner: Plan
 
 
 def test_all_turns_of_the_layers_are_those_of_inverse_kinematics(planner: Planner) -> None:
-    scene, rng = planner.scene(), np.random.default_rng(1)
+    scene = planner.scene()
+    rng = np.random.default_rng(1)
     robot = scene.cell.robot
     poses = scene.chain.tcp_poses(rng.uniform(robot.position_min, robot.position_max, (4, 6)))
-    once, every = scene.inverse_kinematics_once.solve(poses), scene.inverse_kinematics.solve(poses)
+    once = scene.inverse_kinematics_once.solve(poses)
+    every = scene.inverse_kinematics.solve(poses)
     free = rng.random(len(once.q)) < 0.5
-    layers = Layers(np.arange(4.0), once.q, once.pose_index, np.zeros(len(once.q)), free, scene.turning)
+    layers = Layers(
+        np.arange(4.0), once.q, once.pose_index, np.zeros(len(once.q)), free, scene.turning
+    )
     found = with_all_turns(layers, scene, fixed=False)
     assert len(found.q) == len(every.q) > 16 * len(once.q)
     rows = np.lexsort((*np.round(found.q, 6).T, found.layer))
@@ -123,5 +132,7 @@ def test_turns_of_many_angles_are_those_of_each() -> None:
     angles = np.concatenate([rng.uniform(-20.0, 20.0, 200), TURN * np.arange(-3, 4), [1.0 + 5e-11]])
     for low, high in ((-TURN, TURN), (-np.pi, np.pi), (-6.1, 6.1), (1.0, 1.0), (0.5, 9.0)):
         which, values = turns_of_all(angles, low, high)
-        wanted = [(k, value) for k, angle in enumerate(angles) for value in turns(float(angle), low, high)]
+        wanted = [
+            (k, value) for k, angle in enumerate(angles) for value in turns(float(angle), low, high)
+        ]
         assert list(zip(which.tolist(), values.tolist(), strict=True)) == wanted

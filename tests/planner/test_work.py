@@ -47,7 +47,9 @@ def test_work_for_one_thread_is_done_by_the_thread_that_asks(demo_scene: Plannin
 
 
 def test_sbl_exceeds_its_work_nowhere(scene_of: SceneOf) -> None:
-    """Samples are charged by the forty, so it depends on the count whether the last ones still fit."""
+    """Samples are charged by the forty, so it depends on the count whether the last ones still
+    fit.
+    """
     scene = scene_of("table_columns")
     task = scene.cell.task("tL->tR")
     ends = Ends(np.array(task.start), np.array([task.goal]))

@@ -1,4 +1,6 @@
-"""A small cell, and recordings of it made in milliseconds: real messages, synthetic motion and power."""
+"""A small cell, and recordings of it made in milliseconds: real messages, synthetic motion and
+power.
+"""
 
 from __future__ import annotations
 
@@ -91,7 +93,11 @@ program:
 START_NS = 1_700_000_000_000_000_000
 JOINT_DT_NS = 2_000_000
 POWER_DT_NS = 10_000_000
-EXACT = ("sensor_msgs/msg/JointState", "ir_msgs/msg/PowerState", "diagnostic_msgs/msg/DiagnosticArray")
+EXACT = (
+    "sensor_msgs/msg/JointState",
+    "ir_msgs/msg/PowerState",
+    "diagnostic_msgs/msg/DiagnosticArray",
+)
 JOINT_NAMES = [f"joint_a{i}" for i in range(1, 7)]
 TABLE_2_MODES = {
     Mode.STAND_ON_MOTORS: "stand_on_motors",
@@ -107,8 +113,8 @@ def stamp(ns: int) -> Time:
 
 
 def _encoder(kind: str) -> Callable[[Any], bytes]:
-    """rclpy's serialize_message is quick but leaves stray bytes behind short sequences; the middleware
-    doesn't.
+    """rclpy's serialize_message is quick but leaves stray bytes behind short sequences; the
+    middleware doesn't.
     """
     if kind in (
         "sensor_msgs/msg/JointState",
@@ -121,7 +127,9 @@ def _encoder(kind: str) -> Callable[[Any], bytes]:
 
 @dataclass(eq=False)
 class Phase:
-    """A stretch of the run: the joints go (or rest) from `start` to `end` in `seconds`, in one mode."""
+    """A stretch of the run: the joints go (or rest) from `start` to `end` in `seconds`, in one
+    mode.
+    """
 
     seconds: float
     mode: Mode
@@ -140,27 +148,39 @@ class Run:
     phases: list[Phase] = field(default_factory=list)
     savings: list[ProgramSavings] = field(default_factory=list)
 
-    def rest(self, seconds: float, mode: Mode, q: np.ndarray, load: str, target: Mode | None = None) -> None:
+    def rest(
+        self, seconds: float, mode: Mode, q: np.ndarray, load: str, target: Mode | None = None
+    ) -> None:
         self.phases.append(Phase(seconds, mode, q, q, load, target))
 
-    def pause(self, seconds: float, mode: Mode, q: np.ndarray, load: str, station: str, name: str) -> None:
-        step = PlannedMovement(kind="pause", to_station=station, duration=seconds, power_mode=name, load=load)
+    def pause(
+        self, seconds: float, mode: Mode, q: np.ndarray, load: str, station: str, name: str
+    ) -> None:
+        step = PlannedMovement(
+            kind="pause", to_station=station, duration=seconds, power_mode=name, load=load
+        )
         self.phases.append(Phase(seconds, mode, q, q, load, None, step))
 
     def move(
         self, seconds: float, start: np.ndarray, end: np.ndarray, load: str, step: PlannedMovement
     ) -> None:
-        step.duration, step.load = seconds, load
+        step.duration = seconds
+        step.load = load
         step.trajectory_id = f"{len(self.phases):016x}"
-        self.phases.append(Phase(seconds, Mode.MOVING, start, end, load, None, step, step.trajectory_id))
+        self.phases.append(
+            Phase(seconds, Mode.MOVING, start, end, load, None, step, step.trajectory_id)
+        )
 
-    def record(self, path: Path, *, plan_factor: float = 1.0, facts: dict[str, str] | None = None) -> Path:
+    def record(
+        self, path: Path, *, plan_factor: float = 1.0, facts: dict[str, str] | None = None
+    ) -> Path:
         return _Recorder(self, path, plan_factor, facts or {}).record()
 
 
 class _Recorder:
     def __init__(self, run: Run, path: Path, plan_factor: float, facts: dict[str, str]) -> None:
-        self.run, self.factor = run, plan_factor
+        self.run = run
+        self.factor = plan_factor
         self.cell = cell_from_yaml(CELL_YAML)
         self.power = load_power_data()
         self.session = RecordingSession(RecordingWriter(path), facts, START_NS)
@@ -170,7 +190,11 @@ class _Recorder:
             ("/joint_states", "sensor_msgs/msg/JointState", QosOffer(depth=100)),
             ("/ir_sim_driver/power_state", "ir_msgs/msg/PowerState", QosOffer()),
             ("/ir_sim_driver/controller_state", "ir_msgs/msg/ControllerState", QosOffer()),
-            ("/ir_sim_driver/plc_outputs", "ir_msgs/msg/PlcOutputs", QosOffer(transient_local=True)),
+            (
+                "/ir_sim_driver/plc_outputs",
+                "ir_msgs/msg/PlcOutputs",
+                QosOffer(transient_local=True),
+            ),
             (
                 "/ir_program_runner/program_state",
                 "ir_msgs/msg/ProgramState",
@@ -201,7 +225,9 @@ class _Recorder:
 
     def _diagnostics(self, load: str) -> None:
         status = DiagnosticStatus(
-            name="ir_sim_driver", hardware_id="KR210, simulated", values=[KeyValue(key="load", value=load)]
+            name="ir_sim_driver",
+            hardware_id="KR210, simulated",
+            values=[KeyValue(key="load", value=load)],
         )
         message = DiagnosticArray(status=[status])
         message.header.stamp = stamp(self.now)
@@ -225,7 +251,9 @@ class _Recorder:
         q = phase.start + delta * (10 * x**3 - 15 * x**4 + 6 * x**5)[:, None]
         qd = delta * ((30 * x**2 - 60 * x**3 + 30 * x**4) / phase.seconds)[:, None]
         qdd = delta * ((60 * x - 180 * x**2 + 120 * x**3) / phase.seconds**2)[:, None]
-        loads = self.cell.loads("part" if "part" in phase.load else "") if phase.load != "none" else ()
+        loads = (
+            self.cell.loads("part" if "part" in phase.load else "") if phase.load != "none" else ()
+        )
         model = DynamicsModel(self.cell.robot, loads)
         on = TABLE_2_MODES.get(phase.mode, "stand_on_motors") == "stand_on_motors"
         tau = model.inverse_dynamics(q, qd, qdd) if on else np.zeros_like(q)
@@ -251,9 +279,12 @@ class _Recorder:
                 state = ControllerState(joint_names=JOINT_NAMES, trajectory_id=phase.trajectory_id)
                 state.header.stamp = stamp(ns)
                 state.path_time = float(t[k]) if phase.trajectory_id else 0.0
-                state.speed_scaling, state.tool_deviation = 1.0, 0.0004
+                state.speed_scaling = 1.0
+                state.tool_deviation = 0.0004
                 self._put("/ir_sim_driver/controller_state", state, ns)
-        outputs = PlcOutputs(bbs=on, drives_ready=on, alarm_stop=True, moving=phase.mode is Mode.MOVING)
+        outputs = PlcOutputs(
+            bbs=on, drives_ready=on, alarm_stop=True, moving=phase.mode is Mode.MOVING
+        )
         outputs.header.stamp = stamp(self.now)
         self._put("/ir_sim_driver/plc_outputs", outputs, self.now)
         self.now += count * JOINT_DT_NS
@@ -268,21 +299,31 @@ class _Recorder:
         self.energy += power * POWER_DT_NS * 1e-9
         message = PowerState(mode=int(phase.mode), target_mode=int(phase.target or phase.mode))
         message.header.stamp = stamp(ns)
-        message.power, message.energy, message.base_power = power, self.energy, base
+        message.power = power
+        message.energy = self.energy
+        message.base_power = base
         link = self.power.dc_link
-        message.bus_voltage = float(np.sqrt(link.voltage**2 + 2.0 * bus.stored[k] / link.capacitance))
+        message.bus_voltage = float(
+            np.sqrt(link.voltage**2 + 2.0 * bus.stored[k] / link.capacitance)
+        )
         message.burnt_power = float(bus.dissipated[part].mean())
-        message.joint_power, message.joint_torque = axis[part].mean(axis=0), tau[k]
-        message.joint_current = tau[k] / 10.0  # rosbags misreads two empty sequences of doubles in a row
+        message.joint_power = axis[part].mean(axis=0)
+        message.joint_torque = tau[k]
+        message.joint_current = (
+            tau[k] / 10.0
+        )  # rosbags misreads two empty sequences of doubles in a row
         self._put("/ir_sim_driver/power_state", message, ns)
 
     def _plan(self, phase: Phase, mains: Any, axis: Any, bus: Any, base: float) -> None:
-        report, dt = phase.step.report, JOINT_DT_NS * 1e-9
+        report = phase.step.report
+        dt = JOINT_DT_NS * 1e-9
         report.duration = phase.seconds
         report.energy = float(mains.sum() * dt) * self.factor
         report.joint_energy = axis.sum(axis=0) * dt
-        report.base_energy, report.burnt_energy = base * phase.seconds, float(bus.dissipated.sum() * dt)
-        report.peak_power, report.min_clearance = float(mains.max()), 0.1
+        report.base_energy = base * phase.seconds
+        report.burnt_energy = float(bus.dissipated.sum() * dt)
+        report.peak_power = float(mains.max())
+        report.min_clearance = 0.1
 
     def _event(self, phase: Phase, index: int, total: int, event: str) -> None:
         message = ProgramState(program_id="program", index=index, total=total, event=event)
@@ -321,7 +362,9 @@ def demo_run(rest: float = 0.4, move: float = 1.5) -> Run:
         run.rest(rest, Mode.HIBERNATION, HOME, load)
         run.rest(rest / 2, Mode.FROM_HIBERNATION, HOME, load, Mode.STAND_ON_MOTORS)
     fetch = PlannedMovement(kind="regional", from_station="home", to_station="table", attach="part")
-    bring = PlannedMovement(kind="service_entry", from_station="table", to_station="press", detach="part")
+    bring = PlannedMovement(
+        kind="service_entry", from_station="table", to_station="press", detach="part"
+    )
     leave = PlannedMovement(kind="service_exit", from_station="press", to_station="home")
     run.move(move, HOME, TABLE, "gripper", fetch)
     run.move(move, TABLE, PRESS, "gripper+part", bring)

@@ -29,19 +29,28 @@ def test_steps_know_when_they_moved_and_what_they_took(analysis: Analysis) -> No
     for result in analysis.movements:
         assert result.seconds == pytest.approx(1.5, abs=1e-6)
         assert result.energy == pytest.approx(result.step.movement.report.energy, rel=1e-6)
-        np.testing.assert_allclose(result.joint_energy, result.step.movement.report.joint_energy, atol=0.5)
+        np.testing.assert_allclose(
+            result.joint_energy, result.step.movement.report.joint_energy, atol=0.5
+        )
 
 
 def test_energy_is_base_axes_brake_resistor_and_capacitor(analysis: Analysis) -> None:
     capacity = 106.0  # J, data of the drive
     for result in analysis.movements:
-        rest = result.energy - result.base_energy - result.joint_energy.sum() - result.dissipated_energy
+        rest = (
+            result.energy
+            - result.base_energy
+            - result.joint_energy.sum()
+            - result.dissipated_energy
+        )
         assert abs(rest) <= capacity + 1.0
 
 
 def test_motion_and_torque_give_the_same_energy_as_the_meter(analysis: Analysis) -> None:
     for result in analysis.movements:
-        assert result.indirect_energy == pytest.approx(result.energy, abs=116.0)  # the capacitor holds 106 J
+        assert result.indirect_energy == pytest.approx(
+            result.energy, abs=116.0
+        )  # the capacitor holds 106 J
 
 
 def test_both_measurements_agree_where_the_robot_is_as_its_data_say(analysis: Analysis) -> None:
@@ -52,7 +61,9 @@ def test_both_measurements_agree_where_the_robot_is_as_its_data_say(analysis: An
     assert "over 3 movements the indirect measurement is" in both.sentence
     for row in both.movements:
         assert row.from_torques == pytest.approx(row.direct, abs=116.0)
-        assert np.isnan(row.second_opinion) or row.second_opinion == pytest.approx(row.indirect, rel=1e-6)
+        assert np.isnan(row.second_opinion) or row.second_opinion == pytest.approx(
+            row.indirect, rel=1e-6
+        )
 
 
 def test_the_difference_has_the_interval_that_means_of_studies_have(analysis: Analysis) -> None:
@@ -69,7 +80,9 @@ def test_the_difference_has_the_interval_that_means_of_studies_have(analysis: An
 def test_movements_that_differ_alike_have_no_interval(analysis: Analysis) -> None:
     both = agreement(with_differences(analysis, (0.02, 0.02, 0.02)))
     assert np.isnan(both.difference.low)
-    assert both.sentence == "the indirect measurement of each of 3 movements is +2.0 % off the meter"
+    assert (
+        both.sentence == "the indirect measurement of each of 3 movements is +2.0 % off the meter"
+    )
 
 
 def with_differences(analysis: Analysis, shares: Sequence[float]) -> Analysis:
@@ -78,7 +91,9 @@ def with_differences(analysis: Analysis, shares: Sequence[float]) -> Analysis:
         id(result): replace(result, indirect_energy=result.energy * (1.0 + share))
         for result, share in zip(analysis.movements, shares, strict=True)
     }
-    return replace(analysis, steps=tuple(moved.get(id(result), result) for result in analysis.steps))
+    return replace(
+        analysis, steps=tuple(moved.get(id(result), result) for result in analysis.steps)
+    )
 
 
 def test_a_recording_without_power_or_cell_gives_what_is_left(demo_file: Path) -> None:
@@ -99,7 +114,8 @@ def test_a_movement_that_no_state_shows_lasts_as_planned_however_late_its_events
 ) -> None:
     """And a longer one, of which no state is recorded, as its events say."""
     recording = analysis.recording
-    started, ended = recording.events[0], recording.events[1]
+    started = recording.events[0]
+    ended = recording.events[1]
     for planned, lasts in ((0.004, 0.004), (1.0, 2.0)):
         report = replace(started.movement.report, duration=planned)
         movement = replace(started.movement, trajectory_id="unseen", report=report)
@@ -118,7 +134,8 @@ def test_a_movement_that_no_state_shows_ends_when_the_next_one_begins(
     """However late its events are: the power of the next one is none of its own."""
     recording = analysis.recording
     (first, *_) = executed_steps(recording)
-    started, ended = recording.events[0], recording.events[1]
+    started = recording.events[0]
+    ended = recording.events[1]
     report = replace(started.movement.report, duration=0.004)
     movement = replace(started.movement, trajectory_id="unseen", report=report)
     own = [

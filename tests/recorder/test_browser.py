@@ -1,4 +1,5 @@
-"""The page in a real browser: every control operated, at a desk, on a tablet, on a phone and on paper.
+"""The page in a real browser: every control operated, at a desk, on a tablet, on a phone and on
+paper.
 
 Needs Chromium. Without it these tests say `not checked: browser`; where CI=true it has to be there.
 """
@@ -30,7 +31,9 @@ from ir_recorder.report.compare import comparison_html
 T = TypeVar("T")
 TOOL = Path(__file__).resolve().parents[2] / "tools" / "_chromium.py"
 CONTROLS = Path(__file__).with_name("page_controls.js").read_text().strip().split("\n\n")
-DESK, TABLET, PHONE = (1400, 600), (768, 1024), (390, 844)
+DESK = (1400, 600)
+TABLET = (768, 1024)
+PHONE = (390, 844)
 WAIT_SECONDS = 60.0  # a busy machine
 EVIL = "</script><img src=x onerror=document.title='EVIL'><b>&quot;</b>"
 
@@ -100,7 +103,9 @@ def test_every_control_of_the_page_works(browser: Any, file: Path, tmp_path: Pat
     saved = wait_for(lambda: sorted(tmp_path.glob("what_a_cycle_costs.csv")), page)
     assert "full" in saved[0].read_text() or "this run" in saved[0].read_text()
     assert saved[0].read_text().count("\n") == 5
-    charts = page.run("document.querySelectorAll('main canvas, main .figure svg, main .joules').length")
+    charts = page.run(
+        "document.querySelectorAll('main canvas, main .figure svg, main .joules').length"
+    )
     assert page.run("document.querySelectorAll('button.export').length") == tables + charts
     assert tables >= 10
     clean(page)
@@ -153,7 +158,7 @@ def test_nothing_is_cut_off_and_fingers_find_the_controls(
     assert page.run(wider) == []
     if size == PHONE:
         small = """[...document.querySelectorAll('button:not(.go), select')].filter((b) => b.offsetParent)
-            .map((b) => b.getBoundingClientRect()).filter((b) => b.height < 43 || b.width < 43).length"""
+            .map((b) => b.getBoundingClientRect()).filter((b) => b.height < 43 || b.width < 43).length"""  # noqa: E501
         assert page.run(small) == 0
         over = """(() => { const stage = document.querySelector('.stage').getBoundingClientRect();
             return [...document.querySelectorAll('#motion button, #motion input')]
@@ -186,7 +191,10 @@ def test_recordings_side_by_side_and_a_page_for_management(
     page.call("Emulation.setEmulatedMedia", media="print")
     last = "(() => document.getElementById('levers').getBoundingClientRect().bottom + scrollY)()"
     assert page.run(last) <= 1045  # px of A4 between its margins
-    shown = "[...document.querySelectorAll('button.export, .toggles, #theme')].some((e) => e.offsetParent)"
+    shown = (
+        "[...document.querySelectorAll('button.export, .toggles, #theme')].some((e) => "
+        "e.offsetParent)"
+    )
     assert page.run(shown) is False
     clean(page)
     page.close()
@@ -196,7 +204,9 @@ def replace_path(analysis: Analysis, name: str) -> Analysis:
     return replace(analysis, recording=replace(analysis.recording, path=Path(name)))
 
 
-def test_what_a_cell_is_called_is_never_executed(browser: Any, demo_file: Path, tmp_path: Path) -> None:
+def test_what_a_cell_is_called_is_never_executed(
+    browser: Any, demo_file: Path, tmp_path: Path
+) -> None:
     if browser is None:
         return
     recording = read_recording(demo_file)
@@ -231,11 +241,15 @@ def test_what_a_cell_is_called_is_never_executed(browser: Any, demo_file: Path, 
     page.close()
 
 
-def test_a_page_of_an_empty_recording_has_no_error(browser: Any, demo_file: Path, tmp_path: Path) -> None:
+def test_a_page_of_an_empty_recording_has_no_error(
+    browser: Any, demo_file: Path, tmp_path: Path
+) -> None:
     if browser is None:
         return
     recording = read_recording(demo_file)
-    bare = replace(recording, power=None, joints=None, controller=None, events=(), loads=(), cell_yaml="")
+    bare = replace(
+        recording, power=None, joints=None, controller=None, events=(), loads=(), cell_yaml=""
+    )
     path = tmp_path / "empty.html"
     path.write_text(report_html(analyse(bare), ()))
     page = browser.open(path, *TABLET)
@@ -247,7 +261,9 @@ def test_a_page_of_an_empty_recording_has_no_error(browser: Any, demo_file: Path
 @pytest.fixture
 def live() -> Iterator[tuple[LiveServer, Stream, list[tuple[str, bool]]]]:
     """A live view of a cell whose words are made here; the presses of its buttons."""
-    stream, pressed, view = Stream(), list[tuple[str, bool]](), CellView()
+    stream = Stream()
+    pressed = list[tuple[str, bool]]()
+    view = CellView()
     robot = load_cell("demo").robot
 
     def press(name: str, value: bool) -> Answer:
@@ -263,13 +279,27 @@ def live() -> Iterator[tuple[LiveServer, Stream, list[tuple[str, bool]]]]:
         step = {"label": EVIL, "kind": EVIL, "event": "started", "at": [1, 27], "note": EVIL}
         machine = {"name": EVIL, "state": EVIL, "next": EVIL}
         values = {"w": [700.0 + k, 800.0 + k], "energy": 10.0 * k, "mode": "MOVING", "target": EVIL}
-        texts = {"plant": EVIL, "load": "gripper", "contact": {"number": 1, "words": EVIL}, "step": step}
-        lists = {"machines": [machine], "in": levels, "out": {"bbs": True}, "q": [float(x) for x in q]}
+        texts = {
+            "plant": EVIL,
+            "load": "gripper",
+            "contact": {"number": 1, "words": EVIL},
+            "step": step,
+        }
+        lists = {
+            "machines": [machine],
+            "in": levels,
+            "out": {"bbs": True},
+            "q": [float(x) for x in q],
+        }
         heard = {"driver": True, "planner": True, "runner": False}
-        stream.add({**looked, **values, **texts, **lists, "heard": heard, "bound": 0.02}, always=("w",))
+        stream.add(
+            {**looked, **values, **texts, **lists, "heard": heard, "bound": 0.02}, always=("w",)
+        )
     ended = threading.Event()
 
-    def go_on() -> None:  # as a node does: a page takes 3 s of silence for a connection that was lost
+    def go_on() -> (
+        None
+    ):  # as a node does: a page takes 3 s of silence for a connection that was lost
         while not ended.wait(0.2):
             stream.add({})
 
@@ -307,7 +337,9 @@ def test_the_live_view_shows_what_comes_and_asks_for_bits(
     for script in LIVE_CONTROLS:
         page.wait(script)
     page.run("document.querySelector('[data-bit=ab]').click()")
-    page.run("document.getElementById('hold').click()")  # two requests: each is answered when it likes
+    page.run(
+        "document.getElementById('hold').click()"
+    )  # two requests: each is answered when it likes
     wait_for(lambda: len(pressed) == 2, page)
     assert sorted(pressed) == [("ab", True), ("move_enable", False)]
     page.wait("document.getElementById('answer').textContent.includes('refused, <')")
@@ -327,7 +359,12 @@ def test_the_live_view_shows_what_comes_and_asks_for_bits(
     assert page.run("location.hash") == ""  # the token stands in no picture of the window
     own = f"http://127.0.0.1:{server.port}/"
     assert page.faults == []
-    assert {address.removeprefix(own) for address in page.requests} <= {"", "events", "scene", "press"}
+    assert {address.removeprefix(own) for address in page.requests} <= {
+        "",
+        "events",
+        "scene",
+        "press",
+    }
     server.close()
     page.wait("document.getElementById('link').textContent === 'connection lost'")
     page.close()
@@ -340,11 +377,15 @@ def test_the_live_view_on_a_phone_only_watches_without_the_token(
         return
     server, _, pressed = live
     page = browser.open(server.address.partition("#")[0], *PHONE, dark=True, touch=True)
-    page.wait("document.getElementById('no-motion').hidden && document.querySelector('[data-bit=ab]')")
+    page.wait(
+        "document.getElementById('no-motion').hidden && document.querySelector('[data-bit=ab]')"
+    )
     assert page.run("document.documentElement.scrollWidth") == PHONE[0]
     assert page.run("document.getElementById('view-only').hidden") is False
     page.wait("document.getElementById('link').textContent === 'live'")
-    page.wait("[...document.querySelectorAll('#plc button')].filter((b) => !b.disabled).length === 1")  # CSV
+    page.wait(
+        "[...document.querySelectorAll('#plc button')].filter((b) => !b.disabled).length === 1"
+    )  # CSV
     page.run("document.getElementById('hold').click()")
     assert pressed == []
     assert page.faults == []

@@ -26,7 +26,9 @@ def test_columns_agree_with_the_decoder_message_by_message(demo_file: Path) -> N
     decoded = [decode(data) for data in channel.messages]
     assert columns.texts("trajectory_id") == [message.trajectory_id for message in decoded]
     assert columns.numbers("path_time").tolist() == [message.path_time for message in decoded]
-    assert columns.stamps().tolist() == [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in decoded]
+    assert columns.stamps().tolist() == [
+        m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in decoded
+    ]
 
 
 def test_messages_of_different_lengths_are_one_column() -> None:

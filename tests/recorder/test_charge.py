@@ -58,7 +58,8 @@ def test_what_several_pauses_are_late_adds_up_until_the_next_movement() -> None:
 
 def test_a_program_begins_when_it_is_asked_to() -> None:
     """Whatever was left from the one before is not counted on."""
-    first, again = steps((0.0, 1.0, None)), steps((2.0, 3.0, None))
+    first = steps((0.0, 1.0, None))
+    again = steps((2.0, 3.0, None))
     assert lost_charges([*first, *again], Leaking(), LINK) == [0.0, 0.0]
 
 

@@ -20,7 +20,9 @@ from ir_recorder.read.reader import read_recording
 MIB = 2**20
 
 
-def bomb(path: Path, chunks: int, size: int, compression: CompressionType = CompressionType.ZSTD) -> Path:
+def bomb(
+    path: Path, chunks: int, size: int, compression: CompressionType = CompressionType.ZSTD
+) -> Path:
     """A file of chunks that hold one message of zeros each, `size` bytes uncompressed."""
     with path.open("wb") as stream:
         writer = Writer(stream, chunk_size=size, compression=compression)
@@ -34,7 +36,9 @@ def bomb(path: Path, chunks: int, size: int, compression: CompressionType = Comp
 
 
 @pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4])
-def test_a_chunk_beyond_its_bound_costs_only_itself(tmp_path: Path, compression: CompressionType) -> None:
+def test_a_chunk_beyond_its_bound_costs_only_itself(
+    tmp_path: Path, compression: CompressionType
+) -> None:
     path = bomb(tmp_path / "a.mcap", 1, 80 * MIB, compression)
     assert path.stat().st_size < MIB
     tracemalloc.start()
@@ -47,7 +51,9 @@ def test_a_chunk_beyond_its_bound_costs_only_itself(tmp_path: Path, compression:
 def test_many_chunks_end_at_the_bound_of_the_whole(tmp_path: Path) -> None:
     path = bomb(tmp_path / "a.mcap", 10, MIB)
     raw = read_raw(path, limits=ReadLimits(total=4 * MIB))
-    assert any("more than 4 MiB uncompressed: the rest is left out" in problem for problem in raw.problems)
+    assert any(
+        "more than 4 MiB uncompressed: the rest is left out" in problem for problem in raw.problems
+    )
     channel = raw.channel("/text")
     assert channel is not None
     assert len(channel.messages) == 3
@@ -120,7 +126,9 @@ def nested(depth: int) -> str:
         ("int8[0] x\n", "no elements"),
     ],
 )
-def test_a_definition_without_an_end_is_a_sentence(schema: str, sentence: str, tmp_path: Path) -> None:
+def test_a_definition_without_an_end_is_a_sentence(
+    schema: str, sentence: str, tmp_path: Path
+) -> None:
     with pytest.raises(ReadError, match=sentence):
         definitions_of("p/msg/T", schema)
     for topic in ("/joint_states", "/ir_program_runner/program_state"):
@@ -132,7 +140,9 @@ def test_a_definition_without_an_end_is_a_sentence(schema: str, sentence: str, t
             channel = writer.register_channel(topic, "cdr", number)
             writer.add_message(channel, 1, b"\0\1\0\0" + bytes(64), 1)
             writer.finish()
-        assert any(topic in problem and sentence in problem for problem in read_recording(path).problems)
+        assert any(
+            topic in problem and sentence in problem for problem in read_recording(path).problems
+        )
 
 
 def test_a_chunk_of_very_many_records_is_not_opened() -> None:

@@ -11,7 +11,8 @@ from ir_recorder.analysis.clearance import collision_model
 
 def test_clearance_is_that_of_the_recorded_joint_states(analysis: Analysis) -> None:
     result = analysis.movements[1]
-    near, joints = result.clearance, analysis.recording.joints
+    near = result.clearance
+    joints = analysis.recording.joints
     model = collision_model(analysis.cell, "gripper+part", analysis.cell.parts_at_start())
     inside = (joints.time >= result.step.start) & (joints.time <= result.step.end)
     distances = model.distances(joints.position[inside])

@@ -33,7 +33,9 @@ def other(analysis: Analysis) -> Analysis:
     """The same run on a meter that reads a tenth more."""
     power = analysis.recording.power
     assert power is not None
-    more = replace(power, power=power.power * 1.1, energy=power.energy * 1.1, plant="typical, seed 1")
+    more = replace(
+        power, power=power.power * 1.1, energy=power.energy * 1.1, plant="typical, seed 1"
+    )
     return analyse(replace(analysis.recording, power=more, path=Path("other.mcap")))
 
 
@@ -89,7 +91,9 @@ def test_a_spreadsheet_takes_no_text_for_a_formula(analysis: Analysis, tmp_path:
     assert "'=1+1.mcap" in text
 
 
-def test_a_table_of_another_kind_is_a_sentence(demo_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_table_of_another_kind_is_a_sentence(
+    demo_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     folder = demo_file.parent
     out = ["-o", str(folder / "table_page.html"), "--root", str(folder)]
     assert main([str(demo_file), *out, "--table", str(folder / "steps.xlsx")]) == 1
@@ -144,7 +148,9 @@ def test_names_of_points_that_nearly_coincide_stand_below_each_other() -> None:
     assert len(names) == 11
     assert all(b - a >= 13.9 for a, b in pairwise(names))
     lowest = max(float(y) for y in re.findall(r'd="M84 ([-\d.]+)H', drawn))
-    assert names[-1] < max(lowest, 256.0) + 0.1  # not below the drawing, nor in the numbers of its axis
+    assert (
+        names[-1] < max(lowest, 256.0) + 0.1
+    )  # not below the drawing, nor in the numbers of its axis
     ticks = re.findall(r'text-anchor="end">([^<]+)<', drawn)
     assert len(set(ticks)) == len(ticks) > 2  # no two read alike
 
@@ -159,7 +165,9 @@ def test_fifty_series_look_different_and_the_charts_draw_the_same_marks() -> Non
 
 
 def test_plans_that_were_not_driven_are_compared_by_what_was_predicted(analysis: Analysis) -> None:
-    bare = replace(analysis.recording, power=None, joints=None, controller=None, events=(), hardware="")
+    bare = replace(
+        analysis.recording, power=None, joints=None, controller=None, events=(), hardware=""
+    )
     plan = analyse(replace(bare, path=Path("plan.mcap")))
     page = page_of(plan, plan)
     assert page.count("predicted, not driven") == 2

@@ -80,7 +80,9 @@ def test_assumptions_are_marked_and_given_figures_are_not(analysis: Analysis) ->
 
 def test_the_cycle_is_the_one_with_full_pauses(analysis: Analysis) -> None:
     run = cycle_of(analysis)
-    full = cycle_of(analyse(replace(analysis.recording, facts=(("unshortened_pauses", "600 s, 1800 s"),))))
+    full = cycle_of(
+        analyse(replace(analysis.recording, facts=(("unshortened_pauses", "600 s, 1800 s"),)))
+    )
     assert run is not None
     assert full is not None
     assert full.seconds > 2400.0

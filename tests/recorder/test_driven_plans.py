@@ -27,9 +27,11 @@ from ir_recorder.read.front import ACTION
 from ir_recorder.write.session import RecordingSession
 from ir_recorder.write.writer import RecordingWriter
 
-CALLS, STATES = "/ir_planner/calls", "/ir_program_runner/program_state"
+CALLS = "/ir_planner/calls"
+STATES = "/ir_program_runner/program_state"
 SAVINGS = "/ir_planner/savings"
-STATE, SAVED = "ir_msgs/msg/ProgramState", "ir_msgs/msg/ProgramSavings"
+STATE = "ir_msgs/msg/ProgramState"
+SAVED = "ir_msgs/msg/ProgramSavings"
 ROWS = np.array([[1.0, 0.0, 1.0], [1.0, 1.0, 1.0]])
 
 
@@ -46,8 +48,12 @@ class Planned:
         answer = Plan.Result(program_id=self.program)
         answer.status.message = "a text that names point-of-a and t1"
         answer.savings.program_id = f"saved by {self.program}"
-        answer.movements = [PlannedMovement(kind="regional", trajectory_id=each) for each in self.moves]
-        answer.front = [ProgramPoint(cycle_time=9.0, energy=9.0, program_id=each) for each in self.front]
+        answer.movements = [
+            PlannedMovement(kind="regional", trajectory_id=each) for each in self.moves
+        ]
+        answer.front = [
+            ProgramPoint(cycle_time=9.0, energy=9.0, program_id=each) for each in self.front
+        ]
         driven = CorrectionLog(
             *("a", self.program, 1, ((1.0,),), (1.0, 1.0)), *(ROWS, (), ROWS), met="", driven=ROWS
         )
@@ -74,7 +80,9 @@ def record(path: Path, plans: list[Planned], driven: list[tuple[str, str]]) -> P
         session.message(SAVINGS, saved(savings), k + 1)
     for k, (program, trajectory) in enumerate(driven):
         step = PlannedMovement(kind="regional", trajectory_id=trajectory)
-        state = ProgramState(program_id=program, index=k, total=len(driven), event="started", movement=step)
+        state = ProgramState(
+            program_id=program, index=k, total=len(driven), event="started", movement=step
+        )
         session.message(STATES, encode(state), len(plans) + k + 1)
     return session.finish().path
 
@@ -91,7 +99,10 @@ PLANS = [
     [
         ([], ["program-c"]),  # the last that was planned
         ([("program-a", "t1"), ("program-a", "t2")], ["program-a"]),
-        ([("program-b", "t2"), ("program-a", "t1"), ("program-b", "t2")], ["program-b", "program-a"]),
+        (
+            [("program-b", "t2"), ("program-a", "t1"), ("program-b", "t2")],
+            ["program-b", "program-a"],
+        ),
         ([("elsewhere", "t9")], []),  # planned before the recording
         ([("", "t2"), ("", "t3")], ["program-b"]),  # steps that a client handed over
         ([("", "")], []),  # a pause that a client handed over
@@ -111,7 +122,10 @@ def test_searches_are_those_of_the_programs_that_were_driven(
     [
         ([], ["program-c"]),
         ([("program-a", "t1")], ["program-a"]),
-        ([("saved by program-b", "t3")], ["program-b"]),  # what was planned in the common program's time
+        (
+            [("saved by program-b", "t3")],
+            ["program-b"],
+        ),  # what was planned in the common program's time
         ([("elsewhere", "t9")], ["program-a", "program-b", "program-c"]),  # nobody knows
     ],
 )

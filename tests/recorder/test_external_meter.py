@@ -1,4 +1,6 @@
-"""A power meter of its own clock is laid onto a recording, and its joules are those of the analysis."""
+"""A power meter of its own clock is laid onto a recording, and its joules are those of the
+analysis.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ from ir_recorder.errors import TraceError
 from ir_recorder.report import report_html
 from ir_recorder.traces import TraceMapping
 
-SHIFT, FACTOR = 1234.5, 1.03  # s between the clocks; what the meter reads more
+# s between the clocks; what the meter reads more
+SHIFT = 1234.5
+FACTOR = 1.03
 
 
 def meter_file(recording: Path, path: Path, start: float = 0.0) -> Path:
@@ -27,13 +31,16 @@ def meter_file(recording: Path, path: Path, start: float = 0.0) -> Path:
     return path
 
 
-def test_a_meters_clock_is_found_and_its_joules_are_analysed(demo_file: Path, tmp_path: Path) -> None:
+def test_a_meters_clock_is_found_and_its_joules_are_analysed(
+    demo_file: Path, tmp_path: Path
+) -> None:
     recording = read_recording(demo_file)
     measured = with_meter(recording, meter_file(demo_file, tmp_path / "meter.csv"))
     share = float(measured.fact(SHARE).split()[0])
     assert share == pytest.approx(FACTOR, abs=0.002)
     assert (measured.origin, measured.plant) == ("measured", "measured")
-    before, after = analyse(recording), analyse(measured)
+    before = analyse(recording)
+    after = analyse(measured)
     for one, other in zip(before.movements, after.movements, strict=True):
         assert other.energy == pytest.approx(FACTOR * one.energy, rel=0.01)
     page = report_html(after, findings(after))
@@ -41,7 +48,9 @@ def test_a_meters_clock_is_found_and_its_joules_are_analysed(demo_file: Path, tm
     assert measured.fact(METER) == "meter.csv"
 
 
-def test_what_a_meter_does_not_cover_keeps_the_recorded_watts(demo_file: Path, tmp_path: Path) -> None:
+def test_what_a_meter_does_not_cover_keeps_the_recorded_watts(
+    demo_file: Path, tmp_path: Path
+) -> None:
     recording = read_recording(demo_file)
     file = meter_file(demo_file, tmp_path / "late.csv", start=4.0)
     power = with_meter(recording, file, TraceMapping(clock_offset=SHIFT)).power

@@ -20,7 +20,11 @@ def test_bounds_belong_to_the_interval() -> None:
 
 
 def test_what_was_not_measured_neither_holds_nor_fails() -> None:
-    for check in (near("a", math.nan, 1.0, 0.1, "J", "why"), at_least("a", 1.0, math.nan, "m", "why"), OPEN):
+    for check in (
+        near("a", math.nan, 1.0, 0.1, "J", "why"),
+        at_least("a", 1.0, math.nan, "m", "why"),
+        OPEN,
+    ):
         assert check.verdict is Verdict.NOT_CHECKED
         assert not check.ok
 

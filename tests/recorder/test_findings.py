@@ -13,12 +13,23 @@ import pytest
 
 from ir_msgs.msg import PlannedMovement
 from ir_msgs_py.modes import Mode
-from ir_recorder import Analysis, Finding, Tolerances, Verdict, analyse, findings, read_recording, summary
+from ir_recorder import (
+    Analysis,
+    Finding,
+    Tolerances,
+    Verdict,
+    analyse,
+    findings,
+    read_recording,
+    summary,
+)
 from ir_recorder.analysis.results import StepResult
 from ir_recorder.read.recording import GoalEnd, Recording
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
-NEAR = Tolerances(resting_rows=8, safety_distance=-1.0)  # the synthetic run passes through its machines
+NEAR = Tolerances(
+    resting_rows=8, safety_distance=-1.0
+)  # the synthetic run passes through its machines
 
 
 def named(checks: tuple[Finding, ...], start: str) -> list[Finding]:
@@ -74,7 +85,9 @@ def test_a_movement_may_differ_by_one_percent_or_ten_joules(
     for off, ok in ((0.45 * beyond, True), (beyond, False)):
         for sign in (-1.0, 1.0):
             result = replace(moved, step=step, energy=planned + sign * off, stored_energy=0.0)
-            (check,) = named(findings(replace(analysis, steps=(result,))), "energy of 1 home → table")[:1]
+            (check,) = named(
+                findings(replace(analysis, steps=(result,))), "energy of 1 home → table"
+            )[:1]
             assert check.ok == ok, check
 
 
@@ -82,7 +95,9 @@ def test_a_movement_may_differ_by_one_percent_or_ten_joules(
 def test_what_the_next_movement_drew_in_a_shared_reading_is_no_fault_of_a_step(
     analysis: Analysis, held: float, ok: bool
 ) -> None:
-    """A first step that stands still for 4 ms shares its reading with the next one's acceleration."""
+    """A first step that stands still for 4 ms shares its reading with the next one's
+    acceleration.
+    """
     moved = analysis.movements[0]
     report = replace(moved.step.movement.report, energy=3.0, duration=0.004)
     step = replace(moved.step, movement=replace(moved.step.movement, report=report))
@@ -112,11 +127,15 @@ def test_pauses_are_checked_too(analysis: Analysis) -> None:
         assert check.ok == ok
 
 
-def test_a_plant_that_is_not_the_model_is_held_against_the_interval_of_a_pause(analysis: Analysis) -> None:
+def test_a_plant_that_is_not_the_model_is_held_against_the_interval_of_a_pause(
+    analysis: Analysis,
+) -> None:
     """What drives draw while they stand is known by its interval alone, as in movements."""
     pause = next(s for s in analysis.steps if s.step.movement.is_pause)
     planned = pause.step.movement.report.energy
-    report = replace(pause.step.movement.report, energy_low=0.9 * planned, energy_high=1.5 * planned)
+    report = replace(
+        pause.step.movement.report, energy_low=0.9 * planned, energy_high=1.5 * planned
+    )
     movement = replace(
         pause.step.movement, report=report, duration=pause.seconds, power_mode="STAND_ON_MOTORS"
     )
@@ -160,11 +179,15 @@ def test_a_movement_without_a_meter_is_not_checked(demo_file: Path) -> None:
 
 def test_an_empty_recording_is_not_checked(demo_file: Path) -> None:
     recording = read_recording(demo_file)
-    checks = findings(analyse(replace(recording, power=None, joints=None, events=(), loads=(), goals=())))
+    checks = findings(
+        analyse(replace(recording, power=None, joints=None, events=(), loads=(), goals=()))
+    )
     assert summary(checks) == (Verdict.NOT_CHECKED, "nothing was checked")
 
 
-def test_a_tool_of_ones_own_is_not_held_against_table_2(new_run: Callable[[], Any], tmp_path: Path) -> None:
+def test_a_tool_of_ones_own_is_not_held_against_table_2(
+    new_run: Callable[[], Any], tmp_path: Path
+) -> None:
     run = new_run()
     run.rest(1.0, Mode.STAND_ON_MOTORS, HOME, "gripper+part")
     checks = findings(analyse(read_recording(run.record(tmp_path / "own.mcap"))))
@@ -174,7 +197,9 @@ def test_a_tool_of_ones_own_is_not_held_against_table_2(new_run: Callable[[], An
 
 
 @pytest.mark.parametrize("deviation", [0.0, 0.002, 0.1, math.nan])
-def test_clearance_may_only_lack_what_the_tool_was_off(analysis: Analysis, deviation: float) -> None:
+def test_clearance_may_only_lack_what_the_tool_was_off(
+    analysis: Analysis, deviation: float
+) -> None:
     moved = analysis.movements[1]
     assert moved.clearance is not None
     tolerated = 0.005 if math.isnan(deviation) else min(deviation, 0.005)
@@ -216,31 +241,43 @@ def test_clearance_is_held_against_the_safety_distance_it_was_planned_with(
         assert check.reason.startswith(source)
 
 
-def test_the_safety_distance_of_the_plan_comes_before_that_of_the_recording(analysis: Analysis) -> None:
+def test_the_safety_distance_of_the_plan_comes_before_that_of_the_recording(
+    analysis: Analysis,
+) -> None:
     moved = analysis.movements[1]
-    report = replace(moved.step.movement.report, certified=True, min_clearance=0.006, safety_distance=0.005)
+    report = replace(
+        moved.step.movement.report, certified=True, min_clearance=0.006, safety_distance=0.005
+    )
     step = replace(moved.step, movement=replace(moved.step.movement, report=report))
     near = replace(moved.clearance, least=0.0051)
     result = replace(moved, step=step, tool_deviation=0.0, clearance=near)
-    (check,) = named(findings(replace(analysis, steps=(result,), safety_distance=0.02)), "clearance on")
+    (check,) = named(
+        findings(replace(analysis, steps=(result,), safety_distance=0.02)), "clearance on"
+    )
     assert check.ok
     assert check.reason.startswith("safety distance of the plan 5.0 mm")
 
 
-def test_a_plant_that_is_not_the_model_is_held_against_twice_the_interval(analysis: Analysis) -> None:
+def test_a_plant_that_is_not_the_model_is_held_against_twice_the_interval(
+    analysis: Analysis,
+) -> None:
     """One joule more than the interval's end is no fault; as much beyond it again is one."""
     recording = analysis.recording
     assert recording.power is not None
     other = replace(recording, power=replace(recording.power, plant="typical, seed 7"))
     result = analysis.steps[0]
     report = result.step.movement.report
-    low, high = 0.9 * report.energy, 1.1 * report.energy
-    movement = replace(result.step.movement, report=replace(report, energy_low=low, energy_high=high))
+    low = 0.9 * report.energy
+    high = 1.1 * report.energy
+    movement = replace(
+        result.step.movement, report=replace(report, energy_low=low, energy_high=high)
+    )
 
     def check(energy: float, run: Recording) -> Finding:
         step = replace(result, step=replace(result.step, movement=movement), energy=energy)
         (found,) = named(
-            findings(replace(analysis, recording=run, steps=(step,))), f"energy of {step_name(step)}"
+            findings(replace(analysis, recording=run, steps=(step,))),
+            f"energy of {step_name(step)}",
         )[:1]
         return found
 
@@ -264,7 +301,9 @@ def test_a_movement_of_a_few_milliseconds_is_not_measured_by_what_it_has_no_samp
     unseen = replace(result, step=step, indirect_energy=math.nan, tool_deviation=math.nan)
     short = replace(analysis, steps=(unseen,))
     assert named(findings(short), "tool deviation") == []
-    assert [check.name for check in named(findings(short), "energy of")] == [f"energy of {step_name(result)}"]
+    assert [check.name for check in named(findings(short), "energy of")] == [
+        f"energy of {step_name(result)}"
+    ]
     lost = replace(analysis, steps=(replace(result, indirect_energy=math.nan),))
     verdicts = [check.verdict for check in named(findings(lost), "energy of")]
     assert Verdict.NOT_CHECKED in verdicts

@@ -1,7 +1,8 @@
-"""A fit finds the robot that drew the power, says how sure it is, and what the data do not determine.
+"""A fit finds the robot that drew the power, says how sure it is, and what the data do not
+determine.
 
-The robots here are drawn from the prior and run through the forward model with noise; other plants are
-`benchmarks/truth.py`'s.
+The robots here are drawn from the prior and run through the forward model with noise; other plants
+are `benchmarks/truth.py`'s.
 """
 
 from __future__ import annotations
@@ -29,15 +30,21 @@ from ir_recorder.fit.residuals import by_window
 from ir_recorder.measure import PowerModel, Samples, movements
 from ir_recorder.traces import Trace
 
-CELL, PRIOR, STEP = load_cell("demo"), data_sheet(), 0.01
+CELL = load_cell("demo")
+PRIOR = data_sheet()
+STEP = 0.01
 MODEL = PowerModel(CELL.robot, load_power_data().dc_link, CELL.base_pose, PRIOR)
 NOISE = 20.0  # W of a sample
 
 
 def programme(seed: int, count: int, modes: int) -> Samples:
-    """Movements between random postures about home at several speeds, then `modes` modes for 5 s each."""
-    rng, robot = np.random.default_rng(seed), CELL.robot
-    here, parts = np.array(robot.machine_home), []
+    """Movements between random postures about home at several speeds, then `modes` modes for 5 s
+    each.
+    """
+    rng = np.random.default_rng(seed)
+    robot = CELL.robot
+    here = np.array(robot.machine_home)
+    parts = []
     low = np.maximum(robot.position_min, here - 1.2)
     high = np.minimum(robot.position_max, here + 1.2)
     for k in range(count):
@@ -69,7 +76,9 @@ def _still(q: np.ndarray, count: int) -> np.ndarray:
 
 def metered(samples: Samples, truth: PowerParameters, seed: int) -> Samples:
     watts = MODEL.watts(truth.mean, MODEL.prepare(samples))
-    return replace(samples, watts=watts + np.random.default_rng(seed).normal(0.0, NOISE, len(watts)))
+    return replace(
+        samples, watts=watts + np.random.default_rng(seed).normal(0.0, NOISE, len(watts))
+    )
 
 
 @dataclass(frozen=True)
@@ -90,7 +99,8 @@ def test_energies_of_other_movements_are_predicted_and_covered(case: Case) -> No
     truth = MODEL.watts(case.truth.mean, prepared)
     after = MODEL.watts(case.found.parameters.mean, prepared)
     drawn = np.array([MODEL.watts(draw, prepared) for draw in case.found.parameters.draws(60, 0)])
-    errors, inside = [], []
+    errors = []
+    inside = []
     for first, behind in movements(others):
         energy = truth[first:behind].sum()
         errors.append(abs(after[first:behind].sum() / energy - 1.0))
@@ -98,7 +108,9 @@ def test_energies_of_other_movements_are_predicted_and_covered(case: Case) -> No
         inside.append(low <= energy <= high)
     assert np.median(errors) < 0.002
     assert max(errors) < 0.01
-    assert np.mean(inside) > 0.4  # of one robot's movements, which share their errors; 0.9 over many robots
+    assert (
+        np.mean(inside) > 0.4
+    )  # of one robot's movements, which share their errors; 0.9 over many robots
 
 
 def test_what_is_fitted_is_physical_and_no_less_certain(case: Case) -> None:
@@ -142,20 +154,29 @@ def test_a_meter_that_reads_too_seldom_is_refused_with_its_interval() -> None:
 
 
 def test_data_without_motion_say_so_and_data_that_determine_nothing_are_refused() -> None:
-    """A robot at rest shows the watts of its modes, but nothing of motion; in one mode not even these."""
+    """A robot at rest shows the watts of its modes, but nothing of motion; in one mode not even
+    these.
+    """
     whole = programme(6, 1, 3)
-    still = replace(whole, q=np.tile(whole.q[-1], (len(whole), 1)), qd=0.0 * whole.qd, qdd=0.0 * whole.qdd)
+    still = replace(
+        whole, q=np.tile(whole.q[-1], (len(whole), 1)), qd=0.0 * whole.qd, qdd=0.0 * whole.qdd
+    )
     rests = metered(still.part(still.time[-1500], np.inf), PRIOR.drawn(6), 6)
     found = fit(rests, MODEL, PRIOR)
     assert not found.movements
     assert {name.partition(".")[0] for name in found.kept} >= {"viscous", "coulomb", "iron", "gear"}
     assert any("nothing moves" in sentence for sentence in sentences(found))
     one = metered(still.part(still.time[-1500], still.time[-1000]), PRIOR.drawn(6), 6)
-    with pytest.raises(FitError, match=r"none of the \d+ power parameters.* moves in 0\.0 of 5\.0 s"):
+    with pytest.raises(
+        FitError, match=r"none of the \d+ power parameters.* moves in 0\.0 of 5\.0 s"
+    ):
         fit(one, MODEL, PRIOR)
 
 
-SMALL = [(1, 6), *(pytest.param(*each, marks=pytest.mark.long) for each in ((3, 8), (4, 6), (7, 5)))]
+SMALL = [
+    (1, 6),
+    *(pytest.param(*each, marks=pytest.mark.long) for each in ((3, 8), (4, 6), (7, 5))),
+]
 
 
 @pytest.mark.parametrize(("seed", "count"), SMALL)
@@ -163,11 +184,14 @@ def test_a_small_programme_ends_in_no_local_minimum(seed: int, count: int) -> No
     """Least squares of SciPy's, begun at the robot that gave the data, finds nothing cheaper."""
     truth = PRIOR.drawn(seed)
     samples = metered(programme(seed, count, 1), truth, seed)
-    prepared, white = MODEL.prepare(samples), PRIOR.deviation
+    prepared = MODEL.prepare(samples)
+    white = PRIOR.deviation
 
     def missing(mean: np.ndarray) -> np.ndarray:
         pull = (mean - PRIOR.mean) / white
-        return np.concatenate([by_window(MODEL.watts(mean, prepared) - samples.watts) / NOISE, pull])
+        return np.concatenate(
+            [by_window(MODEL.watts(mean, prepared) - samples.watts) / NOISE, pull]
+        )
 
     def slopes(mean: np.ndarray) -> np.ndarray:
         rows = by_window(MODEL.watts_and_slopes(mean, prepared)[1]) / NOISE
@@ -222,13 +246,17 @@ def test_a_meter_with_a_clock_of_its_own_is_fitted_from_csv(
     printed = capsys.readouterr().out
     assert "on its clock agrees with the power that the data sheet predicts" in printed
     found = load_power_parameters(str(tmp_path / "power.yaml"))
-    assert found.value("coulomb.joint_a1") == pytest.approx(truth.value("coulomb.joint_a1"), rel=0.05)
+    assert found.value("coulomb.joint_a1") == pytest.approx(
+        truth.value("coulomb.joint_a1"), rel=0.05
+    )
     assert (tmp_path / "fit.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(
     ("load", "name"), [("anvil", "anvil"), ("gripper+anvil", "anvil"), ("GRIPPER", "GRIPPER")]
 )
-def test_what_is_held_all_the_time_is_refused_where_the_cell_does_not_have_it(load: str, name: str) -> None:
+def test_what_is_held_all_the_time_is_refused_where_the_cell_does_not_have_it(
+    load: str, name: str
+) -> None:
     with pytest.raises(FitError, match=f"^load '{name}' is unknown, known are gear, gripper, none"):
         fit_data(Source(Path("joints.csv"), cell=CELL, load=load), PRIOR)

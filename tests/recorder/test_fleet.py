@@ -1,4 +1,6 @@
-"""A fleet: sums over robots and shifts, hostile files by a sentence each, and the files that are written."""
+"""A fleet: sums over robots and shifts, hostile files by a sentence each, and the files that are
+written.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +49,9 @@ def test_the_sums_are_those_of_the_members(member: Member) -> None:
     moved = by_movement([member], costs)
     assert sum(sum(own.values()) for own in moved.values()) <= 1.001 * by_robot["left"]
     measures = by_measure([member], costs)
-    assert all(0.0 <= joules <= by_robot["left"] for own in measures.values() for joules in own.values())
+    assert all(
+        0.0 <= joules <= by_robot["left"] for own in measures.values() for joules in own.values()
+    )
 
 
 def test_shifts_of_one_robot_are_averaged(member: Member) -> None:
@@ -76,8 +80,18 @@ def test_the_command_sums_folders_up_and_names_what_it_leaves_out(
         shutil.copy(demo_file, tmp_path / robot / "monday.mcap")
     (tmp_path / "bad.mcap").write_bytes(b"not a recording")
     (tmp_path / "empty.mcap").write_bytes(b"")
-    page, table = tmp_path / "out" / "fleet.html", tmp_path / "out" / "fleet.csv"
-    arguments = ["fleet", str(tmp_path), "-o", str(page), "--table", str(table), "--root", str(tmp_path)]
+    page = tmp_path / "out" / "fleet.html"
+    table = tmp_path / "out" / "fleet.csv"
+    arguments = [
+        "fleet",
+        str(tmp_path),
+        "-o",
+        str(page),
+        "--table",
+        str(table),
+        "--root",
+        str(tmp_path),
+    ]
     assert main(arguments) == 0
     said = capsys.readouterr().err
     assert "bad.mcap: left out" in said
@@ -119,18 +133,28 @@ def test_copies_and_empty_folders_are_named(demo_file: Path, tmp_path: Path) -> 
     paths = (tmp_path / "all", tmp_path / "all" / "none", tmp_path / "all" / "a" / "monday.mcap")
     found, said = fleet(tmp_path, *paths)
     assert found == {"a": 1}
-    for words in ("none: holds no recordings", "left out: it is a copy of", "monday.mcap: named twice"):
+    for words in (
+        "none: holds no recordings",
+        "left out: it is a copy of",
+        "monday.mcap: named twice",
+    ):
         assert sum(words in one for one in said) == 1, words
 
 
-def test_a_program_that_was_not_driven_to_the_end_is_no_cycle(demo_file: Path, tmp_path: Path) -> None:
-    """A recording cut after eight of 27 steps was a cycle of 10 s, with more kWh a year than the whole."""
+def test_a_program_that_was_not_driven_to_the_end_is_no_cycle(
+    demo_file: Path, tmp_path: Path
+) -> None:
+    """A recording cut after eight of 27 steps was a cycle of 10 s, with more kWh a year than the
+    whole.
+    """
     whole = demo_file.read_bytes()
     shutil.copy(demo_file, tmp_path / "whole.mcap")
     (tmp_path / "cut.mcap").write_bytes(whole[: 6 * len(whole) // 10])
     found, said = fleet(tmp_path, tmp_path)
     assert found == {"whole": 1}
-    assert any("cut.mcap: left out: its program was not driven to the end" in one for one in said), said
+    assert any(
+        "cut.mcap: left out: its program was not driven to the end" in one for one in said
+    ), said
 
 
 def test_several_cycles_of_a_recording_are_one_on_average(analysis: Analysis) -> None:
@@ -141,7 +165,9 @@ def test_several_cycles_of_a_recording_are_one_on_average(analysis: Analysis) ->
     assert twice.joules == pytest.approx(0.5 * once.joules)
     assert twice.seconds == pytest.approx(0.5 * once.seconds)
     said: list[str] = []
-    more = member_of(replace(analysis, steps=(*analysis.steps, analysis.steps[0])), "r", said.append)
+    more = member_of(
+        replace(analysis, steps=(*analysis.steps, analysis.steps[0])), "r", said.append
+    )
     assert more is not None
     assert any("its last cycle was not driven to the end" in one for one in said)
 
@@ -151,6 +177,8 @@ def test_the_table_as_parquet_has_the_same_columns(member: Member, tmp_path: Pat
     np.testing.assert_equal(stored, fleet_columns([member]))
 
 
-def test_nothing_to_sum_up_is_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_nothing_to_sum_up_is_a_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["fleet", str(tmp_path), "--root", str(tmp_path)]) == 1
     assert "no recording could be used" in capsys.readouterr().err

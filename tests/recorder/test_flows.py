@@ -16,28 +16,38 @@ from ir_recorder.analysis.levers import levers
 from ir_recorder.report.sankey import TALL, rows, sankey, sankey_section
 
 OF_READINGS = 1.0  # J: the program's ends lie between two readings of the meter
-OF_SAMPLING = 0.02  # of the axes' energy: joint states and readings of the meter are not at the same instants
+OF_SAMPLING = (
+    0.02  # of the axes' energy: joint states and readings of the meter are not at the same instants
+)
 JOULES = st.floats(1.0, 1e6)
 
 
 def test_the_mains_are_those_of_the_program(analysis: Analysis) -> None:
-    flows, program = energy_flows(analysis), analysis.program
+    flows = energy_flows(analysis)
+    program = analysis.program
     assert flows is not None
     assert program is not None
     assert flows.mains == pytest.approx(program.whole.energy, rel=0.01)
-    assert flows.mains == pytest.approx(flows.controller + flows.tool + flows.rectifier + flows.from_mains)
+    assert flows.mains == pytest.approx(
+        flows.controller + flows.tool + flows.rectifier + flows.from_mains
+    )
 
 
 def test_friction_and_losses_are_those_of_the_data(analysis: Analysis) -> None:
-    """By the friction and the copper losses of the robot's data, which `energy_flows` doesn't read."""
-    flows, joints, cell = energy_flows(analysis), analysis.recording.joints, analysis.cell
+    """By the friction and the copper losses of the robot's data, which `energy_flows` doesn't
+    read.
+    """
+    flows = energy_flows(analysis)
+    joints = analysis.recording.joints
+    cell = analysis.cell
     assert flows is not None
     assert joints is not None
     assert cell is not None
     moving = np.zeros(len(joints.time), bool)
     for result in analysis.movements:
         moving |= (joints.time >= result.step.start) & (joints.time <= result.step.end)
-    speed, robot = np.abs(joints.velocity[moving]), cell.robot
+    speed = np.abs(joints.velocity[moving])
+    robot = cell.robot
     friction = speed**2 @ robot.friction_viscous + speed @ robot.friction_coulomb
     assert flows.friction == pytest.approx(friction.sum() * 0.002, abs=OF_SAMPLING * flows.taken)
     heat = (joints.effort[moving] / robot.gear_ratio) ** 2 @ robot.copper_loss
@@ -68,7 +78,8 @@ def test_a_meter_of_the_mains_alone_shows_no_flows(analysis: Analysis) -> None:
 
 
 def test_levers_are_at_most_the_joules_of_the_run(analysis: Analysis) -> None:
-    found, program = levers(analysis), analysis.program
+    found = levers(analysis)
+    program = analysis.program
     assert program is not None
     assert 1 <= len(found) <= 5
     assert all(0.0 < lever.joules <= program.whole.energy for lever in found)
@@ -77,12 +88,27 @@ def test_levers_are_at_most_the_joules_of_the_run(analysis: Analysis) -> None:
 
 @given(JOULES, JOULES, JOULES, JOULES, JOULES, st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_every_node_gives_what_it_takes(
-    base: float, tool: float, taken: float, lifted: float, resistor: float, back: float, lowered: float
+    base: float,
+    tool: float,
+    taken: float,
+    lifted: float,
+    resistor: float,
+    back: float,
+    lowered: float,
 ) -> None:
     returned = back * taken
     mains = base + tool + taken + resistor - returned
     flows = EnergyFlows(
-        mains, base, tool, 0.0, taken, returned, resistor, 0.0, lifted * 0.01, lifted * 0.01 * lowered
+        mains,
+        base,
+        tool,
+        0.0,
+        taken,
+        returned,
+        resistor,
+        0.0,
+        lifted * 0.01,
+        lifted * 0.01 * lowered,
     )
     for node in ("DC bus", "axes"):
         into = sum(value for _, to, value in rows(flows) if to in (node, f"back to the {node}"))

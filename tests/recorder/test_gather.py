@@ -34,7 +34,8 @@ def looked(asked: Asked, times: int) -> None:
 
 
 def test_a_lost_answer_is_asked_for_again() -> None:
-    service, taken = Service(), list[str]()
+    service = Service()
+    taken = list[str]()
     asked = Asked(service, "request", lambda answer: not taken.append(answer))
     looked(asked, 2 * PATIENCE + 1)
     assert len(service.asked) == 3

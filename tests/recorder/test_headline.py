@@ -21,7 +21,9 @@ def test_simulated_figures_are_labelled(analysis: Analysis, page: str) -> None:
     assert "plant typical, seed 7" in source(
         replace(analysis, recording=replace(real.recording, power=power))
     )
-    assert "plant not recorded" in source(replace(analysis, recording=replace(real.recording, hardware="")))
+    assert "plant not recorded" in source(
+        replace(analysis, recording=replace(real.recording, hardware=""))
+    )
 
 
 def test_a_run_without_a_program_says_so_and_is_not_green(analysis: Analysis) -> None:

@@ -1,4 +1,6 @@
-"""A recording with damaged bytes anywhere: read in part or refused, in words that can be printed."""
+"""A recording with damaged bytes anywhere: read in part or refused, in words that can be
+printed.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ from ir_recorder.read.reader import read_recording
 from ir_recorder.write.session import RecordingSession
 from ir_recorder.write.writer import RecordingWriter
 
-CASES, SECOND, SENTENCE_MAX = 400, 10**9, 4_000
+CASES = 400
+SECOND = 10**9
+SENTENCE_MAX = 4_000
 
 
 def recorded(path: Path) -> bytes:
@@ -35,7 +39,8 @@ def damaged(data: bytes, generator: np.random.Generator) -> bytes:
     """Some places overwritten, cut out, or filled with anything."""
     result = bytearray(data)
     for _ in range(int(generator.integers(1, 6))):
-        at, length = int(generator.integers(len(result))), int(generator.integers(1, 60))
+        at = int(generator.integers(len(result)))
+        length = int(generator.integers(1, 60))
         noise = generator.integers(0, 256, length, dtype=np.uint8).tobytes()
         change = int(generator.integers(4))
         if change == 0:
@@ -52,8 +57,10 @@ def damaged(data: bytes, generator: np.random.Generator) -> bytes:
 def test_whatever_is_damaged_the_words_can_be_printed(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    whole, generator = recorded(tmp_path / "whole.mcap"), np.random.default_rng(1)
-    path, read = tmp_path / "damaged.mcap", 0
+    whole = recorded(tmp_path / "whole.mcap")
+    generator = np.random.default_rng(1)
+    path = tmp_path / "damaged.mcap"
+    read = 0
     for _ in range(CASES):
         path.write_bytes(damaged(whole, generator))
         try:
@@ -61,6 +68,8 @@ def test_whatever_is_damaged_the_words_can_be_printed(
             read += 1
         except RecorderError as error:
             said = (str(error),)
-        assert all(len(sentence) <= SENTENCE_MAX and sentence.isprintable() for sentence in said), said
+        assert all(len(sentence) <= SENTENCE_MAX and sentence.isprintable() for sentence in said), (
+            said
+        )
     assert read > CASES // 2
     assert "".join(capfd.readouterr()) == ""

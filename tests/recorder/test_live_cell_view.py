@@ -1,4 +1,6 @@
-"""What the live view makes of what it heard: the scene, places of parts, doors, the nearest pair, paths."""
+"""What the live view makes of what it heard: the scene, places of parts, doors, the nearest pair,
+paths.
+"""
 
 from __future__ import annotations
 
@@ -39,12 +41,15 @@ def test_the_nearest_pair_is_that_of_the_cell_as_it_stands(cell: Cell, heard: He
         distance, *points, pair = near
         exact = collision_model(cell, load, cell.parts_at_start()).min_distance(HOME[None])
         assert distance == pytest.approx(exact.distance[0], abs=1e-5)
-        assert np.linalg.norm(np.subtract(points[:3], points[3:])) == pytest.approx(distance, abs=1e-3)
+        assert np.linalg.norm(np.subtract(points[:3], points[3:])) == pytest.approx(
+            distance, abs=1e-3
+        )
         assert " – " in str(pair)
 
 
 def test_joints_in_another_order_are_put_right_and_strangers_show_nothing(heard: Heard) -> None:
-    view, q = CellView(), np.radians([10.0, -80.0, 85.0, 5.0, 30.0, -20.0])
+    view = CellView()
+    q = np.radians([10.0, -80.0, 85.0, 5.0, 30.0, -20.0])
     expected = view.look(replace(heard, q=q))["near"]
     assert view.look(replace(heard, joints=heard.joints[::-1], q=q[::-1]))["near"] == expected
     for joints, values in (
@@ -61,7 +66,10 @@ def test_a_door_that_moves_is_another_scene_and_an_unknown_state_is_none(heard: 
     number = view.look(heard)["scene"]
     assert json.loads(view.scene)["frames"] == 0
     assert view.look(replace(heard, states=(("lathe", "door_closed"),)))["scene"] != number
-    assert view.look(replace(heard, states=(("lathe", "door_open"), ("infeed", ""))))["scene"] == number
+    assert (
+        view.look(replace(heard, states=(("lathe", "door_open"), ("infeed", ""))))["scene"]
+        == number
+    )
     strange = (("lathe", "molten>door_open"), ("gauge", "a>b>c"), ("nobody", "door_open"))
     assert view.look(replace(heard, states=strange))["scene"] == number
 
@@ -73,7 +81,9 @@ def test_a_machine_that_changes_is_heard_as_recordings_have_it() -> None:
     assert states_of(message) == (("lathe", "shut>open"), ("gauge", "up"))
 
 
-def test_a_door_that_opens_is_drawn_and_measured_as_what_it_sweeps(cell: Cell, heard: Heard) -> None:
+def test_a_door_that_opens_is_drawn_and_measured_as_what_it_sweeps(
+    cell: Cell, heard: Heard
+) -> None:
     def drawn(text: str) -> tuple[set[str], set[str], list[Any]]:
         near: Any = view.look(replace(heard, states=(("lathe", text),)))["near"]
         bodies = json.loads(view.scene)["bodies"]

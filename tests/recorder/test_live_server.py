@@ -24,7 +24,8 @@ class Cell:
     """A server with a stream, and what its buttons asked for."""
 
     def __init__(self) -> None:
-        self.stream, self.scene = Stream(), b""
+        self.stream = Stream()
+        self.scene = b""
         self.pressed: list[tuple[str, bool]] = []
         self.server = LiveServer(self.stream, self.press, lambda: self.scene)
 
@@ -33,7 +34,9 @@ class Cell:
         return Answer(True, "set")
 
     def ask(self, method: str, path: str, body: str | None = None, **headers: str) -> HTTPResponse:
-        """An answer; headers by name with _ for -, None for those that a browser sends by itself."""
+        """An answer; headers by name with _ for -, None for those that a browser sends by
+        itself.
+        """
         connection = HTTPConnection("127.0.0.1", self.server.port, timeout=60.0)
         named = {name.replace("_", "-"): value for name, value in headers.items()}
         connection.request(method, path, body, named)
@@ -53,7 +56,8 @@ def cell() -> Iterator[Cell]:
 
 def test_the_page_holds_nothing_of_the_cell_and_may_load_nothing(cell: Cell) -> None:
     answer = cell.ask("GET", "/")
-    page, policy = answer.read().decode(), answer.headers["Content-Security-Policy"]
+    page = answer.read().decode()
+    policy = answer.headers["Content-Security-Policy"]
     assert answer.status == 200
     assert cell.server.guard.token not in page
     assert "{{" not in page
@@ -95,7 +99,10 @@ def test_own_pages_are_answered_under_both_names(cell: Cell) -> None:
     for name in ("127.0.0.1", "localhost"):
         host = f"{name}:{cell.server.port}"
         assert cell.ask("GET", "/", Host=host).status == 200
-        assert cell.post(Host=host, Origin=f"http://{host}", Sec_Fetch_Site="same-origin").status == 200
+        assert (
+            cell.post(Host=host, Origin=f"http://{host}", Sec_Fetch_Site="same-origin").status
+            == 200
+        )
     assert cell.pressed == [("ab", True)] * 2
 
 
@@ -105,7 +112,14 @@ def test_a_button_needs_the_token_and_a_request_that_makes_sense(cell: Cell) -> 
         assert cell.post(X_Live_Token=token).status == 403
     for kind in ("text/plain", "application/x-www-form-urlencoded", ""):
         assert cell.post(Content_Type=kind).status == 403
-    for body in ("", "[]", "{", '{"name": 1, "value": true}', '{"name": "ab", "value": 1}', "[" * 900):
+    for body in (
+        "",
+        "[]",
+        "{",
+        '{"name": 1, "value": true}',
+        '{"name": "ab", "value": 1}',
+        "[" * 900,
+    ):
         assert cell.post(body).status == 400
     assert cell.post("x" * (MOST_BODY + 1)).status == 400
     assert cell.post(Content_Length="-1").status == 400
@@ -118,7 +132,9 @@ def test_what_is_no_bit_is_refused_and_too_many_at_once_too() -> None:
     commands = Commands()
     assert not commands.press("reboot", True).done
     assert all(name in commands.press("<b>", True).sentence for name in BITS)
-    waiting = [threading.Thread(target=commands.press, args=("ab", True)) for _ in range(MOST_WAITING)]
+    waiting = [
+        threading.Thread(target=commands.press, args=("ab", True)) for _ in range(MOST_WAITING)
+    ]
     for thread in waiting:
         thread.start()
     taken: list[Command] = []
@@ -160,7 +176,9 @@ def test_browsers_that_never_read_hold_up_nobody_and_too_many_are_refused(cell: 
     dead = []
     for _ in range(MOST_CONNECTIONS - 1):
         connection = socket.create_connection(("127.0.0.1", cell.server.port))
-        connection.sendall(f"GET /events HTTP/1.1\r\nHost: 127.0.0.1:{cell.server.port}\r\n\r\n".encode())
+        connection.sendall(
+            f"GET /events HTTP/1.1\r\nHost: 127.0.0.1:{cell.server.port}\r\n\r\n".encode()
+        )
         dead.append(connection)
     reader = events(cell.ask("GET", "/events"))
     next(reader)

@@ -1,4 +1,6 @@
-"""Laws: whenever a reader begins and however slow it is, it ends with the same values; memory is bounded."""
+"""Laws: whenever a reader begins and however slow it is, it ends with the same values; memory is
+bounded.
+"""
 
 from __future__ import annotations
 
@@ -31,18 +33,23 @@ class Reader:
             self.state = start["before"]
             changes = start["records"]
         else:
-            changes, self.number = [json.loads(text) for text in kept[0]], kept[1]
+            changes = [json.loads(text) for text in kept[0]]
+            self.number = kept[1]
         for change in changes:
             self.state = {**self.state, **change}
 
 
 @settings(max_examples=40)
 @given(st.lists(st.tuples(VALUES, st.booleans()), max_size=30), st.integers(1, 5))
-def test_every_reader_ends_with_the_last_values(steps: list[tuple[dict[str, Any], bool]], most: int) -> None:
+def test_every_reader_ends_with_the_last_values(
+    steps: list[tuple[dict[str, Any], bool]], most: int
+) -> None:
     now = [0.0]
-    before, module.MOST_KEPT = module.MOST_KEPT, most
+    before = module.MOST_KEPT
+    module.MOST_KEPT = most
     try:
-        stream, slow = Stream(clock=lambda: now[0]), Reader()
+        stream = Stream(clock=lambda: now[0])
+        slow = Reader()
         expected: dict[str, Any] = {}
         for values, reads in steps:
             now[0] += 0.05

@@ -24,7 +24,9 @@ def test_the_load_is_unknown_between_two_that_differ() -> None:
     assert list(LoadTimeline(()).certain(5.0)) == []
 
 
-def test_a_step_of_the_base_load_shows_when_the_tool_came(new_run: Callable[[], Any], tmp_path: Path) -> None:
+def test_a_step_of_the_base_load_shows_when_the_tool_came(
+    new_run: Callable[[], Any], tmp_path: Path
+) -> None:
     run = new_run()
     run.rest(1.0, Mode.STAND_ON_MOTORS, HOME, "none")
     run.rest(2.0, Mode.STAND_ON_MOTORS, HOME, "gripper")

@@ -18,7 +18,9 @@ from ir_recorder.read.recording import Recording, TextEvent
 from ir_recorder.report.machine_lanes import machine_lanes
 
 moments = st.lists(
-    st.tuples(st.floats(0.01, 2.0), st.sampled_from(["open", "open>closed", "closed", "closed>open"])),
+    st.tuples(
+        st.floats(0.01, 2.0), st.sampled_from(["open", "open>closed", "closed", "closed>open"])
+    ),
     min_size=1,
     max_size=12,
 )
@@ -43,16 +45,21 @@ def test_messages_become_events() -> None:
         TextEvent(2.0, "press", ""),
     ]
     contact = Contact(speed=0.5)
-    contact.pair.body_a, contact.pair.body_b = "link_6", "lathe_door"
+    contact.pair.body_a = "link_6"
+    contact.pair.body_b = "lathe_door"
     (event,) = contacts([(3.0, contact)])
     assert (event.time, event.name) == (3.0, "lathe_door")
     assert "lathe_door" in event.text
 
 
 @given(moments)
-def test_the_state_at_every_instant_is_the_last_that_was_heard(recording: Recording, steps: Any) -> None:
+def test_the_state_at_every_instant_is_the_last_that_was_heard(
+    recording: Recording, steps: Any
+) -> None:
     times = np.cumsum([gap for gap, _ in steps]).tolist()
-    events = [TextEvent(time, "lathe", state) for time, (_, state) in zip(times, steps, strict=True)]
+    events = [
+        TextEvent(time, "lathe", state) for time, (_, state) in zip(times, steps, strict=True)
+    ]
     spans = lanes(recording, events).get("lathe")
     if len({event.text for event in events}) == 1:
         assert spans is None  # nothing moved
@@ -66,8 +73,8 @@ def test_the_state_at_every_instant_is_the_last_that_was_heard(recording: Record
 
 def test_contacts_are_shown_where_they_were(recording: Recording) -> None:
     assert "contact" not in lanes(recording)
-    ((start, end, words, _),) = lanes(recording, touched=[TextEvent(4.0, "press", "hand touched press")])[
-        "contact"
-    ]
+    ((start, end, words, _),) = lanes(
+        recording, touched=[TextEvent(4.0, "press", "hand touched press")]
+    )["contact"]
     assert start == 4.0 < end
     assert words == "hand touched press"

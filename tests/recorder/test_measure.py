@@ -1,4 +1,6 @@
-"""The analysis' own torques, bus and derivatives, held against the kernels that they share nothing with."""
+"""The analysis' own torques, bus and derivatives, held against the kernels that they share nothing
+with.
+"""
 
 from __future__ import annotations
 
@@ -57,8 +59,12 @@ def test_torques_are_those_of_the_kernels(seed: int, turned: bool) -> None:
 
 
 @given(st.lists(st.floats(-5e4, 5e4), min_size=1, max_size=60))
-def test_the_bus_balances_and_differs_from_the_kernels_by_the_hysteresis_alone(watts: list[float]) -> None:
-    link, wanted, step = load_power_data().dc_link, np.array(watts), 1e-3
+def test_the_bus_balances_and_differs_from_the_kernels_by_the_hysteresis_alone(
+    watts: list[float],
+) -> None:
+    link = load_power_data().dc_link
+    wanted = np.array(watts)
+    step = 1e-3
     own = bus_flow(link, wanted, step)
     theirs = dc_bus(wanted[:, None], step, DcBusParameters(link.capacity_energy))
     assert (own.watts >= 0.0).all()
@@ -71,8 +77,10 @@ def test_the_bus_balances_and_differs_from_the_kernels_by_the_hysteresis_alone(w
 
 @pytest.mark.parametrize("softness", [0.0, 0.3, 10.0])
 def test_derivatives_go_through_the_bus(softness: float) -> None:
-    link, rng = load_power_data().dc_link, np.random.default_rng(4)
-    wanted, slopes = rng.normal(0.0, 4e3, 300), rng.normal(0.0, 1.0, (300, 3))
+    link = load_power_data().dc_link
+    rng = np.random.default_rng(4)
+    wanted = rng.normal(0.0, 4e3, 300)
+    slopes = rng.normal(0.0, 1.0, (300, 3))
     flow = bus_flow(link, wanted, 0.01, slopes, softness=softness)
     for p in range(3):
         more = bus_flow(link, wanted + 1e-4 * slopes[:, p], 0.01, softness=softness).watts
@@ -83,7 +91,10 @@ def test_derivatives_go_through_the_bus(softness: float) -> None:
 @given(st.lists(st.floats(-5e4, 5e4), min_size=1, max_size=60))
 def test_a_hard_switch_is_the_limit_of_soft_ones(watts: list[float]) -> None:
     """Each switch is off by S ln 2 at most, and what was given differs by what is held."""
-    link, wanted, step, softness = load_power_data().dc_link, np.array(watts), 1e-3, 1e-3
+    link = load_power_data().dc_link
+    wanted = np.array(watts)
+    step = 1e-3
+    softness = 1e-3
     hard, soft = (bus_flow(link, wanted, step, softness=s) for s in (0.0, softness))
     apart = 2.0 * np.log(2.0) * softness * np.arange(1, len(watts) + 1)
     assert (np.abs(hard.charge - soft.charge) <= apart).all()

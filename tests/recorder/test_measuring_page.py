@@ -33,7 +33,9 @@ def words(command: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the first two commands of the page have been run: a programme, and what a plant showed."""
+    """Where the first two commands of the page have been run: a programme, and what a plant
+    showed.
+    """
     place = tmp_path_factory.mktemp("measuring")
     with contextlib.chdir(place):
         for command in COMMANDS[:2]:
@@ -61,7 +63,9 @@ def test_the_commands_of_the_page_lead_from_a_programme_to_a_plan(
 def test_what_a_plant_showed_is_a_trace_with_modes_and_loads(folder: Path) -> None:
     (trace,) = read_traces(folder / "out" / "excitation" / "run.csv")
     assert set(trace.texts["load"]) == {"gripper", "gripper+gear"}
-    assert {"STAND_ON_MOTORS", "MOVING", "STAND_ON_BRAKES", "BUS_POWER_OFF"} <= set(trace.texts["mode"])
+    assert {"STAND_ON_MOTORS", "MOVING", "STAND_ON_BRAKES", "BUS_POWER_OFF"} <= set(
+        trace.texts["mode"]
+    )
     joules = trace.joules()
     assert joules is not None
     assert (np.diff(joules) > 0.0).all()  # there is always a base load
@@ -83,7 +87,12 @@ def test_what_a_plant_showed_is_a_trace_with_modes_and_loads(folder: Path) -> No
     ],
 )
 def test_a_programme_that_makes_no_sense_is_refused_by_name(
-    key: str, value: str, said: str, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    key: str,
+    value: str,
+    said: str,
+    folder: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     page = yaml.safe_load((folder / "out" / "excitation" / "programme.yaml").read_text())
     step = next(step for step in page["steps"] if key in step)
@@ -96,16 +105,23 @@ def test_a_programme_that_makes_no_sense_is_refused_by_name(
 def test_a_load_that_the_cell_does_not_have_is_no_load_of_a_fit(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    rows = (folder / "out" / "excitation" / "run.csv").read_text().replace(",gripper+gear", ",gripper+anvil")
+    rows = (
+        (folder / "out" / "excitation" / "run.csv")
+        .read_text()
+        .replace(",gripper+gear", ",gripper+anvil")
+    )
     (tmp_path / "run.csv").write_text(rows)
     assert main(["energy", "fit", str(tmp_path / "run.csv"), "--cell", "demo"]) != 0
     assert "load 'anvil' is unknown, known are gear, gripper, none" in capsys.readouterr().err
 
 
 def test_a_report_predicts_by_the_parameters_that_it_is_given(analysis: Analysis) -> None:
-    cell, sheet = load_cell("demo"), data_sheet()
-    here, there = np.array(cell.machine_home), np.array(cell.machine_home) + 0.3
-    still, ends = np.zeros((2, 6)), np.stack([here, there])
+    cell = load_cell("demo")
+    sheet = data_sheet()
+    here = np.array(cell.machine_home)
+    there = np.array(cell.machine_home) + 0.3
+    still = np.zeros((2, 6))
+    ends = np.stack([here, there])
     moved = JointTrajectory.from_seconds(JOINT_NAMES, [0.0, 1.5], ends, still, still)
     events = [
         replace(event, movement=replace(event.movement, trajectory=moved))
@@ -117,14 +133,20 @@ def test_a_report_predicts_by_the_parameters_that_it_is_given(analysis: Analysis
     mean[sheet.places("viscous")] *= 1.3
     fitted = replace(sheet, name="cell_3", mean=mean, covariance=0.04 * sheet.covariance)
     recording = replace(analysis.recording, events=tuple(events))
-    (step, *_) = [s.step for s in analyse(recording, fitted).steps if s.step.movement.trajectory is not None]
+    (step, *_) = [
+        s.step for s in analyse(recording, fitted).steps if s.step.movement.trajectory is not None
+    ]
     report = step.movement.report
     assert report.power_parameters == "cell_3"
     assert analysis.cell is not None
-    model = PowerModel(analysis.cell.robot, load_power_data().dc_link, analysis.cell.base_pose, fitted)
+    model = PowerModel(
+        analysis.cell.robot, load_power_data().dc_link, analysis.cell.base_pose, fitted
+    )
     held = analysis.cell.loads("")
     prepared = model.prepare(planned_samples(moved, held, fitted.modes))
-    joules = [1.5 * model.watts(draw, prepared).mean() for draw in fitted.draws(300, 1)]  # no slopes here
+    joules = [
+        1.5 * model.watts(draw, prepared).mean() for draw in fitted.draws(300, 1)
+    ]  # no slopes here
     low, high = np.percentile(joules, [5.0, 95.0])
     assert step.movement.load == "gripper"
     assert report.energy == pytest.approx(1.5 * model.watts(mean, prepared).mean(), rel=1e-6)
@@ -134,8 +156,15 @@ def test_a_report_predicts_by_the_parameters_that_it_is_given(analysis: Analysis
 
 def test_a_report_says_that_it_lacks_the_parameters_of_the_plan(analysis: Analysis) -> None:
     events = [
-        replace(e, movement=replace(e.movement, report=replace(e.movement.report, power_parameters="cell_3")))
+        replace(
+            e,
+            movement=replace(
+                e.movement, report=replace(e.movement.report, power_parameters="cell_3")
+            ),
+        )
         for e in analysis.recording.events
     ]
     found = analyse(replace(analysis.recording, events=tuple(events)))
-    assert any("cell_3" in problem and "--power-parameters" in problem for problem in found.problems)
+    assert any(
+        "cell_3" in problem and "--power-parameters" in problem for problem in found.problems
+    )

@@ -17,7 +17,9 @@ from ir_recorder.analysis.meter import Meter
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 
 
-def test_the_meter_integrates_a_constant_power_exactly(new_run: Callable[[], Any], tmp_path: Path) -> None:
+def test_the_meter_integrates_a_constant_power_exactly(
+    new_run: Callable[[], Any], tmp_path: Path
+) -> None:
     run = new_run()
     run.rest(1.0, Mode.BUS_POWER_OFF, HOME, "gripper")
     meter = Meter(read_recording(run.record(tmp_path / "a.mcap")).power)
@@ -34,25 +36,36 @@ def test_what_readings_at_the_ends_hold_may_belong_to_another_step(
     meter = Meter(read_recording(run.record(tmp_path / "a.mcap")).power)
     length = float(np.diff(meter.time).max())
     first, second = meter.time[20:22]
-    middle, reading = 0.5 * (first + second), 205.0 * length
+    middle = 0.5 * (first + second)
+    reading = 205.0 * length
     assert meter.straddling(first, second) == pytest.approx(0.0, abs=1e-6)
     assert meter.straddling(middle, middle + 10.0 * length) == pytest.approx(
         reading
     )  # half of one at each end
     assert meter.straddling(middle, middle + 0.1 * length) == pytest.approx(0.9 * reading)
-    assert meter.straddling(meter.time[-1] + 1.0, meter.time[-1] + 2.0) == pytest.approx(0.0, abs=1e-6)
+    assert meter.straddling(meter.time[-1] + 1.0, meter.time[-1] + 2.0) == pytest.approx(
+        0.0, abs=1e-6
+    )
 
 
-def test_the_rectifiers_loss_is_counted_and_the_capacitors_by_the_plants_own_mains(demo_file: Path) -> None:
-    """A plant of 540 V holds nothing at 540 V, and what it holds at 560 V is no error of the movement."""
+def test_the_rectifiers_loss_is_counted_and_the_capacitors_by_the_plants_own_mains(
+    demo_file: Path,
+) -> None:
+    """A plant of 540 V holds nothing at 540 V, and what it holds at 560 V is no error of the
+    movement.
+    """
     recording = read_recording(demo_file)
     power = replace(recording.power, rectifier_loss=np.full(len(recording.power.time), 20.0))
-    plant = "dc_link: {capacitance_f: 0.002, mains_v: 540.0, chopper_on_v: 688.0, chopper_off_v: 680.0}"
+    plant = (
+        "dc_link: {capacitance_f: 0.002, mains_v: 540.0, chopper_on_v: 688.0, chopper_off_v: 680.0}"
+    )
     volts = replace(power, bus_voltage=np.full(len(power.time), 560.0))
     result = analyse(replace(recording, power=volts, plant_yaml=plant)).steps[0]
     assert result.rectifier_energy == pytest.approx(20.0 * result.seconds, rel=0.02)
     assert result.stored_energy == pytest.approx(0.5 * 0.002 * (560.0**2 - 540.0**2))
     assert analyse(replace(recording, power=volts)).steps[0].stored_energy == 0.0
-    damaged = analyse(replace(recording, power=volts, power_yaml="nonsense", plant_yaml="dc_link: 3"))
+    damaged = analyse(
+        replace(recording, power=volts, power_yaml="nonsense", plant_yaml="dc_link: 3")
+    )
     assert damaged.steps[0].stored_energy == 0.0
     assert any("power.yaml can't be read" in problem for problem in damaged.problems)

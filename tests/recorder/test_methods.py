@@ -19,7 +19,14 @@ from ir_recorder.report.methods.view import HEIGHT, WIDTH, View
 
 ROWS = np.array([[1.8, -1.1, 1.0], [1.7, -1.0, 1.2], [1.4, -0.9, 1.2], [1.3, -0.8, 1.3]])
 WITHDRAWAL = WithdrawalLog(
-    *("washer_rinse", "gripper+gear", "modified_ga", 3, 83, (("gear_held too near washer_nozzles", 80),)),
+    *(
+        "washer_rinse",
+        "gripper+gear",
+        "modified_ga",
+        3,
+        83,
+        (("gear_held too near washer_nozzles", 80),),
+    ),
     *((50.0, 66.0), ROWS, np.array([0, 0, 1, 1]), ROWS[:2] + 0.1, ROWS[[0, 1, 3]]),
 )
 CONFIGURATIONS = ConfigurationLog(
@@ -57,7 +64,9 @@ def test_each_method_has_a_sentence_with_its_figures_and_a_drawing(analysis: Ana
     assert "http" not in html
 
 
-def test_a_drawing_has_a_mark_for_everything_that_was_kept_dropped_or_tried(analysis: Analysis) -> None:
+def test_a_drawing_has_a_mark_for_everything_that_was_kept_dropped_or_tried(
+    analysis: Analysis,
+) -> None:
     (withdrawal,) = re.findall(r"<svg.*?</svg>", section(analysis, WITHDRAWAL))
     tree = ElementTree.fromstring(withdrawal)
     groups = {group.get("class"): len(group) for group in tree.iter("g")}
@@ -73,7 +82,10 @@ def test_a_drawing_has_a_mark_for_everything_that_was_kept_dropped_or_tried(anal
 @pytest.mark.parametrize(
     ("log", "said"),
     [
-        (replace(WITHDRAWAL, blocked="line out of washer_rinse: a too near b"), "not free (a too near b); 3"),
+        (
+            replace(WITHDRAWAL, blocked="line out of washer_rinse: a too near b"),
+            "not free (a too near b); 3",
+        ),
         (
             replace(WITHDRAWAL, asked=True),
             "asks for it, though the straight line back along the tool is free",
@@ -99,7 +111,9 @@ def test_the_movement_that_is_driven_is_drawn_beside_the_corrected_path(analysis
 
 
 def test_each_drawing_has_a_length_and_says_from_where_it_is_seen(analysis: Analysis) -> None:
-    drawings = re.findall(r"<svg.*?</svg>", section(analysis, WITHDRAWAL, CONFIGURATIONS, CORRECTION))
+    drawings = re.findall(
+        r"<svg.*?</svg>", section(analysis, WITHDRAWAL, CONFIGURATIONS, CORRECTION)
+    )
     for drawn in drawings:
         length, x0, wide = map(float, _bar(drawn))
         assert 0.1 * WIDTH < wide <= 0.3 * WIDTH
@@ -114,12 +128,16 @@ def _bar(drawn: str) -> tuple[str, str, str]:
 
 
 def test_the_chart_of_the_fitness_lies_where_it_hides_least(analysis: Analysis) -> None:
-    x, y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+    x = np.array([1.0, 0.0, 0.0])
+    y = np.array([0.0, 1.0, 0.0])
     for to in (x + y, x - y):  # from above: towards the right top, or the right bottom
         path = np.linspace(0.0, 1.0, 30)[:, None] * 2.0 * to
-        drawn = section(analysis, replace(CORRECTION, straight=path, path=path + 0.01 * x, stretches=()))
+        drawn = section(
+            analysis, replace(CORRECTION, straight=path, path=path + 0.01 * x, stretches=())
+        )
         left, top, wide, high = map(
-            float, re.findall(r'class="chart" x="(\S+)" y="(\S+)" width="(\S+)" height="(\S+)"', drawn)[0]
+            float,
+            re.findall(r'class="chart" x="(\S+)" y="(\S+)" width="(\S+)" height="(\S+)"', drawn)[0],
         )
         (line,) = re.findall(r'class="path" points="(.*?)"', drawn)
         flat = np.array([point.split(",") for point in line.split()], dtype=float)
@@ -136,7 +154,9 @@ def test_figures_that_are_left_out_are_counted(analysis: Analysis) -> None:
     assert "are shown" not in section(analysis, CORRECTION)
 
 
-def test_what_was_the_same_at_several_visits_is_said_once_with_their_number(analysis: Analysis) -> None:
+def test_what_was_the_same_at_several_visits_is_said_once_with_their_number(
+    analysis: Analysis,
+) -> None:
     other = replace(WITHDRAWAL, load="gripper", candidates=90)
     html = section(analysis, WITHDRAWAL, other, WITHDRAWAL, CORRECTION, WITHDRAWAL, CORRECTION)
     first, second, third = re.findall(r"<figcaption>(.*?)</figcaption>", html)
@@ -151,7 +171,9 @@ def test_a_recording_without_logs_has_no_such_section(analysis: Analysis) -> Non
 
 
 def test_logs_of_another_cell_are_said_in_words_and_texts_are_escaped(analysis: Analysis) -> None:
-    html = section(analysis, replace(WITHDRAWAL, station="<script>"), replace(CORRECTION, goal="a&b"))
+    html = section(
+        analysis, replace(WITHDRAWAL, station="<script>"), replace(CORRECTION, goal="a&b")
+    )
     assert "<script>" not in html
     assert "&lt;script&gt;" in html
     assert "a&amp;b" in html
@@ -166,11 +188,14 @@ def test_a_log_without_its_cell_is_a_sentence(log: SearchLog, analysis: Analysis
 
 
 @settings(max_examples=50)
-@given(st.lists(st.tuples(*[st.floats(-5.0, 5.0)] * 3), min_size=1, max_size=6), st.floats(-3.2, 3.2))
+@given(
+    st.lists(st.tuples(*[st.floats(-5.0, 5.0)] * 3), min_size=1, max_size=6), st.floats(-3.2, 3.2)
+)
 def test_all_points_of_a_view_lie_in_it_and_lengths_keep_their_ratio(
     rows: list[tuple[float, float, float]], turn: float
 ) -> None:
-    points, along = np.array(rows), np.array([np.cos(turn), np.sin(turn), 0.3])
+    points = np.array(rows)
+    along = np.array([np.cos(turn), np.sin(turn), 0.3])
     view = View.from_the_side(points, along, 0.1)
     flat = view.flat(points)
     assert (flat >= 0.0).all()

@@ -23,14 +23,25 @@ class _Links(HTMLParser):
         self.open: list[str] = []
 
     def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
-        self.links += [value or "" for name, value in attributes if name in ("src", "href", "data", "action")]
+        self.links += [
+            value or "" for name, value in attributes if name in ("src", "href", "data", "action")
+        ]
 
 
 def test_nothing_is_fetched_from_outside(page: str) -> None:
     parser = _Links()
     parser.feed(page)
     assert all(link.startswith("#") for link in parser.links)
-    for word in ("http://", "https://", "//cdn", "@import", "url(", "fetch(", "XMLHttpRequest", "<link"):
+    for word in (
+        "http://",
+        "https://",
+        "//cdn",
+        "@import",
+        "url(",
+        "fetch(",
+        "XMLHttpRequest",
+        "<link",
+    ):
         assert word not in page
 
 
@@ -39,7 +50,14 @@ def test_the_page_is_small(page: str) -> None:
 
 
 def test_headlines_steps_and_checks_are_written(page: str) -> None:
-    for words in ("test_cell", "home → table", "pause at press", "Table II", "hibernation leave", "A2"):
+    for words in (
+        "test_cell",
+        "home → table",
+        "pause at press",
+        "Table II",
+        "hibernation leave",
+        "A2",
+    ):
         assert words in page
 
 
@@ -54,7 +72,9 @@ def test_names_from_a_file_cannot_become_markup(demo_file: Path) -> None:
 
 def test_an_empty_recording_still_gives_a_page(demo_file: Path, data_of: Any) -> None:
     recording = read_recording(demo_file)
-    bare = replace(recording, power=None, joints=None, controller=None, events=(), loads=(), cell_yaml="")
+    bare = replace(
+        recording, power=None, joints=None, controller=None, events=(), loads=(), cell_yaml=""
+    )
     analysis = analyse(bare)
     page = report_html(analysis, findings(analysis))
     assert data_of(page)["scene"] is None
@@ -72,8 +92,11 @@ def test_places_that_cannot_be_written_are_named(demo_file: Path) -> None:
 
 def brackets_left_open(script: str) -> str:
     """Brackets that don't close, outside of strings and comments."""
-    code = re.sub(r"/\*.*?\*/|//[^\n]*|\"(?:\\.|[^\"\\\n])*\"|'(?:\\.|[^'\\\n])*'", "", script, flags=re.S)
-    pairs, stack = {")": "(", "]": "[", "}": "{"}, []
+    code = re.sub(
+        r"/\*.*?\*/|//[^\n]*|\"(?:\\.|[^\"\\\n])*\"|'(?:\\.|[^'\\\n])*'", "", script, flags=re.S
+    )
+    pairs = {")": "(", "]": "[", "}": "{"}
+    stack = []
     for character in code:
         if character in "([{":
             stack.append(character)

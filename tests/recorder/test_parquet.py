@@ -1,4 +1,6 @@
-"""Parquet beside CSV: the same tables come out, the same traces come in, anything else is a sentence."""
+"""Parquet beside CSV: the same tables come out, the same traces come in, anything else is a
+sentence.
+"""
 
 from __future__ import annotations
 
@@ -67,20 +69,30 @@ def test_without_pyarrow_both_directions_say_what_to_install(
 
 
 @given(
-    rows=st.lists(st.tuples(st.floats(1e-3, 10.0), st.none() | FINITE, FINITE), min_size=2, max_size=20),
+    rows=st.lists(
+        st.tuples(st.floats(1e-3, 10.0), st.none() | FINITE, FINITE), min_size=2, max_size=20
+    ),
     heading=st.sampled_from(["power", "power_kW", "power [kW]", "power (W)"]),
 )
 def test_a_trace_is_the_same_from_both(
-    rows: list[tuple[float, float | None, float]], heading: str, tmp_path_factory: pytest.TempPathFactory
+    rows: list[tuple[float, float | None, float]],
+    heading: str,
+    tmp_path_factory: pytest.TempPathFactory,
 ) -> None:
     folder = tmp_path_factory.mktemp("both")
     time = np.cumsum([step for step, _, _ in rows]).tolist()
-    columns = {"time": time, heading: [p for _, p, _ in rows], "joint_a1_deg": [q for _, _, q in rows]}
+    columns = {
+        "time": time,
+        heading: [p for _, p, _ in rows],
+        "joint_a1_deg": [q for _, _, q in rows],
+    }
     lines = [
-        ",".join("" if v is None else repr(v) for v in row) for row in zip(*columns.values(), strict=True)
+        ",".join("" if v is None else repr(v) for v in row)
+        for row in zip(*columns.values(), strict=True)
     ]
     (folder / "t.csv").write_text("\n".join([",".join(columns), *lines]))
-    ours, other = read(stored(folder, columns)), read(folder / "t.csv")
+    ours = read(stored(folder, columns))
+    other = read(folder / "t.csv")
     np.testing.assert_array_equal(ours.time, other.time)
     assert ours.columns.keys() == other.columns.keys()
     for name, values in ours.columns.items():
@@ -124,7 +136,9 @@ TIME = [0.0, 1.0]
         ({"time": TIME, "power_parsec": TIME, "joint_a1 [ells]": TIME}, "ells"),
     ],
 )
-def test_what_makes_no_sense_is_named(columns: dict[str, Any], sentence: str, tmp_path: Path) -> None:
+def test_what_makes_no_sense_is_named(
+    columns: dict[str, Any], sentence: str, tmp_path: Path
+) -> None:
     path = stored(tmp_path, columns)
     with pytest.raises(TraceError) as refused:
         read(path)
@@ -134,7 +148,9 @@ def test_what_makes_no_sense_is_named(columns: dict[str, Any], sentence: str, tm
 
 def test_a_mapping_names_columns_of_parquet(tmp_path: Path) -> None:
     mapping = tmp_path / "m.yaml"
-    text = "format: ir_trace/1\ncolumns: {time: {column: t, unit: ms}, power: {column: P, unit: kW}}\n"
+    text = (
+        "format: ir_trace/1\ncolumns: {time: {column: t, unit: ms}, power: {column: P, unit: kW}}\n"
+    )
     mapping.write_text(text)
     path = stored(tmp_path, {"t": [0, 500], "P": [1.0, 2.0]})
     (trace,) = read_traces(path, read_mapping(mapping))
@@ -150,12 +166,16 @@ def test_a_fifo_and_a_folder_are_refused_at_once(tmp_path: Path) -> None:
             read_traces(tmp_path / name)
 
 
-@given(place=st.integers(0, 10**6), new=st.binary(min_size=1, max_size=8), cut=st.integers(0, 10**6))
+@given(
+    place=st.integers(0, 10**6), new=st.binary(min_size=1, max_size=8), cut=st.integers(0, 10**6)
+)
 def test_damaged_files_are_read_or_refused(
     place: int, new: bytes, cut: int, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     folder = tmp_path_factory.mktemp("damaged")
-    path = stored(folder, {"time": np.arange(50.0), "power": np.arange(50.0), "joint_a1": np.arange(50.0)})
+    path = stored(
+        folder, {"time": np.arange(50.0), "power": np.arange(50.0), "joint_a1": np.arange(50.0)}
+    )
     content = bytearray(path.read_bytes())
     begin = place % len(content)
     content[begin : begin + len(new)] = new
@@ -163,8 +183,10 @@ def test_damaged_files_are_read_or_refused(
     try:
         trace = read(path)
     except TraceError as error:
-        named, increasing = str(path) in str(error), True
+        named = str(path) in str(error)
+        increasing = True
     else:
-        named, increasing = True, bool((np.diff(trace.time) > 0.0).all())
+        named = True
+        increasing = bool((np.diff(trace.time) > 0.0).all())
     assert named
     assert increasing

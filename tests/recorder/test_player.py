@@ -60,7 +60,8 @@ def test_a_loop_over_nothing_ends() -> None:
 
 def controlled(at: dict[int, Any], **settings: Any) -> list[tuple[float, bytes]]:
     """What is published when; at: what is done to the playhead after so many messages."""
-    clock, out = Clock(), []
+    clock = Clock()
+    out = []
     head = Playhead(clock.now, 1.0)
 
     def publish(message: DueMessage) -> None:
@@ -85,7 +86,8 @@ def test_a_seek_goes_on_from_there_with_what_was_latched() -> None:
 
 
 def test_while_it_is_paused_nothing_is_published() -> None:
-    clock, out = Clock(), []
+    clock = Clock()
+    out = []
     head = Playhead(clock.now, 1.0)
 
     def wait(seconds: float) -> bool:
@@ -135,7 +137,8 @@ def test_keys_pause_seek_and_change_the_rate() -> None:
 
 
 def test_the_clock_ticks_recorded_time_in_between() -> None:
-    clock, ticks = Clock(), []
+    clock = Clock()
+    ticks = []
     player = Player(clock.now, clock.wait, lambda message: None, ticks.append, 0.1)
     player.play(MESSAGES, PlaySettings())
     assert len(ticks) == pytest.approx(11, abs=1)

@@ -41,7 +41,8 @@ def test_a_damaged_chunk_costs_only_itself(demo_file: Path, tmp_path: Path) -> N
     data[middle : middle + 64] = bytes(64)
     broken = tmp_path / "broken.mcap"
     broken.write_bytes(data)
-    recording, whole = read_recording(broken), read_recording(demo_file)
+    recording = read_recording(broken)
+    whole = read_recording(demo_file)
     assert any("is damaged" in problem for problem in recording.problems)
     assert recording.joints.time[-1] == pytest.approx(whole.joints.time[-1], abs=1.0)
     assert len(recording.joints.time) < len(whole.joints.time)
@@ -77,7 +78,8 @@ def test_a_message_from_the_far_future_costs_only_itself(tmp_path: Path) -> None
 
 def test_mutilated_recordings_are_read_or_refused(demo_file: Path, tmp_path: Path) -> None:
     """Bytes changed, dropped and put in at random: a page, or a sentence."""
-    generator, whole = np.random.default_rng(0), demo_file.read_bytes()
+    generator = np.random.default_rng(0)
+    whole = demo_file.read_bytes()
     path = tmp_path / "m.mcap"
     for _ in range(40):
         data = bytearray(whole)

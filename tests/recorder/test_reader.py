@@ -28,7 +28,12 @@ def test_series_are_what_was_published(demo_file: Path) -> None:
     joints = recording.joints
     assert joints.names == tuple(f"joint_a{i}" for i in range(1, 7))
     np.testing.assert_allclose(np.degrees(joints.position[0]), [0, -90, 90, 0, 0, 0], atol=1e-12)
-    assert joints.position.shape == joints.velocity.shape == joints.effort.shape == (len(joints.time), 6)
+    assert (
+        joints.position.shape
+        == joints.velocity.shape
+        == joints.effort.shape
+        == (len(joints.time), 6)
+    )
     energy = np.cumsum(recording.power.power) * 0.01
     np.testing.assert_allclose(recording.power.energy, energy, rtol=1e-9)
     assert recording.events[0].movement.to_station == "table"
@@ -84,8 +89,9 @@ def test_messages_that_do_not_fit_their_definition_are_reported(tmp_path: Path) 
 
 def test_reading_needs_no_ros() -> None:
     code = (
-        "import sys, ir_recorder, ir_recorder.report, ir_recorder.report_main, ir_recorder.report.picture;"
-        "print([m for m in sys.modules if m.split('.')[0] in ('rclpy', 'ir_msgs', 'rosbags', 'matplotlib')])"
+        "import sys, ir_recorder, ir_recorder.report, ir_recorder.report_main, "
+        "ir_recorder.report.picture;print([m for m in sys.modules if m.split('.')[0] in "
+        "('rclpy', 'ir_msgs', 'rosbags', 'matplotlib')])"
     )
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert said.stdout.strip() == "[]"
@@ -125,6 +131,11 @@ def test_only_what_the_chosen_cell_said_is_read(tmp_path: Path) -> None:
 
 def test_a_recording_of_several_cells_says_which_one_is_read(tmp_path: Path) -> None:
     path = two_cells(tmp_path / "two.mcap")
-    assert any("(/left, /right); --namespace chooses" in problem for problem in read_recording(path).problems)
-    with pytest.raises(ReadError, match=r"no cell '/middle' in the recording; there is: /left, /right"):
+    assert any(
+        "(/left, /right); --namespace chooses" in problem
+        for problem in read_recording(path).problems
+    )
+    with pytest.raises(
+        ReadError, match=r"no cell '/middle' in the recording; there is: /left, /right"
+    ):
         read_recording(path, namespace="middle")

@@ -25,7 +25,10 @@ def test_ir_report_says_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixt
 
 
 def test_ir_report_reads_and_writes_only_below_its_roots(
-    demo_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    demo_file: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main([str(demo_file)]) == 1
@@ -36,7 +39,8 @@ def test_ir_report_reads_and_writes_only_below_its_roots(
 
 
 def test_a_report_replaces_a_report_and_nothing_else(demo_file: Path, tmp_path: Path) -> None:
-    target, roots = tmp_path / "report.html", ["--root", str(tmp_path), "--root", str(demo_file.parent)]
+    target = tmp_path / "report.html"
+    roots = ["--root", str(tmp_path), "--root", str(demo_file.parent)]
     target.write_text("my thesis")
     assert main([str(demo_file), "-o", str(target), *roots]) == 1
     assert target.read_text() == "my thesis"

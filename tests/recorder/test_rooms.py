@@ -50,13 +50,19 @@ ROOMS = [path.parent.name for path in sorted(FOLDER.glob("*/__init__.py"))]
 def own_imports(module: Path) -> Iterator[str]:
     """Rooms of this package that a module imports, its own aside."""
     for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("ir_recorder."):
+        if (
+            isinstance(node, ast.ImportFrom)
+            and node.module
+            and node.module.startswith("ir_recorder.")
+        ):
             yield node.module.split(".")[1]
         elif isinstance(node, ast.ImportFrom) and node.module == "ir_recorder":
             yield from (alias.name for alias in node.names)
 
 
-@pytest.mark.parametrize("module", sorted(FOLDER.rglob("*.py")), ids=lambda p: str(p.relative_to(FOLDER)))
+@pytest.mark.parametrize(
+    "module", sorted(FOLDER.rglob("*.py")), ids=lambda p: str(p.relative_to(FOLDER))
+)
 def test_a_room_knows_only_those_below_it(module: Path) -> None:
     room = module.relative_to(FOLDER).parts[0].removesuffix(".py")
     assert set(own_imports(module)) <= KNOWS[room] | {room}

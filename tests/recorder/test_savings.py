@@ -19,12 +19,20 @@ def test_the_savings_of_the_recording_stand_on_the_page(analysis: Analysis, page
     assert (savings.movements.common, savings.movements.planned) == (4000.0, 3000.0)
     assert (savings.total.common, savings.total.planned) == (5000.0, 3800.0)
     assert savings_section(analysis) in page
-    for words in ("25.0 %", "20.0 %", "24.0 %", "1 of 3 around bodies", "the controller&#x27;s own timers"):
+    for words in (
+        "25.0 %",
+        "20.0 %",
+        "24.0 %",
+        "1 of 3 around bodies",
+        "the controller&#x27;s own timers",
+    ):
         assert words in savings_section(analysis)
     assert "what was compared; program 0123456789abcdef" in page
 
 
-def test_lines_for_terminal_and_picture_name_the_baseline(analysis: Analysis, tmp_path: Path) -> None:
+def test_lines_for_terminal_and_picture_name_the_baseline(
+    analysis: Analysis, tmp_path: Path
+) -> None:
     movements, pauses, total = savings_lines(analysis)
     assert movements.startswith(
         "movements: 25.0 % saved by plan (predicted), 3 000 J instead of 4 000 J in 4.50 s"
@@ -33,7 +41,8 @@ def test_lines_for_terminal_and_picture_name_the_baseline(analysis: Analysis, tm
     assert "own timers" in pauses
     assert total.startswith("total: 24.0 %")
     plain = replace(analysis, recording=replace(analysis.recording, savings=()))
-    with_lines, without = tmp_path / "a.png", tmp_path / "b.png"
+    with_lines = tmp_path / "a.png"
+    without = tmp_path / "b.png"
     write_picture(analysis, with_lines)
     write_picture(plain, without)
     assert with_lines.read_bytes() != without.read_bytes()
@@ -65,6 +74,8 @@ def test_a_saving_that_may_be_none_says_so(analysis: Analysis) -> None:
     clear = replace(known.movements, saved_low=400.0, saved_high=1600.0)
     for saving, said in ((doubtful, True), (clear, False)):
         event = replace(analysis.recording.savings[0], savings=replace(known, movements=saving))
-        line = savings_lines(replace(analysis, recording=replace(analysis.recording, savings=(event,))))[0]
+        line = savings_lines(
+            replace(analysis, recording=replace(analysis.recording, savings=(event,)))
+        )[0]
         assert "90 % interval" in line
         assert ("zero lies in it" in line) is said

@@ -18,7 +18,9 @@ def test_the_motion_is_in_the_page_to_a_hundredth_of_a_degree(
     page: str, demo_file: Path, data_of: Any
 ) -> None:
     scene = data_of(page)["scene"]
-    counts = np.frombuffer(base64.b64decode(scene["angles"]), dtype="<i2").reshape(scene["frames"], 6)
+    counts = np.frombuffer(base64.b64decode(scene["angles"]), dtype="<i2").reshape(
+        scene["frames"], 6
+    )
     joints = read_recording(demo_file).joints
     np.testing.assert_allclose(counts[0] * scene["angleStep"], joints.position[0], atol=1.1e-4)
     np.testing.assert_allclose(counts[-1] * scene["angleStep"], joints.position[-1], atol=1.1e-4)
@@ -39,9 +41,15 @@ def test_doors_come_and_go_with_their_states_and_show_what_they_sweep() -> None:
     )
     bodies = door_bodies(cell, [TextEvent(time, "lathe", text) for time, text in texts])
     lathe = {each["name"]: each for each in bodies if each["owner"] == "lathe"}
-    ends = {state: cell.with_equipment("lathe", state=state) for state in ("door_open", "door_closed")}
+    ends = {
+        state: cell.with_equipment("lathe", state=state) for state in ("door_open", "door_closed")
+    }
     for time, state in ((1.0, "door_open"), (6.9, "door_closed"), (9.0, "door_closed")):
-        there = {name for name, each in lathe.items() if [now for at, now in each["shown"] if at <= time][-1]}
+        there = {
+            name
+            for name, each in lathe.items()
+            if [now for at, now in each["shown"] if at <= time][-1]
+        }
         assert there == {body.name for body in ends[state].machine("lathe").world_bodies()}
     swept = [each for each in lathe.values() if each["sweep"]]
     assert swept

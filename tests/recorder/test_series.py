@@ -27,5 +27,7 @@ def test_quantised_numbers_keep_half_a_step() -> None:
 
 
 def test_values_beyond_the_range_are_clipped() -> None:
-    back = np.frombuffer(base64.b64decode(quantised([np.inf, -1e308, np.nan, 2.0], 1e-3)), dtype="<i2")
+    back = np.frombuffer(
+        base64.b64decode(quantised([np.inf, -1e308, np.nan, 2.0], 1e-3)), dtype="<i2"
+    )
     assert back.tolist() == [32767, -32768, 0, 2000]

@@ -13,7 +13,13 @@ BODIES = [
     Body("c", "cylinder", np.eye(4), np.array([0.3, 1.0, 0.0])),
     Body("s", "sphere", np.eye(4), np.array([0.5, 0.0, 0.0])),
     Body("k", "capsule", np.eye(4), np.array([0.2, 0.7, 0.0])),
-    Body("m", "mesh", np.eye(4), np.zeros(3), np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])),
+    Body(
+        "m",
+        "mesh",
+        np.eye(4),
+        np.zeros(3),
+        np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]),
+    ),
 ]
 
 
@@ -23,7 +29,8 @@ def test_triangles_close_around_the_bodys_volume(body: Body) -> None:
     mesh = body_mesh(body)
     a, b, c = (mesh.points[mesh.triangles[:, k]] for k in range(3))
     volume = float(np.einsum("ti,ti->t", a, np.cross(b, c)).sum() / 6.0)
-    r, length = body.size[0], body.size[1]
+    r = body.size[0]
+    length = body.size[1]
     expected = {
         "box": float(np.prod(body.size)),
         "cylinder": np.pi * r**2 * length,

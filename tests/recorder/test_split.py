@@ -1,4 +1,6 @@
-"""Laws: the files of a split recording are together what one file would be, and each can be read alone."""
+"""Laws: the files of a split recording are together what one file would be, and each can be read
+alone.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +48,9 @@ def messages_of(raw: RawRecording) -> dict[str, list[tuple[int, bytes]]]:
     return {c.topic: list(zip(c.log_time.tolist(), c.messages, strict=True)) for c in raw.channels}
 
 
-@pytest.mark.parametrize("split", [Split(duration=1.5), Split(size=1_000_000), Split(1_000_000, 2.0)])
+@pytest.mark.parametrize(
+    "split", [Split(duration=1.5), Split(size=1_000_000), Split(1_000_000, 2.0)]
+)
 def test_the_files_are_together_what_one_file_is(split: Split, tmp_path: Path) -> None:
     whole = recorded(tmp_path / "whole.mcap", Split(), 7)
     parts = recorded(tmp_path / "parts.mcap", split, 7)
@@ -54,7 +58,8 @@ def test_the_files_are_together_what_one_file_is(split: Split, tmp_path: Path) -
     assert parts.seconds == whole.seconds
     assert len(parts.paths) > 2
     assert parts.paths == tuple(part_path(parts.path, part) for part in range(len(parts.paths)))
-    one, many = read_raw(whole.path), read_raw(parts.path)
+    one = read_raw(whole.path)
+    many = read_raw(parts.path)
     assert messages_of(many) == messages_of(one)
     assert many.problems == ()
     assert many.fact("shift") == "night"
@@ -84,7 +89,9 @@ def test_each_file_is_complete_for_other_readers(tmp_path: Path) -> None:
         assert summary.statistics.message_count > 200
 
 
-def test_files_that_are_missing_or_of_another_recording_are_named_or_left_out(tmp_path: Path) -> None:
+def test_files_that_are_missing_or_of_another_recording_are_named_or_left_out(
+    tmp_path: Path,
+) -> None:
     parts = recorded(tmp_path / "parts.mcap", Split(duration=1.5), 10)
     count = len(messages_of(read_raw(parts.path))["/joint_states"])
     own = len(messages_of(read_raw(parts.paths[2]))["/joint_states"])
@@ -106,7 +113,9 @@ def test_a_folder_counts_a_recording_in_several_files_once(tmp_path: Path) -> No
 
 
 def test_files_that_are_too_small_or_would_meet_others_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(SplitError, match="split_size is 10 bytes: it must be 0 or at least 1,000,000"):
+    with pytest.raises(
+        SplitError, match="split_size is 10 bytes: it must be 0 or at least 1,000,000"
+    ):
         Split(size=10)
     for wrong in (0.5, -1.0, float("nan"), float("inf")):
         with pytest.raises(SplitError, match="must be 0 or at least 1"):

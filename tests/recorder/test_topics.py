@@ -10,10 +10,21 @@ from ir_recorder.listen.topics import TopicSelection, checked_topics, single_typ
 
 def test_the_cells_topics_are_chosen_and_strangers_are_not() -> None:
     cell = TopicSelection()
-    for topic in ("/joint_states", "/robot_description", "/rosout", "/diagnostics", "/ir_planner/markers"):
+    for topic in (
+        "/joint_states",
+        "/robot_description",
+        "/rosout",
+        "/diagnostics",
+        "/ir_planner/markers",
+    ):
         assert topic in cell
     assert "/ir_sim_driver/execute_trajectory/_action/status" in cell
-    for topic in ("/camera/image", "/ir_planner_2/markers", "/ir_sim_driver/x/_action/feedback", "/_hidden"):
+    for topic in (
+        "/camera/image",
+        "/ir_planner_2/markers",
+        "/ir_sim_driver/x/_action/feedback",
+        "/_hidden",
+    ):
         assert topic not in cell
 
 

@@ -11,9 +11,13 @@ import pytest
 from ir_recorder import Analysis, analyse
 from ir_recorder.analysis.totals import unshortened_cycle
 
-MOTORS, BUS_OFF = 735.0, 205.0  # W with the 155 kg gripper, Table II at machine home
+# W with the 155 kg gripper, Table II at machine home
+MOTORS = 735.0
+BUS_OFF = 205.0
 BRAKES = 325.0  # W
-TIMER, BRAKING = 20.0, 1.0  # s until the controller closes the brakes; closing and opening
+# s until the controller closes the brakes; closing and opening
+TIMER = 20.0
+BRAKING = 1.0
 CHANGE = 23.0  # s into Bus Power Off and back, by the data
 
 
@@ -27,19 +31,26 @@ def test_movements_pauses_and_waiting_are_the_whole_program(analysis: Analysis) 
 
 
 def test_the_full_cycle_costs_what_its_pauses_are_longer(analysis: Analysis) -> None:
-    """Both pauses of the run at 600 s: the posture is not home, so motors on cost a little more or less."""
+    """Both pauses of the run at 600 s: the posture is not home, so motors on cost a little more or
+    less.
+    """
     facts = (("unshortened_pauses", "600 s, 600 s"),)
     program = analyse(replace(analysis.recording, facts=facts)).program
     assert program is not None
     full = program.unshortened
     assert full is not None
-    standing, resting = analysis.steps[2], analysis.steps[3]
-    assert full.seconds == pytest.approx(program.whole.seconds + 1200.0 - standing.seconds - resting.seconds)
+    standing = analysis.steps[2]
+    resting = analysis.steps[3]
+    assert full.seconds == pytest.approx(
+        program.whole.seconds + 1200.0 - standing.seconds - resting.seconds
+    )
     more = full.energy - program.whole.energy + standing.energy + resting.energy
     motors = standing.motors_power
     assert motors == pytest.approx(MOTORS, rel=0.3)
     left_alone = motors * (TIMER + BRAKING) + BRAKES * (600.0 - TIMER - BRAKING)
-    assert more == pytest.approx(left_alone + motors * CHANGE + BUS_OFF * (600.0 - CHANGE), rel=1e-6)
+    assert more == pytest.approx(
+        left_alone + motors * CHANGE + BUS_OFF * (600.0 - CHANGE), rel=1e-6
+    )
 
 
 def test_a_run_that_does_not_match_has_no_computed_cycle(analysis: Analysis) -> None:
@@ -56,7 +67,9 @@ def test_without_the_fact_nothing_is_shortened(analysis: Analysis) -> None:
 
 
 def test_a_pause_of_several_modes_lasts_longer_in_its_last_one() -> None:
-    """200 s through the brakes to the bus' rest took 60 kJ; 500 s more are spent there, at 205 W."""
+    """200 s through the brakes to the bus' rest took 60 kJ; 500 s more are spent there, at 205
+    W.
+    """
     movement = SimpleNamespace(is_pause=True, power_mode="STAND_ON_BRAKES>BUS_POWER_OFF")
     step = SimpleNamespace(movement=movement, start=0.0, end=200.0)
     pause = SimpleNamespace(step=step, seconds=200.0, energy=60_000.0)

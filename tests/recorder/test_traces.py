@@ -40,7 +40,9 @@ def test_semicolons_decimal_commas_dates_and_missing_values(tmp_path: Path) -> N
     np.testing.assert_allclose(np.diff(trace.time), [1.0, 1.0])
     np.testing.assert_allclose(trace.columns["power"], [1.5, np.nan, 2.5])
     assert trace.texts["mode"][2] == "BUS_POWER_OFF"
-    np.testing.assert_allclose(trace.joules(), [0.0, 1.5, 4.0])  # a missing mean counts as the one before
+    np.testing.assert_allclose(
+        trace.joules(), [0.0, 1.5, 4.0]
+    )  # a missing mean counts as the one before
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be"])
@@ -52,8 +54,13 @@ def test_the_unicode_text_of_a_spreadsheet_is_read(encoding: str, tmp_path: Path
 
 
 def test_a_mapping_names_columns_units_and_the_clock(tmp_path: Path) -> None:
-    text = "format: ir_trace/1\ncolumns: {time: {column: t, unit: ms}, power: {column: P total, unit: kW}}\n"
-    mapping = read_mapping(written(tmp_path, text + "clock_offset: 0.25\npower_is: sample\n", "map.yaml"))
+    text = (
+        "format: ir_trace/1\ncolumns: {time: {column: t, unit: ms}, power: {column: P total, "
+        "unit: kW}}\n"
+    )
+    mapping = read_mapping(
+        written(tmp_path, text + "clock_offset: 0.25\npower_is: sample\n", "map.yaml")
+    )
     (trace,) = read_traces(written(tmp_path, "t,P total,x\n0,1,?\n1000,3,?\n"), mapping)
     np.testing.assert_allclose(trace.time, [0.25, 1.25])
     np.testing.assert_allclose(trace.joules(), [0.0, 2000.0])  # samples: the trapezium
@@ -71,14 +78,20 @@ def test_a_mapping_names_columns_units_and_the_clock(tmp_path: Path) -> None:
         ("time,power\n0,1\n1,2\n1,1\n", ":4: time is 1 s, it must increase"),
         ("time,power\n0,1\n0,1\n1,2\n0.5,2\n", ":5: time is 0.5 s, it must increase"),
         ("time,power\n0,1\n1,2\n2\n", ":4: has 1 values, the header names 2 columns"),
-        ("time,joint_a1,joint_a2,joint_a3\n0,1,1,1\n1,1,1,1\n", "joint_a3 is no joint of the robot"),
+        (
+            "time,joint_a1,joint_a2,joint_a3\n0,1,1,1\n1,1,1,1\n",
+            "joint_a3 is no joint of the robot",
+        ),
         ("time,power\n0,1\n1,1e999\n", ":3: power is '1e999', it must be finite"),
         ("time,power\n,1\n1,1\n", ":2: time is '', it must be a number"),
         ("time [parsec],power\n0,1\n1,1\n", "unit 'parsec' is unknown, known are s, ms"),
         ("time,power,power_kW\n0,1,1\n1,1,1\n", "column power is there twice"),
         ("time,joint_a1\n0,1\n1,1\n", "there is no column joint_a2"),
         (b"\xff\xfe\x00\x01" * 20, "there is no column time"),
-        ("time,power\n0,1\n1,1\n".encode("utf-16-le"), "t.csv:1: has zero bytes: it is no text in UTF-8"),
+        (
+            "time,power\n0,1\n1,1\n".encode("utf-16-le"),
+            "t.csv:1: has zero bytes: it is no text in UTF-8",
+        ),
         ("time,power\n0," + "1" * 200_000 + "\n1,1\n", "t.csv"),
     ],
 )
@@ -90,7 +103,9 @@ def test_what_makes_no_sense_is_named_with_its_line(
     assert sentence in str(caught.value)
 
 
-def test_rows_said_twice_and_a_line_that_was_cut_are_left_out_with_a_sentence(tmp_path: Path) -> None:
+def test_rows_said_twice_and_a_line_that_was_cut_are_left_out_with_a_sentence(
+    tmp_path: Path,
+) -> None:
     text = "time;joint_a1;mode\n0;0,5;OFF\n0;0,5;OFF\n1;;OFF\n1;;OFF\n2;NaN;ON\n3;1,5"
     (trace,) = read_traces(written(tmp_path, text), joint_names=JOINTS[:1])
     np.testing.assert_array_equal(trace.time, [0.0, 1.0, 2.0])
@@ -109,7 +124,10 @@ def test_rows_said_twice_and_a_line_that_was_cut_are_left_out_with_a_sentence(tm
     end=st.sampled_from(("\n", "\r\n", "\r")),
 )
 def test_every_writing_of_the_same_numbers_is_read_alike(
-    rows: list[tuple[float, float, float]], sign: str, end: str, tmp_path_factory: pytest.TempPathFactory
+    rows: list[tuple[float, float, float]],
+    sign: str,
+    end: str,
+    tmp_path_factory: pytest.TempPathFactory,
 ) -> None:
     """Plain lines, which NumPy's parser reads, and the same ones in quotes, which it doesn't."""
     lines = [[repr(float(k)), *map(repr, row)] for k, row in enumerate(rows)]
@@ -136,8 +154,14 @@ def test_every_writing_of_the_same_numbers_is_read_alike(
         ("format: ir_cell/1", "is no mapping of a trace"),
         ("format: ir_trace/1\ncolumns: {power: p}", "must name at least time"),
         ("format: ir_trace/1\ncolumns: {time: t}\nclock: 3", "key 'clock' is unknown"),
-        ("format: ir_trace/1\ncolumns: {time: {column: t, unit: miles}}", "unit 'miles' is unknown"),
-        ("format: ir_trace/1\ncolumns: {time: t}\nclock_offset: soon", "must be a number of seconds"),
+        (
+            "format: ir_trace/1\ncolumns: {time: {column: t, unit: miles}}",
+            "unit 'miles' is unknown",
+        ),
+        (
+            "format: ir_trace/1\ncolumns: {time: t}\nclock_offset: soon",
+            "must be a number of seconds",
+        ),
     ],
 )
 def test_a_broken_mapping_is_named(content: str, sentence: str, tmp_path: Path) -> None:
@@ -154,9 +178,11 @@ def test_any_bytes_are_read_or_refused_with_a_sentence(
     try:
         (trace,) = read_traces(path)
     except TraceError as error:
-        named, increasing = str(path) in str(error), True
+        named = str(path) in str(error)
+        increasing = True
     else:
-        named, increasing = True, bool((np.diff(trace.time) > 0.0).all())
+        named = True
+        increasing = bool((np.diff(trace.time) > 0.0).all())
     assert named
     assert increasing
 
@@ -208,6 +234,7 @@ def test_the_offset_of_a_clock_is_found_within_a_sample(offset: float, rate: flo
 
 
 def test_powers_of_two_runs_are_not_aligned() -> None:
-    rng, time = np.random.default_rng(2), np.arange(0.0, 30.0, 0.01)
+    rng = np.random.default_rng(2)
+    time = np.arange(0.0, 30.0, 0.01)
     with pytest.raises(TraceError, match="give clock_offset"):
         clock_offset(time, rng.normal(size=len(time)), time, rng.normal(size=len(time)))

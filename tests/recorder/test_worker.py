@@ -1,4 +1,6 @@
-"""Laws: a slow disk costs messages, which are counted, and nothing else; a kill costs the last second."""
+"""Laws: a slow disk costs messages, which are counted, and nothing else; a kill costs the last
+second.
+"""
 
 from __future__ import annotations
 
@@ -77,12 +79,16 @@ def test_messages_that_find_no_place_are_counted_and_the_others_written(tmp_path
     assert read_raw(summary.path).channel("/text").log_time.tolist() == list(range(100))
 
 
-def test_a_disk_that_refuses_ends_the_recording_with_its_sentence(tmp_path: Path, wait_for: Any) -> None:
+def test_a_disk_that_refuses_ends_the_recording_with_its_sentence(
+    tmp_path: Path, wait_for: Any
+) -> None:
     writer = RecordingWriter(tmp_path / "full.mcap")
     session = RecordingSession(writer, {}, 0)
     session.open_topic("/text", STRING, [])
     worker = RecordingWorker(session, most=1_000_000)
-    worker.do(lambda session: (_ for _ in ()).throw(writer.fail(OSError(28, "No space left on device"))))
+    worker.do(
+        lambda session: (_ for _ in ()).throw(writer.fail(OSError(28, "No space left on device")))
+    )
     wait_for(lambda: worker._failure, what="the failure is known")
     for act in (worker.check, lambda: worker.write([Message("/text", b"", 1)]), worker.finish):
         with pytest.raises(WriteError, match="No space left on device"):
@@ -90,9 +96,12 @@ def test_a_disk_that_refuses_ends_the_recording_with_its_sentence(tmp_path: Path
 
 
 def killed(folder: Path, number: int, wait_for: Any) -> None:
-    """Kill a recording process; what it had handed to the system is there, as a prefix of what it wrote."""
+    """Kill a recording process; what it had handed to the system is there, as a prefix of what it
+    wrote.
+    """
     folder.mkdir(exist_ok=True)
-    path, counts = folder / f"{number}.mcap", folder / f"{number}.counts"
+    path = folder / f"{number}.mcap"
+    counts = folder / f"{number}.counts"
     counts.write_bytes(bytes(16))
     with counts.open("r+b") as file, mmap.mmap(file.fileno(), 16) as shown:
         process = subprocess.Popen(
@@ -100,7 +109,10 @@ def killed(folder: Path, number: int, wait_for: Any) -> None:
         )
         try:
             wait_for(
-                lambda: struct.unpack("<qq", shown)[1] > 300 + 700 * number or process.poll() is not None,
+                lambda: (
+                    struct.unpack("<qq", shown)[1] > 300 + 700 * number
+                    or process.poll() is not None
+                ),
                 what="messages are with the system",
             )
             assert process.poll() is None, "the recording process has ended by itself"

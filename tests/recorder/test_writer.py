@@ -34,9 +34,15 @@ def test_mcap_ros2_support_reads_every_message_back(demo_file: Path) -> None:
 def test_rosbags_reads_every_message_back(demo_file: Path) -> None:
     with AnyReader([demo_file]) as reader:
         topics = {connection.topic for connection in reader.connections}
-        count = sum(reader.deserialize(raw, c.msgtype) is not None for c, _, raw in reader.messages())
+        count = sum(
+            reader.deserialize(raw, c.msgtype) is not None for c, _, raw in reader.messages()
+        )
         assert count == reader.message_count
-    assert {"/joint_states", "/ir_sim_driver/power_state", "/ir_program_runner/program_state"} <= topics
+    assert {
+        "/joint_states",
+        "/ir_sim_driver/power_state",
+        "/ir_program_runner/program_state",
+    } <= topics
 
 
 def test_chunks_messages_and_attachments_are_indexed(demo_file: Path) -> None:
@@ -52,7 +58,9 @@ def test_chunks_messages_and_attachments_are_indexed(demo_file: Path) -> None:
         "robot.urdf",
         "robot.yaml",
     }
-    assert sum(summary.statistics.channel_message_counts.values()) == summary.statistics.message_count
+    assert (
+        sum(summary.statistics.channel_message_counts.values()) == summary.statistics.message_count
+    )
 
 
 def test_channels_carry_what_rosbag2_wants(demo_file: Path) -> None:
@@ -107,12 +115,17 @@ def test_overwrite_never_touches_what_is_no_recording(tmp_path: Path) -> None:
 
 
 def test_a_recording_stays_below_its_roots(tmp_path: Path) -> None:
-    inside, outside = tmp_path / "inside", tmp_path / "outside"
+    inside = tmp_path / "inside"
+    outside = tmp_path / "outside"
     inside.mkdir()
     outside.mkdir()
     (inside / "link").symlink_to(outside)
     roots = FileRoots.of([inside])
-    for path in (outside / "a.mcap", inside / ".." / "outside" / "a.mcap", inside / "link" / "a.mcap"):
+    for path in (
+        outside / "a.mcap",
+        inside / ".." / "outside" / "a.mcap",
+        inside / "link" / "a.mcap",
+    ):
         with pytest.raises(PathError, match="lies outside of the folders"):
             RecordingWriter(path, roots=roots)
     assert list(outside.iterdir()) == []
@@ -143,7 +156,9 @@ def test_paths_that_cannot_become_recordings_are_refused(name: str, sentence: st
         RecordingWriter(name)
 
 
-def test_a_full_disk_is_a_sentence_and_stays_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_is_a_sentence_and_stays_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def full(self: FileRoots, path: Path, replaces: bytes | None = None) -> BinaryIO:
         return open("/dev/full", "wb")
 

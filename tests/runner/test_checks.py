@@ -17,17 +17,23 @@ def move(start=0.0, end=0.0, **fields):
     positions = np.zeros((2, 6))
     positions[:, 1] = start, end
     trajectory = JointTrajectory(JOINT_NAMES, [0, 10**9], positions)
-    return PlannedMovement(**{"kind": "regional", "trajectory": trajectory, "load": "gripper", **fields})
+    return PlannedMovement(
+        **{"kind": "regional", "trajectory": trajectory, "load": "gripper", **fields}
+    )
 
 
 @pytest.mark.parametrize(
     ("movements", "sentence"),
     [
         ([], "the program has no movements"),
-        ([move(trajectory=None, to_station="lathe")], r"step 1 of 1 \(regional lathe\) has no points"),
+        (
+            [move(trajectory=None, to_station="lathe")],
+            r"step 1 of 1 \(regional lathe\) has no points",
+        ),
         (
             [move(0.0, 0.5), PlannedMovement(kind="pause"), move(0.2)],
-            r"step 3 of 3 \(regional\) starts -0.3000 rad at joint_a2 from where the movement before ends",
+            r"step 3 of 3 \(regional\) starts -0.3000 rad at joint_a2 from where the movement "
+            r"before ends",
         ),
         ([move(wait_for=("door=2",))], 'signal "door=2" has level "2"'),
         ([move(set_signals=("",))], "name of a signal is ''"),

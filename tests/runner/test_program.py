@@ -1,4 +1,6 @@
-"""A program against a fake world: its order, its pauses to the second, what happens when something fails."""
+"""A program against a fake world: its order, its pauses to the second, what happens when something
+fails.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ from ir_program_runner.errors import CanceledError
 from ir_program_runner.program import Program
 from ir_program_runner.settings import ProgramSettings
 
-ENTER, STAY, LEAVE = 3.0, 2.0, 20.0
+ENTER = 3.0
+STAY = 2.0
+LEAVE = 20.0
 TO = {
     Mode.STAND_ON_BRAKES: Mode.TO_BRAKES,
     Mode.BUS_POWER_OFF: Mode.TO_BUS_POWER_OFF,
@@ -67,7 +71,9 @@ class World:
                     request = steps.throw(CanceledError())
                     continue
                 status, modes = self.fulfil(request)
-                request = steps.send(ask.Outcome(self.now, self.heard, status, modes, self.watts * self.now))
+                request = steps.send(
+                    ask.Outcome(self.now, self.heard, status, modes, self.watts * self.now)
+                )
         except StopIteration as ended:
             return ended.value
 
@@ -79,7 +85,7 @@ class World:
         known = [mode for when, mode in self.past if when <= self.now - self.late]
         return known[-1] if known else self.past[0][1]
 
-    def fulfil(self, request):
+    def fulfil(self, request):  # noqa: C901, PLR0912
         refusal = self.refusals.get(type(request).__name__)
         if refusal is not None:
             return refusal, ()
@@ -113,7 +119,11 @@ class World:
                     )
                     for mode in TO
                 )
-                return (Status.success(), table) if self.knows_modes else (Status(StatusCode.TIMED_OUT), ())
+                return (
+                    (Status.success(), table)
+                    if self.knows_modes
+                    else (Status(StatusCode.TIMED_OUT), ())
+                )
             case ask.SendWakePacket():
                 self.packets += 1
                 self.log.append("packet")
@@ -126,7 +136,8 @@ class World:
         return Status.success(), ()
 
     def set_bit(self, name, value):
-        before, self.bits[name] = self.bits.get(name, False), value
+        before = self.bits.get(name, False)
+        self.bits[name] = value
         if self.ignores_bits:
             return
         rest = REST_OF.get(name)
@@ -150,7 +161,9 @@ class World:
     def wait_for_mode(self, modes, timeout):
         deadline = self.now + timeout
         while self.heard not in modes:
-            coming = [when for when, _ in self.changes] + [when + self.late for when, _ in self.past]
+            coming = [when for when, _ in self.changes] + [
+                when + self.late for when, _ in self.past
+            ]
             soon = [when for when in coming if self.now < when <= deadline]
             if not soon:
                 self.pass_time(deadline)
@@ -212,7 +225,8 @@ def test_signals_are_awaited_before_a_step_and_set_after_it():
 def test_a_signal_that_does_not_come_ends_the_program():
     world = World()
     result = world.run(
-        [move(), move(from_station="lathe", wait_for=("door_open",))], ProgramSettings(signal_timeout=30.0)
+        [move(), move(from_station="lathe", wait_for=("door_open",))],
+        ProgramSettings(signal_timeout=30.0),
     )
     assert result.status.code == StatusCode.TIMED_OUT
     assert result.status.message == (
@@ -302,7 +316,8 @@ def test_a_pause_that_is_too_short_is_spent_on_motors_and_says_so():
     result = world.run([pause(24.9, "BUS_POWER_OFF")])
     assert result.status.ok
     assert world.log[-1] == (
-        "0 ended: the pause of 24.9 s is too short for BUS_POWER_OFF, which needs 25 s: stood on motors"
+        "0 ended: the pause of 24.9 s is too short for BUS_POWER_OFF, which needs 25 s: stood on "
+        "motors"
     )
     assert "ab=1" not in world.log
 
@@ -340,7 +355,9 @@ def test_a_robot_that_does_not_wake_ends_the_program():
     assert "drive" not in world.log
 
 
-@pytest.mark.parametrize("mode", [Mode.BUS_POWER_OFF, Mode.HIBERNATION, Mode.EMERGENCY_STOP, Mode.MOVING])
+@pytest.mark.parametrize(
+    "mode", [Mode.BUS_POWER_OFF, Mode.HIBERNATION, Mode.EMERGENCY_STOP, Mode.MOVING]
+)
 def test_a_program_does_not_start_unless_the_robot_stands_awake(mode):
     world = World(mode=mode)
     result = world.run([move()])
@@ -355,13 +372,17 @@ def test_an_aborted_movement_ends_the_program_with_the_drivers_sentence():
     sentence = "the driver aborted with -4: joint_a2 is 0.2 rad off"
     world = World(refusals={"Drive": Status(StatusCode.FAILURE, sentence)})
     result = world.run([move(from_station="lathe", to_station="table"), move()])
-    assert result.status == Status(StatusCode.FAILURE, f"step 1 of 2 (regional lathe -> table): {sentence}")
+    assert result.status == Status(
+        StatusCode.FAILURE, f"step 1 of 2 (regional lathe -> table): {sentence}"
+    )
     assert result.executed == 0
     assert world.log[-1] == f"0 failed: {sentence}"
 
 
 def test_a_refused_load_ends_the_program_before_anything_moves():
-    world = World(refusals={"SetLoad": Status(StatusCode.INVALID_OBJECT_NAME, 'load "x": known are gripper')})
+    world = World(
+        refusals={"SetLoad": Status(StatusCode.INVALID_OBJECT_NAME, 'load "x": known are gripper')}
+    )
     result = world.run([move(load="x")])
     assert result.status.code == StatusCode.INVALID_OBJECT_NAME
     assert "drive" not in world.log
@@ -402,7 +423,9 @@ def test_a_cancel_while_moving_says_where():
 @pytest.mark.parametrize("mode", ["BUS_POWER_OFF", "STAND_ON_BRAKES"])
 def test_a_cancel_in_a_pause_leaves_no_bit_behind(mode):
     world = World()
-    world.cancel_in = lambda request: isinstance(request, ask.WaitUntil) and world.mode is Mode[mode]
+    world.cancel_in = lambda request: (
+        isinstance(request, ask.WaitUntil) and world.mode is Mode[mode]
+    )
     result = world.run([pause(60.0, mode), move()])
     assert result.status.code == StatusCode.PREEMPTED
     assert not any(world.bits.values())
@@ -411,7 +434,9 @@ def test_a_cancel_in_a_pause_leaves_no_bit_behind(mode):
 
 def test_a_cancel_in_hibernation_wakes_the_robot():
     world = World()
-    world.cancel_in = lambda request: isinstance(request, ask.WaitUntil) and world.mode is Mode.HIBERNATION
+    world.cancel_in = lambda request: (
+        isinstance(request, ask.WaitUntil) and world.mode is Mode.HIBERNATION
+    )
     assert world.run([pause(60.0, "HIBERNATION")]).status.code == StatusCode.PREEMPTED
     assert world.packets == 1
     assert world.mode is Mode.FROM_HIBERNATION

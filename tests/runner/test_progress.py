@@ -14,11 +14,15 @@ def move(start=0.0, end=0.0, **fields):
     positions = np.zeros((2, 6))
     positions[:, 1] = start, end
     trajectory = JointTrajectory(JOINT_NAMES, [0, 10**9], positions)
-    return PlannedMovement(**{"kind": "regional", "trajectory": trajectory, "load": "gripper", **fields})
+    return PlannedMovement(
+        **{"kind": "regional", "trajectory": trajectory, "load": "gripper", **fields}
+    )
 
 
 def test_the_rest_of_a_program_is_what_is_planned():
-    progress = Progress("id", [move(duration=2.0), PlannedMovement(kind="pause", duration=10.0)], started=0.0)
+    progress = Progress(
+        "id", [move(duration=2.0), PlannedMovement(kind="pause", duration=10.0)], started=0.0
+    )
     progress.begin(0)
     assert progress.remaining(6.0) == 12.0
     progress.step_started = 5.0

@@ -42,7 +42,9 @@ REST = {"ab": Mode.BUS_POWER_OFF, "hib": Mode.HIBERNATION, "drives_off": Mode.ST
 
 
 class FakeDriver(Node):
-    """Keeps the driver's interfaces; modes change at once, a movement lasts as long as its trajectory."""
+    """Keeps the driver's interfaces; modes change at once, a movement lasts as long as its
+    trajectory.
+    """
 
     def __init__(self, context):
         super().__init__("ir_sim_driver", context=context)
@@ -167,14 +169,18 @@ class Cell:
         values = {"mac": MAC, "wake_repeat": 30.0, "silence_timeout": 30.0, **overrides}
         parameters = [Parameter(name, value=value) for name, value in values.items()]
         self.runner = executor.add_node(
-            ProgramRunnerNode(self.driver.receive, machines, context=context, parameter_overrides=parameters)
+            ProgramRunnerNode(
+                self.driver.receive, machines, context=context, parameter_overrides=parameters
+            )
         )
         self.planner = executor.add_node(FakePlanner(context))
         self.test = executor.add_node(Node("test", context=context))
         self.client = Client(context=context, timeout=60.0)
         self.states = []
         self.set_by_program = []
-        kept = QoSProfile(history=HistoryPolicy.KEEP_ALL, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        kept = QoSProfile(
+            history=HistoryPolicy.KEEP_ALL, durability=DurabilityPolicy.TRANSIENT_LOCAL
+        )
         self.test.create_subscription(
             ProgramState, "ir_program_runner/program_state", self.states.append, kept
         )
@@ -192,7 +198,9 @@ class Cell:
 
     @contextmanager
     def running(self, movements, wait_for):
-        """Run a program during the block, and cancel it at its end; its result is in the list then."""
+        """Run a program during the block, and cancel it at its end; its result is in the list
+        then.
+        """
 
         def answered(ask):
             future = self.executor.run(ask)
@@ -264,8 +272,11 @@ def test_a_program_is_fetched_by_its_id_and_run(cell, wait_for):
     wait_for(lambda: (1, 2, "moving") in phases)
 
 
-def test_diagnostics_say_what_runs_how_it_ended_and_whether_the_driver_is_heard(impatient, wait_for):
-    cell, said = impatient, []
+def test_diagnostics_say_what_runs_how_it_ended_and_whether_the_driver_is_heard(
+    impatient, wait_for
+):
+    cell = impatient
+    said = []
     cell.executor.run(
         lambda: cell.test.create_subscription(
             DiagnosticArray,
@@ -279,10 +290,16 @@ def test_diagnostics_say_what_runs_how_it_ended_and_whether_the_driver_is_heard(
     with cell.running([pause(600.0)], wait_for):
         wait_for(lambda: any("step 1 of 1: pause" in message for _, _, message in said))
     cell.run(program_id="not\nknown")
-    wait_for(lambda: any(level == DiagnosticStatus.WARN and "unknown program" in m for _, level, m in said))
+    wait_for(
+        lambda: any(
+            level == DiagnosticStatus.WARN and "unknown program" in m for _, level, m in said
+        )
+    )
     assert not any("\n" in message for _, _, message in said)
     cell.executor.run(cell.driver.timer.cancel)
-    wait_for(lambda: any("nothing was heard from ir_sim_driver" in message for _, _, message in said))
+    wait_for(
+        lambda: any("nothing was heard from ir_sim_driver" in message for _, _, message in said)
+    )
 
 
 def test_pauses_switch_the_bits_and_wake_by_a_packet(cell):
@@ -371,7 +388,9 @@ def test_a_driver_that_falls_silent_ends_the_program(impatient, wait_for):
     wait_for(lambda: cell.driver.log[-1] == "stopped")
 
 
-def test_a_driver_that_falls_silent_in_a_pause_ends_the_program_and_the_bit_is_taken_back(impatient):
+def test_a_driver_that_falls_silent_in_a_pause_ends_the_program_and_the_bit_is_taken_back(
+    impatient,
+):
     cell = impatient
 
     def fall_silent(at):
@@ -429,12 +448,22 @@ def test_parameters_do_not_change_while_a_program_runs(cell, wait_for):
     [
         ({}, -16, "give either program_id or movements"),
         ({"program_id": "other"}, -19, 'unknown program "other"'),
-        ({"movements": [pause(1.0)], "program_id": "known"}, -16, "give either program_id or movements"),
-        ({"movements": [move(set_signals=("x=7",))]}, -2, 'signal "x=7" has level "7": known are 0, 1'),
+        (
+            {"movements": [pause(1.0)], "program_id": "known"},
+            -16,
+            "give either program_id or movements",
+        ),
+        (
+            {"movements": [move(set_signals=("x=7",))]},
+            -2,
+            'signal "x=7" has level "7": known are 0, 1',
+        ),
         ({"movements": [move(load="anvil")]}, -19, "load: known are gripper, part"),
     ],
 )
-def test_a_bad_request_is_answered_by_a_sentence_and_the_node_lives(cell, request_fields, code, sentence):
+def test_a_bad_request_is_answered_by_a_sentence_and_the_node_lives(
+    cell, request_fields, code, sentence
+):
     result = cell.run(**request_fields)
     assert result.status.code == code
     assert sentence in result.status.message
@@ -496,7 +525,9 @@ class SimulatedTime:
 
     def tick(self):
         self.now += 0.1
-        self.publisher.publish(Clock(clock=Time(sec=int(self.now), nanosec=int(self.now % 1 * 1e9))))
+        self.publisher.publish(
+            Clock(clock=Time(sec=int(self.now), nanosec=int(self.now % 1 * 1e9)))
+        )
 
 
 @pytest.fixture

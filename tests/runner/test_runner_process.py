@@ -1,4 +1,6 @@
-"""The runner as a process: it ends with 0 when it is asked to, and with a sentence when it can't start."""
+"""The runner as a process: it ends with 0 when it is asked to, and with a sentence when it can't
+start.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ NODE = [sys.executable, "-m", "ir_program_runner.node"]
 # at its first line in the log the node is only half made
 @pytest.mark.parametrize("moment", ["ready to run programs", "ir_program_runner"])
 @pytest.mark.parametrize("signal_number", [signal.SIGINT, signal.SIGTERM])
-def test_a_node_that_is_asked_to_end_exits_with_zero(signal_number, moment, ros_domain_id, monkeypatch):
+def test_a_node_that_is_asked_to_end_exits_with_zero(
+    signal_number, moment, ros_domain_id, monkeypatch
+):
     monkeypatch.setenv("ROS_DOMAIN_ID", str(ros_domain_id))
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
     arguments = ["--ros-args", "--log-level", "debug"]

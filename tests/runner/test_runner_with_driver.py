@@ -1,4 +1,6 @@
-"""The runner with the real driver (ideal robot, short transitions): both keep the same interfaces."""
+"""The runner with the real driver (ideal robot, short transitions): both keep the same
+interfaces.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,9 @@ def client(ros_context, ros_executor):
     }
     settings = parameters({"backend": "ideal", "wake_port": 0, **times})
     with BackgroundExecutor(ros_context) as driver_executor:
-        driver = driver_executor.add_node(SimDriver(context=ros_context, parameter_overrides=settings))
+        driver = driver_executor.add_node(
+            SimDriver(context=ros_context, parameter_overrides=settings)
+        )
 
         def send(packet, address, port):
             send_packet(packet, address, driver.port_of("wake_on_lan"))

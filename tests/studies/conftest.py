@@ -12,7 +12,9 @@ from ir_studies import Means
 from ir_studies.arena import ArenaSettings, Finished, run_arena
 from ir_studies.work.means import Progress, nobody
 
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # scripts, imported from their folder
+sys.path.append(
+    str(Path(__file__).parents[2] / "benchmarks")
+)  # scripts, imported from their folder
 
 WORKER = Path(__file__).with_name("fake_worker.py")
 Fought = Callable[..., Finished]

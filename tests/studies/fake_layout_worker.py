@@ -1,4 +1,6 @@
-"""A worker that plans nothing: costs are a bowl, some places impossible, one plan hangs, one dies once."""
+"""A worker that plans nothing: costs are a bowl, some places impossible, one plan hangs, one dies
+once.
+"""
 
 import json
 import os
@@ -11,12 +13,17 @@ assert json.loads(sys.stdin.readline())["kind"] == "layout"
 print(json.dumps({"ready": True}), flush=True)
 for line in sys.stdin:
     words = json.loads(line)
-    x, y = words["values"].get("base.x", 0.0), words["values"].get("base.y", 0.0)
+    x = words["values"].get("base.x", 0.0)
+    y = words["values"].get("base.y", 0.0)
     coarse = 1000.0 + 400.0 * ((x - 0.15) ** 2 + (y + 0.2) ** 2)
     if words["stage"] == "look":
         row = {"solved": True, "coarse": [coarse for _ in words["payloads"]]}
         if x > 0.4 or "nowhere" in sys.argv:
-            row = {"solved": False, "kind": "out of reach", "message": "station infeed_pick is too far"}
+            row = {
+                "solved": False,
+                "kind": "out of reach",
+                "message": "station infeed_pick is too far",
+            }
         print(json.dumps(row), flush=True)
         continue
     if words["seed"] == 0 and "hang" in sys.argv and x == y == 0.0:

@@ -18,5 +18,13 @@ for line in sys.stdin:
         os._exit(3)
     cost = 1000.0 + 100.0 * entry["seed"]
     row = {"solved": True, "free_ptp": False, "cost_j": cost, "energy_j": cost, "duration_s": 2.0}
-    row |= {"movement_cost": 5.0, "clearance_m": 0.02, "first_s": 0.1, "final_s": 0.2, "total_s": 0.3}
-    print(json.dumps({**row, "requests": 1, "progress": [[0.1, 2 * cost], [0.2, cost]]}), flush=True)
+    row |= {
+        "movement_cost": 5.0,
+        "clearance_m": 0.02,
+        "first_s": 0.1,
+        "final_s": 0.2,
+        "total_s": 0.3,
+    }
+    print(
+        json.dumps({**row, "requests": 1, "progress": [[0.1, 2 * cost], [0.2, cost]]}), flush=True
+    )

@@ -29,9 +29,18 @@ def run(planner: str, task: str, cost: float, first: float, final: float) -> Run
     entry = Entry(planner, "open", task, 0, "", "synchronous")
     if math.isnan(cost):
         return Run(entry, {"solved": False, "total_s": 1.0})
-    row = {"solved": True, "cost_j": cost, "first_s": first, "final_s": final, "movement_cost": cost}
+    row = {
+        "solved": True,
+        "cost_j": cost,
+        "first_s": first,
+        "final_s": final,
+        "movement_cost": cost,
+    }
     progress = [[first, 2.0 * cost], [final, cost]]
-    return Run(entry, {**row, "duration_s": 1.0, "energy_j": cost, "clearance_m": 0.02, "progress": progress})
+    return Run(
+        entry,
+        {**row, "duration_s": 1.0, "energy_j": cost, "clearance_m": 0.02, "progress": progress},
+    )
 
 
 RUNS = [
@@ -44,7 +53,10 @@ TIME = np.array([0.0, 0.1, 0.25, 0.55, 1.0])
 
 
 def test_success_is_a_share_of_all_runs_that_only_grows() -> None:
-    assert success_over_time(("a", "b"), RUNS, TIME).T.tolist() == [[0, 50, 50, 100, 100], [0, 0, 50, 50, 50]]
+    assert success_over_time(("a", "b"), RUNS, TIME).T.tolist() == [
+        [0, 50, 50, 100, 100],
+        [0, 0, 50, 50, 50],
+    ]
 
 
 def test_cost_is_held_against_the_best_known_of_the_same_question() -> None:
@@ -62,7 +74,11 @@ def test_figures_of_a_planner_count_what_it_did_not_solve() -> None:
 
 def test_what_costs_nothing_is_a_figure_too() -> None:
     """As W of a task that ends where it begins, and J of it where a second is worth nothing."""
-    runs = [run("a", "stay", 0.0, 0.1, 0.5), run("b", "stay", 0.0, 0.2, 0.5), run("c", "stay", 3.0, 0.1, 0.2)]
+    runs = [
+        run("a", "stay", 0.0, 0.1, 0.5),
+        run("b", "stay", 0.0, 0.2, 0.5),
+        run("c", "stay", 3.0, 0.1, 0.2),
+    ]
     assert (figures("a", runs).cost_ratio, figures("b", runs).movement_ratio) == (1.0, 1.0)
     assert math.isnan(figures("c", runs).cost_ratio)
     assert compared("a", "b", runs) == Compared(1, 1.0, 0)
@@ -99,12 +115,18 @@ def test_planners_are_summed_up_with_free_questions_apart() -> None:
 def test_the_page_says_by_itself_where_the_portfolio_is_beaten() -> None:
     settings = ArenaSettings(cells=("open",), planners=("portfolio", "sbl"))
     mine = [run("portfolio", "1", 100.0, 0.1, 0.5), run("portfolio", "2", 200.0, 0.1, 0.5)]
-    said = verdict([*mine, run("sbl", "1", 90.0, 0.1, 0.5), run("sbl", "2", math.nan, 0.0, 0.0)], settings)
-    assert "open: J of sbl is 10.00 % below the portfolio&#x27;s in the median of the 1 runs" in said
+    said = verdict(
+        [*mine, run("sbl", "1", 90.0, 0.1, 0.5), run("sbl", "2", math.nan, 0.0, 0.0)], settings
+    )
+    assert (
+        "open: J of sbl is 10.00 % below the portfolio&#x27;s in the median of the 1 runs" in said
+    )
     assert "it is lower in 1 of them" in said
     assert "solved" not in said.partition("runs that both solved")[2]
     same = [run("sbl", task, cost, 0.1, 0.5) for task, cost in (("1", 100.0), ("2", 250.0))]
-    assert "In no cell did anybody solve more than the portfolio" in verdict([*mine, *same], settings)
+    assert "In no cell did anybody solve more than the portfolio" in verdict(
+        [*mine, *same], settings
+    )
     more = [run("portfolio", "1", math.nan, 0.0, 0.0), run("sbl", "1", 90.0, 0.1, 0.5)]
     assert "open: sbl solved 1 of 1, the portfolio 0." in verdict(more, settings)
 
@@ -118,8 +140,12 @@ def test_free_questions_do_not_hide_where_the_portfolio_is_beaten() -> None:
     ]
     blocked = [run("portfolio", "b", 100.0, 0.1, 0.5), run("sbl", "b", 90.0, 0.1, 0.5)]
     assert "open: J of sbl is 10.00 % below" in verdict([*free, *blocked], settings)
-    cheaper = [replace(r, row={**r.row, "cost_j": 45.0}) if r.entry.planner == "sbl" else r for r in free]
-    assert "open, straight movement free: J of sbl is 10.00 % below" in verdict([*cheaper], settings)
+    cheaper = [
+        replace(r, row={**r.row, "cost_j": 45.0}) if r.entry.planner == "sbl" else r for r in free
+    ]
+    assert "open, straight movement free: J of sbl is 10.00 % below" in verdict(
+        [*cheaper], settings
+    )
 
 
 def test_means_are_of_questions_that_all_solved() -> None:

@@ -42,7 +42,9 @@ def test_what_hangs_is_cut_and_what_dies_is_tried_once_more(fought: Fought) -> N
     finished = fought("sbl", "tree", "prm")
     assert outcomes(finished) == {"sbl": {"answered"}, "tree": {"answered"}, "prm": {"died"}}
     assert [row["solved"] for row in table(finished)] == ["1", "1", "0"] * 2
-    assert {run.row["message"] for run in finished.runs if not run.solved} == {"twice the process died"}
+    assert {run.row["message"] for run in finished.runs if not run.solved} == {
+        "twice the process died"
+    }
     hanging = fought("rrt", folder="hanging", hang_after=1.0)
     assert outcomes(hanging) == {"rrt": {"cut"}}
     assert [row["solved"] for row in table(hanging)] == ["0"] * 2
@@ -73,7 +75,9 @@ def test_interrupted_and_resumed_it_gives_the_same_table(fought: Fought, tmp_pat
     with (tmp_path / "out" / NAME).open("ab") as file:  # as a line that power loss cut
         file.write(b'{"key": "sbl|open|home->p1|3||sync')
     again: list[str] = []
-    resumed = fought("sbl", "genetic", seeds=4, progress=lambda phase, done, of, best: again.append(phase))
+    resumed = fought(
+        "sbl", "genetic", seeds=4, progress=lambda phase, done, of, best: again.append(phase)
+    )
     assert len(again) == len(set(again)) == 8 - 3
     assert set(made).isdisjoint(again)
     whole = fought("sbl", "genetic", seeds=4, folder="other")
@@ -94,7 +98,11 @@ def test_the_settings_in_the_folder_run_the_same_arena(
     finished = fought("sbl", "genetic")
     kept = finished.files[-1]
     settings = read_settings(kept)
-    assert (settings.planners, settings.seconds, settings.tasks) == (("sbl", "genetic"), 0.01, ("home->p1",))
+    assert (settings.planners, settings.seconds, settings.tasks) == (
+        ("sbl", "genetic"),
+        0.01,
+        ("home->p1",),
+    )
     again = run_arena(settings, tmp_path / "again", Means(2, command=command))
     assert table(again) == table(finished)
     kept.write_text(kept.read_text() + "# mine\n")
@@ -108,7 +116,8 @@ def test_the_settings_in_the_folder_run_the_same_arena(
 def test_a_cell_file_is_known_from_wherever_it_is_named(
     tmp_path: Path, command: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    cells, settings = tmp_path / "my cells", tmp_path / "arena.yaml"
+    cells = tmp_path / "my cells"
+    settings = tmp_path / "arena.yaml"
     cells.mkdir()
     (cells / name).write_text(cell_to_yaml(load_cell("open")))
     head = "format: ir_arena/1\nplanners: [sbl, prm]\ntasks: [home->p1]\nseeds: 2\nseconds: 0.01\n"
@@ -124,8 +133,11 @@ def test_a_cell_file_is_known_from_wherever_it_is_named(
     assert made == []
 
 
-def test_a_cell_that_changed_between_two_runs_is_refused(tmp_path: Path, command: tuple[str, ...]) -> None:
-    file, settings = tmp_path / "cell.yaml", tmp_path / "arena.yaml"
+def test_a_cell_that_changed_between_two_runs_is_refused(
+    tmp_path: Path, command: tuple[str, ...]
+) -> None:
+    file = tmp_path / "cell.yaml"
+    settings = tmp_path / "arena.yaml"
     file.write_text(cell_to_yaml(load_cell("open")))
     settings.write_text(
         "format: ir_arena/1\nplanners: [sbl]\ntasks: [home->p1]\nseeds: 1\nseconds: 0.01\n"
@@ -148,7 +160,9 @@ def test_a_folder_of_other_settings_is_refused(fought: Fought, tmp_path: Path) -
 def test_a_folder_from_before_further_iterations_goes_on_with_none(
     tmp_path: Path, command: tuple[str, ...]
 ) -> None:
-    settings = ArenaSettings(("open",), ("sbl",), tasks=("home->p1",), seconds=0.01, further_iterations=0)
+    settings = ArenaSettings(
+        ("open",), ("sbl",), tasks=("home->p1",), seconds=0.01, further_iterations=0
+    )
     first = run_arena(settings, tmp_path, Means(2, command=command))
     kept = (tmp_path / NAME).read_text()
     assert "further_iterations" not in kept
@@ -169,8 +183,12 @@ def test_two_arenas_in_one_folder_are_one_too_many(fought: Fought) -> None:
     assert "is in use by another study" in refused[0]
 
 
-@pytest.mark.parametrize("content", [b"\x00\xff", b"hello\n", b"[]\n", b'{"format": "ir_cell/1"}\n'])
-def test_a_file_of_something_else_is_refused_and_kept(fought: Fought, tmp_path: Path, content: bytes) -> None:
+@pytest.mark.parametrize(
+    "content", [b"\x00\xff", b"hello\n", b"[]\n", b'{"format": "ir_cell/1"}\n']
+)
+def test_a_file_of_something_else_is_refused_and_kept(
+    fought: Fought, tmp_path: Path, content: bytes
+) -> None:
     path = tmp_path / "out" / NAME
     path.parent.mkdir()
     path.write_bytes(content)
@@ -191,7 +209,9 @@ def test_what_lies_where_the_database_belongs_is_named(fought: Fought, tmp_path:
         fought("sbl", seeds=1)
 
 
-def test_a_database_that_cannot_be_finished_leaves_nothing_behind(fought: Fought, tmp_path: Path) -> None:
+def test_a_database_that_cannot_be_finished_leaves_nothing_behind(
+    fought: Fought, tmp_path: Path
+) -> None:
     (tmp_path / "out" / "arena.db").mkdir(parents=True)
     with pytest.raises(FolderError, match=r"arena\.db can't be written"):
         fought("sbl", seeds=1)
@@ -227,20 +247,29 @@ def test_the_database_has_what_planner_arena_asks_for(fought: Fought) -> None:
     finished = fought("sbl", "prm")
     with sqlite3.connect(finished.files[1]) as database:
         names = dict(database.execute("SELECT id, name FROM plannerConfigs"))
-        solved = database.execute("SELECT plannerid, solved, solution_cost, status FROM runs").fetchall()
+        solved = database.execute(
+            "SELECT plannerid, solved, solution_cost, status FROM runs"
+        ).fetchall()
         assert {(names[planner], *rest) for planner, *rest in solved} == {
             ("sbl", 1, 1000.0, 0),
             ("sbl", 1, 1100.0, 0),
             ("prm", 0, None, 1),
         }
-        progress = database.execute("SELECT time, best_cost FROM progress ORDER BY runid, time").fetchall()
+        progress = database.execute(
+            "SELECT time, best_cost FROM progress ORDER BY runid, time"
+        ).fetchall()
         assert progress == [(0.1, 2000.0), (0.2, 1000.0), (0.1, 2200.0), (0.2, 1100.0)]
         assert database.execute("SELECT name, timelimit, runcount FROM experiments").fetchall() == [
             ("open home->p1 synchronous", 0.01, 2)
         ]
         best = database.execute("SELECT plannerid, avg_solved FROM bestPlannerConfigs").fetchall()
-        assert [(names[planner], solved) for planner, solved in best] == [("sbl", 1.0), ("prm", 0.0)]
-        by_question = "SELECT plannerid, experimentid, avg_solved FROM bestPlannerConfigsPerExperiment"
+        assert [(names[planner], solved) for planner, solved in best] == [
+            ("sbl", 1.0),
+            ("prm", 0.0),
+        ]
+        by_question = (
+            "SELECT plannerid, experimentid, avg_solved FROM bestPlannerConfigsPerExperiment"
+        )
         assert len(database.execute(by_question).fetchall()) == 2
         enums = dict(database.execute("SELECT value, description FROM enums WHERE name = 'status'"))
         assert enums == {0: "answered", 1: "died", 2: "cut"}
@@ -255,7 +284,9 @@ def test_the_page_holds_all_and_fetches_nothing(fought: Fought) -> None:
     assert "{{" not in page
     assert "3 planners, 1 cell, 1 question, 2 seeds: 6 runs of 0.01 s of processor" in page
     data = json.loads(page.partition('id="data">')[2].partition("</script>")[0])
-    assert data["end"] == 0.01  # though the runs took 0.3 s: what comes after the seconds doesn't count
+    assert (
+        data["end"] == 0.01
+    )  # though the runs took 0.3 s: what comes after the seconds doesn't count
     assert "<b>2</b> of 2" in page
     assert "<b>0</b> of 2" in page
     assert "NaN" not in page.partition('id="data">')[2].partition("</script>")[0]

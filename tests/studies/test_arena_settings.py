@@ -61,10 +61,16 @@ def test_the_example_is_read_and_names_every_key(tmp_path: Path) -> None:
         (HEAD + "cells: [open]\ntasks: [a->b]\n", "'a->b' is unknown: known are home->p1"),
         (HEAD + "cells: [open]\nloads: [anvil]\n", "anvil"),
         (HEAD + "cells: [open]\ntimings: [slow]\n", "known are synchronous, asynchronous"),
-        (HEAD + "cells: [open]\nseeds: 0\n", "seeds is 0: it must be a whole number in 1 .. 100000"),
+        (
+            HEAD + "cells: [open]\nseeds: 0\n",
+            "seeds is 0: it must be a whole number in 1 .. 100000",
+        ),
         (HEAD + "cells: [open]\nseeds: 1.5\n", "seeds is 1.5: it must be a whole number"),
         (HEAD + "cells: [open]\nseeds: true\n", "seeds is True"),
-        (HEAD + "cells: [open]\nseconds: .nan\n", "seconds is nan: it must be a number in 0.01 .. 86400"),
+        (
+            HEAD + "cells: [open]\nseconds: .nan\n",
+            "seconds is nan: it must be a number in 0.01 .. 86400",
+        ),
         (HEAD + "cells: [open]\nseconds: -1\n", "seconds is -1"),
         (HEAD + "cells: [open]\nseconds: soon\n", "seconds is 'soon'"),
         (HEAD + "cells: [open]\nsafety_distance: 1e400\n", "safety_distance is"),
@@ -73,7 +79,10 @@ def test_the_example_is_read_and_names_every_key(tmp_path: Path) -> None:
             HEAD + "cells: [open]\ntime_value: 2.0e+6\n",
             "time_value is 2000000.0: it must be a number in 0 .. 1e+06",
         ),
-        (HEAD + "cells: [open]\nsafety_distance: 2\n", "safety_distance is 2: it must be a number in 0 .. 1"),
+        (
+            HEAD + "cells: [open]\nsafety_distance: 2\n",
+            "safety_distance is 2: it must be a number in 0 .. 1",
+        ),
         (HEAD + "cells: [open]\n? [a]\n: 1\n", "is no YAML"),
     ],
 )

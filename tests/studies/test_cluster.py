@@ -45,7 +45,9 @@ def test_without_dask_a_sentence_says_how_to_install_it(
      "foo://127.0.0.1:1", "tcp://a b:8786", "tcp://127.0.0.1:8786 ", "--preload=x:1"],
 )  # fmt: skip
 def test_words_that_are_no_address_are_refused_before_anybody_waits(address: str) -> None:
-    with pytest.raises(WorkerError, match=r"it must be an address with a port .* as tcp://127\.0\.0\.1:8786"):
+    with pytest.raises(
+        WorkerError, match=r"it must be an address with a port .* as tcp://127\.0\.0\.1:8786"
+    ):
         Means(scheduler=address)
 
 
@@ -64,11 +66,15 @@ def processes() -> Iterator[list[subprocess.Popen[bytes]]]:
         process.wait()
 
 
-def dask(processes: list[subprocess.Popen[bytes]], folder: Path, *words: str) -> subprocess.Popen[bytes]:
+def dask(
+    processes: list[subprocess.Popen[bytes]], folder: Path, *words: str
+) -> subprocess.Popen[bytes]:
     """Starts a scheduler or a worker."""
     command = [sys.executable, "-m", "distributed.cli.dask_" + words[0], *words[1:]]
     with (folder / f"{words[0]}_{len(processes)}.log").open("wb") as log:
-        process = subprocess.Popen(command, stdout=log, stderr=log, cwd=folder, start_new_session=True)
+        process = subprocess.Popen(
+            command, stdout=log, stderr=log, cwd=folder, start_new_session=True
+        )
     processes.append(process)
     return process
 
@@ -88,7 +94,9 @@ def scheduler(processes: list[subprocess.Popen[bytes]], folder: Path, wait_for: 
     return str(wait_for(address, what="the scheduler listens"))
 
 
-def worker(processes: list[subprocess.Popen[bytes]], folder: Path, address: str) -> subprocess.Popen[bytes]:
+def worker(
+    processes: list[subprocess.Popen[bytes]], folder: Path, address: str
+) -> subprocess.Popen[bytes]:
     """Starts a worker of one thread, without a nanny that would start it again."""
     words = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1")
     return dask(processes, folder, "worker", address, *words)
@@ -138,7 +146,8 @@ def test_a_scheduler_that_is_killed_meanwhile_ends_the_study_which_goes_on_later
         run_layout(SETTINGS, tmp_path / "both", Means(scheduler=address, progress=kill))
     assert (tmp_path / "both" / NAME).read_bytes().count(b"\n") >= 3
     same(
-        run_layout(SETTINGS, tmp_path / "alone", Means(1)), run_layout(SETTINGS, tmp_path / "both", Means(1))
+        run_layout(SETTINGS, tmp_path / "alone", Means(1)),
+        run_layout(SETTINGS, tmp_path / "both", Means(1)),
     )
 
 
@@ -151,7 +160,9 @@ def test_a_local_cluster_gives_the_same_bytes_and_ends_what_it_started(tmp_path:
         n_workers=2, threads_per_worker=2, processes=True, host="127.0.0.1", dashboard_address=None
     ) as local:
         address = local.scheduler_address
-        stopped = Means(scheduler=address, progress=lambda *_: seen.append(1), stopped=lambda: len(seen) > 4)
+        stopped = Means(
+            scheduler=address, progress=lambda *_: seen.append(1), stopped=lambda: len(seen) > 4
+        )
         with pytest.raises(StoppedError):
             run_layout(SETTINGS, tmp_path / "cluster", stopped)
         assert (tmp_path / "cluster" / NAME).read_bytes().count(b"\n") > 4
@@ -173,9 +184,13 @@ def test_nobody_or_no_scheduler_at_the_address_and_other_builds_are_refused(
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
         silent.listen()
-        with pytest.raises(WorkerError, match=r"no Dask scheduler answers at .* nothing within 2 s"):
+        with pytest.raises(
+            WorkerError, match=r"no Dask scheduler answers at .* nothing within 2 s"
+        ):
             run_layout(
-                SETTINGS, tmp_path / "a", Means(scheduler=f"tcp://127.0.0.1:{silent.getsockname()[1]}")
+                SETTINGS,
+                tmp_path / "a",
+                Means(scheduler=f"tcp://127.0.0.1:{silent.getsockname()[1]}"),
             )
     monkeypatch.setattr(cluster, "_CONNECT_S", 10.0)  # a busy machine's scheduler answers within it
     address = scheduler(processes, tmp_path, wait_for)

@@ -1,4 +1,6 @@
-"""In a worker of a cluster: processes of a study end with it, whatever they do, and those of others go on."""
+"""In a worker of a cluster: processes of a study end with it, whatever they do, and those of others
+go on.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,8 @@ class Threads:
     """What the threads of a worker of the cluster ask."""
 
     def __init__(self, folder: Path, idle: float = IDLE_S) -> None:
-        self.kept, self.mark = Kept(idle), folder / "hangs"
+        self.kept = Kept(idle)
+        self.mark = folder / "hangs"
 
     def pool(self, stopped: Stopped) -> Pool:
         command = (sys.executable, "-S", "-c", WORKER, str(self.mark))
@@ -46,7 +49,8 @@ def runs(pid: object) -> bool:
 
 def test_the_end_of_a_study_leaves_the_processes_of_another_alone(tmp_path: Path) -> None:
     threads = Threads(tmp_path)
-    one, other = threads.row("one")["pid"], threads.row("other")["pid"]
+    one = threads.row("one")["pid"]
+    other = threads.row("other")["pid"]
     assert one != other
     threads.kept.end("one")
     assert not runs(one)
@@ -86,7 +90,9 @@ def test_a_job_that_comes_after_its_study_has_ended_starts_nothing(tmp_path: Pat
     assert len(threads.kept) == 0
 
 
-def test_a_process_without_a_job_ends_and_the_next_job_gets_another(tmp_path: Path, wait_for: Any) -> None:
+def test_a_process_without_a_job_ends_and_the_next_job_gets_another(
+    tmp_path: Path, wait_for: Any
+) -> None:
     threads = Threads(tmp_path, idle=0.05)
     first = threads.row("one")["pid"]
     wait_for(lambda: not runs(first), what="the idle process ends")

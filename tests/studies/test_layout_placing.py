@@ -1,4 +1,6 @@
-"""Where things stand after they were moved, judged by matrices made here, and which machines overlap."""
+"""Where things stand after they were moved, judged by matrices made here, and which machines
+overlap.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,8 @@ DEGREES = st.floats(-180.0, 180.0)
 
 def about_vertical(degrees: float) -> np.ndarray:
     """Rotation (3, 3)."""
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    c = np.cos(np.radians(degrees))
+    s = np.sin(np.radians(degrees))
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
@@ -38,7 +41,9 @@ def test_the_base_moves_along_the_axes_of_the_cell_and_turns_about_itself(
     R = about_vertical(turn) @ DEMO.base_pose[:3, :3]
     np.testing.assert_allclose(cell.base_pose[:3, :3], R, atol=1e-12)
     seen = np.linalg.inv(DEMO.base_pose) @ DEMO.machine("cabinet").pose
-    np.testing.assert_allclose(np.linalg.inv(cell.base_pose) @ cell.machine("cabinet").pose, seen, atol=1e-9)
+    np.testing.assert_allclose(
+        np.linalg.inv(cell.base_pose) @ cell.machine("cabinet").pose, seen, atol=1e-9
+    )
     assert np.array_equal(cell.machine("gauge").pose, DEMO.machine("gauge").pose)
 
 
@@ -46,7 +51,8 @@ def test_the_base_moves_along_the_axes_of_the_cell_and_turns_about_itself(
 @given(x=METRES, turn=DEGREES)
 def test_stations_move_with_their_machine(x: float, turn: float) -> None:
     cell = moved({"equipment.gauge.x": x, "equipment.gauge.turn_deg": turn})
-    machine, station = cell.machine("gauge"), cell.station("gauge_measure")
+    machine = cell.machine("gauge")
+    station = cell.station("gauge_measure")
     np.testing.assert_allclose(station.pose, machine.pose @ station.pose_in_equipment, atol=1e-12)
     np.testing.assert_allclose(machine.pose[0, 3], DEMO.machine("gauge").pose[0, 3] + x, atol=1e-12)
 
@@ -74,7 +80,12 @@ def test_masses_scale_inertia_and_postures_count_from_those_of_the_file() -> Non
 
 def test_a_placement_is_written_and_read_as_it_is() -> None:
     cell = moved(
-        {"base.x": 0.123, "base.turn_deg": 12.3, "equipment.gauge.turn_deg": -7.7, "tool.b_deg": 3.3}
+        {
+            "base.x": 0.123,
+            "base.turn_deg": 12.3,
+            "equipment.gauge.turn_deg": -7.7,
+            "tool.b_deg": 3.3,
+        }
     )
     assert cell_to_yaml(cell_from_yaml(cell_to_yaml(cell))) == cell_to_yaml(cell)
 
@@ -93,7 +104,9 @@ def test_machines_of_the_bundled_cells_stand_apart() -> None:
 
 
 def test_what_reaches_into_each_other_and_below_the_floor_is_named() -> None:
-    cell = moved({"equipment.cabinet.x": 0.5, "equipment.cabinet.y": -1.2, "equipment.gauge.z": -0.1})
+    cell = moved(
+        {"equipment.cabinet.x": 0.5, "equipment.cabinet.y": -1.2, "equipment.gauge.z": -0.1}
+    )
     assert set(deeper(overlaps(cell), overlaps(DEMO))) == {
         ("outfeed_belt", "cabinet"),
         ("gauge_table", "floor"),
@@ -189,18 +202,22 @@ def shifted(x: float) -> np.ndarray:
 
 @settings(max_examples=50)
 @given(
-    centre=st.tuples(*[st.floats(-3.0, 3.0)] * 3), turn=DEGREES, size=st.tuples(*[st.floats(0.1, 2.0)] * 3)
+    centre=st.tuples(*[st.floats(-3.0, 3.0)] * 3),
+    turn=DEGREES,
+    size=st.tuples(*[st.floats(0.1, 2.0)] * 3),
 )
 def test_boxes_are_separable_where_one_of_fifteen_axes_says_so(
     centre: tuple[float, float, float], turn: float, size: tuple[float, float, float]
 ) -> None:
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / 2.0
     R = about_vertical(turn) @ about_vertical(30.0).T[[1, 2, 0]][:, [1, 2, 0]]
-    first, second = corners, corners * size @ R.T + centre
+    first = corners
+    second = corners * size @ R.T + centre
     axes = [*np.eye(3), *R.T, *np.cross(np.eye(3)[:, None], R.T[None]).reshape(-1, 3)]
     gaps = []
     for axis in (a / np.linalg.norm(a) for a in axes if np.linalg.norm(a) > 1e-6):
-        a, b = first @ axis, second @ axis
+        a = first @ axis
+        b = second @ axis
         gaps.append(max(a.min() - b.max(), b.min() - a.max()))
     if abs(max(gaps)) > 1e-6:  # else they touch
         assert separable(first, second) == (max(gaps) > 0.0)

@@ -1,4 +1,6 @@
-"""The search finds what an exhaustive one finds, gives the same again, and says what is impossible."""
+"""The search finds what an exhaustive one finds, gives the same again, and says what is
+impossible.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +53,8 @@ def best_cost(found: Layouts) -> float:
 
 
 def test_the_best_of_a_grid_is_never_left_out(laid: Laid) -> None:
-    bounded, everything = laid(GRID, "a"), laid(replace(GRID, margin=1000.0), "b")
+    bounded = laid(GRID, "a")
+    everything = laid(replace(GRID, margin=1000.0), "b")
     planned = [sum(one.planned for one in found.known) for found in (bounded, everything)]
     assert planned[1] == sum(math.isfinite(one.coarse) for one in everything.known) == 121 - 11
     assert planned[0] < planned[1] / 2
@@ -59,7 +62,8 @@ def test_the_best_of_a_grid_is_never_left_out(laid: Laid) -> None:
 
 
 def test_rounds_come_nearer_than_a_first_look(laid: Laid) -> None:
-    rounds, once = laid(SPREAD, "a"), laid(replace(SPREAD, rounds=1), "b")
+    rounds = laid(SPREAD, "a")
+    once = laid(replace(SPREAD, rounds=1), "b")
     assert best_cost(rounds) < best_cost(once)
     assert best_cost(rounds) < 1032.0  # 1030 is the least that any can have
 
@@ -82,7 +86,9 @@ def test_more_placements_are_added_to_a_folder_and_other_budgets_refused(laid: L
     made: list[str] = []
     laid(replace(SPREAD, keep=3), progress=lambda phase, *_: made.append(phase))
     assert 0 < len(made) < 100
-    with pytest.raises(FolderError, match=r"results with time_value 500.0, the settings have 100.0"):
+    with pytest.raises(
+        FolderError, match=r"results with time_value 500.0, the settings have 100.0"
+    ):
         laid(replace(SPREAD, time_value=100.0))
 
 
@@ -101,7 +107,8 @@ def test_what_is_left_behind(laid: Laid, tmp_path: Path) -> None:
     assert {row["state"] for row in rows} == {"planned", "looked at", "impossible"}
     assert {row["reason"] for row in rows} == {"", "out of reach"}
     best = found.finals[1][0].placement.values
-    cell, given = load_cell(str(tmp_path / "out" / "best_1.yaml")), load_cell("demo")
+    cell = load_cell(str(tmp_path / "out" / "best_1.yaml"))
+    given = load_cell("demo")
     shift = (cell.base_pose - given.base_pose)[:2, 3]
     assert shift == pytest.approx([best["base.x"], best["base.y"]], abs=1e-12)
     page = (tmp_path / "out" / "index.html").read_text()
@@ -138,7 +145,15 @@ def test_a_full_disk_ends_it_with_a_sentence_and_it_goes_on_when_there_is_room(
     command = (sys.executable, "-S", str(WORKER), str(tmp_path))
     places = {"settings": str(settings), "folder": str(tmp_path / "full"), "command": command}
     script = FULL.format(path=sys.path, **places)
-    words = ["sh", "-c", 'ulimit -f 4; exec "$@"', "sh", sys.executable, "-c", script]  # blocks of 512 bytes
+    words = [
+        "sh",
+        "-c",
+        'ulimit -f 4; exec "$@"',
+        "sh",
+        sys.executable,
+        "-c",
+        script,
+    ]  # blocks of 512 bytes
     ended = subprocess.run(words, capture_output=True, text=True, check=False)
     assert ended.returncode == 1
     assert "results.jsonl can't be written: File too large" in ended.stderr
@@ -163,7 +178,10 @@ def test_where_the_given_placement_is_the_best_the_study_says_so(laid: Laid) -> 
 
 
 def test_only_the_given_placement(laid: Laid) -> None:
-    assert "No other was looked at: the given placement stays." in laid(replace(SPREAD, placements=1)).summary
+    assert (
+        "No other was looked at: the given placement stays."
+        in laid(replace(SPREAD, placements=1)).summary
+    )
 
 
 def test_why_the_others_were_not_planned(laid: Laid) -> None:
@@ -175,8 +193,8 @@ def test_why_the_others_were_not_planned(laid: Laid) -> None:
 def test_where_the_bound_left_out_nothing_the_study_says_so(laid: Laid) -> None:
     few = laid(replace(GRID, steps=3), "few").summary
     assert (
-        "All that a look found possible were planned, the bound left out none: the first 16 are planned "
-        "before there is a bound." in few
+        "All that a look found possible were planned, the bound left out none: the first 16 are "
+        "planned before there is a bound." in few
     )
     every = laid(replace(GRID, steps=5, margin=1000.0), "every").summary
     assert "the bound left out none." in every
@@ -187,11 +205,16 @@ def test_where_the_bound_left_out_nothing_the_study_says_so(laid: Laid) -> None:
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        ({}, "Placements are compared by J (energy of the drives + 500 W x seconds of the movements)."),
+        (
+            {},
+            "Placements are compared by J (energy of the drives + 500 W x seconds of the "
+            "movements).",
+        ),
         ({"cycle_times": (9.0,)}, "Placements are compared by joules at the mains per cycle."),
         (
             {"cycle_times": (0.0, 9.0), "time_value": 80.0},
-            "Placements are compared by J (energy of the drives + 80 W x seconds of the movements) without a "
+            "Placements are compared by J (energy of the drives + 80 W x seconds of the "
+            "movements) without a "
             "cycle time, by joules at the mains per cycle in one, mean over 2 conditions.",
         ),
     ],
@@ -214,7 +237,9 @@ def test_what_stands_as_given_is_no_part_of_a_job(laid: Laid) -> None:
 def test_rounds_go_on_over_all_ranges_while_nothing_is_possible(laid: Laid, tmp_path: Path) -> None:
     far = cell_to_yaml(replace(load_cell("demo"), name="far"))
     (tmp_path / "far.yaml").write_text(far)
-    settings = replace(SPREAD, cell=str(tmp_path / "far.yaml"), base={"x": (0.45, 0.9), "y": (0.0, 0.5)})
+    settings = replace(
+        SPREAD, cell=str(tmp_path / "far.yaml"), base={"x": (0.45, 0.9), "y": (0.0, 0.5)}
+    )
     found = laid(replace(settings, placements=60), "out", "nowhere")
     assert len(found.known) == 60
     assert "No placement is possible." in found.summary
@@ -232,16 +257,23 @@ def test_the_cell_of_a_study_is_the_one_that_it_began_with(laid: Laid, tmp_path:
     assert "placements looked at" in found.summary
 
 
-def test_a_study_that_keeps_fewer_leaves_no_cell_of_one_that_kept_more(laid: Laid, tmp_path: Path) -> None:
+def test_a_study_that_keeps_fewer_leaves_no_cell_of_one_that_kept_more(
+    laid: Laid, tmp_path: Path
+) -> None:
     laid(replace(SPREAD, keep=3))
     mine = tmp_path / "out" / "best_9.yaml"
     mine.write_text(cell_to_yaml(load_cell("demo")))
     laid(replace(SPREAD, keep=1))
-    assert sorted(path.name for path in (tmp_path / "out").glob("*.yaml")) == ["best_1.yaml", "best_9.yaml"]
+    assert sorted(path.name for path in (tmp_path / "out").glob("*.yaml")) == [
+        "best_1.yaml",
+        "best_9.yaml",
+    ]
 
 
 @pytest.mark.parametrize("name", ["base", "tool", "a.b"])
-def test_a_machine_may_be_called_like_what_else_moves(laid: Laid, tmp_path: Path, name: str) -> None:
+def test_a_machine_may_be_called_like_what_else_moves(
+    laid: Laid, tmp_path: Path, name: str
+) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text(cell_to_yaml(load_cell("demo")).replace("name: gauge\n", f"name: {name}\n"))
     moved = {"base": {"x": (-0.2, 0.2)}, "equipment": {name: {"x": (-0.3, 0.3)}}}

@@ -42,20 +42,32 @@ def test_the_example_is_read_and_names_every_key() -> None:
         (HEAD + "base: {x: [1, 0]}\n", "the lowest comes first"),
         (HEAD + "base: {x: [0, .inf]}\n", "base: x is inf: it must be a number in -100 .. 100"),
         (HEAD + "base: {w: [0, 1]}\n", "base: 'w' is unknown: known are x, y, z, turn_deg"),
-        (HEAD + "equipment: {oven: {x: [0, 1]}}\n", "equipment: 'oven' is unknown: known are infeed"),
+        (
+            HEAD + "equipment: {oven: {x: [0, 1]}}\n",
+            "equipment: 'oven' is unknown: known are infeed",
+        ),
         (HEAD + "equipment: [gauge]\n", "equipment is ('gauge',)"),
         (HEAD + "park: {a7_deg: [0, 1]}\n", "park: 'a7_deg' is unknown: known are a1_deg"),
         (MOVES + "carried: gauge\n", "carried is 'gauge': it must be a list"),
         (MOVES + "stations: [nowhere]\n", "stations: 'nowhere' is unknown"),
-        (MOVES + "payloads: {gear: [0]}\n", "payloads: gear is 0: it must be a number in 0.001 .. 2000"),
+        (
+            MOVES + "payloads: {gear: [0]}\n",
+            "payloads: gear is 0: it must be a number in 0.001 .. 2000",
+        ),
         (MOVES + "payloads: {gear: []}\n", "make 0 conditions"),
         (MOVES + f"payloads: {{gear: {list(range(1, 52))}}}\n", "make 51 conditions: 1 to 50"),
-        (MOVES + f"cycle_times: {list(range(20_000))}\n", "cycle_times has 20000 values: at most 1000"),
+        (
+            MOVES + f"cycle_times: {list(range(20_000))}\n",
+            "cycle_times has 20000 values: at most 1000",
+        ),
         (MOVES + "cycle_times: [-1]\n", "cycle_times is -1"),
         (MOVES + "cycle_times: []\n", "make 0 conditions"),
         (MOVES + "cycle_times: [0, 0]\n", "cycle_times names one twice"),
         (MOVES + "method: guess\n", "method is 'guess': known are spread, grid"),
-        (MOVES + "method: grid\nsteps: 1000\npark: {a1_deg: [0, 1]}\n", "more than 100000 placements"),
+        (
+            MOVES + "method: grid\nsteps: 1000\npark: {a1_deg: [0, 1]}\n",
+            "more than 100000 placements",
+        ),
         (MOVES + "placements: 1.5\n", "placements is 1.5: it must be a whole number"),
         (MOVES + "placements: true\n", "placements is True"),
         (MOVES + f"placements: {10**400}\n", "placements is 1000"),
@@ -77,7 +89,9 @@ def test_what_makes_no_sense_is_refused(content: str, said: str) -> None:
 
 
 class Compared(str):
-    """A text that counts how often it is compared: a key looked for in a list is, with every entry."""
+    """A text that counts how often it is compared: a key looked for in a list is, with every
+    entry.
+    """
 
     times = 0
     __hash__ = str.__hash__
@@ -114,7 +128,9 @@ def test_the_goal_in_the_documentation_carries_the_settings_as_they_are(tmp_path
     (tmp_path / "layout.yaml").write_text(EXAMPLE)
     command = next(part for part in STUDIES.read_text().split("```") if "ir send_goal" in part)
     shown = 'ir() { printf %s "${@: -1}"; }\n' + command
-    goal = subprocess.run(["bash", "-c", shown], cwd=tmp_path, capture_output=True, check=True).stdout
+    goal = subprocess.run(
+        ["bash", "-c", shown], cwd=tmp_path, capture_output=True, check=True
+    ).stdout
     assert study_of(yaml.safe_load(goal)["settings"]) == study_of(EXAMPLE)
 
 
@@ -132,7 +148,8 @@ format: ir_layout/1
 
 
 def test_the_order_of_keys_says_nothing() -> None:
-    one, other = study_of(PERMUTED).settings, study_of(EXAMPLE).settings
+    one = study_of(PERMUTED).settings
+    other = study_of(EXAMPLE).settings
     assert one == other
     assert json.dumps(asdict(one)) == json.dumps(asdict(other))
     assert one.variables == other.variables
@@ -140,7 +157,12 @@ def test_the_order_of_keys_says_nothing() -> None:
 
 def test_stations_may_be_visited_again_and_postures_between() -> None:
     asked = "stations: [infeed_pick, home, infeed_pick, park]\n"
-    assert study_of(MOVES + asked).settings.stations == ("infeed_pick", "home", "infeed_pick", "park")
+    assert study_of(MOVES + asked).settings.stations == (
+        "infeed_pick",
+        "home",
+        "infeed_pick",
+        "park",
+    )
 
 
 def test_conditions_that_differ_a_little_are_known_apart() -> None:
@@ -160,6 +182,9 @@ def test_many_masses_of_many_parts_are_counted_before_they_are_combined(tmp_path
     )
     (tmp_path / "many.yaml").write_text(cell_to_yaml(replace(cell, parts=(*cell.parts, *others))))
     masses = ", ".join(f"gear_{k}: {list(range(1, 101))}" for k in range(8))
-    asked = f"format: ir_layout/1\ncell: {tmp_path}/many.yaml\nbase: {{x: [0, 1]}}\npayloads: {{{masses}}}\n"
+    asked = (
+        f"format: ir_layout/1\ncell: {tmp_path}/many.yaml\nbase: {{x: [0, 1]}}\n"
+        f"payloads: {{{masses}}}\n"
+    )
     with pytest.raises(SettingsError, match="make 10000000000000000 conditions"):
         study_of(asked)

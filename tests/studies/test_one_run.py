@@ -39,7 +39,9 @@ def asked(
 
     with monkeypatch.context() as patch:
         patch.setattr(planner, "plan_regional", noted)
-        row = one_run(ENTRY, ArenaSettings((ENTRY.cell,), seconds=3600.0, **settings), planner, lambda: 0.0)
+        row = one_run(
+            ENTRY, ArenaSettings((ENTRY.cell,), seconds=3600.0, **settings), planner, lambda: 0.0
+        )
     return options, row
 
 
@@ -55,8 +57,12 @@ def test_requests_after_the_first_may_use_more_work(
     assert row["cost_j"] == costs[-1]
 
 
-def test_all_requests_may_be_given_the_same_work(planner: Planner, monkeypatch: pytest.MonkeyPatch) -> None:
-    options, row = asked(planner, monkeypatch, requests=2, max_iterations=9_000, further_iterations=0)
+def test_all_requests_may_be_given_the_same_work(
+    planner: Planner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options, row = asked(
+        planner, monkeypatch, requests=2, max_iterations=9_000, further_iterations=0
+    )
     assert [one.max_iterations for one in options] == [9_000, 9_000]
     assert row["solved"]
 

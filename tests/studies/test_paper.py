@@ -1,4 +1,6 @@
-"""The claims of the paper: verdicts follow from intervals and seeds, the page from what is stored."""
+"""The claims of the paper: verdicts follow from intervals and seeds, the page from what is
+stored.
+"""
 
 from __future__ import annotations
 
@@ -15,14 +17,26 @@ import numpy as np
 import paper
 import pytest
 from _paper_page import Chapter, bound, number, page
-from _paper_result import CALIBRATED, FAILS, HOLDS, MEASURED, OPEN, Experiment, Row, Statement, judged
+from _paper_result import (
+    CALIBRATED,
+    FAILS,
+    HOLDS,
+    MEASURED,
+    OPEN,
+    Experiment,
+    Row,
+    Statement,
+    judged,
+)
 
 ROOT = Path(__file__).parents[2]
 CHEAP = ("spline", "modes", "withdrawal")  # two seconds of processor time
 
 
 def statement(value: float, low: float, high: float, **more: object) -> Statement:
-    return Statement("it helps", "how much", value, low, high, 10, "tasks", **{"bound": 1.0, **more})  # type: ignore[arg-type]
+    return Statement(
+        "it helps", "how much", value, low, high, 10, "tasks", **{"bound": 1.0, **more}
+    )  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -49,7 +63,13 @@ def test_what_has_no_bound_is_measured_and_what_was_fitted_is_no_evidence() -> N
 
 def experiment(judge: object) -> Experiment:
     return Experiment(
-        "one", "One claim", "It helps.", "It is tried.", lambda seed, quick: [], judge, lambda found: "So."
+        "one",
+        "One claim",
+        "It helps.",
+        "It is tried.",
+        lambda seed, quick: [],
+        judge,
+        lambda found: "So.",
     )  # type: ignore[arg-type]
 
 
@@ -88,7 +108,14 @@ def test_cells_are_drawn_not_the_searches_in_them() -> None:
         helped = rng.normal(0.0, 0.5)  # what a cell does to all searches in it
         for task in range(3):
             for draw in range(8):
-                asked = {"seed": 2, "kind": "OPEN", "place": place, "zones": 100, "task": task, "draw": draw}
+                asked = {
+                    "seed": 2,
+                    "kind": "OPEN",
+                    "place": place,
+                    "zones": 100,
+                    "task": task,
+                    "draw": draw,
+                }
                 rows.append(asked | {"grid": "no cells", "edges": 100.0})
                 rows.append(asked | {"grid": "cells", "edges": 100.0 * math.exp(helped)})
     ratio, cells = _paper_rivals._ratios(rows, {"grid": "cells"}, {"grid": "no cells"})
@@ -99,7 +126,9 @@ def test_cells_are_drawn_not_the_searches_in_them() -> None:
 
 
 def test_an_interval_of_95_percent_holds_the_mean_about_so_often() -> None:
-    rng, inside, count = np.random.default_rng(12), 0, 30
+    rng = np.random.default_rng(12)
+    inside = 0
+    count = 30
     for _ in range(count):
         _, low, high = statistics.interval(statistics.mean, rng.normal(3.0, 1.0, 20))
         inside += low <= 3.0 <= high
@@ -134,7 +163,11 @@ def test_the_page_shows_verdict_interval_bound_and_what_is_missing() -> None:
     one = experiment(means)
     rows = [{"seed": 0, "x": 2.0}, {"seed": 0, "x": 2.5}]
     text = page(
-        [Chapter(one, judged(one, rows), rows, "", 60.0)], ["other"], [2, 3], "a machine", quick=False
+        [Chapter(one, judged(one, rows), rows, "", 60.0)],
+        ["other"],
+        [2, 3],
+        "a machine",
+        quick=False,
     )
     assert "done with seeds 2 and 3 that share nothing" in text
     assert "|  | 60 s |" in text

@@ -1,4 +1,6 @@
-"""Joules and limits of the experiments on the paper's claims, by Pinocchio and a DC bus written here."""
+"""Joules and limits of the experiments on the paper's claims, by Pinocchio and a DC bus written
+here.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,9 @@ def counterbalance(pair: Pair, a2: FloatArray) -> FloatArray:
     (x, z), pivot = data.rod_eye, np.asarray(data.pivot)
     eye = np.stack([x * np.cos(a2) + z * np.sin(a2), z * np.cos(a2) - x * np.sin(a2)], axis=1)
     length = np.linalg.norm(pivot - eye, axis=1)
-    gas = data.gas_volume / (data.gas_volume - data.piston_area * (length - data.rod_length_at_charge))
+    gas = data.gas_volume / (
+        data.gas_volume - data.piston_area * (length - data.rod_length_at_charge)
+    )
     force = data.piston_area * data.charge_pressure * gas**data.exponent / length
     across = eye[:, 1] * (pivot[0] - eye[:, 0]) - eye[:, 0] * (pivot[1] - eye[:, 1])
     return np.asarray(force * across)
@@ -46,15 +50,20 @@ def torques(pair: Pair, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> Float
     data = model.createData()
     found = np.array([pinocchio.rnea(model, data, *row) for row in zip(q, qd, qdd, strict=True)])
     found += (
-        robot.reflected_inertia * qdd + robot.friction_viscous * qd + robot.friction_coulomb * np.sign(qd)
+        robot.reflected_inertia * qdd
+        + robot.friction_viscous * qd
+        + robot.friction_coulomb * np.sign(qd)
     )
     found[:, 1] -= counterbalance(pair, q[:, 1])
     return found
 
 
 def available(pair: Pair, qd: FloatArray) -> FloatArray:
-    robot, found = pair.scene.cell.robot, np.empty_like(qd)
-    for j, (speeds, torque) in enumerate(zip(robot.envelope_speed, robot.envelope_torque, strict=True)):
+    robot = pair.scene.cell.robot
+    found = np.empty_like(qd)
+    for j, (speeds, torque) in enumerate(
+        zip(robot.envelope_speed, robot.envelope_torque, strict=True)
+    ):
         v = np.abs(qd[:, j])
         found[:, j] = np.where(v < speeds[0], torque[0], np.interp(v, speeds, torque[1:]))
     return found
@@ -62,10 +71,13 @@ def available(pair: Pair, qd: FloatArray) -> FloatArray:
 
 def joules(pair: Pair, trajectory: JointTrajectory, slower: float = 1.0) -> float:
     """From the mains for the drives: what the axes take beyond what the capacitor holds."""
-    robot, link, steps = pair.scene.cell.robot, load_power_data().dc_link, 800
+    robot = pair.scene.cell.robot
+    link = load_power_data().dc_link
+    steps = 800
     dt = trajectory.duration / steps
     motion = trajectory.sample((np.arange(steps) + 0.5) * dt)
-    qd, qdd = motion.qd / slower, motion.qdd / slower**2
+    qd = motion.qd / slower
+    qdd = motion.qdd / slower**2
     torque = torques(pair, motion.q, qd, qdd)
     power = torque * qd + robot.copper_loss * (torque / robot.gear_ratio) ** 2
     most = 0.5 * link.capacitance * (link.chopper_on**2 - link.voltage**2)
@@ -100,7 +112,9 @@ def test_curves_are_compared_where_the_robot_can_follow_all_of_them(compared: li
         assert len({round(each.duration, 5) for each in curves.values()}) == 1
         for name, each in curves.items():
             motion = each.sample(np.linspace(0.0, each.duration, 301))
-            use = np.abs(torques(pair, motion.q, motion.qd, motion.qdd)) / available(pair, motion.qd)
+            use = np.abs(torques(pair, motion.q, motion.qd, motion.qdd)) / available(
+                pair, motion.qd
+            )
             assert use.max() < SHARE, name
             assert (np.abs(motion.qd) < 1.001 * robot.velocity_max).all(), name
             assert (np.abs(motion.qdd) < 1.001 * robot.acceleration_max).all(), name
@@ -109,12 +123,15 @@ def test_curves_are_compared_where_the_robot_can_follow_all_of_them(compared: li
 def test_their_joules_are_those_of_another_implementation(compared: list[Any]) -> None:
     for pair, _, curves in compared:
         for name, each in curves.items():
-            assert pair.drive_energy(each) == pytest.approx(joules(pair, each), rel=0.01, abs=5.0), name
+            assert pair.drive_energy(each) == pytest.approx(
+                joules(pair, each), rel=0.01, abs=5.0
+            ), name
 
 
 def test_the_common_ptp_beside_least_j_has_its_best_slow_down(drawn: list[Pair]) -> None:
     for pair in drawn:
-        fastest, slowed = pair.common(), pair.common(objective=_paper_savings.ARMS["free, least J"][0])
+        fastest = pair.common()
+        slowed = pair.common(objective=_paper_savings.ARMS["free, least J"][0])
         assert fastest is not None
         assert slowed is not None
         factors = np.linspace(1.0, 4.0, 31)
@@ -124,8 +141,10 @@ def test_the_common_ptp_beside_least_j_has_its_best_slow_down(drawn: list[Pair])
 
 def test_readings_of_eq_9_differ_in_the_load_and_in_the_lower_index(drawn: list[Pair]) -> None:
     for pair in drawn:
-        robot, found = pair.scene.cell.robot, _paper_cost._costs(pair)
-        moved, held = np.abs(pair.q1 - pair.q0), sum(load.mass for load in pair.scene.loads)
+        robot = pair.scene.cell.robot
+        found = _paper_cost._costs(pair)
+        moved = np.abs(pair.q1 - pair.q0)
+        held = sum(load.mass for load in pair.scene.loads)
         kinetic = 0.5 * robot.link_mass[1:] * robot.velocity_max**2
         load = 0.5 * held * robot.velocity_max[-1] ** 2
         empty = sum(kinetic[i:].sum() * moved[i] for i in range(robot.n))

@@ -88,7 +88,9 @@ def test_every_reading_of_the_descent_is_asked_for_what_its_name_says(
 ) -> None:
     asked: list[tuple[str, str, bool]] = []
 
-    def noted(pose: Any, starts: Any, scene: Any, threshold: Any, settings: Any, work: Any) -> Descent:
+    def noted(
+        pose: Any, starts: Any, scene: Any, threshold: Any, settings: Any, work: Any
+    ) -> Descent:
         assert (threshold > 0.0).all()
         asked.append((settings.set_back, settings.distribution, settings.newton_steps > 0))
         return Descent(starts[:0], 0)
@@ -111,7 +113,9 @@ def test_every_reading_of_the_descent_is_asked_for_what_its_name_says(
 
 def test_the_printed_mean_is_the_weight_times_d_and_has_no_direction() -> None:
     walker = object.__new__(_paper_withdrawal.PrintedMean)
-    walker.settings, walker.first_total = SimpleNamespace(step=0.12), 2.0  # type: ignore[assignment]
+    # type: ignore[assignment]
+    walker.settings = SimpleNamespace(step=0.12)
+    walker.first_total = 2.0
     walker.W = np.array([2.0, 1.0, 1.0, 1.0, 0.5, 0.5])
     parents = SimpleNamespace(total=np.array([2.0, 4.0]), q=np.zeros((2, 6)))
     mean = walker._mean(parents)  # type: ignore[arg-type]
@@ -130,7 +134,14 @@ def test_readings_of_the_withdrawal_differ_in_what_their_names_say() -> None:
 def test_open_closed_and_semi_closed_zones_are_judged_by_cells() -> None:
     """Stations of a cell stand among the same machines."""
     rows = [
-        {"seed": 4, "cell": "one", "station": name, "zone": "OPEN", "reading": "as read", "solved": True}
+        {
+            "seed": 4,
+            "cell": "one",
+            "station": name,
+            "zone": "OPEN",
+            "reading": "as read",
+            "solved": True,
+        }
         for name in "abcdefgh"
     ]
     assert _paper_withdrawal._success(rows, "open", ("OPEN",)).low < 30.0
@@ -140,9 +151,9 @@ def test_the_straight_line_leaves_a_tunnel_but_no_station_beside_a_door() -> Non
     def left(cell: str, station: str) -> bool:
         place = next(place for place in places((cell,), 4, 1) if place.station.name == station)
         return bool(
-            _paper_withdrawal._searched(place, _paper_withdrawal.READINGS[_paper_withdrawal.LINE], 1)[
-                "solved"
-            ]
+            _paper_withdrawal._searched(
+                place, _paper_withdrawal.READINGS[_paper_withdrawal.LINE], 1
+            )["solved"]
         )
 
     assert left("deep_box", "tun")

@@ -17,7 +17,8 @@ from _paper_result import FAILS, HOLDS, JUDGED, OPEN, Row, Statement, judged
 
 PAGE = (Path(__file__).parents[2] / "docs" / "reproduction.md").read_text()
 CLAIMS = [name for name in _paper_claims.EXPERIMENTS if name not in ("modes", "figures")]
-# A phrase, which statement of the experiment it is about, and the verdicts that it may stand beside.
+# A phrase, which statement of the experiment it is about, and the verdicts that it may stand
+# beside.
 PHRASES: dict[str, tuple[tuple[str, int, tuple[str, ...]], ...]] = {
     "kpiece_cells": (
         ("The paper is right", 0, (HOLDS,)),
@@ -73,7 +74,12 @@ def statements_of(name: str) -> list[Statement]:
         rng = np.random.default_rng(1)
         rows: list[Row] = []
         for k in range(80):
-            row: Row = {"seed": k % 2, "load": "none", "direction": ("up", "down")[k % 2], "common_J": 2000.0}
+            row: Row = {
+                "seed": k % 2,
+                "load": "none",
+                "direction": ("up", "down")[k % 2],
+                "common_J": 2000.0,
+            }
             arms = (*_paper_savings.ARMS, _paper_savings.SLOWED)
             rows.append(row | {f"{arm} J": rng.uniform(100.0, 2500.0) for arm in arms})
         return judged(experiment, rows)
@@ -85,7 +91,9 @@ def statements_of(name: str) -> list[Statement]:
         limit = float(bound.split()[1]) if bound else float("nan")
         ends = value - 1.0, value + 1.0, 10, "of them"
         least = not bound.startswith("≤")
-        found.append(Statement(says, figure, value, *ends, bound=limit, at_least=least, verdict="measured"))
+        found.append(
+            Statement(says, figure, value, *ends, bound=limit, at_least=least, verdict="measured")
+        )
     return found
 
 
@@ -102,12 +110,15 @@ def as_found(one: Statement, verdict: str) -> Statement:
 
 @pytest.mark.parametrize("name", CLAIMS)
 def test_what_follows_says_nothing_that_its_verdicts_deny(name: str) -> None:
-    experiment, statements = _paper_claims.EXPERIMENTS[name], statements_of(name)
+    experiment = _paper_claims.EXPERIMENTS[name]
+    statements = statements_of(name)
     rng = np.random.default_rng(5)
     mixed = [rng.choice(JUDGED, len(statements)).tolist() for _ in range(40)]
     seen = set()
     for verdicts in itertools.chain(([one] * len(statements) for one in JUDGED), mixed):
-        text = experiment.follows([as_found(one, v) for one, v in zip(statements, verdicts, strict=True)])
+        text = experiment.follows(
+            [as_found(one, v) for one, v in zip(statements, verdicts, strict=True)]
+        )
         assert not re.search(r"\bnan\b|\binf\b|  |\.\.|: \.|; \.", text), text
         for phrase, k, allowed in PHRASES.get(name, ()):
             if phrase in text:
@@ -118,9 +129,14 @@ def test_what_follows_says_nothing_that_its_verdicts_deny(name: str) -> None:
 
 @pytest.mark.parametrize("name", CLAIMS)
 def test_opposite_verdicts_have_different_conclusions(name: str) -> None:
-    experiment, statements = _paper_claims.EXPERIMENTS[name], statements_of(name)
+    experiment = _paper_claims.EXPERIMENTS[name]
+    statements = statements_of(name)
     words = [
-        re.sub(r"[-+]?\d+(\.\d+)?", "", experiment.follows([as_found(one, verdict) for one in statements]))
+        re.sub(
+            r"[-+]?\d+(\.\d+)?",
+            "",
+            experiment.follows([as_found(one, verdict) for one in statements]),
+        )
         for verdict in (HOLDS, FAILS)
     ]
     assert words[0] != words[1]
@@ -150,12 +166,15 @@ def test_what_the_load_does_to_the_ranks_follows_from_the_figures(by: float, say
     rng = np.random.default_rng(6)
     rows: list[Row] = []
     for k in range(60):
-        joules, noise = rng.uniform(1e3, 4e3), rng.normal(0.0, 1e3)
+        joules = rng.uniform(1e3, 4e3)
+        noise = rng.normal(0.0, 1e3)
         ranked = {"W": joules + (by > 0.0) * noise, _paper_cost.EMPTY: joules + (by < 0.0) * noise}
         row: Row = {"kind": "movement", "joules": joules, "seconds": 1.0 + joules, **ranked}
         row |= {"load": ("none", "tool")[k % 2], "direction": ("up", "down", "level")[k % 3]}
         rows.append(row | {_paper_cost.PRINTED: joules})
-        rows.append(row | {"kind": "choice", "least": joules, "mean": joules, _paper_cost.PRINTED: joules})
+        rows.append(
+            row | {"kind": "choice", "least": joules, "mean": joules, _paper_cost.PRINTED: joules}
+        )
     text = _paper_cost.EXPERIMENT.follows(_paper_cost.judge(rows))
     assert ("together better." in text, "together worse." in text) == (by > 0.0, by < 0.0)
     assert says in text
@@ -169,12 +188,15 @@ def test_what_the_load_does_to_the_ranks_follows_from_the_figures(by: float, say
 def test_the_line_says_how_many_movements_of_the_common_programs_are_no_straight_ones() -> None:
     row: Row = {"cell": "open", "seconds": 10.0, "drives": 0.3, "mains": 0.2, "across": 4}
     rows = [
-        row | {"stops": stops, "around": around} for stops, around in (("a b", 1), ("b a", 3), ("b a", 3))
+        row | {"stops": stops, "around": around}
+        for stops, around in (("a b", 1), ("b a", 3), ("b a", 3))
     ]
     statements = _paper_line.judge(rows)
     assert statements[-1].value == pytest.approx(100.0 * 7 / 12)
     assert {one.count for one in statements} == {2}  # a program that every seed plans is one
-    assert "58 % of the common programs' movements run around bodies" in _paper_line.follows(statements)
+    assert "58 % of the common programs' movements run around bodies" in _paper_line.follows(
+        statements
+    )
 
 
 def test_savings_say_how_often_the_answer_is_the_ptp_itself() -> None:
@@ -183,4 +205,6 @@ def test_savings_say_how_often_the_answer_is_the_ptp_itself() -> None:
     rows = [row | {"same time J": joules} for joules in (2000.0, 2000.0, 2000.0, 1990.0)]
     by = {one.says: one for one in _paper_savings.judge(rows)}
     assert by[_paper_savings.ITSELF].value == 75.0
-    assert "the answer itself for 75 % of the movements" in _paper_savings.follows(list(by.values()))
+    assert "the answer itself for 75 % of the movements" in _paper_savings.follows(
+        list(by.values())
+    )

@@ -1,4 +1,6 @@
-"""Worker processes: they end with who started them, whatever they do, and are kept from batch to batch."""
+"""Worker processes: they end with who started them, whatever they do, and are kept from batch to
+batch.
+"""
 
 from __future__ import annotations
 
@@ -43,10 +45,15 @@ for line in sys.stdin:
 """
 
 
-def test_a_worker_that_hangs_ends_with_a_study_that_was_killed(tmp_path: Path, wait_for: Any) -> None:
-    mark, worker = tmp_path / "pid", tmp_path / "hangs.py"
+def test_a_worker_that_hangs_ends_with_a_study_that_was_killed(
+    tmp_path: Path, wait_for: Any
+) -> None:
+    mark = tmp_path / "pid"
+    worker = tmp_path / "hangs.py"
     worker.write_text(HANGS.format(path=sys.path, mark=str(mark)))
-    study = subprocess.Popen([sys.executable, "-c", STARTS.format(path=sys.path, worker=str(worker))])
+    study = subprocess.Popen(
+        [sys.executable, "-c", STARTS.format(path=sys.path, worker=str(worker))]
+    )
     try:
         pid = wait_for(lambda: mark.exists() and mark.read_text(), what="the worker hangs")
         assert Path(f"/proc/{pid}/stat").exists()

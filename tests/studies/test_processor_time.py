@@ -26,10 +26,14 @@ ENTRY = Entry("rrt_connect", "open", "home->p1", 0, "", "synchronous")
 
 def test_a_process_that_is_charged_counts_also_when_it_has_ended(wait_for: Any) -> None:
     busy = subprocess.Popen([sys.executable, "-S", "-c", "while True: pass"])
-    own, begin = time.process_time(), processor_time()
+    own = time.process_time()
+    begin = processor_time()
     try:
         with charged(busy.pid):
-            wait_for(lambda: processor_time() - begin > time.process_time() - own + 0.02, what="it counts")
+            wait_for(
+                lambda: processor_time() - begin > time.process_time() - own + 0.02,
+                what="it counts",
+            )
             during = processor_time()
     finally:
         busy.kill()
@@ -40,7 +44,8 @@ def test_a_process_that_is_charged_counts_also_when_it_has_ended(wait_for: Any) 
 def test_a_process_that_is_gone_costs_nothing() -> None:
     gone = subprocess.Popen(["true"])
     gone.wait()
-    own, begin = time.process_time(), processor_time()
+    own = time.process_time()
+    begin = processor_time()
     with charged(gone.pid):
         passed = processor_time() - begin
     assert passed <= time.process_time() - own

@@ -35,7 +35,9 @@ def test_a_task_with_another_goal_is_refused_and_a_new_one_is_taken(
 
     def run(*tasks: Task) -> None:
         file.write_text(cell_to_yaml(replace(cell, tasks=tasks)))
-        settings = ArenaSettings(cells=(str(file),), planners=("sbl",), tasks=("home->p1",), seeds=1)
+        settings = ArenaSettings(
+            cells=(str(file),), planners=("sbl",), tasks=("home->p1",), seeds=1
+        )
         run_arena(settings, tmp_path / "out", Means(1, command=command))
 
     first, second = cell.tasks[:2]
@@ -80,9 +82,12 @@ def test_sources_count_by_their_names_and_their_content(
 def test_a_processor_that_computes_other_bits_has_another_arithmetic() -> None:
     def said(**environment: str) -> list[str]:
         words = {**os.environ, "OPENBLAS_NUM_THREADS": "1", **environment}
-        done = subprocess.run([sys.executable, "-c", PROBE], env=words, capture_output=True, check=True)
+        done = subprocess.run(
+            [sys.executable, "-c", PROBE], env=words, capture_output=True, check=True
+        )
         return done.stdout.decode().split()
 
-    here, older = said(), said(OPENBLAS_CORETYPE="Nehalem", NPY_DISABLE_CPU_FEATURES="X86_V4")
+    here = said()
+    older = said(OPENBLAS_CORETYPE="Nehalem", NPY_DISABLE_CPU_FEATURES="X86_V4")
     assert here[1] == build.arithmetic()
     assert (here[0] == older[0]) or (here[1] != older[1])

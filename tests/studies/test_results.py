@@ -1,4 +1,6 @@
-"""Results of a study in a file: whatever is left of it, rows are kept or a damaged line is named."""
+"""Results of a study in a file: whatever is left of it, rows are kept or a damaged line is
+named.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +53,7 @@ def test_a_file_that_ends_anywhere_goes_on_with_its_whole_lines(
 
 @pytest.mark.parametrize(
     "line",
-    [b"\x00" * 40, b"garbage", b"[]", b"5", b"[" * 100_000, b'{"key": 5}', b'{"key": []}', b'{"cells": 5}',
+    [b"\x00" * 40, b"garbage", b"[]", b"5", b"[" * 100_000, b'{"key": 5}', b'{"key": []}', b'{"cells": 5}',  # noqa: E501
      b"\xff\xfe", b'{"key": "0"}{"key": "1"}'],
 )  # fmt: skip
 def test_a_damaged_line_is_named_and_nothing_is_changed(tmp_path: Path, line: bytes) -> None:
@@ -72,7 +74,9 @@ def test_of_two_lines_of_a_job_the_last_counts(tmp_path: Path) -> None:
         assert len(results.rows) == 3
 
 
-def test_a_file_system_without_locks_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_system_without_locks_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def refused(*_: Any) -> None:
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
@@ -82,7 +86,9 @@ def test_a_file_system_without_locks_is_named(tmp_path: Path, monkeypatch: pytes
 
 
 def test_a_full_disk_is_named_when_the_file_begins(tmp_path: Path) -> None:
-    (tmp_path / NAME).symlink_to("/dev/full")  # a device: links are refused, as by an attacker's folder
+    (tmp_path / NAME).symlink_to(
+        "/dev/full"
+    )  # a device: links are refused, as by an attacker's folder
     with pytest.raises(FolderError, match="can't be written"):
         opened(tmp_path)
     (tmp_path / NAME).unlink()

@@ -29,7 +29,9 @@ ASKED = StatisticsSettings("open")
 shares = st.floats(-0.5, 0.5).map(lambda x: round(x, 4))
 
 
-def movement(duration: float, direct: float, timing: str, *, predicted: float = 100.0) -> dict[str, Any]:
+def movement(
+    duration: float, direct: float, timing: str, *, predicted: float = 100.0
+) -> dict[str, Any]:
     """A row of one timing."""
     return {
         "solved": True, "timing": timing, "duration_s": duration, "direct_j": direct,
@@ -51,7 +53,8 @@ def pair(share: float, asynchronous: str = "asynchronous") -> dict[str, Any]:
 def test_the_interval_of_a_mean_is_the_union_of_students_and_halls(values: list[float]) -> None:
     found = findings_of([pair(value) for value in values])
     energy = next(each for each in found.comparisons if each.name == "energy, direct")
-    percent, count = 100.0 * np.array(values), len(values)
+    percent = 100.0 * np.array(values)
+    count = len(values)
     student = ttest_1samp(percent, 0.0)
     interval = student.confidence_interval(0.90)
     error = np.std(percent, ddof=1) / math.sqrt(count)
@@ -67,7 +70,10 @@ def test_the_interval_of_a_mean_is_the_union_of_students_and_halls(values: list[
     assert energy.mean.value == pytest.approx(np.mean(percent), abs=1e-9)
     assert energy.mean.low == pytest.approx(min(interval.low, end(1.0)), abs=1e-6)
     assert energy.mean.high == pytest.approx(max(interval.high, end(-1.0)), abs=1e-6)
-    assert (energy.less, energy.more) == (sum(x < 0.0 for x in values), sum(x > 0.0 for x in values))
+    assert (energy.less, energy.more) == (
+        sum(x < 0.0 for x in values),
+        sum(x > 0.0 for x in values),
+    )
     sign = math.copysign(1.0, float(np.mean(percent)))
     by_hall = 2.0 * t.sf(max(0.0, sign * hall(float(np.mean(percent)) / error)), count - 1)
     assert energy.chance == pytest.approx(max(student.pvalue, by_hall), rel=1e-6, abs=1e-12)
@@ -78,7 +84,9 @@ def test_the_interval_agrees_with_a_bootstrap() -> None:
     values = np.random.default_rng(3).normal(0.04, 0.1, 200)
     found = findings_of([pair(float(value)) for value in values])
     energy = next(each for each in found.comparisons if each.name == "energy, direct")
-    drawn = bootstrap((100.0 * values,), np.mean, confidence_level=0.90, rng=np.random.default_rng(5))
+    drawn = bootstrap(
+        (100.0 * values,), np.mean, confidence_level=0.90, rng=np.random.default_rng(5)
+    )
     near = 0.15 * (energy.mean.high - energy.mean.low)
     assert energy.mean.low == pytest.approx(drawn.confidence_interval.low, abs=near)
     assert energy.mean.high == pytest.approx(drawn.confidence_interval.high, abs=near)
@@ -87,13 +95,18 @@ def test_the_interval_agrees_with_a_bootstrap() -> None:
 def test_two_movements_of_a_pair_count_as_one_where_energies_are_compared() -> None:
     share = np.random.default_rng(6).normal(0.0, 0.1, 40)
     rows = [
-        {timing: movement(2.0, 100.0 * (1.0 + x), timing) for timing in ("synchronous", "asynchronous")}
+        {
+            timing: movement(2.0, 100.0 * (1.0 + x), timing)
+            for timing in ("synchronous", "asynchronous")
+        }
         for x in share.tolist()
     ]
     agreed = findings_of(rows).agreements[0]
     by_pair = mean_of(100.0 * (1.0 / (1.0 + share) - 1.0))
     assert agreed.count == 80
-    assert (agreed.mean.low, agreed.mean.high) == pytest.approx((by_pair.low, by_pair.high), abs=1e-9)
+    assert (agreed.mean.low, agreed.mean.high) == pytest.approx(
+        (by_pair.low, by_pair.high), abs=1e-9
+    )
 
 
 def test_answers_that_are_the_synchronous_one_are_counted_apart() -> None:
@@ -234,5 +247,8 @@ def test_a_cell_without_places_is_a_sentence(tmp_path: Path) -> None:
     make = maker({"cell": str(cell)})
     rows = [make({"number": number}) for number in range(2)]
     said = " ".join(sentences(findings_of(rows), asked))
-    assert "2 pairs without both movements, since the cell empty has no two places that keep 2 mm" in said
+    assert (
+        "2 pairs without both movements, since the cell empty has no two places that keep 2 mm"
+        in said
+    )
     assert said.endswith("Nothing follows from that.")

@@ -18,7 +18,9 @@ def of(shares: list[float], name: str = "energy") -> Comparison:
 
 
 @pytest.mark.parametrize("ends", [(-3.9, 7.95), (-0.2, 0.1), (2.0, 41.0), (-60.0, -1.0)])
-def test_an_interval_that_is_wider_than_its_dots_is_drawn_to_its_ends(ends: tuple[float, float]) -> None:
+def test_an_interval_that_is_wider_than_its_dots_is_drawn_to_its_ends(
+    ends: tuple[float, float],
+) -> None:
     plain = of(list(0.01 * np.linspace(-1.5, 1.0, 40)))
     wide = replace(plain, name="peak", mean=replace(plain.mean, low=ends[0], high=ends[1]))
     drawn = dots([plain, wide], "difference")
@@ -30,7 +32,9 @@ def test_an_interval_that_is_wider_than_its_dots_is_drawn_to_its_ends(ends: tupl
     assert low <= min(ends)
     assert high >= max(ends)
     assert low < 0.0 < high
-    x, width = (float(each) for each in re.findall(r'<rect x="([\d.]+)"[^>]*width="([\d.]+)"', drawn)[1])
+    x, width = (
+        float(each) for each in re.findall(r'<rect x="([\d.]+)"[^>]*width="([\d.]+)"', drawn)[1]
+    )
     per = (right - left) / (high - low)
     assert x == pytest.approx(left + (ends[0] - low) * per, abs=0.2)
     assert width == pytest.approx((ends[1] - ends[0]) * per, abs=0.2)

@@ -26,13 +26,17 @@ def movement(timing: str, number: int, **figures: float) -> dict[str, Any]:
     return named | common | within | figures
 
 
-def pairs(*shares: float, column: str = "direct_j", number: int | None = None) -> list[dict[str, Any]]:
+def pairs(
+    *shares: float, column: str = "direct_j", number: int | None = None
+) -> list[dict[str, Any]]:
     """Rows whose asynchronous movement takes so many shares more of a figure that is 100."""
     return [
         {
             "start": "a",
             "goal": "b",
-            "synchronous": movement("synchronous", k if number is None else number, **{column: 100.0}),
+            "synchronous": movement(
+                "synchronous", k if number is None else number, **{column: 100.0}
+            ),
             "asynchronous": movement(
                 "asynchronous", k if number is None else number, **{column: 100.0 * (1.0 + share)}
             ),
@@ -52,7 +56,8 @@ def test_one_difference_among_eight_that_chance_explains_is_not_shown() -> None:
     rows = pairs(*shares.tolist())
     for k, row in enumerate(rows):  # the other figures vary too
         for name in ("duration_s", "predicted_j", "indirect_j", "peak_w"):
-            row["synchronous"][name], row["asynchronous"][name] = 100.0, 100.0 + (-1.0) ** k
+            row["synchronous"][name] = 100.0
+            row["asynchronous"][name] = 100.0 + (-1.0) ** k
     found = findings_of(rows)
     energy = next(each for each in found.comparisons if each.name == "energy, direct")
     assert energy.outside
@@ -93,17 +98,26 @@ def test_movements_that_were_drawn_again_are_counted() -> None:
 
 
 def test_all_coincide_and_nothing_is_compared() -> None:
-    rows = [{"synchronous": movement("synchronous", 0), "asynchronous": movement("synchronous", 0)}] * 3
+    rows = [
+        {"synchronous": movement("synchronous", 0), "asynchronous": movement("synchronous", 0)}
+    ] * 3
     found = findings_of(rows)
     assert (found.solved, found.same, found.driven) == (3, 3, 3)
-    assert "in 3 of them the asynchronous answer is the synchronous one, so 0 are compared" in said(rows)
+    assert "in 3 of them the asynchronous answer is the synchronous one, so 0 are compared" in said(
+        rows
+    )
     assert "candidate" not in said(rows)
     assert "Fewer than 30 pairs may miss" in said(rows)
 
 
-def test_reasons_are_counted_without_their_figures_and_movements_that_were_not_driven_apart() -> None:
+def test_reasons_are_counted_without_their_figures_and_movements_that_were_not_driven_apart() -> (
+    None
+):
     def lost(clearance: float) -> dict[str, Any]:
-        message = f"on it t_f2 and lathe come to {clearance} mm at 11 % of it (tcp at 0.66, {clearance} m)"
+        message = (
+            f"on it t_f2 and lathe come to {clearance} mm at 11 % of it (tcp at 0.66, "
+            f"{clearance} m)"
+        )
         return {timing: {"solved": False, "message": message} for timing in SIDES}
 
     still = pairs(0.0)[0]
@@ -122,12 +136,17 @@ def test_reasons_are_counted_without_their_figures_and_movements_that_were_not_d
 @pytest.mark.parametrize(
     ("asked", "words"),
     [
-        (replace(ASKED, objective="time"), "none may be slower: a rule, no finding. Slower are 1 of 3"),
+        (
+            replace(ASKED, objective="time"),
+            "none may be slower: a rule, no finding. Slower are 1 of 3",
+        ),
         (ASKED, "1 of 3 take longer"),
         (replace(ASKED, planner=""), "better by time_and_energy as predicted"),
     ],
 )
-def test_what_a_rule_of_the_planner_makes_is_no_finding(asked: StatisticsSettings, words: str) -> None:
+def test_what_a_rule_of_the_planner_makes_is_no_finding(
+    asked: StatisticsSettings, words: str
+) -> None:
     assert words in said(pairs(0.1, 0.0, -0.1, column="duration_s"), asked)
 
 

@@ -51,13 +51,27 @@ def test_every_grid_has_more_placements_than_are_planned_before_there_is_a_bound
         assert steps ** len(small.variables) > BATCH
 
 
-@given(st.lists(st.tuples(st.floats(-0.5, 0.5), st.floats(-0.1, 0.1)), min_size=3, max_size=12, unique=True))
+@given(
+    st.lists(
+        st.tuples(st.floats(-0.5, 0.5), st.floats(-0.1, 0.1)), min_size=3, max_size=12, unique=True
+    )
+)
 @settings(max_examples=15, deadline=None)
-def test_figures_of_the_statistics_are_those_of_the_benchmark(shares: list[tuple[float, float]]) -> None:
+def test_figures_of_the_statistics_are_those_of_the_benchmark(
+    shares: list[tuple[float, float]],
+) -> None:
     def movement(timing: str, k: int, joules: float, off: float) -> dict[str, object]:
-        figures = dict.fromkeys(("duration_s", "direct_j", "peak_w", "path_m", "torque_share"), joules)
+        figures = dict.fromkeys(
+            ("duration_s", "direct_j", "peak_w", "path_m", "torque_share"), joules
+        )
         measured = {"predicted_j": joules * (1.0 + off), "indirect_j": joules * (1.0 - off)}
-        return {"solved": True, "timing": timing, "trajectory_id": f"{timing}{k}", **figures, **measured}
+        return {
+            "solved": True,
+            "timing": timing,
+            "trajectory_id": f"{timing}{k}",
+            **figures,
+            **measured,
+        }
 
     rows = [
         {
@@ -73,7 +87,9 @@ def test_figures_of_the_statistics_are_those_of_the_benchmark(shares: list[tuple
         (folder / "results.jsonl").write_text("".join(f"{json.dumps(row)}\n" for row in rows))
         finished = Finished(StatisticsSettings("open"), tuple(rows), found, ())
         assert all(claim.holds for claim in recomputed(finished, folder))
-        wrong = replace(found, comparisons=tuple(replace(one, mean=WRONG) for one in found.comparisons))
+        wrong = replace(
+            found, comparisons=tuple(replace(one, mean=WRONG) for one in found.comparisons)
+        )
         if np.ptp([share for share, _ in shares]) > 1e-3:
             assert not recomputed(replace(finished, findings=wrong), folder)[0].holds
 

@@ -1,4 +1,6 @@
-"""The main job over processes: `ir demo`, judged from its recording alone by readers that are not ours."""
+"""The main job over processes: `ir demo`, judged from its recording alone by readers that are not
+ours.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,16 @@ class Run:
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     """Run the demonstration once, as `make demo` does."""
     folder = tmp_path_factory.mktemp("demo")
-    command = [sys.executable, "-m", "ir_cli.main", "demo", "--plant", "nominal", "--out", str(folder)]
+    command = [
+        sys.executable,
+        "-m",
+        "ir_cli.main",
+        "demo",
+        "--plant",
+        "nominal",
+        "--out",
+        str(folder),
+    ]
     done = subprocess.run(
         command, capture_output=True, text=True, timeout=PATIENCE, env=dict(os.environ), check=False
     )
@@ -73,14 +84,19 @@ def test_the_recorded_requests_are_planned_again_with_equal_ids(run: Run) -> Non
 
 
 def test_all_eight_values_of_table_2_are_in_the_recording_within_one_percent(run: Run) -> None:
-    power = np.array([(stamp(m), m.mode, m.power) for _, m in run.messages["/ir_sim_driver/power_state"]])
+    power = np.array(
+        [(stamp(m), m.mode, m.power) for _, m in run.messages["/ir_sim_driver/power_state"]]
+    )
     program = run.messages["/ir_program_runner/program_state"]
     before = power[power[:, 0] < stamp(program[0][1])]
     plateaus: dict[int, list[float]] = {mode: [] for mode in RESTS}
     starts = np.flatnonzero(np.diff(before[:, 1], prepend=-1.0))
     for first, last in zip(starts, [*starts[1:], len(before)], strict=True):
-        mode, watts = int(before[first, 1]), before[first:last, 2]
-        if mode in RESTS and len(watts) > 100:  # the load may change on motors: the last 0.8 s count
+        mode = int(before[first, 1])
+        watts = before[first:last, 2]
+        if (
+            mode in RESTS and len(watts) > 100
+        ):  # the load may change on motors: the last 0.8 s count
             plateaus[mode].append(float(np.median(watts[-90:-10])))
     for load, expected in HOME_W.items():
         for mode, watts in zip(RESTS, expected, strict=True):
@@ -93,14 +109,20 @@ def test_joint_states_lie_on_a_gap_free_grid_but_for_hibernation(run: Run) -> No
     ticks = np.rint(stamps / GRID).astype(np.int64)
     assert np.abs(stamps - ticks * GRID).max() < 1e-6
     gaps = np.flatnonzero(np.diff(ticks) != 1)
-    asleep = [(stamp(m), m.mode) for _, m in run.messages["/ir_sim_driver/power_state"] if m.mode in (4, 15)]
+    asleep = [
+        (stamp(m), m.mode)
+        for _, m in run.messages["/ir_sim_driver/power_state"]
+        if m.mode in (4, 15)
+    ]
     for gap in gaps:
         inside = [t for t, _ in asleep if stamps[gap] < t < stamps[gap + 1]]
         assert len(inside) > 100, f"joint_states are missing at {stamps[gap]:.3f} s"
 
 
 def runs_of(states: list[Any]) -> dict[str, list[list[Any]]]:
-    """States of each run of a trajectory, in their order: a robot that is held up lags behind the events."""
+    """States of each run of a trajectory, in their order: a robot that is held up lags behind the
+    events.
+    """
     runs: dict[str, list[list[Any]]] = defaultdict(list)
     for before, state in pairwise([None, *states]):
         if not state.trajectory_id or state.path_time <= 0.0:
@@ -127,7 +149,9 @@ def test_planned_and_measured_energy_agree_for_every_movement(run: Run) -> None:
         start = float(np.median([stamp(s) - s.path_time for s in own]))
         used = np.interp([start, start + event.movement.report.duration], power[:, 0], power[:, 1])
         planned = event.movement.report.energy
-        assert used[1] - used[0] == pytest.approx(planned, abs=max(0.05 * planned, 200.0)), event.index
+        assert used[1] - used[0] == pytest.approx(planned, abs=max(0.05 * planned, 200.0)), (
+            event.index
+        )
         moved += 1
     assert moved >= 15
 
@@ -159,7 +183,10 @@ def test_rosbag2_readers_and_the_attached_cell_are_there(run: Run) -> None:
     (bag / "demo.mcap").symlink_to(run.folder / "demo.mcap")
     (bag / "metadata.yaml").write_text(rosbag2_metadata(summary))
     with Reader(bag) as rosbag:
-        assert {c.topic for c in rosbag.connections} >= {"/joint_states", "/ir_sim_driver/power_state"}
+        assert {c.topic for c in rosbag.connections} >= {
+            "/joint_states",
+            "/ir_sim_driver/power_state",
+        }
         assert rosbag.message_count == summary.statistics.message_count
 
 

@@ -31,8 +31,10 @@ pytestmark = pytest.mark.long
 START_SECONDS = 120.0  # four processes on a busy machine
 IDLE_SECONDS = 6.0
 IDLE_SHARE = 0.35
-"""Of a core, for the planner or the runner that has nothing to do. With /clock at factor 4: 0.15 and 0.09,
-on a busy machine; with a message for every tick of the plant, 2000 a second, it was 0.93 for the planner."""
+"""Of a core, for the planner or the runner that has nothing to do. With /clock at factor 4: 0.15
+and 0.09, on a busy machine; with a message for every tick of the plant, 2000 a second, it was 0.93
+for the planner.
+"""
 AT_WORK = 0.3  # s of processor time after which a planner reads the cell that it was sent
 GOAL = "A1 20 A2 -90 A3 90 A4 0 A5 0 A6 0"
 
@@ -64,7 +66,9 @@ def test_nodes_without_temporary_folder_and_home_plan_and_drive_and_idle_cheaply
 ) -> None:
     simulated = {"use_sim_time": factor != 1.0}
     driver = {"wake_port": 0, "backend": "pybullet", "real_time_factor": factor}
-    nodes.start(cell_nodes("open", driver=driver, planner=simulated, runner=simulated, recorder=simulated))
+    nodes.start(
+        cell_nodes("open", driver=driver, planner=simulated, runner=simulated, recorder=simulated)
+    )
 
     def robot_is_heard() -> bool:
         status = client.call(names.CHECK_STATE, CheckState.Request()).status
@@ -72,9 +76,13 @@ def test_nodes_without_temporary_folder_and_home_plan_and_drive_and_idle_cheaply
 
     wait_for(robot_is_heard, timeout=START_SECONDS)
     plan = client.plan_to(GOAL)
-    assert client.execute(client.get_trajectory(plan.trajectory_id), timeout=START_SECONDS).energy > 0.0
+    assert (
+        client.execute(client.get_trajectory(plan.trajectory_id), timeout=START_SECONDS).energy
+        > 0.0
+    )
     watched = {name: nodes.ids()[f"{name}.node"] for name in (names.PLANNER, names.PROGRAM_RUNNER)}
-    before, began = {name: used(pid) for name, pid in watched.items()}, time.monotonic()
+    before = {name: used(pid) for name, pid in watched.items()}
+    began = time.monotonic()
     wait_for(lambda: time.monotonic() - began > IDLE_SECONDS, timeout=START_SECONDS)
     elapsed = time.monotonic() - began
     shares = {name: (used(pid) - before[name]) / elapsed for name, pid in watched.items()}
@@ -86,7 +94,8 @@ def test_nodes_without_temporary_folder_and_home_plan_and_drive_and_idle_cheaply
 def large_cell(bodies: int) -> str:
     """A cell that takes the planner seconds to read."""
     boxes = "".join(
-        f"      - {{name: b{k}, kind: box, size: [0.02, 0.02, 0.02], xyz: [{k % 50}, {k // 50}, 0.5]}}\n"
+        f"      - {{name: b{k}, kind: box, size: [0.02, 0.02, 0.02], xyz: [{k % 50}, {k // 50}, "
+        "0.5]}\n"
         for k in range(bodies)
     )
     return (
@@ -106,7 +115,9 @@ def test_a_planner_that_is_killed_in_set_cell_is_a_sentence_and_the_next_one_ans
     def ask() -> None:
         try:
             answers.append(
-                client.call(names.SET_CELL, SetCell.Request(cell_yaml=large_cell(3000)), timeout=20.0)
+                client.call(
+                    names.SET_CELL, SetCell.Request(cell_yaml=large_cell(3000)), timeout=20.0
+                )
             )
         except (CallTimedOutError, ServiceUnavailableError) as error:
             answers.append(str(error))
@@ -132,7 +143,9 @@ def test_a_clock_of_times_that_are_none_ends_no_node(
     """A node whose callbacks fail fifty times in a minute ends."""
     simulated = {"use_sim_time": True}
     driver = {"wake_port": 0, "backend": "ideal", **simulated}
-    nodes.start(cell_nodes("open", driver=driver, planner=simulated, runner=simulated, recorder=simulated))
+    nodes.start(
+        cell_nodes("open", driver=driver, planner=simulated, runner=simulated, recorder=simulated)
+    )
     clock = client._executor.run(lambda: client.node.create_publisher(Clock, "/clock", 10))
     wait_for(lambda: clock.get_subscription_count() == len(NODES), timeout=START_SECONDS)
     for _ in range(200):

@@ -37,7 +37,9 @@ def nodes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     process = subprocess.Popen([*IR, "up", "--logs", str(logs)], stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None
-        assert any(READY in line for line in process.stdout)  # another one may name a port that is taken
+        assert any(
+            READY in line for line in process.stdout
+        )  # another one may name a port that is taken
         yield
         process.send_signal(signal.SIGTERM)
         assert process.wait(60) == 130
@@ -84,7 +86,11 @@ def test_every_line_of_the_readme_runs() -> None:
         assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
     for script in [blocks("python")[0], (ROOT / "examples" / "plan_and_drive.py").read_text()]:
         ran = subprocess.run(
-            [sys.executable, "-c", script], capture_output=True, text=True, timeout=PATIENCE, check=False
+            [sys.executable, "-c", script],
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+            check=False,
         )
         assert ran.returncode == 0, ran.stdout + ran.stderr
         assert "certified" in ran.stdout

@@ -1,4 +1,6 @@
-"""Two complete cells in one graph: each plans, drives and records its own, started by two `ir up`."""
+"""Two complete cells in one graph: each plans, drives and records its own, started by two `ir
+up`.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,14 @@ def up(tmp_path: Path, ros_domain_id: int) -> Iterator[Callable[[str], subproces
 
     def start(cell: str) -> subprocess.Popen[str]:
         words = ["up", "--cell", "open", "--namespace", cell, "--domain", str(ros_domain_id)]
-        words += ["-p", "backend:=ideal", "-p", f"ir_recorder:roots:=[{tmp_path}]", "--logs", str(tmp_path)]
+        words += [
+            "-p",
+            "backend:=ideal",
+            "-p",
+            f"ir_recorder:roots:=[{tmp_path}]",
+            "--logs",
+            str(tmp_path),
+        ]
         started.append(
             subprocess.Popen(
                 [sys.executable, "-m", "ir_cli.main", *words],
@@ -59,13 +68,18 @@ def up(tmp_path: Path, ros_domain_id: int) -> Iterator[Callable[[str], subproces
 
 def own(raw: RawRecording, topic: str, message_type: Any) -> list[Any]:
     channel = raw.channel(topic)
-    return [] if channel is None else [deserialize_message(data, message_type) for data in channel.messages]
+    return (
+        []
+        if channel is None
+        else [deserialize_message(data, message_type) for data in channel.messages]
+    )
 
 
 def test_two_cells_in_one_domain_keep_to_themselves(
     up: Any, ros_domain_id: int, wait_for: Any, tmp_path: Path
 ) -> None:
-    processes, clients = [], {}
+    processes = []
+    clients = {}
     try:
         for cell in CELLS:
             processes.append(up(cell))
@@ -85,7 +99,8 @@ def test_two_cells_in_one_domain_keep_to_themselves(
         for cell, client in clients.items():
             wait_for(
                 lambda client=client: (
-                    client.call(names.CHECK_STATE, CheckState.Request()).status.code == Status.SUCCESS
+                    client.call(names.CHECK_STATE, CheckState.Request()).status.code
+                    == Status.SUCCESS
                 ),
                 timeout=START_SECONDS,
                 what=f"the planner of {cell} hears its robot",
@@ -94,7 +109,10 @@ def test_two_cells_in_one_domain_keep_to_themselves(
             ids[cell] = plan.trajectory_id
             client.execute(client.get_trajectory(plan.trajectory_id))
         for cell in CELLS:
-            wait_for(lambda cell=cell: is_written(tmp_path / f"{cell}.mcap", cell), what="all is recorded")
+            wait_for(
+                lambda cell=cell: is_written(tmp_path / f"{cell}.mcap", cell),
+                what="all is recorded",
+            )
         for client in clients.values():
             client.ask(names.STOP_RECORDING, StopRecording.Request())
     finally:
@@ -114,17 +132,25 @@ def is_written(path: Path, cell: str) -> bool:
     """Whether a running recording has the end of the movement, and a word of every node."""
     raw = read_raw(path)
     states = own(raw, f"/{cell}/{names.JOINT_STATES}", JointState)
-    heard = {status.name for msg in own(raw, names.DIAGNOSTICS, DiagnosticArray) for status in msg.status}
+    heard = {
+        status.name for msg in own(raw, names.DIAGNOSTICS, DiagnosticArray) for status in msg.status
+    }
     said = {f"{cell}/{node}" for node in NODES} <= {name.split(":")[0] for name in heard}
     return said and bool(states) and abs(states[-1].position[0] - TURNED[cell]) < REACHED
 
 
 def judge(path: Path, cell: str, trajectory_id: str) -> None:
-    """Everything in the recording is of this cell, and the movement that was asked of it is in it."""
+    """Everything in the recording is of this cell, and the movement that was asked of it is in
+    it.
+    """
     raw = read_raw(path)
     shared = {names.DIAGNOSTICS, names.ROSOUT, names.PARAMETER_EVENTS}
-    assert all(channel.topic.startswith(f"/{cell}/") or channel.topic in shared for channel in raw.channels)
-    statuses = [status.name for msg in own(raw, names.DIAGNOSTICS, DiagnosticArray) for status in msg.status]
+    assert all(
+        channel.topic.startswith(f"/{cell}/") or channel.topic in shared for channel in raw.channels
+    )
+    statuses = [
+        status.name for msg in own(raw, names.DIAGNOSTICS, DiagnosticArray) for status in msg.status
+    ]
     assert {name.split(":")[0] for name in statuses} == {f"{cell}/{node}" for node in NODES}
     assert {msg.name.split(".")[0] for msg in own(raw, names.ROSOUT, Log)} <= {cell}
     events = own(raw, names.PARAMETER_EVENTS, ParameterEvent)

@@ -1,7 +1,8 @@
-"""A second user of the machine, in the same domain with the same names: everybody has a cell of their own.
+"""A second user of the machine, in the same domain with the same names: everybody has a cell of
+their own.
 
-Where this process may become other users, it does; elsewhere the two have homes, temporary folders and
-namespaces of their own.
+Where this process may become other users, it does; elsewhere the two have homes, temporary folders
+and namespaces of their own.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ class User:
     """Runs commands as this user, where that is possible, with a home of its own."""
 
     def __init__(self, number: int, home: Path, domain: int) -> None:
-        self.home, self._words = home, [sys.executable, "-m"]
+        self.home = home
+        self._words = [sys.executable, "-m"]
         self.namespace = "" if _may_change() else f"/user_{number}"
         home.mkdir()
         if _may_change():

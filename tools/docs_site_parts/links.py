@@ -1,4 +1,6 @@
-"""Where links lead: to pages of the site, to headings, to files of the repository that are copied into it."""
+"""Where links lead: to pages of the site, to headings, to files of the repository that are copied
+into it.
+"""
 
 from __future__ import annotations
 
@@ -64,7 +66,9 @@ class Links:
             return link
         path, _, anchor = link.partition("#")
         source = (
-            posixpath.normpath(posixpath.join(posixpath.dirname(page.source), path)) if path else page.source
+            posixpath.normpath(posixpath.join(posixpath.dirname(page.source), path))
+            if path
+            else page.source
         )
         other = self.pages.get(source)
         if other is not None:
@@ -78,7 +82,8 @@ class Links:
 
     def _file(self, page: Page, source: str, link: str) -> str:
         """A file or a folder of the repository, copied into the site."""
-        path, target = self.root / source, f"files/{source}"
+        path = self.root / source
+        target = f"files/{source}"
         if path.is_dir():
             return self._folder(path, target)
         if not path.is_file():

@@ -31,20 +31,20 @@ SECTIONS = (
     Section(
         "How to",
         _docs(
-            "mistakes", "view", "cad", "robot_guide", "compare", "krl", "cartesian", "library", "studies",
+            "mistakes", "view", "cad", "robot_guide", "compare", "krl", "cartesian", "library", "studies",  # noqa: E501
             "arena", "measuring", "recording", "report", "network", "extending",
         ),
     ),
     Section(
         "Look up",
-        _docs("cell_format", "robot_data", "interfaces", "interface_reference", "parameters", "notation"),
+        _docs("cell_format", "robot_data", "interfaces", "interface_reference", "parameters", "notation"),  # noqa: E501
         "docs/reference",
     ),
     Section(
         "Understand",
         (
             *_docs(
-                "planning", "programs", "service_movements", "energy", "driver", "plant", "architecture",
+                "planning", "programs", "service_movements", "energy", "driver", "plant", "architecture",  # noqa: E501
                 "paper_map", "reproduction", "laws", "benchmarks",
             ),
             "CONTRIBUTING.md",

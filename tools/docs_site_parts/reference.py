@@ -15,7 +15,8 @@ from ir_cli.main import COMMAND_MODULES
 
 def package_page(name: str) -> tuple[str, list[str]]:
     """The public face of a package as Markdown, and the names without a docstring."""
-    package, missing = importlib.import_module(name), list[str]()
+    package = importlib.import_module(name)
+    missing = list[str]()
     lines = [f"# {name}", "", "Written from the docstrings of what the package exports.", ""]
     lines += [_prose(inspect.getdoc(package) or ""), ""]
     for exported in sorted(package.__all__, key=str.lower):
@@ -35,12 +36,16 @@ def package_page(name: str) -> tuple[str, list[str]]:
 def _class(name: str, thing: type) -> Iterator[str]:
     yield from (f"## {name}", "", _prose(inspect.getdoc(thing) or ""), "")
     if dataclasses.is_dataclass(thing):
-        yield "Fields: " + ", ".join(f"`{f.name}`" for f in dataclasses.fields(thing) if f.name[0] != "_")
+        yield "Fields: " + ", ".join(
+            f"`{f.name}`" for f in dataclasses.fields(thing) if f.name[0] != "_"
+        )
         yield ""
     for key, member in vars(thing).items():
         if key[0] == "_" or isinstance(member, type):
             continue
-        inner = getattr(member, "__func__", getattr(member, "fget", None) or getattr(member, "func", member))
+        inner = getattr(
+            member, "__func__", getattr(member, "fget", None) or getattr(member, "func", member)
+        )
         if inspect.isfunction(inner) and inspect.getdoc(inner):
             yield from (f"### {name}.{key}", "", *_function(key, inner))
 
@@ -51,7 +56,14 @@ def _function(name: str, function: object) -> Iterator[str]:
     except (TypeError, ValueError):
         signature = "(...)"
     signature = re.sub(r" at 0x[0-9a-f]+", "", signature)
-    yield from ("```python", f"{name}{signature}", "```", "", _prose(inspect.getdoc(function) or ""), "")
+    yield from (
+        "```python",
+        f"{name}{signature}",
+        "```",
+        "",
+        _prose(inspect.getdoc(function) or ""),
+        "",
+    )
 
 
 def _prose(text: str) -> str:

@@ -25,13 +25,19 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "send_goal", help="send a goal: send_goal /ir_planner/plan '{}'; Ctrl-C cancels"
     )
     send.add_argument("action")
-    send.add_argument("values", nargs="*", help="[type] and goal as YAML, as for `ros2 action send_goal`")
+    send.add_argument(
+        "values", nargs="*", help="[type] and goal as YAML, as for `ros2 action send_goal`"
+    )
     send.add_argument("--feedback", action="store_true", help="print the feedback")
-    send.add_argument("--timeout", type=float, default=math.inf, help="s to wait for the result (no end)")
+    send.add_argument(
+        "--timeout", type=float, default=math.inf, help="s to wait for the result (no end)"
+    )
     send.add_argument("--full", action="store_true", help="print long arrays whole")
     send.set_defaults(run=run_send_goal)
 
-    cancel = commands.add_parser("cancel", help="cancel all goals of an action: cancel /ir_planner/plan")
+    cancel = commands.add_parser(
+        "cancel", help="cancel all goals of an action: cancel /ir_planner/plan"
+    )
     cancel.add_argument("action")
     cancel.set_defaults(run=run_cancel)
 
@@ -50,7 +56,9 @@ def run_send_goal(arguments: argparse.Namespace) -> int:
             sys.stdout.write(message_to_yaml(message, limit) + "---\n")
             sys.stdout.flush()
 
-        result = client.send_goal(name, goal, show if arguments.feedback else None, arguments.timeout)
+        result = client.send_goal(
+            name, goal, show if arguments.feedback else None, arguments.timeout
+        )
     sys.stdout.write(message_to_yaml(result, limit))
     return 0 if _succeeded(result) else 1
 

@@ -1,4 +1,6 @@
-"""Who starts nodes is alone in their domain and namespace: nobody else starts them, none are there yet."""
+"""Who starts nodes is alone in their domain and namespace: nobody else starts them, none are there
+yet.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,9 @@ from .errors import CommandError
 from .only_one import claim
 
 DISCOVERY_SECONDS = 1.0
-"""For nodes that are there already to be seen; discovery on one machine takes tenths of a second."""
+"""For nodes that are there already to be seen; discovery on one machine takes tenths of a
+second.
+"""
 POLL_SECONDS = 0.05
 
 
@@ -35,7 +39,8 @@ def refuse_beside(namespace: str) -> None:
     """CommandError with a list where nodes of the same names are in the graph."""
     names = {f"{namespace}/{name}" for name in NODES}
     with Client(node_name="ir_alone") as client:
-        deadline, there = time.monotonic() + DISCOVERY_SECONDS, list[str]()
+        deadline = time.monotonic() + DISCOVERY_SECONDS
+        there = list[str]()
         while not there and time.monotonic() < deadline:
             time.sleep(POLL_SECONDS)
             there = sorted(names & set(client.graph.nodes()))

@@ -1,7 +1,8 @@
 """A node that ends with the process that started it: `python -m ir_cli.child MODULE ARGUMENTS`.
 
-Standard input is a pipe that the parent holds open and never writes to. The kernel closes it when the parent
-ends, by whatever signal; then the node is interrupted, and ended for good when it does not follow.
+Standard input is a pipe that the parent holds open and never writes to. The kernel closes it when
+the parent ends, by whatever signal; then the node is interrupted, and ended for good when it does
+not follow.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""`ir completion`: a bash script that completes commands, options and choices; elsewhere file names.
+"""`ir completion`: a bash script that completes commands, options and choices; elsewhere file
+names.
 
 The script holds the words, so that a press of the tab key starts no Python.
 """
@@ -28,7 +29,9 @@ complete -o default -F _ir ir
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add completion."""
-    completion = commands.add_parser("completion", help="completion for bash: source <(ir completion)")
+    completion = commands.add_parser(
+        "completion", help="completion for bash: source <(ir completion)"
+    )
     completion.set_defaults(run=run)
 
 
@@ -41,9 +44,13 @@ def run(arguments: argparse.Namespace) -> int:
         commands = argparse.ArgumentParser(prog="ir").add_subparsers()
         import_module(module).add_commands(commands)
         words |= {name: _words(parser) for name, parser in commands.choices.items()}
-    cases = [f"            {name}) words={shlex.quote(' '.join(each))} ;;" for name, each in words.items()]
+    cases = [
+        f"            {name}) words={shlex.quote(' '.join(each))} ;;"
+        for name, each in words.items()
+    ]
     text = SCRIPT.format(
-        commands=shlex.quote(" ".join([*COMMAND_MODULES, "--help", "--version"])), cases="\n".join(cases)
+        commands=shlex.quote(" ".join([*COMMAND_MODULES, "--help", "--version"])),
+        cases="\n".join(cases),
     )
     sys.stdout.write(text)
     return 0

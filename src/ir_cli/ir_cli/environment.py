@@ -13,7 +13,9 @@ DEMONSTRATION_DOMAINS = range(1, 101)
 
 
 def ros_defaults() -> dict[str, str]:
-    """Variables for nodes on this machine; raises ParameterError for an IR_NETWORK that is not known."""
+    """Variables for nodes on this machine; raises ParameterError for an IR_NETWORK that is not
+    known.
+    """
     variables, _ = network_variables(os.environ)
     if "AMENT_PREFIX_PATH" not in os.environ:
         variables["AMENT_PREFIX_PATH"] = sys.prefix

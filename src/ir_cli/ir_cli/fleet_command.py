@@ -15,12 +15,18 @@ _CLEAR = "\r\x1b[2K"
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add fleet."""
-    fleet = commands.add_parser("fleet", help="recordings of many robots and shifts on one page, summed up")
+    fleet = commands.add_parser(
+        "fleet", help="recordings of many robots and shifts on one page, summed up"
+    )
     words = "recordings (.mcap), or folders; a folder below one that is named is a robot"
     fleet.add_argument("paths", nargs="+", metavar="PATH", help=words)
-    fleet.add_argument("-o", "--output", default="out/fleet.html", help="page to write (out/fleet.html)")
+    fleet.add_argument(
+        "-o", "--output", default="out/fleet.html", help="page to write (out/fleet.html)"
+    )
     fleet.add_argument("--costs", default="", metavar="FILE", help="prices, shifts and CO2 (YAML)")
-    fleet.add_argument("--table", default="", metavar="FILE", help="figures as .csv or .parquet as well")
+    fleet.add_argument(
+        "--table", default="", metavar="FILE", help="figures as .csv or .parquet as well"
+    )
     add_roots(fleet)
     fleet.set_defaults(run=run_fleet)
 
@@ -40,7 +46,9 @@ def run_fleet(arguments: argparse.Namespace) -> int:
     try:
         members = read_members(arguments.paths, roots, left_out.append, show)
     finally:
-        sys.stderr.write((_CLEAR if live else "") + "".join(f"{sentence}\n" for sentence in left_out))
+        sys.stderr.write(
+            (_CLEAR if live else "") + "".join(f"{sentence}\n" for sentence in left_out)
+        )
     sys.stdout.write(f"{write_fleet(members, arguments.output, left_out, costs, roots)}\n")
     if arguments.table:
         sys.stdout.write(f"{write_fleet_table(members, arguments.table, roots)}\n")

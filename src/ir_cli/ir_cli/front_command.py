@@ -16,17 +16,26 @@ from .terminal import Progress, table
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add front."""
     front = commands.add_parser("front", help="energy over cycle time: front home infeed_pick park")
-    front.add_argument("stations", nargs="*", help="stations and postures to visit; none: the cell's program")
-    front.add_argument("--cycle-time", type=float, default=0.0, help="s that are chosen (the cheapest)")
-    front.add_argument("--points", type=int, default=12, help="programs of the front, at most 50 (12)")
+    front.add_argument(
+        "stations", nargs="*", help="stations and postures to visit; none: the cell's program"
+    )
+    front.add_argument(
+        "--cycle-time", type=float, default=0.0, help="s that are chosen (the cheapest)"
+    )
+    front.add_argument(
+        "--points", type=int, default=12, help="programs of the front, at most 50 (12)"
+    )
     front.add_argument("--seed", type=int, default=0, help="seed of the planner (0)")
-    front.add_argument("--out", type=Path, default=Path("out/front.png"), help="the picture (out/front.png)")
+    front.add_argument(
+        "--out", type=Path, default=Path("out/front.png"), help="the picture (out/front.png)"
+    )
     front.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Plan the front, print it, write the picture."""
-    progress, options = Progress(), PlanOptions(seed=arguments.seed)
+    progress = Progress()
+    options = PlanOptions(seed=arguments.seed)
     with Client(node_name="ir_front") as client:
         progress.begin("plan the front")
         free = client.plan_program(
@@ -36,17 +45,25 @@ def run(arguments: argparse.Namespace) -> int:
             front_points=arguments.points,
         )
         cheapest = min(free.front, key=lambda point: point.energy)
-        choice = Mark("cheapest cycle time", cheapest.cycle_time, cheapest.energy, cheapest.program_id)
+        choice = Mark(
+            "cheapest cycle time", cheapest.cycle_time, cheapest.energy, cheapest.program_id
+        )
         if arguments.cycle_time > 0.0:
             progress.update(f"cycle time {arguments.cycle_time:g} s")
-            plan = client.plan_program(arguments.stations, arguments.cycle_time, options, savings=False)
-            choice = Mark("chosen cycle time", plan.report.duration, plan.report.energy, plan.program_id)
+            plan = client.plan_program(
+                arguments.stations, arguments.cycle_time, options, savings=False
+            )
+            choice = Mark(
+                "chosen cycle time", plan.report.duration, plan.report.energy, plan.program_id
+            )
         progress.end(f"{len(free.front)} programs ({free.info.planning_time:.1f} s of planning)")
     marks = [Mark("free plan", free.report.duration, free.report.energy, free.program_id), choice]
     if free.savings.available:
         total = free.savings.total
         marks.append(Mark("common program", total.seconds, total.common, ""))
-        marks.append(Mark("planned in its time", total.seconds, total.planned, free.savings.program_id))
+        marks.append(
+            Mark("planned in its time", total.seconds, total.planned, free.savings.program_id)
+        )
     front = Front(free.front, tuple(marks))
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     picture = write_front(front, arguments.out)
@@ -55,8 +72,13 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _text(front: Front) -> str:
-    rows = [[f"{p.cycle_time:.2f}", f"{p.energy / 1e3:.2f}", p.program_id, ""] for p in front.points]
-    rows += [[f"{m.cycle_time:.2f}", f"{m.energy / 1e3:.2f}", m.program_id, m.name] for m in front.marks]
+    rows = [
+        [f"{p.cycle_time:.2f}", f"{p.energy / 1e3:.2f}", p.program_id, ""] for p in front.points
+    ]
+    rows += [
+        [f"{m.cycle_time:.2f}", f"{m.energy / 1e3:.2f}", m.program_id, m.name] for m in front.marks
+    ]
     return table(
-        ["cycle time s", "E at the mains kJ", "program", ""], sorted(rows, key=lambda r: float(r[0]))
+        ["cycle time s", "E at the mains kJ", "program", ""],
+        sorted(rows, key=lambda r: float(r[0])),
     )

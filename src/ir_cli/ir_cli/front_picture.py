@@ -19,7 +19,9 @@ _COLOURS = ("#5b8def", "#e8590c", "#868e96", "#37b24d")
 
 @dataclass(frozen=True)
 class Mark:
-    """A program with a name: its cycle time [s] and energy at the mains [J]; its id, "" for none."""
+    """A program with a name: its cycle time [s] and energy at the mains [J]; its id, "" for
+    none.
+    """
 
     name: str
     cycle_time: float
@@ -36,7 +38,9 @@ class Front:
 
 
 def write_front(front: Front, path: Path) -> Path:
-    """The picture as PNG; returns its absolute path. CommandError where matplotlib isn't installed."""
+    """The picture as PNG; returns its absolute path. CommandError where matplotlib isn't
+    installed.
+    """
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
@@ -55,7 +59,13 @@ def write_front(front: Front, path: Path) -> Path:
         place = f"{mark.name}: {mark.cycle_time:.2f} s, {mark.energy / 1e3:.2f} kJ"
         size = 13 if style == "*" else 8
         axes.plot(
-            mark.cycle_time, mark.energy / 1e3, style, color=colour, markersize=size, label=place, linewidth=0
+            mark.cycle_time,
+            mark.energy / 1e3,
+            style,
+            color=colour,
+            markersize=size,
+            label=place,
+            linewidth=0,
         )
     axes.set(xlabel="cycle time [s], waits and pauses included", ylabel="energy at the mains [kJ]")
     axes.grid(color="#dde3ea", linewidth=0.6)

@@ -19,12 +19,16 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Add call, echo and list."""
     call = commands.add_parser("call", help="call a service: call /ir_planner/get_cell '{}'")
     call.add_argument("service")
-    call.add_argument("values", nargs="*", help="[type] and request as YAML, as for `ros2 service call`")
+    call.add_argument(
+        "values", nargs="*", help="[type] and request as YAML, as for `ros2 service call`"
+    )
     call.add_argument("--timeout", type=float, default=60.0, help="s to wait for the answer (60)")
     call.add_argument("--full", action="store_true", help="print long arrays whole")
     call.set_defaults(run=run_call)
 
-    echo = commands.add_parser("echo", help="print a topic's messages: echo /ir_sim_driver/power_state")
+    echo = commands.add_parser(
+        "echo", help="print a topic's messages: echo /ir_sim_driver/power_state"
+    )
     echo.add_argument("topic")
     echo.add_argument("--once", action="store_true", help="one message, then end")
     words = "s to wait for the topic (10, longer while `ir up` starts its node)"
@@ -33,7 +37,9 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     echo.set_defaults(run=run_echo)
 
     listing = commands.add_parser("list", help="list services, topics or actions with their types")
-    listing.add_argument("kind", nargs="?", default="services", choices=("services", "topics", "actions"))
+    listing.add_argument(
+        "kind", nargs="?", default="services", choices=("services", "topics", "actions")
+    )
     listing.set_defaults(run=run_list)
 
 
@@ -57,12 +63,18 @@ def run_echo(arguments: argparse.Namespace) -> int:
     patience = DISCOVERY_SECONDS if arguments.timeout is None else arguments.timeout
     with Client(node_name="ir_echo", timeout=patience) as client:
         name = absolute(arguments.topic)
-        message_type = interface_type(type_of(client.graph.topics, name, "topic", arguments.timeout), "msg")
+        message_type = interface_type(
+            type_of(client.graph.topics, name, "topic", arguments.timeout), "msg"
+        )
         if arguments.once:
-            sys.stdout.write(message_to_yaml(client.next_message(name, message_type), limit) + "---\n")
+            sys.stdout.write(
+                message_to_yaml(client.next_message(name, message_type), limit) + "---\n"
+            )
             return 0
         client.subscribe(
-            name, message_type, lambda message: sys.stdout.write(message_to_yaml(message, limit) + "---\n")
+            name,
+            message_type,
+            lambda message: sys.stdout.write(message_to_yaml(message, limit) + "---\n"),
         )
         threading.Event().wait()
     return 0

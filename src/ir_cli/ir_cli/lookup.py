@@ -15,29 +15,39 @@ from .only_one import claimed
 from .suggestions import nearest, unknown_name
 
 DISCOVERY_SECONDS = 10.0
-"""Longest wait for a graph to grow; discovery takes tenths of a second, on a busy machine seconds."""
+"""Longest wait for a graph to grow; discovery takes tenths of a second, on a busy machine
+seconds.
+"""
 START_SECONDS = 60.0
 """The same for what this project's nodes offer, while `ir up` starts or runs them on this host."""
 SETTLED_SECONDS = 1.0
-"""A graph that has not grown for this long, nor for as long as it took so far, is complete: a name that is
-near a known one is a typo then, unless a node of this project has it as soon as it runs."""
+"""A graph that has not grown for this long, nor for as long as it took so far, is complete: a name
+that is near a known one is a typo then, unless a node of this project has it as soon as it runs.
+"""
 POLL_SECONDS = 0.02
 SEEN_SECONDS = 0.2
-"""What counts of the time between two looks: more is a process that was held up, and saw nothing."""
+"""What counts of the time between two looks: more is a process that was held up, and saw
+nothing.
+"""
 _OF_NODES = tuple(
-    f"/{name}" for name in vars(names).values() if isinstance(name, str) and re.fullmatch(r"\w+/\w+", name)
+    f"/{name}"
+    for name in vars(names).values()
+    if isinstance(name, str) and re.fullmatch(r"\w+/\w+", name)
 )
 """Ends of what this project's nodes offer in any namespace."""
 
 
 class _Watch:
-    """A graph that is looked at again and again; watched, grown [s]: how long, and when it changed last.
-    Time counts in which this process could see that.
+    """A graph that is looked at again and again; watched, grown [s]: how long, and when it changed
+    last. Time counts in which this process could see that.
     """
 
     def __init__(self, look: Callable[[], Mapping[str, str]]) -> None:
-        self._look, self._looked = look, time.monotonic()
-        self.known, self.watched, self.grown = dict(look()), 0.0, 0.0
+        self._look = look
+        self._looked = time.monotonic()
+        self.known = dict(look())
+        self.watched = 0.0
+        self.grown = 0.0
 
     def again(self) -> None:
         """Look after a moment."""
@@ -47,7 +57,8 @@ class _Watch:
         self._looked = now
         found = dict(self._look())
         if found != self.known:
-            self.known, self.grown = found, self.watched
+            self.known = found
+            self.grown = self.watched
 
     @property
     def still(self) -> float:
@@ -65,16 +76,20 @@ def absolute(name: str) -> str:
     return name if name.startswith("/") else "/" + name
 
 
-def type_of(look: Callable[[], Mapping[str, str]], name: str, kind: str, seconds: float | None = None) -> str:
-    """Type of a name as soon as the graph shows it; `kind`: "service", "topic" or "action". seconds: longest
-    wait for a graph that does not grow; None: as long as nodes may take.
+def type_of(
+    look: Callable[[], Mapping[str, str]], name: str, kind: str, seconds: float | None = None
+) -> str:
+    """Type of a name as soon as the graph shows it; `kind`: "service", "topic" or "action".
+    seconds: longest wait for a graph that does not grow; None: as long as nodes may take.
     """
     own = name.endswith(_OF_NODES)
     graph = _Watch(look)
     while name not in graph.known:
         typo = not own and graph.complete and bool(nearest(name, graph.known))
         if typo or graph.still > (DISCOVERY_SECONDS if seconds is None else seconds):
-            starting = not typo and seconds is None and graph.still <= START_SECONDS and _starting(name)
+            starting = (
+                not typo and seconds is None and graph.still <= START_SECONDS and _starting(name)
+            )
             if not starting:
                 raise CommandError(_missing(name, kind, graph.known))
         graph.again()
@@ -96,7 +111,9 @@ def _starting(name: str) -> bool:
 
 
 def checked_type(typed: str, found: str, name: str, kind: str) -> str:
-    """The type that was typed, where it is that of the name; CommandError at once where it is another."""
+    """The type that was typed, where it is that of the name; CommandError at once where it is
+    another.
+    """
     short = "/".join(part for k, part in enumerate(found.split("/")) if k != 1)
     if typed and typed not in (found, short):
         raise CommandError(f"{kind} {name} has the type {found}, not {typed[:80]}")

@@ -113,7 +113,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     chosen = next((word for word in words if not word.startswith("-")), "")
     if chosen and chosen not in COMMAND_MODULES:
-        sys.stderr.write(f"ir: {unknown_name('command', chosen[:80], COMMAND_MODULES, 'ir --help')}\n")
+        sys.stderr.write(
+            f"ir: {unknown_name('command', chosen[:80], COMMAND_MODULES, 'ir --help')}\n"
+        )
         return MISUSED
     parsed = _parser(chosen).parse_args(words)
     # a background job of a shell ignores SIGINT, and SIGTERM would leave child processes behind
@@ -144,7 +146,9 @@ def _sentence(error: Exception) -> str:
 
 
 def _parser(chosen: str) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="ir", description="Energy-aware planning for industrial robots.")
+    parser = argparse.ArgumentParser(
+        prog="ir", description="Energy-aware planning for industrial robots."
+    )
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     if chosen in COMMAND_MODULES:
@@ -173,7 +177,9 @@ def _version() -> str:
 
 
 def _expected_errors() -> tuple[type[Exception], ...]:
-    """Errors that carry a sentence for people; anything else is a fault of ours and shows its trace."""
+    """Errors that carry a sentence for people; anything else is a fault of ours and shows its
+    trace.
+    """
     from ir_description.errors import DescriptionError
     from ir_msgs_py.errors import MsgsError
     from ir_recorder.errors import RecorderError

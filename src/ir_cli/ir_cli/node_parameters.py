@@ -1,4 +1,5 @@
-"""Parameters as people type them, `-p name:=value` or `-p node:name:=value`, held against what nodes know.
+"""Parameters as people type them, `-p name:=value` or `-p node:name:=value`, held against what
+nodes know.
 
 A node would ignore a name that it does not know, and end because of 5 where it wants 5.0.
 """
@@ -22,7 +23,9 @@ _KINDS = {bool: "true or false", int: "a whole number", float: "a number", str: 
 
 
 def given_parameters(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Values by node and name; a name without a node goes to every node that has it. CommandError."""
+    """Values by node and name; a name without a node goes to every node that has it.
+    CommandError.
+    """
     known = {node: parameters_of(node) for node in NODES}
     values: dict[str, dict[str, Any]] = {node: {} for node in NODES}
     for text in texts:

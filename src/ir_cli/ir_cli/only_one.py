@@ -1,7 +1,8 @@
 """Only one process of this host at a time may start the nodes of a domain and namespace.
 
-Discovery takes tenths of a second, so two that start together do not see each other in the graph. A socket
-with a name of the kernel's own name space is taken by one of them, needs no file, and ends with its process.
+Discovery takes tenths of a second, so two that start together do not see each other in the graph. A
+socket with a name of the kernel's own name space is taken by one of them, needs no file, and ends
+with its process.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ def claim(domain: str, namespace: str) -> socket.socket | None:
         held.close()
         where = f"in {namespace}" if namespace else "without a namespace"
         raise CommandError(
-            f"another `ir up` or `ir demo` starts or runs the nodes {where} of domain {domain or '0'}: "
-            "end it, or choose another domain (ROS_DOMAIN_ID) or --namespace"
+            f"another `ir up` or `ir demo` starts or runs the nodes {where} of domain "
+            f"{domain or '0'}: end it, or choose another domain (ROS_DOMAIN_ID) or --namespace"
         ) from error
     return held
 

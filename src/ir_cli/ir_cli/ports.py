@@ -7,11 +7,15 @@ import socket
 import sys
 from types import TracebackType
 
-UDP, TCP = socket.SOCK_DGRAM, socket.SOCK_STREAM
+UDP = socket.SOCK_DGRAM
+TCP = socket.SOCK_STREAM
 _GIVEN_AWAY = 32_768
-"""From here on the system gives ports to whoever asks for any, as DDS does for every participant: one that is
-free now may be taken before a node has started and listens on it."""
-_DDS, _DDS_DOMAIN, _DDS_USED = 7_400, 250, 200
+"""From here on the system gives ports to whoever asks for any, as DDS does for every participant:
+one that is free now may be taken before a node has started and listens on it.
+"""
+_DDS = 7_400
+_DDS_DOMAIN = 250
+_DDS_USED = 200
 """The ports of DDS: 250 of each domain, of which 95 participants on a host use the first 200."""
 _OURS = [port for port in range(10_000, _GIVEN_AWAY) if (port - _DDS) % _DDS_DOMAIN >= _DDS_USED]
 
@@ -29,8 +33,9 @@ def is_free(port: int, kind: socket.SocketKind, host: str = "127.0.0.1") -> bool
 
 
 class PortClaims:
-    """Ports that this process has chosen for nodes it starts: nobody else who asks gets them, though those
-    nodes do not listen yet. They are free again when the block ends, or this process, however it ends.
+    """Ports that this process has chosen for nodes it starts: nobody else who asks gets them,
+    though those nodes do not listen yet. They are free again when the block ends, or this process,
+    however it ends.
     """
 
     def __init__(self) -> None:
@@ -40,14 +45,19 @@ class PortClaims:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         for held in self._held:
             held.close()
         self._held.clear()
 
     def take(self, port: int, kind: socket.SocketKind) -> bool:
-        """Claim a port that nobody listens on and nobody else has claimed; whether that could be done."""
+        """Claim a port that nobody listens on and nobody else has claimed; whether that could be
+        done.
+        """
         if not is_free(port, kind):
             return False
         if not sys.platform.startswith("linux"):

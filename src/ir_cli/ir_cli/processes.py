@@ -1,4 +1,6 @@
-"""Nodes as child processes: started without a launch file, watched, and stopped by their own process id."""
+"""Nodes as child processes: started without a launch file, watched, and stopped by their own
+process id.
+"""
 
 from __future__ import annotations
 
@@ -15,12 +17,16 @@ from types import TracebackType
 from .errors import ProcessError
 
 STOP_SECONDS = 30.0
-"""How long a node may take to end after SIGINT before it is killed; on a busy machine four end at once."""
+"""How long a node may take to end after SIGINT before it is killed; on a busy machine four end at
+once.
+"""
 
 
 @dataclass(frozen=True)
 class NodeCommand:
-    """A node to start: the module that runs it, its ROS parameters, and its namespace ("" for none)."""
+    """A node to start: the module that runs it, its ROS parameters, and its namespace ("" for
+    none).
+    """
 
     module: str
     parameters: Mapping[str, object] = field(default_factory=dict)
@@ -28,7 +34,15 @@ class NodeCommand:
 
     def arguments(self) -> list[str]:
         """Return the command line; strings are quoted so that YAML keeps them strings."""
-        line = [sys.executable, "-m", "ir_cli.child", self.module, "--ros-args", "--log-level", "warn"]
+        line = [
+            sys.executable,
+            "-m",
+            "ir_cli.child",
+            self.module,
+            "--ros-args",
+            "--log-level",
+            "warn",
+        ]
         if self.namespace:
             line += ["-r", f"__ns:={self.namespace}"]
         for name, value in self.parameters.items():
@@ -55,8 +69,8 @@ def ending(code: int) -> str:
 
 
 class NodeProcesses:
-    """A group of node processes; leaving the context stops all that were started, and so does the end of
-    this process, however it ends.
+    """A group of node processes; leaving the context stops all that were started, and so does the
+    end of this process, however it ends.
     """
 
     def __init__(self, log_folder: Path, environment: Mapping[str, str]) -> None:
@@ -69,7 +83,10 @@ class NodeProcesses:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self.stop()
 

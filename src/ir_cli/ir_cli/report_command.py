@@ -9,6 +9,8 @@ from ir_recorder.report_main import add_arguments, run
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add report."""
-    report = commands.add_parser("report", help="write the HTML report of a recording, or compare several")
+    report = commands.add_parser(
+        "report", help="write the HTML report of a recording, or compare several"
+    )
     add_arguments(report)
     report.set_defaults(run=run)

@@ -13,7 +13,9 @@ _SIMILAR = 0.6  # of names that share most of their letters, as difflib proposes
 
 
 def nearest(name: str, known: Iterable[str]) -> list[str]:
-    """Known names that the person may have meant, the nearest first; also those with the same last part."""
+    """Known names that the person may have meant, the nearest first; also those with the same last
+    part.
+    """
     names = sorted(known)
     last = name.rsplit("/", 1)[-1]
     same = [each for each in names if last and each.rsplit("/", 1)[-1] == last]

@@ -22,7 +22,8 @@ class Progress:
 
     def begin(self, title: str) -> None:
         """Start a step."""
-        self._title, self._began = title, time.monotonic()
+        self._title = title
+        self._began = time.monotonic()
         self.update("")
 
     def update(self, detail: str) -> None:
@@ -35,7 +36,9 @@ class Progress:
         """Close the running step with what came out of it."""
         seconds = time.monotonic() - self._began
         start = "\r\x1b[2K" if self._live else ""
-        self._stream.write(f"{start}  {seconds:6.1f} s  {self._title}{': ' if detail else ''}{detail}\n")
+        self._stream.write(
+            f"{start}  {seconds:6.1f} s  {self._title}{': ' if detail else ''}{detail}\n"
+        )
         self._stream.flush()
 
     def say(self, text: str) -> None:

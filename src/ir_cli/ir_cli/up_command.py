@@ -33,8 +33,12 @@ LOOK_SECONDS = 0.5
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add up."""
     up = commands.add_parser("up", help="start planner, driver, runner and recorder until Ctrl-C")
-    up.add_argument("--cell", default="demo", help="a cell file, or the name of a bundled cell (demo)")
-    up.add_argument("--namespace", default="", help="prefix of all names, one for each cell: cell_1 (none)")
+    up.add_argument(
+        "--cell", default="demo", help="a cell file, or the name of a bundled cell (demo)"
+    )
+    up.add_argument(
+        "--namespace", default="", help="prefix of all names, one for each cell: cell_1 (none)"
+    )
     up.add_argument("--domain", type=_domain, help="ROS domain id (ROS_DOMAIN_ID, else 0)")
     up.add_argument(
         "-p",
@@ -42,7 +46,8 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
         default=[],
         dest="parameters",
         metavar="[NODE:]NAME:=VALUE",
-        help="a parameter, of every node that has it or of one node; repeatable (docs/parameters.md)",
+        help="a parameter, of every node that has it or of one node; repeatable "
+        "(docs/parameters.md)",
     )
     up.add_argument(
         "--logs", type=Path, default=Path("out/log"), help="folder of the nodes' output (out/log)"
@@ -91,12 +96,14 @@ def _run_nodes(arguments: argparse.Namespace, namespace: str, cell: Cell, parame
 
 
 def choose_ports(parameters: Given, claims: PortClaims) -> list[str]:
-    """Put free ports where nobody gave one and the usual one is taken; lines that say so. All are claimed:
-    the nodes listen only some seconds later.
+    """Put free ports where nobody gave one and the usual one is taken; lines that say so. All are
+    claimed: the nodes listen only some seconds later.
 
     Raises CommandError for a given port that is taken.
     """
-    driver, runner, lines = parameters["ir_sim_driver"], parameters["ir_program_runner"], []
+    driver = parameters["ir_sim_driver"]
+    runner = parameters["ir_program_runner"]
+    lines = []
     wanted = [("wake_port", UDP, "Wake-on-LAN on UDP", [driver, runner])]
     if driver.get("modbus"):
         wanted.append(("modbus_port", TCP, "Modbus on TCP", [driver]))
@@ -116,7 +123,9 @@ def choose_ports(parameters: Given, claims: PortClaims) -> list[str]:
 
 
 def absolute_namespace(namespace: str) -> str:
-    """The namespace with one leading slash, "" for none. CommandError for one that ROS does not allow."""
+    """The namespace with one leading slash, "" for none. CommandError for one that ROS does not
+    allow.
+    """
     bare = namespace.strip("/")
     if not bare:
         return ""

@@ -1,4 +1,6 @@
-"""The robot and the cells as data: limits, drives, power modes, cells, and their typed, validated loading."""
+"""The robot and the cells as data: limits, drives, power modes, cells, and their typed, validated
+loading.
+"""
 
 from ir_description.cell import (
     AllowedContact,

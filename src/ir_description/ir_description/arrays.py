@@ -1,7 +1,7 @@
 """Arrays that are checked once and then read-only.
 
-Every value type of this package passes its arrays through here: float64, the agreed shape, finite, not
-writable.
+Every value type of this package passes its arrays through here: float64, the agreed shape, finite,
+not writable.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ ROTATION_TOLERANCE = 1e-9
 
 
 def frozen(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> FloatArray:
-    """Return a read-only float64 copy of that shape, (None, 3) for (N, 3), refusing NaN and infinity."""
+    """Return a read-only float64 copy of that shape, (None, 3) for (N, 3), refusing NaN and
+    infinity.
+    """
     try:
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -41,12 +43,16 @@ def frozen_pose(value: ArrayLike, name: str) -> FloatArray:
     """Return a read-only (4, 4) rigid motion, refusing what is not one."""
     pose = frozen(value, (4, 4), name)
     if not _is_rigid(pose.tolist()):
-        raise InvalidValueError(f"{name} is not a pose: its rotation must be orthonormal and right-handed")
+        raise InvalidValueError(
+            f"{name} is not a pose: its rotation must be orthonormal and right-handed"
+        )
     return pose
 
 
 def _is_rigid(rows: list[list[float]]) -> bool:
-    """Whether four rows are those of a rigid motion; in plain floats, a fifth of the time of NumPy's."""
+    """Whether four rows are those of a rigid motion; in plain floats, a fifth of the time of
+    NumPy's.
+    """
     (a, b, c, _), (d, e, f, _), (g, h, i, _), last = rows
     within = (
         abs(error) <= ROTATION_TOLERANCE
@@ -64,15 +70,17 @@ def _is_rigid(rows: list[list[float]]) -> bool:
 
 
 NEEDLE = 1e-12
-"""Least principal moment of inertia over the largest: a rod of 1 m, a thousandth of a millimetre thick."""
+"""Least principal moment of inertia over the largest: a rod of 1 m, a thousandth of a millimetre
+thick.
+"""
 
 
 def frozen_inertia(value: ArrayLike, name: str) -> FloatArray:
     """Return a read-only (3, 3) inertia [kg m^2], refusing what no body can have.
 
-    A body's inertia is symmetric and positive definite, and its principal moments satisfy the triangle
-    inequality (each is at most the sum of the other two). What only rounding keeps positive is refused too:
-    scaled or turned it would be none.
+    A body's inertia is symmetric and positive definite, and its principal moments satisfy the
+    triangle inequality (each is at most the sum of the other two). What only rounding keeps
+    positive is refused too: scaled or turned it would be none.
     """
     inertia = frozen(value, (3, 3), name)
     if np.abs(inertia - inertia.T).max() > 1e-12 * max(1.0, float(np.abs(inertia).max())):
@@ -85,13 +93,15 @@ def frozen_inertia(value: ArrayLike, name: str) -> FloatArray:
         )
     if moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-9):
         raise InvalidValueError(
-            f"{name} breaks the triangle inequality: principal moment {moments[2]:.4g} kg m^2 is above "
-            f"{moments[0] + moments[1]:.4g} kg m^2, the sum of the other two"
+            f"{name} breaks the triangle inequality: principal moment {moments[2]:.4g} kg m^2 is "
+            f"above {moments[0] + moments[1]:.4g} kg m^2, the sum of the other two"
         )
     return inertia
 
 
-def in_range(value: float, low: float, high: float, unit: str, name: str, *, open_low: bool = False) -> float:
+def in_range(
+    value: float, low: float, high: float, unit: str, name: str, *, open_low: bool = False
+) -> float:
     """Return value as a float, refusing NaN and what lies outside [low, high] (or (low, high])."""
     number = float(value)
     if not (low < number <= high if open_low else low <= number <= high):
@@ -103,7 +113,9 @@ def in_range(value: float, low: float, high: float, unit: str, name: str, *, ope
 
 
 def solid_box_inertia(mass: float, size: ArrayLike) -> FloatArray:
-    """Return the inertia (3, 3) [kg m^2] of a solid box about its centre: mass [kg], full size (3,) [m]."""
+    """Return the inertia (3, 3) [kg m^2] of a solid box about its centre: mass [kg], full size (3,)
+    [m].
+    """
     x, y, z = frozen(size, (3,), "size") ** 2
     return frozen(np.diag([y + z, x + z, x + y]) * (mass / 12.0), (3, 3), "inertia")
 

@@ -1,7 +1,8 @@
-"""Reads a cell in a process of its own: however large it is, whoever called can do other things meanwhile.
+"""Reads a cell in a process of its own: however large it is, whoever called can do other things
+meanwhile.
 
-The process has bounds of memory and processor time. Its answer is the cell, or the error that reading it
-here would have raised.
+The process has bounds of memory and processor time. Its answer is the cell, or the error that
+reading it here would have raised.
 """
 
 from __future__ import annotations
@@ -22,7 +23,13 @@ from numpy.typing import NDArray
 
 from ir_description.cell import Cell
 from ir_description.errors import CellFileError, DescriptionError, shown
-from ir_description.library import bundled_cells, bundled_robots, cell_from_yaml, load_cell, load_robot
+from ir_description.library import (
+    bundled_cells,
+    bundled_robots,
+    cell_from_yaml,
+    load_cell,
+    load_robot,
+)
 from ir_description.robot import RobotModel
 
 CHARACTERS_HERE = 50_000
@@ -36,7 +43,8 @@ _SHOWN = 200  # characters of what the process said last
 def read_cell_apart(text: str, name_or_path: str) -> Cell:
     """The cell of a text, or else of a path or bundled name, read elsewhere unless that is quick.
 
-    Raises what cell_from_yaml and load_cell raise, and CellFileError where it takes too much to read.
+    Raises what cell_from_yaml and load_cell raise, and CellFileError where it takes too much to
+    read.
     """
     if text and len(text) <= CHARACTERS_HERE:
         return cell_from_yaml(text)
@@ -82,10 +90,15 @@ def main() -> None:
 
 
 def pickled(value: Cell | DescriptionError) -> bytes:
-    """The value as bytes from which its arrays come back read-only, and a bundled robot as the one object."""
+    """The value as bytes from which its arrays come back read-only, and a bundled robot as the one
+    object.
+    """
     stream = io.BytesIO()
     pickler = pickle.Pickler(stream, protocol=pickle.HIGHEST_PROTOCOL)
-    reducers: dict[type, Callable[[Any], Any]] = {np.ndarray: _reduce_array, RobotModel: _reduce_robot}
+    reducers: dict[type, Callable[[Any], Any]] = {
+        np.ndarray: _reduce_array,
+        RobotModel: _reduce_robot,
+    }
     pickler.dispatch_table = {**copyreg.dispatch_table, **reducers}
     pickler.dump(value)
     return stream.getvalue()

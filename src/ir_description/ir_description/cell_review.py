@@ -1,4 +1,5 @@
-"""Looks over a cell that is valid but may not be meant: what a colleague would ask before running it.
+"""Looks over a cell that is valid but may not be meant: what a colleague would ask before running
+it.
 
 No kinematics here; whether stations are reachable without collision is the planner's to say.
 """
@@ -57,7 +58,9 @@ def _sizes(cell: Cell) -> Iterator[Finding]:
     for body in cell.bodies():
         longest = float(body.size.max(initial=0.0)) if body.kind != "plane" else 0.0
         if longest > _LARGE:
-            sentence = f"is {longest:g} m long; lengths are in m: {longest / 1000.0:g} for {longest:g} mm?"
+            sentence = (
+                f"is {longest:g} m long; lengths are in m: {longest / 1000.0:g} for {longest:g} mm?"
+            )
             yield Finding("warning", body.name, sentence)
 
 
@@ -98,7 +101,8 @@ def _sunk(cell: Cell) -> Iterator[Finding]:
         below = 0.0 if body.kind == "plane" else -float(body.bounds()[0][2])
         if below > _SUNK:
             sentence = (
-                f"reaches {below:.3f} m below the floor; xyz is the middle of a body, not its underside"
+                f"reaches {below:.3f} m below the floor; xyz is the middle of a body, not "
+                "its underside"
             )
             yield Finding("warning", body.name, sentence)
 
@@ -111,7 +115,8 @@ def _base(cell: Cell) -> Iterator[Finding]:
     fixed = [capsule.placed(cell.base_pose) for capsule in cell.robot.capsules if capsule.link == 0]
     reaches = np.array([_capsule_bounds(capsule) for capsule in fixed]).reshape(-1, 2, 3)
     for c, b in overlapping(reaches, bounds):
-        capsule, body = fixed[c], bodies[b]
+        capsule = fixed[c]
+        body = bodies[b]
         if (capsule.name, body.name) in ignored:
             continue
         distance = capsule_distance(body, capsule)
@@ -119,8 +124,8 @@ def _base(cell: Cell) -> Iterator[Finding]:
             yield Finding(
                 "error",
                 body.name,
-                f"stands in the robot's {capsule.name} ({distance:.3f} m); move it, or write base_contacts: "
-                f"[[{capsule.name}, {body.name}]] if the robot is mounted on it",
+                f"stands in the robot's {capsule.name} ({distance:.3f} m); move it, or write "
+                f"base_contacts: [[{capsule.name}, {body.name}]] if the robot is mounted on it",
             )
 
 
@@ -140,7 +145,9 @@ def _stations(cell: Cell) -> Iterator[Finding]:
         for body in bodies:
             depth = point_distance(body, point)
             if depth < 0.0:
-                yield Finding("error", station.name, f"its tcp is {-depth:.3f} m inside {body.name}")
+                yield Finding(
+                    "error", station.name, f"its tcp is {-depth:.3f} m inside {body.name}"
+                )
         distance = float(np.linalg.norm(point - shoulder[:3, 3]))
         if distance > reach:
             unit = "; lengths are in m, not in mm" if distance > _FAR * reach else ""
@@ -153,7 +160,8 @@ def _stations(cell: Cell) -> Iterator[Finding]:
             yield Finding(
                 "warning",
                 station.name,
-                f"its tcp is outside the zone of {machine.name}; only inside do its allowed contacts hold",
+                f"its tcp is outside the zone of {machine.name}; only inside do its allowed "
+                "contacts hold",
             )
 
 
@@ -180,7 +188,9 @@ def _inside(zone: Zone, point: FloatArray) -> bool:
 
 
 def _zones(cell: Cell) -> Iterator[Finding]:
-    """Where zones overlap, one machine obstructs the withdrawal from the other, if there are stations."""
+    """Where zones overlap, one machine obstructs the withdrawal from the other, if there are
+    stations.
+    """
     machines = [machine for machine in cell.equipment if machine.enabled]
     visited = {station.equipment for station in cell.stations}
     zones = [machine.zone for machine in machines]
@@ -204,7 +214,8 @@ def _zone_bounds(zone: Zone) -> tuple[FloatArray, FloatArray]:
 
 def _boxes_overlap(first: Zone, second: Zone) -> bool:
     """Separating axes of two boxes: their faces' normals and the cross products of their edges."""
-    A, B = first.pose[:3, :3], second.pose[:3, :3]
+    A = first.pose[:3, :3]
+    B = second.pose[:3, :3]
     between = second.pose[:3, 3] - first.pose[:3, 3]
     half = (first.size + second.size) / 2.0
     if float(np.linalg.norm(between)) > float(np.linalg.norm(half)):
@@ -219,7 +230,9 @@ def _boxes_overlap(first: Zone, second: Zone) -> bool:
 
 def _signals(cell: Cell) -> Iterator[Finding]:
     answered = {signal.name: signal for signal in cell.signals}
-    set_somewhere = {(signal.name, signal.value) for step in cell.program for signal in step.set_signals}
+    set_somewhere = {
+        (signal.name, signal.value) for step in cell.program for signal in step.set_signals
+    }
     for k, step in enumerate(cell.program, start=1):
         for signal in step.wait_for:
             source = answered[signal.name]
@@ -239,7 +252,9 @@ def _pauses(cell: Cell, power: PowerData) -> Iterator[Finding]:
         if step.kind != "PAUSE" or step.power_mode == AUTO:
             continue
         if step.power_mode not in [mode.name for mode in power.modes]:
-            sentence = f"asks for {step.power_mode}, which the controller {power.name} does not have"
+            sentence = (
+                f"asks for {step.power_mode}, which the controller {power.name} does not have"
+            )
             yield Finding("error", f"step {k}", sentence)
             continue
         mode = power.mode(step.power_mode)
@@ -247,7 +262,8 @@ def _pauses(cell: Cell, power: PowerData) -> Iterator[Finding]:
             yield Finding(
                 "warning",
                 f"step {k}",
-                f"the pause is {step.dwell:g} s, {mode.name} needs at least {mode.time_min_pause:g} s",
+                f"the pause is {step.dwell:g} s, {mode.name} needs at least "
+                f"{mode.time_min_pause:g} s",
             )
 
 

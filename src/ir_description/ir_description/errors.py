@@ -3,12 +3,14 @@
 ::
 
     DescriptionError
-    ├── UnknownNameError       a name that nobody has; the sentence lists the known ones (also a LookupError)
-    └── DescriptionFileError   a file that can't be read as what it claims: path, line, sentence
+    ├── UnknownNameError       a name that nobody has; the sentence lists the known ones (also a
+    LookupError) └── DescriptionFileError   a file that can't be read as what it claims: path, line,
+    sentence
         ├── CellFileError
         └── RobotFileError
 
-A value that no robot, load or cell can have raises InvalidValueError of ir_msgs_py.errors, as everywhere.
+A value that no robot, load or cell can have raises InvalidValueError of ir_msgs_py.errors, as
+everywhere.
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ class UnknownNameError(DescriptionError, LookupError):
 
     def __init__(self, what: str, name: object, known: Iterable[str]) -> None:
         self.known = tuple(known)
-        self._what, self._name = what, name
+        self._what = what
+        self._name = name
         super().__init__(f"{what} {shown(name)} is unknown; known are {listed(self.known)}")
 
     def __reduce__(self) -> tuple[type[UnknownNameError], tuple[object, ...]]:
@@ -36,7 +39,9 @@ class DescriptionFileError(DescriptionError):
     """`path:line: sentence`; line 0 means the file as a whole."""
 
     def __init__(self, path: str, line: int, sentence: str) -> None:
-        self.path, self.line, self.sentence = path, line, sentence
+        self.path = path
+        self.line = line
+        self.sentence = sentence
         super().__init__(f"{path}:{line}: {sentence}" if line else f"{path}: {sentence}")
 
     def __reduce__(self) -> tuple[type[DescriptionFileError], tuple[str, int, str]]:
@@ -52,7 +57,9 @@ class RobotFileError(DescriptionFileError):
 
 
 def shown(value: object, limit: int = 60) -> str:
-    """The value as it may stand in a message or a log: quoted, one line of printable characters, bounded."""
+    """The value as it may stand in a message or a log: quoted, one line of printable characters,
+    bounded.
+    """
     text = repr(value)
     return text if len(text) <= limit else f"{text[: limit - 4]}...{text[-1]}"
 

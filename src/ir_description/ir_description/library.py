@@ -83,11 +83,15 @@ def power_marks(name: str = "kr_c4") -> Mapping[str, str]:
 
 
 def load_power_parameters(name_or_path: str = DATA_SHEET) -> PowerParameters:
-    """Return the parameters of a file by its path; "data_sheet" or "": those of the bundled data."""
+    """Return the parameters of a file by its path; "data_sheet" or "": those of the bundled
+    data.
+    """
     if name_or_path in ("", DATA_SHEET):
         return data_sheet()
     if not is_path(name_or_path):
-        raise UnknownNameError("power parameters", name_or_path, (DATA_SHEET, "the path of a .yaml file"))
+        raise UnknownNameError(
+            "power parameters", name_or_path, (DATA_SHEET, "the path of a .yaml file")
+        )
     try:
         content = read_regular_file(Path(name_or_path), PARAMETER_BYTES_MAX)
     except InvalidValueError as error:
@@ -98,8 +102,8 @@ def load_power_parameters(name_or_path: str = DATA_SHEET) -> PowerParameters:
 
 @cache
 def data_sheet(robot: str = "kr210_r2700_extra", controller: str = "kr_c4") -> PowerParameters:
-    """Return the parameters as the data of a bundled robot and controller have them, with the deviations
-    that their marks of confidence give.
+    """Return the parameters as the data of a bundled robot and controller have them, with the
+    deviations that their marks of confidence give.
     """
     return data_sheet_of(load_robot(robot), load_power_data(controller))
 
@@ -143,7 +147,9 @@ def load_path(name: str) -> CartesianPath:
 
 
 def cell_file_errors(path: str | Path) -> tuple[CellFileError, ...]:
-    """Return everything that is wrong with a cell file, by line; where load_cell reads it, nothing is."""
+    """Return everything that is wrong with a cell file, by line; where load_cell reads it, nothing
+    is.
+    """
     try:
         content = read_regular_file(Path(path), CELL_BYTES_MAX)
         text = text_of(content, str(path), CellFileError)
@@ -155,8 +161,8 @@ def cell_file_errors(path: str | Path) -> tuple[CellFileError, ...]:
 
 
 def cell_file_line(path: str | Path, subject: str) -> int:
-    """Return the line of a cell file on which a machine, a station, a signal, "step 3", "home", .. stands; 0:
-    it is not there.
+    """Return the line of a cell file on which a machine, a station, a signal, "step 3", "home", ..
+    stands; 0: it is not there.
     """
     try:
         text = text_of(read_regular_file(Path(path), CELL_BYTES_MAX), str(path), CellFileError)
@@ -166,11 +172,15 @@ def cell_file_line(path: str | Path, subject: str) -> int:
 
 
 def cell_from_yaml(text: str, source: str = "<text>") -> Cell:
-    """Return the cell of a text; errors name `source` and line. Mesh files can't be named in a text."""
+    """Return the cell of a text; errors name `source` and line. Mesh files can't be named in a
+    text.
+    """
     return read_cell(text, source, load_robot, None)
 
 
 @cache
 def _bundled_cell(name: str) -> Cell:
     path = _DATA / "cells" / f"{name}.yaml"
-    return read_cell(path.read_text(encoding="utf-8"), path.name, load_robot, Path(str(path)).parent)
+    return read_cell(
+        path.read_text(encoding="utf-8"), path.name, load_robot, Path(str(path)).parent
+    )

@@ -65,23 +65,30 @@ def rotation_from_abc(abc_deg: ArrayLike) -> FloatArray:
 
 
 def abc_from_rotation(rotation: FloatArray) -> FloatArray:
-    """Return A, B, C [deg] of a rotation (3, 3), B in [-90, 90]; where A and C share an axis, C is 0."""
+    """Return A, B, C [deg] of a rotation (3, 3), B in [-90, 90]; where A and C share an axis, C is
+    0.
+    """
     R = np.asarray(rotation, dtype=np.float64)
     b = math.atan2(-R[2, 0], math.hypot(R[0, 0], R[1, 0]))
     if math.hypot(R[0, 0], R[1, 0]) > 1e-9:
-        a, c = math.atan2(R[1, 0], R[0, 0]), math.atan2(R[2, 1], R[2, 2])
+        a = math.atan2(R[1, 0], R[0, 0])
+        c = math.atan2(R[2, 1], R[2, 2])
     else:
-        a, c = math.atan2(-R[0, 1], R[1, 1]), 0.0
+        a = math.atan2(-R[0, 1], R[1, 1])
+        c = 0.0
     return np.degrees([a, b, c])
 
 
 def rotation_from_quaternion(xyzw: ArrayLike) -> FloatArray:
-    """Return the rotation (3, 3) of a quaternion x, y, z, w; small errors of length are normalised."""
+    """Return the rotation (3, 3) of a quaternion x, y, z, w; small errors of length are
+    normalised.
+    """
     q = frozen(xyzw, (4,), "quaternion")
     length = float(np.linalg.norm(q))
     if abs(length - 1.0) > QUATERNION_TOLERANCE:
         raise InvalidValueError(
-            f"quaternion has length {length:g}, must be 1 within {QUATERNION_TOLERANCE:g} (order x, y, z, w)"
+            f"quaternion has length {length:g}, must be 1 within {QUATERNION_TOLERANCE:g} (order "
+            "x, y, z, w)"
         )
     x, y, z, w = q / length
     return np.array(

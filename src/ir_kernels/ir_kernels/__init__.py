@@ -1,5 +1,5 @@
-"""Batch functions over arrays: kinematics, exact distances, certified motion, path search, dynamics,
-inverse kinematics, motions along splines.
+"""Batch functions over arrays: kinematics, exact distances, certified motion, path search,
+dynamics, inverse kinematics, motions along splines.
 """
 
 from ir_kernels.ccd import CcdResult, CcdSettings, ccd

@@ -1,5 +1,5 @@
-"""Arrays at the door of the kernels: float64, C-contiguous, right shape, not empty, finite; the message
-names them.
+"""Arrays at the door of the kernels: float64, C-contiguous, right shape, not empty, finite; the
+message names them.
 """
 
 from typing import SupportsFloat
@@ -19,12 +19,19 @@ def shaped(name: str, value: ArrayLike, *shape: int | None) -> FloatArray:
 
     None in the shape is any length but 0: (None, 3) for (N, 3).
 
-    Lists and integers are converted. An array that is not contiguous is refused rather than copied behind the
-    caller's back.
+    Lists and integers are converted. An array that is not contiguous is refused rather than copied
+    behind the caller's back.
     """
-    if type(value) is np.ndarray and value.dtype == FLOAT64 and value.flags.c_contiguous and value.size:
+    if (
+        type(value) is np.ndarray
+        and value.dtype == FLOAT64
+        and value.flags.c_contiguous
+        and value.size
+    ):
         got = value.shape  # the usual cases first: a driver comes here thousands of times a second
-        if got == shape or (len(got) == 2 == len(shape) and shape[0] is None and got[1] == shape[1]):
+        if got == shape or (
+            len(got) == 2 == len(shape) and shape[0] is None and got[1] == shape[1]
+        ):
             return value
     if isinstance(value, np.ndarray) and not value.flags.c_contiguous:
         raise InputError(
@@ -48,7 +55,9 @@ def shaped(name: str, value: ArrayLike, *shape: int | None) -> FloatArray:
 
 
 def _all_finite(array: FloatArray) -> bool:
-    return bool(np.isfinite(array).all() if compiled.MODULE is None else compiled.MODULE.all_finite(array))
+    return bool(
+        np.isfinite(array).all() if compiled.MODULE is None else compiled.MODULE.all_finite(array)
+    )
 
 
 def finite(name: str, array: FloatArray) -> FloatArray:
@@ -75,7 +84,9 @@ def same_length(**arrays: FloatArray) -> None:
 def number(
     name: str, value: SupportsFloat, least: float, most: float = np.inf, *, above: bool = False
 ) -> float:
-    """`value` as a finite float within least and most, not least itself where `above`; or InputError."""
+    """`value` as a finite float within least and most, not least itself where `above`; or
+    InputError.
+    """
     try:
         number = float(value)
     except (TypeError, ValueError):

@@ -1,8 +1,8 @@
 """A 6R arm as the lines of its axes at q = 0, for arms whose axes 2 and 3 are parallel.
 
-Turns about axes 2 and 3 leave the coordinate of every point along z2 as it is. That coordinate, of one point
-and of one direction of the hand, gives two equations in which q2 and q3 do not occur; `shoulder_wrist`
-solves them.
+Turns about axes 2 and 3 leave the coordinate of every point along z2 as it is. That coordinate, of
+one point and of one direction of the hand, gives two equations in which q2 and q3 do not occur;
+`shoulder_wrist` solves them.
 """
 
 from dataclasses import dataclass
@@ -20,8 +20,9 @@ PARALLEL = 1e-9  # of |z2 x z3|
 
 @dataclass(frozen=True)
 class ArmLines:
-    """z (6, 3): directions; o (6, 3): a point of each, those of axes 5 and 6 the nearest to each other; in
-    the frame of link 0 at q = 0. hand (4, 4): pose of link 6 there. meet: whether axes 5 and 6 meet.
+    """z (6, 3): directions; o (6, 3): a point of each, those of axes 5 and 6 the nearest to each
+    other; in the frame of link 0 at q = 0. hand (4, 4): pose of link 6 there. meet: whether axes 5
+    and 6 meet.
     """
 
     z: FloatArray
@@ -49,7 +50,8 @@ def arm_lines(chain: Chain) -> ArmLines:
     if chain.n != 6:
         raise InputError(f"the arm has {chain.n} axes: inverse kinematics needs 6")
     frames = (np.linalg.inv(chain.base_pose) @ chain.link_poses(np.zeros((1, 6)))[0])[1:]
-    z, o = np.einsum("kij,kj->ki", frames[:, :3, :3], chain.joint_axis), frames[:, :3, 3].copy()
+    z = np.einsum("kij,kj->ki", frames[:, :3, :3], chain.joint_axis)
+    o = frames[:, :3, 3].copy()
     o[4], o[5] = _feet(o[4], z[4], o[5], z[5])
     lines = ArmLines(z, o, frames[5], bool(np.linalg.norm(o[5] - o[4]) < MEETING))
     if not lines.parallel(2):
@@ -63,11 +65,14 @@ def arm_lines(chain: Chain) -> ArmLines:
     return lines
 
 
-def _feet(a: FloatArray, u: FloatArray, b: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _feet(
+    a: FloatArray, u: FloatArray, b: FloatArray, v: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Nearest points of the lines a + s u and b + t v; a and b where these are parallel."""
     normal = np.cross(u, v)
     square = float(normal @ normal)
     if square < PARALLEL**2:
         return a, b
-    s, t = np.cross(b - a, v) @ normal / square, np.cross(b - a, u) @ normal / square
+    s = np.cross(b - a, v) @ normal / square
+    t = np.cross(b - a, u) @ normal / square
     return a + s * u, b + t * v

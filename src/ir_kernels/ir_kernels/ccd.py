@@ -1,4 +1,6 @@
-"""Inverse kinematics of any serial chain by cyclic coordinate descent (eqs. 2 and 3), many starts at once."""
+"""Inverse kinematics of any serial chain by cyclic coordinate descent (eqs. 2 and 3), many starts
+at once.
+"""
 
 from dataclasses import dataclass
 
@@ -17,11 +19,12 @@ from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 class CcdSettings:
     """How long to search, and when an answer is good.
 
-    rotation_length: lambda of eq. 2, m/rad: how many metres of distance one radian of rotation weighs.
+    rotation_length: lambda of eq. 2, m/rad: how many metres of distance one radian of rotation
+    weighs.
     xi: a start stops its sweeps when Psi < xi, m^2 (eq. 6); 1e-8 means at most 1e-4 m and 2e-4 rad.
-    max_sweeps: passes over all joints at most. newton_steps: damped least-squares steps at most after the
-    sweeps, 0 for pure eq. 3; each of them is one evaluation. newton_tolerance: Psi below which these stop,
-    m^2.
+    max_sweeps: passes over all joints at most. newton_steps: damped least-squares steps at most
+    after the sweeps, 0 for pure eq. 3; each of them is one evaluation. newton_tolerance: Psi below
+    which these stop, m^2.
     """
 
     rotation_length: float = 0.5
@@ -44,8 +47,8 @@ class CcdSettings:
 class CcdResult:
     """Where every start ended, in the order of the starts.
 
-    q (P, n) rad within the limits; psi (P,) of eq. 2, m^2; position_error (P,) m; rotation_error (P,) rad;
-    sweeps (P,) and newton_steps (P,): the work spent.
+    q (P, n) rad within the limits; psi (P,) of eq. 2, m^2; position_error (P,) m; rotation_error
+    (P,) rad; sweeps (P,) and newton_steps (P,): the work spent.
     """
 
     q: FloatArray
@@ -73,9 +76,11 @@ def ccd(
 ) -> CcdResult:
     """Bring `chain`'s tcp to `pose` (4, 4) in the world from each of `starts` (P, n) rad.
 
-    Each joint in turn, from the tool to the base, takes the value within [position_min, position_max] (n,)
-    that minimises Psi: closed form per joint, so Psi never grows. Starts outside the limits are moved onto
-    them. Starts don't know of each other: a start ends the same in any batch. Raises InputError.
+    Each joint in turn, from the tool to the base, takes the value within [position_min,
+    position_max] (n,)
+    that minimises Psi: closed form per joint, so Psi never grows. Starts outside the limits are
+    moved onto them. Starts don't know of each other: a start ends the same in any batch. Raises
+    InputError.
     """
     settings = CcdSettings() if settings is None else settings
     target = data.pose(pose, "pose")
@@ -84,7 +89,9 @@ def ccd(
     high = data.array(np.ascontiguousarray(position_max), "position_max", (chain.n,))
     if (low > high).any():
         j = int(np.argmax(low > high))
-        raise InputError(f"position_min[{j}] is {low[j]} rad, above position_max[{j}], {high[j]} rad")
+        raise InputError(
+            f"position_min[{j}] is {low[j]} rad, above position_max[{j}], {high[j]} rad"
+        )
     limits = (settings.xi, settings.max_sweeps, settings.newton_steps, settings.newton_tolerance)
     arrays = (chain.joint_origin, chain.joint_axis, chain.base_pose, chain.tcp, target, low, high)
     if core is None or not hasattr(core, "ccd"):

@@ -1,4 +1,6 @@
-"""A serial chain of revolute joints: poses of its links and of the tool centre point, and the Jacobian."""
+"""A serial chain of revolute joints: poses of its links and of the tool centre point, and the
+Jacobian.
+"""
 
 from dataclasses import dataclass
 
@@ -15,11 +17,11 @@ AXIS_TOLERANCE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Kinematics of `robot`, standing at `base_pose` in the world, with `tcp` the pose of its tool point in
-    link n.
+    """Kinematics of `robot`, standing at `base_pose` in the world, with `tcp` the pose of its tool
+    point in link n.
 
-    `robot` gives joint_origin (n, 4, 4) and joint_axis (n, 3). Joint values are (N, n) in rad; limits are no
-    business of the kinematics. Raises InputError for anything that isn't a chain.
+    `robot` gives joint_origin (n, 4, 4) and joint_axis (n, 3). Joint values are (N, n) in rad;
+    limits are no business of the kinematics. Raises InputError for anything that isn't a chain.
     """
 
     robot: ChainLike
@@ -63,7 +65,9 @@ class Chain:
             from ir_kernels.reference import chain as reference
 
             return reference.link_poses(self.joint_origin, self.joint_axis, self.base_pose, q)
-        poses: FloatArray = compiled.MODULE.link_poses(self.joint_origin, self.joint_axis, self.base_pose, q)
+        poses: FloatArray = compiled.MODULE.link_poses(
+            self.joint_origin, self.joint_axis, self.base_pose, q
+        )
         return poses
 
     def tcp_poses(self, q: ArrayLike) -> FloatArray:
@@ -72,8 +76,8 @@ class Chain:
         return poses
 
     def jacobian(self, q: ArrayLike) -> FloatArray:
-        """(N, 6, n): linear [m/rad], then angular velocity of the tcp in the world, per joint velocity, at q
-        (N, n).
+        """(N, 6, n): linear [m/rad], then angular velocity of the tcp in the world, per joint
+        velocity, at q (N, n).
         """
         q = self.checked(q)
         if compiled.MODULE is None:

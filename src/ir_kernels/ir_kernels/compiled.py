@@ -1,8 +1,9 @@
-"""Which build of the compiled core this process uses: native, baseline, or none (the NumPy reference).
+"""Which build of the compiled core this process uses: native, baseline, or none (the NumPy
+reference).
 
-`_native` was compiled for the processor of the machine that built it and may hold instructions that another
-one lacks; `_processor` knows what it needs; `_baseline` runs on any x86-64. The environment variable
-IR_KERNELS forces one of "native", "baseline", "reference".
+`_native` was compiled for the processor of the machine that built it and may hold instructions that
+another one lacks; `_processor` knows what it needs; `_baseline` runs on any x86-64. The environment
+variable IR_KERNELS forces one of "native", "baseline", "reference".
 """
 
 import importlib
@@ -26,8 +27,9 @@ def _import(name: str) -> Core:
 def load(choice: str = "") -> tuple[str, Core]:
     """Name of the build and its module, None for the NumPy reference.
 
-    `choice`: one of CHOICES, or empty for the fastest that runs here. Raises ImportError when a build that is
-    asked for by name is not installed; warns once (RuntimeWarning) when nothing compiled is there.
+    `choice`: one of CHOICES, or empty for the fastest that runs here. Raises ImportError when a
+    build that is asked for by name is not installed; warns once (RuntimeWarning) when nothing
+    compiled is there.
     """
     if choice not in ("", *CHOICES):
         raise ImportError(f"IR_KERNELS is {choice!r}: known are {', '.join(CHOICES)}")
@@ -42,11 +44,12 @@ def load(choice: str = "") -> tuple[str, Core]:
         return "baseline", baseline
     if choice:
         raise ImportError(
-            f"IR_KERNELS asks for the {choice} build of ir_kernels, which is not there or can't run here"
+            f"IR_KERNELS asks for the {choice} build of ir_kernels, which is not there or can't "
+            "run here"
         )
     warnings.warn(
-        "ir_kernels: no compiled core is installed, the NumPy reference is used (some hundred times slower); "
-        "install a C++ compiler and install ir_kernels again",
+        "ir_kernels: no compiled core is installed, the NumPy reference is used (some hundred "
+        "times slower); install a C++ compiler and install ir_kernels again",
         RuntimeWarning,
         stacklevel=3,
     )

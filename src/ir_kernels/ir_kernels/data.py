@@ -1,8 +1,9 @@
-"""What the kernels need to know of a robot, a load and a body: structural types, and the checks at the door.
+"""What the kernels need to know of a robot, a load and a body: structural types, and the checks at
+the door.
 
-Any object with these attributes serves (ir_description's dataclasses do). Lengths in m, angles in rad, masses
-in kg. Links are counted 0..n: link 0 is the base, link i is moved by joint i (1..n); arrays over joints are
-indexed 0..n-1.
+Any object with these attributes serves (ir_description's dataclasses do). Lengths in m, angles in
+rad, masses in kg. Links are counted 0..n: link 0 is the base, link i is moved by joint i (1..n);
+arrays over joints are indexed 0..n-1.
 """
 
 from collections.abc import Sequence
@@ -57,9 +58,9 @@ class CapsuleLike(Protocol):
 class BodyLike(Protocol):
     """A convex solid of the scene.
 
-    size: box: full edge lengths; cylinder: (radius, length, 0), axis z; sphere: (radius, 0, 0); capsule:
-    (radius, length between the centres of the end spheres, 0), axis z; plane: unused, z is the normal and the
-    solid is below; mesh: unused, the solid is the convex hull of `vertices`.
+    size: box: full edge lengths; cylinder: (radius, length, 0), axis z; sphere: (radius, 0, 0);
+    capsule: (radius, length between the centres of the end spheres, 0), axis z; plane: unused, z is
+    the normal and the solid is below; mesh: unused, the solid is the convex hull of `vertices`.
     """
 
     @property
@@ -98,7 +99,9 @@ def array(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> FloatAr
 
 
 def indices(value: ArrayLike, name: str, shape: tuple[int | None, ...], bound: int) -> IntArray:
-    """`value` as an int64 array of `shape`, such as (n,), with 0 <= i < bound, or InputError naming it."""
+    """`value` as an int64 array of `shape`, such as (n,), with 0 <= i < bound, or InputError naming
+    it.
+    """
     raw = np.asarray(value)
     if raw.dtype.kind not in "iu":
         raise InputError(f"{name} has dtype {raw.dtype}, expected whole numbers")

@@ -28,8 +28,8 @@ MAX_TERMS = 8  # of a polynomial segment
 
 @dataclass(frozen=True)
 class Gradients:
-    """Derivatives of a joint quantity y (torque, power): q, qd, qdd are (N, n, n), [k, i, j] = d y_i / d
-    x_j.
+    """Derivatives of a joint quantity y (torque, power): q, qd, qdd are (N, n, n), [k, i, j] = d
+    y_i / d x_j.
     """
 
     q: FloatArray
@@ -38,11 +38,12 @@ class Gradients:
 
 
 class DynamicsModel:
-    """Dynamics of `robot` (see `ir_kernels.data.Robot`) carrying `loads`, mounted at `base_pose` in the
-    world.
+    """Dynamics of `robot` (see `ir_kernels.data.Robot`) carrying `loads`, mounted at `base_pose` in
+    the world.
 
-    The world's z points up. Torques are those of the motors seen at the joint, Nm. Every method takes and
-    returns C-contiguous (N, n) float64 arrays, N >= 1, and raises InputError naming the argument that is not.
+    The world's z points up. Torques are those of the motors seen at the joint, Nm. Every method
+    takes and returns C-contiguous (N, n) float64 arrays, N >= 1, and raises InputError naming the
+    argument that is not.
     """
 
     def __init__(
@@ -58,10 +59,14 @@ class DynamicsModel:
         self.data = dynamics_data(robot, loads, pose, gravity)
         self.n = self.data.n
         self.lossy = any(getattr(self.data, name).any() for name in FURTHER_LOSSES)
-        self._core = None if core is None or not hasattr(core, "Dynamics") else core.Dynamics(self.data)
+        self._core = (
+            None if core is None or not hasattr(core, "Dynamics") else core.Dynamics(self.data)
+        )
 
     def _run(self, function: str, **values: ArrayLike) -> Any:
-        """Call the kernel; only when something it read is not finite are the arguments searched for it."""
+        """Call the kernel; only when something it read is not finite are the arguments searched for
+        it.
+        """
         arrays = [shaped(name, value, None, self.n) for name, value in values.items()]
         if any(len(array) != len(arrays[0]) for array in arrays):
             same_length(**dict(zip(values, arrays, strict=True)))
@@ -71,15 +76,19 @@ class DynamicsModel:
                 return result
         for name, array in zip(values, arrays, strict=True):
             finite(name, array)
-        return result if self._core is not None else getattr(reference, function)(self.data, *arrays)
+        return (
+            result if self._core is not None else getattr(reference, function)(self.data, *arrays)
+        )
 
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> FloatArray:
-        """Motor torque (N, n) Nm at the joint, with rotor inertia and friction, less the counterbalance."""
+        """Motor torque (N, n) Nm at the joint, with rotor inertia and friction, less the
+        counterbalance.
+        """
         return np.asarray(self._run("inverse_dynamics", q=q, qd=qd, qdd=qdd))
 
     def inverse_dynamics_at(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
-        """`inverse_dynamics` of one state, float64 arrays (n,), for who needs it a thousand times a second:
-        half the time.
+        """`inverse_dynamics` of one state, float64 arrays (n,), for who needs it a thousand times a
+        second: half the time.
         """
         if self._core is not None and q.shape == qd.shape == qdd.shape == (self.n,):
             torque, all_finite = self._core.inverse_dynamics(q[None], qd[None], qdd[None])
@@ -88,8 +97,8 @@ class DynamicsModel:
         return np.asarray(self.inverse_dynamics(q[None], qd[None], qdd[None])[0])
 
     def inverse_dynamics_single(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> FloatArray:
-        """`inverse_dynamics` computed in single precision, in half the time; 1e-5 of the largest torque
-        exact.
+        """`inverse_dynamics` computed in single precision, in half the time; 1e-5 of the largest
+        torque exact.
 
         For searches, not for proofs or reports. Without a compiled core it is `inverse_dynamics`.
         """
@@ -104,7 +113,9 @@ class DynamicsModel:
         return np.asarray(self._run("gravity", q=q))
 
     def counterbalance(self, q: ArrayLike) -> FloatArray:
-        """What the counterbalance does about each joint's +axis (N, n) Nm; zero for joints without one."""
+        """What the counterbalance does about each joint's +axis (N, n) Nm; zero for joints without
+        one.
+        """
         return np.asarray(self._run("counterbalance", q=q))
 
     def mass_matrix(self, q: ArrayLike) -> FloatArray:
@@ -122,15 +133,19 @@ class DynamicsModel:
         return np.asarray(self._run("torque_limit", qd=qd))
 
     def axis_power(self, qd: ArrayLike, tau: ArrayLike) -> FloatArray:
-        """Power (N, n) W each axis takes from the DC bus: tau qd + k_cu (tau / ratio)^2, with the losses of
-        iron, inverter and gear that the robot has; negative while braking.
+        """Power (N, n) W each axis takes from the DC bus: tau qd + k_cu (tau / ratio)^2, with the
+        losses of iron, inverter and gear that the robot has; negative while braking.
         """
         power = np.asarray(self._run("axis_power", qd=qd, tau=tau))
         return power + self.further_losses(qd, tau) if self.lossy else power
 
     def further_losses(self, qd: ArrayLike, tau: ArrayLike) -> FloatArray:
-        """Losses (N, n) W that most data have at zero: k_fe qd^2 + k_i |tau / ratio| + k_g |tau qd| + P_0."""
-        speed, torque, d = np.asarray(qd, float), np.abs(np.asarray(tau, float)), self.data
+        """Losses (N, n) W that most data have at zero: k_fe qd^2 + k_i |tau / ratio| + k_g |tau qd|
+        + P_0.
+        """
+        speed = np.asarray(qd, float)
+        torque = np.abs(np.asarray(tau, float))
+        d = self.data
         inverter = d.inverter_loss / np.abs(d.gear_ratio)
         by_torque = torque * (inverter + d.gear_loss * np.abs(speed))
         return np.asarray(d.iron_loss * speed**2 + by_torque + d.idle_loss)
@@ -154,25 +169,29 @@ class DynamicsModel:
         tolerance: float = 0.01,
         max_intervals: int = 20000,
     ) -> TorqueBounds:
-        """Enclose max |tau| / limit per joint along q(t) = sum_k c_k t^k: torque limits proved between
-        samples too.
+        """Enclose max |tau| / limit per joint along q(t) = sum_k c_k t^k: torque limits proved
+        between samples too.
 
-        coefficients (S, n, d + 1), d <= 7, lowest power first in the local time of each segment; durations
-        (S,) s. Interval arithmetic over pieces of time that are halved until upper - sampled <=
-        `tolerance` and every joint is decided, or `max_intervals` pieces are spent. Raises InputError.
+        coefficients (S, n, d + 1), d <= 7, lowest power first in the local time of each segment;
+        durations (S,) s. Interval arithmetic over pieces of time that are halved until upper -
+        sampled <= `tolerance` and every joint is decided, or `max_intervals` pieces are spent.
+        Raises InputError.
         """
         c, T = self._motion(coefficients, durations)
         if not tolerance > 0.0:
             raise InputError(f"tolerance is {tolerance}: it has to be above 0")
         if self._core is None:
-            return torque_bounds(*bounds_reference.torque_bounds(self.data, c, T, tolerance, max_intervals))
+            return torque_bounds(
+                *bounds_reference.torque_bounds(self.data, c, T, tolerance, max_intervals)
+            )
         return torque_bounds(*self._core.torque_bounds(c, T, tolerance, max_intervals))
 
     def power_bounds(
         self, coefficients: ArrayLike, durations: ArrayLike, longest: float = 2e-3
     ) -> PowerBounds:
-        """Bounds of the power that the axes take from the DC bus along q(t) = sum_k c_k t^k, by interval
-        arithmetic over pieces of at most `longest` s; half as long a piece leaves a fourth of the excess.
+        """Bounds of the power that the axes take from the DC bus along q(t) = sum_k c_k t^k, by
+        interval arithmetic over pieces of at most `longest` s; half as long a piece leaves a fourth
+        of the excess.
 
         coefficients (S, n, d + 1), d <= 7; durations (S,) s. Raises InputError.
         """
@@ -183,8 +202,12 @@ class DynamicsModel:
             return power_bounds(*power_reference.power_bounds(self.data, c, T, longest))
         return power_bounds(*self._core.power_bounds(c, T, longest))
 
-    def _motion(self, coefficients: ArrayLike, durations: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    def _motion(
+        self, coefficients: ArrayLike, durations: ArrayLike
+    ) -> tuple[FloatArray, FloatArray]:
         c, T = segments(coefficients, durations)
         if c.shape[1] != self.n or not 1 <= c.shape[2] <= MAX_TERMS:
-            raise InputError(f"coefficients has shape {c.shape}, expected (S, {self.n}, 1..{MAX_TERMS})")
+            raise InputError(
+                f"coefficients has shape {c.shape}, expected (S, {self.n}, 1..{MAX_TERMS})"
+            )
         return c, T

@@ -1,6 +1,8 @@
-"""What the dynamics need to know of a robot: the packed, checked arrays that both builds of the kernels read.
+"""What the dynamics need to know of a robot: the packed, checked arrays that both builds of the
+kernels read.
 
-Loads are lumped into the last link here, so that a robot with its tool and part costs as much as one without.
+Loads are lumped into the last link here, so that a robot with its tool and part costs as much as
+one without.
 """
 
 from collections.abc import Sequence
@@ -14,15 +16,21 @@ from ir_kernels.robot_like import CounterbalanceLike, LoadLike, RobotLike
 from ir_msgs_py.arrays import FloatArray
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
-FURTHER_LOSSES = ("iron_loss", "inverter_loss", "gear_loss", "idle_loss")  # a robot without them has none
+FURTHER_LOSSES = (
+    "iron_loss",
+    "inverter_loss",
+    "gear_loss",
+    "idle_loss",
+)  # a robot without them has none
 
 
 @dataclass(frozen=True)
 class CounterbalanceData:
-    """Gas cylinder between a pivot on the link before `joint` and an eye on the link after it (all in the
-    x-z plane).
+    """Gas cylinder between a pivot on the link before `joint` and an eye on the link after it (all
+    in the x-z plane).
 
-    The joint's axis is +y of its frame; pivot and eye are given in that frame at q = 0, as (x, z) in m.
+    The joint's axis is +y of its frame; pivot and eye are given in that frame at q = 0, as (x, z)
+    in m.
     """
 
     joint: int
@@ -39,11 +47,12 @@ class CounterbalanceData:
 class DynamicsData:
     """Inertias, drives and gravity of an n-joint serial chain; arrays are read-only.
 
-    origin (n, 4, 4), axis (n, 3): the joints, each in the frame of the link before. mass (n,), com (n, 3),
-    inertia (n, 3, 3) about the centre of mass: the moving links 1..n with the loads in the last one. gravity
-    (3,): the acceleration of free fall in the frame of link 0. rotor_inertia, viscous, coulomb,
-    gear_ratio, copper_loss, iron_loss, inverter_loss, gear_loss, idle_loss (n,): the drives. envelope_speed
-    (n, K), envelope_torque (n, K + 1): torque available, a step down at the first speed.
+    origin (n, 4, 4), axis (n, 3): the joints, each in the frame of the link before. mass (n,), com
+    (n, 3), inertia (n, 3, 3) about the centre of mass: the moving links 1..n with the loads in the
+    last one. gravity (3,): the acceleration of free fall in the frame of link 0. rotor_inertia,
+    viscous, coulomb, gear_ratio, copper_loss, iron_loss, inverter_loss, gear_loss, idle_loss (n,):
+    the drives. envelope_speed (n, K), envelope_torque (n, K + 1): torque available, a step down at
+    the first speed.
     """
 
     origin: FloatArray
@@ -123,8 +132,8 @@ def _counterbalance(data: CounterbalanceLike | None) -> CounterbalanceData | Non
     longest = float(np.hypot(*packed.pivot) + np.hypot(*packed.rod_eye))
     if packed.gas_volume - packed.piston_area * (longest - packed.rod_length_at_charge) <= 0.0:
         raise InputError(
-            f"counterbalance: at its longest ({longest:.3f} m) the rod leaves no volume for the gas "
-            f"({packed.gas_volume} m^3 at {packed.rod_length_at_charge} m)"
+            f"counterbalance: at its longest ({longest:.3f} m) the rod leaves no volume for the "
+            f"gas ({packed.gas_volume} m^3 at {packed.rod_length_at_charge} m)"
         )
     return packed
 
@@ -138,7 +147,8 @@ def dynamics_data(
 ) -> DynamicsData:
     """Pack a robot, its loads and its mounting.
 
-    `base_pose` (4, 4): pose of link 0 in the world, whose z points up. `gravity` [m/s^2]. Raises InputError.
+    `base_pose` (4, 4): pose of link 0 in the world, whose z points up. `gravity` [m/s^2]. Raises
+    InputError.
     """
     n = len(robot.joint_axis)
     mass = np.array(robot.link_mass[1:], float)

@@ -1,7 +1,8 @@
 """What the kernels refuse, and why.
 
 KernelError
-└── InputError (also a ValueError): an argument has the wrong shape, type or value; the message names it
+└── InputError (also a ValueError): an argument has the wrong shape, type or value; the message
+names it
 """
 
 

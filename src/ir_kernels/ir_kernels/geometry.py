@@ -1,5 +1,5 @@
-"""What a collision model computes with, as arrays: capsules on links, bodies of the scene, and the pairs of
-both.
+"""What a collision model computes with, as arrays: capsules on links, bodies of the scene, and the
+pairs of both.
 """
 
 from collections.abc import Iterable, Sequence
@@ -15,12 +15,13 @@ from ir_kernels.errors import InputError
 from ir_kernels.scene import Scene, scene
 from ir_msgs_py.arrays import FloatArray, IntArray
 
-ENVIRONMENT, SELF = "ENVIRONMENT", "SELF"
+ENVIRONMENT = "ENVIRONMENT"
+SELF = "SELF"
 
 
 class Pair(NamedTuple):
-    """Two bodies whose distance is kept: a capsule (body_a) and a body of the scene, or another capsule
-    (body_b).
+    """Two bodies whose distance is kept: a capsule (body_a) and a body of the scene, or another
+    capsule (body_b).
     """
 
     kind: str
@@ -40,8 +41,8 @@ class Capsules:
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """A chain with capsules in a scene; Z pairs, environment (E, 2: capsule, body) before self (S, 2:
-    capsules).
+    """A chain with capsules in a scene; Z pairs, environment (E, 2: capsule, body) before self (S,
+    2: capsules).
     """
 
     chain: Chain
@@ -53,7 +54,8 @@ class Geometry:
     @property
     def pairs(self) -> tuple[Pair, ...]:
         """The Z pairs by name, in their fixed order."""
-        capsule, body = self.capsules.names, self.scene.names
+        capsule = self.capsules.names
+        body = self.scene.names
         outside = [Pair(ENVIRONMENT, capsule[a], body[b]) for a, b in self.environment]
         return (*outside, *(Pair(SELF, capsule[a], capsule[b]) for a, b in self.self_pairs))
 
@@ -66,7 +68,9 @@ def capsules(items: Sequence[CapsuleLike], n: int) -> Capsules:
         if not 0 <= item.link <= n:
             raise InputError(f"{label} is on link {item.link}: the chain has links 0 to {n}")
         if not (np.isfinite(item.radius) and item.radius >= 0.0):
-            raise InputError(f"{label} has radius {item.radius} m: expected a finite length of at least 0")
+            raise InputError(
+                f"{label} has radius {item.radius} m: expected a finite length of at least 0"
+            )
     ends = [
         (
             data.array(item.p0, f"capsule {item.name!r}.p0", (3,)),
@@ -115,11 +119,12 @@ def geometry(
 ) -> Geometry:
     """Capsules, bodies and their pairs, checked.
 
-    Every capsule meets every body, but capsules of link 0 (they don't move: the cell's business) and the
-    pairs in `ignored_pairs` (capsule and body in either order; also of self pairs). Raises InputError for
-    unknown names.
+    Every capsule meets every body, but capsules of link 0 (they don't move: the cell's business)
+    and the pairs in `ignored_pairs` (capsule and body in either order; also of self pairs). Raises
+    InputError for unknown names.
     """
-    robot, environment = capsules(items, chain.n), scene(bodies)
+    robot = capsules(items, chain.n)
+    environment = scene(bodies)
     ignored = {frozenset(pair) for pair in ignored_pairs}
     known = (*robot.names, *environment.names)
     for name in sorted({name for pair in ignored for name in pair}.difference(known)):

@@ -15,8 +15,8 @@ from ir_msgs_py.arrays import FloatArray, IntArray
 
 @dataclass(frozen=True)
 class IkSet:
-    """Solutions sorted by pose, branch, q: q (M, 6) rad, pose_index (M,) which pose each belongs to, branch
-    (M,): its number, see the solver.
+    """Solutions sorted by pose, branch, q: q (M, 6) rad, pose_index (M,) which pose each belongs
+    to, branch (M,): its number, see the solver.
     """
 
     q: FloatArray
@@ -49,7 +49,8 @@ def with_turns(found: Iterable[Found], low: FloatArray, high: FloatArray) -> IkS
     rows = np.array([(pose, branch) for pose, branch, _ in solutions], np.int64).reshape(-1, 2)
     for axis in range(6):
         node, values = turns_of_all(q[:, axis], float(low[axis]), float(high[axis]))
-        q, rows = q[node], rows[node]
+        q = q[node]
+        rows = rows[node]
         q[:, axis] = values
     order = np.lexsort((*q.T[::-1], rows[:, 1], rows[:, 0]))
     arrays = q[order], rows[order, 0], rows[order, 1]
@@ -59,8 +60,8 @@ def with_turns(found: Iterable[Found], low: FloatArray, high: FloatArray) -> IkS
 
 
 def turns_of_all(angles: FloatArray, low: float, high: float) -> tuple[IntArray, FloatArray]:
-    """All values angle + 2 pi k within [low, high]: which angle (M,) each is of, in order, and its value
-    (M,); within LIMIT_TOLERANCE of a limit counts as on it.
+    """All values angle + 2 pi k within [low, high]: which angle (M,) each is of, in order, and its
+    value (M,); within LIMIT_TOLERANCE of a limit counts as on it.
     """
     first = np.ceil((low - LIMIT_TOLERANCE - angles) / (2.0 * np.pi)).astype(np.int64)
     last = np.floor((high + LIMIT_TOLERANCE - angles) / (2.0 * np.pi)).astype(np.int64)
@@ -78,5 +79,7 @@ def limits(position_min: ArrayLike, position_max: ArrayLike) -> tuple[FloatArray
     )
     if (low > high).any():
         j = int(np.argmax(low > high))
-        raise InputError(f"position_min[{j}] is {low[j]} rad, above position_max[{j}], {high[j]} rad")
+        raise InputError(
+            f"position_min[{j}] is {low[j]} rad, above position_max[{j}], {high[j]} rad"
+        )
     return low, high

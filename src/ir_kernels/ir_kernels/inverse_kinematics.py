@@ -12,7 +12,9 @@ from ir_kernels.three_parallel import ThreeParallelIk
 from ir_kernels.wrist_geometry import wrist_geometry
 
 
-def inverse_kinematics(chain: Chain, position_min: ArrayLike, position_max: ArrayLike) -> InverseKinematics:
+def inverse_kinematics(
+    chain: Chain, position_min: ArrayLike, position_max: ArrayLike
+) -> InverseKinematics:
     """All configurations within the limits (6,) rad that bring `chain`'s tcp to a pose.
 
     Raises InputError for an arm that has not six axes, or whose axes 2 and 3 are not parallel.

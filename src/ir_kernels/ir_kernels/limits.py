@@ -1,5 +1,5 @@
-"""Exact extremes of the interpolant: how far, how fast, how hard every joint moves, between the points as
-well.
+"""Exact extremes of the interpolant: how far, how fast, how hard every joint moves, between the
+points as well.
 """
 
 from dataclasses import dataclass
@@ -18,8 +18,8 @@ COMPILED_TERMS = 16  # of a polynomial, beyond them the reference works
 
 @dataclass(frozen=True)
 class Extrema:
-    """Smallest and largest values of polynomials (S, n) and when they are taken, s from the start of the
-    segment.
+    """Smallest and largest values of polynomials (S, n) and when they are taken, s from the start
+    of the segment.
     """
 
     minimum: FloatArray
@@ -30,7 +30,8 @@ class Extrema:
 
 @dataclass(frozen=True)
 class MotionExtrema:
-    """Of a whole trajectory, per joint (n,): positions, and the largest |qd|, |qdd|, |qddd| with their times.
+    """Of a whole trajectory, per joint (n,): positions, and the largest |qd|, |qdd|, |qddd| with
+    their times.
 
     rad, rad/s, rad/s^2, rad/s^3; times in s from the start of the trajectory.
     """
@@ -52,7 +53,9 @@ def segments(coefficients: ArrayLike, durations: ArrayLike) -> tuple[FloatArray,
     c = checked("coefficients", coefficients, None, None, None)
     T = checked("durations", durations, len(c))
     if (T <= 0.0).any():
-        raise InputError(f"durations[{int(T.argmin())}] is {T.min()} s: segments have to be longer than 0")
+        raise InputError(
+            f"durations[{int(T.argmin())}] is {T.min()} s: segments have to be longer than 0"
+        )
     return c, T
 
 
@@ -63,7 +66,8 @@ def polynomial_extrema(
     *,
     core: compiled.Core = compiled.MODULE,
 ) -> Extrema:
-    """Extremes of the `derivative`-th derivative of q(t) = sum_k c_k t^k, t in [0, duration], to rounding.
+    """Extremes of the `derivative`-th derivative of q(t) = sum_k c_k t^k, t in [0, duration], to
+    rounding.
 
     coefficients (S, n, d + 1), durations (S,) s. Raises InputError.
     """
@@ -80,15 +84,17 @@ def polynomial_extrema(
 
 
 def motion_extrema(coefficients: ArrayLike, durations: ArrayLike) -> MotionExtrema:
-    """Extremes of q, |qd|, |qdd|, |qddd| per joint over all segments: coefficients (S, n, d + 1), durations
-    (S,) s.
+    """Extremes of q, |qd|, |qdd|, |qddd| per joint over all segments: coefficients (S, n, d + 1),
+    durations (S,) s.
     """
     c, T = segments(coefficients, durations)
     starts = np.concatenate([[0.0], np.cumsum(T)[:-1]])[:, None]
     joints = np.arange(c.shape[1])
     position = polynomial_extrema(c, T)
-    low, high = position.minimum.argmin(axis=0), position.maximum.argmax(axis=0)
-    largest, when = [], []
+    low = position.minimum.argmin(axis=0)
+    high = position.maximum.argmax(axis=0)
+    largest = []
+    when = []
     for order in (1, 2, 3):
         e = polynomial_extrema(c, T, order)
         downwards = -e.minimum > e.maximum

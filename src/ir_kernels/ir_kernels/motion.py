@@ -21,14 +21,15 @@ def polynomial_samples(
     *,
     core: compiled.Core = compiled.MODULE,
 ) -> Motion:
-    """q, qd, qdd (M, n) at times (M,) s of q(t) = sum_k c_k t^k, coefficients (S, n, d + 1), t from the
-    beginning of each segment; begins (S,) s rise, durations (S,) s.
+    """q, qd, qdd (M, n) at times (M,) s of q(t) = sum_k c_k t^k, coefficients (S, n, d + 1), t from
+    the beginning of each segment; begins (S,) s rise, durations (S,) s.
 
-    At a time that two segments share the later one counts; times before and after are those of the ends.
-    Raises InputError.
+    At a time that two segments share the later one counts; times before and after are those of the
+    ends. Raises InputError.
     """
     c, T = segments(coefficients, durations)
-    first, at = checked("begins", begins, len(c)), checked("times", times, None)
+    first = checked("begins", begins, len(c))
+    at = checked("times", times, None)
     if (np.diff(first) <= 0.0).any():
         raise InputError("begins have to rise")
     if core is not None and hasattr(core, "polynomial_samples"):

@@ -15,31 +15,40 @@ _MOST = 0.2  # rad in one step
 
 
 def polished(chain: Chain, targets: FloatArray, found: Sequence[Found]) -> list[Found]:
-    """What was found for targets (N, 4, 4), each that isn't exact after Newton's steps where these brought it
-    nearer.
+    """What was found for targets (N, 4, 4), each that isn't exact after Newton's steps where these
+    brought it nearer.
     """
     if not found:
         return []
-    rows, q = np.array([row for row, _, _ in found]), np.array([each for _, _, each in found])
+    rows = np.array([row for row, _, _ in found])
+    q = np.array([each for _, _, each in found])
     off = np.linalg.norm(pose_error(chain, targets[rows], q), axis=1) > _EXACT
     q[off], _ = newton(chain, targets[rows[off]], q[off], _STEPS)
     return [(row, branch, own) for (row, branch, _), own in zip(found, q, strict=True)]
 
 
-def newton(chain: Chain, poses: FloatArray, q: FloatArray, steps: int) -> tuple[FloatArray, FloatArray]:
-    """q (M, 6) after damped steps towards poses (M, 4, 4), the best of each, and its error (M,) [m, rad]."""
-    best, least = q.copy(), np.full(len(q), np.inf)
+def newton(
+    chain: Chain, poses: FloatArray, q: FloatArray, steps: int
+) -> tuple[FloatArray, FloatArray]:
+    """q (M, 6) after damped steps towards poses (M, 4, 4), the best of each, and its error (M,) [m,
+    rad].
+    """
+    best = q.copy()
+    least = np.full(len(q), np.inf)
     if not len(q):
         return best, least
     for step in range(steps + 1):
         error = pose_error(chain, poses, q)
         size = np.linalg.norm(error, axis=1)
         nearer = size < least
-        best[nearer], least[nearer] = q[nearer], size[nearer]
+        best[nearer] = q[nearer]
+        least[nearer] = size[nearer]
         if step < steps:
             J = chain.jacobian(q)
             JT = np.swapaxes(J, 1, 2)
-            change = (JT @ np.linalg.solve(J @ JT + _DAMPING * np.eye(6), error[:, :, None]))[:, :, 0]
+            change = (JT @ np.linalg.solve(J @ JT + _DAMPING * np.eye(6), error[:, :, None]))[
+                :, :, 0
+            ]
             q = q + np.clip(change, -_MOST, _MOST)
     return best, least
 

@@ -1,7 +1,9 @@
-"""From joint torques to joules at the mains: axis power, the common DC bus, energy of a sampled trajectory.
+"""From joint torques to joules at the mains: axis power, the common DC bus, energy of a sampled
+trajectory.
 
-The axes of one controller share a DC bus that the supply only feeds (it rectifies). What braking axes give
-back goes to the other axes, then into the capacitor; the rest is dissipated in the brake resistor.
+The axes of one controller share a DC bus that the supply only feeds (it rectifies). What braking
+axes give back goes to the other axes, then into the capacitor; the rest is dissipated in the brake
+resistor.
 """
 
 from dataclasses import dataclass
@@ -24,10 +26,10 @@ REGENERATIONS: tuple[Regeneration, ...] = ("shared", "none", "fed_back")
 class DcBusParameters:
     """What the bus can do with braking energy.
 
-    capacity_energy [J]: what fits into the capacitor between rest voltage and brake chopper, C (U_on^2 -
-    U_0^2) / 2. regeneration: "shared" (the surplus beyond the capacitor is dissipated), "none" (every axis'
-    braking energy is dissipated, nothing is shared or stored), "fed_back" (the surplus beyond the capacitor
-    returns to the mains).
+    capacity_energy [J]: what fits into the capacitor between rest voltage and brake chopper, C
+    (U_on^2 - U_0^2) / 2. regeneration: "shared" (the surplus beyond the capacitor is dissipated),
+    "none" (every axis' braking energy is dissipated, nothing is shared or stored), "fed_back" (the
+    surplus beyond the capacitor returns to the mains).
     """
 
     capacity_energy: float
@@ -39,13 +41,15 @@ class DcBusParameters:
                 f"capacity_energy is {self.capacity_energy} J: it has to be finite and not negative"
             )
         if self.regeneration not in REGENERATIONS:
-            raise InputError(f"regeneration is {self.regeneration!r}: known are {', '.join(REGENERATIONS)}")
+            raise InputError(
+                f"regeneration is {self.regeneration!r}: known are {', '.join(REGENERATIONS)}"
+            )
 
 
 @dataclass(frozen=True)
 class DcBus:
-    """Step by step: mains (N,) W drawn for the axes, dissipated (N,) W in the resistor, stored (N,) J
-    after the step.
+    """Step by step: mains (N,) W drawn for the axes, dissipated (N,) W in the resistor, stored (N,)
+    J after the step.
     """
 
     mains: FloatArray
@@ -55,9 +59,11 @@ class DcBus:
 
 @dataclass(frozen=True)
 class DriveEnergy:
-    """Where the drive energy of a trajectory goes, J: mains = sum(axes) + dissipated + capacitor_change.
+    """Where the drive energy of a trajectory goes, J: mains = sum(axes) + dissipated +
+    capacitor_change.
 
-    axes (n,): signed energy each axis took from the bus. peak [W]: the largest mains power of a step.
+    axes (n,): signed energy each axis took from the bus. peak [W]: the largest mains power of a
+    step.
     """
 
     mains: float
@@ -68,7 +74,9 @@ class DriveEnergy:
 
 
 def _steps(dt: ArrayLike, N: int) -> FloatArray:
-    steps = checked("dt", np.broadcast_to(np.asarray(dt, float), (N,)).copy() if np.ndim(dt) == 0 else dt, N)
+    steps = checked(
+        "dt", np.broadcast_to(np.asarray(dt, float), (N,)).copy() if np.ndim(dt) == 0 else dt, N
+    )
     if (steps <= 0.0).any():
         raise InputError(f"dt holds {steps.min()} s: steps have to be longer than 0")
     return steps
@@ -87,21 +95,23 @@ def dc_bus(
     `dt`: length of the steps, one number or (N,), s. `stored` [J]: in the capacitor (above its rest
     voltage) before the first step. In every step, with P the signed sum of the axes:
 
-    - "shared": demand P > 0 empties the capacitor first, the mains give the rest; surplus P < 0 fills it
-      first, the rest is dissipated. mains >= 0.
-    - "fed_back": the same, but the rest of the surplus returns to the mains: mains < 0, dissipated 0.
-    - "none": mains = sum of the positive axes, dissipated = sum of the negative ones; the capacitor stays
-      as it is.
+    - "shared": demand P > 0 empties the capacitor first, the mains give the rest; surplus P < 0
+      fills it first, the rest is dissipated. mains >= 0.
+    - "fed_back": the same, but the rest of the surplus returns to the mains: mains < 0, dissipated
+    0.
+    - "none": mains = sum of the positive axes, dissipated = sum of the negative ones; the capacitor
+      stays as it is.
 
-    Always mains dt = (sum of axes + dissipated) dt + change of stored, and 0 <= stored <= capacity_energy.
-    What is left in the capacitor at the end is not credited to anyone. N may be 1: a driver hands `stored` on
-    from call to call. Raises InputError.
+    Always mains dt = (sum of axes + dissipated) dt + change of stored, and 0 <= stored <=
+    capacity_energy. What is left in the capacitor at the end is not credited to anyone. N may be 1:
+    a driver hands `stored` on from call to call. Raises InputError.
     """
     power = checked("axis_power", axis_power, None, None)
     steps = _steps(dt, len(power))
     if not 0.0 <= stored <= parameters.capacity_energy:
         raise InputError(
-            f"stored is {stored} J: it has to be within 0 and capacity_energy {parameters.capacity_energy} J"
+            f"stored is {stored} J: it has to be within 0 and capacity_energy "
+            f"{parameters.capacity_energy} J"
         )
     scan = reference.dc_bus if core is None or not hasattr(core, "dc_bus") else core.dc_bus
     result = scan(power, steps, parameters.capacity_energy, parameters.regeneration, float(stored))
@@ -113,8 +123,8 @@ def dc_bus(
 def drive_energy(
     axis_power: ArrayLike, dt: ArrayLike, parameters: DcBusParameters, stored: float = 0.0
 ) -> DriveEnergy:
-    """Drive energy of N steps with constant axis powers (N, n) W; the base load of the controller is not in
-    it.
+    """Drive energy of N steps with constant axis powers (N, n) W; the base load of the controller
+    is not in it.
 
     Sample the power at the middles of the steps and the error falls with dt^2. Raises InputError.
     """

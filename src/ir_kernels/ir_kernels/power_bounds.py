@@ -7,9 +7,9 @@ from ir_msgs_py.arrays import FloatArray
 
 @dataclass(frozen=True)
 class PowerBounds:
-    """Of consecutive pieces of a trajectory: seconds (K,) that they last. In each the sum of the axes' powers
-    is at every instant at most net (K,) W, the sum of those that take power at most taken (K,) W; rounding
-    and Coulomb friction of either sign where a joint turns are included.
+    """Of consecutive pieces of a trajectory: seconds (K,) that they last. In each the sum of the
+    axes' powers is at every instant at most net (K,) W, the sum of those that take power at most
+    taken (K,) W; rounding and Coulomb friction of either sign where a joint turns are included.
     """
 
     seconds: FloatArray

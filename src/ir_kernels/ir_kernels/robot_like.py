@@ -1,7 +1,7 @@
 """What the dynamics need to know of a robot and its loads: structural types, for n joints.
 
-Any object with these attributes serves (ir_description's dataclasses do). Link 0 is the base, link i is moved
-by joint i (1..n); arrays over joints are indexed 0..n-1.
+Any object with these attributes serves (ir_description's dataclasses do). Link 0 is the base, link
+i is moved by joint i (1..n); arrays over joints are indexed 0..n-1.
 """
 
 from collections.abc import Sequence

@@ -19,8 +19,8 @@ SIZES = {"box": 3, "cylinder": 2, "sphere": 1, "capsule": 2, "plane": 0, "mesh":
 
 @dataclass(frozen=True, eq=False)
 class Hull:
-    """A convex polytope: vertices (V, 3), triangles (F, 3) and edges (E, 2) of vertex indices, outward face
-    normals (F, 3) and their offsets (F,): x is inside when normals @ x <= offsets.
+    """A convex polytope: vertices (V, 3), triangles (F, 3) and edges (E, 2) of vertex indices,
+    outward face normals (F, 3) and their offsets (F,): x is inside when normals @ x <= offsets.
     """
 
     vertices: FloatArray
@@ -36,13 +36,15 @@ class Hull:
         return vectors
 
 
-NO_HULL = Hull(np.zeros((0, 3)), np.zeros((0, 3), int), np.zeros((0, 2), int), np.zeros((0, 3)), np.zeros(0))
+NO_HULL = Hull(
+    np.zeros((0, 3)), np.zeros((0, 3), int), np.zeros((0, 2), int), np.zeros((0, 3)), np.zeros(0)
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """B bodies: kind (B,) as index into KINDS, pose (B, 4, 4) in the world, size (B, 3), hull of each
-    mesh.
+    """B bodies: kind (B,) as index into KINDS, pose (B, 4, 4) in the world, size (B, 3), hull of
+    each mesh.
     """
 
     names: tuple[str, ...]
@@ -53,7 +55,9 @@ class Scene:
 
 
 def hull(vertices: FloatArray, name: str) -> Hull:
-    """Convex hull of `vertices` (V, 3). InputError for fewer than four or for points that span no volume."""
+    """Convex hull of `vertices` (V, 3). InputError for fewer than four or for points that span no
+    volume.
+    """
     from scipy.spatial import ConvexHull, QhullError  # only scenes with meshes pay for this import
 
     try:
@@ -68,15 +72,20 @@ def hull(vertices: FloatArray, name: str) -> Hull:
     position[found.vertices] = np.arange(len(corners))
     triangles = position[found.simplices].astype(np.int64)
     sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    normals, offsets = found.equations[:, :3].copy(), -found.equations[:, 3]
+    normals = found.equations[:, :3].copy()
+    offsets = -found.equations[:, 3]
     return Hull(corners, triangles, np.unique(sides, axis=0), normals, offsets)
 
 
 def _size(body: BodyLike, name: str) -> FloatArray:
     size = data.array(body.size, f"{name}.size", (3,))
     used = SIZES[body.kind]
-    if (size[:used] <= 0.0).any() and not (body.kind == "capsule" and size[0] > 0.0 and size[1] == 0.0):
-        raise InputError(f"{name}.size is {size.tolist()} m: a {body.kind} needs {used} positive lengths")
+    if (size[:used] <= 0.0).any() and not (
+        body.kind == "capsule" and size[0] > 0.0 and size[1] == 0.0
+    ):
+        raise InputError(
+            f"{name}.size is {size.tolist()} m: a {body.kind} needs {used} positive lengths"
+        )
     return size
 
 
@@ -94,12 +103,16 @@ def scene(bodies: Sequence[BodyLike]) -> Scene:
     names = data.unique_names(bodies, "bodies")
     for body in bodies:
         if body.kind not in KINDS:
-            raise InputError(f"body {body.name!r} is a {body.kind!r}: known kinds are {', '.join(KINDS)}")
+            raise InputError(
+                f"body {body.name!r} is a {body.kind!r}: known kinds are {', '.join(KINDS)}"
+            )
     hulls = []
     for body in bodies:
         points = body.vertices if body.kind == "mesh" else None
         label = f"body {body.name!r}.vertices"
-        hulls.append(NO_HULL if points is None else hull(data.array(points, label, (None, 3)), label))
+        hulls.append(
+            NO_HULL if points is None else hull(data.array(points, label, (None, 3)), label)
+        )
     count = len(bodies)
     return Scene(
         names=names,

@@ -1,7 +1,9 @@
-"""A path between configurations found by two trees that grow towards each other over certified edges.
+"""A path between configurations found by two trees that grow towards each other over certified
+edges.
 
-J. Kuffner and S. LaValle, "RRT-Connect", ICRA 2000, in batches. The search is an object that is grown in
-slices, so that the caller can stop between them; what it finds does not depend on the slices.
+J. Kuffner and S. LaValle, "RRT-Connect", ICRA 2000, in batches. The search is an object that is
+grown in slices, so that the caller can stop between them; what it finds does not depend on the
+slices.
 """
 
 from collections.abc import Sequence
@@ -17,23 +19,23 @@ from ir_msgs_py.arrays import FloatArray
 
 
 class BidirectionalTree:
-    """Searches a path from start (n,) to any of goals (G, n) on which every pair's distance exceeds its
-    threshold (one number or (Z,)) [m].
+    """Searches a path from start (n,) to any of goals (G, n) on which every pair's distance exceeds
+    its threshold (one number or (Z,)) [m].
 
-    low, high (n,): limits of the joints [rad]. scale (n,): how much each joint counts in the distance of
-    configurations. seed: the same one gives the same path, another one usually another. start_line (M, n),
-    goal_lines (one (M_g, n) per goal): free paths that are known already, as a straight retraction: the
-    configurations that follow the start, or that goal. They are certified like all else, and become the
-    trees' first branches as far as they are free.
+    low, high (n,): limits of the joints [rad]. scale (n,): how much each joint counts in the
+    distance of configurations. seed: the same one gives the same path, another one usually another.
+    start_line (M, n), goal_lines (one (M_g, n) per goal): free paths that are known already, as a
+    straight retraction: the configurations that follow the start, or that goal. They are certified
+    like all else, and become the trees' first branches as far as they are free.
 
-    Work is counted in certified edges; sixteen configurations that are only looked at count as one. Different
-    objects may be grown in different threads at once.
+    Work is counted in certified edges; sixteen configurations that are only looked at count as one.
+    Different objects may be grown in different threads at once.
 
-    Raises InputError for arguments that make no sense, among them a start that isn't free, and goals none of
-    which is. A goal that isn't free, while another one is, is never reached.
+    Raises InputError for arguments that make no sense, among them a start that isn't free, and
+    goals none of which is. A goal that isn't free, while another one is, is never reached.
     """
 
-    def __init__(  # long: checks of one argument after the other
+    def __init__(
         self,
         collision: CollisionModel,
         start: ArrayLike,
@@ -48,16 +50,20 @@ class BidirectionalTree:
         goal_lines: Sequence[ArrayLike] | None = None,
     ) -> None:
         n = self._n = collision.chain.n
-        least, most = checked("low", low, n), checked("high", high, n)
+        least = checked("low", low, n)
+        most = checked("high", high, n)
         if (least > most).any():
-            raise InputError(f"low is {least[least > most][0]} where high is {most[least > most][0]} rad")
+            raise InputError(
+                f"low is {least[least > most][0]} where high is {most[least > most][0]} rad"
+            )
         weights = checked("scale", scale, n)
         if (weights <= 0.0).any():
             raise InputError(f"scale holds {weights.min()}: expected more than 0")
         if not 0 <= seed < 2**64:
             raise InputError(f"seed is {seed}: expected at least 0 and less than 2^64")
         limits = collision._per_pair(threshold, "threshold")
-        first, last = checked("start", start, n), checked("goals", goals, None, n)
+        first = checked("start", start, n)
+        last = checked("goals", goals, None, n)
         line = _line("start_line", np.empty((0, n)) if start_line is None else start_line, n)
         lines = _goal_lines(goal_lines, len(last), n)
         for name, rows in (
@@ -93,8 +99,8 @@ class BidirectionalTree:
 
     @property
     def path(self) -> FloatArray:
-        """(M, n) from the start to a goal, both exact; every step, in this direction, has a FREE certificate.
-        (0, n) while none has been found.
+        """(M, n) from the start to a goal, both exact; every step, in this direction, has a FREE
+        certificate. (0, n) while none has been found.
         """
         return np.array(self._search.path(), dtype=np.float64).reshape(-1, self._n)
 
@@ -153,4 +159,6 @@ def _within(name: str, rows: FloatArray, low: FloatArray, high: FloatArray) -> N
     outside = np.argwhere((rows < low) | (rows > high))
     if len(outside):
         k, j = outside[0]
-        raise InputError(f"{name} has joint {j} at {rows[k, j]} rad: expected {low[j]} to {high[j]} rad")
+        raise InputError(
+            f"{name} has joint {j} at {rows[k, j]} rad: expected {low[j]} to {high[j]} rad"
+        )

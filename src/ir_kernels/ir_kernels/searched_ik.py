@@ -1,10 +1,12 @@
-"""Inverse kinematics of 6R arms whose axes 2 and 3 are parallel, whatever their wrist: a search over q4.
+"""Inverse kinematics of 6R arms whose axes 2 and 3 are parallel, whatever their wrist: a search
+over q4.
 
-With q4 known, q1 and q5 follow in closed form (shoulder_wrist), then q6, the sum of q2 and q3, and q2; what
-remains is one equation, that axis 3 is as far from axis 2 as it is built. It is evaluated on a grid of q4,
-and Newton's steps start wherever it is smallest along a branch. Solutions are the real roots of a polynomial,
-which come in pairs: where an odd number is found, one is missing, and the grid gets finer. Every answer is
-exact; that none is missed is measured (benchmarks/robots.py).
+With q4 known, q1 and q5 follow in closed form (shoulder_wrist), then q6, the sum of q2 and q3, and
+q2; what remains is one equation, that axis 3 is as far from axis 2 as it is built. It is evaluated
+on a grid of q4, and Newton's steps start wherever it is smallest along a branch. Solutions are the
+real roots of a polynomial,
+which come in pairs: where an odd number is found, one is missing, and the grid gets finer. Every
+answer is exact; that none is missed is measured (benchmarks/robots.py).
 """
 
 import numpy as np
@@ -20,35 +22,41 @@ from ir_kernels.shoulder_wrist import shoulder_and_wrist
 from ir_kernels.three_parallel import angle_about, displacements, wrist_and_sum
 from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 
-GRID = 720  # values of q4: half a degree; a pair of solutions nearer than that is found by Newton's steps
+# values of q4: half a degree; a pair of solutions nearer than that is found by Newton's steps
+GRID = 720
 FINER = (4, 16)  # times the grid, in turn, where a solution is missing
 CHUNK = 64  # poses at once: 64 x 720 x 4 candidates fit into the cache
-SLACK = 0.05  # how far beyond a tangent a guess may lie: solutions between two values of q4 are near it
+SLACK = (
+    0.05  # how far beyond a tangent a guess may lie: solutions between two values of q4 are near it
+)
 _LEVELS = 3  # the grid, and finer ones
 _PARTS = 12  # of a step of the grid, where a branch ends or a solution is near
-_STEPS, _MORE_STEPS = 8, 40
+_STEPS = 8
+_MORE_STEPS = 40
 _HOPEFUL = 0.02  # m and rad
 _EXACT = 1e-9  # m and rad: what counts as a solution
 _SAME = 1e-6  # rad
 
 
 class SearchedIk:
-    """All configurations within position_min, position_max (6,) rad that bring `chain`'s tcp to a pose.
+    """All configurations within position_min, position_max (6,) rad that bring `chain`'s tcp to a
+    pose.
 
-    branch: 0, 1, .. in the order of q. grid: values of q4 that are tried. Raises InputError where axes 2 and
-    3 are not parallel (1e-9).
+    branch: 0, 1, .. in the order of q. grid: values of q4 that are tried. Raises InputError where
+    axes 2 and 3 are not parallel (1e-9).
     """
 
     def __init__(
         self, chain: Chain, position_min: ArrayLike, position_max: ArrayLike, *, grid: int = GRID
     ) -> None:
-        self.chain, self.lines = chain, arm_lines(chain)
+        self.chain = chain
+        self.lines = arm_lines(chain)
         self.position_min, self.position_max = limits(position_min, position_max)
         self._grid = grid
 
     def solve(self, poses: ArrayLike) -> IkSet:
-        """All solutions for poses (N, 4, 4) of the tcp in the world; tcp(q) meets the pose to 1e-9 m and
-        1e-9 rad.
+        """All solutions for poses (N, 4, 4) of the tcp in the world; tcp(q) meets the pose to 1e-9
+        m and 1e-9 rad.
         """
         targets = shaped("poses", poses, None, 4, 4)
         data.poses(targets, "poses")
@@ -73,16 +81,20 @@ class SearchedIk:
     def _of(self, targets: FloatArray, grid: int) -> list[Found]:
         pose, starts = self._guesses(targets, grid)
         best, error = newton(self.chain, targets[pose], starts, _STEPS)
-        slow = (error >= _EXACT) & (error < _HOPEFUL)  # beside a tangent, where each step gains one bit
+        slow = (error >= _EXACT) & (
+            error < _HOPEFUL
+        )  # beside a tangent, where each step gains one bit
         best[slow], error[slow] = newton(self.chain, targets[pose[slow]], best[slow], _MORE_STEPS)
         exact = error < _EXACT
         return _distinct(pose[exact], best[exact])
 
     def _guesses(self, targets: FloatArray, grid: int) -> tuple[IntArray, FloatArray]:
-        """Where Newton's steps start: poses (M,) and q (M, 6), on the grid, and on finer ones beside values
-        of q4 where a solution is near, a branch ends, or one may lie between two values.
+        """Where Newton's steps start: poses (M,) and q (M, 6), on the grid, and on finer ones
+        beside values of q4 where a solution is near, a branch ends, or one may lie between two
+        values.
         """
-        step, found = 2.0 * np.pi / grid, []
+        step = 2.0 * np.pi / grid
+        found = []
         q4 = np.tile(np.linspace(-np.pi, np.pi, grid, endpoint=False), (len(targets), 1))
         for level in range(_LEVELS):
             count = q4.shape[1]
@@ -103,14 +115,16 @@ class SearchedIk:
     def _candidates(
         self, X: FloatArray, E4: FloatArray, q4: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """q (N, 4, 6), by how much axis 3 misses its place [m] (N, 4), inf where there is nothing, how far
-        beyond a tangent q1 or q5 is (N, 4).
+        """q (N, 4, 6), by how much axis 3 misses its place [m] (N, 4), inf where there is nothing,
+        how far beyond a tangent q1 or q5 is (N, 4).
         """
         lines = self.lines
         q1, q5, exists, beyond = shoulder_and_wrist(lines, X, E4, SLACK)
-        rows, lacks = [], []
+        rows = []
+        lacks = []
         upper = lines.o[2] - lines.o[1]
-        z, turned = lines.z, lines.turned
+        z = lines.z
+        turned = lines.turned
         length = np.linalg.norm(upper - (upper @ z[1]) * z[1])
         for pair in range(4):
             q6, total, _ = wrist_and_sum(lines, X, E4, q1[:, pair], q5[:, pair], 0.0)
@@ -126,10 +140,11 @@ class SearchedIk:
 
 
 def _starts(lack: FloatArray) -> BoolArray:
-    """Where Newton's steps start (n, grid, 4): on both sides of a change of sign and of the end of a branch,
-    and around each smallest value (two solutions near each other change no sign).
+    """Where Newton's steps start (n, grid, 4): on both sides of a change of sign and of the end of
+    a branch, and around each smallest value (two solutions near each other change no sign).
     """
-    there, size = np.isfinite(lack), np.abs(lack)
+    there = np.isfinite(lack)
+    size = np.abs(lack)
     least = there & (size <= np.roll(size, 1, axis=1)) & (size <= np.roll(size, -1, axis=1))
     least |= np.roll(least, 1, axis=1) | np.roll(least, -1, axis=1)
     ends = np.zeros_like(there)
@@ -140,20 +155,27 @@ def _starts(lack: FloatArray) -> BoolArray:
 
 
 def _narrow(beyond: FloatArray) -> BoolArray:
-    """Where (n, count) a branch may lie between two values: nothing exists, and it is nearest to existing."""
+    """Where (n, count) a branch may lie between two values: nothing exists, and it is nearest to
+    existing.
+    """
     least = (beyond <= np.roll(beyond, 1, axis=1)) & (beyond <= np.roll(beyond, -1, axis=1))
     return np.asarray((beyond > 0.0) & least)
 
 
 def _finer(q4: FloatArray, rows: BoolArray, step: float) -> FloatArray:
-    """Values (n, more) in order, within a step of those in `rows` (n, count); the last one repeated."""
+    """Values (n, more) in order, within a step of those in `rows` (n, count); the last one
+    repeated.
+    """
     steps = step * np.arange(-_PARTS, _PARTS + 1) / _PARTS
     near = (own[row][:, None] + steps for own, row in zip(q4, rows, strict=True))
     fine = [np.unique(np.round(values.ravel(), 12)) for values in near]
     most = max(len(each) for each in fine)
     last = [each[-1:] if len(each) else np.zeros(1) for each in fine]
     return np.stack(
-        [np.append(each, np.repeat(end, most - len(each))) for each, end in zip(fine, last, strict=True)]
+        [
+            np.append(each, np.repeat(end, most - len(each)))
+            for each, end in zip(fine, last, strict=True)
+        ]
     )
 
 
@@ -166,7 +188,10 @@ def _distinct(pose: IntArray, q: FloatArray) -> list[Found]:
         own = own[np.lexsort(own.T[::-1])]
         kept: list[FloatArray] = []
         for row in own:
-            if all(np.abs(np.mod(row - other + np.pi, 2.0 * np.pi) - np.pi).max() > _SAME for other in kept):
+            if all(
+                np.abs(np.mod(row - other + np.pi, 2.0 * np.pi) - np.pi).max() > _SAME
+                for other in kept
+            ):
                 kept.append(row)
         found += [(int(k), branch, row) for branch, row in enumerate(kept)]
     return found

@@ -1,11 +1,14 @@
-"""q1 and q5 of an arm whose axes 2 and 3 are parallel, where everything between them and axis 5 is known.
+"""q1 and q5 of an arm whose axes 2 and 3 are parallel, where everything between them and axis 5 is
+known.
 
-With z = z2, X the displacement of the hand, E4 that of axis 4 and o, z the lines of the axes (ArmLines):
+With z = z2, X the displacement of the hand, E4 that of axis 4 and o, z the lines of the axes
+(ArmLines):
 
     z . R1^T (R z6)              = z . R4 R5 z6             a direction along axis 6
     z . E1^-1 (X o6)             = z . E4 E5 o6             the point of axis 6 nearest to axis 5
 
-Each is a cos q1 + b sin q1 + c = d cos q5 + e sin q5 + f. Where axes 5 and 6 meet, the second has no q5 and
+Each is a cos q1 + b sin q1 + c = d cos q5 + e sin q5 + f. Where axes 5 and 6 meet, the second has
+no q5 and
 gives q1 first: two angles each. Else q5 is eliminated: a polynomial of degree four in exp(i q1).
 """
 
@@ -22,7 +25,9 @@ _NOTHING = 1e-12  # m, and of a direction: nothing that an angle could change
 
 
 class Pairs(NamedTuple):
-    """q1, q5 (N, 4), which exist (N, 4), and how far beyond a tangent each is (N, 4): 0 where it exists."""
+    """q1, q5 (N, 4), which exist (N, 4), and how far beyond a tangent each is (N, 4): 0 where it
+    exists.
+    """
 
     q1: FloatArray
     q5: FloatArray
@@ -38,9 +43,9 @@ class _Sum(NamedTuple):
     constant: FloatArray
 
     def angles(self, value: FloatArray, slack: float) -> tuple[FloatArray, BoolArray, FloatArray]:
-        """Both angles (N, 2) at which the sum has a value (N,), whether they exist (N,), and how far the
-        cosine is beyond 1 (N,); 0 where any angle does. A cosine up to 1 + slack counts as if it were as much
-        below 1.
+        """Both angles (N, 2) at which the sum has a value (N,), whether they exist (N,), and how
+        far the cosine is beyond 1 (N,); 0 where any angle does. A cosine up to 1 + slack counts as
+        if it were as much below 1.
         """
         length = np.hypot(self.cosine, self.sine)
         any_angle = length < _NOTHING
@@ -48,7 +53,9 @@ class _Sum(NamedTuple):
         folded = np.where(np.abs(ratio) > 1.0, np.sign(ratio) * (2.0 - np.abs(ratio)), ratio)
         turn = np.arccos(np.clip(folded, -1.0, 1.0))
         middle = np.arctan2(self.sine, self.cosine)
-        angle = np.where(any_angle[:, None], 0.0, middle[:, None] + turn[:, None] * np.array([1.0, -1.0]))
+        angle = np.where(
+            any_angle[:, None], 0.0, middle[:, None] + turn[:, None] * np.array([1.0, -1.0])
+        )
         exists = np.where(any_angle, np.abs(ratio) < _NOTHING, np.abs(ratio) <= 1.0 + slack)
         beyond = np.where(any_angle & ~exists, np.inf, np.maximum(np.abs(ratio) - 1.0, 0.0))
         return angle, exists, beyond
@@ -57,20 +64,22 @@ class _Sum(NamedTuple):
 def _along(to: FloatArray, axis: FloatArray, vector: FloatArray) -> _Sum:
     """to . rot(axis, angle) vector, of directions (3,) or (N, 3) each."""
     along = np.sum(axis * vector, axis=-1, keepdims=True) * axis
-    cosine, sine = np.sum(to * (vector - along), axis=-1), np.sum(to * np.cross(axis, vector), axis=-1)
+    cosine = np.sum(to * (vector - along), axis=-1)
+    sine = np.sum(to * np.cross(axis, vector), axis=-1)
     return _Sum(*np.broadcast_arrays(cosine, sine, np.sum(to * along, axis=-1)))
 
 
-def shoulder_and_wrist(lines: ArmLines, X: FloatArray, E4: FloatArray, slack: float = TOUCH) -> Pairs:
-    """q1 and q5 for displacements (N, 4, 4) of the hand and of axis 4. slack: how far beyond a tangent counts
-    as existing, for those who want guesses near solutions of another E4.
+def shoulder_and_wrist(
+    lines: ArmLines, X: FloatArray, E4: FloatArray, slack: float = TOUCH
+) -> Pairs:
+    """q1 and q5 for displacements (N, 4, 4) of the hand and of axis 4. slack: how far beyond a
+    tangent counts as existing, for those who want guesses near solutions of another E4.
     """
-    z, o = lines.z, lines.o
+    z = lines.z
+    o = lines.o
     seen = np.swapaxes(E4[:, :3, :3], 1, 2) @ z[1]  # z2 before axis 4 turned
-    aim1, aim5 = (
-        _along(z[1], -z[0], X[:, :3, :3] @ z[5]),
-        _along(seen, z[4], np.broadcast_to(z[5], seen.shape)),
-    )
+    aim1 = _along(z[1], -z[0], X[:, :3, :3] @ z[5])
+    aim5 = _along(seen, z[4], np.broadcast_to(z[5], seen.shape))
     reach1 = _along(z[1], -z[0], (X[:, :3, :3] @ o[5] + X[:, :3, 3]) - o[0])
     fixed = seen @ o[4] + E4[:, :3, 3] @ z[1] - z[1] @ o[0]
     if lines.meet:
@@ -102,11 +111,16 @@ def _together(aim1: _Sum, aim5: _Sum, reach1: _Sum, reach5: _Sum, slack: float) 
     M = np.stack([aim1[:2], reach1[:2]]).transpose(2, 0, 1) / scale[:, :, None]
     m = np.stack([aim1.constant - aim5.constant, reach1.constant - reach5.constant], axis=1) / scale
     det = N[:, 0, 0] * N[:, 1, 1] - N[:, 0, 1] * N[:, 1, 0]
-    adj = np.stack([np.stack([N[:, 1, 1], -N[:, 0, 1]], 1), np.stack([-N[:, 1, 0], N[:, 0, 0]], 1)], 1)
-    A, a = adj @ M, (adj @ m[:, :, None])[:, :, 0]
+    adj = np.stack(
+        [np.stack([N[:, 1, 1], -N[:, 0, 1]], 1), np.stack([-N[:, 1, 0], N[:, 0, 0]], 1)], 1
+    )
+    A = adj @ M
+    a = (adj @ m[:, :, None])[:, :, 0]
     w = _unit_roots(A, a, det)
     beyond = np.log(np.abs(w))
-    q1 = np.angle(w) + np.where(np.abs(beyond) > NEAR_UNIT, beyond, 0.0)  # a pair that just left the circle
+    q1 = np.angle(w) + np.where(
+        np.abs(beyond) > NEAR_UNIT, beyond, 0.0
+    )  # a pair that just left the circle
     x = np.stack([np.cos(q1), np.sin(q1)], axis=1)  # (n, 2, 4)
     y = (A @ x + a[:, :, None]) * np.sign(det)[:, None, None]
     far = np.where(np.abs(beyond) > NEAR_UNIT, np.abs(beyond), 0.0)
@@ -114,9 +128,12 @@ def _together(aim1: _Sum, aim5: _Sum, reach1: _Sum, reach5: _Sum, slack: float) 
 
 
 def _unit_roots(A: FloatArray, a: FloatArray, det: FloatArray) -> FloatArray:
-    """Roots w (n, 4) of |A x + a|^2 = det^2 as a polynomial in w = exp(i q1), x = (cos q1, sin q1)."""
+    """Roots w (n, 4) of |A x + a|^2 = det^2 as a polynomial in w = exp(i q1), x = (cos q1, sin
+    q1).
+    """
     p = 0.5 * (A[:, :, 0] - 1j * A[:, :, 1])  # A x + a = p w + conj(p) / w + a
-    square, mixed = (p * p).sum(axis=1), 2.0 * (p * a).sum(axis=1)
+    square = (p * p).sum(axis=1)
+    mixed = 2.0 * (p * a).sum(axis=1)
     middle = 2.0 * (np.abs(p) ** 2).sum(axis=1) + (a * a).sum(axis=1) - det**2
     rows = np.stack([square, mixed, middle + 0j, np.conj(mixed), np.conj(square)], axis=1)
     size = np.abs(rows).max(axis=1)

@@ -1,7 +1,8 @@
-"""Closed-form inverse kinematics of 6R arms with a spherical wrist: every branch and every turn within the
-limits.
+"""Closed-form inverse kinematics of 6R arms with a spherical wrist: every branch and every turn
+within the limits.
 
-Branch numbers 0..7, in bits: 4 the arm reaches backwards over its base, 2 the other elbow, 1 the other wrist.
+Branch numbers 0..7, in bits: 4 the arm reaches backwards over its base, 2 the other elbow, 1 the
+other wrist.
 """
 
 import numpy as np
@@ -18,9 +19,11 @@ from ir_kernels.wrist_geometry import wrist_geometry
 class SphericalWristIk:
     """All configurations within the limits that bring `chain`'s tcp to a pose.
 
-    position_min, position_max (6,) rad. A singular wrist (axes 4 and 6 parallel) leaves one parameter
-    free: the representative with q4 = 0 (or the limit nearest to 0) is given; a wrist centre on axis 1
-    likewise gives q1 = 0 and its opposite. Raises InputError where the chain isn't a 6R arm with z1 _|_ z2
+    position_min, position_max (6,) rad. A singular wrist (axes 4 and 6 parallel) leaves one
+    parameter
+    free: the representative with q4 = 0 (or the limit nearest to 0) is given; a wrist centre on
+    axis 1 likewise gives q1 = 0 and its opposite. Raises InputError where the chain isn't a 6R arm
+    with z1 _|_ z2
     || z3, z4 _|_ z5 _|_ z6 and axes 4 to 6 meeting in a point (1e-9 m).
     """
 
@@ -40,11 +43,13 @@ class SphericalWristIk:
         self._core = None
         if core is not None and hasattr(core, "SphericalWristIk"):
             bounds = (self.position_min, self.position_max)
-            self._core = core.SphericalWristIk(self.geometry, self._to_base, self._from_tcp, *bounds)
+            self._core = core.SphericalWristIk(
+                self.geometry, self._to_base, self._from_tcp, *bounds
+            )
 
     def solve(self, poses: ArrayLike) -> IkSet:
-        """All solutions for poses (N, 4, 4) of the tcp in the world; tcp(q) meets the pose to 1e-9 m and
-        1e-9 rad.
+        """All solutions for poses (N, 4, 4) of the tcp in the world; tcp(q) meets the pose to 1e-9
+        m and 1e-9 rad.
         """
         targets = shaped("poses", poses, None, 4, 4)
         result = None if self._core is None else self._core.solve(targets)

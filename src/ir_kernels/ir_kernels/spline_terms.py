@@ -25,11 +25,13 @@ NOT_NEGATIVE = (
 class SplineTerms:
     """What a motion is judged by; n joints, Z pairs.
 
-    velocity, acceleration, jerk, low, high (n,): bounds, rad and s. travel (n,): cost per rad. threshold
-    (R, Z) m: rows of safety distances, each interval of a spline says which row holds; -inf leaves a pair
-    out. torque_share: of the envelope. energy_value: cost per joule; time_value: per second. capacity_energy
-    [J] and regeneration: see DcBusParameters; smoothing [W]: by how much the bus' switch between mains,
-    capacitor and resistor is rounded, 0: not at all. clearance_margin, clearance_scale [m]. penalty,
+    velocity, acceleration, jerk, low, high (n,): bounds, rad and s. travel (n,): cost per rad.
+    threshold (R, Z) m: rows of safety distances, each interval of a spline says which row holds;
+    -inf leaves a pair out. torque_share: of the envelope. energy_value: cost per joule; time_value:
+    per second. capacity_energy [J] and regeneration: see DcBusParameters; smoothing [W]: by how
+    much the bus' switch between mains,
+    capacitor and resistor is rounded, 0: not at all. clearance_margin, clearance_scale [m].
+    penalty,
     clearance_penalty: cost per second of a relative excess of 1.
     """
 
@@ -53,7 +55,9 @@ class SplineTerms:
 
 
 def _copy(value: ArrayLike) -> ArrayLike:
-    """The same numbers, contiguous, where nobody else writes; what is no array is left to the checks."""
+    """The same numbers, contiguous, where nobody else writes; what is no array is left to the
+    checks.
+    """
     return value.copy() if isinstance(value, np.ndarray) else value
 
 
@@ -64,13 +68,19 @@ def _check_bounds(arrays: dict[str, FloatArray]) -> None:
             raise InputError(f"terms.{name} holds {arrays[name].min()}: bounds have to be above 0")
     if (arrays["low"] > arrays["high"]).any():
         j = int(np.argmax(arrays["low"] > arrays["high"]))
-        raise InputError(f"terms.low[{j}] is {arrays['low'][j]}, above terms.high[{j}] {arrays['high'][j]}")
+        raise InputError(
+            f"terms.low[{j}] is {arrays['low'][j]}, above terms.high[{j}] {arrays['high'][j]}"
+        )
     if (arrays["travel"] < 0.0).any():
-        raise InputError(f"terms.travel holds {arrays['travel'].min()}: a cost per rad can't be negative")
+        raise InputError(
+            f"terms.travel holds {arrays['travel'].min()}: a cost per rad can't be negative"
+        )
 
 
 def checked_terms(terms: SplineTerms, n: int, pairs: int) -> SplineTerms:
-    """The terms as contiguous arrays and floats, or InputError naming the one that makes no sense."""
+    """The terms as contiguous arrays and floats, or InputError naming the one that makes no
+    sense.
+    """
     names = ("velocity", "acceleration", "jerk", "low", "high", "travel")
     arrays: dict[str, FloatArray] = {
         name: data.array(_copy(getattr(terms, name)), f"terms.{name}", (n,)) for name in names
@@ -98,8 +108,12 @@ def checked_terms(terms: SplineTerms, n: int, pairs: int) -> SplineTerms:
         penalty=numbers["penalty"],
         clearance_penalty=numbers["clearance_penalty"],
         threshold=_thresholds(terms.threshold, pairs),
-        torque_share=arguments.number("terms.torque_share", terms.torque_share, 0.0, 1.0, above=True),
-        clearance_scale=arguments.number("terms.clearance_scale", terms.clearance_scale, 0.0, above=True),
+        torque_share=arguments.number(
+            "terms.torque_share", terms.torque_share, 0.0, 1.0, above=True
+        ),
+        clearance_scale=arguments.number(
+            "terms.clearance_scale", terms.clearance_scale, 0.0, above=True
+        ),
         regeneration=terms.regeneration,
     )
 
@@ -114,5 +128,7 @@ def _thresholds(value: ArrayLike, pairs: int) -> FloatArray:
         return np.zeros(rows)
     limits = arguments.shaped(name, _copy(value), None, pairs)
     if np.isnan(limits).any() or (limits == np.inf).any():
-        raise InputError(f"{name} holds nan or +inf: expected lengths in m, or -inf to ignore a pair")
+        raise InputError(
+            f"{name} holds nan or +inf: expected lengths in m, or -inf to ignore a pair"
+        )
     return limits

@@ -1,7 +1,7 @@
 """Closed-form inverse kinematics of 6R arms whose axes 2, 3 and 4 are parallel (UR and its kind).
 
-q1 and q5 first (shoulder_wrist), then q6 from where z2 points in the hand, the sum of q2, q3 and q4 from the
-hand's rotation, and q2, q3 as a planar arm of two links.
+q1 and q5 first (shoulder_wrist), then q6 from where z2 points in the hand, the sum of q2, q3 and q4
+from the hand's rotation, and q2, q3 as a planar arm of two links.
 
 Branch numbers 0..7: +4 for the second shoulder, +2 for the other elbow, +1 for the other wrist.
 """
@@ -21,26 +21,30 @@ from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 
 STRETCHED = 1e-9  # m: how far out of reach still counts as stretched
 FREE = np.linspace(-np.pi, np.pi, 25)  # rad: of a free q6, the nearest to 0 first
-SINGULAR = 1e-7  # sine between axis 6 and z2 below which only the sum of the wrist's angles is determined
+SINGULAR = (
+    1e-7  # sine between axis 6 and z2 below which only the sum of the wrist's angles is determined
+)
 
 
 class ThreeParallelIk:
-    """All configurations within position_min, position_max (6,) rad that bring `chain`'s tcp to a pose.
+    """All configurations within position_min, position_max (6,) rad that bring `chain`'s tcp to a
+    pose.
 
-    Where axis 6 is parallel to axes 2 to 4 one parameter is free: the representative with q6 = 0 (or the
-    limit nearest to 0) is given, or where the arm does not reach so the next in steps of 15 deg. Raises
-    InputError where axes 2, 3 and 4 are not parallel (1e-9).
+    Where axis 6 is parallel to axes 2 to 4 one parameter is free: the representative with q6 = 0
+    (or the limit nearest to 0) is given, or where the arm does not reach so the next in steps of 15
+    deg. Raises InputError where axes 2, 3 and 4 are not parallel (1e-9).
     """
 
     def __init__(self, chain: Chain, position_min: ArrayLike, position_max: ArrayLike) -> None:
-        self.chain, self.lines = chain, arm_lines(chain)
+        self.chain = chain
+        self.lines = arm_lines(chain)
         if not self.lines.parallel(3):
             raise InputError("axes 2, 3 and 4 are not parallel")
         self.position_min, self.position_max = limits(position_min, position_max)
 
     def solve(self, poses: ArrayLike) -> IkSet:
-        """All solutions for poses (N, 4, 4) of the tcp in the world; tcp(q) meets the pose to 1e-9 m and
-        1e-9 rad.
+        """All solutions for poses (N, 4, 4) of the tcp in the world; tcp(q) meets the pose to 1e-9
+        m and 1e-9 rad.
         """
         targets = shaped("poses", poses, None, 4, 4)
         data.poses(targets, "poses")
@@ -48,26 +52,32 @@ class ThreeParallelIk:
         still = np.broadcast_to(np.eye(4), X.shape)
         q1, q5, exists, _ = shoulder_and_wrist(self.lines, X, still)
         pair, rows = np.nonzero(exists.T)
-        found = self._elbows(X[rows], rows, q1[rows, pair], q5[rows, pair], 4 * (pair // 2) + pair % 2)
-        return with_turns(polished(self.chain, targets, found), self.position_min, self.position_max)
+        found = self._elbows(
+            X[rows], rows, q1[rows, pair], q5[rows, pair], 4 * (pair // 2) + pair % 2
+        )
+        return with_turns(
+            polished(self.chain, targets, found), self.position_min, self.position_max
+        )
 
     def _elbows(
         self, X: FloatArray, rows: IntArray, q1: FloatArray, q5: FloatArray, branch: IntArray
     ) -> list[Found]:
-        """Both elbows of q1, q5 (M,) with branch numbers (M,), for displacements (M, 4, 4) that belong to the
-        poses `rows` (M,).
+        """Both elbows of q1, q5 (M,) with branch numbers (M,), for displacements (M, 4, 4) that
+        belong to the poses `rows` (M,).
         """
         found: list[Found] = []
         still = np.broadcast_to(np.eye(4), X.shape)
         open_ = np.ones(len(rows), dtype=bool)
-        low, high = self.position_min[5], self.position_max[5]
+        low = self.position_min[5]
+        high = self.position_max[5]
         for free in sorted(np.clip(FREE, low, high), key=abs):
             q6, total, singular = wrist_and_sum(self.lines, X, still, q1, q5, float(free))
             done = np.zeros(len(rows), dtype=bool)
             for elbow in (0, 1):
                 q, reached = self._planar(X, q1, q5, q6, total, bool(elbow))
                 found += [
-                    (int(rows[k]), int(branch[k]) + 2 * elbow, q[k]) for k in np.flatnonzero(reached & open_)
+                    (int(rows[k]), int(branch[k]) + 2 * elbow, q[k])
+                    for k in np.flatnonzero(reached & open_)
                 ]
                 done |= reached
             open_ &= singular & ~done  # a free angle: the next one may be in reach
@@ -76,11 +86,21 @@ class ThreeParallelIk:
         return found
 
     def _planar(
-        self, X: FloatArray, q1: FloatArray, q5: FloatArray, q6: FloatArray, total: FloatArray, other: bool
+        self,
+        X: FloatArray,
+        q1: FloatArray,
+        q5: FloatArray,
+        q6: FloatArray,
+        total: FloatArray,
+        other: bool,
     ) -> tuple[FloatArray, BoolArray]:
-        """q (N, 6) of one elbow, and whether it is in reach; where the arm is stretched both are the same."""
+        """q (N, 6) of one elbow, and whether it is in reach; where the arm is stretched both are
+        the same.
+        """
         lines = self.lines
-        z, o, turned = lines.z, lines.o, lines.turned
+        z = lines.z
+        o = lines.o
+        turned = lines.turned
         back = turned(0, -q1) @ X @ turned(5, -q6) @ turned(4, -q5)  # = E2 E3 E4
         target = back[:, :3, :3] @ o[3] + back[:, :3, 3] - o[1]
         normal = _normal(z[1])
@@ -89,8 +109,12 @@ class ThreeParallelIk:
         def planar(vector: FloatArray) -> FloatArray:
             return np.asarray(vector @ normal + 1j * (vector @ across))
 
-        upper, fore, aim = planar(o[2] - o[1]), planar(o[3] - o[2]), planar(target)
-        a, b, distance = abs(upper), abs(fore), np.abs(aim)
+        upper = planar(o[2] - o[1])
+        fore = planar(o[3] - o[2])
+        aim = planar(target)
+        a = abs(upper)
+        b = abs(fore)
+        distance = np.abs(aim)
         cosine = (distance**2 - a**2 - b**2) / (2.0 * a * b)
         bend = np.arccos(np.clip(cosine, -1.0, 1.0)) * (-1.0 if other else 1.0)
         turn = bend - np.angle(np.conj(upper) * fore)
@@ -102,7 +126,9 @@ class ThreeParallelIk:
 
 
 def displacements(chain: Chain, lines: ArmLines, targets: FloatArray) -> FloatArray:
-    """(N, 4, 4): how the hand is displaced from q = 0 in link 0, for poses of the tcp in the world."""
+    """(N, 4, 4): how the hand is displaced from q = 0 in link 0, for poses of the tcp in the
+    world.
+    """
     hand = np.linalg.inv(chain.base_pose) @ targets @ np.linalg.inv(chain.tcp)
     return np.asarray(hand @ np.linalg.inv(lines.hand))
 
@@ -110,12 +136,15 @@ def displacements(chain: Chain, lines: ArmLines, targets: FloatArray) -> FloatAr
 def wrist_and_sum(
     lines: ArmLines, X: FloatArray, E4: FloatArray, q1: FloatArray, q5: FloatArray, free: float
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """q6 (N,), the angle (N,) about z2 that is left for axes 2, 3 and those parallel to them, and where q6 is
-    free and taken as `free`.
+    """q6 (N,), the angle (N,) about z2 that is left for axes 2, 3 and those parallel to them, and
+    where q6 is free and taken as `free`.
     """
-    z, turned = lines.z, lines.turned
-    R1, R5 = turned(0, q1)[:, :3, :3], turned(4, q5)[:, :3, :3]
-    R4, R = E4[:, :3, :3], X[:, :3, :3]
+    z = lines.z
+    turned = lines.turned
+    R1 = turned(0, q1)[:, :3, :3]
+    R5 = turned(4, q5)[:, :3, :3]
+    R4 = E4[:, :3, :3]
+    R = X[:, :3, :3]
     before = np.swapaxes(R4 @ R5, 1, 2) @ z[1]  # = R6 (R^T R1 z2)
     after = (np.swapaxes(R, 1, 2) @ R1) @ z[1]
     singular = np.linalg.norm(np.cross(before, z[5]), axis=1) < SINGULAR
@@ -126,8 +155,11 @@ def wrist_and_sum(
 
 
 def angle_about(axis: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """Angles (N,) by which a turn about an axis (3,) brings vectors (N, 3) into the planes of others."""
-    u, v = start - (start @ axis)[:, None] * axis, end - (end @ axis)[:, None] * axis
+    """Angles (N,) by which a turn about an axis (3,) brings vectors (N, 3) into the planes of
+    others.
+    """
+    u = start - (start @ axis)[:, None] * axis
+    v = end - (end @ axis)[:, None] * axis
     return np.asarray(np.arctan2(np.cross(u, v) @ axis, (u * v).sum(axis=1)))
 
 

@@ -1,4 +1,6 @@
-"""What a proof of the torque limits says: per joint an upper bound of |tau| / limit over all times."""
+"""What a proof of the torque limits says: per joint an upper bound of |tau| / limit over all
+times.
+"""
 
 from dataclasses import dataclass
 
@@ -7,7 +9,9 @@ from numpy.typing import NDArray
 
 from ir_msgs_py.arrays import FloatArray
 
-WITHIN, EXCEEDS, UNDECIDED = np.uint8(0), np.uint8(1), np.uint8(2)
+WITHIN = np.uint8(0)
+EXCEEDS = np.uint8(1)
+UNDECIDED = np.uint8(2)
 
 
 @dataclass(frozen=True)
@@ -15,10 +19,10 @@ class TorqueBounds:
     """Enclosure of max over time of |tau(t)| / limit(qd(t)), per joint (n,).
 
     upper: never exceeded, rounding included. sampled: reached, at `time` s from the start of the
-    trajectory; so sampled <= true maximum <= upper. verdict: WITHIN (upper <= 1: proved), EXCEEDS (sampled
-    > 1), else UNDECIDED, which counts as not allowed. intervals: examined, the work. Where a moving
-    joint's velocity may vanish, Coulomb friction of either sign counts (a speed below 1e-9 rad/s is rest);
-    a joint that rests through a segment has none.
+    trajectory; so sampled <= true maximum <= upper. verdict: WITHIN (upper <= 1: proved), EXCEEDS
+    (sampled > 1), else UNDECIDED, which counts as not allowed. intervals: examined, the work. Where
+    a moving joint's velocity may vanish, Coulomb friction of either sign counts (a speed below 1e-9
+    rad/s is rest); a joint that rests through a segment has none.
     """
 
     upper: FloatArray
@@ -33,9 +37,13 @@ class TorqueBounds:
         return bool((self.verdict == WITHIN).all())
 
 
-def torque_bounds(upper: FloatArray, sampled: FloatArray, time: FloatArray, intervals: int) -> TorqueBounds:
+def torque_bounds(
+    upper: FloatArray, sampled: FloatArray, time: FloatArray, intervals: int
+) -> TorqueBounds:
     """The verdicts that follow from the bounds: upper, sampled (n,), time (n,) [s]."""
-    verdict = np.where(upper <= 1.0, WITHIN, np.where(sampled > 1.0, EXCEEDS, UNDECIDED)).astype(np.uint8)
+    verdict = np.where(upper <= 1.0, WITHIN, np.where(sampled > 1.0, EXCEEDS, UNDECIDED)).astype(
+        np.uint8
+    )
     for array in (upper, sampled, time, verdict):
         array.setflags(write=False)
     return TorqueBounds(upper, sampled, time, verdict, int(intervals))

@@ -1,10 +1,11 @@
-"""Constants of a 6R arm with a spherical wrist, derived from its chain; anything else is refused with the
-reason.
+"""Constants of a 6R arm with a spherical wrist, derived from its chain; anything else is refused
+with the reason.
 
-At q = 0 and in the frame of link 0 the joints are lines: points o_i, directions z_i. The closed form
-(Pieper 1968) needs z1 _|_ z2, z2 || z3 (a planar arm behind a turning base), z4 _|_ z5 _|_ z6 and axes 4,
-5, 6 meeting in one point, the wrist centre. Arm quantities are complex numbers in the plane normal to z2:
-z + i x, with z along z1 and x = z2 x z1, because a turn by q about z2 multiplies them by exp(i q).
+At q = 0 and in the frame of link 0 the joints are lines: points o_i, directions z_i. The closed
+form (Pieper 1968) needs z1 _|_ z2, z2 || z3 (a planar arm behind a turning base), z4 _|_ z5 _|_ z6
+and axes 4, 5, 6 meeting in one point, the wrist centre. Arm quantities are complex numbers in the
+plane normal to z2: z + i x, with z along z1 and x = z2 x z1, because a turn by q about z2
+multiplies them by exp(i q).
 """
 
 from dataclasses import dataclass
@@ -27,7 +28,9 @@ class WristGeometry:
     plane: FloatArray  # (3, 3) rows x, y = z2, z = z1
     axis_point: FloatArray  # (3,) foot of axis 1: a point on it
     lateral: float  # m, distance of the wrist centre from axis 1 along z2
-    forward: float  # +1 or -1: the side of axis 1, along x, to which the arm reaches forwards at q1 = 0
+    forward: (
+        float  # +1 or -1: the side of axis 1, along x, to which the arm reaches forwards at q1 = 0
+    )
     shoulder: complex  # axis 2 seen from axis_point
     upper_arm: complex  # from axis 2 to axis 3
     forearm: complex  # from axis 3 to the wrist centre
@@ -40,7 +43,9 @@ class WristGeometry:
 def _meeting_point(o: FloatArray, z: FloatArray) -> FloatArray:
     """Point nearest to the three lines, or InputError when it isn't on each of them."""
     normal = np.eye(3) - z[:, :, None] * z[:, None, :]
-    point = np.linalg.lstsq(normal.reshape(-1, 3), np.einsum("kij,kj->ki", normal, o).ravel(), rcond=None)[0]
+    point = np.linalg.lstsq(
+        normal.reshape(-1, 3), np.einsum("kij,kj->ki", normal, o).ravel(), rcond=None
+    )[0]
     miss = float(np.linalg.norm(np.einsum("kij,kj->ki", normal, point - o), axis=1).max())
     if miss > POINT_TOLERANCE:
         raise InputError(
@@ -64,7 +69,9 @@ def _check_axes(z: FloatArray) -> None:
 
 
 def wrist_geometry(chain: Chain) -> WristGeometry:
-    """Derive the constants of `chain`; InputError names the condition that it breaks, with the value."""
+    """Derive the constants of `chain`; InputError names the condition that it breaks, with the
+    value.
+    """
     if chain.n != 6:
         raise InputError(f"chain has {chain.n} joints, the closed form needs 6")
     to_base = np.linalg.inv(chain.base_pose)
@@ -82,10 +89,13 @@ def wrist_geometry(chain: Chain) -> WristGeometry:
 
     for array in (z, plane, foot):
         array.setflags(write=False)
-    shoulder, upper_arm, forearm = planar(o[1] - foot), planar(o[2] - o[1]), planar(centre - o[2])
+    shoulder = planar(o[1] - foot)
+    upper_arm = planar(o[2] - o[1])
+    forearm = planar(centre - o[2])
     if abs(upper_arm) < POINT_TOLERANCE or abs(forearm) < POINT_TOLERANCE:
         raise InputError(
-            f"chain: upper arm of {abs(upper_arm):.3g} m or forearm of {abs(forearm):.3g} m vanishes"
+            f"chain: upper arm of {abs(upper_arm):.3g} m or forearm of {abs(forearm):.3g} m "
+            "vanishes"
         )
     return WristGeometry(
         axis=z,

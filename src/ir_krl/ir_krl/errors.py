@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Place:
-    """Where something stands: file as the caller named it, line and column from 1; 0 where unknown."""
+    """Where something stands: file as the caller named it, line and column from 1; 0 where
+    unknown.
+    """
 
     file: str = ""
     line: int = 0
@@ -31,7 +33,9 @@ class KrlSyntaxError(KrlError):
 
 
 class KrlRunError(KrlError):
-    """A program that can't be followed: a name without a value, a signal that isn't given, a wrong type."""
+    """A program that can't be followed: a name without a value, a signal that isn't given, a wrong
+    type.
+    """
 
 
 class KrlMotionError(KrlError):

@@ -1,4 +1,6 @@
-"""Names as the controller takes them: letters, digits and _, at most 24 characters, no word of KRL."""
+"""Names as the controller takes them: letters, digits and _, at most 24 characters, no word of
+KRL.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,9 @@ from ir_krl.errors import KrlError
 
 NAME_MAX = 24
 _NAME = re.compile(rf"[A-Za-z][A-Za-z0-9_]{{0,{NAME_MAX - 1}}}")
-_OWN = re.compile(r"XHOME|XSTART|XM\d+_\d+|IR_TOOL|IR_LOAD")  # what a written program calls its variables
+_OWN = re.compile(
+    r"XHOME|XSTART|XM\d+_\d+|IR_TOOL|IR_LOAD"
+)  # what a written program calls its variables
 _WORDS = """
 ANIN ANOUT AND AXIS BOOL BRAKE B_AND B_EXOR B_NOT B_OR CASE CAST_FROM CAST_TO CHANNEL CHAR CIRC
 CIRC_REL CONFIRM CONST CONST_VEL CONTINUE CCLOSE COPEN CREAD CWRITE C_DIS C_ORI C_PTP C_SPL C_VEL
@@ -50,7 +54,8 @@ class SignalNames:
     def _new(self, name: str) -> str:
         if not _NAME.fullmatch(name[:NAME_MAX]) or name in KEYWORDS or _OWN.fullmatch(name):
             name = f"S_{name}"
-        found, k = name[:NAME_MAX], 1
+        found = name[:NAME_MAX]
+        k = 1
         while found in self._taken:
             k += 1
             ending = f"_{k}"

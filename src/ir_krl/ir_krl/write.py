@@ -15,7 +15,9 @@ from ir_msgs_py.arrays import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class WrittenSpline:
-    """A PTP_SPLINE: points (M, 6) [rad] after the start, the share [%] of `seconds` of each (M,)."""
+    """A PTP_SPLINE: points (M, 6) [rad] after the start, the share [%] of `seconds` of each
+    (M,).
+    """
 
     comment: str
     points: FloatArray
@@ -25,8 +27,8 @@ class WrittenSpline:
 
 @dataclass(frozen=True, eq=False)
 class WrittenPath:
-    """A SPLINE of the tool: poses (M, 4, 4) [m] in the robot's foot after the start, at a speed [m/s] and an
-    acceleration [m/s^2] of the tool.
+    """A SPLINE of the tool: poses (M, 4, 4) [m] in the robot's foot after the start, at a speed
+    [m/s] and an acceleration [m/s^2] of the tool.
     """
 
     comment: str
@@ -57,8 +59,8 @@ Part: TypeAlias = WrittenSpline | WrittenPath | WrittenPause | WrittenSignals
 
 @dataclass(frozen=True, eq=False)
 class Attached:
-    """The tool: its frame (4, 4) in the flange [m], mass [kg], centre of mass (3,) [m] in the flange, inertia
-    (3,) about it [kg m^2].
+    """The tool: its frame (4, 4) in the flange [m], mass [kg], centre of mass (3,) [m] in the
+    flange, inertia (3,) about it [kg m^2].
     """
 
     tool: FloatArray
@@ -79,14 +81,17 @@ def written(
     header: Sequence[str],
     *,
     from_home: bool = False,
-) -> tuple[str, str]:  # long: the lines of two files
-    """Texts of NAME.src and NAME.dat: from `start` (6,) [rad], from_home: which is XHOME, through the parts.
+) -> tuple[str, str]:
+    """Texts of NAME.src and NAME.dat: from `start` (6,) [rad], from_home: which is XHOME, through
+    the parts.
 
-    Tool and load are variables of the program: a data list may not give values to those of $CONFIG.DAT, and
-    the controller's own tools stay as they are. Raises KrlError for a name that the controller doesn't take.
+    Tool and load are variables of the program: a data list may not give values to those of
+    $CONFIG.DAT, and the controller's own tools stay as they are. Raises KrlError for a name that
+    the controller doesn't take.
     """
     check_name(name)
-    body, first = _Body(name), "XHOME" if from_home else "XSTART"
+    body = _Body(name)
+    first = "XHOME" if from_home else "XSTART"
     for part in parts:
         body.add(part)
     src = [
@@ -145,12 +150,17 @@ class _Body:
                 self._pause(part)
             case WrittenSignals():
                 self.lines += [
-                    f"WAIT FOR {'' if on else 'NOT '}{self._input(name)}" for name, on in part.wait_for
+                    f"WAIT FOR {'' if on else 'NOT '}{self._input(name)}"
+                    for name, on in part.wait_for
                 ]
-                self.lines += [f"{self._output(name)}={_truth(on)}" for name, on in part.set_signals]
+                self.lines += [
+                    f"{self._output(name)}={_truth(on)}" for name, on in part.set_signals
+                ]
 
     def signals(self) -> list[str]:
-        """SIGNAL declarations: the numbers are to be adapted to the inputs and outputs of the cell."""
+        """SIGNAL declarations: the numbers are to be adapted to the inputs and outputs of the
+        cell.
+        """
         return [
             *(f"SIGNAL {name} $OUT[{n}]" for name, n in self._outputs.items()),
             *(f"SIGNAL {name} $IN[{n}]" for name, n in self._inputs.items()),
@@ -159,7 +169,9 @@ class _Body:
     def _spline(self, part: WrittenSpline) -> None:
         self._movements += 1
         names = [f"XM{self._movements}_{k + 1}" for k in range(len(part.points))]
-        self.points += [f"DECL E6AXIS {name}={_axes(q)}" for name, q in zip(names, part.points, strict=True)]
+        self.points += [
+            f"DECL E6AXIS {name}={_axes(q)}" for name, q in zip(names, part.points, strict=True)
+        ]
         self.lines += [f"; {part.comment}", "PTP_SPLINE", "TIME_BLOCK START"]
         for name, share in zip(names[:-1], part.shares, strict=False):
             self.lines += [f"SPTP {name}", f"TIME_BLOCK PART={share:.9f}"]
@@ -168,7 +180,9 @@ class _Body:
     def _path(self, part: WrittenPath) -> None:
         self._movements += 1
         names = [f"XM{self._movements}_{k + 1}" for k in range(len(part.poses))]
-        self.points += [f"DECL E6POS {n}={_pose(pose)}" for n, pose in zip(names, part.poses, strict=True)]
+        self.points += [
+            f"DECL E6POS {n}={_pose(pose)}" for n, pose in zip(names, part.poses, strict=True)
+        ]
         self.lines += [
             f"; {part.comment}",
             f"$VEL.CP={part.speed:.6f}",
@@ -204,7 +218,9 @@ def _truth(on: bool) -> str:
 def _axes(q: FloatArray) -> str:
     return (
         "{"
-        + ",".join(f"{name} {angle:.7f}" for name, angle in zip(AXIS_NAMES, np.degrees(q), strict=True))
+        + ",".join(
+            f"{name} {angle:.7f}" for name, angle in zip(AXIS_NAMES, np.degrees(q), strict=True)
+        )
         + "}"
     )
 
@@ -216,13 +232,17 @@ def _pose(pose: FloatArray) -> str:
 
 def _tool(attached: Attached) -> str:
     fields = frame(attached.tool).fields
-    return "DECL FRAME IR_TOOL={" + ",".join(f"{name} {value:.4f}" for name, value in fields.items()) + "}"
+    return (
+        "DECL FRAME IR_TOOL={"
+        + ",".join(f"{name} {value:.4f}" for name, value in fields.items())
+        + "}"
+    )
 
 
 def _load(attached: Attached) -> str:
     x, y, z = 1e3 * attached.centre
     jx, jy, jz = attached.inertia
     return (
-        f"DECL LOAD IR_LOAD={{M {attached.mass:.3f},CM {{X {x:.2f},Y {y:.2f},Z {z:.2f},A 0,B 0,C 0}},"
-        f"J {{X {jx:.3f},Y {jy:.3f},Z {jz:.3f}}}}}"
+        f"DECL LOAD IR_LOAD={{M {attached.mass:.3f},CM {{X {x:.2f},Y {y:.2f},Z {z:.2f},A 0,B 0,C "
+        f"0}},J {{X {jx:.3f},Y {jy:.3f},Z {jz:.3f}}}}}"
     )

@@ -10,13 +10,18 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.checks import at_least, finite, read_only, set_field
 from ir_msgs_py.transitions import TransitionTimes
 
-DRIVER, DATA = "driver", "data"
-"""Where timers and transition times are from: the driver's controller, or the data file and the settings."""
+DRIVER = "driver"
+DATA = "data"
+"""Where timers and transition times are from: the driver's controller, or the data file and the
+settings.
+"""
 
 
 @dataclass(frozen=True)
 class ControllerTimers:
-    """What a controller does by itself: its brakes close brakes_after [s] on motors; its transition times."""
+    """What a controller does by itself: its brakes close brakes_after [s] on motors; its transition
+    times.
+    """
 
     brakes_after: float
     transitions: TransitionTimes = field(default_factory=TransitionTimes)
@@ -29,8 +34,8 @@ class ControllerTimers:
 class CarriedLoad:
     """What the robot carries: text names loads of the cell ("gripper+part", "none") or is "custom".
 
-    mass [kg], center_of_mass (3,) [m] in the last link's frame and inertia (3, 3) [kg m^2] about it, in all;
-    watts_always, watts_drive_bus [W].
+    mass [kg], center_of_mass (3,) [m] in the last link's frame and inertia (3, 3) [kg m^2] about
+    it, in all; watts_always, watts_drive_bus [W].
     """
 
     text: str
@@ -50,9 +55,11 @@ class CarriedLoad:
 
 @dataclass(frozen=True, eq=False)
 class CellState:
-    """The planner's cell: name, hash of all that a plan depends on, its machines, and the text of its file.
+    """The planner's cell: name, hash of all that a plan depends on, its machines, and the text of
+    its file.
 
-    Of machine k: equipment[k] its name, poses[k] (4, 4) in the cell, enabled[k], states[k] ("": it has none).
+    Of machine k: equipment[k] its name, poses[k] (4, 4) in the cell, enabled[k], states[k] ("": it
+    has none).
     """
 
     name: str

@@ -1,4 +1,6 @@
-"""The array types of the project, declared once: float64, int64 and bool. Shapes stand in docstrings."""
+"""The array types of the project, declared once: float64, int64 and bool. Shapes stand in
+docstrings.
+"""
 
 import numpy as np
 import numpy.typing as npt

@@ -1,4 +1,6 @@
-"""Today's program and the planner's side by side, as values that whoever plans hands to whoever reports."""
+"""Today's program and the planner's side by side, as values that whoever plans hands to whoever
+reports.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +16,8 @@ from ir_msgs_py.savings import Saving
 
 @dataclass(frozen=True)
 class Hop:
-    """All movements from one stop to the next, or one pause: seconds, and energy [J] at the mains with its
-    90 % interval.
+    """All movements from one stop to the next, or one pause: seconds, and energy [J] at the mains
+    with its 90 % interval.
     """
 
     name: str
@@ -29,12 +31,13 @@ class Hop:
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """A program of the comparison. name: "today", "same cycle time", "free", "for the line"; cycle_time [s]
-    that it was asked for (0: free).
+    """A program of the comparison. name: "today", "same cycle time", "free", "for the line";
+    cycle_time [s] that it was asked for (0: free).
 
-    movements, report, hops: empty where `problem` says why there is none. time (N,) s, watts (N,): power at
-    the mains, means over even steps. saving: of today's energy; where the line needs more time than today's
-    program takes, of today's that waits at its end. peak: ends of the 90 % interval of its peak power [W].
+    movements, report, hops: empty where `problem` says why there is none. time (N,) s, watts (N,):
+    power at the mains, means over even steps. saving: of today's energy; where the line needs more
+    time than today's program takes, of today's that waits at its end. peak: ends of the 90 %
+    interval of its peak power [W].
     """
 
     name: str
@@ -65,9 +68,11 @@ class Side:
 
 @dataclass(frozen=True)
 class Change:
-    """One movement or pause, as it is today and as it is planned: what is to be done, and what that saves.
+    """One movement or pause, as it is today and as it is planned: what is to be done, and what that
+    saves.
 
-    work: 1 a power mode, 2 other times on the same path, 3 another path. seconds: today's and planned.
+    work: 1 a power mode, 2 other times on the same path, 3 another path. seconds: today's and
+    planned.
     saving: its interval is by common draws.
     """
 
@@ -80,8 +85,9 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class BeforeAfter:
-    """today, and the planner's programs for the same stops and pauses; changes: from today to the side
-    `towards`, those that save most, the least work first. kind: what today's program is read from.
+    """today, and the planner's programs for the same stops and pauses; changes: from today to the
+    side `towards`, those that save most, the least work first. kind: what today's program is read
+    from.
     """
 
     name: str

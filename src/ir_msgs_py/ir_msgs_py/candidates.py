@@ -15,8 +15,9 @@ from ir_msgs_py.trajectory import JointTrajectory
 class IkSolution:
     """A configuration q (n,) [rad] that reaches a pose.
 
-    position_error [m], rotation_error [rad]. branch: bit 0 shoulder, bit 1 elbow, bit 2 wrist. turns:
-    whole turns per joint relative to (-pi, pi]. clearance [m] with its pair; movement_cost: W of eq. (9).
+    position_error [m], rotation_error [rad]. branch: bit 0 shoulder, bit 1 elbow, bit 2 wrist.
+    turns: whole turns per joint relative to (-pi, pi]. clearance [m] with its pair; movement_cost:
+    W of eq. (9).
     """
 
     joint_names: tuple[str, ...]

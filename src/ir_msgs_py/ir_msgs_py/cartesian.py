@@ -1,5 +1,6 @@
-"""A path of the tool as a value: lines, circles and splines through poses, with the speed that is kept along
-it. Names and defaults are those of ir_msgs/CartesianSegment and ir_msgs/PlanCartesianMovement.
+"""A path of the tool as a value: lines, circles and splines through poses, with the speed that is
+kept along it. Names and defaults are those of ir_msgs/CartesianSegment and
+ir_msgs/PlanCartesianMovement.
 """
 
 from __future__ import annotations
@@ -13,12 +14,18 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.checks import finite, one_of, read_only, set_field
 from ir_msgs_py.errors import InvalidValueError
 
-LINE, CIRCLE, SPLINE = "line", "circle", "spline"
+LINE = "line"
+CIRCLE = "circle"
+SPLINE = "spline"
 KINDS = (LINE, CIRCLE, SPLINE)
-GIVEN, CONSTANT, TANGENT = "given", "constant", "tangent"
+GIVEN = "given"
+CONSTANT = "constant"
+TANGENT = "tangent"
 ORIENTATIONS = (GIVEN, CONSTANT, TANGENT)
 POSES_MAX = 2000  # of a path
-SPEED_MIN, SPEED_MAX = 1e-4, 10.0  # m/s
+# m/s
+SPEED_MIN = 1e-4
+SPEED_MAX = 10.0
 LENGTH_MAX = 10.0  # m: of an approach, a retract and a blending radius
 _RIGID = 1e-6  # of a rotation
 _POSES = {LINE: (1, 1), CIRCLE: (2, 2), SPLINE: (1, POSES_MAX)}
@@ -28,19 +35,23 @@ def _within(value: float, low: float, high: float, name: str, unit: str = "") ->
     number = finite(value, name, unit)
     if not low <= number <= high:
         suffix = f" {unit}" if unit else ""
-        raise InvalidValueError(f"{name} is {number:g}{suffix}: it must be in [{low:g}, {high:g}]{suffix}")
+        raise InvalidValueError(
+            f"{name} is {number:g}{suffix}: it must be in [{low:g}, {high:g}]{suffix}"
+        )
     return number
 
 
 def _rigid(value: FloatArray, name: str) -> FloatArray:
     """A pose (4, 4), read-only: a rotation and a place."""
     pose = read_only(value, name, (4, 4))
-    rotation, last = pose[:3, :3], pose[3] - (0.0, 0.0, 0.0, 1.0)
+    rotation = pose[:3, :3]
+    last = pose[3] - (0.0, 0.0, 0.0, 1.0)
     off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
     if max(off, float(np.abs(last).max())) > _RIGID or np.linalg.det(rotation) < 0.0:
         raise InvalidValueError(
-            f"{name} is no rotation with a place: R R^T deviates from 1 by {off:.2g}, it must be at most "
-            f"{_RIGID:g}, det R is {np.linalg.det(rotation):.3g}, it must be 1, or the last row isn't 0 0 0 1"
+            f"{name} is no rotation with a place: R R^T deviates from 1 by {off:.2g}, it must be "
+            f"at most {_RIGID:g}, det R is {np.linalg.det(rotation):.3g}, it must be 1, or the "
+            "last row isn't 0 0 0 1"
         )
     return pose
 
@@ -49,8 +60,8 @@ def _rigid(value: FloatArray, name: str) -> FloatArray:
 class CartesianSegment:
     """One part of a path; it begins where the part before it ends.
 
-    poses (4, 4) [m] of the tcp in the cell. line: the end; circle: a point between and the end; spline: every
-    point it passes. tool_speed [m/s], 0: that of the path. Raises InvalidValueError.
+    poses (4, 4) [m] of the tcp in the cell. line: the end; circle: a point between and the end;
+    spline: every point it passes. tool_speed [m/s], 0: that of the path. Raises InvalidValueError.
     """
 
     kind: str
@@ -62,10 +73,18 @@ class CartesianSegment:
         fewest, most = _POSES[self.kind]
         if not fewest <= len(self.poses) <= most:
             wanted = f"{fewest}" if fewest == most else f"{fewest} to {most}"
-            raise InvalidValueError(f"a {self.kind} has {len(self.poses)} poses: it must have {wanted}")
-        set_field(self, "poses", tuple(_rigid(pose, f"poses[{k}]") for k, pose in enumerate(self.poses)))
+            raise InvalidValueError(
+                f"a {self.kind} has {len(self.poses)} poses: it must have {wanted}"
+            )
+        set_field(
+            self, "poses", tuple(_rigid(pose, f"poses[{k}]") for k, pose in enumerate(self.poses))
+        )
         if self.tool_speed != 0.0:
-            set_field(self, "tool_speed", _within(self.tool_speed, SPEED_MIN, SPEED_MAX, "tool_speed", "m/s"))
+            set_field(
+                self,
+                "tool_speed",
+                _within(self.tool_speed, SPEED_MIN, SPEED_MAX, "tool_speed", "m/s"),
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,10 +92,10 @@ class CartesianPath:
     """Where the tool begins, (4, 4) [m] in the cell, its segments, and what is kept along them.
 
     tool_speed [m/s]; speed_tolerance: share of it that may be lost, 1: as slow as the axes need.
-    blending_radius [m] around the corners between segments. orientation: of the poses (given), of the start
-    (constant), or turning with the path about the tool's axis (tangent). free_angle [rad]: how far the tool
-    may turn about its own axis, either way. approach, retract [m]: straight along the tool's axis.
-    Raises InvalidValueError.
+    blending_radius [m] around the corners between segments. orientation: of the poses (given), of
+    the start (constant), or turning with the path about the tool's axis (tangent). free_angle
+    [rad]: how far the tool may turn about its own axis, either way. approach, retract [m]: straight
+    along the tool's axis. Raises InvalidValueError.
     """
 
     start: FloatArray

@@ -21,7 +21,9 @@ def finite(value: float, name: str, unit: str = "") -> float:
 
 
 def not_nan(value: float, name: str, unit: str = "") -> float:
-    """Return the value as a float; infinities stay (no pair of bodies: the clearance is infinite)."""
+    """Return the value as a float; infinities stay (no pair of bodies: the clearance is
+    infinite).
+    """
     number = float(value)
     if math.isnan(number):
         raise InvalidValueError(f"{name} is nan{_spaced(unit)}: it must be a number")
@@ -89,8 +91,8 @@ SENTENCE_MAX = 4000  # characters: the longest sentence of the project's own has
 
 
 def one_line(text: str, limit: int = SENTENCE_MAX) -> str:
-    """The text as it may stand in answers, logs and diagnostics: one line, bounded, every control character
-    and lone surrogate escaped.
+    """The text as it may stand in answers, logs and diagnostics: one line, bounded, every control
+    character and lone surrogate escaped.
     """
     safe = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text[: limit + 1])
     return safe if len(safe) <= limit else f"{safe[: limit - 3]}..."

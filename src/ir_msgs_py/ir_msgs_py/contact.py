@@ -12,9 +12,9 @@ from ir_msgs_py.report import DistancePair
 class Contact:
     """A contact that the station does not allow. stamp_ns: node clock [ns] at the first touch.
 
-    depth [m]: deepest until the robot stood; speed [m/s] towards each other at the first touch, of the robot
-    alone; force [N]: largest, estimated; stopped_after [s]: from the first touch until the robot stood;
-    path_time [s] along the trajectory of this id.
+    depth [m]: deepest until the robot stood; speed [m/s] towards each other at the first touch, of
+    the robot alone; force [N]: largest, estimated; stopped_after [s]: from the first touch until
+    the robot stood; path_time [s] along the trajectory of this id.
     """
 
     pair: DistancePair
@@ -37,9 +37,9 @@ class Contact:
         """For people."""
         where = f" at {self.path_time:.3f} s of {self.trajectory_id}" if self.trajectory_id else ""
         return (
-            f"{self.pair.body_a} touched {self.pair.body_b} ({self.pair.kind}){where}, which is not allowed: "
-            f"{self.speed:.2f} m/s, {self.depth * 1e3:.1f} mm deep, about {self.force:.0f} N (simulated), "
-            f"stood after {self.stopped_after * 1e3:.0f} ms"
+            f"{self.pair.body_a} touched {self.pair.body_b} ({self.pair.kind}){where}, which is "
+            f"not allowed: {self.speed:.2f} m/s, {self.depth * 1e3:.1f} mm deep, about "
+            f"{self.force:.0f} N (simulated), stood after {self.stopped_after * 1e3:.0f} ms"
         )
 
 

@@ -8,8 +8,8 @@ MsgsError
 ├── MessageTextError (ValueError)     YAML text that is not the message it is said to be
 ├── FileRefusedError                  a file outside of the allowed folders, or of another kind
 ├── UnknownTypeError                  no such message, service or action type
-├── ParameterError (ValueError)       a parameter out of range or a settings class without its descriptions
-└── ClientError
+├── ParameterError (ValueError)       a parameter out of range or a settings class without its
+descriptions └── ClientError
     ├── ServiceUnavailableError       no node offers it
     ├── CallTimedOutError             offered, but no answer in time
     └── RequestRefusedError           answered with a status that is not SUCCESS; carries it
@@ -53,7 +53,9 @@ class MessageTextError(MsgsError, ValueError):
 
 
 class FileRefusedError(MsgsError):
-    """A file that may not be read or written; the sentence names the path and the allowed folders."""
+    """A file that may not be read or written; the sentence names the path and the allowed
+    folders.
+    """
 
 
 class UnknownTypeError(MsgsError):

@@ -1,7 +1,9 @@
-"""Which files a node or a command may touch: regular files below configured folders, no links out of them.
+"""Which files a node or a command may touch: regular files below configured folders, no links out
+of them.
 
-A path may come from a request, so it is resolved first, held against the folders, and opened without
-following a link and without waiting for a FIFO. Refusals name the path, never what the file holds.
+A path may come from a request, so it is resolved first, held against the folders, and opened
+without following a link and without waiting for a FIFO. Refusals name the path, never what the file
+holds.
 """
 
 from __future__ import annotations
@@ -29,13 +31,17 @@ class FileRoots:
 
     @classmethod
     def of(cls, folders: Iterable[str | Path] = ()) -> FileRoots:
-        """The given folders; where there are none those of IR_FILE_ROOTS, else the working folder."""
+        """The given folders; where there are none those of IR_FILE_ROOTS, else the working
+        folder.
+        """
         given = [folder for folder in folders if str(folder)]
         named = [folder for folder in os.environ.get(ENVIRONMENT, "").split(os.pathsep) if folder]
         return cls(tuple(_resolved(folder) for folder in given or named or [Path.cwd()]))
 
     def inside(self, path: str | Path) -> Path:
-        """The path with all links resolved; FileRefusedError where it lies outside of the folders."""
+        """The path with all links resolved; FileRefusedError where it lies outside of the
+        folders.
+        """
         real = _resolved(path)
         if any(real.is_relative_to(folder) for folder in self.folders):
             return real
@@ -46,18 +52,23 @@ class FileRoots:
         )
 
     def open_to_read(self, path: str | Path) -> BinaryIO:
-        """A regular file; FileRefusedError for another kind or place, OSError where it can't be opened."""
+        """A regular file; FileRefusedError for another kind or place, OSError where it can't be
+        opened.
+        """
         return os.fdopen(_opened(self.inside(path), os.O_RDONLY, path), "rb")
 
     def open_to_write(self, path: str | Path, replaces: bytes | None = None) -> BinaryIO:
         """A new file, or one in place of a file that is empty or starts with the bytes `replaces`.
 
-        Raises FileExistsError where a file is there and `replaces` is None, FileRefusedError for a file of
+        Raises FileExistsError where a file is there and `replaces` is None, FileRefusedError for a
+        file of
         another kind or place: nothing of it is touched then.
         """
         real = self.inside(path)
         try:
-            return os.fdopen(os.open(real, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _SAFE, _MODE), "wb")
+            return os.fdopen(
+                os.open(real, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _SAFE, _MODE), "wb"
+            )
         except FileExistsError:
             if replaces is None:
                 raise
@@ -65,7 +76,9 @@ class FileRoots:
         try:
             start = stream.read(len(replaces))
             if start not in (b"", replaces):
-                raise FileRefusedError(f"{_shown(path)} is a file of another kind: it is not replaced")
+                raise FileRefusedError(
+                    f"{_shown(path)} is a file of another kind: it is not replaced"
+                )
             stream.seek(0)
             stream.truncate()
         except BaseException:

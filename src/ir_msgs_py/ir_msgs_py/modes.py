@@ -1,7 +1,9 @@
-"""Power modes of the controller as one table, shallow to deep; everything else about them is read off it.
+"""Power modes of the controller as one table, shallow to deep; everything else about them is read
+off it.
 
 A new mode to rest in is one row here, its numbers in ir_msgs/PowerMode, its times in
-ir_msgs_py.transitions, and its watts and PROFIenergy number in the controller's data (ir_description).
+ir_msgs_py.transitions, and its watts and PROFIenergy number in the controller's data
+(ir_description).
 """
 
 from __future__ import annotations
@@ -32,10 +34,11 @@ class Mode(IntEnum):
 
 @dataclass(frozen=True)
 class ModeRow:
-    """A mode that can last. depth: 0 for motors on. entering, leaving: its transitions, itself for none.
+    """A mode that can last. depth: 0 for motors on. entering, leaving: its transitions, itself for
+    none.
 
-    bit: the PLC bit that asks for it, "" for none. on_the_network: whether the controller answers in it and
-    while leaving it. drives_on: whether the drive bus is up in it and in its transitions.
+    bit: the PLC bit that asks for it, "" for none. on_the_network: whether the controller answers
+    in it and while leaving it. drives_on: whether the drive bus is up in it and in its transitions.
     """
 
     mode: Mode
@@ -56,7 +59,14 @@ MODES = (
     ModeRow(Mode.STAND_ON_MOTORS, 0, Mode.STAND_ON_MOTORS, Mode.STAND_ON_MOTORS, drives_on=True),
     ModeRow(Mode.STAND_ON_BRAKES, 1, Mode.TO_BRAKES, Mode.FROM_BRAKES, drives_on=True),
     ModeRow(Mode.BUS_POWER_OFF, 2, Mode.TO_BUS_POWER_OFF, Mode.FROM_BUS_POWER_OFF, bit="ab"),
-    ModeRow(Mode.HIBERNATION, 3, Mode.TO_HIBERNATION, Mode.FROM_HIBERNATION, bit="hib", on_the_network=False),
+    ModeRow(
+        Mode.HIBERNATION,
+        3,
+        Mode.TO_HIBERNATION,
+        Mode.FROM_HIBERNATION,
+        bit="hib",
+        on_the_network=False,
+    ),
 )
 RESTS = MODES[1:]
 """Modes that have to be entered and left."""
@@ -67,23 +77,29 @@ DEEPER = ">"
 """Between the modes of a pause that goes through several."""
 READY = frozenset({Mode.STAND_ON_MOTORS, Mode.MOVING})
 """Modes in which the motors follow commands."""
-OFF_THE_NETWORK = frozenset(m for row in RESTS if not row.on_the_network for m in (row.mode, row.leaving))
+OFF_THE_NETWORK = frozenset(
+    m for row in RESTS if not row.on_the_network for m in (row.mode, row.leaving)
+)
 """Modes in which the controller does not answer."""
-DRIVES_ON = READY | {m for row in RESTS if row.drives_on for m in (row.mode, row.entering, row.leaving)}
+DRIVES_ON = READY | {
+    m for row in RESTS if row.drives_on for m in (row.mode, row.entering, row.leaving)
+}
 """Modes with the drive bus up: a movement may be asked for."""
 REST_OF_BIT = {row.bit: row.mode for row in RESTS if row.bit}
 """The mode that each PLC bit of the power management asks for."""
 
 
 def modes_of(power_mode: str) -> tuple[Mode, ...]:
-    """The modes of a pause, one after the other: "STAND_ON_BRAKES>BUS_POWER_OFF" goes deeper as soon as it
-    can; none for "" and for standing on motors.
+    """The modes of a pause, one after the other: "STAND_ON_BRAKES>BUS_POWER_OFF" goes deeper as
+    soon as it can; none for "" and for standing on motors.
     """
     names = power_mode.split(DEEPER) if power_mode else []
     for name in names:
         if name not in REST_MODES:
             known = ", ".join(REST_MODES)
-            raise InvalidValueError(f"power mode {name[:40]!a} of the pause is unknown: known are {known}")
+            raise InvalidValueError(
+                f"power mode {name[:40]!a} of the pause is unknown: known are {known}"
+            )
     modes = tuple(Mode[name] for name in names)
     if any(ROW[b].depth <= ROW[a].depth for a, b in pairwise(modes)):
         raise InvalidValueError(

@@ -1,7 +1,8 @@
-"""Whose a message is on the topics that all cells share: /diagnostics, /rosout and /parameter_events.
+"""Whose a message is on the topics that all cells share: /diagnostics, /rosout and
+/parameter_events.
 
-Each names its sender by a text; the sender's namespace is part of it, so that two cells in one graph are kept
-apart. Namespaces are absolute: "/" or "/cell_1".
+Each names its sender by a text; the sender's namespace is part of it, so that two cells in one
+graph are kept apart. Namespaces are absolute: "/" or "/cell_1".
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ def owns_node(namespace: str, fully_qualified: str) -> bool:
 def owns_logger(namespace: str, logger: str) -> bool:
     """Whether a logger ("cell_1.ir_planner") belongs to a node right in the namespace.
 
-    A dot also parts a logger from those below it ("ir_planner.action"): those of a cell's nodes are known.
+    A dot also parts a logger from those below it ("ir_planner.action"): those of a cell's nodes are
+    known.
     """
     prefix = "".join(f"{part}." for part in _bare(namespace).split("/") if part)
     if not logger.startswith(prefix):

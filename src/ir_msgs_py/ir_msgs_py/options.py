@@ -15,10 +15,10 @@ TIMINGS = ("synchronous", "asynchronous")
 class PlanOptions:
     """Zero is a value: a seed or safety distance of 0 is taken literally.
 
-    planner_id: "" = the node's portfolio. random_seed: draw a seed and echo it. max_iterations: budget in
-    work, 0 = the node's default. planning_time: ceiling [s]. safety_distance: S_m [m]. time_value [W] in J
-    = energy of the drives + time_value x T, without the base load. duration: wanted [s], 0 = free.
-    velocity_scaling, acceleration_scaling in (0, 1].
+    planner_id: "" = the node's portfolio. random_seed: draw a seed and echo it. max_iterations:
+    budget in work, 0 = the node's default. planning_time: ceiling [s]. safety_distance: S_m [m].
+    time_value [W] in J = energy of the drives + time_value x T, without the base load. duration:
+    wanted [s], 0 = free. velocity_scaling, acceleration_scaling in (0, 1].
     load: load text, "" = what is attached. include_points: put the points into the answer.
     """
 
@@ -40,10 +40,14 @@ class PlanOptions:
     def __post_init__(self) -> None:
         for name, bound in (("seed", 2**64), ("max_iterations", 2**32)):
             if not 0 <= getattr(self, name) < bound:
-                raise InvalidValueError(f"{name} is {getattr(self, name)}: it must be in 0 .. {bound - 1}")
+                raise InvalidValueError(
+                    f"{name} is {getattr(self, name)}: it must be in 0 .. {bound - 1}"
+                )
         planning_time = finite(self.planning_time, "planning_time", "s")
         if planning_time <= 0.0:
-            raise InvalidValueError(f"planning_time is {planning_time:g} s: it must be more than 0 s")
+            raise InvalidValueError(
+                f"planning_time is {planning_time:g} s: it must be more than 0 s"
+            )
         for name, unit in (("safety_distance", "m"), ("time_value", "W"), ("duration", "s")):
             set_field(self, name, at_least(getattr(self, name), 0.0, name, unit))
         one_of(self.objective, OBJECTIVES, "objective")

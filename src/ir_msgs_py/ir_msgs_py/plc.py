@@ -1,7 +1,7 @@
 """Levels between the PLC and the robot's controller, and the signals of the cell's machines.
 
-The bits ab, hib and ks are those of the KR C4 power management by PLC; the others of its automatic external
-interface.
+The bits ab, hib and ks are those of the KR C4 power management by PLC; the others of its automatic
+external interface.
 """
 
 from __future__ import annotations
@@ -54,7 +54,9 @@ class PlcInputs:
             changes: dict[str, Any] = {name: bool(value)}
             return replace(self, **changes)
         if not value:
-            raise InvalidValueError(f"operating mode {name} cannot be taken away: choose another one")
+            raise InvalidValueError(
+                f"operating mode {name} cannot be taken away: choose another one"
+            )
         return replace(self, operating_mode=OperatingMode[name])
 
 
@@ -82,13 +84,17 @@ class PlcOutputs:
 
     def __post_init__(self) -> None:
         if self.operating_mode not in set(OperatingMode):
-            raise InvalidValueError(f"operating_mode is {self.operating_mode}: it must be in 0 .. 4")
+            raise InvalidValueError(
+                f"operating_mode is {self.operating_mode}: it must be in 0 .. 4"
+            )
         object.__setattr__(self, "operating_mode", OperatingMode(self.operating_mode))
 
 
 @dataclass(frozen=True)
 class Signal:
-    """One signal of a machine of the cell: its level, awaited, set or reported; stamp_ns: node clock [ns]."""
+    """One signal of a machine of the cell: its level, awaited, set or reported; stamp_ns: node
+    clock [ns].
+    """
 
     name: str
     value: bool = True
@@ -112,5 +118,7 @@ class Signal:
             return cls(text[4:].strip(), False)
         name, separator, level = text.partition("=")
         if separator and level.strip() not in ("0", "1"):
-            raise InvalidValueError(f'signal "{text[:80]}" has level "{level[:20]}": known are 0, 1')
+            raise InvalidValueError(
+                f'signal "{text[:80]}" has level "{level[:20]}": known are 0, 1'
+            )
         return cls(name.strip(), level.strip() != "0")

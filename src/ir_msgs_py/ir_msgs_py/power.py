@@ -14,12 +14,14 @@ from ir_msgs_py.modes import Mode, checked_mode
 
 @dataclass(frozen=True, kw_only=True)
 class PowerMode:
-    """One mode with its power [W], times [s] and energies [J]; break_even may be infinite: it never pays.
+    """One mode with its power [W], times [s] and energies [J]; break_even may be infinite: it never
+    pays.
 
-    power: at the mains with the present tool. time_min_pause: shortest pause for which it may be entered.
-    time_to_pause, regular_time_to_operate: transition in and out. time_min_length_of_stay: in the mode
-    itself. energy_to_pause, energy_to_operate: of the transitions. break_even: pause from which the mode
-    saves energy against the next shallower one.
+    power: at the mains with the present tool. time_min_pause: shortest pause for which it may be
+    entered.
+    time_to_pause, regular_time_to_operate: transition in and out. time_min_length_of_stay: in the
+    mode itself. energy_to_pause, energy_to_operate: of the transitions. break_even: pause from
+    which the mode saves energy against the next shallower one.
     """
 
     mode: Mode
@@ -39,7 +41,12 @@ class PowerMode:
         set_field(self, "name", self.name or self.mode.name)
         if not 0 <= self.pe_mode_id <= 0xFF:
             raise InvalidValueError(f"pe_mode_id is {self.pe_mode_id}: it must be in 0 .. 255")
-        for name in ("time_min_pause", "time_to_pause", "regular_time_to_operate", "time_min_length_of_stay"):
+        for name in (
+            "time_min_pause",
+            "time_to_pause",
+            "regular_time_to_operate",
+            "time_min_length_of_stay",
+        ):
             set_field(self, name, at_least(getattr(self, name), 0.0, f"{name} of {self.name}", "s"))
         for name in ("power", "energy_to_pause", "energy_to_operate"):
             set_field(self, name, finite(getattr(self, name), f"{name} of {self.name}"))
@@ -66,11 +73,12 @@ AXES = ("joint_power", "joint_torque", "joint_current", "joint_temperature")
 class PowerState:
     """What the mains meter reads; stamp_ns: node clock [ns].
 
-    time_to_target [s], 0 when the target mode is reached; power [W]: mean since the last reading; energy
-    [J] since the meter started; base_power [W] of controller, drives and tool; bus_voltage [V];
-    burnt_power [W]; joint_power (n,) [W] at the DC bus; joint_torque (n,) [Nm] of the motor at the joint;
-    joint_current (n,) [A] of the motors and joint_temperature (n,) [deg C] of the gears, empty where the
-    plant has none; rectifier_loss [W]; tool_power [W], a part of base_power; plant: what is simulated.
+    time_to_target [s], 0 when the target mode is reached; power [W]: mean since the last reading;
+    energy [J] since the meter started; base_power [W] of controller, drives and tool; bus_voltage
+    [V]; burnt_power [W]; joint_power (n,) [W] at the DC bus; joint_torque (n,) [Nm] of the motor at
+    the joint; joint_current (n,) [A] of the motors and joint_temperature (n,) [deg C] of the gears,
+    empty where the plant has none; rectifier_loss [W]; tool_power [W], a part of base_power; plant:
+    what is simulated.
     """
 
     stamp_ns: int

@@ -1,4 +1,6 @@
-"""What a plan costs, how near it comes to its limits and how it came about: values mirrored by messages."""
+"""What a plan costs, how near it comes to its limits and how it came about: values mirrored by
+messages.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,8 @@ def _zeros(shape: int) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class DistancePair:
-    """Two bodies, their signed distance [m] (negative: penetration) and closest points (3,) [m, frame cell].
+    """Two bodies, their signed distance [m] (negative: penetration) and closest points (3,) [m,
+    frame cell].
 
     allowed_contact: the pair has a safety distance of its own here.
     """
@@ -56,7 +59,9 @@ class DistancePair:
     def __post_init__(self) -> None:
         set_field(self, "kind", PairKind(one_of(self.kind, list(PairKind), "kind of pair")))
         set_field(
-            self, "distance", finite(self.distance, f"distance of {self.body_a} and {self.body_b}", "m")
+            self,
+            "distance",
+            finite(self.distance, f"distance of {self.body_a} and {self.body_b}", "m"),
         )
         set_field(self, "point_a", read_only(self.point_a, "point_a", (3,)))
         set_field(self, "point_b", read_only(self.point_b, "point_b", (3,)))
@@ -66,15 +71,15 @@ class DistancePair:
 class TrajectoryReport:
     """What a trajectory costs and how near it comes to its limits.
 
-    duration [s]; movement_cost: W of eq. (9), not joules; energy at the mains with its 90 % interval
-    energy_low to energy_high (from the uncertainty of power_parameters), joint_energy (n,) at the DC bus
-    (signed), base_energy of controller, drives and tool, burnt_energy in the brake resistor [J];
-    peak_power [W]; min_clearance [m] over all pairs without an allowed contact (inf: no pair), closest:
-    that pair at closest_time [s]; safety_distance: S_m [m] that it was planned or judged with, 0 where
-    nobody said; *_ratio (n,): largest used share of each joint's limit; path_length of
-    the tcp [m]; certified: clearance and limits proved for every instant, in the cell of cell_hash and with
-    this load; contacts: pairs that were allowed their own safety distance. torque_reserve:
-    share of the torque envelope that was left to the feedback.
+    duration [s]; movement_cost: W of eq. (9), not joules; energy at the mains with its 90 %
+    interval energy_low to energy_high (from the uncertainty of power_parameters), joint_energy (n,)
+    at the DC bus (signed), base_energy of controller, drives and tool, burnt_energy in the brake
+    resistor [J]; peak_power [W]; min_clearance [m] over all pairs without an allowed contact (inf:
+    no pair), closest: that pair at closest_time [s]; safety_distance: S_m [m] that it was planned
+    or judged with, 0 where nobody said; *_ratio (n,): largest used share of each joint's limit;
+    path_length of the tcp [m]; certified: clearance and limits proved for every instant, in the
+    cell of cell_hash and with this load; contacts: pairs that were allowed their own safety
+    distance. torque_reserve: share of the torque envelope that was left to the feedback.
     """
 
     duration: float = 0.0
@@ -111,10 +116,18 @@ class TrajectoryReport:
             set_field(self, name, finite(getattr(self, name), name))
         set_field(self, "min_clearance", not_nan(self.min_clearance, "min_clearance", "m"))
         joints = np.shape(self.joint_energy)[:1] or (0,)
-        for name in ("joint_energy", "velocity_ratio", "acceleration_ratio", "jerk_ratio", "torque_ratio"):
+        for name in (
+            "joint_energy",
+            "velocity_ratio",
+            "acceleration_ratio",
+            "jerk_ratio",
+            "torque_ratio",
+        ):
             values = read_only(getattr(self, name), name, (None,))
             if len(values) not in (0, *joints):
-                raise InvalidValueError(f"{name} has {len(values)} joints: joint_energy has {joints[0]}")
+                raise InvalidValueError(
+                    f"{name} has {len(values)} joints: joint_energy has {joints[0]}"
+                )
             set_field(self, name, values)
         set_field(self, "contacts", tuple(self.contacts))
 
@@ -149,9 +162,10 @@ class Rejection:
 class PlanningInfo:
     """How an answer came about.
 
-    start: joint values (n,) [rad] that were used, empty where there is no start; start_names: their joints.
-    iterations: work done, in the unit of max_iterations; truncated: cut by planning_time [s]. timing: which
-    the answer is, "synchronous" or "asynchronous"; "" where nobody chose.
+    start: joint values (n,) [rad] that were used, empty where there is no start; start_names: their
+    joints.
+    iterations: work done, in the unit of max_iterations; truncated: cut by planning_time [s].
+    timing: which the answer is, "synchronous" or "asynchronous"; "" where nobody chose.
     """
 
     planner_id: str = ""
@@ -168,7 +182,9 @@ class PlanningInfo:
     def __post_init__(self) -> None:
         for name in ("seed", "iterations"):
             if not 0 <= getattr(self, name) < 2**64:
-                raise InvalidValueError(f"{name} is {getattr(self, name)}: it must be in 0 .. 2^64 - 1")
+                raise InvalidValueError(
+                    f"{name} is {getattr(self, name)}: it must be in 0 .. 2^64 - 1"
+                )
         set_field(self, "start", read_only(self.start, "start", (None,)))
         set_field(self, "start_names", tuple(self.start_names))
         if self.start_names and len(self.start_names) != len(self.start):
@@ -184,11 +200,13 @@ class PlanningInfo:
 class PlannedMovement:
     """One step of a program: a movement or a pause.
 
-    kind: a MovementKind. trajectory_id: "" for a pause; trajectory: None where only the id is known. duration
-    [s]. power_mode: the mode to rest in (pauses), "" = STAND_ON_MOTORS, several as in modes_of. attach,
-    detach: load that is attached or detached when this step has ended; load: what is attached while it runs
-    ("gripper+part", "none"). wait_for: signals of the machines to wait for before; set_signals: to set after,
-    "name=0" clears; states: of machines that it relies on, "lathe=door_open".
+    kind: a MovementKind. trajectory_id: "" for a pause; trajectory: None where only the id is
+    known. duration [s]. power_mode: the mode to rest in (pauses), "" = STAND_ON_MOTORS, several as
+    in modes_of. attach,
+    detach: load that is attached or detached when this step has ended; load: what is attached while
+    it runs ("gripper+part", "none"). wait_for: signals of the machines to wait for before;
+    set_signals: to set after, "name=0" clears; states: of machines that it relies on,
+    "lathe=door_open".
     """
 
     kind: str

@@ -1,4 +1,6 @@
-"""What a program saves against the common program, in three figures; and the points of its Pareto front."""
+"""What a program saves against the common program, in three figures; and the points of its Pareto
+front.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,8 @@ from dataclasses import dataclass, field
 class Saving:
     """Joules at the mains of the common program and of the planned one, over the same seconds.
 
-    saved_low, saved_high: 90 % interval of common - planned, from the uncertainty of the power parameters.
+    saved_low, saved_high: 90 % interval of common - planned, from the uncertainty of the power
+    parameters.
     """
 
     common: float = 0.0
@@ -36,9 +39,10 @@ class Saving:
 
 @dataclass(frozen=True)
 class ProgramSavings:
-    """Savings of the program `program_id`; `around` of the `across` regional movements of the common program
-    run around bodies. total_low, total_high: the interval of the total, which is not that of its parts'
-    sum. sentence: all figures with their baselines, or why there are none (not available).
+    """Savings of the program `program_id`; `around` of the `across` regional movements of the
+    common program run around bodies. total_low, total_high: the interval of the total, which is not
+    that of its parts' sum. sentence: all figures with their baselines, or why there are none (not
+    available).
     """
 
     available: bool = False
@@ -54,15 +58,16 @@ class ProgramSavings:
     @property
     def total(self) -> Saving:
         """Movements and pauses."""
-        a, b = self.movements, self.pauses
+        a = self.movements
+        b = self.pauses
         sums = (a.common + b.common, a.planned + b.planned, a.seconds + b.seconds)
         return Saving(*sums, self.total_low, self.total_high)
 
 
 @dataclass(frozen=True)
 class ProgramPoint:
-    """A program of a Pareto front: its cycle time [s], waits and pauses included, and its energy [J] at the
-    mains.
+    """A program of a Pareto front: its cycle time [s], waits and pauses included, and its energy
+    [J] at the mains.
     """
 
     cycle_time: float

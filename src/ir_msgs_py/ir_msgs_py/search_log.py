@@ -1,7 +1,8 @@
-"""What a search did, as it travels with an answer: the note of a stage of its planning info, in JSON.
+"""What a search did, as it travels with an answer: the note of a stage of its planning info, in
+JSON.
 
-The text is short: positions of the tool in millimetres, reasons with their counts. Whoever reads an answer,
-also years later from a recording, can show what was drawn, what was rejected and why.
+The text is short: positions of the tool in millimetres, reasons with their counts. Whoever reads an
+answer, also years later from a recording, can show what was drawn, what was rejected and why.
 """
 
 from __future__ import annotations
@@ -30,12 +31,13 @@ def _nowhere() -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class WithdrawalLog:
-    """A withdrawal from a station (eq. 7). kept (N, 3) m: positions of the tool at the configurations that
-    were kept, the station first, each with the index of its parent (N,); dropped (M, 3): some of those that
-    came too near something. path (L, 3): along what was left of the best path. load: what was held.
-    distance: the total metric distance D [m] at the station and the largest one reached. asked: whether the
-    cell asks for a withdrawal there. blocked: why the straight line back along the tool leads nowhere from
-    the same configuration, "": it is free, or nobody knows.
+    """A withdrawal from a station (eq. 7). kept (N, 3) m: positions of the tool at the
+    configurations that were kept, the station first, each with the index of its parent (N,);
+    dropped (M, 3): some of those that came too near something. path (L, 3): along what was left of
+    the best path. load: what was held.
+    distance: the total metric distance D [m] at the station and the largest one reached. asked:
+    whether the cell asks for a withdrawal there. blocked: why the straight line back along the tool
+    leads nowhere from the same configuration, "": it is free, or nobody knows.
     """
 
     station: str
@@ -55,8 +57,8 @@ class WithdrawalLog:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """One random start: positions (K, 3) m of the tool from sweep to sweep; why it was rejected, "": it was
-    accepted.
+    """One random start: positions (K, 3) m of the tool from sweep to sweep; why it was rejected,
+    "": it was accepted.
     """
 
     outcome: str
@@ -65,8 +67,9 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class ConfigurationLog:
-    """A search for configurations at a station by cyclic coordinate descent (eqs. 1 to 6): of `starts` random
-    ones so many were accepted, of which so many are distinct; tracks: of the first starts.
+    """A search for configurations at a station by cyclic coordinate descent (eqs. 1 to 6): of
+    `starts` random ones so many were accepted, of which so many are distinct; tracks: of the first
+    starts.
     """
 
     station: str
@@ -79,12 +82,12 @@ class ConfigurationLog:
 
 @dataclass(frozen=True, eq=False)
 class CorrectionLog:
-    """A genetic correction of a straight movement: positions (K, 3) m of the tool along it, along the parts
-    of it that collide, and along the corrected path of least W (L, 3). fitness: by stretch that was
-    corrected, of this movement and of paths on which something still collided, of the best individual of each
-    generation; 1 is the cost of the straight stretch. costs: W of eq. (9) before and after. met: the first
-    pair that is too near. driven (M, 3): along the movement that is driven, optimised from the corrected
-    paths; empty where nobody says.
+    """A genetic correction of a straight movement: positions (K, 3) m of the tool along it, along
+    the parts of it that collide, and along the corrected path of least W (L, 3). fitness: by
+    stretch that was corrected, of this movement and of paths on which something still collided, of
+    the best individual of each generation; 1 is the cost of the straight stretch. costs: W of eq.
+    (9) before and after. met: the first pair that is too near. driven (M, 3): along the movement
+    that is driven, optimised from the corrected paths; empty where nobody says.
     """
 
     start: str
@@ -136,8 +139,13 @@ def _plain(value: Any) -> Any:
 
 
 def _withdrawal(data: Mapping[str, Any]) -> WithdrawalLog:
-    kept, parents = _points(data["kept"]), np.array(data["parents"], dtype=np.int64)
-    if parents.shape != (len(kept),) or (parents < 0).any() or (parents > np.arange(len(kept))).any():
+    kept = _points(data["kept"])
+    parents = np.array(data["parents"], dtype=np.int64)
+    if (
+        parents.shape != (len(kept),)
+        or (parents < 0).any()
+        or (parents > np.arange(len(kept))).any()
+    ):
         raise ValueError
     return WithdrawalLog(
         str(data["station"]),

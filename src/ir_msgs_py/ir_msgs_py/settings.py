@@ -1,8 +1,8 @@
 """Settings of a stage: one frozen dataclass whose fields carry default, unit, range and a sentence.
 
-ROS parameters and the tables of the documentation derive from it; a core that never meets ROS reads the same
-class. A field may hold the settings of another stage (`stage(...)`), or several by name in a mapping: then
-they form a tree, and a setting in it has a dotted name, "genetic.population".
+ROS parameters and the tables of the documentation derive from it; a core that never meets ROS reads
+the same class. A field may hold the settings of another stage (`stage(...)`), or several by name in
+a mapping: then they form a tree, and a setting in it has a dotted name, "genetic.population".
 """
 
 from __future__ import annotations
@@ -24,7 +24,9 @@ SETTING_TYPES = (bool, int, float, str, tuple[float, ...], tuple[str, ...])
 
 @dataclass(frozen=True)
 class Setting:
-    """What one field promises; minimum and maximum are inclusive and count for each element of a tuple."""
+    """What one field promises; minimum and maximum are inclusive and count for each element of a
+    tuple.
+    """
 
     name: str
     type: Any
@@ -73,7 +75,9 @@ def setting(
     choices: tuple[str, ...] = (),
     read_only: bool = False,
 ) -> T:
-    """Describe a field of a settings class: `timeout: float = setting(2.0, "Longest wait.", unit="s")`."""
+    """Describe a field of a settings class: `timeout: float = setting(2.0, "Longest wait.",
+    unit="s")`.
+    """
     metadata = {
         "sentence": sentence,
         "unit": unit,
@@ -86,7 +90,8 @@ def setting(
 
 
 def stage(make: Callable[[], T]) -> T:
-    """Describe a field that holds the settings of a stage, or a mapping of such by name; `make`: its default.
+    """Describe a field that holds the settings of a stage, or a mapping of such by name; `make`:
+    its default.
 
     The settings of the one stage are named `field.setting`, those in a mapping `key.setting`.
     """
@@ -94,7 +99,9 @@ def stage(make: Callable[[], T]) -> T:
 
 
 def describe(settings_class: type[Any]) -> tuple[Setting, ...]:
-    """The class's own settings, in order; ParameterError for a field that no parameter can stand for."""
+    """The class's own settings, in order; ParameterError for a field that no parameter can stand
+    for.
+    """
     types = get_type_hints(settings_class)
     settings = []
     for each in fields(settings_class):
@@ -104,13 +111,17 @@ def describe(settings_class: type[Any]) -> tuple[Setting, ...]:
         if _KEY not in each.metadata or each.default is MISSING:
             raise ParameterError(f"{where} has no description: use setting(default, sentence, ...)")
         if types[each.name] not in SETTING_TYPES:
-            raise ParameterError(f"{where} is a {types[each.name]}: a parameter is one of {SETTING_TYPES}")
+            raise ParameterError(
+                f"{where} is a {types[each.name]}: a parameter is one of {SETTING_TYPES}"
+            )
         settings.append(Setting(each.name, types[each.name], each.default, **each.metadata[_KEY]))
     return tuple(settings)
 
 
 def stages(settings: Any) -> dict[str, Any]:
-    """The settings of stages that a settings object holds, by the prefix of their names without its dot."""
+    """The settings of stages that a settings object holds, by the prefix of their names without its
+    dot.
+    """
     found: dict[str, Any] = {}
     for each in fields(settings):
         if _STAGE in each.metadata:
@@ -120,9 +131,12 @@ def stages(settings: Any) -> dict[str, Any]:
 
 
 def tree(settings: Any) -> dict[str, Setting]:
-    """All settings of an object and of its stages, by their dotted names; defaults are its values."""
+    """All settings of an object and of its stages, by their dotted names; defaults are its
+    values.
+    """
     found = {
-        each.name: replace(each, default=getattr(settings, each.name)) for each in describe(type(settings))
+        each.name: replace(each, default=getattr(settings, each.name))
+        for each in describe(type(settings))
     }
     for prefix, inner in stages(settings).items():
         found |= {f"{prefix}.{name}": each for name, each in tree(inner).items()}
@@ -130,13 +144,17 @@ def tree(settings: Any) -> dict[str, Setting]:
 
 
 def changed(settings: T, values: Mapping[str, Any]) -> T:
-    """The settings with other values by their dotted names. Raises what the classes raise for them."""
+    """The settings with other values by their dotted names. Raises what the classes raise for
+    them.
+    """
     own: dict[str, Any] = {name: value for name, value in values.items() if "." not in name}
     for each in fields(settings):  # type: ignore[arg-type]
         if _STAGE in each.metadata:
             held = getattr(settings, each.name)
             if isinstance(held, Mapping):
-                own[each.name] = {key: changed(inner, _inside(key, values)) for key, inner in held.items()}
+                own[each.name] = {
+                    key: changed(inner, _inside(key, values)) for key, inner in held.items()
+                }
             else:
                 own[each.name] = changed(held, _inside(each.name, values))
     return replace(settings, **own)  # type: ignore[type-var]
@@ -144,7 +162,9 @@ def changed(settings: T, values: Mapping[str, Any]) -> T:
 
 def _inside(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
     head = prefix + "."
-    return {name.removeprefix(head): value for name, value in values.items() if name.startswith(head)}
+    return {
+        name.removeprefix(head): value for name, value in values.items() if name.startswith(head)
+    }
 
 
 def check_settings(settings: Any) -> None:
@@ -154,14 +174,15 @@ def check_settings(settings: Any) -> None:
 
 
 def settings_table(settings: Any, prefix: str = "", *, read_only: bool = False) -> str:
-    """Write the settings, with those of their stages, as a Markdown table for the documentation; read_only:
-    all are fixed at the start.
+    """Write the settings, with those of their stages, as a Markdown table for the documentation;
+    read_only: all are fixed at the start.
     """
     rows = ["| Parameter | Default | Unit | Range | Meaning |", "|---|---|---|---|---|"]
     for name, each in tree(settings).items():
         fixed = " Fixed at start." if read_only or each.read_only else ""
         default = str(each.default).lower() if isinstance(each.default, bool) else str(each.default)
         rows.append(
-            f"| `{prefix}{name}` | {default} | {each.unit} | {each.bounds} | {each.sentence}{fixed} |"
+            f"| `{prefix}{name}` | {default} | {each.unit} | {each.bounds} | "
+            f"{each.sentence}{fixed} |"
         )
     return "\n".join(rows) + "\n"

@@ -1,6 +1,7 @@
 """How a request ended: a code, a sentence and who says it.
 
-The numbers are those of moveit_msgs/MoveItErrorCodes, so that a client of MoveIt reads them without a table.
+The numbers are those of moveit_msgs/MoveItErrorCodes, so that a client of MoveIt reads them without
+a table.
 """
 
 from __future__ import annotations

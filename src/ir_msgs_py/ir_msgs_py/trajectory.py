@@ -2,8 +2,8 @@
 
 A trajectory means the quintic Hermite polynomial through (q, qd, qdd) of its points; cubic where
 accelerations are missing, linear where velocities are too (as ros2_controllers'
-joint_trajectory_controller does). Checks, proofs, energy and the driver all evaluate this interpolant,
-after times are rounded to nanoseconds.
+joint_trajectory_controller does). Checks, proofs, energy and the driver all evaluate this
+interpolant, after times are rounded to nanoseconds.
 """
 
 from __future__ import annotations
@@ -71,7 +71,9 @@ class JointTrajectory:
         if self.velocities is not None:
             set_field(self, "velocities", _checked_values(self.velocities, "velocity", shape))
         if self.accelerations is not None:
-            set_field(self, "accelerations", _checked_values(self.accelerations, "acceleration", shape))
+            set_field(
+                self, "accelerations", _checked_values(self.accelerations, "acceleration", shape)
+            )
 
     @classmethod
     def from_seconds(
@@ -86,7 +88,9 @@ class JointTrajectory:
         seconds = np.asarray(times, dtype=np.float64)
         if seconds.ndim != 1:
             raise TrajectoryError(f"times have shape {seconds.shape}: they must be (N,)")
-        for k in np.flatnonzero(~np.isfinite(seconds) | (np.abs(seconds) >= _MAX_TIME_NS / NS_PER_S)):
+        for k in np.flatnonzero(
+            ~np.isfinite(seconds) | (np.abs(seconds) >= _MAX_TIME_NS / NS_PER_S)
+        ):
             raise TrajectoryError(f"point {k}: time {seconds[k]} s is not a duration", point=int(k))
         return cls(
             tuple(joint_names),
@@ -113,7 +117,11 @@ class JointTrajectory:
         for name in self.joint_names:
             digest.update(name.encode() + b"\0")
         digest.update(np.ascontiguousarray(self.times_ns, dtype="<i8").tobytes())
-        for mark, values in ((b"q", self.positions), (b"v", self.velocities), (b"a", self.accelerations)):
+        for mark, values in (
+            (b"q", self.positions),
+            (b"v", self.velocities),
+            (b"a", self.accelerations),
+        ):
             if values is not None:
                 digest.update(mark + np.ascontiguousarray(values, dtype="<f8").tobytes())
         return digest.hexdigest()[:_ID_LENGTH]
@@ -126,14 +134,16 @@ class JointTrajectory:
         return self._polynomials
 
     def sample(self, t: ArrayLike) -> Samples:
-        """Motion at times t (M,) from start [s]; the robot rests before the first point and after the last.
+        """Motion at times t (M,) from start [s]; the robot rests before the first point and after
+        the last.
 
         At a point that two segments share the later one counts.
         """
         instants = np.asarray(t, dtype=np.float64)
         if instants.ndim != 1 or not np.isfinite(instants).all():
             raise TrajectoryError("sample times must be a finite array (M,)")
-        durations, times = self._polynomials[1], self.times
+        durations = self._polynomials[1]
+        times = self.times
         if len(durations) == 0:
             rest = np.zeros((len(instants), len(self.joint_names)))
             return Samples(np.repeat(self.positions, len(instants), axis=0), rest, rest, rest)
@@ -151,7 +161,11 @@ class JointTrajectory:
         unknown = [name for name in self.joint_names if name not in expected]
         missing = [name for name in expected if name not in self.joint_names]
         if unknown or missing:
-            what = f"unknown joint {unknown[0][:80]!r}" if unknown else f"joint {missing[0]!r} is missing"
+            what = (
+                f"unknown joint {unknown[0][:80]!r}"
+                if unknown
+                else f"joint {missing[0]!r} is missing"
+            )
             raise JointNamesError(f"{what}: expected are {', '.join(expected)}")
         if self.joint_names == expected:
             return self
@@ -180,7 +194,9 @@ class JointTrajectory:
     @cached_property
     def _polynomials(self) -> tuple[FloatArray, FloatArray]:
         durations = np.diff(self.times_ns) / NS_PER_S
-        coefficients = hermite_coefficients(self.positions, self.velocities, self.accelerations, durations)
+        coefficients = hermite_coefficients(
+            self.positions, self.velocities, self.accelerations, durations
+        )
         durations.flags.writeable = False
         coefficients.flags.writeable = False
         return coefficients, durations
@@ -199,8 +215,8 @@ def _checked_times(times_ns: ArrayLike) -> IntArray:
         raise TrajectoryError(f"point 0: time {times[0] / NS_PER_S:.9f} s is negative", point=0)
     for k in np.flatnonzero(np.diff(times) <= 0)[:1] + 1:
         raise TrajectoryError(
-            f"point {k}: time {times[k] / NS_PER_S:.9f} s is not after {times[k - 1] / NS_PER_S:.9f} s "
-            "of the point before",
+            f"point {k}: time {times[k] / NS_PER_S:.9f} s is not after "
+            f"{times[k - 1] / NS_PER_S:.9f} s of the point before",
             point=int(k),
         )
     times.flags.writeable = False
@@ -211,9 +227,12 @@ def _checked_values(values: ArrayLike, what: str, shape: tuple[int, int]) -> Flo
     array: FloatArray = np.array(values, dtype=np.float64)
     if array.shape != shape:
         raise TrajectoryError(
-            f"{what} values have shape {array.shape}: {shape[0]} points of {shape[1]} joints are {shape}"
+            f"{what} values have shape {array.shape}: {shape[0]} points of {shape[1]} joints are "
+            f"{shape}"
         )
     for k, j in np.argwhere(~np.isfinite(array))[:1]:
-        raise TrajectoryError(f"point {k} joint {j} {what} is not finite", point=int(k), joint=int(j))
+        raise TrajectoryError(
+            f"point {k} joint {j} {what} is not finite", point=int(k), joint=int(j)
+        )
     array.flags.writeable = False
     return array

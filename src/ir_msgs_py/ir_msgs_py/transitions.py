@@ -1,6 +1,7 @@
 """Times into and out of the power modes, and the shortest stay in each.
 
-Planner, driver and program runner have one parameter for each, under the same name: PREFIX and the field's.
+Planner, driver and program runner have one parameter for each, under the same name: PREFIX and the
+field's.
 """
 
 from __future__ import annotations
@@ -17,22 +18,34 @@ _WEEK = 604_800.0
 
 @dataclass(frozen=True)
 class TransitionTimes:
-    """Seconds into a rest (enter), out of it to motors on (leave), and at least in it (minimum_stay)."""
+    """Seconds into a rest (enter), out of it to motors on (leave), and at least in it
+    (minimum_stay).
+    """
 
-    stand_on_brakes_enter: float = setting(0.3, "Motors to brakes.", unit="s", minimum=0.0, maximum=_WEEK)
-    stand_on_brakes_leave: float = setting(0.7, "Brakes to motors.", unit="s", minimum=0.0, maximum=_WEEK)
+    stand_on_brakes_enter: float = setting(
+        0.3, "Motors to brakes.", unit="s", minimum=0.0, maximum=_WEEK
+    )
+    stand_on_brakes_leave: float = setting(
+        0.7, "Brakes to motors.", unit="s", minimum=0.0, maximum=_WEEK
+    )
     stand_on_brakes_minimum_stay: float = setting(
         1.0, "Shortest stay on brakes.", unit="s", minimum=0.0, maximum=_WEEK
     )
-    bus_power_off_enter: float = setting(3.0, "Into Bus Power Off.", unit="s", minimum=0.0, maximum=_WEEK)
+    bus_power_off_enter: float = setting(
+        3.0, "Into Bus Power Off.", unit="s", minimum=0.0, maximum=_WEEK
+    )
     bus_power_off_leave: float = setting(
         20.0, "Bus Power Off to motors.", unit="s", minimum=0.0, maximum=_WEEK
     )
     bus_power_off_minimum_stay: float = setting(
         2.0, "Shortest Bus Power Off.", unit="s", minimum=0.0, maximum=_WEEK
     )
-    hibernation_enter: float = setting(60.0, "Into hibernation.", unit="s", minimum=0.0, maximum=_WEEK)
-    hibernation_leave: float = setting(120.0, "Hibernation to motors.", unit="s", minimum=0.0, maximum=_WEEK)
+    hibernation_enter: float = setting(
+        60.0, "Into hibernation.", unit="s", minimum=0.0, maximum=_WEEK
+    )
+    hibernation_leave: float = setting(
+        120.0, "Hibernation to motors.", unit="s", minimum=0.0, maximum=_WEEK
+    )
     hibernation_minimum_stay: float = setting(
         120.0, "Shortest hibernation.", unit="s", minimum=0.0, maximum=_WEEK
     )
@@ -59,7 +72,9 @@ class TransitionTimes:
         """A mode to rest in with its times alone."""
         return PowerMode(
             mode=mode,
-            time_min_pause=self.enter(mode.name) + self.minimum_stay(mode.name) + self.leave(mode.name),
+            time_min_pause=self.enter(mode.name)
+            + self.minimum_stay(mode.name)
+            + self.leave(mode.name),
             time_to_pause=self.enter(mode.name),
             regular_time_to_operate=self.leave(mode.name),
             time_min_length_of_stay=self.minimum_stay(mode.name),

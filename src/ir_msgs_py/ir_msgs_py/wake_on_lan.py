@@ -1,4 +1,6 @@
-"""Wake-on-LAN: six bytes 0xFF, then the MAC address 16 times, by UDP; perhaps a password behind it."""
+"""Wake-on-LAN: six bytes 0xFF, then the MAC address 16 times, by UDP; perhaps a password behind
+it.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,9 @@ import socket
 from ir_msgs_py.errors import InvalidValueError
 
 CONTROLLER_MAC = "02:00:00:c4:02:10"
-"""MAC address of the simulated controller, where nobody says another: driver and program runner have one."""
+"""MAC address of the simulated controller, where nobody says another: driver and program runner
+have one.
+"""
 WAKE_PORT = 9009
 """UDP port that it listens on; the real one, 9, needs rights."""
 
@@ -21,7 +25,9 @@ _MAC = re.compile(r"[0-9A-Fa-f]{2}([:-][0-9A-Fa-f]{2}){5}")
 def mac_bytes(mac: str) -> bytes:
     """Return the six bytes of "02:00:00:c4:02:10". Raises InvalidValueError."""
     if not _MAC.fullmatch(mac):
-        raise InvalidValueError(f"mac is {mac[:80]!r}: it must be six hex bytes like 02:00:00:c4:02:10")
+        raise InvalidValueError(
+            f"mac is {mac[:80]!r}: it must be six hex bytes like 02:00:00:c4:02:10"
+        )
     return bytes.fromhex(mac.replace(":", "").replace("-", ""))
 
 
@@ -31,13 +37,17 @@ def magic_packet(mac: str) -> bytes:
 
 
 def wakes(packet: bytes, mac: str) -> bool:
-    """Whether the packet is a magic packet for this MAC: nothing before it, at most a password behind it."""
+    """Whether the packet is a magic packet for this MAC: nothing before it, at most a password
+    behind it.
+    """
     magic = magic_packet(mac)
     return packet.startswith(magic) and len(packet) - len(magic) in _PASSWORD_LENGTHS
 
 
 def send_packet(packet: bytes, address: str, port: int) -> None:
-    """Send it to an address, which may be a broadcast. Raises OSError where the network is not there."""
+    """Send it to an address, which may be a broadcast. Raises OSError where the network is not
+    there.
+    """
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
         try:

@@ -1,5 +1,5 @@
-"""Planning core: movements and programs of an industrial robot among machines, with joules, seconds and
-clearance.
+"""Planning core: movements and programs of an industrial robot among machines, with joules, seconds
+and clearance.
 
     planner = Planner(time.monotonic)
     planner.set_cell("", "demo")
@@ -20,7 +20,13 @@ from ir_planner.before_after import (
 from ir_planner.cartesian import CartesianPlan
 from ir_planner.checks import Evaluation, StateCheck
 from ir_planner.configurations import IkAnswer
-from ir_planner.errors import CancelledError, PlannerError, RequestError, TimingError, UnknownNameError
+from ir_planner.errors import (
+    CancelledError,
+    PlannerError,
+    RequestError,
+    TimingError,
+    UnknownNameError,
+)
 from ir_planner.krl import EvaluatedProgram, KrlExport, evaluate_krl, export_krl, tool_in_flange
 from ir_planner.planner import Planner
 from ir_planner.program import ProgramPlan, Standby

@@ -34,8 +34,8 @@ def asked_state(
 
 @dataclass(frozen=True, eq=False)
 class StatesCheck:
-    """Of N states: valid (N,), smallest distances (N,) [m] (inf: no pair), and of each the pair that is
-    nearest to violating its distance (None: no pair).
+    """Of N states: valid (N,), smallest distances (N,) [m] (inf: no pair), and of each the pair
+    that is nearest to violating its distance (None: no pair).
     """
 
     valid: BoolArray
@@ -44,8 +44,8 @@ class StatesCheck:
 
 
 def asked_states(scene: PlanningScene, q: FloatArray, margin: float, station: str) -> StatesCheck:
-    """The same for many states q (N, n) at once: one call of the compiled core, two where a station allows
-    contacts. Raises RequestError, which names the first bad state by its index.
+    """The same for many states q (N, n) at once: one call of the compiled core, two where a station
+    allows contacts. Raises RequestError, which names the first bad state by its index.
     """
     safety_distance(margin)
     if not 1 <= len(q) <= STATES_MAX:
@@ -54,7 +54,8 @@ def asked_states(scene: PlanningScene, q: FloatArray, margin: float, station: st
             f"states has {len(q)} states: it must be 1 to {STATES_MAX}",
         )
     robot = scene.cell.robot
-    low, high = robot.position_min - 1e-9, robot.position_max + 1e-9
+    low = robot.position_min - 1e-9
+    high = robot.position_max + 1e-9
     bad = np.flatnonzero(~((q >= low) & (q <= high)).all(axis=1))
     if len(bad):
         within_limits(q[bad[0]], scene.cell, f"states[{bad[0]}]", StatusCode.INVALID_ROBOT_STATE)
@@ -70,7 +71,9 @@ def asked_states(scene: PlanningScene, q: FloatArray, margin: float, station: st
     return StatesCheck(valid, smallest, _pairs(near, scene, allowed))
 
 
-def _pairs(near: MinDistance, scene: PlanningScene, allowed: BoolArray) -> tuple[DistancePair | None, ...]:
+def _pairs(
+    near: MinDistance, scene: PlanningScene, allowed: BoolArray
+) -> tuple[DistancePair | None, ...]:
     pairs = scene.collision.pairs
     return tuple(
         DistancePair(

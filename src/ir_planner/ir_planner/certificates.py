@@ -1,6 +1,6 @@
-"""Where an answer holds: every report names the cell and the load that it was proved with, and the power
-parameters that its joules follow from, with the interval that their uncertainty leaves. Every answer says
-which doors were not as the cell has them.
+"""Where an answer holds: every report names the cell and the load that it was proved with, and the
+power parameters that its joules follow from, with the interval that their uncertainty leaves. Every
+answer says which doors were not as the cell has them.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,14 @@ from ir_msgs_py.status import Status
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.cartesian import CartesianPlan
 from ir_planner.checks import Evaluation, interval, movement_spread
-from ir_planner.program import ProgramPlan, Spreads, doors_advice, doors_text, with_doors, with_intervals
+from ir_planner.program import (
+    ProgramPlan,
+    Spreads,
+    doors_advice,
+    doors_text,
+    with_doors,
+    with_intervals,
+)
 from ir_planner.regional import MovementPlan
 from ir_planner.request import noted
 from ir_planner.scene import PlanningScene
@@ -48,15 +55,21 @@ def in_scene(scene: PlanningScene) -> Stamp:
 
 
 def movement_in(plan: AnyMovement, scene: PlanningScene, note: str) -> AnyMovement:
-    """The plan with its report stamped, remarks on its options and on doors, and what a failure may want."""
-    report, info = in_scene(scene)(plan.report, plan.trajectory), remarked(plan.info, scene, note)
+    """The plan with its report stamped, remarks on its options and on doors, and what a failure may
+    want.
+    """
+    report = in_scene(scene)(plan.report, plan.trajectory)
+    info = remarked(plan.info, scene, note)
     return replace(plan, report=report, info=info, status=_advised(plan.status, scene))
 
 
 def service_in(plan: ServicePlan, scene: PlanningScene, note: str) -> ServicePlan:
     """The plan with the reports of its candidates stamped, and the same remarks."""
-    stamp, info = in_scene(scene), remarked(plan.info, scene, note)
-    candidates = tuple(replace(each, report=stamp(each.report, each.trajectory)) for each in plan.candidates)
+    stamp = in_scene(scene)
+    info = remarked(plan.info, scene, note)
+    candidates = tuple(
+        replace(each, report=stamp(each.report, each.trajectory)) for each in plan.candidates
+    )
     return replace(plan, candidates=candidates, info=info, status=_advised(plan.status, scene))
 
 
@@ -64,14 +77,19 @@ def optimization_in(
     plan: OptimizationPlan, original: JointTrajectory, scene: PlanningScene, note: str
 ) -> OptimizationPlan:
     """The plan with its reports stamped, and the same remarks."""
-    stamp, info = in_scene(scene), remarked(plan.info, scene, note)
-    before, after = stamp(plan.before, original), stamp(plan.after, plan.trajectory)
+    stamp = in_scene(scene)
+    info = remarked(plan.info, scene, note)
+    before = stamp(plan.before, original)
+    after = stamp(plan.after, plan.trajectory)
     return replace(plan, before=before, after=after, info=info, status=_advised(plan.status, scene))
 
 
-def evaluation_in(found: Evaluation, trajectory: JointTrajectory, scene: PlanningScene) -> Evaluation:
+def evaluation_in(
+    found: Evaluation, trajectory: JointTrajectory, scene: PlanningScene
+) -> Evaluation:
     """What is known of a trajectory with its report stamped, and what a violation may come from."""
-    report, advice = in_scene(scene)(found.report, trajectory), doors_advice(scene.cell, "", scene.doors)
+    report = in_scene(scene)(found.report, trajectory)
+    advice = doors_advice(scene.cell, "", scene.doors)
     return replace(found, report=report, advice=advice)
 
 
@@ -85,8 +103,8 @@ def _advised(status: Status, scene: PlanningScene) -> Status:
 
 
 def program_in(plan: ProgramPlan, cell_hash: str, timers: str, spreads: Spreads) -> ProgramPlan:
-    """The plan with each movement's report stamped with its own load, that of all with the cell alone;
-    a stage says whose timers the pauses were planned with.
+    """The plan with each movement's report stamped with its own load, that of all with the cell
+    alone; a stage says whose timers the pauses were planned with.
     """
 
     def step(movement: PlannedMovement) -> PlannedMovement:
@@ -94,7 +112,9 @@ def program_in(plan: ProgramPlan, cell_hash: str, timers: str, spreads: Spreads)
 
     plan = with_intervals(plan, spreads)
     compared = (
-        plan.compared if plan.compared is None else program_in(plan.compared, cell_hash, timers, spreads)
+        plan.compared
+        if plan.compared is None
+        else program_in(plan.compared, cell_hash, timers, spreads)
     )
     whose = PlanningStage("pauses", 0.0, f"timers and transition times of the {timers}")
     return replace(

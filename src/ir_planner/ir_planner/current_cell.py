@@ -1,4 +1,6 @@
-"""The cell as it stands now, and the scenes that requests take of it and of what the robot carries."""
+"""The cell as it stands now, and the scenes that requests take of it and of what the robot
+carries.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -28,8 +30,8 @@ class CurrentCell:
 
     heard: what the driver says. drives: asked for each scene, what is assumed of them. power: the
     controller's figures, None: those of the cell's robot.
-    Changes wait for each other, readers for none: a cell is replaced when it is read and its models are
-    built.
+    Changes wait for each other, readers for none: a cell is replaced when it is read and its models
+    are built.
     """
 
     def __init__(
@@ -39,19 +41,24 @@ class CurrentCell:
         power: PowerData | None = None,
         read: ReadCell = read_cell_here,
     ) -> None:
-        self._heard, self._drives, self._power, self._read = heard, drives, power, read
+        self._heard = heard
+        self._drives = drives
+        self._power = power
+        self._read = read
         self._cell: Cell | None = None
         self._changing = Lock()
         self._hashed: tuple[Cell | None, str] = None, ""
-        # the scene of each load and of machines as they stand; its models take a millisecond to build, and
-        # nothing in it ever changes
+        # the scene of each load and of machines as they stand; its models take a millisecond to
+        # build, and nothing in it ever changes
         self._scenes: dict[_Key, tuple[Cell, PlanningScene]] = {}
 
     @property
     def cell(self) -> Cell:
         """The cell as it stands. Raises RequestError while there is none."""
         if self._cell is None:
-            raise RequestError(StatusCode.INVALID_OBJECT_NAME, "no cell is loaded: call set_cell first")
+            raise RequestError(
+                StatusCode.INVALID_OBJECT_NAME, "no cell is loaded: call set_cell first"
+            )
         return self._cell
 
     @property
@@ -62,7 +69,8 @@ class CurrentCell:
     def load(self, cell_yaml: str, cell_file: str) -> Cell:
         """Another cell, from its text, or from a path or the name of a bundled cell.
 
-        Raises RequestError where not exactly one is given, DescriptionError for what is wrong with the cell.
+        Raises RequestError where not exactly one is given, DescriptionError for what is wrong with
+        the cell.
         """
         if bool(cell_yaml) == bool(cell_file):
             given = "both are" if cell_yaml else "neither is"
@@ -74,11 +82,15 @@ class CurrentCell:
             return self._replaced_by(self._read(cell_yaml, cell_file))
 
     def set_equipment(self, name: str, pose: FloatArray | None, enabled: bool, state: str) -> Cell:
-        """Move a machine to a pose (4, 4), switch it on or off, or change its state (None, "": unchanged)."""
+        """Move a machine to a pose (4, 4), switch it on or off, or change its state (None, "":
+        unchanged).
+        """
         with self._changing:
             cell = self.cell
             if name not in [machine.name for machine in cell.equipment]:
-                raise UnknownNameError("equipment", name, (machine.name for machine in cell.equipment))
+                raise UnknownNameError(
+                    "equipment", name, (machine.name for machine in cell.equipment)
+                )
             return self._replaced_by(cell.with_equipment(name, pose, enabled, state or None))
 
     def hash_of(self, cell: Cell) -> str:
@@ -90,8 +102,9 @@ class CurrentCell:
         return content
 
     def scene(self, load: str = "") -> PlanningScene:
-        """Snapshot of the cell with `load` attached; "" = what the robot carries, and while no driver says
-        so the tool. Machines with a switch are as the driver says, and while none does as the cell has them.
+        """Snapshot of the cell with `load` attached; "" = what the robot carries, and while no
+        driver says so the tool. Machines with a switch are as the driver says, and while none does
+        as the cell has them.
         """
         cell = self.cell
         key = self._key(load or self._attached(cell), cell)
@@ -106,14 +119,21 @@ class CurrentCell:
         return self._heard.of(self._drives().power(self._power or cell.robot.controller))
 
     def _key(self, load: str, cell: Cell) -> _Key:
-        return load, self._heard.doors(cell), self._drives(), self.power(cell).motors_to_brakes_in_program
+        return (
+            load,
+            self._heard.doors(cell),
+            self._drives(),
+            self.power(cell).motors_to_brakes_in_program,
+        )
 
     def _scene_of(self, cell: Cell, load: str, doors: Doors) -> PlanningScene:
         scene = scene_with(cell_in(cell, dict(doors)), load, self.power(cell), self._drives())
         return replace(scene, cell_hash=self.hash_of(cell), doors=doors)
 
     def _replaced_by(self, cell: Cell) -> Cell:
-        """The cell from now on; its models of all pairs, a second's work in a large one, are built before."""
+        """The cell from now on; its models of all pairs, a second's work in a large one, are built
+        before.
+        """
         try:
             load = self._attached(cell)
         except RequestError:  # of requests without a load, as long as the driver carries that
@@ -126,7 +146,9 @@ class CurrentCell:
         return cell
 
     def _attached(self, cell: Cell) -> str:
-        """The load text of what is attached. Raises RequestError where the cell doesn't know that."""
+        """The load text of what is attached. Raises RequestError where the cell doesn't know
+        that.
+        """
         carried = self._heard.load
         if carried is None:
             return load_text(cell)
@@ -136,6 +158,7 @@ class CurrentCell:
             return carried.text
         raise RequestError(
             StatusCode.INVALID_OBJECT_NAME,
-            f"no load is given and the robot carries {carried.text!a} ({carried.mass:g} kg), which cell "
-            f"{cell.name!a} doesn't know: its own is {load_text(cell)!r}, name one of {', '.join(known)}",
+            f"no load is given and the robot carries {carried.text!a} ({carried.mass:g} kg), "
+            f"which cell {cell.name!a} doesn't know: its own is {load_text(cell)!r}, name one of "
+            f"{', '.join(known)}",
         )

@@ -1,8 +1,8 @@
 """What can go wrong in the planner, as one tree.
 
 PlannerError
-├── RequestError         a request that makes no sense: status code and a sentence with value, bound and unit
-│   └── UnknownNameError a name that nobody has; the sentence lists the known ones
+├── RequestError         a request that makes no sense: status code and a sentence with value, bound
+and unit │   └── UnknownNameError a name that nobody has; the sentence lists the known ones
 ├── TimingError          no time law exists: a joint's torque does not carry the arm along this path
 └── CancelledError       the caller asked to stop
 
@@ -37,7 +37,9 @@ class UnknownNameError(RequestError):
     def __init__(self, what: str, name: str, known: Iterable[str]) -> None:
         shown = ascii(name) if len(name) <= 60 else ascii(name[:57]) + "..."
         listed = ", ".join(known) or "none"
-        super().__init__(StatusCode.INVALID_OBJECT_NAME, f"{what} {shown} is unknown: known are {listed}")
+        super().__init__(
+            StatusCode.INVALID_OBJECT_NAME, f"{what} {shown} is unknown: known are {listed}"
+        )
 
 
 class TimingError(PlannerError):

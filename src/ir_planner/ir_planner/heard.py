@@ -1,5 +1,5 @@
-"""What a driver publishes about its controller, its load and the machines around it, and what counts while no
-driver does.
+"""What a driver publishes about its controller, its load and the machines around it, and what
+counts while no driver does.
 """
 
 from collections.abc import Callable, Iterator
@@ -13,8 +13,8 @@ from ir_planner.program import Doors
 
 
 class Heard:
-    """timers, load, machines: what the driver says, None while no driver does. settings: asked for the
-    transition times where no driver says them.
+    """timers, load, machines: what the driver says, None while no driver does. settings: asked for
+    the transition times where no driver says them.
     """
 
     def __init__(self, settings: Callable[[], TransitionTimes]) -> None:
@@ -40,7 +40,9 @@ class Heard:
         return DATA if self.timers is None else DRIVER
 
     def doors(self, cell: Cell) -> Doors:
-        """Machines of a cell with a switch that are not as the cell has them, as the driver says."""
+        """Machines of a cell with a switch that are not as the cell has them, as the driver
+        says.
+        """
         return tuple(self._doors(cell))
 
     def _doors(self, cell: Cell) -> Iterator[tuple[str, tuple[str, ...]]]:

@@ -1,6 +1,8 @@
-"""The planner as a whole, without ROS: the cell as it stands, what is attached, and what was planned.
+"""The planner as a whole, without ROS: the cell as it stands, what is attached, and what was
+planned.
 
-Every request takes one immutable snapshot of the cell; changing the cell meanwhile reaches the next one.
+Every request takes one immutable snapshot of the cell; changing the cell meanwhile reaches the next
+one.
 """
 
 from collections.abc import Callable
@@ -79,7 +81,8 @@ _NEVER: Cancelled = lambda: False  # noqa: E731 - a default argument
 class Planner:
     """Answers requests about one cell. Methods raise RequestError for requests that make no sense.
 
-    clock: seconds, only for ceilings and for the times that answers report. power: the controller's figures,
+    clock: seconds, only for ceilings and for the times that answers report. power: the controller's
+    figures,
     None: those of the cell's robot. read_cell: what reads cells.
     """
 
@@ -116,16 +119,21 @@ class Planner:
     def set_cell(self, cell_yaml: str, cell_file: str) -> Cell:
         """Load a cell from its text, or from a path or the name of a bundled cell.
 
-        Raises RequestError where not exactly one is given, DescriptionError for what is wrong with the cell.
+        Raises RequestError where not exactly one is given, DescriptionError for what is wrong with
+        the cell.
         """
         return self._current.load(cell_yaml, cell_file)
 
     def set_equipment(self, name: str, pose: FloatArray | None, enabled: bool, state: str) -> Cell:
-        """Move a machine to a pose (4, 4), switch it on or off, or change its state (None, "": unchanged)."""
+        """Move a machine to a pose (4, 4), switch it on or off, or change its state (None, "":
+        unchanged).
+        """
         return self._current.set_equipment(name, pose, enabled, state)
 
     def scene(self, load: str = "") -> PlanningScene:
-        """Snapshot of the cell, doors as heard, with `load` attached; "": what is carried, else the tool."""
+        """Snapshot of the cell, doors as heard, with `load` attached; "": what is carried, else the
+        tool.
+        """
         return self._current.scene(load)
 
     def check_state(
@@ -158,7 +166,9 @@ class Planner:
         context = Context(self.scene(load), PlanOptions(safety_distance=margin, seed=seed), journal)
         return configurations_at(goal, near, context, starts, self.settings.interaction)
 
-    def evaluate(self, trajectory: JointTrajectory, margin: float, load: str, station: str) -> Evaluation:
+    def evaluate(
+        self, trajectory: JointTrajectory, margin: float, load: str, station: str
+    ) -> Evaluation:
         """Everything that is known about a trajectory, with the first violation."""
         safety_distance(margin)
         scene = self.scene(load)
@@ -167,7 +177,11 @@ class Planner:
         return evaluation_in(found, trajectory, scene)
 
     def standby(
-        self, pause: float | Lengths, q: FloatArray | None, load: str, postures: tuple[str, ...] = ()
+        self,
+        pause: float | Lengths,
+        q: FloatArray | None,
+        load: str,
+        postures: tuple[str, ...] = (),
     ) -> Standby:
         """How to spend a pause [s] at q (n,), None: machine home, or at one of the postures."""
         scene = self.scene(load)
@@ -178,7 +192,9 @@ class Planner:
     def plan_regional(
         self, start: FloatArray, goal: Goal, options: PlanOptions, cancelled: Cancelled = _NEVER
     ) -> MovementPlan:
-        """Movement from start (n,) to a goal; a pose is reached in the configuration that serves best."""
+        """Movement from start (n,) to a goal; a pose is reached in the configuration that serves
+        best.
+        """
         options, note = self._checked(options)
         scene = self.scene(options.load)
         start = within_limits(start, scene.cell, "start", StatusCode.START_STATE_INVALID)
@@ -195,8 +211,8 @@ class Planner:
         options: PlanOptions,
         cancelled: Cancelled = _NEVER,
     ) -> ServicePlan:
-        """Movements out of a station or into it. configuration (n,): there, None: the best; near (n,):
-        where its cost counts from.
+        """Movements out of a station or into it. configuration (n,): there, None: the best; near
+        (n,): where its cost counts from.
         """
         method = known_method(options.planner_id)
         options, note = checked_options(replace(options, planner_id=""))
@@ -206,7 +222,9 @@ class Planner:
             configuration = within_limits(
                 configuration, scene.cell, "configuration", StatusCode.INVALID_ROBOT_STATE
             )
-        request = ServiceRequest(scene.station(station), direction, configuration, near, max_candidates)
+        request = ServiceRequest(
+            scene.station(station), direction, configuration, near, max_candidates
+        )
         options = replace(options, planner_id=method)
         context = Context(scene, options, Journal(self._work(options, cancelled), options.seed))
         plan = plan_service(request, context, exit_searches(self.settings.withdrawal))
@@ -225,7 +243,12 @@ class Planner:
         return self._kept(plan, scene, note)
 
     def plan_cartesian(
-        self, path: AnyPath, options: PlanOptions, start: FloatArray | None = None, *, t1: bool = False
+        self,
+        path: AnyPath,
+        options: PlanOptions,
+        start: FloatArray | None = None,
+        *,
+        t1: bool = False,
     ) -> CartesianPlan:
         """The tool along a path from `start` (n,), None: from the best. t1: at most 250 mm/s."""
         options, note = checked_path_options(options)
@@ -243,8 +266,11 @@ class Planner:
         """A trajectory made cheaper between its end points, with the trade of time for energy."""
         options, note = self._checked(options or PlanOptions())
         scene = self.scene(options.load)
-        original, work = trajectory.reordered(scene.cell.robot.joint_names), self._work(options, cancelled)
-        plan = optimize_trajectory(examinable(original), scene, options, work, self.settings.searches)
+        original = trajectory.reordered(scene.cell.robot.joint_names)
+        work = self._work(options, cancelled)
+        plan = optimize_trajectory(
+            examinable(original), scene, options, work, self.settings.searches
+        )
         for point in plan.front:
             self.trajectories.add(point.trajectory)
         if plan.trajectory is not None:
@@ -263,13 +289,27 @@ class Planner:
         savings: bool = False,
         front_points: int = 0,
     ) -> ProgramPlan:
-        """The cell's program, or a visit of stations, from start (n,); its `ProgramRequest` says the rest."""
+        """The cell's program, or a visit of stations, from start (n,); its `ProgramRequest` says
+        the rest.
+        """
         options, note = self._checked(options)
-        start = within_limits(start, cell := self.cell, "start", StatusCode.START_STATE_INVALID)
+        cell = self.cell
+        start = within_limits(start, cell, "start", StatusCode.START_STATE_INVALID)
         cycle = bounded(cycle_time, 0.0, 604_800.0, "cycle_time", "s")
-        data, settings = self._current.power(cell), replace(self.settings, transitions=self.heard.transitions)
-        asked = stations, start, options, cycle, settings, savings, front_points, self.heard.doors(cell)
-        spreads = Spreads(request := ProgramRequest(cell, data, *asked))
+        data = self._current.power(cell)
+        settings = replace(self.settings, transitions=self.heard.transitions)
+        asked = (
+            stations,
+            start,
+            options,
+            cycle,
+            settings,
+            savings,
+            front_points,
+            self.heard.doors(cell),
+        )
+        request = ProgramRequest(cell, data, *asked)
+        spreads = Spreads(request)
         stops = max(len(stations or cell.program), 1)  # the ceilings are those of one movement
         plan = plan_program(request, self._work(options, cancelled, stops), progress, spreads)
         plan = program_in(plan, self._current.hash_of(cell), self.heard.source, spreads)

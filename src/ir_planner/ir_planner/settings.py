@@ -18,8 +18,8 @@ from ir_planner.service import ModifiedGa
 
 @dataclass(frozen=True)
 class PlannerSettings:
-    """Work, memory and what the drives' bus does with braking energy; the settings of the stages, and every
-    registered search by its name.
+    """Work, memory and what the drives' bus does with braking energy; the settings of the stages,
+    and every registered search by its name.
     """
 
     max_iterations: int = setting(
@@ -30,7 +30,8 @@ class PlannerSettings:
     )
     improvement_iterations: int = setting(
         2_500,
-        "How many of them go into better movements once there is one, where the request doesn't say.",
+        "How many of them go into better movements once there is one, where the request doesn't "
+        "say.",
         minimum=0,
         maximum=100_000_000,
     )
@@ -41,20 +42,30 @@ class PlannerSettings:
     )
     torque_reserve: float = setting(
         0.1,
-        "Share of the torque envelope that plans leave to the feedback: a robot is never quite as its data.",
+        "Share of the torque envelope that plans leave to the feedback: a robot is never quite "
+        "as its data.",
         minimum=0.0,
         maximum=0.5,
     )
     power_parameters: str = setting(
         "",
-        "Power parameters that joules and torques follow from: path of a .yaml file; empty: the data sheet.",
+        "Power parameters that joules and torques follow from: path of a .yaml file; empty: the "
+        "data sheet.",
         read_only=True,
     )
     stored_trajectories: int = setting(
-        500, "Trajectories remembered by id; the oldest go first.", minimum=1, maximum=100_000, read_only=True
+        500,
+        "Trajectories remembered by id; the oldest go first.",
+        minimum=1,
+        maximum=100_000,
+        read_only=True,
     )
     stored_programs: int = setting(
-        120, "Programs remembered by id; the oldest go first.", minimum=1, maximum=10_000, read_only=True
+        120,
+        "Programs remembered by id; the oldest go first.",
+        minimum=1,
+        maximum=10_000,
+        read_only=True,
     )
     stored_megabytes: int = setting(
         200,
@@ -95,7 +106,9 @@ class PlannerSettings:
 
     @property
     def drives(self) -> Drives:
-        """What is assumed of the drives. Raises DescriptionError for parameters that can't be read."""
+        """What is assumed of the drives. Raises DescriptionError for parameters that can't be
+        read.
+        """
         parameters = _parameters(self.power_parameters) if self.power_parameters else None
         return Drives(cast(Regeneration, self.regeneration), self.torque_reserve, parameters)
 

@@ -1,4 +1,6 @@
-"""Trajectories and programs by their id: a memory bounded in number and bytes, the oldest go first."""
+"""Trajectories and programs by their id: a memory bounded in number and bytes, the oldest go
+first.
+"""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -26,8 +28,8 @@ class StoredProgram:
 class Store(Generic[T]):
     """Values by id; safe to use from several threads.
 
-    what: the word for sentences ("trajectory"). capacity and megabytes: how many and how much is kept; the
-    last value always is. bytes_of: the memory that a value takes.
+    what: the word for sentences ("trajectory"). capacity and megabytes: how many and how much is
+    kept; the last value always is. bytes_of: the memory that a value takes.
     """
 
     def __init__(
@@ -38,8 +40,11 @@ class Store(Generic[T]):
         id_of: Callable[[T], str],
         bytes_of: Callable[[T], int],
     ) -> None:
-        self._what, self._capacity, self._megabytes = what, capacity, megabytes
-        self._id_of, self._bytes_of = id_of, bytes_of
+        self._what = what
+        self._capacity = capacity
+        self._megabytes = megabytes
+        self._id_of = id_of
+        self._bytes_of = bytes_of
         self._values: OrderedDict[str, T] = OrderedDict()
         self._bytes = 0
         self._lock = Lock()
@@ -67,8 +72,8 @@ class Store(Generic[T]):
             count = len(self._values)
         raise RequestError(
             StatusCode.INVALID_OBJECT_NAME,
-            f"{self._what} {key[:40]!a} is unknown: the last {count} are kept, at most {self._capacity} and "
-            f"{self._megabytes} MB",
+            f"{self._what} {key[:40]!a} is unknown: the last {count} are kept, at most "
+            f"{self._capacity} and {self._megabytes} MB",
         )
 
     def __len__(self) -> int:
@@ -86,8 +91,14 @@ def program_store(capacity: int, megabytes: int) -> Store[StoredProgram]:
 
 
 def _trajectory_bytes(trajectory: JointTrajectory) -> int:
-    """Memory of a trajectory with the polynomials between its points: six coefficients a joint and point."""
-    return (9 * len(trajectory.joint_names) + 1) * trajectory.positions.itemsize * len(trajectory.times_ns)
+    """Memory of a trajectory with the polynomials between its points: six coefficients a joint and
+    point.
+    """
+    return (
+        (9 * len(trajectory.joint_names) + 1)
+        * trajectory.positions.itemsize
+        * len(trajectory.times_ns)
+    )
 
 
 def _program_bytes(program: StoredProgram) -> int:

@@ -31,11 +31,14 @@ def standby_at(
     """How to spend a pause [s] at q (n,), None: machine home, or at one of the postures."""
     lengths = pause if isinstance(pause, Lengths) else lengths_of(pause)
     here = scene.cell.machine_home if q is None else q
-    return best_posture(lengths, here, trips_to(postures, here, scene.cell, plan), scene, transitions)
+    return best_posture(
+        lengths, here, trips_to(postures, here, scene.cell, plan), scene, transitions
+    )
 
 
 def trips_to(postures: Sequence[str], here: FloatArray, cell: Cell, plan: Plan) -> tuple[Trip, ...]:
-    """Trips from here (n,) to named postures and stations and back. plan: a movement from a start to a goal.
+    """Trips from here (n,) to named postures and stations and back. plan: a movement from a start
+    to a goal.
 
     Raises RequestError for too many, UnknownNameError for one that the cell doesn't name.
     """
@@ -62,7 +65,9 @@ def _trip(name: str, here: FloatArray, cell: Cell, plan: Plan) -> Trip:
     back = plan(q, Goal(configuration=here))
     if back.trajectory is None:
         return Trip(name, here, problem=back.status.message)
-    return Trip(name, q, _cost(there.report), _cost(back.report), _ids(there.trajectory, back.trajectory))
+    return Trip(
+        name, q, _cost(there.report), _cost(back.report), _ids(there.trajectory, back.trajectory)
+    )
 
 
 def _cost(report: TrajectoryReport) -> tuple[float, float]:

@@ -2,9 +2,10 @@
 
     table = what_if("demo", {"mass gear": [10, 20, 40], "cycle_time": [0, 120]}, workers=2)
 
-One row for each combination of values, in order; pandas.DataFrame(table) takes it as it is. What can be
-changed: `cycle_time` [s], `time_value` [W], `safety_distance` [m], `mass NAME` [kg] of the tool or a part,
-`x NAME`, `y NAME`, `z NAME` [m], how far a machine or a station is moved in the world.
+One row for each combination of values, in order; pandas.DataFrame(table) takes it as it is. What
+can be
+changed: `cycle_time` [s], `time_value` [W], `safety_distance` [m], `mass NAME` [kg] of the tool or
+a part, `x NAME`, `y NAME`, `z NAME` [m], how far a machine or a station is moved in the world.
 """
 
 import itertools
@@ -43,18 +44,21 @@ def what_if(
     stations: tuple[str, ...] = (),
     workers: int = 1,
 ) -> list[Row]:
-    """One row for each combination of `values`: these, then seconds, joules with their 90 % interval, kWh,
-    clearance [m], certified, and the sentence where no program is found (its figures are nan).
+    """One row for each combination of `values`: these, then seconds, joules with their 90 %
+    interval, kWh, clearance [m], certified, and the sentence where no program is found (its figures
+    are nan).
 
-    cell: a value, a file or a bundled name. stations: visit these; (): the cell's program. The same rows with
-    any number of `workers`, processes of their own. Raises RequestError for what nobody can change,
-    DescriptionError for a cell that can't be read.
+    cell: a value, a file or a bundled name. stations: visit these; (): the cell's program. The same
+    rows with any number of `workers`, processes of their own. Raises RequestError for what nobody
+    can change, DescriptionError for a cell that can't be read.
     """
     base = cell if isinstance(cell, Cell) else load_cell(cell)
     every = itertools.product(*values.values())
     changes = [dict(zip(values, map(float, each), strict=True)) for each in every]
     if not 1 <= len(changes) <= ROWS_MAX or workers < 1:
-        sentence = f"{len(changes)} rows with {workers} workers: 1 to {ROWS_MAX} rows, at least 1 worker"
+        sentence = (
+            f"{len(changes)} rows with {workers} workers: 1 to {ROWS_MAX} rows, at least 1 worker"
+        )
         raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, sentence)
     for name in values:
         _changed(base, name, 0.0, look=True)
@@ -70,8 +74,12 @@ def what_if(
 
 def _row(base: Cell, change: Change, options: PlanOptions, stations: tuple[str, ...]) -> Row:
     """Plan with the values of one row."""
-    planner = Planner(itertools.repeat(0.0).__next__)  # work is counted: the same rows on any machine
-    nothing = dict.fromkeys(("seconds", "joules", "joules_low", "joules_high", "kwh", "clearance"), np.nan)
+    planner = Planner(
+        itertools.repeat(0.0).__next__
+    )  # work is counted: the same rows on any machine
+    nothing = dict.fromkeys(
+        ("seconds", "joules", "joules_low", "joules_high", "kwh", "clearance"), np.nan
+    )
     row: Row = {**change, **nothing, "certified": False, "sentence": ""}
     value, margin = (change.get(name, getattr(options, name)) for name in OPTIONS)
     chosen = replace(options, time_value=value, safety_distance=margin)
@@ -99,8 +107,8 @@ def _row(base: Cell, change: Change, options: PlanOptions, stations: tuple[str, 
 
 
 def _changed(cell: Cell, name: str, value: float, *, look: bool = False) -> Cell:
-    """The cell with one value changed; options change nothing of it. look: only whether there is such a
-    thing.
+    """The cell with one value changed; options change nothing of it. look: only whether there is
+    such a thing.
     """
     what, _, thing = name.partition(" ")
     if name in (CYCLE_TIME, *OPTIONS):
@@ -141,7 +149,10 @@ def _moved(cell: Cell, name: str, by: FloatArray) -> Cell:
         if station.name == name:
             own = cell.machine(station.equipment).pose
             return cell.with_station(name, np.linalg.inv(own) @ shift @ station.pose)
-    known = [*(machine.name for machine in cell.equipment), *(station.name for station in cell.stations)]
+    known = [
+        *(machine.name for machine in cell.equipment),
+        *(station.name for station in cell.stations),
+    ]
     raise UnknownNameError("machine or station", name, known)
 
 

@@ -1,4 +1,6 @@
-"""Runs a planned program on the driver: movements, pauses with their power mode, signals of the machines."""
+"""Runs a planned program on the driver: movements, pauses with their power mode, signals of the
+machines.
+"""
 
 from ir_program_runner.checks import check_program, load_after
 from ir_program_runner.errors import CanceledError, ProgramError, RunnerError, StepFailedError

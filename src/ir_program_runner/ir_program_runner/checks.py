@@ -33,7 +33,9 @@ def check_request(program_id: str, steps: int) -> None:
 
 
 def check_program(movements: Sequence[PlannedMovement]) -> None:
-    """Raise ProgramError: no steps, no points, a gap between two movements, a bad signal or load."""
+    """Raise ProgramError: no steps, no points, a gap between two movements, a bad signal or
+    load.
+    """
     if not movements:
         raise ProgramError("the program has no movements")
     before: PlannedMovement | None = None
@@ -59,8 +61,8 @@ def check_program(movements: Sequence[PlannedMovement]) -> None:
 
 
 def station_of(movement: PlannedMovement) -> str:
-    """The station or path whose allowed contacts count in a movement: into it, out of it, along it; ""
-    elsewhere.
+    """The station or path whose allowed contacts count in a movement: into it, out of it, along it;
+    "" elsewhere.
     """
     kinds = (MovementKind.SERVICE_EXIT, MovementKind.SERVICE_ENTRY, MovementKind.CARTESIAN)
     service = movement.kind in kinds
@@ -78,7 +80,9 @@ def load_after(movement: PlannedMovement) -> str:
     loads = [] if movement.load == NO_LOAD else movement.load.split(LOAD_SEPARATOR)
     if movement.detach:
         if movement.detach not in loads:
-            raise InvalidValueError(f"{movement.detach} is detached, but attached is {movement.load}")
+            raise InvalidValueError(
+                f"{movement.detach} is detached, but attached is {movement.load}"
+            )
         loads.remove(movement.detach)
     if movement.attach:
         if movement.attach in loads:

@@ -1,4 +1,6 @@
-"""Fulfils a program's requests one by one, through ports: the node plugs ROS in, a test whatever it likes."""
+"""Fulfils a program's requests one by one, through ports: the node plugs ROS in, a test whatever it
+likes.
+"""
 
 from __future__ import annotations
 
@@ -53,8 +55,8 @@ class DriverPort(Protocol):
         station: str,
         states: Sequence[str],
     ) -> Status:
-        """Execute a trajectory that was planned in a cell and with a load; stop along the path when `stop`
-        is true. station: whose contacts are allowed; states: of machines that it relies on.
+        """Execute a trajectory that was planned in a cell and with a load; stop along the path when
+        `stop` is true. station: whose contacts are allowed; states: of machines that it relies on.
         """
 
 
@@ -62,7 +64,8 @@ class DriverPort(Protocol):
 class Ports:
     """The world of one program.
 
-    until: waits for a condition. now: time of the program [s]. fault: why no wait may go on, "" = it may.
+    until: waits for a condition. now: time of the program [s]. fault: why no wait may go on, "" =
+    it may.
     canceled: whether somebody asked to stop. The others do at once what they are called.
     """
 
@@ -93,7 +96,11 @@ class Fulfilment:
             request = next(steps)
             while True:
                 outcome = await self._outcome(request)
-                if isinstance(request, ask.INTERRUPTIBLE) and self._stop() and not outcome.status.ok:
+                if (
+                    isinstance(request, ask.INTERRUPTIBLE)
+                    and self._stop()
+                    and not outcome.status.ok
+                ):
                     self._thrown = True
                     request = steps.throw(CanceledError(outcome.status.message))
                 else:
@@ -116,7 +123,7 @@ class Fulfilment:
             status = await self._fulfil(request)
         return ask.Outcome(ports.now(), ports.driver.mode, status, modes, ports.driver.energy)
 
-    async def _fulfil(self, request: ask.Request) -> Status:
+    async def _fulfil(self, request: ask.Request) -> Status:  # noqa: C901, PLR0911
         ports = self._ports
         match request:
             case ask.Begin(index):
@@ -134,7 +141,9 @@ class Fulfilment:
             case ask.SetPlcInput(name, value):
                 return await ports.driver.set_plc_input(name, value)
             case ask.Drive(trajectory, cell_hash, load, station, states):
-                return await ports.driver.drive(trajectory, self._stop, cell_hash, load, station, states)
+                return await ports.driver.drive(
+                    trajectory, self._stop, cell_hash, load, station, states
+                )
             case ask.WaitForSignals(signals, timeout):
                 return await self._wait(lambda: ports.machines.holds(signals), timeout)
             case ask.WaitForMode(wanted, timeout):
@@ -149,7 +158,12 @@ class Fulfilment:
         deadline = ports.now() + timeout
 
         def over() -> bool:
-            return self._stop() or ports.driver.silent or bool(ports.fault()) or ports.now() >= deadline
+            return (
+                self._stop()
+                or ports.driver.silent
+                or bool(ports.fault())
+                or ports.now() >= deadline
+            )
 
         await ports.until(lambda: condition() or over())
         if condition():

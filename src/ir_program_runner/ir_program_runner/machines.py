@@ -1,4 +1,6 @@
-"""The cell's machines as a soft PLC: levels of signals, and answers that follow a signal after a delay."""
+"""The cell's machines as a soft PLC: levels of signals, and answers that follow a signal after a
+delay.
+"""
 
 from __future__ import annotations
 
@@ -44,11 +46,15 @@ class Machines:
         self._levels[signal.name] = signal.value
         for each in self._signals:
             if each.follows == signal.name:
-                self._due = [(when, answer) for when, answer in self._due if answer.name != each.name]
+                self._due = [
+                    (when, answer) for when, answer in self._due if answer.name != each.name
+                ]
                 self._due.append((now + each.delay, Signal(each.name, signal.value)))
 
     def hear(self, signal: Signal, now: float) -> None:
-        """Take a level from outside. Raises InvalidValueError for a new name when there are MOST_SIGNALS."""
+        """Take a level from outside. Raises InvalidValueError for a new name when there are
+        MOST_SIGNALS.
+        """
         if signal.name not in self._levels and len(self._levels) >= MOST_SIGNALS:
             raise InvalidValueError(
                 f"there are {MOST_SIGNALS} signals already: {signal.name} is one too many"

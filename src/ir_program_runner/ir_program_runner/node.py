@@ -1,4 +1,6 @@
-"""The node `ir_program_runner`: fetches a program, fulfils its requests and publishes its progress."""
+"""The node `ir_program_runner`: fetches a program, fulfils its requests and publishes its
+progress.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +53,9 @@ from ir_program_runner.requests import Announce
 from ir_program_runner.settings import LinkSettings
 
 _KEPT = QoSProfile(depth=5 * MOST_STEPS, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""The longest program is kept for a recorder that comes late; a runner that works for weeks stays small."""
+"""The longest program is kept for a recorder that comes late; a runner that works for weeks stays
+small.
+"""
 _SIGNALS = COMMANDS[0]  # a driver that starts later hears them too
 _FEEDBACK_PERIOD = 0.2  # s: a person reads no faster
 _MACHINES_PERIOD = 0.02  # s: cycle of the soft PLC, as a small real one has
@@ -60,8 +64,8 @@ _MACHINES_PERIOD = 0.02  # s: cycle of the soft PLC, as a small real one has
 class ProgramRunnerNode(Node):
     """Runs one program at a time.
 
-    send: sends a packet to an address and UDP port. machines: the soft PLC; None = the one of the parameter
-    `cell`.
+    send: sends a packet to an address and UDP port. machines: the soft PLC; None = the one of the
+    parameter `cell`.
     """
 
     def __init__(
@@ -76,13 +80,17 @@ class ProgramRunnerNode(Node):
         links = self._settings.links.value
         self._send = send
         self._machines = (
-            Machines(load_cell(links.cell).signals if links.cell else ()) if machines is None else machines
+            Machines(load_cell(links.cell).signals if links.cell else ())
+            if machines is None
+            else machines
         )
         self._waiting = Waiting(self)
         self._planner = Planner(self, self._waiting, links.planner, links.response_timeout)
         self._driver = self._link_to_driver(links)
         self._jump = ""
-        back = JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=False)
+        back = JumpThreshold(
+            min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=False
+        )
         self._jumps = self.get_clock().create_jump_callback(back, post_callback=self._clock_jumped)
         self._signals = self.create_publisher(SignalMsg, "~/signals", _SIGNALS)
         self._machine_signals = self.create_publisher(SignalMsg, "~/machine_signals", _SIGNALS)
@@ -90,7 +98,8 @@ class ProgramRunnerNode(Node):
         CommandTopic(self, SignalMsg, "~/signals", self._hear_signals, of=lambda msg: msg.name)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(_MACHINES_PERIOD, self._let_machines_answer, clock=steady)
-        self._last, self._diagnostics = Status.success(), RunnerDiagnostics(self)
+        self._last = Status.success()
+        self._diagnostics = RunnerDiagnostics(self)
         self.create_timer(1.0, self._diagnose, clock=steady)
         self._server = RecordedActionServer(
             self,
@@ -131,7 +140,9 @@ class ProgramRunnerNode(Node):
             status, movements = await self._fetch(goal.request)
             # a driver or a /clock that has just been started gets the time to be discovered
             patience = self._settings.links.value.response_timeout
-            await self._waiting.until(lambda: not self._driver.silent and self._now() > 0.0, patience)
+            await self._waiting.until(
+                lambda: not self._driver.silent and self._now() > 0.0, patience
+            )
             progress.started = self._now()
             self._jump = ""
             energy = self._driver.energy
@@ -202,7 +213,9 @@ class ProgramRunnerNode(Node):
             self._send(magic_packet(links.mac), links.wake_address, links.wake_port)
         except OSError as error:
             where = f"{links.wake_address} port {links.wake_port}"
-            return Status(StatusCode.FAILURE, f"no Wake-on-LAN packet could be sent to {where}: {error}")
+            return Status(
+                StatusCode.FAILURE, f"no Wake-on-LAN packet could be sent to {where}: {error}"
+            )
         return Status.success()
 
     def _set_signal(self, signal: Signal) -> None:
@@ -225,7 +238,9 @@ class ProgramRunnerNode(Node):
             self._signals.publish(signal_to_msg(self._stamped(signal)))
 
     def _diagnose(self) -> None:
-        self._diagnostics.publish(self._progress, self._driver.state(), self._driver.mode, self._last)
+        self._diagnostics.publish(
+            self._progress, self._driver.state(), self._driver.mode, self._last
+        )
 
     def _stamped(self, signal: Signal) -> Signal:
         return Signal(signal.name, signal.value, self.get_clock().now().nanoseconds)
@@ -286,8 +301,12 @@ class ProgramRunnerNode(Node):
 def main(arguments: list[str] | None = None) -> int:
     """Run the node until it is ended."""
     refusals = (ParameterError, DescriptionError, ValueError)
-    about = "Runs planned programs: movements, pauses in their power modes, signals of the machines."
-    return run_node(names.PROGRAM_RUNNER, ProgramRunnerNode, arguments, refusals=refusals, about=about)
+    about = (
+        "Runs planned programs: movements, pauses in their power modes, signals of the machines."
+    )
+    return run_node(
+        names.PROGRAM_RUNNER, ProgramRunnerNode, arguments, refusals=refusals, about=about
+    )
 
 
 if __name__ == "__main__":

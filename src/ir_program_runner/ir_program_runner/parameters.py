@@ -22,10 +22,14 @@ class RunnerParameters:
 
 
 def declare_parameters(node: Node, busy: Callable[[], bool]) -> RunnerParameters:
-    """Declare all; a change while `busy` is refused. Raises ParameterError for a bad value at the start."""
+    """Declare all; a change while `busy` is refused. Raises ParameterError for a bad value at the
+    start.
+    """
 
     def refuse(names: tuple[str, ...]) -> str:
-        return f"a program runs: {', '.join(names)} can be changed when it has ended" if busy() else ""
+        return (
+            f"a program runs: {', '.join(names)} can be changed when it has ended" if busy() else ""
+        )
 
     return RunnerParameters(
         Parameters(node, ProgramSettings, refuse=refuse),

@@ -1,4 +1,5 @@
-"""A pause in one power mode or deeper and deeper: go to rest, wake in time, be ready when the pause ends.
+"""A pause in one power mode or deeper and deeper: go to rest, wake in time, be ready when the pause
+ends.
 
 AB switches the drive bus off, HIB hibernates, DRIVES_OFF closes the brakes. While it hibernates the
 controller reacts to nothing but a Wake-on-LAN packet; the HIB bit is cleared when it is back.
@@ -33,7 +34,9 @@ _ASLEEP = (Mode.TO_HIBERNATION, Mode.HIBERNATION)
 _AWAKE = (Mode.FROM_HIBERNATION, *READY, Mode.STAND_ON_BRAKES)
 _ROUNDING = 1e-6  # s; a plan may use the shortest pause exactly
 _LATE = 0.1  # s; a shorter delay is not reported: readings and answers take as long
-_SHARE, _JOULES = 0.05, 100.0  # whichever is larger: readings come every 10 ms, answers take as long
+# whichever is larger: readings come every 10 ms, answers take as long
+_SHARE = 0.05
+_JOULES = 100.0
 _PULSE = 0.1  # s: a level has to stay 20 ms to count
 _BIT = {row.mode: row.bit or "drives_off" for row in RESTS}
 
@@ -41,10 +44,14 @@ _BIT = {row.mode: row.bit or "drives_off" for row in RESTS}
 class Pause:
     """One pause; `run()` is the generator that returns a note, "" when all went as planned."""
 
-    def __init__(self, movement: PlannedMovement, settings: ProgramSettings, times: TransitionTimes) -> None:
-        self._movement, self._duration = movement, movement.duration
+    def __init__(
+        self, movement: PlannedMovement, settings: ProgramSettings, times: TransitionTimes
+    ) -> None:
+        self._movement = movement
+        self._duration = movement.duration
         self._modes = modes_of(movement.power_mode)
-        self._settings, self._times = settings, times
+        self._settings = settings
+        self._times = times
         self._mode = Mode.STAND_ON_MOTORS  # the deepest that was asked for
         self.restarted = False  # whether the controller has hibernated
 
@@ -81,12 +88,16 @@ class Pause:
     def _difference(self, measured: float) -> str:
         """What a pause took where it isn't what was planned for this length, "" where it is."""
         planned = self._movement.report
-        same = planned.energy > 0.0 and abs(planned.duration - self._duration) < _ROUNDING and measured > 0.0
+        same = (
+            planned.energy > 0.0
+            and abs(planned.duration - self._duration) < _ROUNDING
+            and measured > 0.0
+        )
         if not same or abs(measured - planned.energy) <= max(_SHARE * planned.energy, _JOULES):
             return ""
         return (
-            f"the pause took {measured:.0f} J, {planned.energy:.0f} J were planned: the program was planned "
-            "for other timers, powers or loads than the driver's"
+            f"the pause took {measured:.0f} J, {planned.energy:.0f} J were planned: the program "
+            "was planned for other timers, powers or loads than the driver's"
         )
 
     def _rest(self, end: float, times: Sequence[PowerMode]) -> Generator[Request, Outcome, str]:
@@ -111,10 +122,11 @@ class Pause:
         return ""
 
     def _ask_for(self, mode: Mode) -> Requests:
-        """Set the bit of a mode, then clear that of the one before: between the two the robot stays where it
-        is. The controller waits for the shortest stay by itself.
+        """Set the bit of a mode, then clear that of the one before: between the two the robot stays
+        where it is. The controller waits for the shortest stay by itself.
         """
-        before, self._mode = self._mode, mode
+        before = self._mode
+        self._mode = mode
         outcome = need((yield SetPlcInput(_BIT[mode], True)))
         if before in _BIT:
             outcome = need((yield SetPlcInput(_BIT[before], False)))
@@ -139,7 +151,8 @@ class Pause:
         if outcome.status.code == StatusCode.TIMED_OUT:
             found = "not known" if outcome.mode is None else outcome.mode.name
             sentence = (
-                f"the robot is not ready {outcome.now - end:.1f} s after the pause: the mode is {found}"
+                f"the robot is not ready {outcome.now - end:.1f} s after the pause: the "
+                f"mode is {found}"
             )
             raise StepFailedError(Status(StatusCode.TIMED_OUT, sentence))
         ready = need(outcome)
@@ -156,7 +169,8 @@ class Pause:
             if outcome.status.ok and outcome.mode not in _ASLEEP:
                 return outcome
         self.restarted = True
-        asleep, waking = outcome.mode in _ASLEEP, False
+        asleep = outcome.mode in _ASLEEP
+        waking = False
         while not waking and outcome.now < limit:
             need((yield SendWakePacket()))
             outcome = yield WaitForMode((Mode.FROM_HIBERNATION,), self._settings.wake_repeat)
@@ -167,7 +181,9 @@ class Pause:
         return outcome
 
     def _stay_awake(self) -> Requests:
-        """Take the HIB bit back; whoever doesn't answer hibernates, and who has begun to shows it soon."""
+        """Take the HIB bit back; whoever doesn't answer hibernates, and who has begun to shows it
+        soon.
+        """
         outcome = yield SetPlcInput(_BIT[self._mode], False)
         if outcome.status.ok:
             seen = yield WaitForMode(_ASLEEP, self._settings.wake_repeat)

@@ -1,7 +1,7 @@
 """A program as a generator over its steps: it yields requests and is sent outcomes.
 
-One step: wait for its signals, carry its load, move or pause, attach or detach, set its signals. Nothing
-here knows ROS or a clock, so a test runs a day's program in milliseconds.
+One step: wait for its signals, carry its load, move or pause, attach or detach, set its signals.
+Nothing here knows ROS or a clock, so a test runs a day's program in milliseconds.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ class ProgramResult:
 
 
 class Program:
-    """One run of a checked program. `run()` is the generator. times: of the power modes, where the driver
-    doesn't report them.
+    """One run of a checked program. `run()` is the generator. times: of the power modes, where the
+    driver doesn't report them.
 
     CanceledError may be thrown into it once, at a request that is INTERRUPTIBLE.
     """
@@ -81,7 +81,9 @@ class Program:
                 note = yield from self._step(index, movement)
             except StepFailedError as failure:
                 yield Announce(index, Event.FAILED, failure.status.message)
-                return ProgramResult(Status(failure.status.code, f"{where}: {failure.status.message}"), index)
+                return ProgramResult(
+                    Status(failure.status.code, f"{where}: {failure.status.message}"), index
+                )
             except CanceledError as canceled:
                 yield Announce(index, Event.CANCELED, str(canceled))
                 return ProgramResult(Status(StatusCode.PREEMPTED, f"canceled in {where}"), index)
@@ -102,7 +104,9 @@ class Program:
             need((yield SetPlcInput(bit, False)))
 
     def _step(self, index: int, movement: PlannedMovement) -> Generator[Request, Outcome, str]:
-        """Do one step; it counts as started when its signals are there: waiting is no part of its energy."""
+        """Do one step; it counts as started when its signals are there: waiting is no part of its
+        energy.
+        """
         note = ""
         yield Begin(index)
         if movement.wait_for:
@@ -118,7 +122,9 @@ class Program:
             assert movement.trajectory is not None  # checked with the program
             yield Phase("moving")
             planned = movement.report.cell_hash, movement.report.load
-            need((yield Drive(movement.trajectory, *planned, station_of(movement), movement.states)))
+            need(
+                (yield Drive(movement.trajectory, *planned, station_of(movement), movement.states))
+            )
         yield from self._carry(load_after(movement))
         for text in movement.set_signals:
             need((yield SetSignal(Signal.parse(text))))
@@ -135,7 +141,9 @@ class Program:
         need(outcome)
 
     def _carry(self, load: str) -> Steps:
-        """Make sure that the driver carries exactly this; a robot that still settles is asked again."""
+        """Make sure that the driver carries exactly this; a robot that still settles is asked
+        again.
+        """
         if not load or load == self._carried:
             return
         outcome = yield SetLoad(load)

@@ -30,7 +30,9 @@ class Progress:
         self.step_started = None
 
     def remaining(self, now: float) -> float:
-        """Planned seconds until the program ends; a step that takes longer counts as nothing more."""
+        """Planned seconds until the program ends; a step that takes longer counts as nothing
+        more.
+        """
         elapsed = 0.0 if self.step_started is None else now - self.step_started
         step = max(0.0, self.movements[self.index].duration - elapsed)
         return step + sum(movement.duration for movement in self.movements[self.index + 1 :])

@@ -1,6 +1,7 @@
 """What a program asks of the world, one request at a time, and what the world answers.
 
-The program never waits, sends or looks at a clock itself: it yields a request and is sent an Outcome.
+The program never waits, sends or looks at a clock itself: it yields a request and is sent an
+Outcome.
 """
 
 from __future__ import annotations
@@ -132,7 +133,8 @@ INTERRUPTIBLE = (WaitForSignals, WaitForMode, WaitUntil, Drive)
 class Outcome:
     """What came of a request.
 
-    now: a steady clock [s]. mode: the power mode, None before it is known. modes: the answer to AskModes.
+    now: a steady clock [s]. mode: the power mode, None before it is known. modes: the answer to
+    AskModes.
     energy: at the mains so far [J].
     A status ROBOT_STATE_STALE means that the driver is silent, whatever was asked.
     """

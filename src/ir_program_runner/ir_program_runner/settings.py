@@ -18,7 +18,11 @@ class ProgramSettings:
         600.0, "Longest wait for the signals of a step.", unit="s", minimum=0.0, maximum=24 * _HOUR
     )
     ready_timeout: float = setting(
-        10.0, "How much later than planned the robot may be ready.", unit="s", minimum=0.0, maximum=_HOUR
+        10.0,
+        "How much later than planned the robot may be ready.",
+        unit="s",
+        minimum=0.0,
+        maximum=_HOUR,
     )
     enter_timeout: float = setting(
         5.0,
@@ -28,7 +32,11 @@ class ProgramSettings:
         maximum=_HOUR,
     )
     load_timeout: float = setting(
-        2.0, "How long a load is offered to a robot that still settles.", unit="s", minimum=0.0, maximum=60.0
+        2.0,
+        "How long a load is offered to a robot that still settles.",
+        unit="s",
+        minimum=0.0,
+        maximum=60.0,
     )
     wake_repeat: float = setting(
         1.0,
@@ -58,7 +66,11 @@ class LinkSettings:
         "127.0.0.1", "Where Wake-on-LAN packets go; may be a broadcast.", read_only=True
     )
     wake_port: int = setting(
-        WAKE_PORT, "UDP port of Wake-on-LAN; the real one is 9.", minimum=1, maximum=65535, read_only=True
+        WAKE_PORT,
+        "UDP port of Wake-on-LAN; the real one is 9.",
+        minimum=1,
+        maximum=65535,
+        read_only=True,
     )
     response_timeout: float = setting(
         5.0,
@@ -77,7 +89,12 @@ class LinkSettings:
         read_only=True,
     )
     cancel_timeout: float = setting(
-        5.0, "Longest wait for a stop along the path.", unit="s", minimum=0.1, maximum=60.0, read_only=True
+        5.0,
+        "Longest wait for a stop along the path.",
+        unit="s",
+        minimum=0.1,
+        maximum=60.0,
+        read_only=True,
     )
 
     def __post_init__(self) -> None:

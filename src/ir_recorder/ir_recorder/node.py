@@ -1,8 +1,8 @@
-"""The recorder node `ir_recorder`: all topics of the cell into one MCAP, started and stopped by service or
-by `ir-record`.
+"""The recorder node `ir_recorder`: all topics of the cell into one MCAP, started and stopped by
+service or by `ir-record`.
 
-Control never waits for the recorder: it only subscribes, and a storage that fails ends the recording, not
-the node.
+Control never waits for the recorder: it only subscribes, and a storage that fails ends the
+recording, not the node.
 """
 
 from __future__ import annotations
@@ -54,7 +54,8 @@ class RecorderNode(Node):
         **options: Any,
     ) -> None:
         super().__init__(name, **options)
-        self._settings, self._open_writer = settings or declared_settings(self), writer
+        self._settings = settings or declared_settings(self)
+        self._open_writer = writer
         self._recording: RecordingWorker | None = None
         self._schemas = SchemaLibrary()
         self._selection = TopicSelection()
@@ -63,7 +64,8 @@ class RecorderNode(Node):
         self._failure = ""
         self._cell = CellRequest(self, self._attach)
         self._parameter_requests = ParameterRequests(
-            self, lambda name, text: self._write(lambda session: session.attach(name, text, self._now()))
+            self,
+            lambda name, text: self._write(lambda session: session.attach(name, text, self._now())),
         )
         self._diagnostics = RecorderDiagnostics(self)
         if name == names.RECORDER:  # a command's own recording is no service of the cell
@@ -109,7 +111,8 @@ class RecorderNode(Node):
         roots: FileRoots | None = None,
         split: Split | None = None,
     ) -> str:
-        """Opens a recording below `roots` (None: those of the settings) and returns its absolute path.
+        """Opens a recording below `roots` (None: those of the settings) and returns its absolute
+        path.
 
         PathError, SplitError or WriteError when it can't.
         """
@@ -121,7 +124,8 @@ class RecorderNode(Node):
         into = self._open(path, overwrite, roots or self._settings.file_roots, split)
         self._selection = TopicSelection(wanted, self.get_namespace())
         self._passed_over.clear()
-        self._listener.lost, self._failure = 0, ""
+        self._listener.lost = 0
+        self._failure = ""
         if files is not None:
             self._attach(files)
         self._cell.begin()
@@ -147,7 +151,8 @@ class RecorderNode(Node):
     def finish(self) -> RecordingSummary | None:
         """Ends the recording and returns its summary, or None when there was none."""
         self._collect()
-        recording, self._recording = self._recording, None
+        recording = self._recording
+        self._recording = None
         self._listener.close()
         if recording is None:
             return None
@@ -174,7 +179,11 @@ class RecorderNode(Node):
         if self._recording is None:
             return
         for topic, types in self.get_topic_names_and_types():
-            if topic in self._listener or topic in self._passed_over or topic not in self._selection:
+            if (
+                topic in self._listener
+                or topic in self._passed_over
+                or topic not in self._selection
+            ):
                 continue
             type_name = single_type(topic, types)
             offers = self._listener.offers(topic)
@@ -199,7 +208,8 @@ class RecorderNode(Node):
         """Hands on what has arrived since the last time."""
         if self._recording is None:
             return
-        own, everything = self.get_namespace(), bool(self._selection.wanted)
+        own = self.get_namespace()
+        everything = bool(self._selection.wanted)
         arrivals = self._listener.take()
         try:
             self._recording.write(
@@ -226,7 +236,9 @@ class RecorderNode(Node):
         )
 
     def _ask(self) -> None:
-        """Asks the planner for its cell and the nodes for their parameters, until they have answered."""
+        """Asks the planner for its cell and the nodes for their parameters, until they have
+        answered.
+        """
         if self._recording is None:
             return
         self._parameter_requests.each()
@@ -260,7 +272,9 @@ class RecorderNode(Node):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """`ir-record PATH [--overwrite] [--topics ...] [--cell NAME]`: records until SIGINT or SIGTERM."""
+    """`ir-record PATH [--overwrite] [--topics ...] [--cell NAME]`: records until SIGINT or
+    SIGTERM.
+    """
     everything = sys.argv[1:] if arguments is None else list(arguments)
     try:
         options = record_parser().parse_args(own_words("ir-record", everything))
@@ -272,12 +286,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     def start() -> RecorderNode:
         name = COMMAND_NODE if options.path else names.RECORDER
-        recorders.append(node := RecorderNode(name=name, namespace=options.namespace or None))
+        node = RecorderNode(name=name, namespace=options.namespace or None)
+        recorders.append(node)
         try:
             if options.path:
                 roots = FileRoots.of(options.roots) if options.roots else None
                 split = Split(options.split_size, options.split_duration)
-                node.start(options.path, options.overwrite, options.topics, options.cell, roots, split)
+                node.start(
+                    options.path, options.overwrite, options.topics, options.cell, roots, split
+                )
         except BaseException:
             node.destroy_node()
             raise
@@ -287,7 +304,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return bool(options.path) and any(node.failure for node in recorders)
 
     refusals = (RecorderError, MsgsError)
-    code = run_node("ir-record", start, everything, refusals=refusals, goes_on=lambda node: not fails())
+    code = run_node(
+        "ir-record", start, everything, refusals=refusals, goes_on=lambda node: not fails()
+    )
     return 1 if fails() else code
 
 

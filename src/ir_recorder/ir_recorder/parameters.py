@@ -9,7 +9,7 @@ from ir_recorder.settings import RecorderSettings
 
 
 def declared_settings(node: Node) -> RecorderSettings:
-    """Declares a parameter per setting, fixed at the start, and returns their values; ParameterError for a
-    bad one.
+    """Declares a parameter per setting, fixed at the start, and returns their values;
+    ParameterError for a bad one.
     """
     return Parameters(node, RecorderSettings).value

@@ -1,4 +1,6 @@
-"""`ir-report FILE [-o out/report.html]`: explains a recording as one HTML page, compares several on one."""
+"""`ir-report FILE [-o out/report.html]`: explains a recording as one HTML page, compares several on
+one.
+"""
 
 from __future__ import annotations
 
@@ -32,17 +34,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "files", nargs="+", help="recordings (.mcap), or folders of them; several are compared"
     )
-    parser.add_argument("-o", "--output", default="out/report.html", help="page to write (out/report.html)")
+    parser.add_argument(
+        "-o", "--output", default="out/report.html", help="page to write (out/report.html)"
+    )
     parser.add_argument("--namespace", help="of the cell, where the recording holds several")
-    words = "what joules are predicted and rebuilt by, as a fit writes it (the plan's, and the data sheet)"
+    words = (
+        "what joules are predicted and rebuilt by, as a fit writes it (the plan's, and the "
+        "data sheet)"
+    )
     parser.add_argument("--power-parameters", default="", metavar="FILE", help=words)
     add_roots(parser)
-    parser.add_argument("--costs", default="", help="prices, shifts and CO2 (YAML); else as assumed")
+    parser.add_argument(
+        "--costs", default="", help="prices, shifts and CO2 (YAML); else as assumed"
+    )
     meter = "a power meter's file (.csv, .parquet) in place of the recorded watts, of one recording"
     parser.add_argument("--meter", default="", metavar="FILE", help=meter)
-    parser.add_argument("--meter-mapping", default="", metavar="FILE", help="what its columns are (.yaml)")
-    parser.add_argument("--table", default="", help="steps as a table to write as well (.csv or .parquet)")
-    parser.add_argument("--picture", default="", help="picture to write as well (.png), of one recording")
+    parser.add_argument(
+        "--meter-mapping", default="", metavar="FILE", help="what its columns are (.yaml)"
+    )
+    parser.add_argument(
+        "--table", default="", help="steps as a table to write as well (.csv or .parquet)"
+    )
+    parser.add_argument(
+        "--picture", default="", help="picture to write as well (.png), of one recording"
+    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -66,7 +81,8 @@ def run(options: argparse.Namespace) -> int:
 
 def _analyses(options: argparse.Namespace, roots: FileRoots) -> list[Analysis]:
     """The recordings asked for; one of a folder that can't be read is named and left out."""
-    analyses, parameters = [], _parameters(options.power_parameters)
+    analyses = []
+    parameters = _parameters(options.power_parameters)
     for path, named in _paths(options.files, roots):
         try:
             recording = read_recording(path, roots, namespace=options.namespace)
@@ -95,7 +111,9 @@ def _metered(recording: Recording, options: argparse.Namespace, roots: FileRoots
 
 
 def _paths(files: Sequence[str], roots: FileRoots) -> list[tuple[Path, bool]]:
-    """Files to read, and whether each was named itself; a folder stands for its recordings, by name."""
+    """Files to read, and whether each was named itself; a folder stands for its recordings, by
+    name.
+    """
     paths: list[tuple[Path, bool]] = []
     for name in files:
         if Path(name).is_dir():

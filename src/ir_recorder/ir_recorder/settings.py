@@ -12,19 +12,26 @@ from ir_recorder.format.parts import Split
 
 @dataclass(frozen=True)
 class RecorderSettings:
-    """Settings of the recorder node. An empty text in a list counts as nothing: ROS has no empty lists."""
+    """Settings of the recorder node. An empty text in a list counts as nothing: ROS has no empty
+    lists.
+    """
 
-    path: str = setting("", "File to record into from the start; empty: wait for ~/start.", read_only=True)
+    path: str = setting(
+        "", "File to record into from the start; empty: wait for ~/start.", read_only=True
+    )
     overwrite: bool = setting(False, "Replace an existing file.", read_only=True)
     topics: tuple[str, ...] = setting(
         ("",), "Names or patterns of topics; empty: all topics of the cell.", read_only=True
     )
     roots: tuple[str, ...] = setting(
         ("",),
-        "Folders below which recordings may be written; empty: IR_FILE_ROOTS, else the working folder.",
+        "Folders below which recordings may be written; empty: IR_FILE_ROOTS, else the working "
+        "folder.",
         read_only=True,
     )
-    cell: str = setting("", "Name or file of the cell to attach; empty: ask the planner.", read_only=True)
+    cell: str = setting(
+        "", "Name or file of the cell to attach; empty: ask the planner.", read_only=True
+    )
     facts: tuple[str, ...] = setting(
         ("",), "Texts key=value, kept in the file and shown by the report.", read_only=True
     )
@@ -53,10 +60,19 @@ class RecorderSettings:
         read_only=True,
     )
     depth: int = setting(
-        2000, "Messages kept per topic between two looks.", minimum=1, maximum=100_000, read_only=True
+        2000,
+        "Messages kept per topic between two looks.",
+        minimum=1,
+        maximum=100_000,
+        read_only=True,
     )
     discovery_period: float = setting(
-        0.1, "Time between two looks for new topics.", unit="s", minimum=0.01, maximum=60.0, read_only=True
+        0.1,
+        "Time between two looks for new topics.",
+        unit="s",
+        minimum=0.01,
+        maximum=60.0,
+        read_only=True,
     )
 
     def __post_init__(self) -> None:

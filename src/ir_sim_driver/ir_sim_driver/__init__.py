@@ -1,4 +1,5 @@
-"""A simulated KUKA KR210 on a KR C4: trajectories, power modes, PLC, mains meter. The core runs without ROS.
+"""A simulated KUKA KR210 on a KR C4: trajectories, power modes, PLC, mains meter. The core runs
+without ROS.
 
 simulation = make_simulation("demo")
 simulation.run(1.0)
@@ -22,8 +23,22 @@ from ir_sim_driver.errors import (
     TrajectoryRefusedError,
 )
 from ir_sim_driver.load_check import LoadCheckSettings, LoadFinding
-from ir_sim_driver.motion import ErrorCode, ExecutionSettings, JointTolerance, Outcome, TrajectoryGoal
-from ir_sim_driver.plant import BACKENDS, Backend, Carried, ControlSettings, Work, carried, custom_load
+from ir_sim_driver.motion import (
+    ErrorCode,
+    ExecutionSettings,
+    JointTolerance,
+    Outcome,
+    TrajectoryGoal,
+)
+from ir_sim_driver.plant import (
+    BACKENDS,
+    Backend,
+    Carried,
+    ControlSettings,
+    Work,
+    carried,
+    custom_load,
+)
 from ir_sim_driver.plc import LINKS, Link, PlcSettings
 from ir_sim_driver.power import IdleTimes
 

@@ -3,9 +3,9 @@
 DriverError
 ├── SettingsError (ValueError)        a setting out of its range
 ├── TrajectoryRefusedError            not executed; code of control_msgs/FollowJointTrajectory
-├── RequestRefusedError               a request that cannot be met; code of moveit_msgs/MoveItErrorCodes
-├── PlantStoppedError                 nobody steps the simulation any more: the process ends
-├── LinkError                         a link to the PLC that cannot be opened
+├── RequestRefusedError               a request that cannot be met; code of
+moveit_msgs/MoveItErrorCodes ├── PlantStoppedError                 nobody steps the simulation any
+more: the process ends ├── LinkError                         a link to the PLC that cannot be opened
 ├── ModbusRefusedError                a request that an exception code of Modbus answers
 └── BackendError                      the physics gave up: not installed, disconnected or diverged
 """

@@ -1,7 +1,7 @@
 """The node `ir_studies`: one study at a time by an action, with progress and cancel.
 
-Settings are the YAML of the command. Files are written below one folder only, and cell files read below the
-folders that were allowed.
+Settings are the YAML of the command. Files are written below one folder only, and cell files read
+below the folders that were allowed.
 """
 
 from __future__ import annotations
@@ -45,7 +45,9 @@ _THREADS = 4  # the study, goals that are refused, cancelling, parameters
 
 
 class StudiesNode(Node):
-    """Runs one study at a time; `means`: what it is made with, for tests; None: as the parameters say."""
+    """Runs one study at a time; `means`: what it is made with, for tests; None: as the parameters
+    say.
+    """
 
     def __init__(
         self, settings: StudiesSettings | None = None, means: Means | None = None, **options: Any
@@ -55,7 +57,8 @@ class StudiesNode(Node):
         self._output = FileRoots.of([found.output])
         self._roots = FileRoots.of(found.roots)
         self._means = means or Means(found.workers, found.scheduler)
-        self._turn, self._ending = threading.Lock(), threading.Event()
+        self._turn = threading.Lock()
+        self._ending = threading.Event()
         self._doing = ""
         self._diagnostics = Diagnostics(self)
         self.create_timer(1.0, self._diagnose)
@@ -80,7 +83,13 @@ class StudiesNode(Node):
     def _run(self, goal: ServerGoalHandle) -> RunStudy.Result:
         """One goal, from its settings to its files."""
         result = RunStudy.Result()
-        answered(result, names.STUDIES, lambda: self._study(goal, result), _known, self.get_logger().error)
+        answered(
+            result,
+            names.STUDIES,
+            lambda: self._study(goal, result),
+            _known,
+            self.get_logger().error,
+        )
         code = result.status.code
         if code == StatusCode.SUCCESS:
             goal.succeed()
@@ -93,7 +102,9 @@ class StudiesNode(Node):
     def _study(self, goal: ServerGoalHandle, result: RunStudy.Result) -> Status:
         """The status of a study; what it found is in the result."""
         if not self._turn.acquire(blocking=False):
-            return Status(StatusCode.FAILURE, "a study is running: one at a time; cancel it, or wait")
+            return Status(
+                StatusCode.FAILURE, "a study is running: one at a time; cancel it, or wait"
+            )
         try:
             asked = goal.request
             study = study_of(asked.settings, asked.kind, self._placed)
@@ -107,13 +118,18 @@ class StudiesNode(Node):
 
     def _means_of(self, goal: ServerGoalHandle) -> Means:
         """The means of a goal: progress as feedback, cancel as what stops it."""
-        own, last, said = self._means, [-_FEEDBACK_S], [""]
+        own = self._means
+        last = [-_FEEDBACK_S]
+        said = [""]
 
         def progress(phase: str, done: int, of: int, best: str) -> None:
             self._doing = f"{phase} {done} of {of}"
             if time.monotonic() - last[0] >= _FEEDBACK_S or done == of or phase != said[0]:
-                last[0], said[0] = time.monotonic(), phase
-                goal.publish_feedback(RunStudy.Feedback(phase=phase, done=done, total=of, best=best))
+                last[0] = time.monotonic()
+                said[0] = phase
+                goal.publish_feedback(
+                    RunStudy.Feedback(phase=phase, done=done, total=of, best=best)
+                )
 
         def stopped() -> bool:
             return self._ending.is_set() or bool(goal.is_cancel_requested)

@@ -9,7 +9,7 @@ from ir_studies.settings import StudiesSettings
 
 
 def declared_settings(node: Node) -> StudiesSettings:
-    """Declares a parameter per setting, fixed at the start, and returns their values; ParameterError for a
-    bad one.
+    """Declares a parameter per setting, fixed at the start, and returns their values;
+    ParameterError for a bad one.
     """
     return Parameters(node, StudiesSettings).value

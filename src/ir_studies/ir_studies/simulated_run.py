@@ -1,5 +1,5 @@
-"""The simulated driver, stepped without real time, while a meter and encoders are read: a recording as a
-trace.
+"""The simulated driver, stepped without real time, while a meter and encoders are read: a recording
+as a trace.
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ from ir_studies.errors import DrivingError
 READING = 0.01  # s between readings of positions and meter
 _LATEST = 2.0  # times of a movement's duration until it must have ended
 _CHANGE = 600.0  # s until a mode must have come
-_REST, _LONGEST_REST = 0.5, 20.0  # s between looks at the capacitor, and until it counts as empty
+# s between looks at the capacitor, and until it counts as empty
+_REST = 0.5
+_LONGEST_REST = 20.0
 _BITS = {Mode.STAND_ON_BRAKES: "drives_off", Mode.BUS_POWER_OFF: "ab", Mode.HIBERNATION: "hib"}
 
 
@@ -71,8 +73,11 @@ class SimulatedRun:
         self.simulation.backend.close()
 
     def place(self, q: FloatArray) -> None:
-        """Stand at q (n,) as if driven there long ago: the loops have settled, the capacitor is empty."""
-        simulation, mains = self.simulation, self.simulation.mains
+        """Stand at q (n,) as if driven there long ago: the loops have settled, the capacitor is
+        empty.
+        """
+        simulation = self.simulation
+        mains = self.simulation.mains
         if simulation.stopped:
             simulation.recover()
         simulation.backend.reset(q)
@@ -90,7 +95,9 @@ class SimulatedRun:
             simulation.cell_watch.stand_in(self.cell, simulation.load)
 
     def drive(self, trajectory: JointTrajectory) -> tuple[float, float]:
-        """Drive a trajectory; when it began and should have ended [s]. DrivingError where it fails."""
+        """Drive a trajectory; when it began and should have ended [s]. DrivingError where it
+        fails.
+        """
         simulation = self.simulation
         began = simulation.time
         simulation.execute(simulation.vet(TrajectoryGoal(trajectory), 0), 0)
@@ -111,7 +118,9 @@ class SimulatedRun:
         modes, loads = zip(*self._words, strict=True)
         texts = {"mode": tuple(modes), "load": tuple(loads)}
         columns["energy"] = np.array(self._joules)
-        return Trace(f"simulated, {self.simulation.plant.name}", np.array(self._times), columns, texts)
+        return Trace(
+            f"simulated, {self.simulation.plant.name}", np.array(self._times), columns, texts
+        )
 
     def _read(self) -> None:
         simulation = self.simulation
@@ -129,7 +138,8 @@ class SimulatedRun:
 
     def _stay(self, mode: Mode, seconds: float) -> None:
         """Enter a mode of rest by the signals of a PLC, stay, and leave it again."""
-        simulation, bit = self.simulation, _BITS[mode]
+        simulation = self.simulation
+        bit = _BITS[mode]
         simulation.plc.set_bit(bit, True)
         self._come(mode)
         self.advance(seconds)
@@ -144,7 +154,9 @@ class SimulatedRun:
         modes = self.simulation.modes
         self._until(lambda: modes.mode is mode, _CHANGE)
         if modes.mode is not mode:
-            raise DrivingError(f"{mode.name} has not come within {_CHANGE:g} s, it is {modes.mode.name}")
+            raise DrivingError(
+                f"{mode.name} has not come within {_CHANGE:g} s, it is {modes.mode.name}"
+            )
 
 
 def driven(cell: Cell, plant: str, steps: Sequence[Step]) -> Trace:

@@ -21,8 +21,8 @@ from ir_studies.work.settings_file import kind_of
 
 @dataclass(frozen=True)
 class Answer:
-    """summary: what follows from a study, in a few sentences; files that were written; table: CSV with a
-    header, its best or summed up rows.
+    """summary: what follows from a study, in a few sentences; files that were written; table: CSV
+    with a header, its best or summed up rows.
     """
 
     summary: str
@@ -32,8 +32,8 @@ class Answer:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of study: what it answers, a settings file with all its keys, how settings are read from a
-    text, and how it is run in a folder.
+    """A kind of study: what it answers, a settings file with all its keys, how settings are read
+    from a text, and how it is run in a folder.
     """
 
     about: str
@@ -78,7 +78,8 @@ KINDS = {
     ),
     "arena": Kind("planners against each other", arena.EXAMPLE, arena_settings, _run_arena),
     "statistics": Kind(
-        "time and energy over random movements, synchronous and asynchronous, predicted and measured",
+        "time and energy over random movements, synchronous and asynchronous, predicted and "
+        "measured",
         statistics.EXAMPLE,
         statistics.statistics_settings,
         _run_statistics,
@@ -87,7 +88,9 @@ KINDS = {
 
 
 def read_study(path: str | Path) -> Study:
-    """The study that a YAML file asks for; cell files count from its folder. SettingsError names the key."""
+    """The study that a YAML file asks for; cell files count from its folder. SettingsError names
+    the key.
+    """
     content = read_text(path)
     try:
         return study_of(content, placed=beside(path))

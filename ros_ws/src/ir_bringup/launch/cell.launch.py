@@ -1,7 +1,8 @@
 """The four nodes of a cell, for machines with a full ROS 2.
 
-`ros2 launch ir_bringup cell.launch.py cell:=demo rviz:=true`. Nothing here is needed to run them: every node
-starts by its own name with defaults that work, as `ir demo` shows. A second cell in the same graph needs a
+`ros2 launch ir_bringup cell.launch.py cell:=demo rviz:=true`. Nothing here is needed to run them:
+every node starts by its own name with defaults that work, as `ir demo` shows. A second cell in the
+same graph needs a
 namespace and ports of its own: `namespace:=cell_2 wake_port:=9010 modbus_port:=5021`.
 """
 
@@ -12,15 +13,27 @@ from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
 
 NODES = ("ir_planner", "ir_sim_driver", "ir_program_runner", "ir_recorder")
-TF_IN_NAMESPACE = [("/tf", "tf"), ("/tf_static", "tf_static")]  # frames of two cells are called the same
+TF_IN_NAMESPACE = [
+    ("/tf", "tf"),
+    ("/tf_static", "tf_static"),
+]  # frames of two cells are called the same
 ARGUMENTS = {
     "cell": ("demo", "a cell file, or the name of a bundled cell"),
     "namespace": ("", "prefix of all names: one for each cell"),
     "parameters": ("", "parameter file of the four nodes; empty: config/cell.yaml"),
-    "wake_port": ("", "UDP port of Wake-on-LAN, for driver and runner; empty: as in the parameter file"),
-    "modbus_port": ("", "TCP port on which a PLC can connect by Modbus; empty: as in the parameter file"),
+    "wake_port": (
+        "",
+        "UDP port of Wake-on-LAN, for driver and runner; empty: as in the parameter file",
+    ),
+    "modbus_port": (
+        "",
+        "TCP port on which a PLC can connect by Modbus; empty: as in the parameter file",
+    ),
     "rviz": ("false", "show the robot, the cell and its zones"),
-    "robot_state_publisher": ("false", "let robot_state_publisher publish tf instead of the driver"),
+    "robot_state_publisher": (
+        "false",
+        "let robot_state_publisher publish tf instead of the driver",
+    ),
 }
 
 
@@ -49,15 +62,19 @@ def views(given: dict[str, str]) -> list[Node]:
         from ir_description import load_cell, robot_urdf
 
         cell = load_cell(given["cell"])
-        # It ends with an exception where its parameter is empty, and publishes it as well: the driver's
-        # description, which follows the load, keeps its topic.
+        # It ends with an exception where its parameter is empty, and publishes it as well: the
+        # driver's description, which follows the load, keeps its topic.
         nodes.append(
             Node(
                 package="robot_state_publisher",
                 executable="robot_state_publisher",
                 namespace=given["namespace"],
                 parameters=[
-                    {"robot_description": robot_urdf(cell.robot, cell.tool, cell.tcp, cell.base_pose)}
+                    {
+                        "robot_description": robot_urdf(
+                            cell.robot, cell.tool, cell.tcp, cell.base_pose
+                        )
+                    }
                 ],
                 remappings=[*TF_IN_NAMESPACE, ("robot_description", "~/robot_description")],
                 output="screen",

@@ -1,4 +1,6 @@
-"""Print the prefix below which the ROS 2 wheels of this interpreter have put share/, lib/ and include/."""
+"""Print the prefix below which the ROS 2 wheels of this interpreter have put share/, lib/ and
+include/.
+"""
 
 import importlib.util
 import pathlib
@@ -6,7 +8,9 @@ import sys
 
 
 def main() -> str:
-    """Return the nearest folder above the interface generator's module that holds an ament index."""
+    """Return the nearest folder above the interface generator's module that holds an ament
+    index.
+    """
     spec = importlib.util.find_spec("rosidl_adapter")
     if spec is None or spec.origin is None:
         return "no ROS 2 wheels here: pip install -r requirements/setup.txt comes first"

@@ -1,7 +1,9 @@
-"""`ir cell check --deep`: what a program would fail at, and what to write into the cell file instead.
+"""`ir cell check --deep`: what a program would fail at, and what to write into the cell file
+instead.
 
-Every station in every situation that the program finds there: a configuration with a free line in and out, or
-the contacts, the zone and the approach distance that would make one. Then everything is planned, with what
+Every station in every situation that the program finds there: a configuration with a free line in
+and out, or the contacts, the zone and the approach distance that would make one. Then everything is
+planned, with what
 was suggested: what still fails is said too.
 """
 
@@ -43,7 +45,9 @@ def suggestions_of(cell: Cell) -> Iterator[Suggestion]:
 
 
 def mended_cell(cell: Cell) -> tuple[Cell, list[Suggestion]]:
-    """The cell with the contacts, zones and approach distances that its stations lack, and what these are."""
+    """The cell with the contacts, zones and approach distances that its stations lack, and what
+    these are.
+    """
     suggestions = list[Suggestion]()
     situations: dict[str, list[Visit]] = {}
     for visit in visits(cell):
@@ -54,7 +58,10 @@ def mended_cell(cell: Cell) -> tuple[Cell, list[Suggestion]]:
         suggestions += lacking
     for machine in mended.equipment:
         if machine is not cell.machine(machine.name):
-            sentence = "allowed contacts hold in its zone only, and the tcp is outside while they are needed"
+            sentence = (
+                "allowed contacts hold in its zone only, and the tcp is outside while "
+                "they are needed"
+            )
             suggestions.append(Suggestion("error", machine.name, sentence, zone_yaml(machine)))
     return mended, suggestions
 
@@ -65,13 +72,18 @@ def _station(cell: Cell, name: str, found: Sequence[Visit]) -> tuple[Cell, list[
     here = exits(found, 0.0)
     if not here:
         loads = found[0].scene.load_text
-        return cell, [Suggestion("error", name, f"no configuration reaches it with {loads}: move or turn it")]
+        return cell, [
+            Suggestion("error", name, f"no configuration reaches it with {loads}: move or turn it")
+        ]
     best = best_exit(found)
     if best is None:
         return _without_line(cell, name, found, here)
-    given, suggestions = station.approach_distance, list[Suggestion]()
+    given = station.approach_distance
+    suggestions = list[Suggestion]()
     if best.contacts:
-        sentence = f"no configuration keeps {1e3 * MARGIN:g} mm; in the best of them {best.sentence}"
+        sentence = (
+            f"no configuration keeps {1e3 * MARGIN:g} mm; in the best of them {best.sentence}"
+        )
         station = with_contacts(station, best.contacts)
         suggestions.append(Suggestion("error", name, sentence, "\n".join(contacts_yaml(station))))
     if best.approach != given:
@@ -86,7 +98,9 @@ def _station(cell: Cell, name: str, found: Sequence[Visit]) -> tuple[Cell, list[
 def _without_line(
     cell: Cell, name: str, found: Sequence[Visit], here: Sequence[Exit]
 ) -> tuple[Cell, list[Suggestion]]:
-    """The same where no straight line can be free: contacts at the station itself, if these suffice."""
+    """The same where no straight line can be free: contacts at the station itself, if these
+    suffice.
+    """
     station = cell.station(name)
     best = max(here, key=lambda each: (each.free, each.mendable, each.depth))
     if not (best.free or best.mendable):
@@ -96,7 +110,9 @@ def _without_line(
     suggestions = []
     if best.contacts:
         station = with_contacts(station, best.contacts)
-        sentence = f"no configuration keeps {1e3 * MARGIN:g} mm; in the best of them {best.sentence}"
+        sentence = (
+            f"no configuration keeps {1e3 * MARGIN:g} mm; in the best of them {best.sentence}"
+        )
         suggestions.append(Suggestion("error", name, sentence, "\n".join(contacts_yaml(station))))
     given = station.approach_distance or DISTANCES[0]
     out = f"has no free straight line out of {given:g} m: {_why(found, given)}"
@@ -116,16 +132,23 @@ def _door(best: Exit, cell: Cell) -> str:
     for machine in cell.equipment:
         for state in machine.states:
             for body in in_path.intersection(state.bodies):
-                by = f" by signal {machine.switch.signal}, and wait for it" if machine.switch else ""
-                return f"{body} is there while {machine.name} is {state.name}: change that before{by}"
+                by = (
+                    f" by signal {machine.switch.signal}, and wait for it" if machine.switch else ""
+                )
+                return (
+                    f"{body} is there while {machine.name} is {state.name}: change that before{by}"
+                )
     return ""
 
 
 def _by(best: Exit, found: Sequence[Visit]) -> str:
-    """By how much, and where to: the shortest that parts the worst pair, "" where that is not known."""
+    """By how much, and where to: the shortest that parts the worst pair, "" where that is not
+    known.
+    """
     worst = min((line for line in best.lines if line.near), key=lambda line: line.near[0].distance)
     visit = found[best.lines.index(worst)]
-    pair, model = worst.near[0], visit.scene.collision
+    pair = worst.near[0]
+    model = visit.scene.collision
     z = next(k for k, each in enumerate(model.pairs) if each[1:] == (pair.body_a, pair.body_b))
     if model.pairs[z].kind == "SELF":
         return ""
@@ -144,12 +167,17 @@ def _with_zone(cell: Cell, name: str, best: Exit) -> Cell:
 
 
 def _planned(cell: Cell) -> Iterator[Suggestion]:
-    """What the planner refuses: the program, and stations where it does not go, from park and back."""
-    planner, options = Planner(time.monotonic), PlanOptions(planning_time=CEILING)
+    """What the planner refuses: the program, and stations where it does not go, from park and
+    back.
+    """
+    planner = Planner(time.monotonic)
+    options = PlanOptions(planning_time=CEILING)
     planner.set_cell(cell_to_yaml(cell), "")
     visited = {step.target for step in cell.program}
     asked: list[tuple[str, tuple[str, ...]]] = [("program", ())] if cell.program else []
-    asked += [(each.name, (each.name, "park")) for each in cell.stations if each.name not in visited]
+    asked += [
+        (each.name, (each.name, "park")) for each in cell.stations if each.name not in visited
+    ]
     for subject, stations in asked:
         plan = planner.plan_program(stations, 0.0, options, cell.posture("park"))
         if not plan.status.ok:

@@ -1,5 +1,5 @@
-"""The straight line out of a station, judged by distances: what comes near on it, and whether contacts or a
-larger zone would make it free.
+"""The straight line out of a station, judged by distances: what comes near on it, and whether
+contacts or a larger zone would make it free.
 """
 
 from __future__ import annotations
@@ -25,7 +25,9 @@ _JUMP = 0.35  # rad between points of a line: more is another branch
 
 @dataclass(frozen=True)
 class Near:
-    """A pair that is nearer than it may be: the distance [m] (negative: the depth), and how far out [m]."""
+    """A pair that is nearer than it may be: the distance [m] (negative: the depth), and how far out
+    [m].
+    """
 
     body_a: str
     body_b: str
@@ -45,8 +47,10 @@ class Near:
 class Line:
     """The line out of a station in one configuration q (n,); reach [m]: how far it can be followed.
 
-    near: pairs too near with what the station allows, the nearest first. mendable: contacts and a zone would
-    make it free: these contacts, and a zone that holds the places (P, 3) [m] of the tcp in `within`.
+    near: pairs too near with what the station allows, the nearest first. mendable: contacts and a
+    zone would
+    make it free: these contacts, and a zone that holds the places (P, 3) [m] of the tcp in
+    `within`.
     """
 
     q: FloatArray
@@ -72,7 +76,8 @@ class Line:
 
 def lines_of(visit: Visit, approach: float) -> list[Line]:
     """The line of every configuration that reaches the station, with an approach distance [m]."""
-    station, scene = replace(visit.station, approach_distance=approach), visit.scene
+    station = replace(visit.station, approach_distance=approach)
+    scene = visit.scene
     poses = line_poses(station)
     solved = scene.inverse_kinematics.solve(poses[1:]) if len(poses) > 1 else None
     nexts = [] if solved is None else [solved.of_pose(k) for k in range(len(poses) - 1)]
@@ -93,8 +98,10 @@ def _followed(q: FloatArray, nexts: Sequence[FloatArray]) -> FloatArray:
 
 def _judged(points: FloatArray, count: int, station: Station, scene: PlanningScene) -> Line:
     """A line (L, n): contacts count where the tcp is in the zone, and never at the outer end."""
-    distance, tcp = scene.collision.distances(points), scene.chain.tcp_poses(points)[:, :3, 3]
-    out, whole = np.linalg.norm(tcp - tcp[0], axis=1), len(points) == count
+    distance = scene.collision.distances(points)
+    tcp = scene.chain.tcp_poses(points)[:, :3, 3]
+    out = np.linalg.norm(tcp - tcp[0], axis=1)
+    whole = len(points) == count
     kept = scene.thresholds(MARGIN, station.name)
     last = np.arange(len(points)) == (count - 1 if count > 1 else -1)
     plain = last | ~tcp_inside(points, scene, station.name, MARGIN)
@@ -103,11 +110,14 @@ def _judged(points: FloatArray, count: int, station: Station, scene: PlanningSce
     found = []
     for z in pairs:
         k = int(np.flatnonzero(violated[:, z])[np.argmin(distance[violated[:, z], z])])
-        a, b = scene.collision.pairs[z].body_a, scene.collision.pairs[z].body_b
+        a = scene.collision.pairs[z].body_a
+        b = scene.collision.pairs[z].body_b
         found.append(Near(a, b, float(distance[k, z]), float(out[k])))
     least = distance.min(axis=0, initial=np.inf)
     at_end = (distance[last] <= MARGIN).any(axis=0)
-    mendable = whole and all(least[z] > 0.0 and not at_end[z] and _by_hand(int(z), scene) for z in pairs)
+    mendable = whole and all(
+        least[z] > 0.0 and not at_end[z] and _by_hand(int(z), scene) for z in pairs
+    )
     contacts = tuple(_contact(int(z), float(least[z]), scene) for z in pairs if least[z] <= kept[z])
     within = tcp[(distance <= MARGIN).any(axis=1) & ~last]
     near = tuple(sorted(found, key=lambda each: each.distance))
@@ -124,5 +134,6 @@ def _by_hand(z: int, scene: PlanningScene) -> bool:
 
 def _contact(z: int, distance: float, scene: PlanningScene) -> AllowedContact:
     """What allows a pair to come to a distance [m]."""
-    pair, least = scene.collision.pairs[z], float(np.floor(_SHARE * distance / _GRID + _NOISE) * _GRID)
+    pair = scene.collision.pairs[z]
+    least = float(np.floor(_SHARE * distance / _GRID + _NOISE) * _GRID)
     return AllowedContact(pair.body_a, pair.body_b, round(max(least, 0.0), 6))

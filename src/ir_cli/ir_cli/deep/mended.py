@@ -1,5 +1,5 @@
-"""What to write into a cell file so that a station can be entered and left: contacts, a zone, an approach
-distance.
+"""What to write into a cell file so that a station can be entered and left: contacts, a zone, an
+approach distance.
 """
 
 from __future__ import annotations
@@ -37,7 +37,9 @@ class Suggestion:
 
 @dataclass(frozen=True, eq=False)
 class Exit:
-    """The lines of one configuration in every situation at a station, with one approach distance [m]."""
+    """The lines of one configuration in every situation at a station, with one approach distance
+    [m].
+    """
 
     approach: float
     lines: tuple[Line, ...]
@@ -66,7 +68,9 @@ class Exit:
     def sentence(self) -> str:
         """What is in the path, in words."""
         found = dict.fromkeys(near.sentence for line in self.lines for near in line.near[:3])
-        found.update(dict.fromkeys(line.sentence for line in self.lines if not line.near and not line.whole))
+        found.update(
+            dict.fromkeys(line.sentence for line in self.lines if not line.near and not line.whole)
+        )
         return ", ".join(found)
 
 
@@ -77,8 +81,8 @@ def exits(visits: Sequence[Visit], approach: float) -> list[Exit]:
 
 
 def best_exit(visits: Sequence[Visit]) -> Exit | None:
-    """What is nearest to the given approach: a free line, else one that contacts or a zone make free; None
-    where there is neither.
+    """What is nearest to the given approach: a free line, else one that contacts or a zone make
+    free; None where there is neither.
     """
     given = visits[0].station.approach_distance
     tried = sorted({given, *DISTANCES} - {0.0}, key=lambda each: (each != given, abs(each - given)))
@@ -87,7 +91,9 @@ def best_exit(visits: Sequence[Visit]) -> Exit | None:
     if free is not None:
         return free
     mendable = [each for each in every if each.mendable]
-    return min(mendable, key=lambda each: (abs(each.approach - given), len(each.contacts)), default=None)
+    return min(
+        mendable, key=lambda each: (abs(each.approach - given), len(each.contacts)), default=None
+    )
 
 
 def with_contacts(station: Station, contacts: Iterable[AllowedContact]) -> Station:
@@ -110,13 +116,17 @@ def with_zone(machine: Equipment, places: FloatArray) -> Equipment:
     high = np.maximum(half, np.ceil((local.max(axis=0) + _PAD) / _GRID - _NOISE) * _GRID)
     pose = zone.pose.copy()
     pose[:3, 3] += zone.pose[:3, :3] @ (0.5 * (low + high))
-    return replace(machine, zone_in_equipment=replace(zone, pose=pose, size=np.round(high - low, 6)))
+    return replace(
+        machine, zone_in_equipment=replace(zone, pose=pose, size=np.round(high - low, 6))
+    )
 
 
 def zone_lacks(machine: Equipment, places: FloatArray) -> bool:
     """Whether one of places (P, 3) is farther from the zone than contacts hold."""
     zone = machine.zone
-    beyond = np.maximum(np.abs((places - zone.pose[:3, 3]) @ zone.pose[:3, :3]) - 0.5 * zone.size, 0.0)
+    beyond = np.maximum(
+        np.abs((places - zone.pose[:3, 3]) @ zone.pose[:3, :3]) - 0.5 * zone.size, 0.0
+    )
     return bool((np.linalg.norm(beyond, axis=1) > MARGIN).any())
 
 
@@ -147,12 +157,14 @@ def _row(values: FloatArray) -> str:
 def changed_station(cell: Cell, station: Station) -> Cell:
     """The cell with a station in place of the one of that name."""
     return replace(
-        cell, stations=tuple(station if each.name == station.name else each for each in cell.stations)
+        cell,
+        stations=tuple(station if each.name == station.name else each for each in cell.stations),
     )
 
 
 def changed_machine(cell: Cell, machine: Equipment) -> Cell:
     """The same for a machine."""
     return replace(
-        cell, equipment=tuple(machine if each.name == machine.name else each for each in cell.equipment)
+        cell,
+        equipment=tuple(machine if each.name == machine.name else each for each in cell.equipment),
     )

@@ -1,4 +1,6 @@
-"""What a robot can do at the stations of a cell: configurations that reach them, and what obstructs."""
+"""What a robot can do at the stations of a cell: configurations that reach them, and what
+obstructs.
+"""
 
 from __future__ import annotations
 
@@ -29,12 +31,14 @@ class Visit:
     @property
     def lying(self) -> str:
         """Which parts lie where: "gear at pallet", "" for none."""
-        return ", ".join(f"{part.name} at {part.station}" for part in self.scene.cell.parts if part.station)
+        return ", ".join(
+            f"{part.name} at {part.station}" for part in self.scene.cell.parts if part.station
+        )
 
 
 def visits(cell: Cell) -> Iterator[Visit]:
-    """Every station as the program finds it when it arrives and when it leaves; as it is before the program
-    where that does not go. Each situation once.
+    """Every station as the program finds it when it arrives and when it leaves; as it is before the
+    program where that does not go. Each situation once.
     """
     scenes = Scenes(cell, cell.robot.controller)
     route = Route.over(placed_steps(cell, cell.program, cell.parts_at_start()), scenes)
@@ -49,8 +53,8 @@ def visits(cell: Cell) -> Iterator[Visit]:
 
 
 def reaching(visit: Visit) -> FloatArray:
-    """Configurations (K, n) that reach a station, free or not, those that differ by whole turns once: the one
-    nearest to machine home.
+    """Configurations (K, n) that reach a station, free or not, those that differ by whole turns
+    once: the one nearest to machine home.
     """
     home = visit.scene.cell.machine_home
     q = visit.scene.inverse_kinematics.solve(np.asarray(visit.station.pose)[None]).q
@@ -62,17 +66,20 @@ def reaching(visit: Visit) -> FloatArray:
 
 
 def stations_of(cell: Cell) -> list[Row]:
-    """One row per situation at a station: configurations that reach it, how many of them keep 20 mm (or what
-    the station allows), the best clearance, and the obstructing pairs where none does.
+    """One row per situation at a station: configurations that reach it, how many of them keep 20 mm
+    (or what the station allows), the best clearance, and the obstructing pairs where none does.
     """
     return [_row(visit, cell) for visit in visits(cell)]
 
 
 def _row(visit: Visit, cell: Cell) -> Row:
-    station, scene = visit.station, visit.scene
+    station = visit.station
+    scene = visit.scene
     threshold = scene.thresholds(MARGIN, station.name)
     found = free_configurations(station.pose, scene, threshold, cell.machine_home)
-    none = "" if len(found.q) else no_configuration(station.pose, scene, found, station.name).message
+    none = (
+        "" if len(found.q) else no_configuration(station.pose, scene, found, station.name).message
+    )
     clearances = scene.collision.min_distance(found.q, threshold).distance if len(found.q) else ()
     return {
         "station": station.name,

@@ -24,16 +24,24 @@ CONFIGURATIONS: Columns = {
 
 
 def configurations_of(cell: Cell) -> list[Row]:
-    """One row for each configuration in each situation; one that says so where none reaches the station."""
+    """One row for each configuration in each situation; one that says so where none reaches the
+    station.
+    """
     return [row for visit in visits(cell) for row in _rows(visit)]
 
 
 def _rows(visit: Visit) -> Iterator[Row]:
     distance = visit.station.approach_distance
-    there, out = lines_of(visit, 0.0), lines_of(visit, distance)
+    there = lines_of(visit, 0.0)
+    out = lines_of(visit, distance)
     situation = {"station": visit.station.name, "held": visit.scene.load_text, "lying": visit.lying}
     if not there:
-        yield situation | {"joints_deg": "", "clearance": None, "at_station": "not reached", "line_out": ""}
+        yield situation | {
+            "joints_deg": "",
+            "clearance": None,
+            "at_station": "not reached",
+            "line_out": "",
+        }
     for here, line in zip(there, out, strict=True):
         nearest = visit.scene.collision.min_distance(here.q[None]).distance[0]
         yield situation | {

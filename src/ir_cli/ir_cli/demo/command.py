@@ -13,8 +13,12 @@ from ir_cli.terminal import Progress
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add demo."""
     demo = commands.add_parser("demo", help="plan, drive, record and explain a cell")
-    demo.add_argument("--cell", default="demo", help="a cell file, or the name of a bundled cell (demo)")
-    demo.add_argument("--out", type=Path, default=Path("out"), help="folder for recording and report (out)")
+    demo.add_argument(
+        "--cell", default="demo", help="a cell file, or the name of a bundled cell (demo)"
+    )
+    demo.add_argument(
+        "--out", type=Path, default=Path("out"), help="folder for recording and report (out)"
+    )
     demo.add_argument("--seed", type=int, default=0, help="seed of the planner (0)")
     demo.add_argument(
         "--plant",

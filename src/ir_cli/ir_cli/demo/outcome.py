@@ -7,7 +7,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ir_cli.terminal import table
-from ir_recorder import Analysis, Finding, Tolerances, Verdict, analyse, findings, read_recording, summary
+from ir_recorder import (
+    Analysis,
+    Finding,
+    Tolerances,
+    Verdict,
+    analyse,
+    findings,
+    read_recording,
+    summary,
+)
 from ir_recorder.analysis.findings import row_name
 from ir_recorder.report import write_report
 from ir_recorder.report.picture import write_picture
@@ -32,7 +41,13 @@ class Outcome:
 
     def text(self) -> str:
         """Tables for the terminal."""
-        parts = [self._movements(), self._at_rest(), self._cycle(), self._saved(), *self.analysis.problems]
+        parts = [
+            self._movements(),
+            self._at_rest(),
+            self._cycle(),
+            self._saved(),
+            *self.analysis.problems,
+        ]
         parts += [_sentence(check) for check in self.checks if not check.ok]
         parts.append(f"checks: {summary(self.checks)[1]}")
         return "\n\n".join(part for part in parts if part)
@@ -100,13 +115,14 @@ def _sentence(check: Finding) -> str:
     if check.verdict is Verdict.NOT_CHECKED:
         return f"NOT CHECKED  {check.name}{note}"
     return (
-        f"FAILED  {check.name}: {number(check.measured, check.unit)}, allowed {allowed}: {check.reason}{note}"
+        f"FAILED  {check.name}: {number(check.measured, check.unit)}, allowed {allowed}: "
+        f"{check.reason}{note}"
     )
 
 
 def examine(recording: Path, report: Path, picture: Path, loads: int, failed: str = "") -> Outcome:
-    """Analyse the recording, write report and picture; loads: how many the tour carried; failed: why the
-    demonstration ended early.
+    """Analyse the recording, write report and picture; loads: how many the tour carried; failed:
+    why the demonstration ended early.
     """
     analysis = analyse(read_recording(recording))
     if failed:

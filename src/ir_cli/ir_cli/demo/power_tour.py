@@ -1,8 +1,9 @@
-"""A tour through the power modes at machine home, by PLC bits and Wake-on-LAN: the paper's Table II.
+"""A tour through the power modes at machine home, by PLC bits and Wake-on-LAN: the paper's Table
+II.
 
-For each load the robot rests on motors, on brakes, with the drive bus off and in hibernation, long enough
-for the mains meter to show a plateau. Hibernation takes the controller off the network: only Wake-on-LAN
-brings it back.
+For each load the robot rests on motors, on brakes, with the drive bus off and in hibernation, long
+enough for the mains meter to show a plateau. Hibernation takes the controller off the network: only
+Wake-on-LAN brings it back.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ MODE_SECONDS = 30.0
 
 
 class PowerWatch:
-    """The last message of the mains meter, and waiting for a mode or for time on the meter's own clock."""
+    """The last message of the mains meter, and waiting for a mode or for time on the meter's own
+    clock.
+    """
 
     def __init__(self, client: Client, patience: float = MODE_SECONDS) -> None:
         self._patience = patience
@@ -31,7 +34,9 @@ class PowerWatch:
         client.subscribe("/" + names.POWER_STATE, PowerState, self._take)
 
     def wait_for_mode(self, mode: int) -> None:
-        """Wait until the controller rests in a mode; DemonstrationError after `patience` [s] of the meter."""
+        """Wait until the controller rests in a mode; DemonstrationError after `patience` [s] of the
+        meter.
+        """
         self._wait(lambda state: state.mode == mode, f"power mode {mode}")
 
     def stay(self, seconds: float) -> None:
@@ -41,11 +46,14 @@ class PowerWatch:
         """
         self._wait(lambda state: True, "the mains meter")
         began = max(_seconds(self._last()), self._now())
-        self._wait(lambda state: _seconds(state) >= began + seconds, f"{seconds:g} s on the mains meter")
+        self._wait(
+            lambda state: _seconds(state) >= began + seconds, f"{seconds:g} s on the mains meter"
+        )
 
     def _wait(self, condition: Callable[[PowerState], bool], what: str) -> None:
-        """Until a reading meets the condition; DemonstrationError where the meter is silent for `patience`
-        [s], or has measured for as long: it counts its own time, since on a busy machine it lags behind.
+        """Until a reading meets the condition; DemonstrationError where the meter is silent for
+        `patience` [s], or has measured for as long: it counts its own time, since on a busy machine
+        it lags behind.
         """
         with self._changed:
             heard = self._state
@@ -89,7 +97,9 @@ def tour(
     wake: Callable[[], None],
     progress: Callable[[str], None],
 ) -> None:
-    """Visit the four modes with each load (load texts), staying `stay` seconds in each; ends on motors."""
+    """Visit the four modes with each load (load texts), staying `stay` seconds in each; ends on
+    motors.
+    """
     for load in loads:
         progress(f"load {load}: on motors")
         motors_on(client, watch)

@@ -1,8 +1,8 @@
 """The demonstration: four nodes, one cell, from the cell file to the report.
 
 Pauses of the program and the transitions of hibernation and Bus Power Off are shortened, so that it
-takes a minute instead of half an hour; the recording carries the facts and the report shows them. The
-clock is never scaled.
+takes a minute instead of half an hour; the recording carries the facts and the report shows them.
+The clock is never scaled.
 """
 
 from __future__ import annotations
@@ -45,22 +45,35 @@ TRANSITIONS = {
 LONGEST_PAUSE = 12.0
 """Seconds; longer pauses of the program are cut to this."""
 TOUR_STAY = 1.2
-"""Seconds in each power mode at machine home: a plateau of the mains meter (100 Hz) needs some tenths."""
+"""Seconds in each power mode at machine home: a plateau of the mains meter (100 Hz) needs some
+tenths.
+"""
 LONGEST_TRANSITION = 600.0
 """Longest wait for a mode [s] where transitions take as long as the controller's."""
 LOOK_SECONDS = 0.1
 """Between two looks whether the nodes are there."""
 START_SECONDS = 60.0
-"""Longest wait for a node to offer its services: four processes that start at once on a slow machine."""
+"""Longest wait for a node to offer its services: four processes that start at once on a slow
+machine.
+"""
 
 
 class Demonstration:
     """One run: `run` returns what came out of it, or raises an error with a sentence."""
 
     def __init__(
-        self, cell: str, out: Path, seed: int, plant: str, progress: Progress, *, real_pauses: bool = False
+        self,
+        cell: str,
+        out: Path,
+        seed: int,
+        plant: str,
+        progress: Progress,
+        *,
+        real_pauses: bool = False,
     ) -> None:
-        self._out, self._plant, self._progress = out, plant, progress
+        self._out = out
+        self._plant = plant
+        self._progress = progress
         full = load_cell(cell)
         pauses = [step.dwell for step in full.program if step.kind == "PAUSE"]
         self._full_pauses = [] if real_pauses else pauses
@@ -75,13 +88,16 @@ class Demonstration:
     def run(self) -> Outcome:
         """Start the nodes, run the story, stop the nodes, examine the recording."""
         self._out.mkdir(parents=True, exist_ok=True)
-        recording, cell_file = self._out / "demo.mcap", self._out / "demo_cell.yaml"
+        recording = self._out / "demo.mcap"
+        cell_file = self._out / "demo_cell.yaml"
         cell_file.write_text(cell_to_yaml(self._cell))
         progress = self._progress
         what = f"cell {self._cell.name}, simulated plant {self._plant}"
         progress.say(f"Demonstration of {what}: real nodes over DDS, real time")
         nodes = NodeProcesses(self._out / "log", {})
-        transitions = {f"transitions.{name}": seconds for name, seconds in self._transitions.items()}
+        transitions = {
+            f"transitions.{name}": seconds for name, seconds in self._transitions.items()
+        }
         with nodes, Client(timeout=START_SECONDS, node_name="ir_demo") as client:
             progress.begin("start planner, driver, runner, recorder")
             nodes.start(
@@ -102,13 +118,15 @@ class Demonstration:
             nodes.end()
         progress.begin("read the recording, write report and picture")
         loads = 0 if failed else len(self._loads)
-        outcome = examine(recording, self._out / "report.html", self._out / "demo.png", loads, failed)
+        outcome = examine(
+            recording, self._out / "report.html", self._out / "demo.png", loads, failed
+        )
         progress.end(f"{self._out / 'report.html'}, {self._out / 'demo.png'}")
         return outcome
 
     def _story(self, client: Client) -> str:
-        """Plan, visit the modes, drive; why that ended early, "" where it didn't: what was recorded till then
-        is reported.
+        """Plan, visit the modes, drive; why that ended early, "" where it didn't: what was recorded
+        till then is reported.
         """
         try:
             plan = self._plan(client)
@@ -134,7 +152,9 @@ class Demonstration:
             **{name: f"{seconds:g} s" for name, seconds in self._transitions.items()},
         }
         if self._full_pauses:
-            facts[contents.UNSHORTENED_PAUSES] = ", ".join(f"{seconds:g} s" for seconds in self._full_pauses)
+            facts[contents.UNSHORTENED_PAUSES] = ", ".join(
+                f"{seconds:g} s" for seconds in self._full_pauses
+            )
         return [f"{key}={value}" for key, value in facts.items()]
 
     def _start_recording(self, client: Client, path: Path) -> None:
@@ -152,11 +172,11 @@ class Demonstration:
         why = one_sided(report.energy, report.energy_low, report.energy_high)
         why = f", {why}" if why else ""
         self._progress.end(
-            f"{len(plan.movements)} steps, {report.duration:.1f} s, "
-            f"predicted {report.energy / 1000.0:.1f} kJ "
-            f"(90 %: {report.energy_low / 1000.0:.1f} to {report.energy_high / 1000.0:.1f} kJ{why}), "
-            f"clearance {report.min_clearance * 1000.0:.0f} mm, "
-            f"{proof} ({plan.info.planning_time:.2f} s of planning)"
+            f"{len(plan.movements)} steps, {report.duration:.1f} s, predicted "
+            f"{report.energy / 1000.0:.1f} kJ (90 %: {report.energy_low / 1000.0:.1f} to "
+            f"{report.energy_high / 1000.0:.1f} kJ{why}), clearance "
+            f"{report.min_clearance * 1000.0:.0f} mm, {proof} ({plan.info.planning_time:.2f} s "
+            "of planning)"
         )
         return plan
 

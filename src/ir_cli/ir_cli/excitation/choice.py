@@ -1,7 +1,8 @@
-"""Which excursions: greedily the one that says most per second, by the determinant of the information.
+"""Which excursions: greedily the one that says most per second, by the determinant of the
+information.
 
-The information of an excursion is what its windows of 50 ms, with the noise of a meter and a model, say of
-the parameters beyond their prior (D-optimal design; Fedorov, 1972).
+The information of an excursion is what its windows of 50 ms, with the noise of a meter and a model,
+say of the parameters beyond their prior (D-optimal design; Fedorov, 1972).
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ IDENTIFIED = 0.8  # of the deviation before: at most so much is left
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """What a programme says of the parameters: names, and the share (P,) of their deviation that is left."""
+    """What a programme says of the parameters: names, and the share (P,) of their deviation that is
+    left.
+    """
 
     names: tuple[str, ...]
     left: FloatArray
@@ -44,7 +47,8 @@ class Design:
     """Excursions chosen one after another for a model and a prior."""
 
     def __init__(self, model: PowerModel, prior: PowerParameters) -> None:
-        self._model, self._prior = model, prior
+        self._model = model
+        self._prior = prior
         self._free = prior.deviation > 0.0
         self._scale = np.where(self._free, prior.deviation, 0.0)
         self._information = np.eye(len(self._scale))  # in deviations of the prior
@@ -62,10 +66,12 @@ class Design:
     def choose(
         self, pool: Sequence[Excursion], informations: Sequence[FloatArray], seconds: float
     ) -> list[Excursion]:
-        """Excursions of the pool, with the information (P, P) of each, at most once each, until they take so
-        long together.
+        """Excursions of the pool, with the information (P, P) of each, at most once each, until
+        they take so long together.
         """
-        left, chosen, taken = list(range(len(pool))), [], 0.0
+        left = list(range(len(pool)))
+        chosen = []
+        taken = 0.0
         while left and taken < seconds:
             root = np.linalg.cholesky(np.linalg.inv(self._information))
             cost = [pool[k].seconds + 2.0 * REST for k in left]
@@ -91,7 +97,9 @@ class Design:
         if mode == "STAND_ON_MOTORS":
             still[self._prior.index("drives_watts")] = still[self._prior.index(IDLE)] = 1.0
         scaled = still * self._scale
-        self._information = self._information + np.outer(scaled, scaled) * seconds / WINDOW / NOISE**2
+        self._information = (
+            self._information + np.outer(scaled, scaled) * seconds / WINDOW / NOISE**2
+        )
 
     def identified(self) -> Identified:
         """What is known of each parameter after all that was chosen."""

@@ -1,7 +1,8 @@
 """The pool: certified excursions from several postures, out and back along straight joint segments.
 
-One axis at a time and several together, each at its fastest and at shares of that speed. Two points at rest
-are a quintic, so a trajectory is as simple as its ends; the planner proves limits, torque and clearance.
+One axis at a time and several together, each at its fastest and at shares of that speed. Two points
+at rest are a quintic, so a trajectory is as simple as its ends; the planner proves limits, torque
+and clearance.
 """
 
 from __future__ import annotations
@@ -27,7 +28,9 @@ _PEAKS = (1.875, 5.7735, 60.0)  # speed, acceleration, jerk of a quintic over 1 
 
 @dataclass(frozen=True, eq=False)
 class Excursion:
-    """Out of posture number `posture` and back with a load text; `name` says which axes and how fast."""
+    """Out of posture number `posture` and back with a load text; `name` says which axes and how
+    fast.
+    """
 
     name: str
     posture: int
@@ -42,8 +45,11 @@ class Excursion:
 
 
 def postures(planner: Planner, load: str, margin: float, count: int, seed: int) -> list[FloatArray]:
-    """Free configurations (n,) far from each other, machine home first; fewer where there are not so many."""
-    robot, generator = planner.cell.robot, np.random.default_rng(seed)
+    """Free configurations (n,) far from each other, machine home first; fewer where there are not
+    so many.
+    """
+    robot = planner.cell.robot
+    generator = np.random.default_rng(seed)
     low = np.maximum(robot.position_min + 0.3, -2.6)
     high = np.minimum(robot.position_max - 0.3, 2.6)
     drawn = generator.uniform(low, high, (_SAMPLES, robot.n))
@@ -90,8 +96,12 @@ def _in_direction(
     """The largest free excursion in a direction, at every speed."""
     robot = planner.cell.robot
     for reach in REACHES:
-        there = np.clip(place + reach * direction, robot.position_min + 0.05, robot.position_max - 0.05)
-        fastest = _certified_pair(planner, place, there, _least_seconds(planner, place, there), load, margin)
+        there = np.clip(
+            place + reach * direction, robot.position_min + 0.05, robot.position_max - 0.05
+        )
+        fastest = _certified_pair(
+            planner, place, there, _least_seconds(planner, place, there), load, margin
+        )
         if fastest is None:
             continue
         for share in SPEEDS:
@@ -108,7 +118,8 @@ def _in_direction(
 
 def _least_seconds(planner: Planner, start: FloatArray, goal: FloatArray) -> float:
     """What speed, acceleration and jerk allow a quintic between two configurations (n,)."""
-    robot, travel = planner.cell.robot, np.abs(goal - start)
+    robot = planner.cell.robot
+    travel = np.abs(goal - start)
     bounds = (robot.velocity_max, robot.acceleration_max, robot.jerk_max)
     least = [
         float(((peak * travel / bound) ** (1.0 / order)).max())
@@ -129,13 +140,19 @@ def _certified_pair(
         found = [planner.evaluate(each, margin, load, "").verification for each in pair]
         if all(each.certified for each in found):
             return pair
-        if any(v is not None and v.what == "clearance" for each in found for v in (each.violation,)):
+        if any(
+            v is not None and v.what == "clearance" for each in found for v in (each.violation,)
+        ):
             return None
         seconds *= _SLOWER
     return None
 
 
-def straight(names: Sequence[str], start: FloatArray, goal: FloatArray, seconds: float) -> JointTrajectory:
+def straight(
+    names: Sequence[str], start: FloatArray, goal: FloatArray, seconds: float
+) -> JointTrajectory:
     """From rest to rest between two configurations (n,)."""
     still = np.zeros((2, len(start)))
-    return JointTrajectory.from_seconds(names, [0.0, seconds], np.stack([start, goal]), still, still)
+    return JointTrajectory.from_seconds(
+        names, [0.0, seconds], np.stack([start, goal]), still, still
+    )

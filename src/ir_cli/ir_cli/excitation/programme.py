@@ -1,4 +1,6 @@
-"""The programme: excursions by load and posture, the movements between postures, and pauses in every mode."""
+"""The programme: excursions by load and posture, the movements between postures, and pauses in
+every mode.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,8 @@ class Programme:
     def seconds(self) -> float:
         """All movements and stays together [s]."""
         return sum(
-            step.seconds if step.trajectory is None else step.trajectory.duration for step in self.steps
+            step.seconds if step.trajectory is None else step.trajectory.duration
+            for step in self.steps
         )
 
 
@@ -66,7 +69,11 @@ def plan_programme(planner: Planner, prior: PowerParameters, asked: Asked) -> Pr
     loads = load_texts(planner)
     places = postures(planner, loads[-1], asked.margin, asked.postures, asked.seed)
     places = _reachable(planner, places, loads[-1], asked)
-    pool = [each for load in loads for each in excursions(planner, places, load, asked.margin, asked.seed)]
+    pool = [
+        each
+        for load in loads
+        for each in excursions(planner, places, load, asked.margin, asked.seed)
+    ]
     if not pool:
         raise CommandError(f"no excursion from {len(places)} postures of {cell.name} is certified")
     held = {load: planner.scene(load).loads for load in loads}
@@ -76,7 +83,9 @@ def plan_programme(planner: Planner, prior: PowerParameters, asked: Asked) -> Pr
     chosen = design.choose(pool, [design.of(each, held[each.load]) for each in pool], asked.seconds)
     steps: list[Step] = []
     for load in loads:
-        steps += _with_load(planner, places, [each for each in chosen if each.load == load], load, asked)
+        steps += _with_load(
+            planner, places, [each for each in chosen if each.load == load], load, asked
+        )
     stays = [Step(f"in {mode}", loads[0], mode=mode, seconds=STAY) for mode in modes]
     return Programme((*stays, *steps), design.identified())
 
@@ -91,7 +100,9 @@ def load_texts(planner: Planner) -> tuple[str, ...]:
     return (tool, f"{tool}+{part}" if cell.tool is not None else part)
 
 
-def _reachable(planner: Planner, places: Sequence[FloatArray], load: str, asked: Asked) -> list[FloatArray]:
+def _reachable(
+    planner: Planner, places: Sequence[FloatArray], load: str, asked: Asked
+) -> list[FloatArray]:
     """The postures that can be reached from home and left for it."""
     home = places[0]
     return [
@@ -113,9 +124,15 @@ def _moved(
 
 
 def _with_load(
-    planner: Planner, places: Sequence[FloatArray], chosen: Sequence[Excursion], load: str, asked: Asked
+    planner: Planner,
+    places: Sequence[FloatArray],
+    chosen: Sequence[Excursion],
+    load: str,
+    asked: Asked,
 ) -> list[Step]:
-    """Excursions posture by posture, from home and back to it, with a rest on motors beside each."""
+    """Excursions posture by posture, from home and back to it, with a rest on motors beside
+    each.
+    """
     steps: list[Step] = []
     for number, place in enumerate(places):
         own = [each for each in chosen if each.posture == number]
@@ -135,7 +152,9 @@ def _transfer(
 ) -> list[Step]:
     trajectory = _moved(planner, start, goal, load, asked)
     if trajectory is None:
-        raise CommandError(f"the movement {name} with {load} was found with another load and is not any more")
+        raise CommandError(
+            f"the movement {name} with {load} was found with another load and is not any more"
+        )
     return [Step(name, load, trajectory), Step("at rest", load, mode=MODES[0], seconds=REST)]
 
 
@@ -149,13 +168,16 @@ def advice(missing: Sequence[str]) -> tuple[str, ...]:
 
 
 _ADVICE = {
-    "iron": "iron: longer movements of that axis at full speed, which viscous friction can be separated from",
+    "iron": "iron: longer movements of that axis at full speed, which viscous friction can be "
+    "separated from",
     "viscous": "viscous: more speeds of that axis; give it room in the cell, or more --seconds",
     "coulomb": "coulomb: slow movements of that axis in both directions; more --seconds",
     "copper": "copper: hold and move a heavier load, with the arm stretched",
-    "inverter": "inverter: postures that hold little beside postures that hold much; more --postures",
+    "inverter": "inverter: postures that hold little beside postures that hold much; more "
+    "--postures",
     "gear": "gear: the same movement with and without a load; a cell with a part",
     "load_mass": "load_mass: a part that can be held, or lift the tool over a larger height",
     "tool_watts": "tool_watts: one run without the tool",
-    "rectifier_efficiency": "rectifier_efficiency: a load of known work; else a meter at the DC link",
+    "rectifier_efficiency": "rectifier_efficiency: a load of known work; else a meter at the DC "
+    "link",
 }

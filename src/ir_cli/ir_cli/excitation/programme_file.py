@@ -1,5 +1,5 @@
-"""A programme as a folder: `programme.yaml` names the steps in their order, each movement a CSV file that `ir
-evaluate` reads.
+"""A programme as a folder: `programme.yaml` names the steps in their order, each movement a CSV
+file that `ir evaluate` reads.
 """
 
 from __future__ import annotations
@@ -41,7 +41,9 @@ def write_programme(programme: Programme, folder: Path, cell: str) -> Path:
 
 
 def read_programme(folder: Path) -> tuple[Cell, tuple[Step, ...]]:
-    """The cell and the steps of a folder that `write_programme` wrote. InputError with file and line."""
+    """The cell and the steps of a folder that `write_programme` wrote. InputError with file and
+    line.
+    """
     path = folder / FILE
     try:
         text = read_regular_file(path, _BYTES_MAX).decode("utf-8", "replace")
@@ -57,11 +59,14 @@ def read_programme(folder: Path) -> tuple[Cell, tuple[Step, ...]]:
 
 def _step(item: Item, cell: Cell, folder: Path) -> Step:
     row = item.table(("name", "load"), ("trajectory", "mode", "seconds"))
-    name, load = row["name"].text(), row["load"].text()
+    name = row["name"].text()
+    load = row["load"].text()
     if "trajectory" not in row:
         if "mode" not in row or "seconds" not in row:
             item.fail("must have a trajectory, or a mode and seconds")
-        return Step(name, load, mode=row["mode"].choice(MODES), seconds=row["seconds"].number(0.0, _LONGEST))
+        return Step(
+            name, load, mode=row["mode"].choice(MODES), seconds=row["seconds"].number(0.0, _LONGEST)
+        )
     file = row["trajectory"].text()
     if Path(file).name != file:
         row["trajectory"].fail("must be the name of a file in the same folder")

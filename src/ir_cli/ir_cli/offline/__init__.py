@@ -1,1 +1,3 @@
-"""Commands that need no ROS: they ask the planner as a library. `ir plan`, `ir move`, `ir ik` and others."""
+"""Commands that need no ROS: they ask the planner as a library. `ir plan`, `ir move`, `ir ik` and
+others.
+"""

@@ -11,7 +11,8 @@ from ir_studies.arena import EXAMPLE, ArenaSettings, arena_settings
 
 from .studying import add_study, settings_of, studied
 
-_FOLDER, _QUICK_FOLDER = "out/arena", "out/arena_quick"
+_FOLDER = "out/arena"
+_QUICK_FOLDER = "out/arena_quick"
 _QUICK_S = 0.2  # of processor per run: 550 runs of the example take two minutes on two cores
 
 
@@ -20,11 +21,13 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     arena = commands.add_parser(
         "arena",
         help="planners against each other over cells, tasks and seeds; needs no ROS",
-        description="Runs what the folder has no result of; the same command goes on after an interruption.",
+        description="Runs what the folder has no result of; the same command goes on after an "
+        "interruption.",
     )
     add_study(arena, _FOLDER)
     words = (
-        f"one seed and {_QUICK_S:g} s per run, in {_QUICK_FOLDER}; without SETTINGS.yaml those of --example"
+        f"one seed and {_QUICK_S:g} s per run, in {_QUICK_FOLDER}; without SETTINGS.yaml "
+        "those of --example"
     )
     arena.add_argument("--quick", action="store_true", help=words)
     arena.add_argument("--parquet", action="store_true", help="also table.parquet; needs pyarrow")
@@ -37,7 +40,9 @@ def run(arguments: argparse.Namespace) -> int:
         sys.stdout.write(EXAMPLE)
         return 0
     settings, folder = asked(arguments)
-    finished = studied(arguments, lambda means: run_arena(settings, folder, means, parquet=arguments.parquet))
+    finished = studied(
+        arguments, lambda means: run_arena(settings, folder, means, parquet=arguments.parquet)
+    )
     sys.stdout.write(f"{finished.summary}\n")
     sys.stdout.writelines(f"{path}\n" for path in finished.files)
     return 0

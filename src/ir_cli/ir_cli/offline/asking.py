@@ -1,4 +1,5 @@
-"""What the commands without ROS share: a planner with a cell, goals, options, and errors as sentences.
+"""What the commands without ROS share: a planner with a cell, goals, options, and errors as
+sentences.
 
 Exit codes: 0 it was found, 1 it was looked for and not found, 2 the input makes no sense.
 """
@@ -36,12 +37,16 @@ def sentences() -> Iterator[None]:
 
 
 def planner_of(cell: str, power_parameters: str = "") -> Planner:
-    """A planner with a cell: the name of a bundled one, or a file; power_parameters: a file, or ""."""
+    """A planner with a cell: the name of a bundled one, or a file; power_parameters: a file, or
+    "".
+    """
     planner = Planner(time.monotonic, PlannerSettings(power_parameters=power_parameters))
     try:
         load_cell(cell)
     except UnknownNameError as error:
-        beside = [name for name in (f"{cell[:80]}.yaml", f"{cell[:80]}.yml") if Path(name).is_file()]
+        beside = [
+            name for name in (f"{cell[:80]}.yaml", f"{cell[:80]}.yml") if Path(name).is_file()
+        ]
         known = beside or error.known
         raise InputError(unknown_name("cell", cell[:80], known, "ir cell list")) from error
     planner.set_cell("", cell)
@@ -59,7 +64,9 @@ def goal_of(text: str, planner: Planner) -> Goal:
 
 
 def check_stations(names: Iterable[str], planner: Planner) -> None:
-    """Raise InputError for a name that is no station, posture or path, with the one that was meant."""
+    """Raise InputError for a name that is no station, posture or path, with the one that was
+    meant.
+    """
     known = [*_places(planner), *(path.name for path in planner.cell.paths)]
     for name in names:
         if name not in known:
@@ -86,7 +93,9 @@ def configuration_of(text: str, planner: Planner, margin: float, load: str = "")
 
 def add_cell(parser: argparse.ArgumentParser) -> None:
     """The first argument of every command here."""
-    parser.add_argument("cell", metavar="CELL", help="a cell file, or the name of a bundled cell: demo")
+    parser.add_argument(
+        "cell", metavar="CELL", help="a cell file, or the name of a bundled cell: demo"
+    )
 
 
 def add_parameters(parser: argparse.ArgumentParser) -> None:
@@ -97,8 +106,12 @@ def add_parameters(parser: argparse.ArgumentParser) -> None:
 
 def add_margin(parser: argparse.ArgumentParser) -> None:
     """The safety distance, and what the robot holds."""
-    parser.add_argument("--safety-distance", type=float, default=0.02, metavar="M", help="m to keep (0.02)")
-    parser.add_argument("--load", default="", help='what is held: "gripper+part", "none" (the tool)')
+    parser.add_argument(
+        "--safety-distance", type=float, default=0.02, metavar="M", help="m to keep (0.02)"
+    )
+    parser.add_argument(
+        "--load", default="", help='what is held: "gripper+part", "none" (the tool)'
+    )
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -109,7 +122,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--time-value", type=float, default=500.0, metavar="W", help="worth of a second (500)"
     )
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--planning-time", type=float, default=CEILING, metavar="S", help="ceiling in s")
+    parser.add_argument(
+        "--planning-time", type=float, default=CEILING, metavar="S", help="ceiling in s"
+    )
 
 
 def options_of(arguments: argparse.Namespace, duration: float = 0.0) -> PlanOptions:

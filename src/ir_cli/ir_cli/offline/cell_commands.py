@@ -27,7 +27,17 @@ from ..suggestions import unknown_name
 from ..terminal import table
 from .cell_import import add_import
 from .cell_worlds import add_export
-from .output import Columns, ProgressLine, Row, add_formats, number, print_csv, print_json, print_table, text
+from .output import (
+    Columns,
+    ProgressLine,
+    Row,
+    add_formats,
+    number,
+    print_csv,
+    print_json,
+    print_table,
+    text,
+)
 
 if TYPE_CHECKING:
     from ..deep.mended import Suggestion
@@ -53,7 +63,9 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Add cell new, cell check, cell import, cell export and cell list."""
     cell = commands.add_parser("cell", help="begin and check cell files, list the bundled cells")
     verbs = cell.add_subparsers(dest="verb", required=True)
-    check = verbs.add_parser("check", help="everything that is wrong with a cell file, and its stations")
+    check = verbs.add_parser(
+        "check", help="everything that is wrong with a cell file, and its stations"
+    )
     check.add_argument("file", metavar="CELL", help="a path, or the name of a bundled cell")
     check.add_argument(
         "--deep",
@@ -62,9 +74,13 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     add_formats(check, comma=False)
     check.set_defaults(run=run_check)
-    new = verbs.add_parser("new", help="begin a cell file: a robot, two tables and a program that plans")
+    new = verbs.add_parser(
+        "new", help="begin a cell file: a robot, two tables and a program that plans"
+    )
     new.add_argument("file", metavar="FILE", help="the file to write: my_cell.yaml")
-    new.add_argument("--robot", default="kr210_r2700_extra", metavar="ROBOT", help="ir robot list, or a file")
+    new.add_argument(
+        "--robot", default="kr210_r2700_extra", metavar="ROBOT", help="ir robot list, or a file"
+    )
     new.set_defaults(run=run_new)
     add_import(verbs)
     add_export(verbs)
@@ -93,7 +109,9 @@ def run_check(arguments: argparse.Namespace) -> int:
     if arguments.json:
         listed = {"findings": [asdict(f) for f in findings if isinstance(f, Finding)]}
         listed["suggestions"] = [asdict(s) for s in suggestions]
-        print_json({"cell": cell.name, "stations": stations, "configurations": configurations, **listed})
+        print_json(
+            {"cell": cell.name, "stations": stations, "configurations": configurations, **listed}
+        )
     else:
         _print_cell(cell)
         if stations:
@@ -155,11 +173,18 @@ def _readable(name: str) -> Cell | None:
 
 def _print_cell(cell: Cell) -> None:
     rows = [
-        [machine.name, str(machine.zone.kind).lower(), str(len(machine.bodies)), machine.state or "-"]
+        [
+            machine.name,
+            str(machine.zone.kind).lower(),
+            str(len(machine.bodies)),
+            machine.state or "-",
+        ]
         for machine in cell.equipment
     ]
     tool = cell.tool.name if cell.tool else "none"
-    sys.stdout.write(f"cell {cell.name}: robot {cell.robot.name}, tool {tool}; {len(cell.program)} steps\n")
+    sys.stdout.write(
+        f"cell {cell.name}: robot {cell.robot.name}, tool {tool}; {len(cell.program)} steps\n"
+    )
     if rows:
         sys.stdout.write(table(["equipment", "zone", "bodies", "state"], rows) + "\n")
 

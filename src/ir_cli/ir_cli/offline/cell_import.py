@@ -1,4 +1,6 @@
-"""`ir cell import`: a mesh from CAD as the line of a cell file, with what its pieces cost, or a world."""
+"""`ir cell import`: a mesh from CAD as the line of a cell file, with what its pieces cost, or a
+world.
+"""
 
 from __future__ import annotations
 
@@ -21,11 +23,19 @@ _NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
 
 def add_import(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add cell import."""
-    command = verbs.add_parser("import", help="a mesh from CAD as a line to paste, or a world as a cell")
-    command.add_argument("file", metavar="FILE", help="a mesh: .stl, .obj, .glb, .gltf; a world: .sdf, .urdf")
+    command = verbs.add_parser(
+        "import", help="a mesh from CAD as a line to paste, or a world as a cell"
+    )
+    command.add_argument(
+        "file", metavar="FILE", help="a mesh: .stl, .obj, .glb, .gltf; a world: .sdf, .urdf"
+    )
     command.add_argument("--unit", choices=tuple(UNITS), help="of a mesh; never guessed")
-    command.add_argument("--pieces", type=_pieces, default=PIECES, help=f"at most so many ({PIECES})")
-    command.add_argument("--robot", default="kr210_r2700_extra", metavar="ROBOT", help="of a world's cell")
+    command.add_argument(
+        "--pieces", type=_pieces, default=PIECES, help=f"at most so many ({PIECES})"
+    )
+    command.add_argument(
+        "--robot", default="kr210_r2700_extra", metavar="ROBOT", help="of a world's cell"
+    )
     command.add_argument("--json", action="store_true", help="print the answer as JSON")
     command.set_defaults(run=run_import)
 
@@ -45,7 +55,9 @@ def run_import(arguments: argparse.Namespace) -> int:
     line = f"- {{name: {name}, mesh: {path.name}, unit: {arguments.unit}{pieces}}}"
     if arguments.json:
         measures = {"margin": found.margin, "protrusion": found.protrusion, "volume": found.volume}
-        print_json({"line": line, "pieces": len(found.vertices), **measures, "of_pieces": found.of_pieces})
+        print_json(
+            {"line": line, "pieces": len(found.vertices), **measures, "of_pieces": found.of_pieces}
+        )
     else:
         sys.stdout.write(f"{line}\n# {found.sentence}\n")
     return 0

@@ -48,11 +48,13 @@ program:
   - {{station: place, dwell: 0.5}}
   - {{posture: home}}
   - {{pause: 30}}
-"""
+"""  # noqa: E501
 
 
 def write_cell(path: Path, robot: str) -> None:
-    """Write the file, which must not be there yet, and say what is next. Raises InputError, CommandError."""
+    """Write the file, which must not be there yet, and say what is next. Raises InputError,
+    CommandError.
+    """
     if path.suffix not in (".yaml", ".yml"):
         raise InputError(f"{path}: the name of a cell file ends in .yaml")
     text = cell_text(path.stem, robot, _robot(path, robot))
@@ -69,11 +71,13 @@ def write_cell(path: Path, robot: str) -> None:
 def cell_text(name: str, robot: str, model: RobotModel) -> str:
     """The file: tables and tool in proportion to the arm."""
     reach = float(np.linalg.norm(model.joint_origin[1:, :3, 3], axis=1).sum())
-    height, tool, edge = _cm(0.2 * reach), _cm(0.08 * reach), _cm(0.25 * reach)
+    height = _cm(0.2 * reach)
+    tool = _cm(0.08 * reach)
+    edge = _cm(0.25 * reach)
     return TEXT.format(
         name="".join(c if c.isalnum() or c in "_.-" else "_" for c in name),
         robot=robot,
-        home=f"[{', '.join(f'{angle + 0.0:g}' for angle in np.round(np.degrees(model.machine_home), 3))}]",
+        home=f"[{', '.join(f'{angle + 0.0:g}' for angle in np.round(np.degrees(model.machine_home), 3))}]",  # noqa: E501
         mass=round(0.2 * model.rated_payload, 1),
         tool=tool,
         half=round(0.5 * tool, 3),

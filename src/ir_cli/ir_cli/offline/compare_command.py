@@ -64,21 +64,37 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "compare", help="today's program (KRL, a trace, or PTP at 100 %%) against the planner's"
     )
     add_cell(compare)
-    words = "a KRL program (.src, then .dat), or a trace (.csv, .parquet, .mcap); none: PTP at 100 %%"
-    compare.add_argument("today", nargs="*", type=Path, metavar="TODAY", help=words)
-    compare.add_argument("--stations", nargs="+", default=[], metavar="NAME", help="of PTP at 100 %%")
-    compare.add_argument("--start", default="park", help="of PTP at 100 %%: posture or joint values (park)")
-    compare.add_argument(
-        "--cycle-time", type=float, default=0.0, metavar="S", help="what the line needs; 0: nobody said (0)"
+    words = (
+        "a KRL program (.src, then .dat), or a trace (.csv, .parquet, .mcap); none: PTP at 100 %%"
     )
-    compare.add_argument("--costs", default="", metavar="FILE", help="prices, shifts and CO2 (YAML)")
+    compare.add_argument("today", nargs="*", type=Path, metavar="TODAY", help=words)
+    compare.add_argument(
+        "--stations", nargs="+", default=[], metavar="NAME", help="of PTP at 100 %%"
+    )
+    compare.add_argument(
+        "--start", default="park", help="of PTP at 100 %%: posture or joint values (park)"
+    )
+    compare.add_argument(
+        "--cycle-time",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="what the line needs; 0: nobody said (0)",
+    )
+    compare.add_argument(
+        "--costs", default="", metavar="FILE", help="prices, shifts and CO2 (YAML)"
+    )
     page = "page to write, with both motions side by side (out/compare.html)"
-    compare.add_argument("-o", "--output", default="out/compare.html", metavar="FILE.html", help=page)
-    compare.add_argument("--table", default="", metavar="FILE", help="figures as .csv or .parquet as well")
+    compare.add_argument(
+        "-o", "--output", default="out/compare.html", metavar="FILE.html", help=page
+    )
+    compare.add_argument(
+        "--table", default="", metavar="FILE", help="figures as .csv or .parquet as well"
+    )
     add_followed(compare)
     words = (
-        "of KRL: lines (5-9) whose motions are a process, that every program drives, repeatable; none: no "
-        "motion is (those between an output's on and off)"
+        "of KRL: lines (5-9) whose motions are a process, that every program drives, repeatable; "
+        "none: no motion is (those between an output's on and off)"
     )
     compare.add_argument("--process", action="append", default=[], metavar="LINES", help=words)
     add_measured(compare)
@@ -112,13 +128,16 @@ def run_compare(arguments: argparse.Namespace) -> int:
 
 
 def _found(arguments: argparse.Namespace, planner: Planner, line: ProgressLine) -> BeforeAfter:
-    options, process = options_of(arguments), _process(arguments.process)
+    options = options_of(arguments)
+    process = _process(arguments.process)
     endings = {path.suffix.lower() for path in arguments.today}
     if not endings:
         stations: Sequence[str] = arguments.stations
         check_stations(stations, planner)
         start = configuration_of(arguments.start, planner, arguments.safety_distance)
-        return before_after_common(planner, stations, start, arguments.cycle_time, options, line.show)
+        return before_after_common(
+            planner, stations, start, arguments.cycle_time, options, line.show
+        )
     if arguments.process and not endings <= set(KRL):
         raise InputError("--process names lines of a KRL program: a trace has none")
     if arguments.stations:
@@ -153,8 +172,10 @@ def _process(words: Sequence[str]) -> tuple[tuple[int, int], ...] | None:
 
 def row_of(side: Side) -> Row:
     """Figures of one program, SI units but for kWh."""
-    report, saving = side.report, side.saving
-    there, own = side.found, side.name == "today"
+    report = side.report
+    saving = side.saving
+    there = side.found
+    own = side.name == "today"
     saved = (saving.share, saving.saved, saving.saved_low, saving.saved_high)
     share, joules, low, high = saved if there and not own else (None, None, None, None)
     return {
@@ -191,7 +212,10 @@ def _sentences(found: BeforeAfter) -> list[str]:
         f"({change.saving.saved_low:.0f} to {change.saving.saved_high:.0f})"
         for k, change in enumerate(found.changes, start=1)
     ]
-    head = [f"today: {found.name} ({found.kind}); changes towards: {found.towards}, the least work first"]
+    head = [
+        f"today: {found.name} ({found.kind}); changes towards: {found.towards}, the least work "
+        "first"
+    ]
     return [*head, *changes, *(f"note: {note}" for note in found.notes)]
 
 

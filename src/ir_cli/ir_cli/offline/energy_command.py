@@ -1,5 +1,5 @@
-"""`ir energy`: direct against indirect measurement, parameters fitted to a meter, movements that identify
-them, and a simulated plant that drives these.
+"""`ir energy`: direct against indirect measurement, parameters fitted to a meter, movements that
+identify them, and a simulated plant that drives these.
 """
 
 from __future__ import annotations
@@ -50,7 +50,9 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="compare measurements, fit power parameters, plan what identifies them; needs no ROS",
     )
     verbs = energy.add_subparsers(dest="verb", required=True)
-    compare = verbs.add_parser("compare", help="the meter beside the energy from positions, by movement")
+    compare = verbs.add_parser(
+        "compare", help="the meter beside the energy from positions, by movement"
+    )
     compare.add_argument("recording", type=Path, metavar="RECORDING", help="a recording (.mcap)")
     add_formats(compare)
     compare.set_defaults(run=run_compare)
@@ -58,20 +60,32 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     _add_excite(verbs)
     drive = verbs.add_parser("drive", help="drive such a programme on a simulated plant")
     drive.add_argument("folder", type=Path, metavar="FOLDER", help="what ir energy excite wrote")
-    drive.add_argument("--plant", default="typical", help="nominal, typical:SEED or a file (typical)")
+    drive.add_argument(
+        "--plant", default="typical", help="nominal, typical:SEED or a file (typical)"
+    )
     drive.add_argument("--output", type=Path, metavar="CSV", help="file to write (FOLDER/run.csv)")
     drive.set_defaults(run=run_drive)
 
 
 def _add_fit(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    fitted = verbs.add_parser("fit", help="power parameters from a meter, with what is left uncertain")
-    fitted.add_argument("motion", type=Path, metavar="RECORDING", help="a recording, or CSV of the joints")
+    fitted = verbs.add_parser(
+        "fit", help="power parameters from a meter, with what is left uncertain"
+    )
+    fitted.add_argument(
+        "motion", type=Path, metavar="RECORDING", help="a recording, or CSV of the joints"
+    )
     fitted.add_argument("--meter", type=Path, metavar="FILE", help="CSV of a power meter beside it")
-    fitted.add_argument("--mapping", type=Path, metavar="FILE", help="what the columns of the joints mean")
-    fitted.add_argument("--meter-mapping", type=Path, metavar="FILE", help="what those of the meter mean")
+    fitted.add_argument(
+        "--mapping", type=Path, metavar="FILE", help="what the columns of the joints mean"
+    )
+    fitted.add_argument(
+        "--meter-mapping", type=Path, metavar="FILE", help="what those of the meter mean"
+    )
     fitted.add_argument("--cell", default="", help="of the robot, where the recording carries none")
     fitted.add_argument("--load", default="", help='what is held all the time: "gripper+part"')
-    fitted.add_argument("--prior", default="", metavar="FILE", help="parameters to begin with (data sheet)")
+    fitted.add_argument(
+        "--prior", default="", metavar="FILE", help="parameters to begin with (data sheet)"
+    )
     fitted.add_argument("--name", default="fit", help="of the parameters (fit)")
     fitted.add_argument("--output", type=Path, default=Path("out/power.yaml"), help="file to write")
     fitted.add_argument("--picture", type=Path, metavar="PNG", help="picture to write as well")
@@ -82,13 +96,23 @@ def _add_fit(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 def _add_excite(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     excite = verbs.add_parser("excite", help="plan movements that identify power parameters")
     add_cell(excite)
-    excite.add_argument("--seconds", type=float, default=180.0, help="s of excursions, at most (180)")
-    excite.add_argument("--postures", type=int, default=3, help="to start from, home among them (3)")
+    excite.add_argument(
+        "--seconds", type=float, default=180.0, help="s of excursions, at most (180)"
+    )
+    excite.add_argument(
+        "--postures", type=int, default=3, help="to start from, home among them (3)"
+    )
     excite.add_argument("--hibernate", action="store_true", help="hibernate too; takes minutes")
-    excite.add_argument("--safety-distance", type=float, default=0.02, metavar="M", help="m to keep (0.02)")
-    excite.add_argument("--prior", default="", metavar="FILE", help="what is known already (data sheet)")
+    excite.add_argument(
+        "--safety-distance", type=float, default=0.02, metavar="M", help="m to keep (0.02)"
+    )
+    excite.add_argument(
+        "--prior", default="", metavar="FILE", help="what is known already (data sheet)"
+    )
     excite.add_argument("--seed", type=int, default=0)
-    excite.add_argument("--output", type=Path, default=Path("out/excitation"), help="folder to write")
+    excite.add_argument(
+        "--output", type=Path, default=Path("out/excitation"), help="folder to write"
+    )
     add_formats(excite, comma=False)
     excite.set_defaults(run=run_excite)
 
@@ -113,7 +137,9 @@ def run_compare(arguments: argparse.Namespace) -> int:
         mean = both.difference
         interval = {"mean": mean.value, "low": mean.low, "high": mean.high, "spread": both.spread}
         source = analysis.recording.hardware
-        print_json({"source": source, "movements": rows, "difference": interval, "sentence": both.sentence})
+        print_json(
+            {"source": source, "movements": rows, "difference": interval, "sentence": both.sentence}
+        )
     elif arguments.csv:
         print_csv(rows)
     else:
@@ -128,7 +154,8 @@ def run_fit(arguments: argparse.Namespace) -> int:
     with sentences():
         prior = load_power_parameters(arguments.prior)
         cell = load_cell(arguments.cell) if arguments.cell else None
-    motion, meter = arguments.mapping, arguments.meter_mapping
+    motion = arguments.mapping
+    meter = arguments.meter_mapping
     source = Source(
         arguments.motion,
         arguments.meter,
@@ -168,13 +195,16 @@ def run_excite(arguments: argparse.Namespace) -> int:
     if not 1 <= arguments.postures <= 20:
         raise InputError(f"--postures is {arguments.postures}, must be 1 to 20")
     if not 0.0 < arguments.seconds <= 3600.0:
-        raise InputError(f"--seconds is {arguments.seconds:.12g} s, must be above 0 and at most 3600 s")
+        raise InputError(
+            f"--seconds is {arguments.seconds:.12g} s, must be above 0 and at most 3600 s"
+        )
 
     from ..excitation.programme import Asked, advice, plan_programme
     from ..excitation.programme_file import write_programme
 
     with sentences():
-        planner, prior = planner_of(arguments.cell), load_power_parameters(arguments.prior)
+        planner = planner_of(arguments.cell)
+        prior = load_power_parameters(arguments.prior)
         asked = Asked(
             arguments.seconds,
             arguments.postures,
@@ -184,14 +214,16 @@ def run_excite(arguments: argparse.Namespace) -> int:
         )
         programme = plan_programme(planner, prior, asked)
     path = write_programme(programme, arguments.output, arguments.cell)
-    known, said = programme.identified, advice(programme.identified.missing)
+    known = programme.identified
+    said = advice(programme.identified.missing)
     moved = sum(step.trajectory is not None for step in programme.steps)
     if arguments.json:
         figures = {"movements": moved, "seconds": programme.seconds, "file": str(path)}
         print_json({**figures, "identified": known.found, "missing": known.missing, "advice": said})
         return 0
     lines = [
-        f"{moved} certified movements and {len(programme.steps) - moved} rests, {programme.seconds:.0f} s",
+        f"{moved} certified movements and {len(programme.steps) - moved} rests, "
+        f"{programme.seconds:.0f} s",
         f"identified ({len(known.found)}): {', '.join(known.found)}",
         f"not identified ({len(known.missing)}): {', '.join(known.missing) or 'nothing'}",
         *(f"to add: {sentence}" for sentence in said),
@@ -202,7 +234,9 @@ def run_excite(arguments: argparse.Namespace) -> int:
 
 
 def run_drive(arguments: argparse.Namespace) -> int:
-    """Drive a programme as fast as the plant can be stepped, write its readings, print where they are."""
+    """Drive a programme as fast as the plant can be stepped, write its readings, print where they
+    are.
+    """
     from ir_studies.simulated_run import driven
 
     from ..excitation.programme_file import read_programme
@@ -214,6 +248,7 @@ def run_drive(arguments: argparse.Namespace) -> int:
     write_readings(path, trace)
     joules = trace.columns["energy"][-1]
     sys.stdout.write(
-        f"{len(steps)} steps in {trace.time[-1]:.0f} s, {joules / 1e3:.1f} kJ ({trace.source})\n{path}\n"
+        f"{len(steps)} steps in {trace.time[-1]:.0f} s, {joules / 1e3:.1f} kJ "
+        f"({trace.source})\n{path}\n"
     )
     return 0

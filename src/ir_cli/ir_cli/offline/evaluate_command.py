@@ -19,7 +19,10 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     add_cell(evaluate)
     evaluate.add_argument(
-        "trace", type=Path, metavar="TRACE", help="CSV with time and joints, Parquet, or a recording"
+        "trace",
+        type=Path,
+        metavar="TRACE",
+        help="CSV with time and joints, Parquet, or a recording",
     )
     add_measured(evaluate)
     evaluate.add_argument("--station", default="", help="whose allowed contacts hold in its zone")
@@ -33,7 +36,9 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     """Evaluate and print; exit code 1 where a limit or the clearance is violated."""
     with sentences(), ProgressLine() as line:
         planner = planner_of(arguments.cell, arguments.power_parameters)
-        margin, load, station = arguments.safety_distance, arguments.load, arguments.station
+        margin = arguments.safety_distance
+        load = arguments.load
+        station = arguments.station
         known, trajectory = motion_of(arguments, planner, line.show)
         line.show("evaluate", 0, 1, 0.0)
         found = planner.evaluate(trajectory, margin, load, station)

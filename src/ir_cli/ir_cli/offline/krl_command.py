@@ -10,7 +10,14 @@ from pathlib import Path
 from ir_description import Cell
 from ir_description.files import is_utf16
 from ir_krl import Followed, follow, parse
-from ir_planner import EvaluatedProgram, Planner, PlanOptions, evaluate_krl, export_krl, tool_in_flange
+from ir_planner import (
+    EvaluatedProgram,
+    Planner,
+    PlanOptions,
+    evaluate_krl,
+    export_krl,
+    tool_in_flange,
+)
 
 from ..errors import InputError
 from .asking import (
@@ -26,7 +33,17 @@ from .asking import (
     planner_of,
     sentences,
 )
-from .output import Columns, ProgressLine, Row, add_formats, number, print_csv, print_json, print_table, text
+from .output import (
+    Columns,
+    ProgressLine,
+    Row,
+    add_formats,
+    number,
+    print_csv,
+    print_json,
+    print_table,
+    text,
+)
 
 BYTES_MAX = 4_000_000
 COLUMNS: Columns = {
@@ -44,20 +61,26 @@ COLUMNS: Columns = {
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add krl import and krl export."""
-    krl = commands.add_parser("krl", help="KUKA programs: what one costs in a cell, and planned ones as KRL")
+    krl = commands.add_parser(
+        "krl", help="KUKA programs: what one costs in a cell, and planned ones as KRL"
+    )
     actions = krl.add_subparsers(dest="action", required=True, metavar="ACTION")
     _add_import(actions)
     _add_export(actions)
 
 
 def _add_import(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    read = actions.add_parser("import", help="drive a .src (with its .dat) as a KR C4 would, in a cell")
+    read = actions.add_parser(
+        "import", help="drive a .src (with its .dat) as a KR C4 would, in a cell"
+    )
     read.add_argument(
         "files", nargs="+", type=Path, metavar="FILE", help=".src first, then .dat and subprograms"
     )
     read.add_argument("--cell", default="demo", help="name of a bundled cell, or a file (demo)")
     add_followed(read)
-    read.add_argument("--compare", action="store_true", help="plan the same stations and show the difference")
+    read.add_argument(
+        "--compare", action="store_true", help="plan the same stations and show the difference"
+    )
     add_margin(read)
     add_parameters(read)
     add_formats(read)
@@ -66,7 +89,9 @@ def _add_import(actions: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def add_followed(parser: argparse.ArgumentParser) -> None:
     """What decides how a KRL program is followed."""
-    parser.add_argument("--routine", default="", metavar="NAME", help="of KRL: the first of the first file")
+    parser.add_argument(
+        "--routine", default="", metavar="NAME", help="of KRL: the first of the first file"
+    )
     parser.add_argument(
         "--input",
         action="append",
@@ -91,12 +116,16 @@ def followed(files: Sequence[Path], cell: Cell, arguments: argparse.Namespace) -
 
 
 def _add_export(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    write = actions.add_parser("export", help="plan a program and write it as .src and .dat, certified again")
+    write = actions.add_parser(
+        "export", help="plan a program and write it as .src and .dat, certified again"
+    )
     add_cell(write)
     write.add_argument(
         "-o", "--output", type=Path, required=True, metavar="FILE.src", help="the .dat is beside it"
     )
-    write.add_argument("--stations", nargs="+", default=[], metavar="NAME", help="visit these instead")
+    write.add_argument(
+        "--stations", nargs="+", default=[], metavar="NAME", help="visit these instead"
+    )
     write.add_argument(
         "--cycle-time", type=float, default=0.0, metavar="S", help="for the cycle; 0: free (0)"
     )
@@ -116,7 +145,12 @@ def run_import(arguments: argparse.Namespace) -> int:
     compared = _compared(planner, found) if arguments.compare else {}
     if arguments.json:
         print_json(
-            {**totals_of(found), **compared, "steps": rows, "notes": [str(note) for note in found.notes]}
+            {
+                **totals_of(found),
+                **compared,
+                "steps": rows,
+                "notes": [str(note) for note in found.notes],
+            }
         )
     elif arguments.csv:
         print_csv(rows)
@@ -136,7 +170,8 @@ def run_export(arguments: argparse.Namespace) -> int:
         if path.exists():
             raise InputError(f"{path} is there already")
     with sentences(), ProgressLine() as line:
-        planner, stations = planner_of(arguments.cell, arguments.power_parameters), tuple(arguments.stations)
+        planner = planner_of(arguments.cell, arguments.power_parameters)
+        stations = tuple(arguments.stations)
         check_stations(stations, planner)
         start = configuration_of(arguments.start, planner, arguments.safety_distance)
         options = options_of(arguments)
@@ -146,9 +181,11 @@ def run_export(arguments: argparse.Namespace) -> int:
         written = export_krl(planner, plan.movements, source.stem, options)
     source.write_text(written.source, encoding="utf-8")
     data.write_text(written.data, encoding="utf-8")
-    planned, driven = written.planned, written.exported
+    planned = written.planned
+    driven = written.exported
     sys.stdout.write(
-        f"{source} and {data.name}: {driven.duration:.2f} s, {driven.energy:.0f} J moving, at least "
+        f"{source} and {data.name}: {driven.duration:.2f} s, {driven.energy:.0f} J moving, at "
+        "least "
         f"{1e3 * driven.min_clearance:.1f} mm clear as the controller drives it, certified\n"
         f"planned: {planned.duration:.2f} s, {planned.energy:.0f} J; "
         f"joints at most {written.deviation:.2g} rad apart\n"
@@ -195,7 +232,8 @@ def _note(condition: str, violation: str) -> str:
 def _sentences(found: EvaluatedProgram) -> list[str]:
     judged = "free of violations" if found.certified else "NOT certified: see above"
     return [
-        f"{found.name}: {found.report.duration:.2f} s, {found.report.energy:.0f} J predicted, {judged}",
+        f"{found.name}: {found.report.duration:.2f} s, {found.report.energy:.0f} J predicted, "
+        f"{judged}",
         f"stations: {', '.join(found.stations) or 'none recognised'}",
         *(f"note: {note}" for note in found.notes),
     ]
@@ -205,14 +243,14 @@ def _compared(planner: Planner, found: EvaluatedProgram) -> Row:
     """The stations of the program as the planner visits them: free, and in the program's time."""
     if any(step.step.process for step in found.steps):
         raise InputError(
-            "the program works along paths of the tool, between an output's on and off, that a visit of its "
-            "stations would leave out: compare with `ir compare`"
+            "the program works along paths of the tool, between an output's on and off, that a "
+            "visit of its stations would leave out: compare with `ir compare`"
         )
     if len(set(found.stations)) < 2:
         known = found.stations[0] if found.stations else "none"
         raise InputError(
-            f"stations recognised: {known}; --compare plans between at least two: `ir compare` makes "
-            "stations of the other stops"
+            f"stations recognised: {known}; --compare plans between at least two: `ir compare` "
+            "makes stations of the other stops"
         )
     start = found.steps[0].step.trajectory.positions[0]
     answer: dict[str, object] = {}
@@ -239,12 +277,16 @@ def _comparison(compared: Row) -> list[str]:
 def _text(path: Path) -> str:
     try:
         if path.stat().st_size > BYTES_MAX:
-            raise InputError(f"{path} has {path.stat().st_size} bytes: at most {BYTES_MAX} are read")
+            raise InputError(
+                f"{path} has {path.stat().st_size} bytes: at most {BYTES_MAX} are read"
+            )
         content = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from error
     if is_utf16(content):
-        raise InputError(f"{path}:1: the file is UTF-16 text, must be UTF-8: save it with that encoding")
+        raise InputError(
+            f"{path}:1: the file is UTF-16 text, must be UTF-8: save it with that encoding"
+        )
     return content.decode("utf-8", errors="replace")
 
 

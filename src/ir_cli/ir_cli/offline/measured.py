@@ -1,11 +1,12 @@
-"""Measured positions as a motion: smoothed with a stated bandwidth, and what its energy is then worth.
+"""Measured positions as a motion: smoothed with a stated bandwidth, and what its energy is then
+worth.
 
-A spline of degree five with knots at twice the bandwidth is fitted by least squares, so that speed and
-acceleration are its derivatives, whatever the rows' spacing. The bandwidth is the one of several whose
-energy is known best. How well is found by experiment: the smoothed motion is sampled as the trace was, with
-as much noise again, and smoothed once more. What the noise adds is the difference that it makes there; what
-smoothing loses is at most a few times what it loses the second time. `benchmarks/shop_floor.py` holds the
-bounds against motions whose energy is known.
+A spline of degree five with knots at twice the bandwidth is fitted by least squares, so that speed
+and acceleration are its derivatives, whatever the rows' spacing. The bandwidth is the one of
+several whose energy is known best. How well is found by experiment: the smoothed motion is sampled
+as the trace was, with as much noise again, and smoothed once more. What the noise adds is the
+difference that it makes there; what smoothing loses is at most a few times what it loses the second
+time. `benchmarks/shop_floor.py` holds the bounds against motions whose energy is known.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ from ir_planner.program import Progress, nobody
 from ..errors import InputError
 
 BANDWIDTHS = (8.0, 11.0, 16.0, 22.0)  # Hz
-_LOWEST, _HIGHEST = 5.0, 100.0  # Hz: below it the movement itself is smoothed away
+# Hz: below it the movement itself is smoothed away
+_LOWEST = 5.0
+_HIGHEST = 100.0
 _DEGREE = 5
 _ROWS_PER_KNOT = 2.0  # at least: fewer leave the ends of the spline to the noise
 _REPEATS = 4
@@ -32,7 +35,9 @@ _EVALUATIONS = 2 + _REPEATS  # of the energy, for each bandwidth
 _PHASE = "smooth"
 _LOST = 4.0  # times what smoothing loses the second time
 _LEAST = 0.0075  # share of an energy that positions leave open in any case
-_COARSE, _COARSE_SHARE = 0.02, 0.025  # s: rows that lie farther apart leave this share open
+# s: rows that lie farther apart leave this share open
+_COARSE = 0.02
+_COARSE_SHARE = 0.025
 _STILL = 0.005  # rad/s
 _AT_REST = 0.02  # rad/s: a trace that ends with less ends at rest
 _DIFFERENCES = np.sqrt(20.0)  # the third difference of noise is so many times larger
@@ -44,9 +49,9 @@ Joules = Callable[[JointTrajectory], float]
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """A motion from positions alone: its bandwidth [Hz], the rate [Hz] and the noise [rad] (one standard
-    deviation, worst joint) of the positions, the joules that the noise adds, and the bound [J] within which
-    the energy holds. notes: what was left out of the file or assumed of it.
+    """A motion from positions alone: its bandwidth [Hz], the rate [Hz] and the noise [rad] (one
+    standard deviation, worst joint) of the positions, the joules that the noise adds, and the bound
+    [J] within which the energy holds. notes: what was left out of the file or assumed of it.
     """
 
     trajectory: JointTrajectory
@@ -65,9 +70,9 @@ class Measured:
     @property
     def _worth(self) -> str:
         return (
-            f"from positions alone ({self.rate:.0f} Hz, {1e3 * self.noise:.3f} mrad of noise), smoothed at "
-            f"{self.bandwidth:g} Hz: the energy holds within {self.bound:.0f} J, of which noise adds about "
-            f"{self.noise_joules:.0f} J"
+            f"from positions alone ({self.rate:.0f} Hz, {1e3 * self.noise:.3f} mrad of noise), "
+            f"smoothed at {self.bandwidth:g} Hz: the energy holds within {self.bound:.0f} J, of "
+            f"which noise adds about {self.noise_joules:.0f} J"
         )
 
 
@@ -89,7 +94,9 @@ def smoothed(
 
 
 def _supported(knots: FloatArray, time: FloatArray) -> FloatArray:
-    """Without the knots (M,) that no row of time (N,) lies before: in gaps, where the robot stood still."""
+    """Without the knots (M,) that no row of time (N,) lies before: in gaps, where the robot stood
+    still.
+    """
     rows = np.searchsorted(time, knots)
     kept = np.concatenate([[True], np.diff(rows) > 0])
     kept[-1] = True
@@ -104,12 +111,13 @@ def measured(
     bandwidth: float = 0.0,
     progress: Progress = nobody,
 ) -> Measured:
-    """The motion of positions (N, n) at time (N,) [s] with the bandwidth [Hz] (0: the best of several) that
-    leaves least open of its energy. InputError for too few or too many rows.
+    """The motion of positions (N, n) at time (N,) [s] with the bandwidth [Hz] (0: the best of
+    several) that leaves least open of its energy. InputError for too few or too many rows.
     """
     _check(time, bandwidth)
     tried = [bandwidth] if bandwidth > 0.0 else BANDWIDTHS
-    steps, total = count(1), len(tried) * _EVALUATIONS
+    steps = count(1)
+    total = len(tried) * _EVALUATIONS
     progress(_PHASE, 0, total, 0.0)
 
     def shown(motion: JointTrajectory) -> float:
@@ -122,21 +130,24 @@ def measured(
 
 
 def _check(time: FloatArray, bandwidth: float) -> None:
-    """InputError for rows at time (N,) [s], or a bandwidth [Hz], that nothing can be smoothed with."""
+    """InputError for rows at time (N,) [s], or a bandwidth [Hz], that nothing can be smoothed
+    with.
+    """
     if not 8 <= len(time) <= _ROWS_MAX:
         raise InputError(
-            f"{len(time)} rows of positions alone: 8 to {_ROWS_MAX} can be smoothed; --between takes one "
-            "cycle out of a long file"
+            f"{len(time)} rows of positions alone: 8 to {_ROWS_MAX} can be smoothed; --between "
+            "takes one cycle out of a long file"
         )
     period = float(np.median(np.diff(time)))
     if period < _PERIOD_MIN:
         raise InputError(
-            f"the rows are {period:.3g} s apart, no log has less than {_PERIOD_MIN:g} s: is the unit right?"
+            f"the rows are {period:.3g} s apart, no log has less than {_PERIOD_MIN:g} s: is the "
+            "unit right?"
         )
     if period > _PERIOD_MAX:
         raise InputError(
-            f"the rows are {period:.3g} s apart: positions alone say how the robot moved where that is at "
-            f"most {_PERIOD_MAX:g} s; is the unit of time right?"
+            f"the rows are {period:.3g} s apart: positions alone say how the robot moved where "
+            f"that is at most {_PERIOD_MAX:g} s; is the unit of time right?"
         )
     if bandwidth != 0.0 and not _LOWEST <= bandwidth <= _HIGHEST:
         raise InputError(
@@ -145,7 +156,11 @@ def _check(time: FloatArray, bandwidth: float) -> None:
 
 
 def _worth(
-    names: tuple[str, ...], time: FloatArray, positions: FloatArray, joules: Joules, bandwidth: float
+    names: tuple[str, ...],
+    time: FloatArray,
+    positions: FloatArray,
+    joules: Joules,
+    bandwidth: float,
 ) -> Measured:
     """The smoothed motion, and the experiment that says what its energy is worth."""
     motion = smoothed(names, time, positions, bandwidth)

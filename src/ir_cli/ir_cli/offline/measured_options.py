@@ -1,4 +1,6 @@
-"""What the commands that take traces share: the mapping of their columns, the bandwidth, and the motion."""
+"""What the commands that take traces share: the mapping of their columns, the bandwidth, and the
+motion.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,8 @@ def motion_of(
     arguments: argparse.Namespace, planner: Planner, progress: Progress, path: Path | None = None
 ) -> tuple[Measured | None, JointTrajectory]:
     """The motion of a trace, and what is known of it where it was smoothed."""
-    robot, file = planner.cell.robot, path or arguments.trace
+    robot = planner.cell.robot
+    file = path or arguments.trace
     progress(f"read {file.name}", 0, 1, 0.0)
     found = read_motion(file, robot.joint_names, arguments.mapping)
     if arguments.between is not None:
@@ -62,7 +65,8 @@ def between(file: Path, found: JointTrajectory | Rows, begin: float, end: float)
     inside = (found.time >= begin) & (found.time <= end)
     if np.count_nonzero(inside) < 2:
         raise InputError(
-            f"--between {begin:g} {end:g} holds no two rows of {file}, which lasts {found.time[-1]:g} s"
+            f"--between {begin:g} {end:g} holds no two rows of {file}, which lasts "
+            f"{found.time[-1]:g} s"
         )
     time = found.time[inside]
     return Rows(time - time[0], found.positions[inside], found.notes)

@@ -32,7 +32,9 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     form = 'a posture, a station, "A1 0 A2 -90 ..." in degrees or "X 1.8 Y 0 ..." in m and degrees'
     move.add_argument("start", metavar="START", help=form)
     move.add_argument("goal", metavar="GOAL", help="the same")
-    move.add_argument("--duration", type=float, default=0.0, metavar="S", help="s it takes; 0: the best (0)")
+    move.add_argument(
+        "--duration", type=float, default=0.0, metavar="S", help="s it takes; 0: the best (0)"
+    )
     move.add_argument("--trajectory", type=Path, metavar="FILE", help="write its points as CSV")
     add_options(move)
     add_parameters(move)
@@ -44,7 +46,9 @@ def run_move(arguments: argparse.Namespace) -> int:
     """Plan and print; exit code 1 where nothing is found."""
     with sentences():
         planner = planner_of(arguments.cell, arguments.power_parameters)
-        start = configuration_of(arguments.start, planner, arguments.safety_distance, arguments.load)
+        start = configuration_of(
+            arguments.start, planner, arguments.safety_distance, arguments.load
+        )
         goal = goal_of(arguments.goal, planner)
         plan = planner.plan_regional(start, goal, options_of(arguments, arguments.duration))
     notes = assumed_doors(planner.cell)
@@ -87,8 +91,11 @@ def figures_of(report: TrajectoryReport) -> Row:
 
 def predicted(report: TrajectoryReport) -> str:
     """The interval of an energy, and what it follows from."""
-    low, high = report.energy_low, report.energy_high
-    within = f"{low:.0f} to {high:.0f} J" if high < 1e5 else f"{low / 1e3:.1f} to {high / 1e3:.1f} kJ"
+    low = report.energy_low
+    high = report.energy_high
+    within = (
+        f"{low:.0f} to {high:.0f} J" if high < 1e5 else f"{low / 1e3:.1f} to {high / 1e3:.1f} kJ"
+    )
     why = one_sided(report.energy, low, high)
     return f"90 % interval {within} by {report.power_parameters}{f', {why}' if why else ''}"
 
@@ -96,7 +103,11 @@ def predicted(report: TrajectoryReport) -> str:
 def sentence_of(report: TrajectoryReport) -> str:
     """The same for people."""
     near = report.closest
-    pair = "" if near is None else f" between {near.body_a} and {near.body_b} at {report.closest_time:.2f} s"
+    pair = (
+        ""
+        if near is None
+        else f" between {near.body_a} and {near.body_b} at {report.closest_time:.2f} s"
+    )
     used = max(
         float(share.max(initial=0.0))
         for share in (
@@ -107,8 +118,10 @@ def sentence_of(report: TrajectoryReport) -> str:
         )
     )
     return (
-        f"{report.duration:.3f} s, {report.energy:.0f} J from the mains, predicted ({predicted(report)}), "
+        f"{report.duration:.3f} s, {report.energy:.0f} J from the mains, predicted "
+        f"({predicted(report)}), "
         f"at most {report.peak_power / 1e3:.1f} kW\n"
-        f"clearance {report.min_clearance * 1e3:.1f} mm{pair}; uses {100.0 * used:.0f} % of a limit; "
+        f"clearance {report.min_clearance * 1e3:.1f} mm{pair}; uses {100.0 * used:.0f} % of a "
+        "limit; "
         f"{'certified' if report.certified else 'NOT certified'}"
     )

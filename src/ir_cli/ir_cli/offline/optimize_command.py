@@ -21,7 +21,10 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     add_cell(optimize)
     optimize.add_argument(
-        "trace", type=Path, metavar="TRACE", help="CSV with time and joints, Parquet, or a recording"
+        "trace",
+        type=Path,
+        metavar="TRACE",
+        help="CSV with time and joints, Parquet, or a recording",
     )
     optimize.add_argument(
         "--duration", type=float, default=0.0, metavar="S", help="s it takes; 0: the best (0)"
@@ -46,7 +49,8 @@ def run_optimize(arguments: argparse.Namespace) -> int:
         found = planner.optimize_trajectory(motion, options_of(arguments, arguments.duration))
     if known is not None and len(moving) > 1:
         sys.stderr.write(
-            f"ir: {len(moving)} movements with stops between them are made one: ir compare keeps the stops\n"
+            f"ir: {len(moving)} movements with stops between them are made one: ir compare keeps "
+            "the stops\n"
         )
     if found.trajectory is None:
         return failed(found.status.message)

@@ -95,7 +95,9 @@ class ProgressLine:
         self._write("")
 
     def show(self, phase: str, done: int, total: int, cost: float, left: str = "") -> None:
-        """Phase, steps done of all, cost of the best answer so far (0, inf: none yet), time left in words."""
+        """Phase, steps done of all, cost of the best answer so far (0, inf: none yet), time left in
+        words.
+        """
         best = f", best {cost:.0f}" if math.isfinite(cost) and cost > 0.0 else ""
         self._write(f"… {phase} {done} of {total}{best}{left}")
 

@@ -1,4 +1,6 @@
-"""`ir path`: the tool along a path of the cell file, or of a file of its own, with what it costs."""
+"""`ir path`: the tool along a path of the cell file, or of a file of its own, with what it
+costs.
+"""
 
 from __future__ import annotations
 
@@ -29,12 +31,18 @@ from .trace_file import write_trace
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add path."""
-    path = commands.add_parser("path", help="drive the tool along a path at a given speed; needs no ROS")
+    path = commands.add_parser(
+        "path", help="drive the tool along a path at a given speed; needs no ROS"
+    )
     add_cell(path)
     words = "a path of the cell file by its name, or a file with a path (docs/cartesian.md)"
     path.add_argument("path", metavar="PATH", help=words)
-    path.add_argument("--start", default="", metavar="Q", help='"A1 0 A2 -90 ...": begin there (the best)')
-    path.add_argument("--t1", action="store_true", help="at most 250 mm/s at the tcp and the flange")
+    path.add_argument(
+        "--start", default="", metavar="Q", help='"A1 0 A2 -90 ...": begin there (the best)'
+    )
+    path.add_argument(
+        "--t1", action="store_true", help="at most 250 mm/s at the tcp and the flange"
+    )
     path.add_argument("--trajectory", type=Path, metavar="FILE", help="write its points as CSV")
     add_options(path)
     add_parameters(path)
@@ -49,7 +57,9 @@ def run_path(arguments: argparse.Namespace) -> int:
         path = _path(arguments.path, planner)
         start = None
         if arguments.start:
-            start = configuration_of(arguments.start, planner, arguments.safety_distance, arguments.load)
+            start = configuration_of(
+                arguments.start, planner, arguments.safety_distance, arguments.load
+            )
         plan = planner.plan_cartesian(path, options_of(arguments), start, t1=arguments.t1)
     notes = assumed_doors(planner.cell)
     said = "".join(f"\nnote: {note}" for note in notes)
@@ -87,9 +97,9 @@ def _path(text: str, planner: Planner) -> CartesianPath | CellPath:
 def _kept(plan: CartesianPlan) -> str:
     notes = [f"\n{stage.note}" for stage in plan.info.stages if stage.name in _SHOWN]
     return (
-        f"{plan.lengths[-1]:.3f} m; the tool within {plan.tool_error * 1e3:.3f} mm of its path and within "
-        f"{100.0 * plan.speed_deviation:.2f} % of its speed; {plan.configurations} configurations looked at"
-        + "".join(notes)
+        f"{plan.lengths[-1]:.3f} m; the tool within {plan.tool_error * 1e3:.3f} mm of its path "
+        f"and within {100.0 * plan.speed_deviation:.2f} % of its speed; {plan.configurations} "
+        "configurations looked at" + "".join(notes)
     )
 
 

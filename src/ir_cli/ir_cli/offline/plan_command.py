@@ -40,7 +40,9 @@ from .output import (
 )
 
 J_PER_KWH = 3.6e6
-HOW_TO_SAVE = "--saving holds it against a common program in equal time, which takes some seconds more"
+HOW_TO_SAVE = (
+    "--saving holds it against a common program in equal time, which takes some seconds more"
+)
 COLUMNS: Columns = {
     "step": ("step", text),
     "kind": ("kind", text),
@@ -58,17 +60,31 @@ COLUMNS: Columns = {
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add plan."""
-    plan = commands.add_parser("plan", help="plan a cell's program: seconds, joules, clearance; needs no ROS")
+    plan = commands.add_parser(
+        "plan", help="plan a cell's program: seconds, joules, clearance; needs no ROS"
+    )
     add_cell(plan)
-    plan.add_argument("--stations", nargs="+", default=[], metavar="NAME", help="visit these instead")
-    plan.add_argument("--cycle-time", type=float, default=0.0, metavar="S", help="for the cycle; 0: free (0)")
+    plan.add_argument(
+        "--stations", nargs="+", default=[], metavar="NAME", help="visit these instead"
+    )
+    plan.add_argument(
+        "--cycle-time", type=float, default=0.0, metavar="S", help="for the cycle; 0: free (0)"
+    )
     plan.add_argument("--start", default="park", help="posture or joint values (park)")
     plan.add_argument(
-        "--saving", action="store_true", help="hold it against a common program in equal time as well"
+        "--saving",
+        action="store_true",
+        help="hold it against a common program in equal time as well",
     )
-    words = "also write the plan as a recording, for ir report and ir replan (needs ROS's Python packages)"
+    words = (
+        "also write the plan as a recording, for ir report and ir replan (needs ROS's Python "
+        "packages)"
+    )
     plan.add_argument("--record", default="", metavar="FILE.mcap", help=words)
-    words = "also write the report of the plan as a page; why, where it failed (needs these packages, too)"
+    words = (
+        "also write the report of the plan as a page; why, where it failed (needs these "
+        "packages, too)"
+    )
     plan.add_argument("--html", default="", metavar="FILE.html", help=words)
     add_options(plan)
     add_parameters(plan)
@@ -79,7 +95,8 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run_plan(arguments: argparse.Namespace) -> int:
     """Plan and print; exit code 1 where nothing is found."""
     with sentences(), ProgressLine() as line:
-        planner, stations = planner_of(arguments.cell, arguments.power_parameters), tuple(arguments.stations)
+        planner = planner_of(arguments.cell, arguments.power_parameters)
+        stations = tuple(arguments.stations)
         check_stations(stations, planner)
         start = configuration_of(arguments.start, planner, arguments.safety_distance)
         options = options_of(arguments)
@@ -122,7 +139,9 @@ def _record(
     return write_plan(file, plan, request, planner, roots)
 
 
-def _page(arguments: argparse.Namespace, plan: ProgramPlan, planner: Planner, options: PlanOptions) -> None:
+def _page(
+    arguments: argparse.Namespace, plan: ProgramPlan, planner: Planner, options: PlanOptions
+) -> None:
     """Write the report of the plan; of one that failed with the sentence that says why."""
     from ir_recorder.analysis import analyse, findings
     from ir_recorder.read import read_recording
@@ -132,7 +151,9 @@ def _page(arguments: argparse.Namespace, plan: ProgramPlan, planner: Planner, op
         file = str(Path(folder) / "plan.mcap")
         recording = _record(file, arguments, plan, planner, options, ANYWHERE)
         analysis = analyse(read_recording(recording))
-    moved = replace(analysis.recording, planned=tuple(plan.movements))  # the file has no trajectories by step
+    moved = replace(
+        analysis.recording, planned=tuple(plan.movements)
+    )  # the file has no trajectories by step
     problems = analysis.problems if plan.status.ok else (plan.status.message,)
     analysis = replace(analysis, recording=moved, problems=problems)
     sys.stderr.write(f"ir: {write_report(analysis, findings(analysis), arguments.html)}\n")
@@ -191,8 +212,7 @@ def sentences_of(plan: ProgramPlan) -> list[str]:
         f"movements {totals['moving_seconds']:.2f} s {totals['moving_joules'] / 1e3:.2f} kJ, "
         f"pauses {standing:.2f} s {waiting / 1e3:.2f} kJ",
         f"cycle {totals['seconds']:.2f} s, {energy} from the mains, predicted: "
-        f"{predicted(plan.report)}; "
-        f"{proof if totals['certified'] else 'NOT certified'}",
+        f"{predicted(plan.report)}; {proof if totals['certified'] else 'NOT certified'}",
     ]
     if plan.status.message:
         lines.append(plan.status.message)

@@ -32,14 +32,15 @@ from ir_recorder.format import contents
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.write import CellFiles, RecordingSession, RecordingWriter
 
-_DOORS, _DOORS_ARE = "doors_at_the_start", "doors at the start are "
+_DOORS = "doors_at_the_start"
+_DOORS_ARE = "doors at the start are "
 _STEP = 1_000_000  # ns between two messages, so that their order is seen
 
 
 @dataclass(frozen=True)
 class ProgramRequest:
-    """What was asked: stations (empty: the cell's program), cycle time [s], options, and whether the program
-    was held against the common one.
+    """What was asked: stations (empty: the cell's program), cycle time [s], options, and whether
+    the program was held against the common one.
     """
 
     stations: tuple[str, ...] = ()
@@ -56,7 +57,8 @@ def write_plan(
     roots: FileRoots | None = None,
     overwrite: bool = False,
 ) -> Path:
-    """Write the plan of a program, with its request, the planner's cell and its settings, as a recording.
+    """Write the plan of a program, with its request, the planner's cell and its settings, as a
+    recording.
 
     PathError or WriteError where that can't be.
     """
@@ -73,7 +75,9 @@ def write_plan(
     if planner.settings.power_parameters:
         text = Path(planner.settings.power_parameters).read_text(encoding="utf-8")
         session.attach(contents.POWER_PARAMETERS, text, now)
-    for number, (topic, kind, latched, message) in enumerate(_messages(plan, request, planner, now)):
+    for number, (topic, kind, latched, message) in enumerate(
+        _messages(plan, request, planner, now)
+    ):
         session.open_topic(f"/{topic}", kind, [QosOffer(transient_local=latched)])
         session.message(f"/{topic}", serialize_message(message), now + number * _STEP)
     return session.finish().path
@@ -82,7 +86,9 @@ def write_plan(
 def _messages(
     plan: ProgramPlan, request: ProgramRequest, planner: Planner, now: int
 ) -> list[tuple[str, str, bool, Any]]:
-    """Topic, type, whether it is latched, and message, in the order in which the node publishes them."""
+    """Topic, type, whether it is latched, and message, in the order in which the node publishes
+    them.
+    """
     state = cell_state_to_msg(cell_state(planner.cell, planner.cell_hash))
     state.header.stamp = _stamp(now)
     found: list[tuple[str, str, bool, Any]] = [(names.CELL, "ir_msgs/msg/CellState", True, state)]
@@ -109,8 +115,10 @@ def _call(plan: ProgramPlan, request: ProgramRequest, now: int) -> RecordedCall:
     answer = PlanProgram.Response(status=status_to_msg(plan.status))
     fill_program(answer, plan, include_points=False)
     call = RecordedCall(node=f"/{names.PLANNER}", service=f"/{names.PLAN_PROGRAM}")
-    call.type, call.header.stamp = "ir_msgs/srv/PlanProgram", _stamp(now)
-    call.request, call.response = serialize_message(asked), serialize_message(answer)
+    call.type = "ir_msgs/srv/PlanProgram"
+    call.header.stamp = _stamp(now)
+    call.request = serialize_message(asked)
+    call.response = serialize_message(answer)
     return call
 
 

@@ -12,29 +12,35 @@ from ir_recorder.read.recording import TextEvent
 
 
 class RecordedDoors:
-    """Of the machines of `cell` that a signal switches. events: their states, "shut>open" while they change;
-    start [s]: the time of the events at which the motion's time is 0.
+    """Of the machines of `cell` that a signal switches. events: their states, "shut>open" while
+    they change; start [s]: the time of the events at which the motion's time is 0.
     """
 
     def __init__(self, cell: Cell, events: Sequence[TextEvent], start: float) -> None:
-        self._switched = [each for each in cell.equipment if each.switch is not None and each.enabled]
-        self._events, self._start = events, start
+        self._switched = [
+            each for each in cell.equipment if each.switch is not None and each.enabled
+        ]
+        self._events = events
+        self._start = start
 
     def during(self, begin: float, end: float) -> Doors | None:
-        """Those that were not as the cell has them between two times [s] of the motion, with their state or
-        the two that they were in; None where no state was recorded.
+        """Those that were not as the cell has them between two times [s] of the motion, with their
+        state or the two that they were in; None where no state was recorded.
         """
         if not self._events:
             return None
         found = (
-            (each, self._states(each, begin + self._start, end + self._start)) for each in self._switched
+            (each, self._states(each, begin + self._start, end + self._start))
+            for each in self._switched
         )
         return tuple((each.name, states) for each, states in found if states != (each.state,))
 
     def _states(self, machine: Equipment, begin: float, end: float) -> tuple[str, ...]:
         own = [event for event in self._events if event.name == machine.name]
         before = [event for event in own if event.time <= begin][-1:] or own[:1]
-        texts = [event.text for event in (*before, *(each for each in own if begin < each.time < end))]
+        texts = [
+            event.text for event in (*before, *(each for each in own if begin < each.time < end))
+        ]
         states = tuple(dict.fromkeys(state for text in texts for state in text.split(">")))
         if not states or not {state.name for state in machine.states}.issuperset(states):
             return (machine.state,)

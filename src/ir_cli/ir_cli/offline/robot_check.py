@@ -68,7 +68,8 @@ def _home(robot: RobotModel, chain: Chain) -> Iterator[Remark]:
     model = CollisionModel(chain, robot.capsules, (), robot.self_pairs)
     distance = model.distances(robot.machine_home[None])[0]
     for z in np.flatnonzero(distance <= MARGIN):
-        pair, depth = model.pairs[int(z)], 1e3 * float(distance[z])
+        pair = model.pairs[int(z)]
+        depth = 1e3 * float(distance[z])
         yield Remark(
             "error",
             "machine_home_deg",
@@ -79,13 +80,19 @@ def _home(robot: RobotModel, chain: Chain) -> Iterator[Remark]:
 
 def _postures(robot: RobotModel) -> FloatArray:
     """Random ones (N, n)."""
-    return np.random.default_rng(0).uniform(robot.position_min, robot.position_max, (POSTURES, robot.n))
+    return np.random.default_rng(0).uniform(
+        robot.position_min, robot.position_max, (POSTURES, robot.n)
+    )
 
 
 def _near_itself(robot: RobotModel, chain: Chain) -> Iterator[Remark]:
     """Pairs of links that leave few postures to plan in."""
     model = CollisionModel(chain, robot.capsules, (), robot.self_pairs)
-    near = (model.distances(_postures(robot)) <= MARGIN).mean(axis=0) if robot.self_pairs else np.zeros(0)
+    near = (
+        (model.distances(_postures(robot)) <= MARGIN).mean(axis=0)
+        if robot.self_pairs
+        else np.zeros(0)
+    )
     for z in np.flatnonzero(near > NEAR):
         pair = model.pairs[int(z)]
         often = f"{1e3 * MARGIN:g} mm in {100.0 * near[z]:.0f} % of {POSTURES} postures"
@@ -104,7 +111,9 @@ def _torque(robot: RobotModel) -> Iterator[Remark]:
     postures = _postures(robot)
     for what, loads in (("empty", ()), (f"with {robot.rated_payload:g} kg at the flange", (load,))):
         yield from _held(robot, home, loads, "error", f"at machine home, {what},")
-        yield from _held(robot, postures, loads, "warning", f"in one of {POSTURES} postures, {what},")
+        yield from _held(
+            robot, postures, loads, "warning", f"in one of {POSTURES} postures, {what},"
+        )
 
 
 def _held(
@@ -120,7 +129,8 @@ def _held(
         yield Remark(
             severity,
             robot.joint_names[i],
-            f"{where} gravity needs {torque[i]:.0f} Nm, the drive has {robot.envelope_torque[i, 0]:.0f} Nm",
+            f"{where} gravity needs {torque[i]:.0f} Nm, the drive has "
+            f"{robot.envelope_torque[i, 0]:.0f} Nm",
         )
 
 
@@ -128,15 +138,21 @@ def _speed(robot: RobotModel) -> Iterator[Remark]:
     for i, name in enumerate(robot.joint_names):
         ramp = robot.velocity_max[i] / robot.acceleration_max[i]
         if not 0.02 <= ramp <= 5.0:
-            limits = f"{robot.velocity_max[i]:.3g} rad/s and {robot.acceleration_max[i]:.3g} rad/s^2"
+            limits = (
+                f"{robot.velocity_max[i]:.3g} rad/s and {robot.acceleration_max[i]:.3g} rad/s^2"
+            )
             yield Remark(
-                "warning", name, f"reaches full speed in {ramp:.3g} s ({limits}), usual are 0.02 to 5 s"
+                "warning",
+                name,
+                f"reaches full speed in {ramp:.3g} s ({limits}), usual are 0.02 to 5 s",
             )
         needed = robot.acceleration_max[i] * robot.reflected_inertia[i]
         if needed > robot.envelope_torque[i, 0]:
             have = f"the drive has {robot.envelope_torque[i, 0]:.0f} Nm"
             yield Remark(
-                "warning", name, f"the rotor alone needs {needed:.0f} Nm at full acceleration, {have}"
+                "warning",
+                name,
+                f"the rotor alone needs {needed:.0f} Nm at full acceleration, {have}",
             )
 
 
@@ -145,14 +161,22 @@ def _controller(robot: RobotModel) -> Iterator[Remark]:
     if power.has_table:
         return
     watts = power.modes[0].controller_watts
-    counted = f"{watts:g} W while it stands" if watts else "no watts of its own: energies leave it out"
-    yield Remark("note", "controller", f"without a table of power modes, pauses stay on motors; {counted}")
+    counted = (
+        f"{watts:g} W while it stands" if watts else "no watts of its own: energies leave it out"
+    )
+    yield Remark(
+        "note", "controller", f"without a table of power modes, pauses stay on motors; {counted}"
+    )
 
 
 def _marks(robot: RobotModel) -> Iterator[Remark]:
     count = Counter(robot.marks.values())
     if count["L"]:
         guessed = sorted(place for place, mark in robot.marks.items() if mark == "L")
-        listed = ", ".join(guessed[:8]) + (f" and {len(guessed) - 8} more" if len(guessed) > 8 else "")
+        listed = ", ".join(guessed[:8]) + (
+            f" and {len(guessed) - 8} more" if len(guessed) > 8 else ""
+        )
         total = sum(count.values())
-        yield Remark("note", "estimates", f"{count['L']} of {total} figures are estimates: {listed}")
+        yield Remark(
+            "note", "estimates", f"{count['L']} of {total} figures are estimates: {listed}"
+        )

@@ -1,4 +1,6 @@
-"""`ir robot`: the robots that come with the project, robot files checked, and new ones from a URDF."""
+"""`ir robot`: the robots that come with the project, robot files checked, and new ones from a
+URDF.
+"""
 
 from __future__ import annotations
 
@@ -41,17 +43,25 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_formats(listing)
     listing.set_defaults(run=run_list)
     check = verbs.add_parser("check", help="what a robot file lacks, before anything is planned")
-    check.add_argument("robot", metavar="ROBOT", help="a robot file, or the name of a bundled robot")
+    check.add_argument(
+        "robot", metavar="ROBOT", help="a robot file, or the name of a bundled robot"
+    )
     add_formats(check, comma=False)
     check.set_defaults(run=run_check)
     _add_new(verbs.add_parser("new", help="a robot file from a URDF and a sheet of drive figures"))
 
 
 def _add_new(new: argparse.ArgumentParser) -> None:
-    new.add_argument("--template", action="store_true", help="print an empty sheet of drive figures, and end")
-    new.add_argument("--urdf", metavar="FILE", help="how the arm is built: links, joints, masses, shapes")
+    new.add_argument(
+        "--template", action="store_true", help="print an empty sheet of drive figures, and end"
+    )
+    new.add_argument(
+        "--urdf", metavar="FILE", help="how the arm is built: links, joints, masses, shapes"
+    )
     new.add_argument("--drives", metavar="FILE", help="what the URDF does not say; see --template")
-    new.add_argument("-o", "--out", metavar="FILE", default="robot.yaml", help="robot file (robot.yaml)")
+    new.add_argument(
+        "-o", "--out", metavar="FILE", default="robot.yaml", help="robot file (robot.yaml)"
+    )
     new.add_argument("--tip", default="", metavar="LINK", help="link at the flange (flange, tool0)")
     words = "folder below which package://NAME/.. is found (that of the URDF and those above)"
     new.add_argument("--packages", default="", metavar="FOLDER", help=words)
@@ -66,7 +76,9 @@ def run_new(arguments: argparse.Namespace) -> int:
         sys.stdout.write(TEMPLATE)
         return 0
     if not arguments.urdf or not arguments.drives:
-        raise InputError("give --urdf FILE and --drives FILE; ir robot new --template prints an empty sheet")
+        raise InputError(
+            "give --urdf FILE and --drives FILE; ir robot new --template prints an empty sheet"
+        )
     from .robot_new import write_robot
 
     packages = Path(arguments.packages) if arguments.packages else None
@@ -86,7 +98,9 @@ def run_check(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json({"robot": robot.name, "remarks": [remark._asdict() for remark in remarks]})
     else:
-        sys.stdout.write(f"robot {robot.name}: {robot.title or 'without a title'}, {robot.n} axes, ")
+        sys.stdout.write(
+            f"robot {robot.name}: {robot.title or 'without a title'}, {robot.n} axes, "
+        )
         sys.stdout.write(f"{robot.rated_payload:g} kg, {len(robot.capsules)} capsules\n")
         for remark in remarks:
             sys.stdout.write(f"{remark.severity}: {remark.subject}: {remark.sentence}\n")

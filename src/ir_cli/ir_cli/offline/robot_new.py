@@ -39,7 +39,8 @@ def write_robot(urdf: Path, drives: Path, tip: str, packages: Path | None, out: 
 
 def _comments(urdf: Path, drives: Path, shapes: Shapes) -> list[str]:
     return [
-        f"Written from {urdf.name} and {drives.name}. Frames: parallel to the base at q = 0, the last at the",
+        f"Written from {urdf.name} and {drives.name}. Frames: parallel to the base at q = 0, the "
+        "last at the",
         "flange with x out. Capsules, and how far they stand out from what they enclose:",
         *(f"  {sentence}" for sentence in shapes.sentences),
     ]
@@ -51,7 +52,9 @@ def _say(out: Path, arm: UrdfArm, sheet: DriveSheet, shapes: Shapes, pairs: int)
     sys.stdout.write(f"{pairs} pairs of capsules can touch\n")
     if guessed:
         sys.stdout.write(f"estimated: {', '.join(guessed)}\n")
-    sys.stdout.write(f"{out}: robot {sheet.name} of {len(arm.joints)} axes; next: ir robot check {out}\n")
+    sys.stdout.write(
+        f"{out}: robot {sheet.name} of {len(arm.joints)} axes; next: ir robot check {out}\n"
+    )
 
 
 def _text(path: Path) -> str:

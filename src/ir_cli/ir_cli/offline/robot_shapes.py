@@ -1,4 +1,6 @@
-"""Capsules of a robot from the collision shapes of its URDF, and the pairs of them that can touch."""
+"""Capsules of a robot from the collision shapes of its URDF, and the pairs of them that can
+touch.
+"""
 
 from __future__ import annotations
 
@@ -34,8 +36,11 @@ class Shapes(NamedTuple):
 
 
 def capsules_of(arm: UrdfArm, sheet: DriveSheet, names: tuple[str, ...], folder: Path) -> Shapes:
-    """Fitted to the shapes of each link; without any, from its joint to the next with the sheet's radius."""
-    capsules, sentences = [], []
+    """Fitted to the shapes of each link; without any, from its joint to the next with the sheet's
+    radius.
+    """
+    capsules = []
+    sentences = []
     for k, link in enumerate(arm.links):
         to = arm.origin[k] if k < len(arm.origin) else np.zeros(3)
         if link.shapes:
@@ -49,7 +54,9 @@ def capsules_of(arm: UrdfArm, sheet: DriveSheet, names: tuple[str, ...], folder:
                 )
         elif sheet.radii is not None:
             radius = float(sheet.radii[k])
-            capsules.append(Capsule(name=f"{names[k]}_0", link=k, p0=np.zeros(3), p1=to, radius=radius))
+            capsules.append(
+                Capsule(name=f"{names[k]}_0", link=k, p0=np.zeros(3), p1=to, radius=radius)
+            )
             sentences.append(
                 f"{names[k]}_0: no shape; radius {1e3 * radius:.0f} mm along its axis, an estimate"
             )
@@ -63,13 +70,16 @@ def capsules_of(arm: UrdfArm, sheet: DriveSheet, names: tuple[str, ...], folder:
 def touching_pairs(
     arm: UrdfArm, capsules: tuple[Capsule, ...], low: FloatArray, high: FloatArray
 ) -> list[tuple[str, str]]:
-    """Pairs of capsules of links that are no neighbours, but for those that touch in nearly every posture, or
-    whose distance hardly changes; low, high (6,) rad.
+    """Pairs of capsules of links that are no neighbours, but for those that touch in nearly every
+    posture, or whose distance hardly changes; low, high (6,) rad.
     """
     origins = np.tile(np.eye(4), (len(arm.origin), 1, 1))
-    origins[:, :3, 3], origins[-1, :3, :3] = arm.origin, arm.flange
+    origins[:, :3, 3] = arm.origin
+    origins[-1, :3, :3] = arm.flange
     chain = Chain(SimpleNamespace(joint_origin=origins, joint_axis=arm.axis))
-    far = [(a.name, b.name) for a, b in itertools.combinations(capsules, 2) if abs(a.link - b.link) > 1]
+    far = [
+        (a.name, b.name) for a, b in itertools.combinations(capsules, 2) if abs(a.link - b.link) > 1
+    ]
     model = CollisionModel(chain, capsules, (), far)
     q = np.random.default_rng(0).uniform(low, high, (SAMPLES, len(low)))
     distance = model.distances(q)
@@ -107,7 +117,9 @@ def _mesh(name: str, folder: Path) -> FloatArray:
 
 
 def _places(name: str, folder: Path) -> Iterator[Path]:
-    """Where a mesh may be: package://NAME/REST below a folder called NAME, or below this one or one above."""
+    """Where a mesh may be: package://NAME/REST below a folder called NAME, or below this one or one
+    above.
+    """
     rest = name.removeprefix("package://").removeprefix("file://")
     yield Path(rest) if Path(rest).is_absolute() else folder / rest
     inner = rest.partition("/")[2]
@@ -136,6 +148,9 @@ def _cylinder(size: FloatArray) -> FloatArray:
 
 def _sphere(size: FloatArray) -> FloatArray:
     k = np.arange(ON_SPHERE) + 0.5
-    height, turn = 1.0 - 2.0 * k / ON_SPHERE, np.pi * (1.0 + np.sqrt(5.0)) * k
+    height = 1.0 - 2.0 * k / ON_SPHERE
+    turn = np.pi * (1.0 + np.sqrt(5.0)) * k
     flat = np.sqrt(1.0 - height**2)
-    return np.asarray(size[0] * 1.02 * np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1))
+    return np.asarray(
+        size[0] * 1.02 * np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1)
+    )

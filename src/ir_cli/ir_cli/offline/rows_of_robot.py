@@ -1,7 +1,8 @@
-"""Measured positions held against the robot: turns that a log doesn't count, rows that it can't have driven.
+"""Measured positions held against the robot: turns that a log doesn't count, rows that it can't
+have driven.
 
-A wrong unit, a row that is missing in the middle of a movement or a log of another robot would otherwise be
-a movement of absurd energy, and the planner's would save 99 % of it.
+A wrong unit, a row that is missing in the middle of a movement or a log of another robot would
+otherwise be a movement of absurd energy, and the planner's would save 99 % of it.
 """
 
 from __future__ import annotations
@@ -14,18 +15,22 @@ from ir_msgs_py.arrays import FloatArray
 from ..errors import InputError
 
 _TURN = 2.0 * np.pi
-_FASTER = 3.0  # times its speed limit: no encoder's noise or clock's jitter at the rate of a log does this
+# times its speed limit: no encoder's noise or clock's jitter at the rate of a log does this
+_FASTER = 3.0
 _NOISE = 0.002  # rad: coarser than any log is rounded
-_BEYOND = np.pi  # rad outside of its range that a joint may be: what is more was never measured there
+_BEYOND = (
+    np.pi
+)  # rad outside of its range that a joint may be: what is more was never measured there
 
 
 def counted_turns(
     source: str, time: FloatArray, positions: FloatArray, robot: RobotModel
 ) -> tuple[FloatArray, tuple[str, ...]]:
-    """Positions (N, n) [rad] without jumps by whole turns, which logs make that are written within half a
-    turn, and a sentence for each joint that had some.
+    """Positions (N, n) [rad] without jumps by whole turns, which logs make that are written within
+    half a turn, and a sentence for each joint that had some.
 
-    InputError where a joint moves faster between two rows than it can, or is far outside of its range.
+    InputError where a joint moves faster between two rows than it can, or is far outside of its
+    range.
     """
     turns = np.round(np.diff(positions, axis=0) / _TURN)
     unwrapped = positions.copy()
@@ -40,14 +45,17 @@ def counted_turns(
 
 
 def check_ranges(source: str, positions: FloatArray, robot: RobotModel) -> None:
-    """InputError where a position (N, n) [rad] is farther outside of a joint's range than half a turn."""
+    """InputError where a position (N, n) [rad] is farther outside of a joint's range than half a
+    turn.
+    """
     beyond = np.maximum(robot.position_min - positions, positions - robot.position_max)
     row, j = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
     if beyond[row, j] > _BEYOND:
         low, high = np.degrees((robot.position_min[j], robot.position_max[j]))
         raise InputError(
-            f"{source}: {robot.joint_names[j]} is at {np.degrees(positions[row, j]):.0f} deg, its range is "
-            f"{low:.0f} to {high:.0f} deg: are its unit and the robot right? Values without a unit are rad"
+            f"{source}: {robot.joint_names[j]} is at {np.degrees(positions[row, j]):.0f} deg, "
+            f"its range is {low:.0f} to {high:.0f} deg: are its unit and the robot right? Values "
+            "without a unit are rad"
         )
 
 
@@ -59,14 +67,17 @@ def _check_speeds(source: str, time: FloatArray, positions: FloatArray, robot: R
     row, j = np.unravel_index(int(np.argmax(share)), share.shape)
     if share[row, j] > _FASTER:
         raise InputError(
-            f"{source}: {robot.joint_names[j]} moves by {np.degrees(moved[row, j]):.3g} deg between "
-            f"{time[row]:.3f} s and {time[row + 1]:.3f} s, {share[row, j]:.0f} times as fast as it can: are "
-            "the units, the rows and the robot right? Values without a unit are rad and s"
+            f"{source}: {robot.joint_names[j]} moves by {np.degrees(moved[row, j]):.3g} deg "
+            f"between {time[row]:.3f} s and {time[row + 1]:.3f} s, {share[row, j]:.0f} times as "
+            "fast as it can: are the units, the rows and the robot right? Values without a unit "
+            "are rad and s"
         )
 
 
 def _shift(values: FloatArray, low: float, high: float) -> float:
-    """Whole turns [rad] that bring values (N,) into low .. high; 0 where they are there, or none do."""
+    """Whole turns [rad] that bring values (N,) into low .. high; 0 where they are there, or none
+    do.
+    """
     for turns in (0, -1, 1):
         if low <= values.min() + _TURN * turns and values.max() + _TURN * turns <= high:
             return _TURN * turns

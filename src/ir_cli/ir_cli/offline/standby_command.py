@@ -19,11 +19,17 @@ COLUMNS = {
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add standby."""
-    standby = commands.add_parser("standby", help="the power mode of least energy for a pause; needs no ROS")
+    standby = commands.add_parser(
+        "standby", help="the power mode of least energy for a pause; needs no ROS"
+    )
     add_cell(standby)
-    standby.add_argument("--pause", type=float, required=True, metavar="S", help="s from stop to next start")
+    standby.add_argument(
+        "--pause", type=float, required=True, metavar="S", help="s from stop to next start"
+    )
     standby.add_argument("--state", default="home", help="where the robot stands (home)")
-    standby.add_argument("--load", default="", help='what is held: "gripper+part", "none" (the tool)')
+    standby.add_argument(
+        "--load", default="", help='what is held: "gripper+part", "none" (the tool)'
+    )
     add_parameters(standby)
     add_formats(standby)
     standby.set_defaults(run=run_standby)
@@ -50,7 +56,9 @@ def run_standby(arguments: argparse.Namespace) -> int:
         asked = zip(found.modes, found.switch_times, strict=True)
         within = {"saving_low": found.saving_low, "saving_high": found.saving_high}
         modes = [{"mode": mode, "seconds": seconds} for mode, seconds in asked]
-        print_json({**chosen, "modes": modes, "saving": found.saving, **within, "alternatives": rows})
+        print_json(
+            {**chosen, "modes": modes, "saving": found.saving, **within, "alternatives": rows}
+        )
     elif arguments.csv:
         print_csv(rows)
     else:

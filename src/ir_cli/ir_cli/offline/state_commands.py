@@ -32,10 +32,16 @@ PAIRS = {
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ik and check."""
-    ik = commands.add_parser("ik", help="all configurations that reach a pose or a station; needs no ROS")
+    ik = commands.add_parser(
+        "ik", help="all configurations that reach a pose or a station; needs no ROS"
+    )
     add_cell(ik)
-    ik.add_argument("goal", metavar="GOAL", help='a station, or "X 1.8 Y 0 Z 1.2 A 0 B 90 C 0" (m, degrees)')
-    ik.add_argument("--near", default="home", metavar="STATE", help="where their cost counts from (home)")
+    ik.add_argument(
+        "goal", metavar="GOAL", help='a station, or "X 1.8 Y 0 Z 1.2 A 0 B 90 C 0" (m, degrees)'
+    )
+    ik.add_argument(
+        "--near", default="home", metavar="STATE", help="where their cost counts from (home)"
+    )
     ik.add_argument("--method", choices=("analytic", "ccd"), default="analytic")
     add_margin(ik)
     add_formats(ik)
@@ -55,11 +61,14 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run_ik(arguments: argparse.Namespace) -> int:
     """Print the free configurations, cheapest first; exit code 1 where there is none."""
-    margin, load = arguments.safety_distance, arguments.load
+    margin = arguments.safety_distance
+    load = arguments.load
     with sentences():
         planner = planner_of(arguments.cell)
         near = configuration_of(arguments.near, planner, margin, load)
-        answer = planner.compute_ik(goal_of(arguments.goal, planner), arguments.method, margin, near, load)
+        answer = planner.compute_ik(
+            goal_of(arguments.goal, planner), arguments.method, margin, near, load
+        )
     if not answer.solutions:
         return failed(answer.status.message)
     rows: list[Row] = [
@@ -68,7 +77,9 @@ def run_ik(arguments: argparse.Namespace) -> int:
             "clearance": found.clearance,
             "movement_cost": found.movement_cost,
             "branch": found.branch,
-            "pair": "" if found.closest is None else f"{found.closest.body_a} - {found.closest.body_b}",
+            "pair": ""
+            if found.closest is None
+            else f"{found.closest.body_a} - {found.closest.body_b}",
         }
         for found in answer.solutions
     ]
@@ -78,7 +89,9 @@ def run_ik(arguments: argparse.Namespace) -> int:
         print_csv(rows)
     else:
         joints = planner.cell.robot.joint_names
-        titles = {name: (f"A{k} deg", number(1, 180.0 / np.pi)) for k, name in enumerate(joints, start=1)}
+        titles = {
+            name: (f"A{k} deg", number(1, 180.0 / np.pi)) for k, name in enumerate(joints, start=1)
+        }
         ends = {
             "clearance": ("clearance mm", number(1, 1e3)),
             "movement_cost": ("W", number(0)),
@@ -91,7 +104,8 @@ def run_ik(arguments: argparse.Namespace) -> int:
 
 def run_check(arguments: argparse.Namespace) -> int:
     """Print the nearest pairs; exit code 1 where one is too near."""
-    margin, load = arguments.safety_distance, arguments.load
+    margin = arguments.safety_distance
+    load = arguments.load
     with sentences():
         planner = planner_of(arguments.cell)
         q = configuration_of(arguments.state, planner, margin, load)
@@ -102,7 +116,9 @@ def run_check(arguments: argparse.Namespace) -> int:
     elif arguments.csv:
         print_csv(rows)
     else:
-        verdict = f"free: every pair keeps {margin * 1e3:g} mm" if found.valid else found.status.message
+        verdict = (
+            f"free: every pair keeps {margin * 1e3:g} mm" if found.valid else found.status.message
+        )
         sys.stdout.write(verdict + "\n")
         print_table(rows, PAIRS)
     return 0 if found.valid else FAILED

@@ -23,11 +23,13 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
         one = kinds.add_parser(
             name,
             help=kind.about,
-            description=f"{kind.about.capitalize()}. Makes what the folder has no result of; the same "
-            "command goes on after an interruption.",
+            description=f"{kind.about.capitalize()}. Makes what the folder has no result of; the "
+            "same command goes on after an interruption.",
         )
         add_study(one, f"out/{name}")
-        one.add_argument("--json", action="store_true", help="print summary, files and table as JSON")
+        one.add_argument(
+            "--json", action="store_true", help="print summary, files and table as JSON"
+        )
     study.set_defaults(run=run)
 
 

@@ -23,18 +23,27 @@ class TimeLeft:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._phase, self._of, self._first, self._done = "", 0, 0, 0
+        self._phase = ""
+        self._of = 0
+        self._first = 0
+        self._done = 0
         self._begun = clock()
 
     def words(self, phase: str, done: int, of: int) -> str:
         """The time left, or nothing where it isn't known yet."""
         now = self._clock()
         if (phase, of) != (self._phase, self._of) or done < self._done:
-            self._phase, self._of, self._first, self._begun = phase, of, done, now
+            self._phase = phase
+            self._of = of
+            self._first = done
+            self._begun = now
         self._done = done
         if done in (self._first, of):
             return ""
-        return f", about {_rounded((now - self._begun) * (of - done) / (done - self._first))} for the others"
+        return (
+            f", about {_rounded((now - self._begun) * (of - done) / (done - self._first))} "
+            "for the others"
+        )
 
 
 def _rounded(seconds: float) -> str:
@@ -48,12 +57,16 @@ def _rounded(seconds: float) -> str:
 def add_study(parser: argparse.ArgumentParser, folder: str) -> None:
     """SETTINGS.yaml, -o, --workers, --scheduler and --example."""
     parser.add_argument("settings", nargs="?", metavar="SETTINGS.yaml", help="what is asked")
-    parser.add_argument("-o", "--output", default=folder, metavar="FOLDER", help=f"results ({folder})")
+    parser.add_argument(
+        "-o", "--output", default=folder, metavar="FOLDER", help=f"results ({folder})"
+    )
     words = f"processes, 1 to {MOST_WORKERS} (as many as cores)"
     parser.add_argument("--workers", type=int, default=0, metavar="N", help=words)
     words = "of a Dask cluster that makes the jobs instead, as tcp://127.0.0.1:8786"
     parser.add_argument("--scheduler", default="", metavar="ADDRESS", help=words)
-    parser.add_argument("--example", action="store_true", help="print a settings file with all keys, and end")
+    parser.add_argument(
+        "--example", action="store_true", help="print a settings file with all keys, and end"
+    )
 
 
 def settings_of(arguments: argparse.Namespace, command: str) -> str:
@@ -65,7 +78,8 @@ def settings_of(arguments: argparse.Namespace, command: str) -> str:
 
 def studied(arguments: argparse.Namespace, make: Callable[[Means], Made]) -> Made:
     """What `make` returns, with a line that says how far it is."""
-    made, left = [0, 0], TimeLeft()
+    made = [0, 0]
+    left = TimeLeft()
     if not 0 <= arguments.workers <= MOST_WORKERS:
         raise InputError(f"--workers is {arguments.workers}: it must be in 1 .. {MOST_WORKERS}")
 

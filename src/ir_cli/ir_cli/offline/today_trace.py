@@ -1,4 +1,6 @@
-"""A measured trace as today's program: movements between standstills, pauses where the robot stood."""
+"""A measured trace as today's program: movements between standstills, pauses where the robot
+stood.
+"""
 
 from __future__ import annotations
 
@@ -37,15 +39,25 @@ def today_of_trace(
         raise InputError(f"{path}: the robot does not move in it")
     notes = [] if known is None else list(known.sentences)
     if lost >= PAUSE:
-        notes.append(f"{lost:.1f} s of standstill before the first and after the last movement are left out")
+        notes.append(
+            f"{lost:.1f} s of standstill before the first and after the last movement are left out"
+        )
     notes += _meter(arguments, planner, path)
-    start = np.asarray(stretches[0].trajectory.positions[0]) if stretches[0].trajectory is not None else None
+    start = (
+        np.asarray(stretches[0].trajectory.positions[0])
+        if stretches[0].trajectory is not None
+        else None
+    )
     assert start is not None  # a cycle begins with a movement
     return Today(path.name, "trace", start, tuple(stretches), tuple(notes))
 
 
-def stretches_of(motion: JointTrajectory, doors: RecordedDoors | None = None) -> tuple[list[Stretch], float]:
-    """Movements and pauses from the first movement to the last, and the seconds [s] outside of them."""
+def stretches_of(
+    motion: JointTrajectory, doors: RecordedDoors | None = None
+) -> tuple[list[Stretch], float]:
+    """Movements and pauses from the first movement to the last, and the seconds [s] outside of
+    them.
+    """
     runs = _runs(motion)
     found: list[Stretch] = []
 
@@ -56,9 +68,12 @@ def stretches_of(motion: JointTrajectory, doors: RecordedDoors | None = None) ->
         behind = runs[k + 1][0] if k + 1 < len(runs) else end
         stands = behind - end >= PAUSE
         last = end if stands else behind
-        part, label = cut(motion, begin, last), f"{begin:.2f} s"
+        part = cut(motion, begin, last)
+        label = f"{begin:.2f} s"
         at = stood(begin, last)
-        found.append(Stretch(part, np.asarray(part.positions[-1]), part.duration, label=label, doors=at))
+        found.append(
+            Stretch(part, np.asarray(part.positions[-1]), part.duration, label=label, doors=at)
+        )
         if stands:
             at = stood(end, behind)
             found.append(Stretch(None, found[-1].q, behind - end, label=f"{end:.2f} s", doors=at))
@@ -73,12 +88,15 @@ def _runs(motion: JointTrajectory) -> list[tuple[float, float]]:
     seen = motion.sample(at)
     speed = np.abs(seen.qd).max(axis=1)
     moving = speed > _MOVING
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]]).astype(int))).reshape(-1, 2)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]]).astype(int))).reshape(
+        -1, 2
+    )
     runs: list[tuple[float, float]] = []
     for first, behind in edges.tolist():
         if np.ptp(seen.q[first:behind], axis=0).max() < _NOISE:
             continue
-        begin, end = float(at[_slowest(speed, first, -1)]), float(at[_slowest(speed, behind - 1, 1)])
+        begin = float(at[_slowest(speed, first, -1)])
+        end = float(at[_slowest(speed, behind - 1, 1)])
         if runs and begin - runs[-1][1] < _STOP:
             begin = runs.pop()[0]
         runs.append((begin, end))
@@ -86,7 +104,9 @@ def _runs(motion: JointTrajectory) -> list[tuple[float, float]]:
 
 
 def _slowest(speed: FloatArray, row: int, step: int) -> int:
-    """The row near `row` up to which a speed (N,) goes on falling: where a movement really begins or ends."""
+    """The row near `row` up to which a speed (N,) goes on falling: where a movement really begins
+    or ends.
+    """
     for _ in range(_FALLING):
         if not 0 <= row + step < len(speed) or speed[row + step] >= speed[row]:
             break
@@ -99,7 +119,8 @@ def cut(motion: JointTrajectory, begin: float, end: float) -> JointTrajectory:
     inside = motion.times[(motion.times > begin + _NEAR) & (motion.times < end - _NEAR)]
     times = np.concatenate([[begin], inside, [end]])
     found = motion.sample(times)
-    qd, qdd = found.qd.copy(), found.qdd.copy()
+    qd = found.qd.copy()
+    qdd = found.qdd.copy()
     qd[[0, -1]] = qdd[[0, -1]] = 0.0
     return JointTrajectory.from_seconds(motion.joint_names, times - begin, found.q, qd, qdd)
 
@@ -113,8 +134,8 @@ def _meter(arguments: argparse.Namespace, planner: Planner, path: Path) -> list[
     except RecorderError as error:
         raise InputError(str(error)) from error
     return [
-        f"the meter counted {joules[-1]:.0f} J in the {trace.time[-1] - trace.time[0]:.1f} s of the file: "
-        "today's figures here are predicted, as the planner's are"
+        f"the meter counted {joules[-1]:.0f} J in the {trace.time[-1] - trace.time[0]:.1f} s of "
+        "the file: today's figures here are predicted, as the planner's are"
         for trace, joules in counted
         if joules is not None
     ]

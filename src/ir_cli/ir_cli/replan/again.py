@@ -1,4 +1,6 @@
-"""Requests of a recording planned once more: start states and drawn seeds are those of the answers."""
+"""Requests of a recording planned once more: start states and drawn seeds are those of the
+answers.
+"""
 
 from __future__ import annotations
 
@@ -56,10 +58,12 @@ class Replanned:
 def replan(recorded: RecordedPlanner) -> Iterator[Replanned]:
     """Every request that plans, in its order, with what the planner knew by then.
 
-    Time stands still: an answer that its ceiling did not cut is not cut here either, however slow this is.
+    Time stands still: an answer that its ceiling did not cut is not cut here either, however slow
+    this is.
     """
     planner = recorded.planner(lambda: 0.0)
-    changes, states = recorded.changes(), recorded.states()
+    changes = recorded.changes()
+    states = recorded.states()
     for call in recorded.calls():
         while changes and changes[0].time <= call.time:
             changes.pop(0).make(planner)
@@ -78,18 +82,28 @@ def _again(planner: Planner, call: Call, states: list[tuple[int, bytes]]) -> Rep
     seed = int(call.response.info.seed)
     state = LastState(q=_start(planner, call, states))
     requests = Requests(
-        planner, state, lambda: _FREE, lambda: None, lambda planned: None, lambda: seed, problems.append
+        planner,
+        state,
+        lambda: _FREE,
+        lambda: None,
+        lambda planned: None,
+        lambda: seed,
+        problems.append,
     )
     answer = type(call.response)()
     requests.guarded(getattr(requests, HANDLERS[call.type]))(call.request, answer)
-    before, now = ids_of(call.response), ids_of(answer)
+    before = ids_of(call.response)
+    now = ids_of(answer)
     if before == now:
         return Replanned(call.service, len(before) - 1, Verdict.EQUAL)
     other = [key for key in before | now if before.get(key) != now.get(key)]
-    key, said = other[0], answer.status.message
+    key = other[0]
+    said = answer.status.message
     sentence = f"{key} was {before.get(key, 'none')}, is {now.get(key, 'none')}"
     sentence += f"; {len(other)} of {len(before | now)} differ" if len(other) > 1 else ""
-    return Replanned(call.service, len(before) - 1, Verdict.DIFFERENT, f"{sentence}; {said}".strip("; "))
+    return Replanned(
+        call.service, len(before) - 1, Verdict.DIFFERENT, f"{sentence}; {said}".strip("; ")
+    )
 
 
 def ids_of(message: Any) -> dict[str, str]:
@@ -104,7 +118,8 @@ def ids_of(message: Any) -> dict[str, str]:
 
 def _texts(message: Any, place: str) -> Iterator[tuple[str, str, str]]:
     for name in message.get_fields_and_field_types():
-        value, here = getattr(message, name), f"{place}.{name}".lstrip(".")
+        value = getattr(message, name)
+        here = f"{place}.{name}".lstrip(".")
         if isinstance(value, str):
             yield here, name, value
         elif hasattr(value, "get_fields_and_field_types"):
@@ -115,7 +130,9 @@ def _texts(message: Any, place: str) -> Iterator[tuple[str, str, str]]:
 
 
 def _start(planner: Planner, call: Call, states: list[tuple[int, bytes]]) -> Any:
-    """The robot's state as the planner knew it: where the answer names its start, that one, to the bit."""
+    """The robot's state as the planner knew it: where the answer names its start, that one, to the
+    bit.
+    """
     start = np.array(call.response.info.start.position)
     if len(start) and not call.type.endswith("PlanServiceMovement"):  # its start is a candidate's
         return start

@@ -16,7 +16,9 @@ from .recorded import RecordedPlanner
 
 def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add replan."""
-    again = commands.add_parser("replan", help="plan a recording's requests again and compare the ids")
+    again = commands.add_parser(
+        "replan", help="plan a recording's requests again and compare the ids"
+    )
     again.add_argument("file", help="recording (.mcap)")
     again.add_argument("--namespace", help="of the cell, where the recording holds several")
     add_roots(again)
@@ -50,8 +52,12 @@ def sentence_of(found: list[Replanned], differences: list[str]) -> str:
         return "the recording holds no request that plans"
     count = {verdict: sum(each.verdict is verdict for each in found) for verdict in Verdict}
     ids = sum(each.ids for each in found if each.verdict is Verdict.EQUAL)
-    parts = [f"{count[Verdict.EQUAL]} of {len(found)} requests planned again with equal ids ({ids} ids)"]
-    parts += [f"{count[kind]} {kind}" for kind in (Verdict.DIFFERENT, Verdict.NOT_COMPARED) if count[kind]]
+    parts = [
+        f"{count[Verdict.EQUAL]} of {len(found)} requests planned again with equal ids ({ids} ids)"
+    ]
+    parts += [
+        f"{count[kind]} {kind}" for kind in (Verdict.DIFFERENT, Verdict.NOT_COMPARED) if count[kind]
+    ]
     if differences:
         parts.append("recorded with another build or other data: " + "; ".join(differences))
     return "; ".join(parts)

@@ -1,4 +1,6 @@
-"""What a planner had when it planned, as a recording holds it: cell, settings, what it heard, requests."""
+"""What a planner had when it planned, as a recording holds it: cell, settings, what it heard,
+requests.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +48,8 @@ class Change:
 
 @dataclass(frozen=True)
 class Call:
-    """A request that the planner took at `time` [ns]: the service's name, its type, both as messages.
+    """A request that the planner took at `time` [ns]: the service's name, its type, both as
+    messages.
 
     response is None where it was too long to be recorded.
     """
@@ -84,12 +87,16 @@ class RecordedPlanner:
         for call in sorted(taken, key=lambda call: _nanoseconds(call.header.stamp)):
             kind = interface_type(call.type, "action" if "/action/" in call.type else "srv")
             ask, answer = (
-                (kind.Goal, kind.Result) if "/action/" in call.type else (kind.Request, kind.Response)
+                (kind.Goal, kind.Result)
+                if "/action/" in call.type
+                else (kind.Request, kind.Response)
             )
             if len(call.request):
                 response = _decoded(bytes(call.response), answer) if len(call.response) else None
                 request = _decoded(bytes(call.request), ask)
-                yield Call(_nanoseconds(call.header.stamp), call.service, call.type, request, response)
+                yield Call(
+                    _nanoseconds(call.header.stamp), call.service, call.type, request, response
+                )
 
     def changes(self) -> list[Change]:
         """What the planner learnt meanwhile, in the order of time."""
@@ -119,7 +126,9 @@ class RecordedPlanner:
         return list(zip(channel.log_time.tolist(), channel.messages, strict=True))
 
     def differences(self) -> list[str]:
-        """What is other here than where it was recorded: versions, and data of robot and controller."""
+        """What is other here than where it was recorded: versions, and data of robot and
+        controller.
+        """
         found = []
         for entry in self._raw.fact(contents.PACKAGES).split(", "):
             name, _, version = entry.partition(" ")
@@ -150,7 +159,11 @@ class RecordedPlanner:
         channel = self._raw.channel(name if name.startswith("/") else self._prefix + name)
         if channel is None:
             return
-        kind = RecordedCall if channel.type.endswith("/RecordedCall") else interface_type(channel.type, "msg")
+        kind = (
+            RecordedCall
+            if channel.type.endswith("/RecordedCall")
+            else interface_type(channel.type, "msg")
+        )
         for time, data in zip(channel.log_time.tolist(), channel.messages, strict=True):
             yield time, _decoded(data, kind)
 
@@ -166,15 +179,23 @@ def _parameters(page: bytes) -> dict[str, Any]:
     """Values by name of a file as `--params-file` takes it."""
     try:
         nodes = yaml.safe_load(page) or {}
-        return {name: value for node in nodes.values() for name, value in node["ros__parameters"].items()}
+        return {
+            name: value
+            for node in nodes.values()
+            for name, value in node["ros__parameters"].items()
+        }
     except (yaml.YAMLError, AttributeError, KeyError, TypeError, UnicodeDecodeError) as error:
         raise ReadError(f"the planner's parameters can't be read: {error}") from error
 
 
 def _with(settings: PlannerSettings, values: dict[str, Any]) -> PlannerSettings:
     known = tree(settings)
-    own = {name: value for name, value in values.items() if name in known and name not in _OWN_PLACE}
-    plain = {name: tuple(value) if isinstance(value, list) else value for name, value in own.items()}
+    own = {
+        name: value for name, value in values.items() if name in known and name not in _OWN_PLACE
+    }
+    plain = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in own.items()
+    }
     return changed(settings, plain)
 
 

@@ -1,1 +1,3 @@
-"""`ir view`: a cell in a browser, from its file: looked at, moved about, checked and planned again."""
+"""`ir view`: a cell in a browser, from its file: looked at, moved about, checked and planned
+again.
+"""

@@ -19,9 +19,18 @@ def look_at(server: Any, cell: Cell) -> None:
     """The first view of browsers that open from now on; those that look already keep theirs."""
     base = cell.base_pose[:3, 3]
     points = [base, base + np.array([0.0, 0.0, 1.5])]
-    bodies = [body for machine in cell.equipment for body in machine.world_bodies() if body.kind != "plane"]
+    bodies = [
+        body
+        for machine in cell.equipment
+        for body in machine.world_bodies()
+        if body.kind != "plane"
+    ]
     points += [corner for body in bodies for corner in body.bounds()]
-    low, high = np.min(points, axis=0), np.max(points, axis=0)
-    middle, size = (low + high) / 2.0, max(float(np.linalg.norm(high - low)), LEAST)
+    low = np.min(points, axis=0)
+    high = np.max(points, axis=0)
+    middle = (low + high) / 2.0
+    size = max(float(np.linalg.norm(high - low)), LEAST)
     server.initial_camera.look_at = middle
-    server.initial_camera.position = middle + DISTANCE * size * DIRECTION / np.linalg.norm(DIRECTION)
+    server.initial_camera.position = middle + DISTANCE * size * DIRECTION / np.linalg.norm(
+        DIRECTION
+    )

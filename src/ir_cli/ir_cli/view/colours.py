@@ -38,7 +38,10 @@ SCALE = np.array(
 
 def by_power(watts: FloatArray) -> NDArray[np.uint8]:
     """Colours (N, 3) of watts (N,), from the least of them to the most."""
-    low, high = float(watts.min()), float(watts.max())
+    low = float(watts.min())
+    high = float(watts.max())
     share = (watts - low) / max(high - low, 1e-9)
     steps = np.linspace(0.0, 1.0, len(SCALE))
-    return np.stack([np.interp(share, steps, SCALE[:, k]) for k in range(3)], axis=1).astype(np.uint8)
+    return np.stack([np.interp(share, steps, SCALE[:, k]) for k in range(3)], axis=1).astype(
+        np.uint8
+    )

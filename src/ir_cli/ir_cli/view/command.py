@@ -20,15 +20,21 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_cell(view)
     words = f"on {HOST}; 0: a free one ({PORT}, or a free one where that is taken)"
     view.add_argument("--port", type=_port, help=words)
-    view.add_argument("--stations", nargs="+", default=[], metavar="NAME", help="visit these instead")
-    view.add_argument("--seconds", type=_seconds, default=math.inf, help="end after so long (with Ctrl-C)")
+    view.add_argument(
+        "--stations", nargs="+", default=[], metavar="NAME", help="visit these instead"
+    )
+    view.add_argument(
+        "--seconds", type=_seconds, default=math.inf, help="end after so long (with Ctrl-C)"
+    )
     view.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Serve the page until SIGINT, SIGTERM or the end of the given time."""
     check_installed()
-    from .session import Session  # planner and report, after the command line was found to make sense
+    from .session import (
+        Session,
+    )  # planner and report, after the command line was found to make sense
     from .watched import Watched
 
     watched = Watched(arguments.cell)
@@ -50,7 +56,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _port(text: str) -> int:
     if not (text.isascii() and text.isdigit() and int(text) <= 65535):
-        raise argparse.ArgumentTypeError(f"{text[:60]!r} must be a whole number 0 .. 65535; 0 is a free one")
+        raise argparse.ArgumentTypeError(
+            f"{text[:60]!r} must be a whole number 0 .. 65535; 0 is a free one"
+        )
     return int(text)
 
 

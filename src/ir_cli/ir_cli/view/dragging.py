@@ -19,7 +19,8 @@ class Dragging:
     """At most one handle; `dragged` is called by any thread, with whether it was let go."""
 
     def __init__(self, scene: Any, dragged: Callable[[bool], None]) -> None:
-        self._scene, self._dragged = scene, dragged
+        self._scene = scene
+        self._dragged = dragged
         self.target: Target | None = None
         self._handle: Any = None
 
@@ -27,7 +28,8 @@ class Dragging:
         """Show the handle at a target, None: nowhere."""
         if self._handle is not None:
             self._handle.remove()
-        self.target, self._handle = target, None
+        self.target = target
+        self._handle = None
         if target is not None:
             self._handle = self._scene.add_transform_controls("/drag", scale=SIZE, depth_test=False)
             self.settle(cell)
@@ -36,11 +38,16 @@ class Dragging:
     def settle(self, cell: Cell) -> None:
         """Put the handle where its target stands."""
         if self.target is not None:
-            kind, name = self.target.kind, self.target.name
-            placed(self._handle, cell.machine(name).pose if kind == "equipment" else cell.station(name).pose)
+            kind = self.target.kind
+            name = self.target.name
+            placed(
+                self._handle,
+                cell.machine(name).pose if kind == "equipment" else cell.station(name).pose,
+            )
 
     def pose(self, cell: Cell, file: Cell) -> FloatArray:
-        """The target's pose (4, 4) where the handle is, on the grid of what is written; file: as it was.
+        """The target's pose (4, 4) where the handle is, on the grid of what is written; file: as it
+        was.
 
         Raises ValueError or InvalidValueError for a pose that is none.
         """

@@ -1,7 +1,8 @@
-"""A cell in viser's scene: robot, loads, machines with their zones and stations, parts, a planned path.
+"""A cell in viser's scene: robot, loads, machines with their zones and stations, parts, a planned
+path.
 
-The triangles are those of the report. A machine is a frame with all that belongs to it below, so that moving
-it moves one frame.
+The triangles are those of the report. A machine is a frame with all that belongs to it below, so
+that moving it moves one frame.
 """
 
 from __future__ import annotations
@@ -37,17 +38,35 @@ from .poses import placed
 from .reach import reach_lines
 
 MOST_BODIES = 600
-"""Up to so many bodies stand for themselves; more are drawn as one per machine, and can't be highlighted."""
-_BOX = [(0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
+"""Up to so many bodies stand for themselves; more are drawn as one per machine, and can't be
+highlighted.
+"""
+_BOX = [
+    (0, 1),
+    (1, 3),
+    (3, 2),
+    (2, 0),
+    (4, 5),
+    (5, 7),
+    (7, 6),
+    (6, 4),
+    (0, 4),
+    (1, 5),
+    (2, 6),
+    (3, 7),
+]
 
 
 class Drawing:
     """A cell that is drawn; another one replaces all of it."""
 
     def __init__(self, scene: Any, cell: Cell) -> None:
-        self._scene, self.cell = scene, cell
+        self._scene = scene
+        self.cell = cell
         self._chain = Chain(cell.robot, cell.base_pose, cell.tcp)
-        self._meshes: dict[str, tuple[Any, Colour]] = {}  # by name of body or capsule: what is highlighted
+        self._meshes: dict[
+            str, tuple[Any, Colour]
+        ] = {}  # by name of body or capsule: what is highlighted
         self._machines: dict[str, Any] = {}
         self._links: list[Any] = []
         self._held: dict[str, list[Any]] = {}
@@ -65,13 +84,16 @@ class Drawing:
         self.states(cell)
 
     def _robot(self) -> None:
-        cell, scene = self.cell, self._scene
+        cell = self.cell
+        scene = self._scene
         for link in range(cell.robot.n + 1):
             self._links.append(scene.add_frame(f"/robot/link_{link}", show_axes=False))
         for k, part in enumerate(robot_parts(cell.robot)):
             self._mesh(f"/robot/link_{part.link}/look_{k}", part.mesh, KINDS[part.kind])
         for capsule in cell.robot.capsules:
-            self._capsule(f"/robot/link_{capsule.link}", capsule.name, capsule_mesh(capsule), hidden=True)
+            self._capsule(
+                f"/robot/link_{capsule.link}", capsule.name, capsule_mesh(capsule), hidden=True
+            )
         loads = [(load, "tool") for load in cell.loads()]
         loads += [(part.held(cell.tcp), "part") for part in cell.parts]
         for load, kind in loads:
@@ -80,7 +102,9 @@ class Drawing:
                 handle = self._mesh(path, capsule_mesh(capsule), KINDS[kind])
                 self._meshes[capsule.name] = handle, KINDS[kind]
                 self._held.setdefault(load.name, []).append(handle)
-        flange = scene.add_frame(f"/robot/link_{cell.robot.n}/tcp", axes_length=0.15, axes_radius=0.004)
+        flange = scene.add_frame(
+            f"/robot/link_{cell.robot.n}/tcp", axes_length=0.15, axes_radius=0.004
+        )
         placed(flange, cell.tcp)
         base = scene.add_frame("/reach", show_axes=False)
         placed(base, cell.base_pose)
@@ -94,7 +118,8 @@ class Drawing:
         self._shown["capsules"].append(handle)
 
     def _machine(self, name: str) -> None:
-        machine, scene = self.cell.machine(name), self._scene
+        machine = self.cell.machine(name)
+        scene = self._scene
         frame = scene.add_frame(f"/machines/{name}", show_axes=False)
         placed(frame, machine.pose)
         self._machines[name] = frame
@@ -117,7 +142,8 @@ class Drawing:
                 self._station(station.name)
 
     def _station(self, name: str) -> None:
-        station, scene = self.cell.station(name), self._scene
+        station = self.cell.station(name)
+        scene = self._scene
         path = f"/machines/{station.equipment}/station_{name}"
         frame = scene.add_frame(path, axes_length=0.15, axes_radius=0.006)
         placed(frame, station.pose_in_equipment)
@@ -135,7 +161,10 @@ class Drawing:
         self._parts[name] = frame
 
     def _floor(self) -> None:
-        far = max((float(np.abs(machine.pose[:2, 3]).max()) for machine in self.cell.equipment), default=1.0)
+        far = max(
+            (float(np.abs(machine.pose[:2, 3]).max()) for machine in self.cell.equipment),
+            default=1.0,
+        )
         size = 2.0 * (2.0 + far)
         self._scene.add_grid("/floor", width=size, height=size, visible=self.cell.floor)
 
@@ -155,7 +184,9 @@ class Drawing:
             self._meshes[body.name] = handle, colour
 
     def _merged(self, name: str, bodies: Sequence[Body], colour: Colour) -> None:
-        points, triangles, count = [], [], 0
+        points = []
+        triangles = []
+        count = 0
         for body in bodies:
             mesh = body_mesh(body)
             if mesh is not None:
@@ -205,7 +236,9 @@ class Drawing:
         """Shows of each machine what is there in its state."""
         for machine in cell.equipment:
             there = {body.name for body in machine.present_bodies()}
-            bound = {name for state in machine.states for name in state.bodies} & self._meshes.keys()
+            bound = {
+                name for state in machine.states for name in state.bodies
+            } & self._meshes.keys()
             for name in bound:
                 self._meshes[name][0].visible = name in there
 

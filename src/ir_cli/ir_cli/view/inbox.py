@@ -1,6 +1,8 @@
-"""What happened in browsers, for the one thread that changes anything: the latest of each kind counts.
+"""What happened in browsers, for the one thread that changes anything: the latest of each kind
+counts.
 
-A quick hand drags a machine through a hundred places a second; of those that wait only the last is looked at.
+A quick hand drags a machine through a hundred places a second; of those that wait only the last is
+looked at.
 """
 
 from __future__ import annotations

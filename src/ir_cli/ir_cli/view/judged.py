@@ -1,4 +1,6 @@
-"""What the robot can do at each station, with the configuration that does it best and its nearest pair."""
+"""What the robot can do at each station, with the configuration that does it best and its nearest
+pair.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +18,11 @@ from ..deep.stations import MARGIN, Visit, visits
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A station with one load: configurations that reach it, how many of them are free, and the best one.
+    """A station with one load: configurations that reach it, how many of them are free, and the
+    best one.
 
-    clearance [m] of q (n,) and its nearest pair (None, (): none reaches it); sentence: why none is free.
+    clearance [m] of q (n,) and its nearest pair (None, (): none reaches it); sentence: why none is
+    free.
     """
 
     station: str
@@ -37,10 +41,12 @@ def judged(cell: Cell, first: Collection[str] = ()) -> Iterator[Judged]:
 
 
 def _judged(visit: Visit) -> Judged:
-    station, scene = visit.station, visit.scene
+    station = visit.station
+    scene = visit.scene
     threshold = scene.thresholds(MARGIN, station.name)
     found = free_configurations(station.pose, scene, threshold, scene.cell.machine_home)
-    free, q = len(found.q), found.q
+    free = len(found.q)
+    q = found.q
     if not free:
         q = scene.inverse_kinematics.solve(np.asarray(station.pose)[None]).q
     sentence = "" if free else no_configuration(station.pose, scene, found, station.name).message
@@ -53,4 +59,6 @@ def _judged(visit: Visit) -> Judged:
     pair = scene.collision.pairs[int(near.pair[k])]
     names = (pair.body_a, pair.body_b)
     clearance = float(near.distance[k])
-    return Judged(station.name, scene.load_text, found.reached, free, clearance, q[k], names, sentence)
+    return Judged(
+        station.name, scene.load_text, found.reached, free, clearance, q[k], names, sentence
+    )

@@ -1,7 +1,9 @@
-"""Who may look: the address that `ir view` prints ends with a token, and only who has it gets an answer.
+"""Who may look: the address that `ir view` prints ends with a token, and only who has it gets an
+answer.
 
-The page is asked for with the token; its answer sets a cookie, which the browser sends with everything that
-the page asks for then, the websocket included. Cookies don't know ports, so its name has the port.
+The page is asked for with the token; its answer sets a cookie, which the browser sends with
+everything that the page asks for then, the websocket included. Cookies don't know ports, so its
+name has the port.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """viser's server, for browsers on this machine alone.
 
-It listens on 127.0.0.1 and answers to who has its token, and to a page that it served itself: a page from
-elsewhere in the same browser is refused by its Origin. viser can publish a server through a tunnel when a
-client asks for it; not this one.
+It listens on 127.0.0.1 and answers to who has its token, and to a page that it served itself: a
+page from elsewhere in the same browser is refused by its Origin. viser can publish a server through
+a tunnel when a client asks for it; not this one.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ def check_installed() -> None:
 
 
 def opened(port: int | None, token: str) -> Any:
-    """A running viser.ViserServer on a port, 0: a free one, None: the usual one or a free one; for who has
-    the token.
+    """A running viser.ViserServer on a port, 0: a free one, None: the usual one or a free one; for
+    who has the token.
 
     Raises CommandError where the port is taken.
     """
@@ -76,18 +76,20 @@ def _on(port: int, token: str) -> Any:
 
 
 class _asked_by:  # noqa: N801 - used as a function
-    """While it lasts, servers of websockets start that answer to these origins only (None: to programs), and
-    to who has the token.
+    """While it lasts, servers of websockets start that answer to these origins only (None: to
+    programs), and to who has the token.
     """
 
     def __init__(self, origins: list[str], token: str, port: int) -> None:
         self._origins: list[Any] = [*origins, None]
-        self._token, self._port = token, port
+        self._token = token
+        self._port = port
 
     def __enter__(self) -> None:
         import websockets.asyncio.server as module
 
-        self._module, self._serve = module, module.serve
+        self._module = module
+        self._serve = module.serve
         module.serve = self._started  # type: ignore[assignment, misc]  # viser has no argument for it
 
     def _started(self, *arguments: Any, process_request: Answer, **settings: Any) -> Any:

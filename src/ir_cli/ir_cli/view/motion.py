@@ -1,4 +1,6 @@
-"""A plan as it is played: joint values, power and the tool's place over time, with what each step is."""
+"""A plan as it is played: joint values, power and the tool's place over time, with what each step
+is.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +24,8 @@ PAUSE_SHOWN = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A movement or a pause: what it is, its true seconds and joules, what is held and where parts lie
-    meanwhile, and the cell with its machines in their states.
+    """A movement or a pause: what it is, its true seconds and joules, what is held and where parts
+    lie meanwhile, and the cell with its machines in their states.
     """
 
     label: str
@@ -38,8 +40,8 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """time (N,) s from 0, q (N, n) rad, watts (N,) W at the mains, tool (N, 3) m in the world, step (N,) of
-    steps. shortened: whether pauses are played shorter than they are.
+    """time (N,) s from 0, q (N, n) rad, watts (N,) W at the mains, tool (N, 3) m in the world, step
+    (N,) of steps. shortened: whether pauses are played shorter than they are.
     """
 
     time: FloatArray
@@ -60,7 +62,9 @@ class Motion:
         return min(int(np.searchsorted(self.time, time)), len(self.time) - 1)
 
     def segments(self) -> IntArray:
-        """Samples k (M,) whose successor belongs to the same movement: the pieces of the tool's path."""
+        """Samples k (M,) whose successor belongs to the same movement: the pieces of the tool's
+        path.
+        """
         moves = np.abs(np.diff(self.tool, axis=0)).max(axis=1, initial=0.0) > 1e-6
         return np.flatnonzero(moves & (np.diff(self.step) == 0))
 
@@ -70,11 +74,18 @@ def motion_of(
 ) -> Motion | None:
     """The movements one after the other; None where there is none. scene_of: with a load."""
     chain = Chain(cell.robot, cell.base_pose, cell.tcp)
-    places, begin, shortened, states = cell.parts_at_start(), 0.0, False, States(cell)
+    places = cell.parts_at_start()
+    begin = 0.0
+    shortened = False
+    states = States(cell)
     q = next((m.trajectory.sample([0.0]).q[0] for m in movements if m.trajectory is not None), None)
     if q is None:
         return None
-    times, qs, watts, numbers, steps = [], [], [], [], []
+    times = []
+    qs = []
+    watts = []
+    numbers = []
+    steps = []
     for number, movement in enumerate(movements):
         shown = min(movement.duration, PAUSE_SHOWN) if movement.is_pause else movement.duration
         shortened |= shown < movement.duration
@@ -100,10 +111,13 @@ def motion_of(
 
 
 class States:
-    """States of machines along a program: as its movements rely on them, and as its signals turn them."""
+    """States of machines along a program: as its movements rely on them, and as its signals turn
+    them.
+    """
 
     def __init__(self, cell: Cell) -> None:
-        self._cell, self._now = cell, {machine.name: machine.state for machine in cell.equipment}
+        self._cell = cell
+        self._now = {machine.name: machine.state for machine in cell.equipment}
         self._cells: dict[tuple[str, ...], Cell] = {tuple(self._now.values()): cell}
 
     def during(self, movement: PlannedMovement) -> Cell:
@@ -122,7 +136,9 @@ class States:
             name, _, level = text.partition("=")
             for machine in self._cell.equipment:
                 if machine.switch is not None and machine.switch.signal == name:
-                    self._turn(machine.name, machine.switch.off if level == "0" else machine.switch.on)
+                    self._turn(
+                        machine.name, machine.switch.off if level == "0" else machine.switch.on
+                    )
 
     def _turn(self, machine: str, state: str) -> None:
         if state in [each.name for each in self._cell.machine(machine).states]:

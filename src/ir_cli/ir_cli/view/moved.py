@@ -1,7 +1,8 @@
-"""A cell with machines and stations where they were dragged, and its file with nothing else changed.
+"""A cell with machines and stations where they were dragged, and its file with nothing else
+changed.
 
-Only the numbers of the poses are replaced in the file's text: comments, order and layout stay. What comes out
-is read again and compared with what is shown before anybody gets it.
+Only the numbers of the poses are replaced in the file's text: comments, order and layout stay. What
+comes out is read again and compared with what is shown before anybody gets it.
 """
 
 from __future__ import annotations
@@ -73,7 +74,9 @@ def snippet(moves: Moves) -> str:
 
 
 def edited(text: str, cell: Cell, moves: Moves) -> str:
-    """The text of the file of `cell` with the moves. ValueError where a pose can't be found in it."""
+    """The text of the file of `cell` with the moves. ValueError where a pose can't be found in
+    it.
+    """
     changes: list[tuple[int, int, str]] = []
     places = dict(_places(yaml.compose(text, Loader=_LOADER)))
     for target, pose in moves.items():

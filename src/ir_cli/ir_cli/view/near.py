@@ -29,16 +29,25 @@ class Nearest:
 
 
 class NearestPairs:
-    """Finds the nearest pair in a cell; keeps the model of it until what is held or lies there changes."""
+    """Finds the nearest pair in a cell; keeps the model of it until what is held or lies there
+    changes.
+    """
 
     def __init__(self) -> None:
         self._model: tuple[object, CollisionModel] | None = None
         self._cell: Cell | None = None
 
     def at(
-        self, cell: Cell, q: FloatArray, load: str, places: PartPlaces, movement: PlannedMovement | None
+        self,
+        cell: Cell,
+        q: FloatArray,
+        load: str,
+        places: PartPlaces,
+        movement: PlannedMovement | None,
     ) -> Nearest | None:
-        """At q (n,), without pairs that the movement's stations allow to touch; None: there is none."""
+        """At q (n,), without pairs that the movement's stations allow to touch; None: there is
+        none.
+        """
         model = self._of(cell, load, places)
         offset = np.zeros(len(model.pairs))
         if movement is not None and movement.trajectory is not None:
@@ -53,5 +62,6 @@ class NearestPairs:
     def _of(self, cell: Cell, load: str, places: PartPlaces) -> CollisionModel:
         key = (load, places.held, tuple(sorted(places.lying.items())))
         if self._model is None or self._model[0] != key or self._cell is not cell:
-            self._model, self._cell = (key, collision_model(cell, load, places)), cell
+            self._model = (key, collision_model(cell, load, places))
+            self._cell = cell
         return self._model[1]

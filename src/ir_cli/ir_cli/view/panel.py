@@ -45,9 +45,13 @@ class Panel:
     """The controls of one robot."""
 
     def __init__(self, gui: Any, robot: RobotModel, post: Post, do: Actions) -> None:
-        self._gui, self._post = gui, post
+        self._gui = gui
+        self._post = post
         gui.configure_theme(  # beside the picture, not over it
-            control_layout="collapsible", control_width="medium", show_logo=False, show_share_button=False
+            control_layout="collapsible",
+            control_width="medium",
+            show_logo=False,
+            show_share_button=False,
         )
         self.status = gui.add_html("")
         with gui.add_folder("Program"):
@@ -70,14 +74,17 @@ class Panel:
             self.undo = self._button("Undo all moves", do.undo, visible=False)
         with gui.add_folder("Show", expand_by_default=False):
             self.shown = {
-                name: self._input(gui.add_checkbox(name, name in ("zones", "labels")), "show", do.show)
+                name: self._input(
+                    gui.add_checkbox(name, name in ("zones", "labels")), "show", do.show
+                )
                 for name in ("zones", "labels", "capsules", "reach")
             }
 
     def of_cell(self, name: str, targets: Iterable[str], stations: Iterable[Station]) -> None:
         """What can be chosen in another cell."""
         self._gui.set_panel_label(f"ir view {name}")
-        self.target.options, self.target.value = (NOBODY, *targets), NOBODY
+        self.target.options = (NOBODY, *targets)
+        self.target.value = NOBODY
         self.at.options = (NOBODY, "home", "park", *(station.name for station in stations))
         self.at.value = NOBODY
 
@@ -87,7 +94,9 @@ class Panel:
         self.progress.value = 0.0
 
     def _joint(self, k: int, robot: RobotModel, action: Callable[[], None]) -> Any:
-        low, high, home = np.degrees([robot.position_min[k], robot.position_max[k], robot.machine_home[k]])
+        low, high, home = np.degrees(
+            [robot.position_min[k], robot.position_max[k], robot.machine_home[k]]
+        )
         slider = self._gui.add_slider(f"A{k + 1}", float(low), float(high), 0.1, float(home))
         return self._input(slider, "joints", action)
 
@@ -136,7 +145,8 @@ def stations_html(found: Sequence[Judged], complete: bool) -> str:
 def legend_html(motion: Motion) -> str:
     """The colours of the path with the watts that they mean."""
     stops = ",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in SCALE)
-    low, high = motion.watts.min() / 1e3, motion.watts.max() / 1e3
+    low = motion.watts.min() / 1e3
+    high = motion.watts.max() / 1e3
     bar = f"<div style='height:8px;background:linear-gradient(to right,{stops})'></div>"
     note = "<br>pauses are played in 1 s at most" if motion.shortened else ""
     return f"<div {_BOX}>{bar}{low:.1f} kW to {high:.1f} kW at the mains{note}</div>"

@@ -1,4 +1,6 @@
-"""Checks and plans a cell in a thread of its own; a newer cell, or a person, ends the one under way."""
+"""Checks and plans a cell in a thread of its own; a newer cell, or a person, ends the one under
+way.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ QUIET = 0.4
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """A cell to check, those stations first, and to plan: `stations`, none: its program, or its tasks."""
+    """A cell to check, those stations first, and to plan: `stations`, none: its program, or its
+    tasks.
+    """
 
     number: int
     cell: Cell
@@ -38,7 +42,9 @@ class Asked:
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """A plan as it is played (None: there is none), what is known about it, and why it was not found."""
+    """A plan as it is played (None: there is none), what is known about it, and why it was not
+    found.
+    """
 
     motion: Motion | None
     lines: tuple[str, ...] = ()
@@ -61,7 +67,8 @@ class Worker:
     """Works on what was asked last, until it is closed."""
 
     def __init__(self, inbox: Inbox, listener: Listener) -> None:
-        self._inbox, self._listener = inbox, listener
+        self._inbox = inbox
+        self._listener = listener
         self._asked: Asked | None = None
         self._latest = 0
         self._closed = False
@@ -72,19 +79,23 @@ class Worker:
     def ask(self, asked: Asked) -> None:
         """Work on this; what was under way ends."""
         with self._changed:
-            self._asked, self._latest = asked, asked.number
+            self._asked = asked
+            self._latest = asked.number
             self._changed.notify()
 
     def cancel(self) -> None:
         """End what is under way, without an answer."""
         with self._changed:
-            self._asked, self._latest = None, 0
+            self._asked = None
+            self._latest = 0
             self._changed.notify()
 
     def close(self, patience: float = 5.0) -> None:
         """End the thread, at its next look at its work."""
         with self._changed:
-            self._closed, self._asked, self._latest = True, None, 0
+            self._closed = True
+            self._asked = None
+            self._latest = 0
             self._changed.notify()
         self._thread.join(patience)
 
@@ -94,14 +105,20 @@ class Worker:
                 self._changed.wait_for(lambda: self._asked is not None or self._closed)
                 if self._closed:
                     return
-                asked, self._asked = self._asked, None
+                asked = self._asked
+                self._asked = None
             assert asked is not None
             try:
                 self._work(asked)
             except CancelledError:
                 continue
             except (DescriptionError, KernelError, MsgsError, PlannerError) as error:
-                self._post("planned", self._listener.planned, asked.number, Planned(None, failure=str(error)))
+                self._post(
+                    "planned",
+                    self._listener.planned,
+                    asked.number,
+                    Planned(None, failure=str(error)),
+                )
             except BaseException as error:
                 self._inbox.post("fault", partial(_raise, error))
                 return
@@ -138,7 +155,9 @@ class Worker:
             )
             if not plan.status.ok:
                 return Planned(None, failure=plan.status.message)
-            return Planned(motion_of(plan.movements, cell, planner.scene), tuple(sentences_of(plan)[:2]))
+            return Planned(
+                motion_of(plan.movements, cell, planner.scene), tuple(sentences_of(plan)[:2])
+            )
         movements = []
         failures = []
         for each in _tasks(planner, progress, old):

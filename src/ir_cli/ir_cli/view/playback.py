@@ -21,7 +21,9 @@ class Playback:
     @property
     def step(self) -> Step | None:
         """The step that is shown."""
-        return None if self.motion is None else self.motion.steps[int(self.motion.step[self.sample])]
+        return (
+            None if self.motion is None else self.motion.steps[int(self.motion.step[self.sample])]
+        )
 
     def advance(self, seconds: float) -> None:
         """Go on by so many seconds; after the end from the beginning."""

@@ -1,4 +1,6 @@
-"""Poses between the cell, viser and what a person may mean: rounded to millimetres and tenths of a degree."""
+"""Poses between the cell, viser and what a person may mean: rounded to millimetres and tenths of a
+degree.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,9 @@ def pose_of_handle(handle: Any) -> FloatArray:
 
 
 def meant(dragged: FloatArray, before: FloatArray) -> FloatArray:
-    """A dragged pose (4, 4) on the grid of what is written; what did not move stays as it was before."""
+    """A dragged pose (4, 4) on the grid of what is written; what did not move stays as it was
+    before.
+    """
     moved = np.abs(dragged[:3, 3] - before[:3, 3]) > _SAME_PLACE
     xyz = np.where(moved, np.round(dragged[:3, 3], MILLIMETRE), before[:3, 3])
     turned = Rotation.from_matrix(dragged[:3, :3] @ before[:3, :3].T).magnitude() > _SAME_TURN

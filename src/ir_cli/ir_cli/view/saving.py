@@ -1,4 +1,6 @@
-"""Writes what was dragged as a new file beside the cell's own, or here where the cell is bundled."""
+"""Writes what was dragged as a new file beside the cell's own, or here where the cell is
+bundled.
+"""
 
 from __future__ import annotations
 
@@ -20,14 +22,17 @@ class SavingError(Exception):
 def save(watched: Watched, cell: Cell, moves: Moves) -> Path:
     """The new file: the text of the old one, comments and all, with the moves. Raises SavingError.
 
-    cell: as the file has it. No file is ever overwritten, and what was written is read back and compared.
+    cell: as the file has it. No file is ever overwritten, and what was written is read back and
+    compared.
     """
     try:
         text = edited(_text(watched), cell, moves)
         path = _written(watched, text)
         if cell_to_yaml(load_cell(path)) != cell_to_yaml(cell_with(cell, moves)):
             path.unlink()
-            raise SavingError("the file has changed meanwhile, or its poses can't be replaced one by one")
+            raise SavingError(
+                "the file has changed meanwhile, or its poses can't be replaced one by one"
+            )
     except (OSError, UnicodeError, ValueError, DescriptionError) as error:
         raise SavingError(str(error)) from error
     return path
@@ -36,7 +41,9 @@ def save(watched: Watched, cell: Cell, moves: Moves) -> Path:
 def _text(watched: Watched) -> str:
     if watched.path is not None:
         return watched.path.read_text(encoding="utf-8")
-    return (files("ir_description") / "data" / "cells" / f"{watched.name}.yaml").read_text(encoding="utf-8")
+    return (files("ir_description") / "data" / "cells" / f"{watched.name}.yaml").read_text(
+        encoding="utf-8"
+    )
 
 
 def _written(watched: Watched, text: str) -> Path:

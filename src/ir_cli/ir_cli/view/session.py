@@ -1,4 +1,6 @@
-"""One look at a cell: what is shown, what was dragged, what is planned. One thread runs all of it."""
+"""One look at a cell: what is shown, what was dragged, what is planned. One thread runs all of
+it.
+"""
 
 from __future__ import annotations
 
@@ -35,11 +37,14 @@ class Session:
     """Shows a cell until `run` returns; `close` ends its thread."""
 
     def __init__(self, server: Any, watched: Watched, stations: tuple[str, ...] = ()) -> None:
-        self._server, self._watched, self._stations = server, watched, stations
+        self._server = server
+        self._watched = watched
+        self._stations = stations
         self._inbox = Inbox()
         self._worker = Worker(self._inbox, Listener(self._checked, self._progress, self._planned))
         self._number = 0
-        self._playback, self._slid = Playback(), 0.0
+        self._playback = Playback()
+        self._slid = 0.0
         self._passed = self._looked = time.monotonic()
         self._moves: dict[Target, FloatArray] = {}
         self._file: Cell | None = None
@@ -50,7 +55,9 @@ class Session:
         self._read()
 
     def run(self, until: float = np.inf) -> None:
-        """Do what browsers, file and planner ask for, until the monotonic clock says `until` [s]."""
+        """Do what browsers, file and planner ask for, until the monotonic clock says `until`
+        [s].
+        """
         while (now := time.monotonic()) < until:
             for action in self._inbox.take(TICK if self._playback.runs else LOOK / 3.0):
                 action()
@@ -67,9 +74,12 @@ class Session:
         self._worker.close()
 
     def _read(self) -> None:
-        """Take the file as it is now; where it has errors, these stand beside the cell that it had."""
+        """Take the file as it is now; where it has errors, these stand beside the cell that it
+        had.
+        """
         reading = self._watched.read()
-        cell, file = reading.cell, self._file
+        cell = reading.cell
+        file = self._file
         if cell is not None and (file is None or cell_to_yaml(cell) != cell_to_yaml(file)):
             note = "read again; what was dragged is dropped" if self._moves else ""
             self._show(cell)
@@ -86,7 +96,9 @@ class Session:
         other = self._file is None or self._file.robot.document != cell.robot.document
         other |= self._file is not None and self._file.robot.name != cell.robot.name
         q = np.array(cell.machine_home) if other else self._stage.q
-        self._file, self._moves, self._playback = cell, {}, Playback()
+        self._file = cell
+        self._moves = {}
+        self._playback = Playback()
         self._dragging.choose(None, cell)
         with self._server.atomic():
             self._server.scene.reset()
@@ -154,13 +166,16 @@ class Session:
     def _target_chosen(self) -> None:
         cell = self._stage.cell
         wanted = self._panel.target.value
-        self._dragging.choose(next((each for each in targets(cell) if each.text == wanted), None), cell)
+        self._dragging.choose(
+            next((each for each in targets(cell) if each.text == wanted), None), cell
+        )
 
     def _post_drag(self, ended: bool) -> None:
         self._inbox.post("drag", lambda: self._dragged(ended))
 
     def _dragged(self, ended: bool) -> None:
-        target, file = self._dragging.target, self._file
+        target = self._dragging.target
+        file = self._file
         if target is None or file is None:
             return
         try:
@@ -176,9 +191,11 @@ class Session:
 
     def _take(self, cell: Cell, moves: dict[Target, FloatArray], target: Target | None) -> None:
         """Show and plan the cell with these moves; target: what moved last."""
-        self._moves, self._stage.note = moves, ""
+        self._moves = moves
+        self._stage.note = ""
         self._stop()
-        self._stage.found, self._stage.failure = (), ""
+        self._stage.found = ()
+        self._stage.failure = ""
         with self._server.atomic():
             self._stage.move(cell)
             self._stage.stand(self._stage.q)
@@ -207,7 +224,11 @@ class Session:
 
     def _say_moves(self) -> None:
         there = bool(self._moves)
-        text = f"<pre style='white-space:pre-wrap'>{plain(snippet(self._moves))}</pre>" if there else ""
+        text = (
+            f"<pre style='white-space:pre-wrap'>{plain(snippet(self._moves))}</pre>"
+            if there
+            else ""
+        )
         self._panel.moves_text.content = box([text] if there else [])
         self._panel.save.visible = self._panel.undo.visible = there
 
@@ -241,13 +262,16 @@ class Session:
         if number != self._number:
             return
         motion = plan.motion
-        self._stage.failure, self._playback = plan.failure, Playback(motion)
+        self._stage.failure = plan.failure
+        self._playback = Playback(motion)
         self._panel.working(False)
         lines = [bad(f"not planned: {plan.failure}")] if plan.failure else []
         lines += map(plain, plan.lines)
         if motion is None and not plan.failure:
             lines.append("the cell has neither program nor tasks: nothing was planned")
-        self._panel.plan_text.content = box(lines) + (legend_html(motion) if motion is not None else "")
+        self._panel.plan_text.content = box(lines) + (
+            legend_html(motion) if motion is not None else ""
+        )
         self._panel.time.max = round(motion.duration, 2) if motion is not None else 1.0
         self._panel.time.value = 0.0
         self._stage.drawing.path(motion)
@@ -287,7 +311,9 @@ class Session:
 
     def _picture(self) -> None:
         """Draw the robot as the motion has it now."""
-        motion, step, stage = self._playback.motion, self._playback.step, self._stage
+        motion = self._playback.motion
+        step = self._playback.step
+        stage = self._stage
         if motion is None or step is None:
             return
         k = self._playback.sample

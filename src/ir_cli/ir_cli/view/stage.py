@@ -26,8 +26,12 @@ class Stage:
     """
 
     def __init__(self, server: Any, cell: Cell, source: str, q: FloatArray) -> None:
-        self._server, self._source, self._pairs = server, source, NearestPairs()
-        self.cell, self._now, self.q = cell, cell, q
+        self._server = server
+        self._source = source
+        self._pairs = NearestPairs()
+        self.cell = cell
+        self._now = cell
+        self.q = q
         self.held = cell.tool.name if cell.tool is not None else ""
         self.places = cell.parts_at_start()
         self.near: Nearest | None = None
@@ -51,13 +55,16 @@ class Stage:
         self.drawing.path(None)
 
     def hold(self, load: str, places: PartPlaces, cell: Cell | None = None) -> None:
-        """What the robot holds, where the parts lie, and the cell with its machines in other states."""
+        """What the robot holds, where the parts lie, and the cell with its machines in other
+        states.
+        """
         now = cell or self.cell
         if now is not self._now:
             self._now = now
             self.drawing.states(now)
         if (load, places) != (self.held, self.places):
-            self.held, self.places = load, places
+            self.held = load
+            self.places = places
             self.drawing.lie(places, load)
 
     def stand(self, q: FloatArray, movement: PlannedMovement | None = None) -> None:
@@ -91,8 +98,8 @@ class Stage:
         return box(lines)
 
     def configuration(self, name: str) -> FloatArray | None:
-        """Joint values (n,) of a posture, or of the best configuration at a station with what is held there;
-        None, and a note, where there is none.
+        """Joint values (n,) of a posture, or of the best configuration at a station with what is
+        held there; None, and a note, where there is none.
         """
         if name in ("home", "park"):
             return np.array(self.cell.posture(name))

@@ -39,7 +39,9 @@ class Reading:
 
 
 class Watched:
-    """A cell file, or a bundled cell, which never changes. Raises InputError where there is none."""
+    """A cell file, or a bundled cell, which never changes. Raises InputError where there is
+    none.
+    """
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -70,7 +72,9 @@ class Watched:
             return Reading(None, tuple(map(str, found[:MOST_ERRORS])))
 
     def changed(self, now: float) -> bool:
-        """Whether it was saved since it was read, and is not being written any more; now: a clock [s]."""
+        """Whether it was saved since it was read, and is not being written any more; now: a clock
+        [s].
+        """
         stamp = self._stamped()
         if stamp == self._stamp:
             self._seen = None
@@ -97,7 +101,9 @@ def _beside(folder: Path) -> Iterator[str]:
     count = 0
     for root, folders, names in os.walk(folder or "."):
         depth = len(Path(root).relative_to(folder).parts)
-        folders[:] = sorted(each for each in folders if not each.startswith(".")) if depth < DEPTH else []
+        folders[:] = (
+            sorted(each for each in folders if not each.startswith(".")) if depth < DEPTH else []
+        )
         for name in sorted(names):
             count += 1
             if count > MOST_FILES:

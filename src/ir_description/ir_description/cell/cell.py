@@ -19,7 +19,14 @@ from ir_description.cell.checks import (
     check_program,
     check_single_places,
 )
-from ir_description.cell.equipment import AllowedContact, Equipment, Station, Zone, station_at, zone_around
+from ir_description.cell.equipment import (
+    AllowedContact,
+    Equipment,
+    Station,
+    Zone,
+    station_at,
+    zone_around,
+)
 from ir_description.cell.part import Part
 from ir_description.cell.program import CellSignal, PartPlaces, ProgramStep
 from ir_description.cell.tool_path import CellPath
@@ -53,8 +60,8 @@ class Task:
 class Cell:
     """base_pose (4, 4) of base_link in the world; tcp (4, 4) in the last link.
 
-    park and machine_home (n,) [rad] are the two named postures. base_contacts: pairs of a capsule of
-    base_link and a body that touch for good (a pedestal); `ignored_pairs` adds the floor.
+    park and machine_home (n,) [rad] are the two named postures. base_contacts: pairs of a capsule
+    of base_link and a body that touch for good (a pedestal); `ignored_pairs` adds the floor.
     """
 
     name: str
@@ -84,7 +91,9 @@ class Cell:
             object.__setattr__(self, name, posture)
             check_posture(self.robot, posture, name)
         for task in self.tasks:
-            check_posture(self.robot, frozen(task.start, (n,), "start"), f"start of task {task.name}")
+            check_posture(
+                self.robot, frozen(task.start, (n,), "start"), f"start of task {task.name}"
+            )
             check_posture(self.robot, frozen(task.goal, (n,), "goal"), f"goal of task {task.name}")
         check_names(self)
         check_single_places(self.parts)
@@ -121,7 +130,9 @@ class Cell:
         return self._stop(stop).allowed_contacts
 
     def zone_at(self, stop: str) -> Zone | None:
-        """Return the zone of its machine, in which they may; None for a path that belongs to none."""
+        """Return the zone of its machine, in which they may; None for a path that belongs to
+        none.
+        """
         machine = self._stop(stop).equipment
         return self.machine(machine).zone if machine else None
 
@@ -136,7 +147,8 @@ class Cell:
         return self.machine_home if name == "home" else self.park
 
     def bodies(self, parts: PartPlaces | None = None) -> tuple[Body, ...]:
-        """Return all bodies in the world: the floor, the enabled equipment as it stands, the parts that lie.
+        """Return all bodies in the world: the floor, the enabled equipment as it stands, the parts
+        that lie.
 
         `parts` says where the parts are; None: where they are before the program starts.
         """
@@ -161,7 +173,9 @@ class Cell:
         return (*self.robot.capsules, *(c for load in self.loads(held) for c in load.capsules))
 
     def self_pairs(self, held: str = "") -> tuple[tuple[str, str], ...]:
-        """Return the pairs of capsules that can touch: every load against the robot, and the robot's own."""
+        """Return the pairs of capsules that can touch: every load against the robot, and the
+        robot's own.
+        """
         loads = tuple(
             (capsule.name, other)
             for load in self.loads(held)
@@ -181,9 +195,15 @@ class Cell:
         return PartPlaces("", {part.name: part.station for part in self.parts})
 
     def with_equipment(
-        self, name: str, pose: FloatArray | None = None, enabled: bool | None = None, state: str | None = None
+        self,
+        name: str,
+        pose: FloatArray | None = None,
+        enabled: bool | None = None,
+        state: str | None = None,
     ) -> Cell:
-        """Return the cell with a machine moved, switched on or off, or in another state; stations follow."""
+        """Return the cell with a machine moved, switched on or off, or in another state; stations
+        follow.
+        """
         old = self.machine(name)
         new = replace(
             old,
@@ -203,10 +223,18 @@ class Cell:
         old = self.station(name)
         machine = self.machine(old.equipment)
         moved = station_at(
-            machine, name, pose_in_equipment, old.allowed_contacts, old.approach_distance, old.search
+            machine,
+            name,
+            pose_in_equipment,
+            old.allowed_contacts,
+            old.approach_distance,
+            old.search,
         )
         stations = tuple(moved if station is old else station for station in self.stations)
-        mine = [tuple(s for s in each if s.equipment == machine.name) for each in (self.stations, stations)]
+        mine = [
+            tuple(s for s in each if s.equipment == machine.name)
+            for each in (self.stations, stations)
+        ]
         equipment = self.equipment
         if machine.has_default_zone(mine[0]):
             zone = zone_around(machine.zone_in_equipment.kind, machine.bodies, mine[1])
@@ -218,7 +246,8 @@ class Cell:
 def check_posture(robot: RobotModel, posture: FloatArray, name: str) -> None:
     """Refuse joint values (n,) [rad] beyond the robot's limits."""
     for i, value in enumerate(posture):
-        low, high = robot.position_min[i], robot.position_max[i]
+        low = robot.position_min[i]
+        high = robot.position_max[i]
         if not low <= value <= high:
             raise InvalidValueError(
                 f"{name}: {robot.joint_names[i]} is {np.degrees(value):g} deg, must be in "

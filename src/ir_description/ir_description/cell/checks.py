@@ -1,6 +1,8 @@
-"""What must hold between the things of a cell: unique names, known names, a payload the robot carries.
+"""What must hold between the things of a cell: unique names, known names, a payload the robot
+carries.
 
-The rules are small objects and functions so that the reader of cell files can ask each at the line it reads.
+The rules are small objects and functions so that the reader of cell files can ask each at the line
+it reads.
 """
 
 from __future__ import annotations
@@ -71,19 +73,25 @@ class NameRegister:
 
 
 def shape_register(robot: RobotModel) -> NameRegister:
-    """Return the register of all capsules and bodies: a reported pair must be clear by its names."""
+    """Return the register of all capsules and bodies: a reported pair must be clear by its
+    names.
+    """
     return NameRegister("capsule or body", [*(capsule.name for capsule in robot.capsules), "floor"])
 
 
-def check_contact(contact: AllowedContact, capsules: Collection[str], bodies: Collection[str]) -> None:
-    """Refuse an allowed contact whose names nobody has, or without a capsule of robot, tool or part."""
+def check_contact(
+    contact: AllowedContact, capsules: Collection[str], bodies: Collection[str]
+) -> None:
+    """Refuse an allowed contact whose names nobody has, or without a capsule of robot, tool or
+    part.
+    """
     for name in (contact.body_a, contact.body_b):
         if name not in capsules and name not in bodies:
             raise UnknownNameError("capsule or body", name, sorted(capsules) + sorted(bodies))
     if contact.body_a not in capsules and contact.body_b not in capsules:
         raise InvalidValueError(
-            f"allowed contact {contact.body_a}, {contact.body_b} has no capsule of robot, tool or part; "
-            f"capsules are {', '.join(sorted(capsules))}"
+            f"allowed contact {contact.body_a}, {contact.body_b} has no capsule of robot, tool "
+            f"or part; capsules are {', '.join(sorted(capsules))}"
         )
 
 
@@ -128,10 +136,12 @@ def check_follows(signals: Iterable[CellSignal]) -> None:
 def check_switch(machine: Equipment, signals: Collection[str]) -> None:
     """Refuse a machine whose switch names a signal that nobody has."""
     if machine.switch is not None and machine.switch.signal not in signals:
-        raise UnknownNameError(f"signal that switches {machine.name}", machine.switch.signal, signals)
+        raise UnknownNameError(
+            f"signal that switches {machine.name}", machine.switch.signal, signals
+        )
 
 
-def check_names(cell: _Cell) -> None:
+def check_names(cell: _Cell) -> None:  # noqa: C901
     """Refuse names that are given twice or that nobody has."""
     shapes = shape_register(cell.robot)
     for shape in _load_capsules(cell):
@@ -159,7 +169,9 @@ def check_names(cell: _Cell) -> None:
             raise UnknownNameError(f"station of part {part.name}", part.station, stations)
     for station in cell.stations:
         if station.equipment not in machines:
-            raise UnknownNameError(f"equipment of station {station.name}", station.equipment, machines)
+            raise UnknownNameError(
+                f"equipment of station {station.name}", station.equipment, machines
+            )
     check_follows(cell.signals)
     signals = dict.fromkeys(signal.name for signal in cell.signals)
     for machine in cell.equipment:
@@ -183,7 +195,9 @@ def check_contacts(cell: _Cell) -> None:
         for contact in station.allowed_contacts:
             check_contact(contact, capsules, bodies)
     for path in cell.paths:
-        check_path(path, dict.fromkeys(machine.name for machine in cell.equipment), capsules, bodies)
+        check_path(
+            path, dict.fromkeys(machine.name for machine in cell.equipment), capsules, bodies
+        )
     for capsule, body in cell.base_contacts:
         check_base_contact(cell.robot, capsule, body, bodies)
 

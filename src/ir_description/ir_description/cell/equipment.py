@@ -42,7 +42,9 @@ class Zone:
 
     def __post_init__(self) -> None:
         if self.kind not in ZONE_KINDS:
-            raise InvalidValueError(f"kind of zone is {self.kind!r}, must be one of {', '.join(ZONE_KINDS)}")
+            raise InvalidValueError(
+                f"kind of zone is {self.kind!r}, must be one of {', '.join(ZONE_KINDS)}"
+            )
         object.__setattr__(self, "pose", frozen_pose(self.pose, "pose of the zone"))
         object.__setattr__(self, "size", frozen(self.size, (3,), "size of the zone"))
         if (self.size <= 0.0).any() or (self.size > ZONE_MAX).any():
@@ -54,11 +56,14 @@ class Zone:
 def zone_around(kind: ZoneKind, bodies: Iterable[Body], stations: Iterable[Station] = ()) -> Zone:
     """Return the box of a machine's bodies and its stations' tcps along the axes of its frame.
 
-    What stands on a table belongs to it, up to the height of the station above it. Planes don't count.
+    What stands on a table belongs to it, up to the height of the station above it. Planes don't
+    count.
     """
     bounds = [body.bounds() for body in bodies if body.kind != "plane"]
     if not bounds:
-        raise InvalidValueError("the zone has no bodies to enclose; give its box (zone: {kind, size, ...})")
+        raise InvalidValueError(
+            "the zone has no bodies to enclose; give its box (zone: {kind, size, ...})"
+        )
     tcps = [station.pose_in_equipment[:3, 3] for station in stations]
     low = np.min([*(low for low, _ in bounds), *tcps], axis=0)
     high = np.max([*(high for _, high in bounds), *tcps], axis=0)
@@ -95,8 +100,9 @@ class StateSwitch:
 class Equipment:
     """A machine. pose (4, 4) in the world; bodies and zone_in_equipment in the machine's frame.
 
-    A body that no state names is always there; one that states name is there in these states only. Where
-    there is a switch, `state` is the one that plans assume and that counts until its signal is heard.
+    A body that no state names is always there; one that states name is there in these states only.
+    Where there is a switch, `state` is the one that plans assume and that counts until its signal
+    is heard.
     """
 
     name: str
@@ -119,7 +125,9 @@ class Equipment:
         for state in self.states:
             for body in state.bodies:
                 if body not in names:
-                    raise UnknownNameError(f"body in state {state.name} of {self.name}", body, names)
+                    raise UnknownNameError(
+                        f"body in state {state.name} of {self.name}", body, names
+                    )
         if self.state not in (known or [""]):
             raise UnknownNameError(f"state of {self.name}", self.state, known)
         for end in () if self.switch is None else (self.switch.on, self.switch.off):
@@ -127,7 +135,9 @@ class Equipment:
                 raise UnknownNameError(f"state that the switch of {self.name} names", end, known)
 
     def has_default_zone(self, stations: Iterable[Station]) -> bool:
-        """Whether its zone is the one that a machine with these stations has where none is given."""
+        """Whether its zone is the one that a machine with these stations has where none is
+        given.
+        """
         if all(body.kind == "plane" for body in self.bodies):
             return False
         own = self.zone_in_equipment
@@ -167,7 +177,9 @@ class Equipment:
 
 @dataclass(frozen=True)
 class AllowedContact:
-    """A pair that may come closer than the safety distance at a station, and its own distance [m]."""
+    """A pair that may come closer than the safety distance at a station, and its own distance
+    [m].
+    """
 
     body_a: str
     body_b: str
@@ -183,9 +195,9 @@ class AllowedContact:
 class StationSearch:
     """How a program finds the configurations at a station and the path out of it.
 
-    configurations: "analytic" for all of the closed form, "ccd" for those that cyclic coordinate descent
-    finds from `starts` random starts. withdrawal: the search that finds the path out even where a straight
-    line is free; "": a straight line where that is free.
+    configurations: "analytic" for all of the closed form, "ccd" for those that cyclic coordinate
+    descent finds from `starts` random starts. withdrawal: the search that finds the path out even
+    where a straight line is free; "": a straight line where that is free.
     """
 
     configurations: str = CONFIGURATION_SEARCHES[0]
@@ -195,15 +207,18 @@ class StationSearch:
     def __post_init__(self) -> None:
         in_range(self.starts, 1, STARTS_MAX, "", "starts")
         if self.configurations not in CONFIGURATION_SEARCHES:
-            raise UnknownNameError("search for configurations", self.configurations, CONFIGURATION_SEARCHES)
+            raise UnknownNameError(
+                "search for configurations", self.configurations, CONFIGURATION_SEARCHES
+            )
 
 
 @dataclass(frozen=True, eq=False)
 class Station:
-    """Where the tool works: pose (4, 4) of the tcp in the WORLD, and the same in its machine's frame.
+    """Where the tool works: pose (4, 4) of the tcp in the WORLD, and the same in its machine's
+    frame.
 
-    zone is the kind of its machine's zone. The tool leaves by approach_distance [m] along -x of the tcp.
-    The allowed contacts hold inside the machine's zone only.
+    zone is the kind of its machine's zone. The tool leaves by approach_distance [m] along -x of the
+    tcp. The allowed contacts hold inside the machine's zone only.
     """
 
     name: str
@@ -220,7 +235,9 @@ class Station:
         object.__setattr__(
             self, "pose_in_equipment", frozen_pose(self.pose_in_equipment, f"pose of {self.name}")
         )
-        in_range(self.approach_distance, 0.0, APPROACH_MAX, "m", f"approach_distance of {self.name}")
+        in_range(
+            self.approach_distance, 0.0, APPROACH_MAX, "m", f"approach_distance of {self.name}"
+        )
 
 
 def station_at(

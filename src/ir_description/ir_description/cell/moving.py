@@ -1,7 +1,8 @@
 """A machine while it changes its state: an opening door counts as all that it sweeps.
 
-The bodies that only the one state has are taken for those that only the other has, in their order; each pair
-becomes the convex hull of both, around the boxes that enclose them. What has no partner is there in full.
+The bodies that only the one state has are taken for those that only the other has, in their order;
+each pair becomes the convex hull of both, around the boxes that enclose them. What has no partner
+is there in full.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ _CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
 
 
 def cell_in(cell: Cell, states: Mapping[str, Sequence[str]]) -> Cell:
-    """The cell with these machines in their states, by name; two: while they change between them."""
+    """The cell with these machines in their states, by name; two: while they change between
+    them.
+    """
     machines = (
         machine_in(machine, states[machine.name]) if machine.name in states else machine
         for machine in cell.equipment
@@ -31,13 +34,19 @@ def cell_in(cell: Cell, states: Mapping[str, Sequence[str]]) -> Cell:
 
 
 def machine_in(machine: Equipment, states: Sequence[str]) -> Equipment:
-    """The machine in a state, or, where two are given, in a further one: while it changes between them."""
+    """The machine in a state, or, where two are given, in a further one: while it changes between
+    them.
+    """
     if len(states) == 1:
         return replace(machine, state=states[0])
     first, second = states
     swept = tuple(hull for *_, hull in _sweeps(machine, first, second))
     before, after = (_only(machine, state) for state in (first, second))
-    names = (*before, *(name for name in after if name not in before), *(body.name for body in swept))
+    names = (
+        *before,
+        *(name for name in after if name not in before),
+        *(body.name for body in swept),
+    )
     state = EquipmentState(f"{first}>{second}", names)
     return replace(
         machine, bodies=(*machine.bodies, *swept), states=(*machine.states, state), state=state.name
@@ -58,7 +67,8 @@ def sweep_speeds(machine: Equipment, first: str, second: str) -> Mapping[str, fl
 def _sweeps(machine: Equipment, first: str, second: str) -> Iterator[tuple[Body, Body, Body]]:
     """Pairs of bodies that are one in two places, and the hull of each pair."""
     bodies = {body.name: body for body in machine.bodies}
-    before, after = _only(machine, first), _only(machine, second)
+    before = _only(machine, first)
+    after = _only(machine, second)
     going = [bodies[name] for name in before if name not in after]
     coming = [bodies[name] for name in after if name not in before]
     for a, b in zip(going, coming, strict=False):
@@ -73,7 +83,9 @@ def _only(machine: Equipment, state: str) -> tuple[str, ...]:
 
 
 def _corners(body: Body) -> FloatArray:
-    """Corners (8, 3) of a box around a body, in the machine's frame and always in the same order."""
+    """Corners (8, 3) of a box around a body, in the machine's frame and always in the same
+    order.
+    """
     low, high = replace(body, pose=np.eye(4)).bounds()
     corners: FloatArray = transformed(body.pose, (low + high) / 2.0 + _CORNERS * (high - low) / 2.0)
     return corners

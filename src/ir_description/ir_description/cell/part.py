@@ -14,10 +14,11 @@ from ir_msgs_py.errors import InvalidValueError
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """load and bodies stand in the part's own frame; grasp (4, 4) is that frame in the tcp when it is held.
+    """load and bodies stand in the part's own frame; grasp (4, 4) is that frame in the tcp when it
+    is held.
 
-    station: where it lies, "" for nowhere (held, or not there). Lying at a station means lying as it is
-    held when the tcp stands at the station.
+    station: where it lies, "" for nowhere (held, or not there). Lying at a station means lying as
+    it is held when the tcp stands at the station.
     """
 
     load: Load
@@ -28,7 +29,9 @@ class Part:
     def __post_init__(self) -> None:
         object.__setattr__(self, "grasp", frozen_pose(self.grasp, f"grasp of {self.load.name}"))
         if self.load.kind != "part":
-            raise InvalidValueError(f"the load of part {self.name} is of kind {self.load.kind}, must be part")
+            raise InvalidValueError(
+                f"the load of part {self.name} is of kind {self.load.kind}, must be part"
+            )
         if any(body.kind == "plane" for body in self.bodies):
             raise InvalidValueError(f"part {self.name} has a plane as body; a part is finite")
 

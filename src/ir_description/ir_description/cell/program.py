@@ -1,7 +1,7 @@
 """The program of a cell: stations, postures, paths and pauses in order, with what happens at each.
 
-One step runs in this order: wait for the signals, move, attach or detach, set the signals, dwell. A pause
-stays where the step before it ended.
+One step runs in this order: wait for the signals, move, attach or detach, set the signals, dwell. A
+pause stays where the step before it ended.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ PAUSE_MAX = 604_800.0
 class CellSignal:
     """A signal of the cell, its value at the start, and how the machine answers.
 
-    Where `follows` is given the signal takes its value `delay` [s] after that signal was set (the soft
-    PLC's rule), e.g. the door is open 1.5 s after it was asked to.
+    Where `follows` is given the signal takes its value `delay` [s] after that signal was set (the
+    soft PLC's rule), e.g. the door is open 1.5 s after it was asked to.
     """
 
     name: str
@@ -49,8 +49,9 @@ class ProgramStep:
     pause.
 
     dwell [s] after arrival, or the length of a pause. attach and detach name a part ("" for none).
-    power_mode is one of PAUSE_POWER_MODES for a pause and "" otherwise; AUTO leaves the choice to whoever
-    plans. planner: which search looks for the regional movement to the target, "": as the request says.
+    power_mode is one of PAUSE_POWER_MODES for a pause and "" otherwise; AUTO leaves the choice to
+    whoever plans. planner: which search looks for the regional movement to the target, "": as the
+    request says.
     """
 
     kind: StepKind
@@ -87,7 +88,9 @@ class ProgramStep:
 
 @dataclass(frozen=True)
 class PartPlaces:
-    """Where the parts are between two steps: the held one and the station each lies at; "" is none."""
+    """Where the parts are between two steps: the held one and the station each lies at; "" is
+    none.
+    """
 
     held: str
     lying: Mapping[str, str]
@@ -100,13 +103,16 @@ class PartPlaces:
                 raise InvalidValueError(f"{step.attach} can't be attached, {self.held} is held")
             if where != step.target:
                 raise InvalidValueError(
-                    f"{step.attach} can't be attached at {step.target}, it lies at {where or 'no station'}"
+                    f"{step.attach} can't be attached at {step.target}, it lies at "
+                    f"{where or 'no station'}"
                 )
             return PartPlaces(step.attach, {**self.lying, step.attach: ""})
         if step.detach:
             self._station_of(step.detach)
             if self.held != step.detach:
-                raise InvalidValueError(f"{step.detach} can't be detached, {self.held or 'no part'} is held")
+                raise InvalidValueError(
+                    f"{step.detach} can't be detached, {self.held or 'no part'} is held"
+                )
             for part, station in self.lying.items():
                 if station == step.target:
                     raise InvalidValueError(

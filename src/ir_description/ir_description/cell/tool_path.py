@@ -12,8 +12,9 @@ from ir_msgs_py.errors import InvalidValueError
 
 @dataclass(frozen=True, eq=False)
 class CellPath:
-    """path: its poses are poses of the tcp in the cell. equipment: the machine that it belongs to and moves
-    with, "": none. The allowed contacts hold inside that machine's zone, as a station's do.
+    """path: its poses are poses of the tcp in the cell. equipment: the machine that it belongs to
+    and moves with, "": none. The allowed contacts hold inside that machine's zone, as a station's
+    do.
     """
 
     name: str
@@ -24,7 +25,8 @@ class CellPath:
     def __post_init__(self) -> None:
         if self.allowed_contacts and not self.equipment:
             raise InvalidValueError(
-                f"path {self.name} allows contacts but names no equipment: they hold in a machine's zone"
+                f"path {self.name} allows contacts but names no equipment: they hold in a "
+                "machine's zone"
             )
 
     def moved(self, by: FloatArray) -> CellPath:

@@ -10,8 +10,16 @@ from ir_description.files.path_reader import path_from_yaml
 from ir_description.files.places import is_path
 from ir_description.files.plain_yaml import plain_yaml
 from ir_description.files.power_file import power_from_yaml
-from ir_description.files.power_parameters_file import power_parameters_from_yaml, power_parameters_to_yaml
-from ir_description.files.robot_file import read_robot, robot_errors, robot_file_errors, robot_from_yaml
+from ir_description.files.power_parameters_file import (
+    power_parameters_from_yaml,
+    power_parameters_to_yaml,
+)
+from ir_description.files.robot_file import (
+    read_robot,
+    robot_errors,
+    robot_file_errors,
+    robot_from_yaml,
+)
 from ir_description.files.subject_lines import subject_line
 from ir_description.files.text_file import is_utf16, text_of
 from ir_description.files.urdf import robot_urdf

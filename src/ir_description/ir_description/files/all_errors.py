@@ -1,8 +1,8 @@
 """Everything that is wrong with a cell or robot file, in one run.
 
-The reader stops at the first error. Here what it refused is left out and the rest is read again, until
-nothing is wrong any more. Errors that only follow from what was left out (a missing key, a name that was in
-it) are not reported.
+The reader stops at the first error. Here what it refused is left out and the rest is read again,
+until nothing is wrong any more. Errors that only follow from what was left out (a missing key, a
+name that was in it) are not reported.
 """
 
 from __future__ import annotations
@@ -45,7 +45,9 @@ def document_errors(
             place = document.place_of(error.sentence)
             if not document.follows(error.sentence, place):
                 found.append(kind(source, error.line, document.renumbered(error.sentence, place)))
-            if not document.leave_out(place, unknown=_UNKNOWN_KEY.search(error.sentence) is not None):
+            if not document.leave_out(
+                place, unknown=_UNKNOWN_KEY.search(error.sentence) is not None
+            ):
                 break
     return tuple(sorted(found, key=lambda error: error.line))
 
@@ -56,7 +58,9 @@ class _Document:
     def __init__(self, root: Node) -> None:
         self.root = root
         self._names: set[str] = set()  # that stood in what was left out
-        self._thinned: dict[int, Node] = {}  # by id: what misses something now, and what that is a part of
+        self._thinned: dict[
+            int, Node
+        ] = {}  # by id: what misses something now, and what that is a part of
         self._step_gone = False  # of the program, or a part of one
         self._known: dict[int, Node] = {}  # by id: mappings of which a known key is missing now
         self._numbers: dict[int, list[int]] = {}  # of the entries that a list still has
@@ -76,8 +80,8 @@ class _Document:
     def follows(self, sentence: str, place: tuple[Step, ...]) -> bool:
         """Whether the error is only there because something was left out before.
 
-        The keys of a mapping are checked before the values of any: where a value was left out, a key that is
-        unknown now was known with it, as `unit` beside the `mesh` of a body.
+        The keys of a mapping are checked before the values of any: where a value was left out, a
+        key that is unknown now was known with it, as `unit` beside the `mesh` of a body.
         """
         if _UNKNOWN_KEY.search(sentence) is not None:
             return id(self._at(place[:-1]).content) in self._known
@@ -85,14 +89,18 @@ class _Document:
             return self._step_gone
         missing = _MISSING.search(sentence) is not None
         thinned = any(id(node) in self._thinned for node in self._along(place))
-        return (missing and thinned) or any(f"'{name}' is unknown" in sentence for name in self._names)
+        return (missing and thinned) or any(
+            f"'{name}' is unknown" in sentence for name in self._names
+        )
 
     def leave_out(self, place: tuple[Step, ...], unknown: bool = False) -> bool:
         """Remove the smallest part at a place that stands for itself; False where there is none.
 
         unknown: it is a key that is not known there.
         """
-        while place and isinstance(place[-1], int) and not isinstance(self._at(place).content, dict):
+        while (
+            place and isinstance(place[-1], int) and not isinstance(self._at(place).content, dict)
+        ):
             place = place[:-1]  # a number of a vector is nothing without the others
         if not place:
             return False
@@ -115,18 +123,21 @@ class _Document:
         return True
 
     def renumbered(self, sentence: str, place: tuple[Step, ...]) -> str:
-        """The sentence with the numbers that entries have in the file; without known names where some are
-        gone.
+        """The sentence with the numbers that entries have in the file; without known names where
+        some are gone.
         """
         if self._names:
-            sentence = sentence.partition("; known are")[0] if "is unknown" in sentence else sentence
+            sentence = (
+                sentence.partition("; known are")[0] if "is unknown" in sentence else sentence
+            )
         for steps in (place, place[:-1]):  # an unknown key stands after its mapping
             if steps and sentence.startswith(_named(steps)):
                 return _named(self._in_file(steps)) + sentence[len(_named(steps)) :]
         return sentence
 
     def _in_file(self, place: tuple[Step, ...]) -> tuple[Step, ...]:
-        node, steps = self.root, list[Step]()
+        node = self.root
+        steps = list[Step]()
         for step in place:
             if isinstance(step, int) and isinstance(node.content, list):
                 steps.append(self._numbers_of(node.content)[step])
@@ -145,8 +156,8 @@ class _Document:
         return node
 
     def _along(self, place: tuple[Step, ...]) -> list[Node]:
-        """The nodes from the root to a place, without those that everything is a part of: the root (unless it
-        is the place) and its lists.
+        """The nodes from the root to a place, without those that everything is a part of: the root
+        (unless it is the place) and its lists.
         """
         nodes = [self.root]
         for step in place:

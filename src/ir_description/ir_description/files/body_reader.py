@@ -22,7 +22,12 @@ from ir_description.files.mesh import (
     read_stl,
 )
 from ir_description.files.solid_reader import SolidReader, piece_names
-from ir_description.poses import pose_of, rotation_from_abc, rotation_from_matrix, rotation_from_quaternion
+from ir_description.poses import (
+    pose_of,
+    rotation_from_abc,
+    rotation_from_matrix,
+    rotation_from_quaternion,
+)
 from ir_description.shapes import KINDS, SIZE_MAX, Body
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
@@ -39,7 +44,9 @@ def read_pose(item: Item) -> FloatArray:
 
 
 def pose_in(table: Table) -> FloatArray:
-    """Return the pose (4, 4) of xyz [m] and one of abc_deg, quaternion (x, y, z, w) or rotation (rows)."""
+    """Return the pose (4, 4) of xyz [m] and one of abc_deg, quaternion (x, y, z, w) or rotation
+    (rows).
+    """
     xyz = table["xyz"].numbers(3, -FAR, FAR, "m") if "xyz" in table else np.zeros(3)
     if not any(key in table for key in POSE_KEYS[1:]):
         return pose_of(xyz)
@@ -59,7 +66,8 @@ class BodyReader:
     """Reads bodies, each with a name that no other body or capsule has."""
 
     def __init__(self, shapes: NameRegister, folder: Path | None) -> None:
-        self._shapes, self._folder = shapes, folder
+        self._shapes = shapes
+        self._folder = folder
         self._count = self._corners = self._triangles = 0
         self._meshes: dict[tuple[str, bool], FloatArray] = {}
         self._solids = SolidReader(folder)
@@ -67,7 +75,9 @@ class BodyReader:
         """Names of the bodies that stand for a mesh, by its name."""
 
     def all(self, items: Iterable[Item]) -> tuple[Body, ...]:
-        """Return the bodies of a list; a mesh from CAD becomes one body for each of its convex pieces."""
+        """Return the bodies of a list; a mesh from CAD becomes one body for each of its convex
+        pieces.
+        """
         found: list[Body] = []
         for item in items:
             if item.holds("mesh"):
@@ -115,7 +125,8 @@ class BodyReader:
         self._corners += corners
         if self._corners > CORNERS_MAX:
             item.fail(
-                f"is one mesh too many: all have {self._corners} corners, at most {CORNERS_MAX} are taken"
+                f"is one mesh too many: all have {self._corners} corners, at most {CORNERS_MAX} "
+                "are taken"
             )
 
     def read(self, item: Item) -> Body:
@@ -132,9 +143,12 @@ class BodyReader:
         for key in _ALL_SHAPE_KEYS:
             if key in table and key not in shape:
                 table[key].fail(
-                    f"does not belong to a {kind}; its keys are {', '.join(shape) or 'only its pose'}"
+                    f"does not belong to a {kind}; its keys are "
+                    f"{', '.join(shape) or 'only its pose'}"
                 )
-        size, vertices = self._mesh(table) if kind == "mesh" else (_size(table, kind), np.zeros((0, 3)))
+        size, vertices = (
+            self._mesh(table) if kind == "mesh" else (_size(table, kind), np.zeros((0, 3)))
+        )
         self._counted(item, len(vertices))
         with item.blamed():
             return Body(name, kind, pose_in(table), size, vertices)  # type: ignore[arg-type]

@@ -10,13 +10,17 @@ _LENGTH = 16  # hexadecimal digits, as ids of trajectories have
 
 
 def cell_hash(cell: Cell) -> str:
-    """Hash of bodies, poses, states, zones, stations, loads and robot; its program and its texts don't count.
+    """Hash of bodies, poses, states, zones, stations, loads and robot; its program and its texts
+    don't count.
 
-    The state of a machine that a signal switches doesn't count either: doors move while a program runs, and
-    a movement that relies on a state says so. The file of a cell, written and read again, has the same hash.
+    The state of a machine that a signal switches doesn't count either: doors move while a program
+    runs, and a movement that relies on a state says so. The file of a cell, written and read again,
+    has the same hash.
     """
     machines = tuple(_unswitched(machine) for machine in cell.equipment)
-    place = replace(cell, description="", equipment=machines, program=(), signals=(), tasks=(), paths=())
+    place = replace(
+        cell, description="", equipment=machines, program=(), signals=(), tasks=(), paths=()
+    )
     content = f"{cell_to_yaml(place)}\n{cell.robot!r}"
     return hashlib.sha256(content.encode()).hexdigest()[:_LENGTH]
 

@@ -1,7 +1,7 @@
 """Reads a cell file into a Cell. The format: docs/cell_format.md.
 
-Errors stand at the line that is wrong: every rule between the things of a cell is asked while its line is
-at hand.
+Errors stand at the line that is wrong: every rule between the things of a cell is asked while its
+line is at hand.
 """
 
 from __future__ import annotations
@@ -94,7 +94,9 @@ def cell_errors(
 
 
 def _robot(item: Item, robots: RobotSource, folder: Path | None) -> RobotModel:
-    """A bundled robot by its name, one in a file beside the cell file, or one that is written out."""
+    """A bundled robot by its name, one in a file beside the cell file, or one that is written
+    out.
+    """
     if not item.is_scalar():
         return robot_of(item, folder)
     if not is_path(item.text()):
@@ -120,13 +122,16 @@ class _CellReader:
     """One reading: what has been named so far."""
 
     def __init__(self, root: Item, table: Table, robot: RobotModel, folder: Path | None) -> None:
-        self._root, self._table, self._robot = root, table, robot
+        self._root = root
+        self._table = table
+        self._robot = robot
         self._shapes = shape_register(robot)
         self._bodies = BodyReader(self._shapes, folder)
         self._capsules = [capsule.name for capsule in robot.capsules]
 
     def cell(self) -> Cell:
-        table, robot = self._table, self._robot
+        table = self._table
+        robot = self._robot
         base_pose = _pose(table.get("base"))
         tcp = _pose(table.get("tcp"))
         tool = self._tool()
@@ -175,7 +180,8 @@ class _CellReader:
         return tool
 
     def _parts(self, tool: Load | None) -> tuple[Part, ...]:
-        names, parts = NameRegister("part"), []
+        names = NameRegister("part")
+        parts = []
         for item in self._list("parts", 1000):
             with item.blamed():
                 part = read_part(item, self._robot.n, self._shapes, self._bodies)
@@ -186,8 +192,10 @@ class _CellReader:
         return tuple(parts)
 
     def _equipment(self) -> tuple[tuple[Equipment, ...], list[_Placed]]:
-        names, station_names = NameRegister("equipment"), NameRegister("station")
-        machines, placed = [], []
+        names = NameRegister("equipment")
+        station_names = NameRegister("station")
+        machines = []
+        placed = []
         for item in self._list("equipment", 10_000):
             with item.blamed():
                 machine, stations = read_equipment(item, self._bodies)
@@ -216,7 +224,8 @@ class _CellReader:
         equipment: tuple[Equipment, ...],
         parts: tuple[Part, ...],
     ) -> None:
-        capsules, bodies = set(self._capsules), _body_names(equipment, parts)
+        capsules = set(self._capsules)
+        bodies = _body_names(equipment, parts)
         machines = [machine.name for machine in equipment]
         for item, path in zip(self._list("paths", PATHS_MAX), paths, strict=True):
             with item.blamed():
@@ -229,7 +238,8 @@ class _CellReader:
     def _base_contacts(
         self, equipment: tuple[Equipment, ...], parts: tuple[Part, ...]
     ) -> tuple[tuple[str, str], ...]:
-        bodies, pairs = _body_names(equipment, parts), []
+        bodies = _body_names(equipment, parts)
+        pairs = []
         for item in self._list("base_contacts", 1000):
             first, second = item.list(2, 2)
             for name in self._bodies.named((second.name(),)):
@@ -240,7 +250,8 @@ class _CellReader:
         return tuple(pairs)
 
     def _signals(self) -> tuple[CellSignal, ...]:
-        names, signals = NameRegister("signal"), []
+        names = NameRegister("signal")
+        signals = []
         for item in self._list("signals", 1000):
             with item.blamed():
                 signal = read_signal(item)
@@ -251,7 +262,9 @@ class _CellReader:
                 check_follows(signals)
         return tuple(signals)
 
-    def _check_switches(self, equipment: tuple[Equipment, ...], signals: tuple[CellSignal, ...]) -> None:
+    def _check_switches(
+        self, equipment: tuple[Equipment, ...], signals: tuple[CellSignal, ...]
+    ) -> None:
         known = dict.fromkeys(signal.name for signal in signals)
         for item, machine in zip(self._list("equipment", 10_000), equipment, strict=True):
             with dict(item.pairs()).get("switch", item).blamed():
@@ -263,7 +276,9 @@ class _CellReader:
             return default
         key = self._table.one_of(name, f"{name}_deg")
         item = self._table[key]
-        values = item.numbers(self._robot.n, -3600.0, 3600.0, "deg" if key.endswith("_deg") else "rad")
+        values = item.numbers(
+            self._robot.n, -3600.0, 3600.0, "deg" if key.endswith("_deg") else "rad"
+        )
         posture = np.radians(values) if key.endswith("_deg") else values
         with item.blamed():
             try:

@@ -1,8 +1,8 @@
 """Writes a Cell as a cell file: what `read_cell` reads back is the same cell, bit for bit.
 
-Numbers are the shortest decimals that give the same float. Orientations are written as A, B, C where these
-give the same matrix, else as the matrix; postures in degrees where these give the same radians. Meshes
-stand as vertices.
+Numbers are the shortest decimals that give the same float. Orientations are written as A, B, C
+where these give the same matrix, else as the matrix; postures in degrees where these give the same
+radians. Meshes stand as vertices.
 """
 
 from __future__ import annotations
@@ -64,7 +64,9 @@ def _cell(cell: Cell) -> Iterator[str]:
     at: dict[str, list[Station]] = {machine.name: [] for machine in cell.equipment}
     for station in cell.stations:
         at[station.equipment].append(station)
-    yield from _block("equipment", (_machine(machine, at[machine.name]) for machine in cell.equipment))
+    yield from _block(
+        "equipment", (_machine(machine, at[machine.name]) for machine in cell.equipment)
+    )
     yield from _block("signals", ([_signal(signal)] for signal in cell.signals))
     yield from _block("program", ([_step(step)] for step in cell.program))
     yield from _block(
@@ -90,7 +92,8 @@ def _load(load: Load) -> Iterator[str]:
 
 
 def _capsule(capsule: Capsule) -> str:
-    p0, p1 = _row(capsule.p0), _row(capsule.p1)
+    p0 = _row(capsule.p0)
+    p1 = _row(capsule.p1)
     return f"{{name: {capsule.name}, p0: {p0}, p1: {p1}, radius: {_number(capsule.radius)}}}"
 
 
@@ -159,14 +162,19 @@ def _station(station: Station) -> Iterator[str]:
     yield from _block(
         "allowed_contacts",
         (
-            [f"{{between: [{c.body_a}, {c.body_b}], safety_distance: {_number(c.safety_distance)}}}"]
+            [
+                f"{{between: [{c.body_a}, {c.body_b}], safety_distance: "
+                f"{_number(c.safety_distance)}}}"
+            ]
             for c in station.allowed_contacts
         ),
     )
 
 
 def _signal(signal: CellSignal) -> str:
-    follows = f", follows: {signal.follows}, delay: {_number(signal.delay)}" if signal.follows else ""
+    follows = (
+        f", follows: {signal.follows}, delay: {_number(signal.delay)}" if signal.follows else ""
+    )
     return f"{{name: {signal.name}, initial: {_word(signal.initial)}{follows}}}"
 
 
@@ -203,7 +211,8 @@ def _posture(name: str, posture: FloatArray) -> Iterator[str]:
 
 def _pose(pose: FloatArray) -> str:
     """Return the keys of a pose without braces."""
-    xyz, R = f"xyz: {_row(pose[:3, 3])}", pose[:3, :3]
+    xyz = f"xyz: {_row(pose[:3, 3])}"
+    R = pose[:3, :3]
     if np.array_equal(R, np.eye(3)):
         return xyz
     abc = np.round(abc_from_rotation(R), _DIGITS)

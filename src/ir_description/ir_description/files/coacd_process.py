@@ -1,4 +1,5 @@
-"""CoACD in a process of its own: it is native code that hostile meshes can crash, and it takes its time.
+"""CoACD in a process of its own: it is native code that hostile meshes can crash, and it takes its
+time.
 
 The seed is fixed: the same mesh gives the same pieces.
 """
@@ -17,7 +18,8 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
 
 MISSING = (
-    'a mesh is divided by coacd, which is missing: pip install "ir_description[cad]", or pip install coacd'
+    'a mesh is divided by coacd, which is missing: pip install "ir_description[cad]", or '
+    "pip install coacd"
 )
 CONCAVITY = 0.03
 """Concavity at which a piece is not divided any more, as a share of the mesh's size."""
@@ -30,14 +32,15 @@ CORNERS = 64
 
 
 def decomposed(triangles: FloatArray, most: int, share: int = 1) -> list[FloatArray]:
-    """Corners (V, 3) of at most `most` convex pieces of a closed mesh (T, 3, 3), in one of `share` parts
-    of PROCESSOR_SECONDS. Raises InvalidValueError.
+    """Corners (V, 3) of at most `most` convex pieces of a closed mesh (T, 3, 3), in one of `share`
+    parts of PROCESSOR_SECONDS. Raises InvalidValueError.
     """
     if find_spec("coacd") is None:
         raise InvalidValueError(MISSING)
     corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     stream = io.BytesIO()
-    faces, seconds = index.reshape(-1, 3).astype(np.int32), max(PROCESSOR_SECONDS // share, 1)
+    faces = index.reshape(-1, 3).astype(np.int32)
+    seconds = max(PROCESSOR_SECONDS // share, 1)
     np.savez(stream, corners=corners, faces=faces, most=most, seconds=seconds)
     process = subprocess.run(
         [sys.executable, "-c", PROGRAM],
@@ -47,7 +50,8 @@ def decomposed(triangles: FloatArray, most: int, share: int = 1) -> list[FloatAr
     if process.returncode != 0:
         last = process.stderr.decode(errors="replace").strip().splitlines()[-1:]
         raise InvalidValueError(
-            f"the mesh can't be divided into convex pieces (code {process.returncode}: {''.join(last)[:120]})"
+            f"the mesh can't be divided into convex pieces (code {process.returncode}: "
+            f"{''.join(last)[:120]})"
         )
     with np.load(io.BytesIO(process.stdout), allow_pickle=False) as found:
         pieces = [np.asarray(found[key], dtype=np.float64) for key in found.files]
@@ -63,7 +67,8 @@ def main() -> None:
 
     with np.load(io.BytesIO(sys.stdin.buffer.read()), allow_pickle=False) as given:
         mesh = coacd.Mesh(given["corners"], given["faces"])
-        most, seconds = int(given["most"]), int(given["seconds"])
+        most = int(given["most"])
+        seconds = int(given["seconds"])
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
     coacd.set_log_level("error")
     found = coacd.run_coacd(

@@ -1,4 +1,5 @@
-"""The controller of a robot file: a bundled table, one in a file beside it, one written out, or none.
+"""The controller of a robot file: a bundled table, one in a file beside it, one written out, or
+none.
 
 Without a table: its watts while the motors are on and its DC link, as far as they are known.
 """

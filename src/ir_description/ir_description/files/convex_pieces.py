@@ -1,8 +1,10 @@
 """A closed mesh as convex pieces that contain it, and what that costs in distance and volume.
 
-Approximate convex decomposition (CoACD, Wei et al., 2022) gives pieces. They are widened by a margin until
-every point of the mesh lies in one of them, and that is proved: a triangle lies in a convex piece where its
-corners do; one that lies in none is cut into four. So the pieces are never smaller than the mesh.
+Approximate convex decomposition (CoACD, Wei et al., 2022) gives pieces. They are widened by a
+margin until
+every point of the mesh lies in one of them, and that is proved: a triangle lies in a convex piece
+where its corners do; one that lies in none is cut into four. So the pieces are never smaller than
+the mesh.
 """
 
 from __future__ import annotations
@@ -32,9 +34,10 @@ _TRIANGLES = 100_000  # that are looked at in one cut
 
 @dataclass(frozen=True, eq=False)
 class ConvexPieces:
-    """vertices: corners (V, 3) [m] of each piece. margin [m]: by which they were widened at least, to contain
-    the mesh. protrusion [m]: a bound of the distance from any point of them to the solid. volume,
-    of_pieces [m^3]: of the solid, and of the pieces, what several of them share counted for each.
+    """vertices: corners (V, 3) [m] of each piece. margin [m]: by which they were widened at least,
+    to contain the mesh. protrusion [m]: a bound of the distance from any point of them to the
+    solid. volume, of_pieces [m^3]: of the solid, and of the pieces, what several of them share
+    counted for each.
     """
 
     vertices: tuple[FloatArray, ...]
@@ -55,19 +58,23 @@ class ConvexPieces:
 
 
 def convex_pieces(triangles: FloatArray, most: int) -> ConvexPieces:
-    """At most `most` pieces that contain a mesh (T, 3, 3) [m]. Raises InvalidValueError with the reason."""
+    """At most `most` pieces that contain a mesh (T, 3, 3) [m]. Raises InvalidValueError with the
+    reason.
+    """
     triangles = triangles[np.linalg.norm(_normals(triangles), axis=1) > 0.0]
     volume = float(np.linalg.det(triangles).sum()) / 6.0
     wrong = open_edges(triangles)
     if not len(triangles) or len(wrong):
         where = f"{len(wrong)} edges, one at {_place(wrong[0])} m" if len(wrong) else "no triangles"
         raise InvalidValueError(
-            f"the mesh is not closed ({where}; each must belong to exactly two triangles that agree which "
-            "side is outside): close it in CAD or with trimesh.repair (docs/cad.md, Repair), or take kind: "
-            "mesh with convex_hull: true"
+            f"the mesh is not closed ({where}; each must belong to exactly two triangles that "
+            "agree which side is outside): close it in CAD or with trimesh.repair (docs/cad.md, "
+            "Repair), or take kind: mesh with convex_hull: true"
         )
     if volume <= 0.0:
-        raise InvalidValueError(f"the mesh has {volume:.3g} m^3: its triangles must be seen from outside")
+        raise InvalidValueError(
+            f"the mesh has {volume:.3g} m^3: its triangles must be seen from outside"
+        )
     raw = [_sorted(piece) for piece in _divided(triangles, most)]
     for margin in MARGINS:
         pieces = [_widened(piece, margin) for piece in raw]
@@ -82,8 +89,10 @@ def convex_pieces(triangles: FloatArray, most: int) -> ConvexPieces:
 
 
 def _divided(triangles: FloatArray, most: int) -> list[FloatArray]:
-    """Corners (V, 3) of at most `most` pieces of a closed mesh (T, 3, 3). Each of its shells is divided by
-    itself, unless one is a hollow: CoACD takes minutes for shells that touch; a convex one is a piece.
+    """Corners (V, 3) of at most `most` pieces of a closed mesh (T, 3, 3). Each of its shells is
+    divided by
+    itself, unless one is a hollow: CoACD takes minutes for shells that touch; a convex one is a
+    piece.
     """
     shells = closed_shells(triangles)
     if len(shells) > most or any(np.linalg.det(shell).sum() <= 0.0 for shell in shells):
@@ -97,7 +106,9 @@ def _divided(triangles: FloatArray, most: int) -> list[FloatArray]:
 
 
 def closed_shells(triangles: FloatArray) -> list[FloatArray]:
-    """The parts of a mesh (T, 3, 3) that share no corner, each (T, 3, 3), in the order of the mesh."""
+    """The parts of a mesh (T, 3, 3) that share no corner, each (T, 3, 3), in the order of the
+    mesh.
+    """
     corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     faces = index.reshape(-1, 3)
     pairs = np.concatenate([faces[:, :2], faces[:, 1:]])
@@ -124,7 +135,9 @@ def _place(point: FloatArray) -> str:
 
 
 def contains(pieces: Sequence[FloatArray], triangles: FloatArray) -> bool:
-    """Whether every point of the triangles (T, 3, 3) is proved to lie in the hull of a piece (V, 3)."""
+    """Whether every point of the triangles (T, 3, 3) is proved to lie in the hull of a piece (V,
+    3).
+    """
     planes = [ConvexHull(piece).equations for piece in pieces]
     left = triangles
     for _ in range(_CUTS):
@@ -138,7 +151,9 @@ def contains(pieces: Sequence[FloatArray], triangles: FloatArray) -> bool:
 
 
 def _inside(planes: Sequence[FloatArray], triangles: FloatArray) -> BoolArray:
-    """Whether each triangle (T, 3, 3) lies in one piece; planes (F, 4) of each piece as Qhull gives them."""
+    """Whether each triangle (T, 3, 3) lies in one piece; planes (F, 4) of each piece as Qhull gives
+    them.
+    """
     found = np.zeros(len(triangles), dtype=bool)
     for faces in planes:
         open_ = np.flatnonzero(~found)
@@ -152,8 +167,12 @@ def _inside(planes: Sequence[FloatArray], triangles: FloatArray) -> BoolArray:
 
 def _cut(triangles: FloatArray) -> FloatArray:
     """Four triangles (4 T, 3, 3) instead of each, by the middles of its edges."""
-    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
-    ab, bc, ca = (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0
+    a = triangles[:, 0]
+    b = triangles[:, 1]
+    c = triangles[:, 2]
+    ab = (a + b) / 2.0
+    bc = (b + c) / 2.0
+    ca = (c + a) / 2.0
     fours = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
     return np.concatenate([np.stack(four, axis=1) for four in fours])
 
@@ -167,8 +186,8 @@ def _widened(piece: FloatArray, margin: float) -> FloatArray:
         raise InvalidValueError("one of its convex pieces is too thin") from error
     if len(corners) > HULL_VERTICES_MAX:
         raise InvalidValueError(
-            f"one of its convex pieces has {len(corners)} corners, must have at most {HULL_VERTICES_MAX}: "
-            "a coarser mesh is enough for planning"
+            f"one of its convex pieces has {len(corners)} corners, must have at most "
+            f"{HULL_VERTICES_MAX}: a coarser mesh is enough for planning"
         )
     return corners
 
@@ -178,5 +197,7 @@ def _sorted(points: FloatArray) -> FloatArray:
 
 
 def _normals(triangles: FloatArray) -> FloatArray:
-    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    a = triangles[:, 0]
+    b = triangles[:, 1]
+    c = triangles[:, 2]
     return np.cross(b - a, c - a)

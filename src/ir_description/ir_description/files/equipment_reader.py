@@ -103,7 +103,8 @@ def _switch(item: Item, states: tuple[EquipmentState, ...]) -> StateSwitch:
     known = tuple(state.name for state in states)
     if not known:
         item.fail("belongs to a machine with states")
-    on, off = table["on"].choice(known), table["off"].choice(known)
+    on = table["on"].choice(known)
+    off = table["off"].choice(known)
     time = table["time"].number(0.0, SWITCH_MAX, "s") if "time" in table else 0.0
     with item.blamed():
         return StateSwitch(table["signal"].name(), on, off, time)
@@ -142,4 +143,6 @@ def read_contact(item: Item) -> AllowedContact:
     table = item.table(("between", "safety_distance"))
     first, second = table["between"].list(2, 2)
     with item.blamed():
-        return AllowedContact(first.name(), second.name(), table["safety_distance"].number(0.0, 10.0, "m"))
+        return AllowedContact(
+            first.name(), second.name(), table["safety_distance"].number(0.0, 10.0, "m")
+        )

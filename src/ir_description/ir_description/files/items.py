@@ -1,7 +1,8 @@
-"""Typed reading of a YAML tree: every refusal is one sentence with file, line, value, bound and unit.
+"""Typed reading of a YAML tree: every refusal is one sentence with file, line, value, bound and
+unit.
 
-An `Item` is a value in its place ("equipment[2].bodies[0].size"); it is asked for what the reader expects
-there.
+An `Item` is a value in its place ("equipment[2].bodies[0].size"); it is asked for what the reader
+expects there.
 """
 
 from __future__ import annotations
@@ -37,14 +38,22 @@ class Item:
 
     __slots__ = ("_content", "_error", "_source", "line", "where")
 
-    def __init__(self, node: Node, source: str, error: type[DescriptionFileError], where: str) -> None:
+    def __init__(
+        self, node: Node, source: str, error: type[DescriptionFileError], where: str
+    ) -> None:
         self._content = node.content
-        self._source, self._error = source, error
-        self.line, self.where = node.line, where
+        self._source = source
+        self._error = error
+        self.line = node.line
+        self.where = where
 
     def fail(self, sentence: str) -> NoReturn:
-        """Raise the file's error for this place; the sentence goes on after the name of the place."""
-        raise self._error(self._source, self.line, f"{self.where} {sentence}" if self.where else sentence)
+        """Raise the file's error for this place; the sentence goes on after the name of the
+        place.
+        """
+        raise self._error(
+            self._source, self.line, f"{self.where} {sentence}" if self.where else sentence
+        )
 
     @contextmanager
     def blamed(self) -> Iterator[None]:
@@ -65,7 +74,8 @@ class Item:
         items = {}
         for key, entry in self._content.items():
             if key not in known:
-                place, meant = self.where or "the file", decimal_comma(key)
+                place = self.where or "the file"
+                meant = decimal_comma(key)
                 raise self._error(
                     self._source,
                     entry.line,
@@ -96,7 +106,8 @@ class Item:
             self.fail(f"is {shown(self._scalar(wanted).text)}, must be {wanted}")
         if not low <= len(self._content) <= high:
             self.fail(
-                f"has {len(self._content)} entries, must have {low if low == high else f'{low} to {high}'}"
+                f"has {len(self._content)} entries, must have "
+                f"{low if low == high else f'{low} to {high}'}"
             )
         return [
             Item(node, self._source, self._error, f"{self.where}[{i}]")
@@ -136,7 +147,8 @@ class Item:
             self.fail(f"is a name of {len(text)} characters, must have 1 to {NAME_LENGTH}")
         if not _NAME.fullmatch(text):
             self.fail(
-                f"is {shown(text)}, must be a name: a letter of A to Z or a to z, then such, digits, _ . or -"
+                f"is {shown(text)}, must be a name: a letter of A to Z or a to z, then such, "
+                "digits, _ . or -"
             )
 
     def choice(self, known: Sequence[str]) -> str:
@@ -208,7 +220,8 @@ class Table:
     __slots__ = ("_items", "item")
 
     def __init__(self, item: Item, items: dict[str, Item]) -> None:
-        self.item, self._items = item, items
+        self.item = item
+        self._items = items
 
     def __getitem__(self, key: str) -> Item:
         return self._items[key]

@@ -19,23 +19,31 @@ BYTES_MAX = 20_000_000
 TRIANGLES_MAX = 200_000
 HULL_VERTICES_MAX = 1_000
 CORNERS_MAX = 50_000
-"""Corners of all meshes of a cell together: each is compared with the robot, drawn and published."""
+"""Corners of all meshes of a cell together: each is compared with the robot, drawn and
+published.
+"""
 CELL_TRIANGLES_MAX = 1_000_000
 """Triangles of all mesh files of a cell together."""
 CONVEX_TOLERANCE = 1e-3
-"""A mesh whose volume is this share below its hull's still counts as convex (tessellation, rounding)."""
+"""A mesh whose volume is this share below its hull's still counts as convex (tessellation,
+rounding).
+"""
 
 _BINARY = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
 
 
 def read_regular_file(path: Path, limit: int) -> bytes:
-    """Return the content of a regular file of at most `limit` bytes; never blocks on a FIFO or device."""
+    """Return the content of a regular file of at most `limit` bytes; never blocks on a FIFO or
+    device.
+    """
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise InvalidValueError(f"file {shown(str(path), 200)} can't be opened: {reason}") from error
+        raise InvalidValueError(
+            f"file {shown(str(path), 200)} can't be opened: {reason}"
+        ) from error
     try:
         status = os.fstat(descriptor)
         if not stat.S_ISREG(status.st_mode):
@@ -61,8 +69,8 @@ def mesh_path(folder: Path, name: str, suffixes: tuple[str, ...] = (".stl",)) ->
         or path.suffix.lower() not in suffixes
     ):
         raise InvalidValueError(
-            f"mesh file {shown(name)} must be an {' or '.join(suffixes)} file in the cell file's folder, "
-            "named relative to it, without '..'"
+            f"mesh file {shown(name)} must be an {' or '.join(suffixes)} file in the cell file's "
+            "folder, named relative to it, without '..'"
         )
     resolved = (folder / path).resolve()
     if not resolved.is_relative_to(folder.resolve()):
@@ -83,16 +91,22 @@ def triangles_from_stl(content: bytes) -> FloatArray:
     else:
         triangles = _ascii_triangles(content)
     if not 4 <= len(triangles) <= TRIANGLES_MAX:
-        raise InvalidValueError(f"the mesh has {len(triangles)} triangles, must have 4 to {TRIANGLES_MAX}")
+        raise InvalidValueError(
+            f"the mesh has {len(triangles)} triangles, must have 4 to {TRIANGLES_MAX}"
+        )
     return frozen(triangles, (None, 3, 3), "mesh")
 
 
 def _ascii_triangles(content: bytes) -> FloatArray:
     if not content.lstrip().startswith(b"solid"):
-        raise InvalidValueError("the file is neither a binary STL (its length does not fit) nor an ASCII one")
+        raise InvalidValueError(
+            "the file is neither a binary STL (its length does not fit) nor an ASCII one"
+        )
     found = _VERTEX.findall(content)
     if len(found) % 3:
-        raise InvalidValueError(f"the ASCII STL has {len(found)} vertices, must have three to a triangle")
+        raise InvalidValueError(
+            f"the ASCII STL has {len(found)} vertices, must have three to a triangle"
+        )
     try:
         return np.array(found, dtype=np.float64).reshape(-1, 3, 3)
     except ValueError as error:
@@ -105,7 +119,9 @@ def hull_vertices(points: FloatArray) -> FloatArray:
 
 
 def convex_vertices(triangles: FloatArray, take_hull: bool) -> FloatArray:
-    """Return the corners (V, 3) of a convex mesh (T, 3, 3); others are refused unless `take_hull`."""
+    """Return the corners (V, 3) of a convex mesh (T, 3, 3); others are refused unless
+    `take_hull`.
+    """
     points = np.unique(triangles.reshape(-1, 3), axis=0)
     hull = _hull(points)
     volume = abs(float(np.linalg.det(triangles).sum()) / 6.0)
@@ -116,8 +132,8 @@ def convex_vertices(triangles: FloatArray, take_hull: bool) -> FloatArray:
         )
     if not take_hull and volume < (1.0 - CONVEX_TOLERANCE) * hull.volume:
         raise InvalidValueError(
-            f"the mesh is not convex (volume {volume:.4g} m^3, its hull {hull.volume:.4g} m^3); split it "
-            "into convex meshes or say convex_hull: true to use its hull"
+            f"the mesh is not convex (volume {volume:.4g} m^3, its hull {hull.volume:.4g} m^3); "
+            "split it into convex meshes or say convex_hull: true to use its hull"
         )
     return _points_of(hull, points)
 
@@ -128,13 +144,17 @@ def _hull(points: FloatArray) -> ConvexHull:
     try:
         return ConvexHull(points)
     except (QhullError, ValueError) as error:
-        raise InvalidValueError(f"the mesh has {len(points)} corners that span no volume") from error
+        raise InvalidValueError(
+            f"the mesh has {len(points)} corners that span no volume"
+        ) from error
 
 
 def _points_of(hull: ConvexHull, points: FloatArray) -> FloatArray:
     corners = points[np.sort(hull.vertices)]
     if len(corners) > HULL_VERTICES_MAX:
-        raise InvalidValueError(f"the hull has {len(corners)} corners, must have at most {HULL_VERTICES_MAX}")
+        raise InvalidValueError(
+            f"the hull has {len(corners)} corners, must have at most {HULL_VERTICES_MAX}"
+        )
     return frozen(corners, (None, 3), "vertices")
 
 

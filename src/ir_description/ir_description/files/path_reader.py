@@ -12,7 +12,14 @@ from ir_description.files.body_reader import read_pose
 from ir_description.files.equipment_reader import read_contact
 from ir_description.files.items import Item, Table, read_items
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.cartesian import KINDS, LINE, ORIENTATIONS, POSES_MAX, CartesianPath, CartesianSegment
+from ir_msgs_py.cartesian import (
+    KINDS,
+    LINE,
+    ORIENTATIONS,
+    POSES_MAX,
+    CartesianPath,
+    CartesianSegment,
+)
 
 PATHS_MAX = 1000
 _SETTINGS = tuple(field for field in fields(CartesianPath) if field.default is not MISSING)
@@ -21,7 +28,9 @@ _FAR = 1e6
 
 
 def path_from_yaml(text: str, source: str) -> CartesianPath:
-    """The path of a file with the keys of a cell file's path but for its name. Raises CellFileError."""
+    """The path of a file with the keys of a cell file's path but for its name. Raises
+    CellFileError.
+    """
     root = read_items(text, source, CellFileError)
     with root.blamed():
         return _path(root.table(("start", "segments"), _NAMES))
@@ -29,13 +38,17 @@ def path_from_yaml(text: str, source: str) -> CartesianPath:
 
 def read_paths(items: list[Item]) -> tuple[CellPath, ...]:
     """The named paths of a cell."""
-    names, paths = NameRegister("path"), []
+    names = NameRegister("path")
+    paths = []
     for item in items:
-        table = item.table(("name", "start", "segments"), (*_NAMES, "equipment", "allowed_contacts"))
+        table = item.table(
+            ("name", "start", "segments"), (*_NAMES, "equipment", "allowed_contacts")
+        )
         contacts = table["allowed_contacts"].list(0, 1000) if "allowed_contacts" in table else []
         machine = table["equipment"].name() if "equipment" in table else ""
         with item.blamed():
-            names.add(name := table["name"].name())
+            name = table["name"].name()
+            names.add(name)
             paths.append(CellPath(name, _path(table), machine, tuple(map(read_contact, contacts))))
     return tuple(paths)
 
@@ -63,7 +76,9 @@ def _segment(item: Item) -> CartesianSegment:
 def path_lines(
     named: CellPath, pose: Callable[[FloatArray], str], number: Callable[[float], str]
 ) -> Iterator[str]:
-    """The lines of a path in a cell file; `pose` writes the keys of a pose (4, 4), `number` a number."""
+    """The lines of a path in a cell file; `pose` writes the keys of a pose (4, 4), `number` a
+    number.
+    """
     path = named.path
     yield f"name: {named.name}"
     if named.equipment:

@@ -1,6 +1,7 @@
 """Convex pieces of meshes, kept by their content: dividing a mesh takes seconds to minutes.
 
-What is kept is checked again when it is taken: that the pieces contain the mesh is proved each time.
+What is kept is checked again when it is taken: that the pieces contain the mesh is proved each
+time.
 """
 
 from __future__ import annotations
@@ -57,7 +58,9 @@ def _read(path: Path) -> ConvexPieces | None:
         margin, protrusion, volume, of_pieces = (float(each) for each in numbers)
     except Exception:  # whatever a broken file makes NumPy raise: it is made anew
         return None
-    if not all(each.ndim == 2 and each.shape[1] == 3 and np.isfinite(each).all() for each in vertices):
+    if not all(
+        each.ndim == 2 and each.shape[1] == 3 and np.isfinite(each).all() for each in vertices
+    ):
         return None
     return ConvexPieces(vertices, margin, protrusion, volume, of_pieces)
 

@@ -15,13 +15,18 @@ def is_path(text: str) -> bool:
 
 
 def inside(folder: Path | None, name: str) -> Path:
-    """The path of a YAML file that another file names, relative to that file's folder; nothing leads out."""
+    """The path of a YAML file that another file names, relative to that file's folder; nothing
+    leads out.
+    """
     if folder is None:
-        raise InvalidValueError(f"file {shown(name)} can't be named in a text; write out what it says")
+        raise InvalidValueError(
+            f"file {shown(name)} can't be named in a text; write out what it says"
+        )
     path = Path(name)
     if "://" in name or "\\" in name or path.is_absolute() or ".." in path.parts:
         raise InvalidValueError(
-            f"file {shown(name)} must stand beside this file or below, named relative to it, without '..'"
+            f"file {shown(name)} must stand beside this file or below, named relative to it, "
+            "without '..'"
         )
     resolved = (folder / path).resolve()
     if not resolved.is_relative_to(folder.resolve()):

@@ -1,4 +1,6 @@
-"""Small settings files as plain values. What `yaml_tree` refuses is refused: keys that stand twice."""
+"""Small settings files as plain values. What `yaml_tree` refuses is refused: keys that stand
+twice.
+"""
 
 from __future__ import annotations
 

@@ -6,7 +6,14 @@ from ir_description.errors import RobotFileError
 from ir_description.files.confidence import marks_of
 from ir_description.files.figures import figure
 from ir_description.files.items import Item, Table, read_items
-from ir_description.robot import ControllerMode, DcLink, EnergyShare, MeasuredPower, PlcBit, PowerData
+from ir_description.robot import (
+    ControllerMode,
+    DcLink,
+    EnergyShare,
+    MeasuredPower,
+    PlcBit,
+    PowerData,
+)
 
 FORMAT = "ir_description/power/1"
 
@@ -16,7 +23,7 @@ def power_from_yaml(text: str, source: str = "<text>") -> PowerData:
     return power_of(read_items(text, source, RobotFileError))
 
 
-def power_of(root: Item) -> PowerData:  # long: one line per field
+def power_of(root: Item) -> PowerData:
     """Return the power data of a document, or of a mapping in one."""
     top = root.table(
         (
@@ -61,7 +68,15 @@ def power_of(root: Item) -> PowerData:  # long: one line per field
 
 def _mode(item: Item) -> ControllerMode:
     table = item.table(
-        ("name", "controller_w", "enter_s", "leave_s", "minimum_stay_s", "time_min_pause_s", "profienergy_id")
+        (
+            "name",
+            "controller_w",
+            "enter_s",
+            "leave_s",
+            "minimum_stay_s",
+            "time_min_pause_s",
+            "profienergy_id",
+        )
     )
     return ControllerMode(
         name=table["name"].name(),
@@ -80,7 +95,9 @@ def _seconds(table: Table, key: str) -> float:
 
 def dc_link(item: Item) -> DcLink:
     """The drives' bus."""
-    table = item.table(("capacitance_f", "voltage_v", "chopper_on_v", "chopper_off_v", "brake_resistor_ohm"))
+    table = item.table(
+        ("capacitance_f", "voltage_v", "chopper_on_v", "chopper_off_v", "brake_resistor_ohm")
+    )
     with item.blamed():
         return DcLink(
             capacitance=figure(table["capacitance_f"]).number(0, 10, "F", above=True),
@@ -113,4 +130,6 @@ def _table_2_row(item: Item, modes: tuple[str, ...]) -> MeasuredPower:
 
 def _table_1_row(item: Item) -> EnergyShare:
     table = item.table(("consumer", "value"))
-    return EnergyShare(consumer=table["consumer"].name(), percent=table["value"].number(0, 100, "%"))
+    return EnergyShare(
+        consumer=table["consumer"].name(), percent=table["value"].number(0, 100, "%")
+    )

@@ -1,6 +1,8 @@
-"""Reads and writes power parameters (`ir_description/power_parameters/1`): what a fit found, with covariance.
+"""Reads and writes power parameters (`ir_description/power_parameters/1`): what a fit found, with
+covariance.
 
-A file names the parameters that it knows; the others stay as the data of its robot and controller have them.
+A file names the parameters that it knows; the others stay as the data of its robot and controller
+have them.
 """
 
 from __future__ import annotations
@@ -22,11 +24,13 @@ _BIG = 1e12
 def power_parameters_from_yaml(
     text: str, source: str, data_sheet: Callable[[str, str], PowerParameters]
 ) -> PowerParameters:
-    """Return the parameters a text describes; data_sheet: those of a robot and a controller by their names.
-    Errors name file and line.
+    """Return the parameters a text describes; data_sheet: those of a robot and a controller by
+    their names. Errors name file and line.
     """
     root = read_items(text, source, RobotFileError)
-    top = root.table(("format", "name", "robot", "controller", "parameters"), ("source", "correlation"))
+    top = root.table(
+        ("format", "name", "robot", "controller", "parameters"), ("source", "correlation")
+    )
     top["format"].choice((FORMAT,))
     if "source" in top:
         top["source"].text(400)
@@ -49,7 +53,9 @@ def power_parameters_from_yaml(
 
 def _given(item: Item, start: PowerParameters) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
     """Mean, deviations and sources with those that the file names, else those of `start`."""
-    mean, deviation, sources = start.mean.copy(), start.deviation.copy(), list(start.sources)
+    mean = start.mean.copy()
+    deviation = start.deviation.copy()
+    sources = list(start.sources)
     known: list[str] = []
     for entry in item.list(0, len(start.names)):
         row = entry.table(("name", "value", "deviation"), ("unit", "source"))
@@ -72,19 +78,23 @@ def power_parameters_to_yaml(parameters: PowerParameters, source: str = "") -> s
     lines += [f"robot: {parameters.robot}", f"controller: {parameters.controller}"]
     lines += [f"source: {_quoted(source)}"] if source else []
     lines.append("parameters:")
-    rows = zip(parameters.names, parameters.mean, parameters.deviation, parameters.sources, strict=True)
+    rows = zip(
+        parameters.names, parameters.mean, parameters.deviation, parameters.sources, strict=True
+    )
     for name, value, deviation, origin in rows:
         unit = parameter_unit(name)
         shown = f", unit: {_quoted(unit)}" if unit else ""
         lines.append(
-            f"  - {{name: {name}, value: {value:{_DIGITS}}, deviation: {deviation:{_DIGITS}}{shown}, "
-            f"source: {_quoted(origin)}}}"
+            f"  - {{name: {name}, value: "
+            f"{value:{_DIGITS}}, deviation: {deviation:{_DIGITS}}{shown}, source: {_quoted(origin)}}}"  # noqa: E501
         )
     return "\n".join([*lines, *_correlation_lines(parameters)]) + "\n"
 
 
 def _correlation(item: Item | None, names: tuple[str, ...]) -> FloatArray:
-    """Correlation (P, P) of a list of names and the rows below the diagonal; 0 where nothing is said."""
+    """Correlation (P, P) of a list of names and the rows below the diagonal; 0 where nothing is
+    said.
+    """
     matrix = np.eye(len(names))
     if item is None:
         return matrix

@@ -49,11 +49,16 @@ def read_step(item: Item) -> ProgramStep:
     kind = table.one_of("station", "posture", "path", "pause")
     for key in _STEP_KEYS:
         if key in table and key not in _KEYS[kind]:
-            table[key].fail(f"does not belong to a {kind} step; its keys are {', '.join(_KEYS[kind])}")
-    wait_for, set_signals = _signals(table, "wait_for"), _signals(table, "set_signals")
+            table[key].fail(
+                f"does not belong to a {kind} step; its keys are {', '.join(_KEYS[kind])}"
+            )
+    wait_for = _signals(table, "wait_for")
+    set_signals = _signals(table, "set_signals")
     if kind == "pause":
         mode = (
-            table["power_mode"].choice(PAUSE_POWER_MODES) if "power_mode" in table else PAUSE_POWER_MODES[0]
+            table["power_mode"].choice(PAUSE_POWER_MODES)
+            if "power_mode" in table
+            else PAUSE_POWER_MODES[0]
         )
         return ProgramStep(
             kind="PAUSE",

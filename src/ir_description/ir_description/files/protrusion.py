@@ -1,9 +1,9 @@
 """How far convex pieces stick out of the solid that they stand for: a bound, not a sample.
 
-A triangle of a piece's surface is at most as far from the solid as its centre is, and its own radius more,
-and no farther from a triangle of the solid than its corners are; one whose centre is deeper inside than its
-radius does not stick out at all. Those that could be the worst are cut until the bound is near what was
-found.
+A triangle of a piece's surface is at most as far from the solid as its centre is, and its own
+radius more, and no farther from a triangle of the solid than its corners are; one whose centre is
+deeper inside than its radius does not stick out at all. Those that could be the worst are cut until
+the bound is near what was found.
 """
 
 from __future__ import annotations
@@ -27,12 +27,16 @@ _CHUNK = 2_000_000
 
 
 def protrusion(pieces: Sequence[FloatArray], triangles: FloatArray) -> float:
-    """A bound [m] of the distance from the pieces (V, 3) to the solid in a closed mesh (T, 3, 3)."""
+    """A bound [m] of the distance from the pieces (V, 3) to the solid in a closed mesh (T, 3,
+    3).
+    """
     solid = _Solid(triangles)
     left = np.concatenate([piece[ConvexHull(piece).simplices] for piece in pieces])
     points = triangles.reshape(-1, 3)
     size = float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
-    found, bound, looked = 0.0, 0.0, 0
+    found = 0.0
+    bound = 0.0
+    looked = 0
     most = min(_POINTS, _WORK // len(triangles))
     for _ in range(_ROUNDS):
         distance, worst = solid.distances(left)
@@ -52,7 +56,8 @@ class _Solid:
 
     def __init__(self, triangles: FloatArray) -> None:
         self._triangles = triangles
-        parts, owner = triangles, np.arange(len(triangles))
+        parts = triangles
+        owner = np.arange(len(triangles))
         while 2 * len(parts) < _SAMPLES:
             long = _longest(parts) >= np.quantile(_longest(parts), 0.5)
             parts = np.concatenate([parts[~long], halved(parts[long])])
@@ -63,7 +68,9 @@ class _Solid:
         self._tree = cKDTree(centres)
 
     def distances(self, parts: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Of triangles (N, 3, 3): bounds of the distance to the solid, of the centres and of all (N,)."""
+        """Of triangles (N, 3, 3): bounds of the distance to the solid, of the centres and of all
+        (N,).
+        """
         centres = parts.mean(axis=1)
         radius = np.linalg.norm(parts - centres[:, None], axis=2).max(axis=1)
         samples, nearest = self._tree.query(centres, k=_NEIGHBOURS)
@@ -73,7 +80,9 @@ class _Solid:
         to_mesh = np.min([_point_triangle(centres, there[:, k]) for k in candidates], axis=0)
         distance = np.where(inside, 0.0, to_mesh)
         # the distance to a triangle is convex: over another one it is largest in a corner
-        corners = [[_point_triangle(parts[:, c], there[:, k]) for c in range(3)] for k in candidates]
+        corners = [
+            [_point_triangle(parts[:, c], there[:, k]) for c in range(3)] for k in candidates
+        ]
         worst = np.minimum(distance + radius, np.max(corners, axis=1).min(axis=0))
         deep = inside & (np.asarray(samples)[:, 0] - self._step >= radius)
         return distance, np.where(deep, 0.0, worst)
@@ -93,7 +102,9 @@ def winding(triangles: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def halved(triangles: FloatArray) -> FloatArray:
-    """Two triangles (2 T, 3, 3) instead of each, by the middle of its longest edge; first halves first."""
+    """Two triangles (2 T, 3, 3) instead of each, by the middle of its longest edge; first halves
+    first.
+    """
     edges = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
     rows = np.arange(len(triangles))
     at = edges.argmax(axis=1)
@@ -103,20 +114,25 @@ def halved(triangles: FloatArray) -> FloatArray:
 
 
 def _longest(triangles: FloatArray) -> FloatArray:
-    longest: FloatArray = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
+    longest: FloatArray = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(
+        axis=1
+    )
     return longest
 
 
 def _point_triangle(points: FloatArray, triangles: FloatArray) -> FloatArray:
     """Distance (N,) of each point (N, 3) from its triangle (N, 3, 3)."""
-    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    a = triangles[:, 0]
+    b = triangles[:, 1]
+    c = triangles[:, 2]
     found = np.min([_point_segment(points, *ends) for ends in ((a, b), (b, c), (c, a))], axis=0)
     normal = np.cross(b - a, c - a)
     height = np.einsum("ni,ni->n", points - a, normal)
     square = np.einsum("ni,ni->n", normal, normal)
     foot = points - (height / square)[:, None] * normal
     sides = [
-        np.einsum("ni,ni->n", np.cross(q - p, foot - p), normal) >= 0.0 for p, q in ((a, b), (b, c), (c, a))
+        np.einsum("ni,ni->n", np.cross(q - p, foot - p), normal) >= 0.0
+        for p, q in ((a, b), (b, c), (c, a))
     ]
     nearest: FloatArray = np.where(np.all(sides, axis=0), np.abs(height) / np.sqrt(square), found)
     return nearest

@@ -1,4 +1,6 @@
-"""Reads a robot file (data/robots/*.yaml) into a RobotModel. Every figure names its source and confidence."""
+"""Reads a robot file (data/robots/*.yaml) into a RobotModel. Every figure names its source and
+confidence.
+"""
 
 from __future__ import annotations
 
@@ -65,17 +67,23 @@ _DRIVE_KEYS = (
 
 
 def robot_from_yaml(text: str, source: str = "<text>", folder: Path | None = None) -> RobotModel:
-    """Return the robot a text describes; errors name file and line. folder: of its controller's file."""
+    """Return the robot a text describes; errors name file and line. folder: of its controller's
+    file.
+    """
     return robot_of(read_items(text, source, RobotFileError), folder)
 
 
 def read_robot(path: Path) -> RobotModel:
-    """Return the robot of a file. Raises RobotFileError, InvalidValueError where it can't be opened."""
+    """Return the robot of a file. Raises RobotFileError, InvalidValueError where it can't be
+    opened.
+    """
     return robot_from_yaml(_decoded(path), str(path), path.parent)
 
 
 def robot_file_errors(path: Path) -> tuple[RobotFileError, ...]:
-    """Everything that is wrong with a robot file, by line; where read_robot reads it, nothing is."""
+    """Everything that is wrong with a robot file, by line; where read_robot reads it, nothing
+    is.
+    """
     try:
         return robot_errors(_decoded(path), str(path), path.parent)
     except InvalidValueError as error:
@@ -117,7 +125,7 @@ def robot_of(root: Item, folder: Path | None) -> RobotModel:
     return replace(robot, controller=power, marks=marks_of(root.node), document=document)
 
 
-def _robot(root: Item) -> RobotModel:  # long: one line per field
+def _robot(root: Item) -> RobotModel:
     top = root.table(_KEYS, _OPTIONAL)
     top["format"].choice((FORMAT,))
     joints = top["joints"].table(_JOINT_KEYS, ("rotation_abc_deg",))
@@ -154,7 +162,9 @@ def _robot(root: Item) -> RobotModel:  # long: one line per field
             counterbalance=_counterbalance(top.get("counterbalance"), joint_names),
             capsules=capsules,
             self_pairs=tuple(_pair(item) for item in top["self_pairs"].list(0, 1000)),
-            load_self_capsules=tuple(item.name() for item in top["load_self_capsules"].list(0, 200)),
+            load_self_capsules=tuple(
+                item.name() for item in top["load_self_capsules"].list(0, 200)
+            ),
             machine_home=np.radians(_row(top, "machine_home_deg", n, -3600)),
             rated_payload=figure(top["rated_payload_kg"]).number(0, 1e4, "kg", above=True),
             title=top["title"].text(64) if "title" in top else "",

@@ -1,7 +1,8 @@
-"""Closed triangle meshes of machines from CAD: STL, OBJ and glTF files inside the cell file's folder.
+"""Closed triangle meshes of machines from CAD: STL, OBJ and glTF files inside the cell file's
+folder.
 
-glTF's y axis points up, a cell's z: such meshes are turned. Nothing outside the folder is ever opened,
-whatever a file refers to.
+glTF's y axis points up, a cell's z: such meshes are turned. Nothing outside the folder is ever
+opened, whatever a file refers to.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
 """Metres of each unit; no file says its own reliably, so whoever names one does."""
 MISSING = 'needs trimesh and coacd: pip install "ir_description[cad]", or pip install trimesh coacd'
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-_OBJ_VERTEX, _OBJ_FACE = b"v", b"f"
+_OBJ_VERTEX = b"v"
+_OBJ_FACE = b"f"
 _BUFFERS_MAX = 16
 
 
@@ -72,7 +74,9 @@ def triangles_from_obj(content: bytes) -> FloatArray:
                     raise ValueError("a vertex has three numbers")
             elif words[:1] == [_OBJ_FACE]:
                 corners = [_index(word, len(vertices)) for word in words[1:]]
-                triangles += [(corners[0], corners[k], corners[k + 1]) for k in range(1, len(corners) - 1)]
+                triangles += [
+                    (corners[0], corners[k], corners[k + 1]) for k in range(1, len(corners) - 1)
+                ]
         except ValueError as error:
             raise InvalidValueError(f"line {number} of the OBJ is wrong: {error}") from error
         if len(triangles) > TRIANGLES_MAX:
@@ -93,7 +97,9 @@ def _index(word: bytes, count: int) -> int:
 
 
 def _buffers(path: Path, content: bytes) -> dict[str, bytes]:
-    """What a .gltf keeps in other files, each in its own folder or below; data in the text is left there."""
+    """What a .gltf keeps in other files, each in its own folder or below; data in the text is left
+    there.
+    """
     try:
         listed = json.loads(content).get("buffers", [])
         names = [str(each.get("uri", "")) for each in listed]
@@ -101,8 +107,13 @@ def _buffers(path: Path, content: bytes) -> dict[str, bytes]:
         raise InvalidValueError("the glTF is not JSON with a list of buffers") from error
     names = [name for name in names if not name.startswith("data:")]
     if len(names) > _BUFFERS_MAX:
-        raise InvalidValueError(f"the glTF has {len(names)} buffers, must have at most {_BUFFERS_MAX}")
-    return {name: read_regular_file(mesh_path(path.parent, name, (".bin",)), BYTES_MAX) for name in names}
+        raise InvalidValueError(
+            f"the glTF has {len(names)} buffers, must have at most {_BUFFERS_MAX}"
+        )
+    return {
+        name: read_regular_file(mesh_path(path.parent, name, (".bin",)), BYTES_MAX)
+        for name in names
+    }
 
 
 def _triangles_from_gltf(content: bytes, buffers: dict[str, bytes], suffix: str) -> FloatArray:
@@ -115,7 +126,9 @@ def _triangles_from_gltf(content: bytes, buffers: dict[str, bytes], suffix: str)
             io.BytesIO(content), file_type=suffix[1:], resolver=_Resolver(buffers), process=False
         )
         meshes = [each for each in scene.dump() if isinstance(each, trimesh.Trimesh)]
-        triangles = [np.asarray(mesh.triangles, dtype=np.float64).reshape(-1, 3, 3) for mesh in meshes]
+        triangles = [
+            np.asarray(mesh.triangles, dtype=np.float64).reshape(-1, 3, 3) for mesh in meshes
+        ]
     except Exception as error:  # of trimesh, of any kind
         raise InvalidValueError(f"the glTF can't be read: {shown(str(error), 120)}") from error
     if not triangles:
@@ -140,7 +153,9 @@ class _Resolver:
 
 def _checked(triangles: FloatArray) -> FloatArray:
     if not 4 <= len(triangles) <= TRIANGLES_MAX:
-        raise InvalidValueError(f"the mesh has {len(triangles)} triangles, must have 4 to {TRIANGLES_MAX}")
+        raise InvalidValueError(
+            f"the mesh has {len(triangles)} triangles, must have 4 to {TRIANGLES_MAX}"
+        )
     if not np.isfinite(triangles).all():
         raise InvalidValueError("the mesh has corners that are not finite")
     return triangles + 0.0  # no zeros that differ by their sign

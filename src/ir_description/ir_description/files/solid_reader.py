@@ -30,7 +30,8 @@ class SolidReader:
 
     def read(self, table: Table) -> tuple[FloatArray, ...]:
         """Return the corners (V, 3) [m] of each piece of the mesh that an entry describes."""
-        name, unit = table["mesh"].text(), table["unit"].choice(tuple(UNITS))
+        name = table["mesh"].text()
+        unit = table["unit"].choice(tuple(UNITS))
         most = table["pieces"].integer(1, PIECES_MAX) if "pieces" in table else PIECES
         with table["mesh"].blamed():
             if (name, unit, most) not in self._known:
@@ -58,5 +59,7 @@ class SolidReader:
 
 
 def piece_names(name: str, count: int) -> tuple[str, ...]:
-    """Names of the bodies that stand for a mesh: its own where it is one, else name.1, name.2 and so on."""
+    """Names of the bodies that stand for a mesh: its own where it is one, else name.1, name.2 and
+    so on.
+    """
     return (name,) if count == 1 else tuple(f"{name}.{k}" for k in range(1, count + 1))

@@ -13,7 +13,8 @@ _KEYS = ("program", "base", "tcp", "home_deg", "home", "park_deg", "park")
 
 
 def subject_line(text: str, subject: str) -> int:
-    """The line (from 1) of the thing of that name, of "step 3", "program", "base", "tcp", "home" or "park";
+    """The line (from 1) of the thing of that name, of "step 3", "program", "base", "tcp", "home" or
+    "park";
     0: it is not there.
     """
     try:
@@ -40,7 +41,11 @@ def _named(node: Node, name: str) -> Iterator[int]:
             yield from _named(entry, name)
     elif isinstance(node.content, dict):
         own = node.content.get("name")
-        if own is not None and isinstance(own.node.content, Scalar) and own.node.content.text == name:
+        if (
+            own is not None
+            and isinstance(own.node.content, Scalar)
+            and own.node.content.text == name
+        ):
             yield own.line
         for value in node.content.values():
             yield from _named(value.node, name)

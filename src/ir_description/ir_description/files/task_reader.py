@@ -9,11 +9,13 @@ from ir_description.robot import RobotModel
 
 def read_tasks(items: list[Item], robot: RobotModel) -> tuple[Task, ...]:
     """Return the tasks of a robot."""
-    names, tasks = NameRegister("task"), []
+    names = NameRegister("task")
+    tasks = []
     for item in items:
         row = item.table(("name", "start", "goal"))
         with row["name"].blamed():
-            names.add(name := row["name"].text(64))
+            name = row["name"].text(64)
+            names.add(name)
         ends = []
         for key in ("start", "goal"):
             posture = row[key].numbers(robot.n, -70.0, 70.0, "rad")

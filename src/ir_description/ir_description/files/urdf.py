@@ -1,8 +1,10 @@
-"""The robot as URDF: links from the robot data, shapes from its capsules, loads fixed to the flange.
+"""The robot as URDF: links from the robot data, shapes from its capsules, loads fixed to the
+flange.
 
-Frames: cell (the root, where the base's pose is given), base_link, link_1 .. link_n, flange (the last link's
-frame), tool0 (at the flange, z out), tcp. The root has no inertia, as KDL wants it. A capsule is a cylinder
-with a sphere at each end, because URDF has no capsules. Friction, rotor inertia and the counterbalance are
+Frames: cell (the root, where the base's pose is given), base_link, link_1 .. link_n, flange (the
+last link's frame), tool0 (at the flange, z out), tcp. The root has no inertia, as KDL wants it. A
+capsule is a cylinder with a sphere at each end, because URDF has no capsules. Friction, rotor
+inertia and the counterbalance are
 not part of it: they belong to the drives.
 """
 
@@ -33,10 +35,11 @@ def robot_urdf(
     tcp: FloatArray | None = None,
     base_pose: FloatArray | None = None,
 ) -> str:
-    """Return the URDF text of the robot with its load(s) and the tcp (4, 4) in the last link's frame.
+    """Return the URDF text of the robot with its load(s) and the tcp (4, 4) in the last link's
+    frame.
 
-    Each load is a link `load_<name>` fixed to the flange. Without a tcp it stands at the flange. With the
-    base's pose (4, 4) in the cell, the root is the frame `cell`.
+    Each load is a link `load_<name>` fixed to the flange. Without a tcp it stands at the flange.
+    With the base's pose (4, 4) in the cell, the root is the frame `cell`.
     """
     loads = () if load is None else (load,) if isinstance(load, Load) else tuple(load)
     root = Xml.Element("robot", name=robot.name)
@@ -48,7 +51,9 @@ def robot_urdf(
         _fixed(root, base, WORLD_FRAME, base_pose[:3, 3], _rpy(base_pose[:3, :3]))
     for i, name in enumerate(robot.link_names):
         capsules = [capsule for capsule in robot.capsules if capsule.link == i]
-        mass, com, inertia = float(robot.link_mass[i]), robot.link_com[i], robot.link_inertia[i]
+        mass = float(robot.link_mass[i])
+        com = robot.link_com[i]
+        inertia = robot.link_inertia[i]
         _link(root, name, mass, com, inertia, capsules, "link")
     for i in range(robot.n):
         _joint(root, robot, i)
@@ -78,8 +83,17 @@ def _link(
     inertial = Xml.SubElement(link, "inertial")
     _origin(inertial, com, (0.0, 0.0, 0.0))
     Xml.SubElement(inertial, "mass", value=repr(mass))
-    entries = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
-    Xml.SubElement(inertial, "inertia", {key: repr(float(inertia[ij])) for key, ij in entries.items()})
+    entries = {
+        "ixx": (0, 0),
+        "ixy": (0, 1),
+        "ixz": (0, 2),
+        "iyy": (1, 1),
+        "iyz": (1, 2),
+        "izz": (2, 2),
+    }
+    Xml.SubElement(
+        inertial, "inertia", {key: repr(float(inertia[ij])) for key, ij in entries.items()}
+    )
     for capsule in capsules:
         for kind in ("visual", "collision"):
             _capsule(link, kind, capsule, material)
@@ -130,14 +144,22 @@ def _joint(root: Xml.Element, robot: RobotModel, i: int) -> None:
 
 
 def _frame(
-    root: Xml.Element, name: str, parent: str, xyz: Sequence[float] | FloatArray, rpy: Sequence[float]
+    root: Xml.Element,
+    name: str,
+    parent: str,
+    xyz: Sequence[float] | FloatArray,
+    rpy: Sequence[float],
 ) -> None:
     _link(root, name, FRAME_MASS, np.zeros(3), _FRAME_INERTIA, (), "link")
     _fixed(root, name, parent, xyz, rpy)
 
 
 def _fixed(
-    root: Xml.Element, child: str, parent: str, xyz: Sequence[float] | FloatArray, rpy: Sequence[float]
+    root: Xml.Element,
+    child: str,
+    parent: str,
+    xyz: Sequence[float] | FloatArray,
+    rpy: Sequence[float],
 ) -> None:
     joint = Xml.SubElement(root, "joint", name=f"{child}_joint", type="fixed")
     _origin(joint, xyz, rpy)

@@ -1,4 +1,6 @@
-"""Machines of a world in SDF or URDF: static models and links, their collision shapes, meshes beside it."""
+"""Machines of a world in SDF or URDF: static models and links, their collision shapes, meshes
+beside it.
+"""
 
 from __future__ import annotations
 
@@ -74,7 +76,8 @@ class _Reader:
     """One reading."""
 
     def __init__(self, folder: Path, taken: NameRegister) -> None:
-        self._folder, self._taken = folder, taken
+        self._folder = folder
+        self._taken = taken
         self._names: set[str] = set()
         self.left_out: list[str] = []
 
@@ -83,7 +86,8 @@ class _Reader:
         for include in (root if world is None else world).findall("include"):
             self.left_out.append(f"include {shown(include.findtext('uri') or '')}: merge it first")
         for model in (root if world is None else world).findall("model"):
-            name, bodies = _plain(model.get("name") or "model"), list[Body]()
+            name = _plain(model.get("name") or "model")
+            bodies = list[Body]()
             if any(joint.get("type") != "fixed" for joint in model.findall("joint")):
                 self.left_out.append(f"model {name}: it has joints that move")
                 continue
@@ -97,20 +101,28 @@ class _Reader:
     def urdf(self, root: Xml.Element) -> Iterator[WorldMachine]:
         above = {}
         for joint in root.findall("joint"):
-            parent, child = joint.find("parent"), joint.find("child")
+            parent = joint.find("parent")
+            child = joint.find("child")
             if parent is None or child is None:
-                raise ValueError(f"joint {shown(joint.get('name') or '')} has no parent or no child")
+                raise ValueError(
+                    f"joint {shown(joint.get('name') or '')} has no parent or no child"
+                )
             above[child.get("link") or ""] = (parent.get("link") or "", joint)
         for link in root.findall("link"):
-            name, pose, at = link.get("name") or "link", np.eye(4), link.get("name") or "link"
-            moving, seen = False, set[str]()
+            name = link.get("name") or "link"
+            pose = np.eye(4)
+            at = link.get("name") or "link"
+            moving = False
+            seen = set[str]()
             while at in above and at not in seen:
                 seen.add(at)
                 at, joint = above[at]
                 moving |= joint.get("type") != "fixed"
                 pose = composed(_urdf_pose(joint), pose)
             if moving or at in above:
-                self.left_out.append(f"link {_plain(name)}: a joint above it moves, or there is no root")
+                self.left_out.append(
+                    f"link {_plain(name)}: a joint above it moves, or there is no root"
+                )
                 continue
             places = link.findall("collision")
             bodies = [each for p in places for each in self._bodies(_plain(name), p, _urdf_pose(p))]
@@ -124,7 +136,9 @@ class _Reader:
         if len(self._names) > BODIES_MAX:
             raise InvalidValueError(f"there are more than {BODIES_MAX} bodies")
         if shape is None or shape.tag not in ("box", "cylinder", "sphere", "capsule", "mesh"):
-            self.left_out.append(f"{name}: its shape is {'none' if shape is None else shown(shape.tag)}")
+            self.left_out.append(
+                f"{name}: its shape is {'none' if shape is None else shown(shape.tag)}"
+            )
             return []
         if shape.tag == "mesh":
             vertices = self._mesh(shape)
@@ -145,7 +159,8 @@ class _Reader:
         given = shape.get("scale") or shape.findtext("scale") or "1 1 1"
         triangles = read_solid(self._folder, file).triangles * _row(given, 3)
         points = np.unique(triangles.reshape(-1, 3), axis=0)
-        hull, volume = ConvexHull(points), float(np.linalg.det(triangles).sum()) / 6.0
+        hull = ConvexHull(points)
+        volume = float(np.linalg.det(triangles).sum()) / 6.0
         if is_closed(triangles) and volume >= (1.0 - _CONVEX) * hull.volume:
             return (points[np.sort(hull.vertices)],)
         return pieces_of(triangles, PIECES).vertices
@@ -153,7 +168,11 @@ class _Reader:
     def _name(self, machine: str, name: str) -> str:
         """A name that no other body has."""
         plain = _plain(name)
-        wanted = [plain, f"{machine}_{plain}", *(f"{machine}_{plain}_{k}" for k in range(2, BODIES_MAX))]
+        wanted = [
+            plain,
+            f"{machine}_{plain}",
+            *(f"{machine}_{plain}_{k}" for k in range(2, BODIES_MAX)),
+        ]
         for each in wanted:
             if each not in self._names:
                 try:
@@ -191,7 +210,9 @@ def _sdf_pose(element: Xml.Element) -> FloatArray:
     if pose is None or not (pose.text or "").strip():
         return np.eye(4)
     if pose.get("relative_to") or pose.get("rotation_format", "euler_rpy") != "euler_rpy":
-        raise ValueError("poses relative to other frames, or as quaternions, are not read: write them out")
+        raise ValueError(
+            "poses relative to other frames, or as quaternions, are not read: write them out"
+        )
     values = _row(pose.text or "", 6)
     angles = values[3:] if pose.get("degrees") == "true" else np.degrees(values[3:])
     return pose_of(values[:3], rotation_from_abc(angles[::-1]))

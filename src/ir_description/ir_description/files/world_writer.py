@@ -1,4 +1,6 @@
-"""The machines of a cell as a world of SDF or URDF: poses, primitives, and hulls as OBJ files beside it."""
+"""The machines of a cell as a world of SDF or URDF: poses, primitives, and hulls as OBJ files
+beside it.
+"""
 
 from __future__ import annotations
 
@@ -18,9 +20,12 @@ Files = dict[str, str]
 
 
 def world_sdf(cell: Cell) -> tuple[str, Files]:
-    """Return the SDF of the machines as they stand, a static model each, and the OBJ files that it names."""
+    """Return the SDF of the machines as they stand, a static model each, and the OBJ files that it
+    names.
+    """
     root = Xml.Element("sdf", version="1.9")
-    world, files = Xml.SubElement(root, "world", name=cell.name), Files()
+    world = Xml.SubElement(root, "world", name=cell.name)
+    files = Files()
     for machine in _machines(cell):
         model = Xml.SubElement(world, "model", name=machine.name)
         Xml.SubElement(model, "static").text = "true"
@@ -36,7 +41,9 @@ def world_sdf(cell: Cell) -> tuple[str, Files]:
 
 def world_urdf(cell: Cell) -> tuple[str, Files]:
     """Return the same as URDF: a root link, and a link fixed to it for each machine."""
-    root, files = Xml.Element("robot", name=cell.name, version="1.2"), Files()  # 1.2 has capsules
+    # 1.2 has capsules
+    root = Xml.Element("robot", name=cell.name, version="1.2")
+    files = Files()
     Xml.SubElement(root, "link", name="world")
     for machine in _machines(cell):
         link = Xml.SubElement(root, "link", name=machine.name)

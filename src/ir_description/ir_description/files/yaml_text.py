@@ -1,4 +1,6 @@
-"""A tree of YAML as text again, without its comments: reading it gives the same tree, but for its lines."""
+"""A tree of YAML as text again, without its comments: reading it gives the same tree, but for its
+lines.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +38,9 @@ def _small(node: Node) -> bool:
     content = node.content
     if isinstance(content, dict):
         return "value" in content or not content
-    return isinstance(content, Scalar) or not any(isinstance(each.content, dict) for each in content)
+    return isinstance(content, Scalar) or not any(
+        isinstance(each.content, dict) for each in content
+    )
 
 
 def _flow(node: Node) -> str:

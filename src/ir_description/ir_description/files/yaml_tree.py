@@ -1,7 +1,7 @@
 """YAML as a tree that knows its lines, and nothing a description has no use for.
 
-Refused: aliases and anchors (they multiply), tags, several documents, keys that are not text, duplicate
-keys, and texts beyond the limits. Scalars stay text here; `items` gives them their types.
+Refused: aliases and anchors (they multiply), tags, several documents, keys that are not text,
+duplicate keys, and texts beyond the limits. Scalars stay text here; `items` gives them their types.
 """
 
 from __future__ import annotations
@@ -55,10 +55,14 @@ class Node:
 def parse_yaml(
     text: str, source: str, error: type[DescriptionFileError], limits: Limits | None = None
 ) -> Node:
-    """Return the only document of `text` as a tree; every refusal is an `error` with path and line."""
+    """Return the only document of `text` as a tree; every refusal is an `error` with path and
+    line.
+    """
     limits = limits or Limits()
     if len(text) > limits.characters:
-        raise error(source, 0, f"the text has {len(text)} characters, must be at most {limits.characters}")
+        raise error(
+            source, 0, f"the text has {len(text)} characters, must be at most {limits.characters}"
+        )
     try:
         return _Builder(text, source, error, limits).document()
     except yaml.MarkedYAMLError as broken:
@@ -69,23 +73,33 @@ def parse_yaml(
         raise error(source, line, f"this is not YAML: {why}") from broken
     except UnicodeEncodeError as broken:
         line = text.count("\n", 0, broken.start) + 1
-        raise error(source, line, f"character {shown(text[broken.start])} is not allowed in YAML") from broken
+        raise error(
+            source, line, f"character {shown(text[broken.start])} is not allowed in YAML"
+        ) from broken
     except yaml.reader.ReaderError as broken:
         line = text.count("\n", 0, broken.position) + 1 if isinstance(broken.position, int) else 0
-        raise error(source, line, f"character {shown(broken.character)} is not allowed in YAML") from broken
+        raise error(
+            source, line, f"character {shown(broken.character)} is not allowed in YAML"
+        ) from broken
 
 
 def _before(text: str, mark: yaml.Mark) -> str:
     """What stands in the line of a mark up to and with it."""
-    return text.splitlines()[mark.line][: mark.column + 1] if mark.line < text.count("\n") + 1 else ""
+    return (
+        text.splitlines()[mark.line][: mark.column + 1] if mark.line < text.count("\n") + 1 else ""
+    )
 
 
 class _Builder:
     """Builds the tree from the parser's events."""
 
-    def __init__(self, text: str, source: str, error: type[DescriptionFileError], limits: Limits) -> None:
+    def __init__(
+        self, text: str, source: str, error: type[DescriptionFileError], limits: Limits
+    ) -> None:
         self._events = yaml.parse(text, Loader=_LOADER)
-        self._source, self._error, self._limits = source, error, limits
+        self._source = source
+        self._error = error
+        self._limits = limits
         self._nodes = 0
 
     def document(self) -> Node:
@@ -97,19 +111,27 @@ class _Builder:
         next(self._events)  # end of document
         after = next(self._events)
         if not isinstance(after, yaml.StreamEndEvent):
-            raise self._error(self._source, _line(after), "a second document starts here; one file holds one")
+            raise self._error(
+                self._source, _line(after), "a second document starts here; one file holds one"
+            )
         return root
 
     def _node(self, event: yaml.Event, depth: int) -> Node:
         line = _line(event)
         self._nodes += 1
         if self._nodes > self._limits.nodes:
-            raise self._error(self._source, line, f"the file has more than {self._limits.nodes} values")
+            raise self._error(
+                self._source, line, f"the file has more than {self._limits.nodes} values"
+            )
         if depth > self._limits.depth:
-            raise self._error(self._source, line, f"values are nested more than {self._limits.depth} deep")
+            raise self._error(
+                self._source, line, f"values are nested more than {self._limits.depth} deep"
+            )
         if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) is not None:
             raise self._error(
-                self._source, line, "anchors and aliases (& and *) are not allowed; write the value out"
+                self._source,
+                line,
+                "anchors and aliases (& and *) are not allowed; write the value out",
             )
         tag = getattr(event, "tag", None)
         if tag is not None:
@@ -122,13 +144,16 @@ class _Builder:
 
     def _sequence(self, depth: int) -> list[Node]:
         nodes = []
-        while not isinstance(event := next(self._events), yaml.SequenceEndEvent):
+        event = next(self._events)
+        while not isinstance(event, yaml.SequenceEndEvent):
             nodes.append(self._node(event, depth + 1))
+            event = next(self._events)
         return nodes
 
     def _mapping(self, depth: int) -> dict[str, Entry]:
         entries: dict[str, Entry] = {}
-        while not isinstance(event := next(self._events), yaml.MappingEndEvent):
+        event = next(self._events)
+        while not isinstance(event, yaml.MappingEndEvent):
             key = self._node(event, depth + 1)
             if not isinstance(key.content, Scalar):
                 raise self._error(self._source, key.line, "a key must be a word")
@@ -136,9 +161,12 @@ class _Builder:
             if name in entries:
                 first = entries[name].line
                 raise self._error(
-                    self._source, key.line, f"{shown(name)} stands here twice, first in line {first}"
+                    self._source,
+                    key.line,
+                    f"{shown(name)} stands here twice, first in line {first}",
                 )
             entries[name] = Entry(key.line, self._node(next(self._events), depth + 1))
+            event = next(self._events)
         return entries
 
 

@@ -12,7 +12,9 @@ from ir_description.robot.robot import RobotModel
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import WORLD_FRAME
 
-TOOL0 = np.array([[0.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+TOOL0 = np.array(
+    [[0.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+)
 """Pose (4, 4) of tool0 at the flange: its z points out."""
 
 
@@ -27,7 +29,9 @@ class FramePose(NamedTuple):
 def fixed_frames(
     robot: RobotModel, loads: Iterable[Load], tcp: FloatArray, base_pose: FloatArray
 ) -> tuple[FramePose, ...]:
-    """Frames that no joint moves: base in the cell, flange, tool0, tcp (4, 4) and loads at the flange."""
+    """Frames that no joint moves: base in the cell, flange, tool0, tcp (4, 4) and loads at the
+    flange.
+    """
     at = np.eye(4)
     return (
         FramePose(WORLD_FRAME, robot.link_names[0], base_pose),

@@ -1,4 +1,6 @@
-"""A load of the flange: the tool, or a part held by it. Mass, centre of mass, inertia, watts and capsules."""
+"""A load of the flange: the tool, or a part held by it. Mass, centre of mass, inertia, watts and
+capsules.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
 
 MASS_MAX = 2000.0
-"""Largest mass [kg] a load may claim; what the robot carries is limited by RobotModel.rated_payload."""
+"""Largest mass [kg] a load may claim; what the robot carries is limited by
+RobotModel.rated_payload.
+"""
 
 LoadKind = Literal["tool", "part"]
 
@@ -22,9 +26,9 @@ LoadKind = Literal["tool", "part"]
 class Load:
     """What moves with the last link.
 
-    A tool is mass data plus watts, a part is mass only. com (3,) [m] and the capsules stand in the frame of
-    the last link for a tool, in the part's own frame for a part (see `placed`). inertia (3, 3) [kg m^2] is
-    about com.
+    A tool is mass data plus watts, a part is mass only. com (3,) [m] and the capsules stand in the
+    frame of the last link for a tool, in the part's own frame for a part (see `placed`). inertia
+    (3, 3) [kg m^2] is about com.
     """
 
     name: str
@@ -44,13 +48,19 @@ class Load:
         set_(self, "com", frozen(self.com, (3,), "com"))
         set_(self, "inertia", frozen_inertia(self.inertia, "inertia"))
         set_(self, "watts_always", in_range(self.watts_always, 0.0, 1e5, "W", "watts_always"))
-        set_(self, "watts_drive_bus", in_range(self.watts_drive_bus, 0.0, 1e5, "W", "watts_drive_bus"))
+        set_(
+            self,
+            "watts_drive_bus",
+            in_range(self.watts_drive_bus, 0.0, 1e5, "W", "watts_drive_bus"),
+        )
         names = [capsule.name for capsule in self.capsules]
         if len(set(names)) != len(names):
             raise InvalidValueError(f"load {self.name} names a capsule twice")
 
     def placed(self, pose: FloatArray) -> Load:
-        """Return the load with its geometry re-expressed by the pose (4, 4) of its frame in another frame."""
+        """Return the load with its geometry re-expressed by the pose (4, 4) of its frame in another
+        frame.
+        """
         pose = frozen_pose(pose, "pose")
         R = pose[:3, :3]
         inertia = R @ self.inertia @ R.T

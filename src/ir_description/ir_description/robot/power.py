@@ -1,4 +1,6 @@
-"""The power side of a controller as data: modes, transitions, DC link, PLC bits, Tables I and II."""
+"""The power side of a controller as data: modes, transitions, DC link, PLC bits, Tables I and
+II.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +16,9 @@ from ir_msgs_py.errors import InvalidValueError
 class ControllerMode:
     """One energy mode of the controller.
 
-    controller_watts [W] without drives, tool and holding torque. time_to_pause [s] into the mode and
-    regular_time_to_operate [s] back to motors on; minimum_stay [s] between them; time_min_pause [s] below
-    which the mode is not worth entering; pe_mode_id is PROFIenergy's number.
+    controller_watts [W] without drives, tool and holding torque. time_to_pause [s] into the mode
+    and regular_time_to_operate [s] back to motors on; minimum_stay [s] between them; time_min_pause
+    [s] below which the mode is not worth entering; pe_mode_id is PROFIenergy's number.
     """
 
     name: str
@@ -36,7 +38,9 @@ class ControllerMode:
 
 @dataclass(frozen=True)
 class DcLink:
-    """Bus of the drives: the supply rectifies only; what the capacitors cannot take is dissipated."""
+    """Bus of the drives: the supply rectifies only; what the capacitors cannot take is
+    dissipated.
+    """
 
     capacitance: float  # F
     voltage: float  # V, rectified mains
@@ -49,8 +53,8 @@ class DcLink:
             in_range(getattr(self, name), 0.0, 1e6, unit, name, open_low=True)
         if not self.voltage < self.chopper_off <= self.chopper_on:
             raise InvalidValueError(
-                f"chopper switches off at {self.chopper_off:g} V and on at {self.chopper_on:g} V, must be "
-                f"above {self.voltage:g} V and in this order"
+                f"chopper switches off at {self.chopper_off:g} V and on at {self.chopper_on:g} "
+                f"V, must be above {self.voltage:g} V and in this order"
             )
 
     @property
@@ -90,8 +94,8 @@ class EnergyShare:
 class PowerData:
     """All of a controller's power figures; tool watts belong to the tool (Load).
 
-    table_2_robot: the robot that Table II was measured with, "" where there is no such table. marks: how sure
-    each figure is, by its place in the file.
+    table_2_robot: the robot that Table II was measured with, "" where there is no such table.
+    marks: how sure each figure is, by its place in the file.
     """
 
     name: str
@@ -144,7 +148,9 @@ class PowerData:
             if row.payload == payload and row.mode == mode:
                 return row.watts
         raise UnknownNameError(
-            "row of Table II", f"{payload:g} kg {mode}", (f"{r.payload:g} kg {r.mode}" for r in self.table_2)
+            "row of Table II",
+            f"{payload:g} kg {mode}",
+            (f"{r.payload:g} kg {r.mode}" for r in self.table_2),
         )
 
 
@@ -152,7 +158,9 @@ NO_TABLE = "no_table"
 """Name of the figures of a controller whose power modes are not known."""
 NEVER = 604_800.0
 """s until brakes close that no controller closes by itself: a week, the longest pause there is."""
-USUAL_LINK = DcLink(capacitance=1e-3, voltage=560.0, chopper_on=688.0, chopper_off=668.0, brake_resistor=20.0)
+USUAL_LINK = DcLink(
+    capacitance=1e-3, voltage=560.0, chopper_on=688.0, chopper_off=668.0, brake_resistor=20.0
+)
 """Of drives on 400 V mains (an estimate): 79 J of braking energy fit in."""
 
 

@@ -1,9 +1,10 @@
 """What the joules of a robot follow from, as one named vector with its covariance.
 
-Per joint the friction, the copper losses and three losses that the data sheet does not have (zero there);
-for the whole robot scales of masses and of watts, the rectifier, idle inverters and the controller's watts by
-mode. A fit
-gives the same vector with another mean and covariance, so planner, driver and report load both alike.
+Per joint the friction, the copper losses and three losses that the data sheet does not have (zero
+there); for the whole robot scales of masses and of watts, the rectifier, idle inverters and the
+controller's watts by mode. A fit
+gives the same vector with another mean and covariance, so planner, driver and report load both
+alike.
 """
 
 from __future__ import annotations
@@ -31,8 +32,9 @@ AXIS_UNITS = {
     "inverter": "W/Nm",
     "gear": "",
 }
-"""Per joint: friction at the joint, W per motor torque squared, W per joint speed squared, W per motor torque
-magnitude, share of |joint torque x speed| lost in the gear."""
+"""Per joint: friction at the joint, W per motor torque squared, W per joint speed squared, W per
+motor torque magnitude, share of |joint torque x speed| lost in the gear.
+"""
 
 SCALARS = (
     "rotor_inertia",
@@ -42,10 +44,14 @@ SCALARS = (
     "tool_watts",
     "rectifier_efficiency",
 )
-"""Factors of what the data say (1: as they say), and the share of the mains power that reaches the bus."""
+"""Factors of what the data say (1: as they say), and the share of the mains power that reaches the
+bus.
+"""
 
 IDLE = "idle_watts"
-"""W that the inverters of all axes together take from the DC link while the motors are on, whatever moves."""
+"""W that the inverters of all axes together take from the DC link while the motors are on, whatever
+moves.
+"""
 
 LEVELS = (0.05, 0.95)
 """Quantiles that are the ends of an interval over drawn robots."""
@@ -57,8 +63,8 @@ _SYMMETRIC = 1e-9  # relative to the variances: rounding of a file's digits
 
 
 def interval_over(nominal: float, added: FloatArray) -> tuple[float, float]:
-    """Ends of the 90 % interval of a figure to which drawn robots add `added` (N,): it holds the nominal one,
-    which need not be near its middle.
+    """Ends of the 90 % interval of a figure to which drawn robots add `added` (N,): it holds the
+    nominal one, which need not be near its middle.
     """
     low, high = np.quantile(added, LEVELS)
     return nominal + min(float(low), 0.0), nominal + max(float(high), 0.0)
@@ -95,8 +101,8 @@ def physical_bounds(names: Iterable[str]) -> tuple[FloatArray, FloatArray]:
 class PowerParameters:
     """Mean (P,) and covariance (P, P) of the parameters of a robot and its controller, read-only.
 
-    name: what reports call them; robot, controller: whose; joints, modes: their names, which give the order;
-    sources (P,): where each is from ("data M", "fit").
+    name: what reports call them; robot, controller: whose; joints, modes: their names, which give
+    the order; sources (P,): where each is from ("data M", "fit").
     """
 
     name: str
@@ -113,12 +119,16 @@ class PowerParameters:
         object.__setattr__(self, "mean", frozen(self.mean, (size,), "mean"))
         object.__setattr__(self, "covariance", frozen(self.covariance, (size, size), "covariance"))
         if len(self.sources) != size:
-            raise InvalidValueError(f"sources has {len(self.sources)} entries: there are {size} parameters")
+            raise InvalidValueError(
+                f"sources has {len(self.sources)} entries: there are {size} parameters"
+            )
         low, high = physical_bounds(self.names)
         for name, value, least, most in zip(self.names, self.mean, low, high, strict=True):
             if not least <= value <= most:
                 unit = parameter_unit(name)
-                raise InvalidValueError(f"{name} is {value:g} {unit}, must be in [{least:g}, {most:g}]")
+                raise InvalidValueError(
+                    f"{name} is {value:g} {unit}, must be in [{least:g}, {most:g}]"
+                )
         self._check_covariance()
 
     def _check_covariance(self) -> None:
@@ -161,10 +171,13 @@ class PowerParameters:
         return self.mean[self.places(term)]
 
     def draws(self, count: int, seed: int) -> FloatArray:
-        """Vectors (count, P) of the normal distribution, cut off at the physical bounds: a loss that the
-        data sheet has at zero is drawn as a half normal one, and correlations hold at the bounds.
+        """Vectors (count, P) of the normal distribution, cut off at the physical bounds: a loss
+        that the data sheet has at zero is drawn as a half normal one, and correlations hold at the
+        bounds.
         """
-        return truncated_normal(self.mean, self.covariance, *physical_bounds(self.names), count, seed)
+        return truncated_normal(
+            self.mean, self.covariance, *physical_bounds(self.names), count, seed
+        )
 
     def drawn(self, seed: int) -> PowerParameters:
         """One robot of these: a draw as the mean, without uncertainty."""
@@ -178,7 +191,8 @@ class PowerParameters:
 
     def robot_with(self, robot: RobotModel) -> RobotModel:
         """The robot with these friction, losses, masses and counterbalance."""
-        balance, mass = robot.counterbalance, self.value("link_mass")
+        balance = robot.counterbalance
+        mass = self.value("link_mass")
         if balance is not None:
             pressure = balance.charge_pressure * max(self.value("counterbalance"), 1e-9)
             balance = replace(balance, charge_pressure=pressure)
@@ -199,7 +213,8 @@ class PowerParameters:
 
     def loads_with(self, loads: Iterable[Load]) -> tuple[Load, ...]:
         """Loads with these masses and watts."""
-        mass, watts = self.value("load_mass"), self.value("tool_watts")
+        mass = self.value("load_mass")
+        watts = self.value("tool_watts")
         return tuple(
             replace(
                 load,
@@ -213,5 +228,7 @@ class PowerParameters:
 
     def power_with(self, data: PowerData) -> PowerData:
         """The controller with these watts."""
-        modes = tuple(replace(m, controller_watts=self.value(f"watts.{m.name}")) for m in data.modes)
+        modes = tuple(
+            replace(m, controller_watts=self.value(f"watts.{m.name}")) for m in data.modes
+        )
         return replace(data, modes=modes, drives_and_brake_release=self.value("drives_watts"))

@@ -1,8 +1,9 @@
-"""How far a robot may be from its data sheet, before anything is measured: from the marks of confidence.
+"""How far a robot may be from its data sheet, before anything is measured: from the marks of
+confidence.
 
-This is the one table of the planner's assumptions: its intervals, the reserve of torque and the start of a
-fit read it. The plants of the simulation are drawn by rules of their own (docs/plant.md), so that what
-holds on them is a finding.
+This is the one table of the planner's assumptions: its intervals, the reserve of torque and the
+start of a fit read it. The plants of the simulation are drawn by rules of their own
+(docs/plant.md), so that what holds on them is a finding.
 """
 
 from __future__ import annotations
@@ -22,10 +23,14 @@ RELATIVE_DEVIATION = {"H": 0.02, "M": 0.10, "L": 0.30}
 """Standard deviation as a share of the value, by the mark of confidence in the data."""
 
 _FACTORS = {"viscous": 1.5, "coulomb": 1.5}
-"""Friction is this much less certain than its mark says: it changes with temperature, grease and wear."""
+"""Friction is this much less certain than its mark says: it changes with temperature, grease and
+wear.
+"""
 
 COUNTERBALANCE = 0.03
-"""Gas pressure of the counterbalance: filled and checked to a few per cent, whatever its geometry's mark."""
+"""Gas pressure of the counterbalance: filled and checked to a few per cent, whatever its geometry's
+mark.
+"""
 
 LOAD_MASS = 0.01
 TOOL_WATTS = 0.20
@@ -35,14 +40,20 @@ IRON_SHARE = 0.005
 """Iron loss at full speed, as a share of peak torque times full speed: half normal, its scale."""
 
 INVERTER_WATTS = 3.0
-"""W per Nm of motor torque: 1 to 2 V across each conducting switch, 1 to 2 A per Nm; half normal."""
+"""W per Nm of motor torque: 1 to 2 V across each conducting switch, 1 to 2 A per Nm; half
+normal.
+"""
 
 GEAR_SHARE = 0.04
-"""Loss of the gears that grows with the torque, beyond the friction that the data have; half normal."""
+"""Loss of the gears that grows with the torque, beyond the friction that the data have; half
+normal.
+"""
 
 IDLE_WATTS = 10.0
-"""Per axis: switching losses of an inverter without a current; half normal. The data count them with the
-drives, which they can't exceed; but they come from the DC link, where braking axes pay for them."""
+"""Per axis: switching losses of an inverter without a current; half normal. The data count them
+with the drives, which they can't exceed; but they come from the DC link, where braking axes pay for
+them.
+"""
 
 RECTIFIER_LOSS = 0.02
 """Diode rectifier and mains filter; half normal below 1."""
@@ -62,7 +73,8 @@ Marks = Mapping[str, str]
 
 def prior(robot: RobotModel, power: PowerData, marks: Marks) -> PowerParameters:
     """The parameters as the data have them, independent, with the deviations of this module."""
-    joints, modes = robot.joint_names, tuple(mode.name for mode in power.modes)
+    joints = robot.joint_names
+    modes = tuple(mode.name for mode in power.modes)
     names = parameter_names(joints, modes)
     watts = [
         float(robot.idle_loss.sum()),
@@ -80,7 +92,11 @@ def prior(robot: RobotModel, power: PowerData, marks: Marks) -> PowerParameters:
     mean = np.concatenate([*means, np.ones(len(SCALARS)), watts])
     known = [_mark(name, robot, marks) for name in names]
     share = np.array([RELATIVE_DEVIATION.get(mark, 0.0) for mark in known])
-    deviation = np.abs(mean) * share * np.array([_FACTORS.get(name.partition(".")[0], 1.0) for name in names])
+    deviation = (
+        np.abs(mean)
+        * share
+        * np.array([_FACTORS.get(name.partition(".")[0], 1.0) for name in names])
+    )
     for name, value in _assumed(robot, power).items():
         deviation[names.index(name)] = value
     return PowerParameters(
@@ -99,7 +115,10 @@ def _assumed(robot: RobotModel, power: PowerData) -> dict[str, float]:
     """Standard deviations of what the data have no mark for."""
     iron = IRON_SHARE * robot.envelope_torque[:, 0] / robot.velocity_max
     return {
-        **{f"iron.{joint}": float(value) for joint, value in zip(robot.joint_names, iron, strict=True)},
+        **{
+            f"iron.{joint}": float(value)
+            for joint, value in zip(robot.joint_names, iron, strict=True)
+        },
         **{f"inverter.{joint}": INVERTER_WATTS for joint in robot.joint_names},
         **{f"gear.{joint}": GEAR_SHARE for joint in robot.joint_names},
         "load_mass": LOAD_MASS,

@@ -1,6 +1,7 @@
 """The robot as data: chain, limits, bodies, drives, torque envelope, counterbalance, capsules.
 
-Figures and their sources: data/robots/*.yaml, docs/robot_data.md. n joints, links 0..n with 0 = base_link.
+Figures and their sources: data/robots/*.yaml, docs/robot_data.md. n joints, links 0..n with 0 =
+base_link.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ __all__ = ["Capsule", "Counterbalance", "RobotModel"]
 class Counterbalance:
     """A gas spring between link `joint` (0-based index; pivot) and the link it carries (rod eye).
 
-    pivot (2,) and rod_eye (2,) are x, z [m] in the joint's frame at angle 0. With th the joint angle, P the
-    rod eye turned by th about +y and l = |P - pivot|: the pressure is
-    p = charge_pressure (V / (V - A (l - rod_length_at_charge)))^exponent, the force A p along the rod, and
-    its torque about the positive axis is what helps the motor.
+    pivot (2,) and rod_eye (2,) are x, z [m] in the joint's frame at angle 0. With th the joint
+    angle, P the rod eye turned by th about +y and l = |P - pivot|: the pressure is
+    p = charge_pressure (V / (V - A (l - rod_length_at_charge)))^exponent, the force A p along the
+    rod, and its torque about the positive axis is what helps the motor.
     """
 
     joint: int
@@ -59,22 +60,25 @@ _NOT_IN_DATA = ("iron_loss", "inverter_loss", "gear_loss", "idle_loss")
 class RobotModel:
     """One robot. SI, all arrays float64 and read-only.
 
-    joint_origin (n, 4, 4): pose of joint frame i, which is the frame of link i+1 at q_i = 0, in link i.
-    joint_axis (n, 3): unit axis in the joint frame; signs are KUKA's, so q is A1..A6.
-    position_min/max (n,) rad, velocity_max rad/s, acceleration_max rad/s^2 (the hard cap), jerk_max rad/s^3.
-    link_mass (n+1,) kg, link_com (n+1, 3) m in the link frame, link_inertia (n+1, 3, 3) kg m^2 about the com.
-    gear_ratio (n,), reflected_inertia kg m^2, friction_viscous Nm s/rad, friction_coulomb Nm (joint side),
-    copper_loss W/Nm^2 of MOTOR torque; iron_loss W s^2/rad^2 of joint speed squared, inverter_loss W/Nm of
-    motor torque magnitude, gear_loss share of |joint torque x speed|, idle_loss W of an inverter that is on:
-    none where not given.
-    envelope_speed (n, K) rad/s, envelope_torque (n, K+1) Nm: the torque available is envelope_torque[:, 0]
-    below the first speed, steps down to [:, 1] there, is linear between (speed[k], torque[k+1]) and stays at
-    the last value. It bounds the total torque, rotor inertia and friction included.
-    capsules: of the links, without tool. self_pairs: names of the robot's own capsules that can touch.
+    joint_origin (n, 4, 4): pose of joint frame i, which is the frame of link i+1 at q_i = 0, in
+    link i. joint_axis (n, 3): unit axis in the joint frame; signs are KUKA's, so q is A1..A6.
+    position_min/max (n,) rad, velocity_max rad/s, acceleration_max rad/s^2 (the hard cap), jerk_max
+    rad/s^3. link_mass (n+1,) kg, link_com (n+1, 3) m in the link frame, link_inertia (n+1, 3, 3) kg
+    m^2 about the com. gear_ratio (n,), reflected_inertia kg m^2, friction_viscous Nm s/rad,
+    friction_coulomb Nm (joint side), copper_loss W/Nm^2 of MOTOR torque; iron_loss W s^2/rad^2 of
+    joint speed squared, inverter_loss W/Nm of motor torque magnitude, gear_loss share of |joint
+    torque x speed|, idle_loss W of an inverter that is on: none where not given.
+    envelope_speed (n, K) rad/s, envelope_torque (n, K+1) Nm: the torque available is
+    envelope_torque[:, 0] below the first speed, steps down to [:, 1] there, is linear between
+    (speed[k], torque[k+1]) and stays at the last value. It bounds the total torque, rotor inertia
+    and friction included.
+    capsules: of the links, without tool. self_pairs: names of the robot's own capsules that can
+    touch.
     load_self_capsules: robot capsules that every capsule of a load is checked against.
     machine_home (n,) rad: the posture of Table II. rated_payload kg: tool and part together.
-    title: maker and model, for people. controller: its power figures. marks: how sure each figure is, H, M or
-    L, by its place in the file. document: the robot file as text; "" for a bundled robot: its name is enough.
+    title: maker and model, for people. controller: its power figures. marks: how sure each figure
+    is, H, M or L, by its place in the file. document: the robot file as text; "" for a bundled
+    robot: its name is enough.
     """
 
     name: str
@@ -145,7 +149,9 @@ class RobotModel:
             [frozen_pose(pose, f"joint_origin {i}") for i, pose in enumerate(self.joint_origin)]
         )
         object.__setattr__(self, "joint_origin", frozen(origins, (n, 4, 4), "joint_origin"))
-        inertias = np.array([frozen_inertia(J, f"link_inertia {i}") for i, J in enumerate(self.link_inertia)])
+        inertias = np.array(
+            [frozen_inertia(J, f"link_inertia {i}") for i, J in enumerate(self.link_inertia)]
+        )
         object.__setattr__(self, "link_inertia", frozen(inertias, (n + 1, 3, 3), "link_inertia"))
         self._check_signs()
         self._check_envelope()
@@ -167,14 +173,17 @@ class RobotModel:
                 raise InvalidValueError(f"{name} must not be negative")
         if (self.position_min >= self.position_max).any():
             raise InvalidValueError("position_min must be below position_max for every joint")
-        if ((self.machine_home < self.position_min) | (self.machine_home > self.position_max)).any():
+        if (
+            (self.machine_home < self.position_min) | (self.machine_home > self.position_max)
+        ).any():
             raise InvalidValueError("machine_home lies outside the position limits")
         if np.abs(np.linalg.norm(self.joint_axis, axis=1) - 1.0).max() > 1e-12:
             raise InvalidValueError("joint_axis must hold unit vectors")
         in_range(self.rated_payload, 0.0, 1e4, "kg", "rated_payload", open_low=True)
 
     def _check_envelope(self) -> None:
-        speed, torque = self.envelope_speed, self.envelope_torque
+        speed = self.envelope_speed
+        torque = self.envelope_torque
         if torque.shape[1] != speed.shape[1] + 1:
             raise InvalidValueError("envelope_torque must have one column more than envelope_speed")
         if (speed <= 0.0).any() or (np.diff(speed, axis=1) <= 0.0).any():
@@ -184,15 +193,22 @@ class RobotModel:
 
     def _check_names(self, n: int) -> None:
         if len(self.link_names) != n + 1:
-            raise InvalidValueError(f"{len(self.link_names)} link names for {n} joints, must be {n + 1}")
+            raise InvalidValueError(
+                f"{len(self.link_names)} link names for {n} joints, must be {n + 1}"
+            )
         names = [capsule.name for capsule in self.capsules]
         if len(set(names)) != len(names):
             raise InvalidValueError("a capsule name is used twice")
         if any(capsule.link > n for capsule in self.capsules):
             raise InvalidValueError(f"a capsule stands on a link beyond {n}")
-        for name in (*(name for pair in self.self_pairs for name in pair), *self.load_self_capsules):
+        for name in (
+            *(name for pair in self.self_pairs for name in pair),
+            *self.load_self_capsules,
+        ):
             if name not in names:
-                raise InvalidValueError(f"self pairs name the capsule {name}, known are {', '.join(names)}")
+                raise InvalidValueError(
+                    f"self pairs name the capsule {name}, known are {', '.join(names)}"
+                )
         if self.counterbalance is not None and not 0 <= self.counterbalance.joint < n:
             raise InvalidValueError(
                 f"counterbalance on joint {self.counterbalance.joint}, must be in [0, {n - 1}]"

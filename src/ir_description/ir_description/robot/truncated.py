@@ -1,7 +1,7 @@
 """Draws of a normal distribution that physics cuts off: correlations hold at the bounds too.
 
-Only parameters that have a bound within reach are drawn one after the other, each from its own distribution
-given the others (Geweke, 1991); the others follow from them in one step.
+Only parameters that have a bound within reach are drawn one after the other, each from its own
+distribution given the others (Geweke, 1991); the others follow from them in one step.
 """
 
 from __future__ import annotations
@@ -17,18 +17,25 @@ _RIDGE = 1e-9  # relative: covariances of a file are rounded
 
 
 def truncated_normal(
-    mean: FloatArray, covariance: FloatArray, low: FloatArray, high: FloatArray, count: int, seed: int
+    mean: FloatArray,
+    covariance: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    count: int,
+    seed: int,
 ) -> FloatArray:
     """Vectors (count, P) of N(mean (P,), covariance (P, P)) between low and high (P,).
 
     What has no deviation stays at its mean.
     """
-    generator, deviation = np.random.default_rng(seed), np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    generator = np.random.default_rng(seed)
+    deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     free = deviation > 0.0
     scale = deviation[free]
     matrix = covariance[np.ix_(free, free)] / np.outer(scale, scale)
     matrix = matrix + _RIDGE * np.eye(len(matrix))
-    least, most = (low - mean)[free] / scale, (high - mean)[free] / scale
+    least = (low - mean)[free] / scale
+    most = (high - mean)[free] / scale
     near = np.asarray((least > -_REACH) | (most < _REACH))
     drawn = np.empty((count, len(scale)))
     drawn[:, near] = _bounded(matrix[np.ix_(near, near)], least[near], most[near], count, generator)
@@ -39,7 +46,11 @@ def truncated_normal(
 
 
 def _bounded(
-    matrix: FloatArray, least: FloatArray, most: FloatArray, count: int, generator: np.random.Generator
+    matrix: FloatArray,
+    least: FloatArray,
+    most: FloatArray,
+    count: int,
+    generator: np.random.Generator,
 ) -> FloatArray:
     """Draws (count, B) about 0 with covariance (B, B) between the bounds (B,)."""
     size = len(matrix)
@@ -62,7 +73,8 @@ def _following(
     matrix: FloatArray, near: BoolArray, given: FloatArray, generator: np.random.Generator
 ) -> FloatArray:
     """Draws (count, F) of those that are not near a bound, given the others (count, B)."""
-    own, across = matrix[np.ix_(~near, ~near)], matrix[np.ix_(~near, near)]
+    own = matrix[np.ix_(~near, ~near)]
+    across = matrix[np.ix_(~near, near)]
     gain = np.linalg.solve(matrix[np.ix_(near, near)], across.T).T if near.any() else across
     values, vectors = np.linalg.eigh(own - gain @ across.T)
     root = vectors * np.sqrt(np.maximum(values, 0.0))

@@ -22,12 +22,13 @@ _NO_VERTICES = frozen(np.zeros((0, 3)), (0, 3), "vertices")
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """pose (4, 4) in the frame of its owner (a machine or part); in the world for what Cell.bodies returns.
+    """pose (4, 4) in the frame of its owner (a machine or part); in the world for what Cell.bodies
+    returns.
 
-    size (3,) [m]: box the full edges; cylinder (radius, length, 0) about z; sphere (radius, 0, 0); capsule
-    (radius, length between the sphere centres, 0) about z; plane and mesh zeros. A plane is solid below its
-    z axis. vertices (V, 3) [m] in the body's frame for a mesh, whose convex hull is the body; (0, 3)
-    otherwise.
+    size (3,) [m]: box the full edges; cylinder (radius, length, 0) about z; sphere (radius, 0, 0);
+    capsule (radius, length between the sphere centres, 0) about z; plane and mesh zeros. A plane is
+    solid below its z axis. vertices (V, 3) [m] in the body's frame for a mesh, whose convex hull is
+    the body; (0, 3) otherwise.
     """
 
     name: str
@@ -43,7 +44,9 @@ class Body:
             )
         object.__setattr__(self, "pose", frozen_pose(self.pose, f"pose of {self.name}"))
         object.__setattr__(self, "size", frozen(self.size, (3,), f"size of {self.name}"))
-        object.__setattr__(self, "vertices", frozen(self.vertices, (None, 3), f"vertices of {self.name}"))
+        object.__setattr__(
+            self, "vertices", frozen(self.vertices, (None, 3), f"vertices of {self.name}")
+        )
         used = _LENGTHS[self.kind]
         positive = 1 if self.kind == "capsule" else used  # a capsule of length 0 is a sphere
         if (
@@ -53,12 +56,13 @@ class Body:
             or self.size[used:].any()
         ):
             raise InvalidValueError(
-                f"size of {self.name} is {self.size.tolist()} m, a {self.kind} must have its first {used} in "
-                f"(0, {SIZE_MAX:g}] m and the others 0"
+                f"size of {self.name} is {self.size.tolist()} m, a {self.kind} must have its "
+                f"first {used} in (0, {SIZE_MAX:g}] m and the others 0"
             )
         if (self.kind == "mesh") != (len(self.vertices) >= 4):
             raise InvalidValueError(
-                f"{self.name} has {len(self.vertices)} vertices, a mesh must have at least 4 and others none"
+                f"{self.name} has {len(self.vertices)} vertices, a mesh must have at least 4 and "
+                "others none"
             )
 
     def placed(self, pose: FloatArray) -> Body:
@@ -66,8 +70,11 @@ class Body:
         return replace(self, pose=composed(pose, self.pose))
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Return the lowest and highest corner (3,) [m] in the owner's frame; infinite for a plane."""
-        R, centre = self.pose[:3, :3], self.pose[:3, 3]
+        """Return the lowest and highest corner (3,) [m] in the owner's frame; infinite for a
+        plane.
+        """
+        R = self.pose[:3, :3]
+        centre = self.pose[:3, 3]
         if self.kind == "plane":
             return np.full(3, -np.inf), np.full(3, np.inf)
         if self.kind == "mesh":
@@ -79,7 +86,9 @@ class Body:
             reach = np.full(3, self.size[0])
         else:
             axis = np.abs(R[:, 2])
-            side = np.sqrt(np.maximum(0.0, 1.0 - axis**2)) if self.kind == "cylinder" else np.ones(3)
+            side = (
+                np.sqrt(np.maximum(0.0, 1.0 - axis**2)) if self.kind == "cylinder" else np.ones(3)
+            )
             reach = axis * self.size[1] / 2.0 + side * self.size[0]
         return centre - reach, centre + reach
 

@@ -1,4 +1,6 @@
-"""Signed distance of a point and of a capsule to one body, plain and exact: to check a cell, not to plan."""
+"""Signed distance of a point and of a capsule to one body, plain and exact: to check a cell, not to
+plan.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,9 @@ from ir_msgs_py.arrays import FloatArray
 
 
 def point_distance(body: Body, point: FloatArray) -> float:
-    """Return the distance [m] of a point (3,) in the body's owner frame to its surface, negative inside."""
+    """Return the distance [m] of a point (3,) in the body's owner frame to its surface, negative
+    inside.
+    """
     p = body.pose[:3, :3].T @ (point - body.pose[:3, 3])
     if body.kind == "plane":
         return float(p[2])
@@ -22,7 +26,8 @@ def point_distance(body: Body, point: FloatArray) -> float:
     if body.kind == "box":
         return _outside_or_depth(np.abs(p) - body.size / 2.0)
     if body.kind == "cylinder":
-        radial, axial = np.hypot(p[0], p[1]) - body.size[0], abs(p[2]) - body.size[1] / 2.0
+        radial = np.hypot(p[0], p[1]) - body.size[0]
+        axial = abs(p[2]) - body.size[1] / 2.0
         return _outside_or_depth(np.array([radial, axial]))
     return _hull_distance(body.vertices, p)
 

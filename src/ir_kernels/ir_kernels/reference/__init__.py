@@ -1,1 +1,3 @@
-"""Every kernel in plain NumPy, written for reading: the tests' oracle, and what runs without a compiler."""
+"""Every kernel in plain NumPy, written for reading: the tests' oracle, and what runs without a
+compiler.
+"""

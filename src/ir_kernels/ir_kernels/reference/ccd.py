@@ -1,7 +1,9 @@
-"""Cyclic coordinate descent on the pose error (eq. 3), batched over starts, with an optional Newton finish.
+"""Cyclic coordinate descent on the pose error (eq. 3), batched over starts, with an optional Newton
+finish.
 
-Psi = |p - p*|^2 + (lambda^2 / 2) |R - R*|_F^2 (eq. 2). As a function of one joint's increment phi it is
-const - 2 ((k2 - k1) cos phi + k3 sin phi): the minimum is closed form, and at limits the better one of both.
+Psi = |p - p*|^2 + (lambda^2 / 2) |R - R*|_F^2 (eq. 2). As a function of one joint's increment phi
+it is const - 2 ((k2 - k1) cos phi + k3 sin phi): the minimum is closed form, and at limits the
+better one of both.
 """
 
 from dataclasses import dataclass
@@ -11,13 +13,18 @@ import numpy as np
 from ir_kernels.reference.chain import axes, axis_rotation, jacobian, link_poses
 from ir_msgs_py.arrays import FloatArray, IntArray
 
-DAMPING_START, DAMPING_DOWN, DAMPING_UP = 1e-4, 0.1, 10.0
-DAMPING_LEAST, DAMPING_MOST = 1e-12, 1e6
+DAMPING_START = 1e-4
+DAMPING_DOWN = 0.1
+DAMPING_UP = 10.0
+DAMPING_LEAST = 1e-12
+DAMPING_MOST = 1e6
 
 
 @dataclass(frozen=True)
 class Problem:
-    """Chain (origins, axes, base, tcp), pose (4, 4) in the world, limits (n,), lambda [m/rad] of eq. 2."""
+    """Chain (origins, axes, base, tcp), pose (4, 4) in the world, limits (n,), lambda [m/rad] of
+    eq. 2.
+    """
 
     joint_origin: FloatArray
     joint_axis: FloatArray
@@ -44,11 +51,17 @@ def psi(problem: Problem, poses: FloatArray) -> FloatArray:
 
 
 def rotation_vector(R: FloatArray) -> FloatArray:
-    """Axis times angle (P, 3) of rotations (P, 3, 3), accurate for small angles and usable near pi."""
-    twice_sine = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
+    """Axis times angle (P, 3) of rotations (P, 3, 3), accurate for small angles and usable near
+    pi.
+    """
+    twice_sine = np.stack(
+        [R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1
+    )
     length = np.linalg.norm(twice_sine, axis=1)
     angle = np.arctan2(length, np.trace(R, axis1=1, axis2=2) - 1.0)
-    return np.asarray(twice_sine * np.where(length > 1e-12, angle / np.maximum(length, 1e-12), 0.5)[:, None])
+    return np.asarray(
+        twice_sine * np.where(length > 1e-12, angle / np.maximum(length, 1e-12), 0.5)[:, None]
+    )
 
 
 def errors(problem: Problem, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -74,10 +87,15 @@ def coefficients(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """k1, k2, k3 (P,) of eq. 3 for axes z (P, 3) through o (P, 3) and tcp poses (P, 4, 4)."""
     wo = problem.rotation_length**2 / 2.0
-    Pc, Pt = pose[:, :3, 3] - o, problem.pose[:3, 3] - o
-    uc, ut = pose[:, :3, :3], problem.pose[:3, :3]
-    along_c, along_t = np.einsum("pij,pi->pj", uc, z), np.einsum("ij,pi->pj", ut, z)
-    k1 = np.einsum("pi,pi->p", Pt, z) * np.einsum("pi,pi->p", Pc, z) + wo * (along_c * along_t).sum(axis=1)
+    Pc = pose[:, :3, 3] - o
+    Pt = problem.pose[:3, 3] - o
+    uc = pose[:, :3, :3]
+    ut = problem.pose[:3, :3]
+    along_c = np.einsum("pij,pi->pj", uc, z)
+    along_t = np.einsum("ij,pi->pj", ut, z)
+    k1 = np.einsum("pi,pi->p", Pt, z) * np.einsum("pi,pi->p", Pc, z) + wo * (along_c * along_t).sum(
+        axis=1
+    )
     k2 = np.einsum("pi,pi->p", Pt, Pc) + wo * np.einsum("pij,ij->p", uc, ut)
     turned = np.cross(Pc, Pt) + wo * np.cross(uc, np.broadcast_to(ut, uc.shape), axis=1).sum(axis=2)
     return k1, k2, np.einsum("pi,pi->p", z, turned)
@@ -86,7 +104,9 @@ def coefficients(
 def best_value(
     q: FloatArray, k1: FloatArray, k2: FloatArray, k3: FloatArray, low: float, high: float
 ) -> FloatArray:
-    """The joint value (P,) within [low, high] that minimises Psi, of equal ones the nearest to q (P,)."""
+    """The joint value (P,) within [low, high] that minimises Psi, of equal ones the nearest to q
+    (P,).
+    """
     free = q + np.arctan2(k3, k2 - k1)
     turns = 2.0 * np.pi * np.arange(-1, 2)
     candidates = free[:, None] + turns
@@ -109,7 +129,8 @@ def sweep(problem: Problem, q: FloatArray) -> FloatArray:
     pose = links[:, -1] @ problem.tcp
     for i in reversed(range(q.shape[1])):
         k1, k2, k3 = coefficients(problem, direction[:, i], origin[:, i], pose)
-        low, high = float(problem.position_min[i]), float(problem.position_max[i])
+        low = float(problem.position_min[i])
+        high = float(problem.position_max[i])
         value = best_value(q[:, i], k1, k2, k3, low, high)
         for p in range(len(q)):  # the joints inside of i stay: only the tool turns about axis i
             turn = axis_rotation(direction[p, i], (value - q[:, i])[p : p + 1])[0]
@@ -120,15 +141,21 @@ def sweep(problem: Problem, q: FloatArray) -> FloatArray:
 
 
 def newton_step(problem: Problem, q: FloatArray, damping: FloatArray) -> FloatArray:
-    """Damped least-squares step (P, n), held at limits: joints at a limit that would leave it are fixed."""
+    """Damped least-squares step (P, n), held at limits: joints at a limit that would leave it are
+    fixed.
+    """
     links = link_poses(problem.joint_origin, problem.joint_axis, problem.base_pose, q)
     J = jacobian(problem.joint_axis, links, problem.tcp)
     pose = links[:, -1] @ problem.tcp
     turn = rotation_vector(problem.pose[:3, :3] @ np.swapaxes(pose[:, :3, :3], 1, 2))
-    error = np.concatenate([problem.pose[:3, 3] - pose[:, :3, 3], problem.rotation_length * turn], axis=1)
+    error = np.concatenate(
+        [problem.pose[:3, 3] - pose[:, :3, 3], problem.rotation_length * turn], axis=1
+    )
     J[:, 3:] *= problem.rotation_length
     gradient = np.einsum("pij,pi->pj", J, error)
-    held = ((q <= problem.position_min) & (gradient < 0.0)) | ((q >= problem.position_max) & (gradient > 0.0))
+    held = ((q <= problem.position_min) & (gradient < 0.0)) | (
+        (q >= problem.position_max) & (gradient > 0.0)
+    )
     J = np.where(held[:, None, :], 0.0, J)
     normal = np.swapaxes(J, 1, 2) @ J + damping[:, None, None] * np.eye(q.shape[1])
     step = np.linalg.solve(normal, np.where(held, 0.0, gradient)[:, :, None])[:, :, 0]
@@ -143,10 +170,13 @@ def run(
     newton_steps: int,
     newton_tolerance: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, IntArray, IntArray]:
-    """q (P, n), Psi, distance, angle (P,), sweeps and Newton steps spent (P,) of every start on its own."""
+    """q (P, n), Psi, distance, angle (P,), sweeps and Newton steps spent (P,) of every start on its
+    own.
+    """
     q = np.clip(starts, problem.position_min, problem.position_max)
     value = psi(problem, tcp_poses(problem, q))
-    sweeps, steps = np.zeros(len(q), np.int64), np.zeros(len(q), np.int64)
+    sweeps = np.zeros(len(q), np.int64)
+    steps = np.zeros(len(q), np.int64)
     for _ in range(max_sweeps):
         going = np.flatnonzero(value >= xi)
         if len(going) == 0:

@@ -1,12 +1,13 @@
 """Proof that a motion keeps all distances above their thresholds, by bisection of time.
 
-Over an interval about its middle every joint j stays within spread_j of its value there. Then no point of a
-capsule on link i moves farther, seen from link k, than the sum found by turning the joints one after the
-other from the outermost: m <- m + spread_j (reach_j + m), j = i..k+1, with reach_j the distance of the
-capsule's axis from joint axis j in the middle (a point that has already moved by m is at most reach_j + m
-away from axis j, which hasn't moved yet). A distance in the middle that exceeds threshold + m therefore
-proves the interval. What can't be proved is halved, down to a movement of RESOLUTION: what is left is
-undecided.
+Over an interval about its middle every joint j stays within spread_j of its value there. Then no
+point of a capsule on link i moves farther, seen from link k, than the sum found by turning the
+joints one after the
+other from the outermost: m <- m + spread_j (reach_j + m), j = i..k+1, with reach_j the distance of
+the capsule's axis from joint axis j in the middle (a point that has already moved by m is at most
+reach_j + m away from axis j, which hasn't moved yet). A distance in the middle that exceeds
+threshold + m therefore proves the interval. What can't be proved is halved, down to a movement of
+RESOLUTION: what is left is undecided.
 """
 
 from typing import NamedTuple, Protocol
@@ -42,7 +43,8 @@ class Edges:
     """Straight segments in joint space from q0 (M, n) to q1 (M, n), parameter 0..1."""
 
     def __init__(self, q0: FloatArray, q1: FloatArray) -> None:
-        self.q0, self.step = q0, q1 - q0
+        self.q0 = q0
+        self.step = q1 - q0
 
     def span(self) -> FloatArray:
         """Every edge runs from 0 to 1."""
@@ -60,10 +62,13 @@ class Edges:
 
 
 class Polynomials:
-    """Segments q(t) = sum_k c_k t^k of coefficients (M, n, K) over durations (M,), parameter t in s."""
+    """Segments q(t) = sum_k c_k t^k of coefficients (M, n, K) over durations (M,), parameter t in
+    s.
+    """
 
     def __init__(self, coefficients: FloatArray, durations: FloatArray) -> None:
-        self.coefficients, self.durations = coefficients, durations
+        self.coefficients = coefficients
+        self.durations = durations
 
     def span(self) -> FloatArray:
         """The durations."""
@@ -90,12 +95,12 @@ class Polynomials:
 
 
 class Outcome(NamedTuple):
-    """Per motion: verdict (M,), interval [t0, t1] of the first violation (M,), its pair (M,), and a proven
-    bound (M,).
+    """Per motion: verdict (M,), interval [t0, t1] of the first violation (M,), its pair (M,), and a
+    proven bound (M,).
 
-    Everything before t0 is proved free. COLLIDES: at t1 the pair is not above its threshold. UNDECIDED:
-    neither could be shown between t0 and t1. FREE: t0 = t1 = the end, pair -1. bound: min over all proved
-    intervals of distance - threshold - movement; meaningful for FREE only.
+    Everything before t0 is proved free. COLLIDES: at t1 the pair is not above its threshold.
+    UNDECIDED: neither could be shown between t0 and t1. FREE: t0 = t1 = the end, pair -1. bound:
+    min over all proved intervals of distance - threshold - movement; meaningful for FREE only.
     """
 
     verdict: NDArray[np.uint8]
@@ -108,9 +113,12 @@ class Outcome(NamedTuple):
 def motion_bounds(
     model: Geometry, link_poses: FloatArray, segments: FloatArray, spread: FloatArray
 ) -> FloatArray:
-    """(I, Z): how much each pair's distance can change while joint j moves by at most spread_j (I, n) [m]."""
+    """(I, Z): how much each pair's distance can change while joint j moves by at most spread_j (I,
+    n) [m].
+    """
     origin, direction = chain.axes(model.chain.joint_axis, link_poses)
-    links, n = model.capsules.link, model.chain.n
+    links = model.capsules.link
+    n = model.chain.n
     # bound[:, c, k]: movement of capsule c, seen from link k <= its own
     bound = np.zeros((len(segments), len(links), n + 1))
     for c, link in enumerate(links):
@@ -122,49 +130,71 @@ def motion_bounds(
             bound[:, c, j] = moved
     outside = bound[:, model.environment[:, 0], 0]
     a, b = model.self_pairs.T
-    outer, inner = np.where(links[a] >= links[b], a, b), np.where(links[a] >= links[b], b, a)
+    outer = np.where(links[a] >= links[b], a, b)
+    inner = np.where(links[a] >= links[b], b, a)
     return np.concatenate([outside, bound[:, outer, links[inner]]], axis=1)
 
 
-def certify(model: Geometry, motion: Motion, threshold: FloatArray) -> Outcome:
+def certify(model: Geometry, motion: Motion, threshold: FloatArray) -> Outcome:  # noqa: PLR0915
     """Outcome for every motion; thresholds (Z,) in m, -inf ignores a pair."""
     span = motion.span()
-    hit_at, hit_pair = np.full(len(span), np.inf), np.full(len(span), -1)
-    stuck_from, stuck_to, stuck_pair = np.full(len(span), np.inf), span.copy(), np.full(len(span), -1)
+    hit_at = np.full(len(span), np.inf)
+    hit_pair = np.full(len(span), -1)
+    stuck_from = np.full(len(span), np.inf)
+    stuck_to = span.copy()
+    stuck_pair = np.full(len(span), -1)
     bound = np.full(len(span), np.inf)
-    rows, low, high = np.arange(len(span)), np.zeros(len(span)), span.copy()
+    rows = np.arange(len(span))
+    low = np.zeros(len(span))
+    high = span.copy()
     while len(rows) and len(threshold):
         turn = _rank(rows) < FRONT
-        now, a, b = rows[turn], low[turn], high[turn]
+        now = rows[turn]
+        a = low[turn]
+        b = high[turn]
         middle = (a + b) / 2.0
         poses = collision.poses(model, motion.at(now, middle))
         segments = collision.ends(model, poses)
         above = collision.distances(model, segments) - threshold
-        moved = motion_bounds(model, poses, segments, motion.spread(now, middle, (b - a) / 2.0)) + MARGIN
-        index, nearest, doubtful = np.arange(len(now)), above.argmin(axis=1), (above - moved).argmin(axis=1)
+        moved = (
+            motion_bounds(model, poses, segments, motion.spread(now, middle, (b - a) / 2.0))
+            + MARGIN
+        )
+        index = np.arange(len(now))
+        nearest = above.argmin(axis=1)
+        doubtful = (above - moved).argmin(axis=1)
         proved = (above - moved)[index, doubtful]
-        hit, free = above[index, nearest] <= -MARGIN, proved > 0.0
+        hit = above[index, nearest] <= -MARGIN
+        free = proved > 0.0
         np.minimum.at(bound, now[free], proved[free])
         for k in np.flatnonzero(hit):
             if middle[k] < hit_at[now[k]]:
-                hit_at[now[k]], hit_pair[now[k]] = middle[k], nearest[k]
+                hit_at[now[k]] = middle[k]
+                hit_pair[now[k]] = nearest[k]
         located = np.isfinite(hit_at[now]) & (b - a < LOCATE * span[now])
         stuck = ~free & (located | (~hit & (moved[index, doubtful] < RESOLUTION)))
         for k in np.flatnonzero(stuck):
             if a[k] < stuck_from[now[k]]:
-                stuck_from[now[k]], stuck_to[now[k]], stuck_pair[now[k]] = a[k], b[k], doubtful[k]
-        before, split = hit & ~stuck, ~free & ~hit & ~stuck
+                stuck_from[now[k]] = a[k]
+                stuck_to[now[k]] = b[k]
+                stuck_pair[now[k]] = doubtful[k]
+        before = hit & ~stuck
+        split = ~free & ~hit & ~stuck
         rows = np.concatenate([now[before], now[split], now[split], rows[~turn]])
         high = np.concatenate([middle[before], middle[split], b[split], high[~turn]])
         low = np.concatenate([a[before], a[split], middle[split], low[~turn]])
         open_ = np.flatnonzero(low < np.minimum(hit_at, stuck_from)[rows])
         order = open_[np.lexsort((low[open_], rows[open_]))]
-        rows, low, high = rows[order], low[order], high[order]
+        rows = rows[order]
+        low = low[order]
+        high = high[order]
     collides = np.isfinite(hit_at)
     doubt = np.isfinite(stuck_from)
     verdict = np.where(collides, COLLIDES, np.where(doubt, UNDECIDED, FREE)).astype(np.uint8)
     t1 = np.where(collides, hit_at, np.where(doubt, stuck_to, span))
-    return Outcome(verdict, np.minimum(stuck_from, t1), t1, np.where(collides, hit_pair, stuck_pair), bound)
+    return Outcome(
+        verdict, np.minimum(stuck_from, t1), t1, np.where(collides, hit_pair, stuck_pair), bound
+    )
 
 
 def _rank(rows: IntArray) -> IntArray:

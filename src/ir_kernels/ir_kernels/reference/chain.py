@@ -1,4 +1,6 @@
-"""Forward kinematics and Jacobians of a serial chain of revolute joints, as product of transforms."""
+"""Forward kinematics and Jacobians of a serial chain of revolute joints, as product of
+transforms.
+"""
 
 import numpy as np
 
@@ -10,7 +12,8 @@ def axis_rotation(axis: FloatArray, angle: FloatArray) -> FloatArray:
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     outer = np.outer(axis, axis)
-    s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
+    s = np.sin(angle)[:, None, None]
+    c = np.cos(angle)[:, None, None]
     result: FloatArray = outer + c * (np.eye(3) - outer) + s * cross
     return result
 
@@ -30,8 +33,8 @@ def link_poses(
 
 
 def axes(joint_axis: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Origins and unit directions (N, n, 3) of the joint axes in the world, from link poses (N, n + 1, 4,
-    4).
+    """Origins and unit directions (N, n, 3) of the joint axes in the world, from link poses (N, n +
+    1, 4, 4).
     """
     frames = poses[:, 1:]
     return frames[..., :3, 3], np.einsum("kjab,jb->kja", frames[..., :3, :3], joint_axis)

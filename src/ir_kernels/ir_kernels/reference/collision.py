@@ -1,4 +1,6 @@
-"""Signed distances of capsules on a chain from the bodies of a scene and from each other, with witnesses."""
+"""Signed distances of capsules on a chain from the bodies of a scene and from each other, with
+witnesses.
+"""
 
 import numpy as np
 
@@ -10,7 +12,9 @@ from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 
 def poses(model: Geometry, q: FloatArray) -> FloatArray:
     """(N, n + 1, 4, 4): link poses at q (N, n)."""
-    return chain.link_poses(model.chain.joint_origin, model.chain.joint_axis, model.chain.base_pose, q)
+    return chain.link_poses(
+        model.chain.joint_origin, model.chain.joint_axis, model.chain.base_pose, q
+    )
 
 
 def ends(model: Geometry, link_poses: FloatArray) -> FloatArray:
@@ -32,8 +36,8 @@ def _inflate(axis: Witness, radius_a: FloatArray, radius_b: FloatArray) -> Witne
 
 
 def witnesses(model: Geometry, segments: FloatArray, pairs: IntArray) -> Witness:
-    """One pair (N,) of each row of capsule ends (N, C, 2, 3): distance, points on both surfaces, normal from
-    b to a.
+    """One pair (N,) of each row of capsule ends (N, C, 2, 3): distance, points on both surfaces,
+    normal from b to a.
     """
     result = Witness(np.empty(len(pairs)), *(np.empty((len(pairs), 3)) for _ in range(3)))
     outside = len(model.environment)
@@ -44,14 +48,17 @@ def witnesses(model: Geometry, segments: FloatArray, pairs: IntArray) -> Witness
         rows = np.flatnonzero(body_of == body)
         if body < 0:
             a, b = model.self_pairs[pairs[rows] - outside].T
-            first, second = segments[rows, a], segments[rows, b]
+            first = segments[rows, a]
+            second = segments[rows, b]
             found = segment_segment(first[:, 0], first[:, 1], second[:, 0], second[:, 1])
             found = _inflate(found, radius[a], radius[b])
         else:
             a = model.environment[pairs[rows], 0]
-            rotation, origin = model.scene.pose[body, :3, :3], model.scene.pose[body, :3, 3]
+            rotation = model.scene.pose[body, :3, :3]
+            origin = model.scene.pose[body, :3, 3]
             local = (segments[rows, a] - origin) @ rotation
-            hull, kind = model.scene.hulls[body], int(model.scene.kind[body])
+            hull = model.scene.hulls[body]
+            kind = int(model.scene.kind[body])
             found = segment_body(local[:, 0], local[:, 1], kind, model.scene.size[body], hull)
             found = _inflate(found, radius[a], np.zeros(len(rows)))
             found = Witness(
@@ -66,15 +73,20 @@ def witnesses(model: Geometry, segments: FloatArray, pairs: IntArray) -> Witness
 
 
 def distances(model: Geometry, segments: FloatArray) -> FloatArray:
-    """(N, Z): signed distances [m] of all pairs, from capsule ends (N, C, 2, 3); penetration is negative."""
-    rows, count = len(segments), len(model.environment) + len(model.self_pairs)
+    """(N, Z): signed distances [m] of all pairs, from capsule ends (N, C, 2, 3); penetration is
+    negative.
+    """
+    rows = len(segments)
+    count = len(model.environment) + len(model.self_pairs)
     pairs = np.tile(np.arange(count), rows)
     found = witnesses(model, np.repeat(segments, count, axis=0), pairs)
     return found.distance.reshape(rows, count)
 
 
 def nearest(distance: FloatArray, offset: FloatArray) -> IntArray:
-    """(N,): the pair with the least distance - offset (Z,), the first of equals; -1 where there is none."""
+    """(N,): the pair with the least distance - offset (Z,), the first of equals; -1 where there is
+    none.
+    """
     if distance.shape[1] == 0:
         return np.full(len(distance), -1)
     excess = distance - offset
@@ -82,9 +94,11 @@ def nearest(distance: FloatArray, offset: FloatArray) -> IntArray:
     return np.where(np.isinf(excess[np.arange(len(best)), best]), -1, best)
 
 
-def gradient(model: Geometry, link_poses: FloatArray, found: Witness, pairs: IntArray) -> FloatArray:
-    """(N, n): derivative of the distance of `pairs` (N,) by q [m/rad], along the witness' normal (Danskin's
-    theorem).
+def gradient(
+    model: Geometry, link_poses: FloatArray, found: Witness, pairs: IntArray
+) -> FloatArray:
+    """(N, n): derivative of the distance of `pairs` (N,) by q [m/rad], along the witness' normal
+    (Danskin's theorem).
     """
     outside = len(model.environment)
     own = pairs >= outside

@@ -1,10 +1,11 @@
-"""Inverse and forward dynamics of a serial chain, written for reading: the oracle of the compiled core.
+"""Inverse and forward dynamics of a serial chain, written for reading: the oracle of the compiled
+core.
 
-tau = H(q) qdd + h(q, qd) + J_r qdd + F_v qd + F_c sign(qd) - T_cb(q)      (eq. 8; design: gravity is part
-of h)
+tau = H(q) qdd + h(q, qd) + J_r qdd + F_v qd + F_c sign(qd) - T_cb(q)      (eq. 8; design: gravity
+is part of h)
 
-Recursive Newton-Euler in link frames (Luh, Walker, Paul 1980), composite bodies for H (Walker, Orin 1982).
-Arrays q, qd, qdd, tau are (N, n); rad, rad/s, rad/s^2, Nm.
+Recursive Newton-Euler in link frames (Luh, Walker, Paul 1980), composite bodies for H (Walker, Orin
+1982). Arrays q, qd, qdd, tau are (N, n); rad, rad/s, rad/s^2, Nm.
 """
 
 from collections.abc import Callable, Sequence
@@ -36,7 +37,9 @@ def _outward(
     qdd: Sequence[Number],
     with_gravity: bool,
 ) -> tuple[list[Matrix], list[Vector], list[Vector]]:
-    """Rotation of each link in the one before, and force and moment that its motion takes, in its frame."""
+    """Rotation of each link in the one before, and force and moment that its motion takes, in its
+    frame.
+    """
     zero = qd[0] * 0.0
     spin: Vector = (zero, zero, zero)
     spin_rate: Vector = (zero, zero, zero)
@@ -46,14 +49,18 @@ def _outward(
     forces: list[Vector] = []
     moments: list[Vector] = []
     for i in range(data.n):
-        axis, arm, com = vector(data.axis[i]), vector(data.origin[i, :3, 3]), vector(data.com[i])
+        axis = vector(data.axis[i])
+        arm = vector(data.origin[i, :3, 3])
+        com = vector(data.com[i])
         R = joint_rotation(data.origin[i], data.axis[i], sin[i], cos[i])
         to_link = transpose(R)
         acceleration = add(acceleration, add(cross(spin_rate, arm), cross(spin, cross(spin, arm))))
         acceleration = apply(to_link, acceleration)
         carried = apply(to_link, spin)
         relative = scale(axis, qd[i])
-        spin_rate = add(apply(to_link, spin_rate), add(scale(axis, qdd[i]), cross(carried, relative)))
+        spin_rate = add(
+            apply(to_link, spin_rate), add(scale(axis, qdd[i]), cross(carried, relative))
+        )
         spin = add(carried, relative)
         of_com = add(acceleration, add(cross(spin_rate, com), cross(spin, cross(spin, com))))
         force = scale(of_com, float(data.mass[i]))
@@ -77,12 +84,15 @@ def rigid_body_torque(
     rotations, forces, moments = _outward(data, sin, cos, qd, qdd, with_gravity)
     torque: list[Number] = [qd[0] * 0.0] * data.n
     for i in reversed(range(data.n)):
-        axis, arm = vector(data.axis[i]), vector(data.origin[i, :3, 3])
+        axis = vector(data.axis[i])
+        arm = vector(data.origin[i, :3, 3])
         torque[i] = axis[0] * moments[i][0] + axis[1] * moments[i][1] + axis[2] * moments[i][2]
         if i > 0:
             force = apply(rotations[i], forces[i])
             forces[i - 1] = add(forces[i - 1], force)
-            moments[i - 1] = add(moments[i - 1], add(apply(rotations[i], moments[i]), cross(arm, force)))
+            moments[i - 1] = add(
+                moments[i - 1], add(apply(rotations[i], moments[i]), cross(arm, force))
+            )
     return torque
 
 
@@ -93,11 +103,12 @@ def counterbalance_torque(
     sqrt: Callable[..., Number],
     power: Callable[..., Number],
 ) -> Number:
-    """Torque about the joint's +axis (positive lowers the arm), for any kind of number with its sqrt and
-    power.
+    """Torque about the joint's +axis (positive lowers the arm), for any kind of number with its
+    sqrt and power.
     """
     (bx, bz), (ex, ez) = data.pivot, data.rod_eye
-    px, pz = cos * ex + sin * ez, cos * ez - sin * ex
+    px = cos * ex + sin * ez
+    pz = cos * ez - sin * ex
     length = sqrt(
         cos * (-2.0 * (bx * ex + bz * ez))
         + sin * (-2.0 * (bx * ez - bz * ex))
@@ -134,8 +145,12 @@ def friction(data: DynamicsData, qd: FloatArray) -> FloatArray:
     return data.viscous * qd + data.coulomb * np.sign(qd.real)
 
 
-def inverse_dynamics(data: DynamicsData, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
-    """Torque (N, n) of the motors at the joint: with rotor inertia and friction, less the counterbalance."""
+def inverse_dynamics(
+    data: DynamicsData, q: FloatArray, qd: FloatArray, qdd: FloatArray
+) -> FloatArray:
+    """Torque (N, n) of the motors at the joint: with rotor inertia and friction, less the
+    counterbalance.
+    """
     arm = rigid(data, q, qd, qdd)
     return arm + data.rotor_inertia * qdd + friction(data, qd) - counterbalance(data, q)
 
@@ -157,22 +172,30 @@ def bias(data: DynamicsData, q: FloatArray, qd: FloatArray) -> FloatArray:
 def mass_matrix(data: DynamicsData, q: FloatArray) -> FloatArray:
     """H (N, n, n) without rotor inertia, by composite bodies in the frame of link 0."""
     N, n = q.shape
-    R, p = np.broadcast_to(np.eye(3), (N, 3, 3)), np.zeros((N, 3))
-    axes, origins = np.empty((n, N, 3)), np.empty((n, N, 3))
-    masses, moments, inertias = np.empty((n, N)), np.empty((n, N, 3)), np.empty((n, N, 3, 3))
-    sin, cos = np.sin(q), np.cos(q)
+    R = np.broadcast_to(np.eye(3), (N, 3, 3))
+    p = np.zeros((N, 3))
+    axes = np.empty((n, N, 3))
+    origins = np.empty((n, N, 3))
+    masses = np.empty((n, N))
+    moments = np.empty((n, N, 3))
+    inertias = np.empty((n, N, 3, 3))
+    sin = np.sin(q)
+    cos = np.cos(q)
     for i in range(n):
         p = p + R @ data.origin[i, :3, 3]
         local = joint_rotation(data.origin[i], data.axis[i], sin[:, i], cos[:, i])
         R = R @ np.moveaxis(np.array(local), 2, 0)
         com = p + R @ data.com[i]
-        axes[i], origins[i] = R @ data.axis[i], p
-        masses[i], moments[i] = data.mass[i], data.mass[i] * com
+        axes[i] = R @ data.axis[i]
+        origins[i] = p
+        masses[i] = data.mass[i]
+        moments[i] = data.mass[i] * com
         inertias[i] = R @ data.inertia[i] @ np.swapaxes(R, 1, 2) + data.mass[i] * _about_origin(com)
     H = np.empty((N, n, n))
     for i in reversed(range(n)):
         if i < n - 1:  # the composite of all bodies from i outwards, about the origin of link 0
-            masses[i], moments[i] = masses[i] + masses[i + 1], moments[i] + moments[i + 1]
+            masses[i] = masses[i] + masses[i + 1]
+            moments[i] = moments[i] + moments[i + 1]
             inertias[i] = inertias[i] + inertias[i + 1]
         # momentum of the composite turning about axis i with unit speed
         velocity = np.cross(origins[i], axes[i])
@@ -190,8 +213,12 @@ def _about_origin(d: FloatArray) -> FloatArray:
     return np.asarray(squared - d[:, :, None] * d[:, None, :])
 
 
-def forward_dynamics(data: DynamicsData, q: FloatArray, qd: FloatArray, tau: FloatArray) -> FloatArray:
-    """Accelerations (N, n) under the motor torques tau (N, n): (H + J_r) qdd = tau - h - friction + T_cb."""
+def forward_dynamics(
+    data: DynamicsData, q: FloatArray, qd: FloatArray, tau: FloatArray
+) -> FloatArray:
+    """Accelerations (N, n) under the motor torques tau (N, n): (H + J_r) qdd = tau - h - friction +
+    T_cb.
+    """
     effort = tau - bias(data, q, qd) - friction(data, qd) + counterbalance(data, q)
     H = mass_matrix(data, q) + np.diag(data.rotor_inertia)
     return np.asarray(np.linalg.solve(H, effort[:, :, None])[:, :, 0])
@@ -201,7 +228,8 @@ def torque_limit(data: DynamicsData, qd: FloatArray) -> FloatArray:
     """Torque available at the speed |qd| (N, n)."""
     limit = np.empty_like(qd)
     for j in range(data.n):
-        speeds, torques = data.envelope_speed[j], data.envelope_torque[j]
+        speeds = data.envelope_speed[j]
+        torques = data.envelope_torque[j]
         speed = np.abs(qd[:, j])
         limit[:, j] = np.where(speed < speeds[0], torques[0], np.interp(speed, speeds, torques[1:]))
     return limit
@@ -220,9 +248,12 @@ STEP = 1e-100  # of the complex steps: so small that no digit is lost
 def torque_gradients(
     data: DynamicsData, q: FloatArray, qd: FloatArray, qdd: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """d tau_i / d q_j, d qd_j, d qdd_j, each (N, n, n) [i, j], by complex steps: exact to rounding."""
+    """d tau_i / d q_j, d qd_j, d qdd_j, each (N, n, n) [i, j], by complex steps: exact to
+    rounding.
+    """
     N, n = q.shape
-    of_q, of_qd = np.empty((N, n, n)), np.empty((N, n, n))
+    of_q = np.empty((N, n, n))
+    of_qd = np.empty((N, n, n))
     for j in range(n):
         step = np.zeros((1, n), complex)
         step[0, j] = STEP * 1j

@@ -1,8 +1,8 @@
 """Motions over pieces of time as intervals: what proofs of torque and bounds of power share.
 
-Over a piece with middle m a smooth f lies in f(m) + f' over the piece (t - m): the mean value form, whose
-excess shrinks with the square of the piece. Coulomb friction is of either sign where the velocity may vanish,
-none where the joint rests through the segment.
+Over a piece with middle m a smooth f lies in f(m) + f' over the piece (t - m): the mean value form,
+whose excess shrinks with the square of the piece. Coulomb friction is of either sign where the
+velocity may vanish, none where the joint rests through the segment.
 """
 
 from dataclasses import dataclass
@@ -27,8 +27,8 @@ class Pieces:
 
 @dataclass(frozen=True)
 class Enclosure:
-    """Per joint over the pieces (K,): step = t - m; speed, torque without Coulomb friction and that friction;
-    at the middles, and over the pieces with their derivatives.
+    """Per joint over the pieces (K,): step = t - m; speed, torque without Coulomb friction and that
+    friction; at the middles, and over the pieces with their derivatives.
     """
 
     step: Interval
@@ -44,7 +44,9 @@ def pieces_of(durations: FloatArray, counts: IntArray) -> Pieces:
     segment = np.repeat(np.arange(len(durations)), counts)
     k = np.concatenate([np.arange(count) for count in counts])
     width = durations / counts
-    return Pieces(segment, k * width[segment], np.minimum((k + 1) * width[segment], durations[segment]))
+    return Pieces(
+        segment, k * width[segment], np.minimum((k + 1) * width[segment], durations[segment])
+    )
 
 
 def _horner(a: list[Interval], x: Interval) -> Interval:
@@ -54,7 +56,9 @@ def _horner(a: list[Interval], x: Interval) -> Interval:
     return value
 
 
-def _smooth_torque(data: DynamicsData, sin: Number, cos: Number, qd: Number, qdd: Number) -> list[Number]:
+def _smooth_torque(
+    data: DynamicsData, sin: Number, cos: Number, qd: Number, qdd: Number
+) -> list[Number]:
     tau = dynamics.rigid_body_torque(data, sin, cos, qd, qdd)
     for j in range(data.n):
         tau[j] = tau[j] + qdd[j] * float(data.rotor_inertia[j]) + qd[j] * float(data.viscous[j])
@@ -66,7 +70,9 @@ def _smooth_torque(data: DynamicsData, sin: Number, cos: Number, qd: Number, qdd
     return tau
 
 
-def enclosure(data: DynamicsData, coefficients: FloatArray, rests: FloatArray, pieces: Pieces) -> Enclosure:
+def enclosure(
+    data: DynamicsData, coefficients: FloatArray, rests: FloatArray, pieces: Pieces
+) -> Enclosure:
     """Of coefficients (S, n, terms), `rests` (S, n) those that don't move, over pieces (K,)."""
     middle = 0.5 * (pieces.begin + pieces.end)
     step = Interval((interval(pieces.begin) - middle).lo, (interval(pieces.end) - middle).hi)
@@ -93,10 +99,13 @@ def enclosure(data: DynamicsData, coefficients: FloatArray, rests: FloatArray, p
         speed,
         [Dual(a, jerk) for a, jerk in zip(ranges[2], ranges[3], strict=True)],
     )
-    torque = [Dual(intersect(t.v, t0 + t.d * step), t.d) for t, t0 in zip(over, at_middle, strict=True)]
+    torque = [
+        Dual(intersect(t.v, t0 + t.d * step), t.d) for t, t0 in zip(over, at_middle, strict=True)
+    ]
     friction = []
     for j, v in enumerate(ranges[1]):
-        size, still = float(data.coulomb[j]), rests[pieces.segment, j]
+        size = float(data.coulomb[j])
+        still = rests[pieces.segment, j]
         least = np.where(still, 0.0, np.where(v.lo > 0.0, size, -size))
         friction.append(Interval(least, np.where(still, 0.0, np.where(v.hi < 0.0, -size, size))))
     return Enclosure(step, points[1], at_middle, speed, torque, friction)

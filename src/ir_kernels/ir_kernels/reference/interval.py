@@ -1,7 +1,9 @@
-"""Numbers for proofs: intervals that round outwards, and dual numbers that carry a derivative along.
+"""Numbers for proofs: intervals that round outwards, and dual numbers that carry a derivative
+along.
 
-An Interval holds arrays of lower and upper ends; the result of an operation encloses the true result for
-all points of its arguments, because every end is moved outwards by two units in the last place.
+An Interval holds arrays of lower and upper ends; the result of an operation encloses the true
+result for all points of its arguments, because every end is moved outwards by two units in the last
+place.
 """
 
 from __future__ import annotations
@@ -13,7 +15,8 @@ import numpy as np
 from ir_kernels.reference.vectors import Number
 from ir_msgs_py.arrays import FloatArray
 
-OUTWARD, TINY = 4.5e-16, 1e-300
+OUTWARD = 4.5e-16
+TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +42,17 @@ class Interval:
 
     def __mul__(self, other: Number) -> Interval:
         o = interval(other)
-        p, q, r, s = self.lo * o.lo, self.lo * o.hi, self.hi * o.lo, self.hi * o.hi
+        p = self.lo * o.lo
+        q = self.lo * o.hi
+        r = self.hi * o.lo
+        s = self.hi * o.hi
         return outward(
-            np.minimum(np.minimum(p, q), np.minimum(r, s)), np.maximum(np.maximum(p, q), np.maximum(r, s))
+            np.minimum(np.minimum(p, q), np.minimum(r, s)),
+            np.maximum(np.maximum(p, q), np.maximum(r, s)),
         )
 
-    __radd__, __rmul__ = __add__, __mul__
+    __radd__ = __add__
+    __rmul__ = __mul__
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +84,8 @@ class Dual:
             return Dual(self.v * other.v, self.d * other.v + self.v * other.d)
         return Dual(self.v * other, self.d * other)
 
-    __radd__, __rmul__ = __add__, __mul__
+    __radd__ = __add__
+    __rmul__ = __mul__
 
 
 def interval(x: Number) -> Interval:
@@ -105,10 +114,13 @@ def power(x: Number, exponent: float) -> Number:
 
 def sine_cosine(x: Interval) -> tuple[Interval, Interval]:
     """Sines and cosines of all angles of x."""
-    sine, cosine = (np.sin(x.lo), np.sin(x.hi)), (np.cos(x.lo), np.cos(x.hi))
+    sine = (np.sin(x.lo), np.sin(x.hi))
+    cosine = (np.cos(x.lo), np.cos(x.hi))
     wide = x.hi - x.lo > 3.0
 
-    def between(value: tuple[FloatArray, FloatArray], slope: tuple[FloatArray, FloatArray]) -> Interval:
+    def between(
+        value: tuple[FloatArray, FloatArray], slope: tuple[FloatArray, FloatArray]
+    ) -> Interval:
         # a turning point within rounding of an end is no higher than the end, to rounding squared
         top = wide | ((slope[0] > 0.0) & (slope[1] < 0.0))
         bottom = wide | ((slope[0] < 0.0) & (slope[1] > 0.0))

@@ -1,7 +1,8 @@
-"""Closed-form inverse kinematics of a 6R arm with a spherical wrist: all branches, all turns (Pieper 1968).
+"""Closed-form inverse kinematics of a 6R arm with a spherical wrist: all branches, all turns
+(Pieper 1968).
 
-Branch numbers 0..7: +4 where the arm reaches backwards over its base, +2 for the other elbow, +1 for the
-other wrist.
+Branch numbers 0..7: +4 where the arm reaches backwards over its base, +2 for the other elbow, +1
+for the other wrist.
 """
 
 from itertools import product
@@ -18,20 +19,22 @@ SINGULAR_WRIST = 1e-10  # sine of the wrist angle below which only q4 +- q6 is d
 
 
 def arm_branches(geometry: WristGeometry, centre: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """q1, q2, q3 (N, 4, 3) for wrist centres (N, 3) in the frame of link 0, and which exist (N, 4); branches
-    00 01 10 11.
+    """q1, q2, q3 (N, 4, 3) for wrist centres (N, 3) in the frame of link 0, and which exist (N, 4);
+    branches 00 01 10 11.
 
-    Where the arm is stretched both elbows are the same: only the first exists. On axis 1 any q1 serves: 0
-    is taken.
+    Where the arm is stretched both elbows are the same: only the first exists. On axis 1 any q1
+    serves: 0 is taken.
     """
     x, y, z = geometry.plane @ (centre - geometry.axis_point).T
     N = len(centre)
-    q, exists = np.empty((N, 4, 3)), np.empty((N, 4), bool)
+    q = np.empty((N, 4, 3))
+    exists = np.empty((N, 4), bool)
     radius = np.hypot(x, y)
     d = geometry.lateral
     beyond = radius < abs(d) - REACH_TOLERANCE
     forward = np.sqrt(np.maximum(radius**2 - d**2, 0.0))
-    upper, fore = abs(geometry.upper_arm), abs(geometry.forearm)
+    upper = abs(geometry.upper_arm)
+    fore = abs(geometry.forearm)
     opening = np.angle(np.conj(geometry.upper_arm) * geometry.forearm)
     for back in (0, 1):
         reach = geometry.forward * (-forward if back else forward)
@@ -43,7 +46,9 @@ def arm_branches(geometry: WristGeometry, centre: FloatArray) -> tuple[FloatArra
         reachable = (distance <= upper + fore + REACH_TOLERANCE) & (
             distance >= abs(upper - fore) - REACH_TOLERANCE
         )
-        bend = np.where(stretched, np.where(cosine > 0.0, 0.0, np.pi), np.arccos(np.clip(cosine, -1.0, 1.0)))
+        bend = np.where(
+            stretched, np.where(cosine > 0.0, 0.0, np.pi), np.arccos(np.clip(cosine, -1.0, 1.0))
+        )
         for low in (0, 1):
             turn = (-bend if low else bend) - opening
             elbow = geometry.upper_arm + geometry.forearm * np.exp(1j * turn)
@@ -58,35 +63,48 @@ def arm_branches(geometry: WristGeometry, centre: FloatArray) -> tuple[FloatArra
 def wrist_branches(
     geometry: WristGeometry, arm: FloatArray, hand: FloatArray, free_q4: float
 ) -> tuple[FloatArray, BoolArray]:
-    """q4, q5, q6 (N, 2, 3) for arm angles (N, 3) and the hand's rotation (N, 3, 3) in link 0, and which exist
-    (N, 2).
+    """q4, q5, q6 (N, 2, 3) for arm angles (N, 3) and the hand's rotation (N, 3, 3) in link 0, and
+    which exist (N, 2).
 
-    Where axes 4 and 6 are parallel only their sum is determined: one representative with q4 = `free_q4`
-    exists.
+    Where axes 4 and 6 are parallel only their sum is determined: one representative with q4 =
+    `free_q4` exists.
     """
     z = geometry.axis
-    before = axis_rotation(z[0], arm[:, 0]) @ axis_rotation(z[1], arm[:, 1]) @ axis_rotation(z[2], arm[:, 2])
-    W = np.swapaxes(before, 1, 2) @ hand @ geometry.hand[:3, :3].T  # = exp(z4 q4) exp(z5 q5) exp(z6 q6)
+    before = (
+        axis_rotation(z[0], arm[:, 0])
+        @ axis_rotation(z[1], arm[:, 1])
+        @ axis_rotation(z[2], arm[:, 2])
+    )
+    W = (
+        np.swapaxes(before, 1, 2) @ hand @ geometry.hand[:3, :3].T
+    )  # = exp(z4 q4) exp(z5 q5) exp(z6 q6)
     e3 = np.cross(z[3], z[4])
     pointing = W @ z[5]
-    c, a, b = pointing @ z[3], pointing @ z[4], pointing @ e3
+    c = pointing @ z[3]
+    a = pointing @ z[4]
+    b = pointing @ e3
     s = np.hypot(a, b)
     singular = s < SINGULAR_WRIST
-    q, exists = np.empty((len(arm), 2, 3)), np.empty((len(arm), 2), bool)
+    q = np.empty((len(arm), 2, 3))
+    exists = np.empty((len(arm), 2), bool)
     for flip in (0, 1):
         sign = -1.0 if flip else 1.0
         q4 = np.where(singular, free_q4, np.arctan2(sign * a, -sign * b))
         q5 = np.arctan2(sign * s, c) - geometry.wrist_zero
-        rest = np.swapaxes(axis_rotation(z[3], q4) @ axis_rotation(z[4], q5), 1, 2) @ W  # = exp(z6 q6)
+        rest = (
+            np.swapaxes(axis_rotation(z[3], q4) @ axis_rotation(z[4], q5), 1, 2) @ W
+        )  # = exp(z6 q6)
         turned = rest @ z[4]
-        q[:, flip] = np.stack([q4, q5, np.arctan2(turned @ np.cross(z[5], z[4]), turned @ z[4])], axis=1)
+        q[:, flip] = np.stack(
+            [q4, q5, np.arctan2(turned @ np.cross(z[5], z[4]), turned @ z[4])], axis=1
+        )
         exists[:, flip] = ~(singular & bool(flip))
     return q, exists
 
 
 def turns(angle: float, low: float, high: float) -> list[float]:
-    """All values angle + 2 pi k within [low, high], ascending; within LIMIT_TOLERANCE of a limit counts as
-    on it.
+    """All values angle + 2 pi k within [low, high], ascending; within LIMIT_TOLERANCE of a limit
+    counts as on it.
     """
     first = int(np.ceil((low - LIMIT_TOLERANCE - angle) / (2.0 * np.pi)))
     last = int(np.floor((high + LIMIT_TOLERANCE - angle) / (2.0 * np.pi)))
@@ -96,8 +114,8 @@ def turns(angle: float, low: float, high: float) -> list[float]:
 def solve(
     geometry: WristGeometry, hand: FloatArray, position_min: FloatArray, position_max: FloatArray
 ) -> tuple[FloatArray, IntArray, IntArray]:
-    """All q (M, 6) for poses of link 6 (N, 4, 4) in link 0, with pose index (M,) and branch (M,), sorted by
-    pose, branch, q.
+    """All q (M, 6) for poses of link 6 (N, 4, 4) in link 0, with pose index (M,) and branch (M,),
+    sorted by pose, branch, q.
     """
     centre = hand[:, :3, 3] + hand[:, :3, :3] @ geometry.wrist_in_hand
     arm, arm_exists = arm_branches(geometry, centre)

@@ -1,5 +1,5 @@
-"""The collision model in NumPy, with the methods of the compiled one (cpp/geometry.cpp): arrays that are
-checked in, tuples of arrays out.
+"""The collision model in NumPy, with the methods of the compiled one (cpp/geometry.cpp): arrays
+that are checked in, tuples of arrays out.
 """
 
 import numpy as np
@@ -15,7 +15,9 @@ Verdicts = tuple[NDArray[np.uint8], FloatArray, FloatArray, IntArray]
 
 
 class Model:
-    """Distances of one geometry. See ir_kernels.collision.CollisionModel for what the methods promise."""
+    """Distances of one geometry. See ir_kernels.collision.CollisionModel for what the methods
+    promise.
+    """
 
     def __init__(self, geometry: Geometry) -> None:
         self.geometry = geometry
@@ -28,7 +30,9 @@ class Model:
         return collision.distances(self.geometry, self._segments(q))
 
     def min_distance(self, q: FloatArray, offset: FloatArray) -> NearestPairs:
-        """Distance (N,), pair (N,), point a, point b, normal (N, 3) at q (N, n) with offset (Z,)."""
+        """Distance (N,), pair (N,), point a, point b, normal (N, 3) at q (N, n) with offset
+        (Z,).
+        """
         segments = self._segments(q)
         pair = collision.nearest(collision.distances(self.geometry, segments), offset)
         found = pair >= 0
@@ -42,11 +46,15 @@ class Model:
     def witnesses(
         self, q: FloatArray, pair: IntArray, gradient: bool
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Distance (N,), point a, point b, normal (N, 3), gradient (N, n), empty unless asked for."""
+        """Distance (N,), point a, point b, normal (N, 3), gradient (N, n), empty unless asked
+        for.
+        """
         poses = collision.poses(self.geometry, q)
         found = collision.witnesses(self.geometry, collision.ends(self.geometry, poses), pair)
         slope = (
-            collision.gradient(self.geometry, poses, found, pair) if gradient else np.zeros((0, q.shape[1]))
+            collision.gradient(self.geometry, poses, found, pair)
+            if gradient
+            else np.zeros((0, q.shape[1]))
         )
         return found.distance, found.on_segment, found.on_body, found.normal, slope
 
@@ -61,13 +69,18 @@ class Model:
     def certify_trajectory(
         self, coefficients: FloatArray, durations: FloatArray, threshold: FloatArray
     ) -> tuple[int, float, float, int, float]:
-        """Verdict, interval from the start, pair, proven bound; coefficients (S, n, 6), durations (S,)."""
-        found = certify.certify(self.geometry, certify.Polynomials(coefficients, durations), threshold)
+        """Verdict, interval from the start, pair, proven bound; coefficients (S, n, 6), durations
+        (S,).
+        """
+        found = certify.certify(
+            self.geometry, certify.Polynomials(coefficients, durations), threshold
+        )
         unsafe = np.flatnonzero(found.verdict != FREE)
         if not len(unsafe):
             total = float(durations.sum())
             return FREE, total, total, -1, float(found.bound.min(initial=np.inf))
         k = int(unsafe[0])
         begin = float(durations[:k].sum())
-        t0, t1 = begin + float(found.t0[k]), begin + float(found.t1[k])
+        t0 = begin + float(found.t0[k])
+        t1 = begin + float(found.t1[k])
         return int(found.verdict[k]), t0, t1, int(found.pair[k]), -np.inf

@@ -8,9 +8,13 @@ from ir_msgs_py.arrays import FloatArray
 def dc_bus(
     axis_power: FloatArray, dt: FloatArray, capacity: float, regeneration: str, stored: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Mains W, dissipated W and stored J (N,) for axis_power (N, n) W; see `ir_kernels.power.dc_bus`."""
+    """Mains W, dissipated W and stored J (N,) for axis_power (N, n) W; see
+    `ir_kernels.power.dc_bus`.
+    """
     N = len(axis_power)
-    mains, dissipated, level = np.empty(N), np.zeros(N), np.empty(N)
+    mains = np.empty(N)
+    dissipated = np.zeros(N)
+    level = np.empty(N)
     for k in range(N):
         if regeneration == "none":
             mains[k] = sum(max(p, 0.0) for p in axis_power[k])

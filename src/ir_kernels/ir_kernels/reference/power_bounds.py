@@ -12,13 +12,17 @@ from ir_msgs_py.arrays import FloatArray
 def power_bounds(
     data: DynamicsData, coefficients: FloatArray, durations: FloatArray, longest: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Seconds, net and taken (K,) of pieces of at most `longest` s: see `ir_kernels.power_bounds`."""
+    """Seconds, net and taken (K,) of pieces of at most `longest` s: see
+    `ir_kernels.power_bounds`.
+    """
     counts = np.maximum(np.ceil(durations / longest), 1).astype(int)
     pieces = pieces_of(durations, counts)
     rests = (coefficients[:, :, 1:] == 0.0).all(axis=2)
     found = enclosure(data, coefficients, rests, pieces)
     middle: Number = interval(np.zeros(len(pieces.segment)))
-    slope, over, taken = middle, middle, np.zeros(len(pieces.segment))
+    slope = middle
+    over = middle
+    taken = np.zeros(len(pieces.segment))
     for j in range(data.n):
         # whatever the friction's sign is at an instant, it is one number of this interval there
         friction = found.coulomb[j]
@@ -26,7 +30,9 @@ def power_bounds(
         torque = Dual(found.torque[j].v + friction, found.torque[j].d)
         power = _axis_power(data, j, torque, found.speed[j])
         sharp: Interval = intersect(power.v, at_middle + power.d * found.step)
-        middle, slope, over = middle + at_middle, slope + power.d, over + sharp
+        middle = middle + at_middle
+        slope = slope + power.d
+        over = over + sharp
         taken = taken + np.maximum(sharp.hi, 0.0)
     net = intersect(over, middle + slope * found.step)
     return pieces.end - pieces.begin, net.hi, taken * (1.0 + 8 * OUTWARD)

@@ -1,5 +1,5 @@
-"""Two trees over certified edges, written for reading; the compiled search draws other numbers, so it finds
-other paths.
+"""Two trees over certified edges, written for reading; the compiled search draws other numbers, so
+it finds other paths.
 
 The search is a generator that yields how many edges it has certified; `grow` pays for them.
 """
@@ -19,8 +19,12 @@ BETWEEN_JOINED = 4  # configurations of a join that are looked at before it is c
 STEP = 0.7  # longest extension, weighted rad
 KEPT = 0.9  # how much of the proved part of a blocked edge is used
 SHORTEST = 0.02  # weighted rad: parts that are shorter aren't worth a node
-AROUND_NODE, OTHER_TREE = 0.62, 0.08  # shares of targets; the rest: anywhere
-BETWEEN, MARGIN = 0.85, 1.0  # share of the latter within so many rad of the box around start and a goal
+# shares of targets; the rest: anywhere
+AROUND_NODE = 0.62
+OTHER_TREE = 0.08
+# share of the latter within so many rad of the box around start and a goal
+BETWEEN = 0.85
+MARGIN = 1.0
 SPREADS = (0.1, 0.2, 0.4, 0.8)  # rad, of what is scattered around a node
 
 Work = Generator[int, None, Any]
@@ -66,7 +70,9 @@ class Tree:
 
 
 class Search:
-    """One search; arguments as search.BidirectionalTree has checked them: start (n,), goals (G, n)."""
+    """One search; arguments as search.BidirectionalTree has checked them: start (n,), goals (G,
+    n).
+    """
 
     def __init__(
         self,
@@ -81,14 +87,20 @@ class Search:
         start_line: FloatArray,
         goal_lines: list[FloatArray],
     ) -> None:
-        self._model, self._threshold = model, threshold
-        self._low, self._high, self._scale = low, high, scale
-        self._start, self._goals = start, goals
+        self._model = model
+        self._threshold = threshold
+        self._low = low
+        self._high = high
+        self._scale = scale
+        self._start = start
+        self._goals = goals
         self._rng = np.random.default_rng(seed)
         self._trees = (Tree(start[None], scale), Tree(goals, scale))
         self._lines = [(0, 0, start_line), *((1, g, line) for g, line in enumerate(goal_lines))]
         self._path = np.empty((0, len(start)))
-        self._goal, self._spent, self._owed = -1, 0, 0
+        self._goal = -1
+        self._spent = 0
+        self._owed = 0
         node, self._gap = self._trees[1].nearest(start)
         self._gap_ends = np.stack([start, goals[node]])
         self._work = self._rounds()
@@ -98,7 +110,9 @@ class Search:
         left = max_edges
         while not self.found():
             paid = min(left, self._owed)
-            self._spent, self._owed, left = self._spent + paid, self._owed - paid, left - paid
+            self._spent = self._spent + paid
+            self._owed = self._owed - paid
+            left = left - paid
             if self._owed > 0:
                 return False
             self._owed = next(self._work, 0)
@@ -164,7 +178,9 @@ class Search:
 
     def _target(self, here: Tree, there: Tree) -> FloatArray:
         """A place to grow to."""
-        rng, low, high = self._rng, self._low, self._high
+        rng = self._rng
+        low = self._low
+        high = self._high
         which = rng.uniform()
         if which < OTHER_TREE:
             return np.asarray(there.nodes[rng.integers(len(there.nodes))])
@@ -174,21 +190,21 @@ class Search:
             return np.asarray(np.clip(scattered, low, high))
         if rng.uniform() < BETWEEN:
             ends = np.stack([self._start, self._goals[rng.integers(len(self._goals))]])
-            low, high = (
-                np.maximum(low, ends.min(axis=0) - MARGIN),
-                np.minimum(high, ends.max(axis=0) + MARGIN),
-            )
+            low = np.maximum(low, ends.min(axis=0) - MARGIN)
+            high = np.minimum(high, ends.max(axis=0) + MARGIN)
         return np.asarray(rng.uniform(low, high))
 
     def _extend(self, side: int) -> Work:
         """New nodes of one tree, a step towards each target or as far as that is proved."""
-        here, there = self._trees[side], self._trees[1 - side]
+        here = self._trees[side]
+        there = self._trees[1 - side]
         tried = []
         for _ in range(BATCH):
             target = self._target(here, there)
             parent, length = here.nearest(target)
             if length >= SHORTEST:
-                begin, share = here.nodes[parent], STEP / length
+                begin = here.nodes[parent]
+                share = STEP / length
                 end = begin + share * (target - begin) if share < 1.0 else target
                 tried.append((parent, begin, end, min(length, STEP)))
         yield 1
@@ -203,19 +219,23 @@ class Search:
         ]
 
     def _join(self, side: int, new: list[int]) -> Work:
-        """Pairs of a new node and one of the other tree with a free movement between them; where there are
-        none, the other tree grows as far as its movements are proved.
+        """Pairs of a new node and one of the other tree with a free movement between them; where
+        there are none, the other tree grows as far as its movements are proved.
         """
-        here, there = self._trees[side], self._trees[1 - side]
+        here = self._trees[side]
+        there = self._trees[1 - side]
         pairs = [(*there.nearest(here.nodes[k]), k) for k in new]
         pairs = sorted(pairs, key=lambda pair: pair[1])[:JOINED]
         if pairs and pairs[0][1] < self._gap:
             ends = [here.nodes[pairs[0][2]], there.nodes[pairs[0][0]]]
-            self._gap, self._gap_ends = pairs[0][1], np.array(ends if side == 0 else ends[::-1])
+            self._gap = pairs[0][1]
+            self._gap_ends = np.array(ends if side == 0 else ends[::-1])
         pairs = yield from self._maybe_free(pairs, here, there)
         steps = [(there.nodes[other], here.nodes[mine]) for other, _, mine in pairs]
         verdict, share = yield from self._certified(steps)
-        free = [(mine, other) for (other, _, mine), v in zip(pairs, verdict, strict=True) if v == FREE]
+        free = [
+            (mine, other) for (other, _, mine), v in zip(pairs, verdict, strict=True) if v == FREE
+        ]
         if not free:
             for (other, length, _), (q0, q1), part in zip(pairs, steps, share, strict=True):
                 if part * length >= SHORTEST:
@@ -223,8 +243,8 @@ class Search:
         return free
 
     def _maybe_free(self, pairs: list[tuple[int, float, int]], here: Tree, there: Tree) -> Work:
-        """The pairs without those whose movement isn't free at a place in between: dropped at once, like
-        extensions.
+        """The pairs without those whose movement isn't free at a place in between: dropped at once,
+        like extensions.
         """
         if not pairs:
             return []
@@ -238,7 +258,8 @@ class Search:
     def _confirmed(self, at_start: int, at_goal: int) -> Work:
         """Whether every step of a path is proved as it will be driven; what isn't is cut off."""
         first, second = self._trees
-        out, back = first.branch(at_start)[::-1], second.branch(at_goal)
+        out = first.branch(at_start)[::-1]
+        back = second.branch(at_goal)
         points = [*(first.nodes[k] for k in out), *(second.nodes[k] for k in back)]
         verdict, _ = yield from self._certified(list(pairwise(points)))
         if (verdict == FREE).all():

@@ -1,10 +1,10 @@
-"""Signed distance of a segment (the axis of a capsule) from a convex solid or from another segment, with
-witnesses.
+"""Signed distance of a segment (the axis of a capsule) from a convex solid or from another segment,
+with witnesses.
 
-The distance from a convex set is a convex function of the place t on the segment, so its slope is bisected.
-Where the segment crosses the solid the distance is minus the penetration depth; the witnesses are those of
-the segment moved out by it, so that always on_segment - on_body = distance * normal: an optimiser that
-follows the normal gets out.
+The distance from a convex set is a convex function of the place t on the segment, so its slope is
+bisected. Where the segment crosses the solid the distance is minus the penetration depth; the
+witnesses are those of the segment moved out by it, so that always on_segment - on_body = distance *
+normal: an optimiser that follows the normal gets out.
 """
 
 from collections.abc import Callable
@@ -22,8 +22,8 @@ TOUCH = 1e-12  # [m] below this distance a segment counts as crossing the solid
 
 
 class Witness(NamedTuple):
-    """distance (N,) [m], nearest points on_segment and on_body (N, 3), unit normal (N, 3) from the body to
-    the segment.
+    """distance (N,) [m], nearest points on_segment and on_body (N, 3), unit normal (N, 3) from the
+    body to the segment.
     """
 
     distance: FloatArray
@@ -37,12 +37,14 @@ def _nearest(
 ) -> tuple[FloatArray, FloatArray]:
     """Points (N, 3) of the segments and of the solid that are nearest to each other."""
     d = p1 - p0
-    low, high = np.zeros((len(p0), 1)), np.ones((len(p0), 1))
+    low = np.zeros((len(p0), 1))
+    high = np.ones((len(p0), 1))
     for _ in range(BISECTIONS):
         middle = (low + high) / 2.0
         point = p0 + middle * d
         rising = np.sum((point - project(point)) * d, axis=1, keepdims=True) > 0.0
-        low, high = np.where(rising, low, middle), np.where(rising, middle, high)
+        low = np.where(rising, low, middle)
+        high = np.where(rising, middle, high)
     on_segment = p0 + np.where(low > 0.0, high, low) * d
     return on_segment, project(on_segment)
 
@@ -69,16 +71,22 @@ def _from_solid(
 
 
 def segment_segment(a0: FloatArray, a1: FloatArray, b0: FloatArray, b1: FloatArray) -> Witness:
-    """Nearest points of two segments (N, 3) per row: ends of each with the other, and both insides."""
-    da, db, r = a1 - a0, b1 - b0, a0 - b0
+    """Nearest points of two segments (N, 3) per row: ends of each with the other, and both
+    insides.
+    """
+    da = a1 - a0
+    db = b1 - b0
+    r = a0 - b0
     aa, bb, ab = (np.sum(x * y, axis=1) for x, y in ((da, da), (db, db), (da, db)))
-    ra, rb = np.sum(r * da, axis=1), np.sum(r * db, axis=1)
+    ra = np.sum(r * da, axis=1)
+    rb = np.sum(r * db, axis=1)
 
     def ratio(numerator: FloatArray, denominator: FloatArray) -> FloatArray:
         safe = np.where(denominator > 0.0, denominator, 1.0)
         return np.clip(np.where(denominator > 0.0, numerator / safe, 0.0), 0.0, 1.0)
 
-    zero, one = np.zeros(len(a0)), np.ones(len(a0))
+    zero = np.zeros(len(a0))
+    one = np.ones(len(a0))
     s = ratio(ab * rb - bb * ra, aa * bb - ab * ab)
     choices = [
         (s, ratio(rb + s * ab, bb)),
@@ -87,18 +95,25 @@ def segment_segment(a0: FloatArray, a1: FloatArray, b0: FloatArray, b1: FloatArr
         (ratio(-ra, aa), zero),
         (ratio(ab - ra, aa), one),
     ]
-    s, t = np.array([c[0] for c in choices]), np.array([c[1] for c in choices])
+    s = np.array([c[0] for c in choices])
+    t = np.array([c[1] for c in choices])
     gap = r + s[..., None] * da - t[..., None] * db
     best = np.sum(gap * gap, axis=-1).argmin(axis=0)
     rows = np.arange(len(a0))
-    gap, s, t = gap[best, rows], s[best, rows], t[best, rows]
-    normal = unit(gap, unit(np.cross(da, db), solids.perpendicular(np.where((aa > bb)[:, None], da, db))))
+    gap = gap[best, rows]
+    s = s[best, rows]
+    t = t[best, rows]
+    normal = unit(
+        gap, unit(np.cross(da, db), solids.perpendicular(np.where((aa > bb)[:, None], da, db)))
+    )
     return Witness(np.linalg.norm(gap, axis=1), a0 + s[:, None] * da, b0 + t[:, None] * db, normal)
 
 
-def segment_body(p0: FloatArray, p1: FloatArray, kind: int, size: FloatArray, hull: Hull) -> Witness:
-    """Witness of segments (N, 3), (N, 3) given in the frame of a body; spheres and capsules with their
-    radius.
+def segment_body(
+    p0: FloatArray, p1: FloatArray, kind: int, size: FloatArray, hull: Hull
+) -> Witness:
+    """Witness of segments (N, 3), (N, 3) given in the frame of a body; spheres and capsules with
+    their radius.
     """
     name = KINDS[kind]
     if name == "box":
@@ -107,7 +122,8 @@ def segment_body(p0: FloatArray, p1: FloatArray, kind: int, size: FloatArray, hu
             p0, p1, lambda p: solids.project_box(p, half), lambda a, b: solids.depth_box(a, b, half)
         )
     if name == "cylinder":
-        radius, half_length = float(size[0]), float(size[1]) / 2.0
+        radius = float(size[0])
+        half_length = float(size[1]) / 2.0
         return _from_solid(
             p0,
             p1,
@@ -116,7 +132,10 @@ def segment_body(p0: FloatArray, p1: FloatArray, kind: int, size: FloatArray, hu
         )
     if name == "mesh":
         return _from_solid(
-            p0, p1, lambda p: solids.project_hull(p, hull), lambda a, b: solids.depth_hull(a, b, hull)
+            p0,
+            p1,
+            lambda p: solids.project_hull(p, hull),
+            lambda a, b: solids.depth_hull(a, b, hull),
         )
     if name == "plane":
         lowest = np.where((p0[:, 2] <= p1[:, 2])[:, None], p0, p1)

@@ -1,10 +1,12 @@
-"""Nearest point and penetration depth of a convex solid, in the solid's own frame, for one point or segment
-per row.
+"""Nearest point and penetration depth of a convex solid, in the solid's own frame, for one point or
+segment per row.
 
-`project` gives the nearest point of the solid, which is the point itself where it is inside. `depth` gives
-the shortest translation of a segment that crosses the solid until it only touches it: the minimum over
-directions n of support(n) - min(n.p0, n.p1), for which a polytope needs only the normals of its faces and the
-cross products of its edges with the segment, and a cylinder those of its caps, its side, and its rims.
+`project` gives the nearest point of the solid, which is the point itself where it is inside.
+`depth` gives
+the shortest translation of a segment that crosses the solid until it only touches it: the minimum
+over directions n of support(n) - min(n.p0, n.p1), for which a polytope needs only the normals of
+its faces and the cross products of its edges with the segment, and a cylinder those of its caps,
+its side, and its rims.
 """
 
 from collections.abc import Callable
@@ -54,8 +56,8 @@ def project_cylinder(points: FloatArray, radius: float, half_length: float) -> F
 
 
 def project_triangle(points: FloatArray, corners: FloatArray) -> FloatArray:
-    """Nearest point (N, F, 3) of each triangle (F, 3, 3): inside its prism the plane's, else the nearest of
-    its sides'.
+    """Nearest point (N, F, 3) of each triangle (F, 3, 3): inside its prism the plane's, else the
+    nearest of its sides'.
     """
     start = corners
     along = corners[:, [1, 2, 0]] - start
@@ -79,9 +81,13 @@ def project_hull(points: FloatArray, hull: Hull) -> FloatArray:
     return np.where(inside[:, None], points, on_surface)
 
 
-def _shallowest(direction: FloatArray, support: FloatArray, p0: FloatArray, p1: FloatArray) -> Depth:
+def _shallowest(
+    direction: FloatArray, support: FloatArray, p0: FloatArray, p1: FloatArray
+) -> Depth:
     """The least overlap over K directions (N, K, 3) with the solid's support values (N, K)."""
-    ahead = np.minimum(np.einsum("nki,ni->nk", direction, p0), np.einsum("nki,ni->nk", direction, p1))
+    ahead = np.minimum(
+        np.einsum("nki,ni->nk", direction, p0), np.einsum("nki,ni->nk", direction, p1)
+    )
     overlap = support - ahead
     best = overlap.argmin(axis=1)
     rows = np.arange(len(p0))
@@ -106,7 +112,9 @@ def depth_box(p0: FloatArray, p1: FloatArray, half: FloatArray) -> Depth:
     cross = np.cross(np.eye(3)[None], (p1 - p0)[:, None])
     parallel = np.linalg.norm(cross, axis=-1) <= 1e-9 * np.linalg.norm(p1 - p0, axis=1)[:, None]
     crossing = np.where(parallel[..., None], faces[0], unit(cross))
-    direction = np.concatenate([np.broadcast_to(faces, (len(p0), 6, 3)), crossing, -crossing], axis=1)
+    direction = np.concatenate(
+        [np.broadcast_to(faces, (len(p0), 6, 3)), crossing, -crossing], axis=1
+    )
     return _shallowest(direction, np.abs(direction) @ half, p0, p1)
 
 
@@ -115,9 +123,11 @@ def _golden_section(overlap: Callable[[FloatArray], FloatArray], best: IntArray)
     low = (best[:, None] - 1.0) * (2.0 * np.pi / RIM_SAMPLES)
     high = (best[:, None] + 1.0) * (2.0 * np.pi / RIM_SAMPLES)
     for _ in range(GOLDEN_STEPS):
-        left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+        left = high - GOLDEN * (high - low)
+        right = low + GOLDEN * (high - low)
         smaller = overlap(left) < overlap(right)
-        low, high = np.where(smaller, low, left), np.where(smaller, right, high)
+        low = np.where(smaller, low, left)
+        high = np.where(smaller, right, high)
     middle: FloatArray = (low + high) / 2.0
     return middle
 
@@ -140,10 +150,14 @@ def depth_cylinder(p0: FloatArray, p1: FloatArray, radius: float, half_length: f
     # The rims, swept along the segment: directions perpendicular to it, on a circle.
     u = perpendicular(d)
     v = unit(np.cross(unit(d), u), u)
-    angle = np.broadcast_to(np.arange(RIM_SAMPLES) * (2.0 * np.pi / RIM_SAMPLES), (len(p0), RIM_SAMPLES))
+    angle = np.broadcast_to(
+        np.arange(RIM_SAMPLES) * (2.0 * np.pi / RIM_SAMPLES), (len(p0), RIM_SAMPLES)
+    )
 
     def on_circle(angle: FloatArray) -> FloatArray:
-        result: FloatArray = u[:, None] * np.cos(angle)[..., None] + v[:, None] * np.sin(angle)[..., None]
+        result: FloatArray = (
+            u[:, None] * np.cos(angle)[..., None] + v[:, None] * np.sin(angle)[..., None]
+        )
         return result
 
     def overlap(angle: FloatArray) -> FloatArray:
@@ -153,5 +167,7 @@ def depth_cylinder(p0: FloatArray, p1: FloatArray, radius: float, half_length: f
         return result
 
     closest = _golden_section(overlap, overlap(angle).argmin(axis=1))
-    direction = np.concatenate([caps, radial[:, None], -radial[:, None], on_circle(closest)], axis=1)
+    direction = np.concatenate(
+        [caps, radial[:, None], -radial[:, None], on_circle(closest)], axis=1
+    )
     return _shallowest(direction, support(direction), p0, p1)

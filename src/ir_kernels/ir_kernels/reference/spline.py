@@ -1,9 +1,10 @@
-"""What a motion along a uniform cubic B-spline costs, with its derivatives: the oracle of the compiled core.
+"""What a motion along a uniform cubic B-spline costs, with its derivatives: the oracle of the
+compiled core.
 
-Each interval between knots is sampled at the middles of SAMPLES equal parts. There the drives are looked at
-(torque, speed, power) and the clearance; accelerations at the knots, jerks between them and positions by the
-control points. Derivatives go backwards: by the samples' q, qd, qdd first, then by the control points and by
-the interval.
+Each interval between knots is sampled at the middles of SAMPLES equal parts. There the drives are
+looked at (torque, speed, power) and the clearance; accelerations at the knots, jerks between them
+and positions by the control points. Derivatives go backwards: by the samples' q, qd, qdd first,
+then by the control points and by the interval.
 """
 
 from dataclasses import dataclass
@@ -27,7 +28,9 @@ HOLDING = 0.02  # against bending
 
 @dataclass
 class Samples:
-    """q, qd, qdd (N, n) at N places, and derivatives of the cost by them and by the time between two."""
+    """q, qd, qdd (N, n) at N places, and derivatives of the cost by them and by the time between
+    two.
+    """
 
     q: FloatArray
     qd: FloatArray
@@ -39,10 +42,17 @@ class Samples:
 
 
 def basis() -> FloatArray:
-    """(3, SAMPLES, 4): weights of an interval's control points for position and two derivatives by u."""
+    """(3, SAMPLES, 4): weights of an interval's control points for position and two derivatives by
+    u.
+    """
     u = np.arange(SAMPLES) / SAMPLES
     v = 1.0 - u
-    position = [v**3 / 6, (3 * u**3 - 6 * u**2 + 4) / 6, (-3 * u**3 + 3 * u**2 + 3 * u + 1) / 6, u**3 / 6]
+    position = [
+        v**3 / 6,
+        (3 * u**3 - 6 * u**2 + 4) / 6,
+        (-3 * u**3 + 3 * u**2 + 3 * u + 1) / 6,
+        u**3 / 6,
+    ]
     first = [-(v**2) / 2, (3 * u**2 - 4 * u) / 2, (-3 * u**2 + 2 * u + 1) / 2, u**2 / 2]
     second = [v, 3 * u - 2, 1 - 3 * u, u]
     weights: FloatArray = np.array([position, first, second]).transpose(0, 2, 1)
@@ -58,12 +68,17 @@ def sampling(K: int) -> FloatArray:
 
 
 def torque_limit(data: DynamicsData, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Torque limit (N, n) at |speed|, and its slope; the step at the first speed is a ramp below it."""
-    limit, slope = np.empty_like(speed), np.empty_like(speed)
+    """Torque limit (N, n) at |speed|, and its slope; the step at the first speed is a ramp below
+    it.
+    """
+    limit = np.empty_like(speed)
+    slope = np.empty_like(speed)
     for j, (v, t) in enumerate(zip(data.envelope_speed, data.envelope_torque, strict=True)):
-        at, torque = np.append(v[0] * (1.0 - RAMP), v), t
+        at = np.append(v[0] * (1.0 - RAMP), v)
+        torque = t
         if v[0] == 0.0:
-            at, torque = v, t[1:]
+            at = v
+            torque = t[1:]
         limit[:, j] = np.interp(speed[:, j], at, torque)
         slopes = np.concatenate([[0.0], np.diff(torque) / np.diff(at), [0.0]])
         slope[:, j] = slopes[np.searchsorted(at, speed[:, j])]
@@ -78,7 +93,9 @@ def torques(data: DynamicsData, s: Samples) -> FloatArray:
 
 
 def torques_back(data: DynamicsData, s: Samples, of_torque: FloatArray) -> None:
-    """Hand derivatives of the cost by the torques (N, n) on to positions, speeds and accelerations."""
+    """Hand derivatives of the cost by the torques (N, n) on to positions, speeds and
+    accelerations.
+    """
     of_q, of_qd, of_qdd = dynamics.torque_gradients(data, s.q, s.qd, s.qdd)  # with viscous friction
     s.of_q += np.einsum("ki,kij->kj", of_torque, of_q)
     s.of_qd += np.einsum("ki,kij->kj", of_torque, of_qd)
@@ -87,31 +104,43 @@ def torques_back(data: DynamicsData, s: Samples, of_torque: FloatArray) -> None:
 
 
 def bus(power: FloatArray, step: float, terms: SplineTerms) -> tuple[float, FloatArray, float]:
-    """Joules at the mains for axis powers (N, n) held for `step` each, what a joule more adds (N, n), and
-    what the smoothing adds per second of `step`.
+    """Joules at the mains for axis powers (N, n) held for `step` each, what a joule more adds (N,
+    n), and what the smoothing adds per second of `step`.
     """
     if terms.regeneration == "none":
         value, slope, _ = above(power, terms.smoothing)
         return float(value.sum() * step), slope, 0.0
-    wanted, back = power.sum(axis=1) * step, float(terms.regeneration == "fed_back")
-    most, stored, mains = terms.smoothing * step, 0.0, 0.0
+    wanted = power.sum(axis=1) * step
+    back = float(terms.regeneration == "fed_back")
+    most = terms.smoothing * step
+    stored = 0.0
+    mains = 0.0
     left = np.empty(len(power))  # in the capacitor, if it had no ends
     for k, joules in enumerate(wanted):
         left[k] = stored - joules
-        lack, surplus = above(-left[k], most)[0], above(left[k] - terms.capacity_energy, most)[0]
+        lack = above(-left[k], most)[0]
+        surplus = above(left[k] - terms.capacity_energy, most)[0]
         mains += float(lack - back * surplus)
         stored = float(left[k] + lack - surplus)
-    adds, worth, of_most = np.empty(len(power)), 0.0, 0.0  # worth: of a joule more in the capacitor
-    lacks, surpluses = above(-left, most), above(left - terms.capacity_energy, most)
+    # worth: of a joule more in the capacitor
+    adds = np.empty(len(power))
+    worth = 0.0
+    of_most = 0.0
+    lacks = above(-left, most)
+    surpluses = above(left - terms.capacity_energy, most)
     for k in reversed(range(len(power))):
         of_most += float(lacks[2][k] * (1.0 - worth) - surpluses[2][k] * (back - worth))
-        worth = float(worth * (1.0 - lacks[1][k] - surpluses[1][k]) + lacks[1][k] + back * surpluses[1][k])
+        worth = float(
+            worth * (1.0 - lacks[1][k] - surpluses[1][k]) + lacks[1][k] + back * surpluses[1][k]
+        )
         adds[k] = worth
     return mains, np.repeat(adds[:, None], power.shape[1], axis=1), of_most * terms.smoothing
 
 
 def above(x: FloatArray, smoothing: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """max(x, 0), a hyperbola that is `smoothing` above it at 0; its slope, derivative by the smoothing."""
+    """max(x, 0), a hyperbola that is `smoothing` above it at 0; its slope, derivative by the
+    smoothing.
+    """
     if smoothing == 0.0:
         return np.maximum(x, 0.0), (x > 0.0).astype(float), np.zeros_like(x)
     root = np.sqrt(x * x + 4.0 * smoothing * smoothing)
@@ -119,23 +148,31 @@ def above(x: FloatArray, smoothing: float) -> tuple[FloatArray, FloatArray, Floa
 
 
 class SplineCost:
-    """Cost of one robot in one scene. See ir_kernels.spline.SplineCost for what the methods promise."""
+    """Cost of one robot in one scene. See ir_kernels.spline.SplineCost for what the methods
+    promise.
+    """
 
     def __init__(self, geometry: Geometry, data: DynamicsData, terms: SplineTerms) -> None:
-        self.geometry, self.data, self.terms = geometry, data, terms
+        self.geometry = geometry
+        self.data = data
+        self.terms = terms
 
     def value(
         self, control: FloatArray, row: IntArray, interval: float
     ) -> tuple[float, FloatArray, float, float]:
         """Cost, gradient (K, n), derivative by the interval, energy."""
-        t, count, step = self.terms, len(control) - 3, interval / SAMPLES
+        t = self.terms
+        count = len(control) - 3
+        step = interval / SAMPLES
         weights = sampling(len(control))
         weights[1] /= interval
         weights[2] /= interval**2
         zeros = np.zeros((count * SAMPLES, control.shape[1]))
         q, qd, qdd = weights @ control
         s = Samples(q, qd, qdd, zeros, zeros.copy(), zeros.copy())
-        with np.errstate(over="ignore", invalid="ignore"):  # as in the compiled core: inf and nan say it
+        with np.errstate(
+            over="ignore", invalid="ignore"
+        ):  # as in the compiled core: inf and nan say it
             value, energy = self._drives(s, step)
             value += self._clearance(s, np.repeat(row, SAMPLES), step)
             gradient = weights[0].T @ s.of_q + weights[1].T @ s.of_qd + weights[2].T @ s.of_qdd
@@ -144,7 +181,9 @@ class SplineCost:
             value += t.time_value * count * interval
             for order, limit in ((3, t.jerk), (2, t.acceleration)):
                 found = self._beyond(control, order, limit, interval)
-                value, gradient, of_interval = value + found[0], gradient + found[1], of_interval + found[2]
+                value = value + found[0]
+                gradient = gradient + found[1]
+                of_interval = of_interval + found[2]
             over = ABOUT * np.maximum(np.maximum(t.low - control, control - t.high), 0.0)
             value += t.penalty * interval * float(np.sum(over**2))
             gradient += 2.0 * t.penalty * interval * ABOUT * over * np.sign(control - t.high)
@@ -161,7 +200,8 @@ class SplineCost:
         tolerance: float,
     ) -> tuple[FloatArray, float, float, int]:
         """New control (K, n), interval, value, evaluations."""
-        m, n = len(control) - 6, control.shape[1]
+        m = len(control) - 6
+        n = control.shape[1]
         metric = bending_metric(m, HOLDING)
 
         def spline(x: FloatArray) -> tuple[FloatArray, float]:
@@ -186,13 +226,16 @@ class SplineCost:
 
     def _drives(self, s: Samples, step: float) -> tuple[float, float]:
         """Cost of energy and travel, of torque and speed beyond their limits; and the energy."""
-        t, data = self.terms, self.data
-        torque, speed = torques(data, s), np.abs(s.qd)
+        t = self.terms
+        data = self.data
+        torque = torques(data, s)
+        speed = np.abs(s.qd)
         limit, falls = torque_limit(data, speed)
         # near standstill friction may be as much more than it is with its smoothed sign
         unsure = data.coulomb * (STILL / np.hypot(s.qd, STILL)) ** 2
         use = (np.abs(torque) + unsure) / (limit * t.torque_share)
-        too_much, too_fast = np.maximum(use - 1.0, 0.0), np.maximum(speed / t.velocity - 1.0, 0.0)
+        too_much = np.maximum(use - 1.0, 0.0)
+        too_fast = np.maximum(speed / t.velocity - 1.0, 0.0)
         travelled = t.travel * (np.hypot(s.qd, STILL) - STILL)
         rate = t.penalty * float(np.sum(too_much**2 + too_fast**2)) + float(np.sum(travelled))
         weight = 2.0 * t.penalty * step * too_much
@@ -200,7 +243,9 @@ class SplineCost:
         s.of_qd += np.sign(s.qd) * (
             2.0 * t.penalty * step * too_fast / t.velocity - weight * use / limit * falls
         )
-        s.of_qd -= 2.0 * weight / (limit * t.torque_share) * unsure * s.qd / np.hypot(s.qd, STILL) ** 2
+        s.of_qd -= (
+            2.0 * weight / (limit * t.torque_share) * unsure * s.qd / np.hypot(s.qd, STILL) ** 2
+        )
         s.of_qd += step * t.travel * s.qd / np.hypot(s.qd, STILL)
         power = dynamics.axis_power(data, s.qd, torque)
         energy, adds, of_step = bus(power, step, t)
@@ -208,14 +253,16 @@ class SplineCost:
         of_torque += of_power * (s.qd + 2.0 * data.copper_loss / data.gear_ratio**2 * torque)
         s.of_qd += of_power * torque
         torques_back(data, s, of_torque)
-        # without a common bus a slope stands for the share of its axis that counts, not for its joules
+        # without a common bus a slope stands for the share of its axis that counts, not for its
+        # joules
         supplied = energy / step if t.regeneration == "none" else float(np.sum(adds * power))
         s.of_step += rate + t.energy_value * (supplied + of_step)
         return rate * step + t.energy_value * energy, energy
 
     def _clearance(self, s: Samples, row: IntArray, step: float) -> float:
         """Cost of pairs nearer than their threshold and the margin."""
-        t, model = self.terms, self.geometry
+        t = self.terms
+        model = self.geometry
         if t.threshold.shape[1] == 0 or not np.isfinite(s.q).all():
             return 0.0
         poses = collision.poses(model, s.q)
@@ -236,12 +283,19 @@ class SplineCost:
     def _beyond(
         self, control: FloatArray, order: int, limit: FloatArray, interval: float
     ) -> tuple[float, FloatArray, float]:
-        """Cost of derivatives of `order` beyond their limit (n,), and its own by control and interval."""
+        """Cost of derivatives of `order` beyond their limit (n,), and its own by control and
+        interval.
+        """
         difference = np.diff(np.eye(len(control)), order, axis=0) / interval**order
         derivative = difference @ control
         over = np.maximum(np.abs(derivative) / limit - 1.0, 0.0)
         slope = 2.0 * self.terms.penalty * interval * over / limit * np.sign(derivative)
         of_interval = (
-            self.terms.penalty * float(np.sum(over**2)) - order * float(np.sum(slope * derivative)) / interval
+            self.terms.penalty * float(np.sum(over**2))
+            - order * float(np.sum(slope * derivative)) / interval
         )
-        return self.terms.penalty * interval * float(np.sum(over**2)), difference.T @ slope, of_interval
+        return (
+            self.terms.penalty * interval * float(np.sum(over**2)),
+            difference.T @ slope,
+            of_interval,
+        )

@@ -1,6 +1,7 @@
 """The descent on the speed profile along a fixed path: the oracle of the compiled one.
 
-A spline passes p(s) at its inner knots; s and the logarithm of the duration change, each in its scale.
+A spline passes p(s) at its inner knots; s and the logarithm of the duration change, each in its
+scale.
 """
 
 from typing import Any
@@ -11,7 +12,9 @@ from ir_kernels.reference.descent import descend
 from ir_msgs_py.arrays import FloatArray
 
 BENDING = 0.03  # weight of the jerk of s in the metric
-SCALE, TIME = 0.03, 0.1  # of s, and of the duration's logarithm
+# of s, and of the duration's logarithm
+SCALE = 0.03
+TIME = 0.1
 
 
 def along(breaks: FloatArray, cubics: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -23,21 +26,32 @@ def along(breaks: FloatArray, cubics: FloatArray, s: FloatArray) -> tuple[FloatA
 
 
 class ProfileCost:
-    """Cost of the splines that pass a path (breaks, cubics) at s (C,) + SCALE x at their inner knots, of
-    `duration` s times exp(TIME x), by a core's `value`.
+    """Cost of the splines that pass a path (breaks, cubics) at s (C,) + SCALE x at their inner
+    knots, of `duration` s times exp(TIME x), by a core's `value`.
     """
 
     def __init__(
-        self, core: Any, path: tuple[FloatArray, FloatArray], s: FloatArray, duration: float, fixed: bool
+        self,
+        core: Any,
+        path: tuple[FloatArray, FloatArray],
+        s: FloatArray,
+        duration: float,
+        fixed: bool,
     ) -> None:
         count = len(s)
-        self.core, self.path, self.s, self.duration, self.fixed = core, path, s, duration, fixed
+        self.core = core
+        self.path = path
+        self.s = s
+        self.duration = duration
+        self.fixed = fixed
         self.knots = 4.0 * np.eye(count) + np.eye(count, k=1) + np.eye(count, k=-1)
         self.ends = along(*path, np.array([0.0, 1.0]))[0]
 
     def at(self, x: FloatArray) -> tuple[FloatArray, float]:
         """s (C,) and duration [s] at x (C + 1,)."""
-        return np.clip(self.s + SCALE * x[:-1], 0.0, 1.0), self.duration * float(np.exp(TIME * x[-1]))
+        return np.clip(self.s + SCALE * x[:-1], 0.0, 1.0), self.duration * float(
+            np.exp(TIME * x[-1])
+        )
 
     def value(self, x: FloatArray) -> tuple[float, FloatArray]:
         """Cost and its gradient (C + 1,)."""
@@ -46,8 +60,11 @@ class ProfileCost:
         right = 6.0 * q
         right[0] -= ends[0]
         right[-1] -= ends[1]
-        inner, interval = np.linalg.solve(self.knots, right), duration / (len(s) + 3)
-        control = np.concatenate([np.repeat(ends[:1], 3, axis=0), inner, np.repeat(ends[1:], 3, axis=0)])
+        inner = np.linalg.solve(self.knots, right)
+        interval = duration / (len(s) + 3)
+        control = np.concatenate(
+            [np.repeat(ends[:1], 3, axis=0), inner, np.repeat(ends[1:], 3, axis=0)]
+        )
         row = np.zeros(len(s) + 3, np.int32)
         cost, gradient, of_interval, _ = self.core.value(control, row, interval)
         by_s = 6.0 * SCALE * (np.linalg.solve(self.knots, gradient[3:-3]) * slope).sum(axis=1)

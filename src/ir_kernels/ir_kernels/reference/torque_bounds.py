@@ -1,5 +1,5 @@
-"""A proof of the torque limits by interval arithmetic over pieces of the trajectory, halved where it isn't
-sharp.
+"""A proof of the torque limits by interval arithmetic over pieces of the trajectory, halved where
+it isn't sharp.
 
 Over a piece the torque lies in its enclosure (`enclosures`).
 """
@@ -19,12 +19,17 @@ REST = 1e-9  # rad/s: below, a sample lets Coulomb friction have either sign
 ROUNDING_MARGIN = 1e-9  # of the limit
 
 
-def least_limit(data: DynamicsData, joint: int, slowest: FloatArray, fastest: FloatArray) -> FloatArray:
+def least_limit(
+    data: DynamicsData, joint: int, slowest: FloatArray, fastest: FloatArray
+) -> FloatArray:
     """Smallest torque available (K,) over the speeds slowest..fastest (K,)."""
-    speeds, torques = data.envelope_speed[joint], data.envelope_torque[joint]
+    speeds = data.envelope_speed[joint]
+    torques = data.envelope_torque[joint]
 
     def limit(speed: FloatArray) -> FloatArray:
-        found: FloatArray = np.where(speed < speeds[0], torques[0], np.interp(speed, speeds, torques[1:]))
+        found: FloatArray = np.where(
+            speed < speeds[0], torques[0], np.interp(speed, speeds, torques[1:])
+        )
         return found
 
     least = np.minimum(limit(slowest), limit(fastest))
@@ -40,7 +45,9 @@ def upper_ratios(
     found = enclosure(data, coefficients, rests, pieces)
     ratio = np.empty((len(pieces.segment), data.n))
     for j in range(data.n):
-        tau, friction, speed = found.torque[j].v, found.coulomb[j], found.speed[j].v
+        tau = found.torque[j].v
+        friction = found.coulomb[j]
+        speed = found.speed[j].v
         still = rests[pieces.segment, j]
         size = np.maximum(np.abs(tau.lo + friction.lo), np.abs(tau.hi + friction.hi))
         ends = np.abs(speed.lo), np.abs(speed.hi)
@@ -51,7 +58,11 @@ def upper_ratios(
 
 
 def sampled_ratios(
-    data: DynamicsData, coefficients: FloatArray, rests: FloatArray, segment: IntArray, t: FloatArray
+    data: DynamicsData,
+    coefficients: FloatArray,
+    rests: FloatArray,
+    segment: IntArray,
+    t: FloatArray,
 ) -> FloatArray:
     """(K, n): |tau| / limit at local times t (K,) of the segments (K,)."""
     c = coefficients[segment]
@@ -72,7 +83,9 @@ def torque_bounds(
 ) -> tuple[FloatArray, FloatArray, FloatArray, int]:
     """Upper bound, largest sample, its time (n,), and how many intervals were examined."""
     n = data.n
-    upper, sampled, time = np.zeros(n), np.full(n, -1.0), np.zeros(n)
+    upper = np.zeros(n)
+    sampled = np.full(n, -1.0)
+    time = np.zeros(n)
     rests = (coefficients[:, :, 1:] == 0.0).all(axis=2)
     start = np.concatenate([[0.0], np.cumsum(durations)[:-1]])
     counts = np.maximum(FEWEST_PIECES, np.ceil(durations / FIRST_PIECE)).astype(int)
@@ -85,10 +98,12 @@ def torque_bounds(
             worst = ratio.argmax(axis=0)
             largest = ratio[worst, np.arange(n)]
             when = (start[pieces.segment] + t)[worst]
-            time, sampled = np.where(largest > sampled, when, time), np.maximum(sampled, largest)
+            time = np.where(largest > sampled, when, time)
+            sampled = np.maximum(sampled, largest)
         spent += len(pieces.segment)
         sharp = (
-            (bound <= sampled + tolerance * np.maximum(sampled, 1.0)) & ~((sampled <= 1.0) & (bound > 1.0))
+            (bound <= sampled + tolerance * np.maximum(sampled, 1.0))
+            & ~((sampled <= 1.0) & (bound > 1.0))
         ).all(axis=1)
         short = pieces.end - pieces.begin <= SHORTEST * durations[pieces.segment]
         halve = ~sharp & ~short

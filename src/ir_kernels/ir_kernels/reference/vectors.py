@@ -1,8 +1,8 @@
 """Vectors and matrices as tuples of numbers, so that one recursion serves floats, complex steps and
 intervals.
 
-A "number" is anything with + - * (an array over the batch, or an `Interval` of two); a Vector is three of
-them. Constants of the robot are plain floats.
+A "number" is anything with + - * (an array over the batch, or an `Interval` of two); a Vector is
+three of them. Constants of the robot are plain floats.
 """
 
 from typing import Any
@@ -58,13 +58,17 @@ def transpose(m: Matrix) -> Matrix:
 
 
 def joint_rotation(origin: FloatArray, axis: FloatArray, sin: Number, cos: Number) -> Matrix:
-    """Rotation of the frame after a revolute joint in the frame before it (Rodrigues), entry by entry.
+    """Rotation of the frame after a revolute joint in the frame before it (Rodrigues), entry by
+    entry.
 
-    R(q) = E (a a' + cos q (1 - a a') + sin q [a]x) with origin (4, 4), E = origin[:3, :3] and a = axis (3,).
+    R(q) = E (a a' + cos q (1 - a a') + sin q [a]x) with origin (4, 4), E = origin[:3, :3] and a =
+    axis (3,).
     """
     E = origin[:3, :3]
     along = np.outer(axis, axis)
     skew = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    A, B, C = E @ along, E @ (np.eye(3) - along), E @ skew
+    A = E @ along
+    B = E @ (np.eye(3) - along)
+    C = E @ skew
     rows = [tuple(cos * B[k, j] + sin * C[k, j] + A[k, j] for j in range(3)) for k in range(3)]
     return rows[0], rows[1], rows[2]

@@ -1,4 +1,6 @@
-"""The language: texts of .src and .dat files to routines and data, with places for every complaint."""
+"""The language: texts of .src and .dat files to routines and data, with places for every
+complaint.
+"""
 
 from ir_krl.language.parse import Parameter, Routine, Source, Tree, Word, parse, place_of
 

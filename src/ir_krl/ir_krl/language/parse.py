@@ -1,7 +1,8 @@
 """From the texts of a program to its routines and its data.
 
-KRL doesn't distinguish upper and lower case, and one statement is one line: the text is brought into upper
-case outside of strings, comments and header lines are blanked, and lines and columns stay as they were.
+KRL doesn't distinguish upper and lower case, and one statement is one line: the text is brought
+into upper case outside of strings, comments and header lines are blanked, and lines and columns
+stay as they were.
 """
 
 from __future__ import annotations
@@ -43,7 +44,8 @@ _SPELLED = {  # what a user calls the parser's terminals
     "DOT": ".",
 }
 _EXPECTED_MAX = 6  # alternatives that a sentence names
-_KNOWN_ELSEWHERE = {  # constructs of KRL that aren't read: named, so that nobody looks for a typing error
+# constructs of KRL that aren't read: named, so that nobody looks for a typing error
+_KNOWN_ELSEWHERE = {
     "ANIN": "cyclic analog input",
     "ANOUT": "analog output",
     "ASYPTP": "asynchronous axes",
@@ -60,7 +62,9 @@ _KNOWN_ELSEWHERE = {  # constructs of KRL that aren't read: named, so that nobod
 
 @dataclass(frozen=True, eq=False)
 class Tree:
-    """A piece of the program: the grammar's rule, and its children: trees, words, None for what lacks."""
+    """A piece of the program: the grammar's rule, and its children: trees, words, None for what
+    lacks.
+    """
 
     data: str
     children: tuple[Any, ...]
@@ -77,7 +81,8 @@ class Word(str):
     def __new__(cls, text: str, line: int, column: int) -> Word:
         """The text itself."""
         word = super().__new__(cls, text)
-        word.line, word.column = line, column
+        word.line = line
+        word.column = column
         return word
 
 
@@ -116,11 +121,15 @@ def parse(text: str, file: str) -> Source:
     """
     if len(text) > TEXT_MAX:
         raise KrlSyntaxError(f"{len(text)} characters: at most {TEXT_MAX} are read", Place(file))
-    text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")  # as editors leave them
+    text = (
+        text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+    )  # as editors leave them
     try:
         units = _tree(_parser().parse(_prepared(text) + "\n")).children
     except RecursionError:
-        raise KrlSyntaxError("brackets, signs or blocks are nested too deeply", Place(file)) from None
+        raise KrlSyntaxError(
+            "brackets, signs or blocks are nested too deeply", Place(file)
+        ) from None
     except UnexpectedInput as error:
         sentence, column = _complaint(error, text)
         raise KrlSyntaxError(sentence, Place(file, error.line, column)) from None
@@ -147,7 +156,8 @@ def _prepared(text: str) -> str:
     def blanked(found: re.Match[str]) -> str:
         return found[0] if found[0].startswith('"') else " " * len(found[0])
 
-    parts, end = [], 0
+    parts = []
+    end = 0
     for found in _COMMENT.finditer(text):
         parts += [text[end : found.start()].upper(), blanked(found)]
         end = found.end()
@@ -184,9 +194,10 @@ def _complaint(error: Any, text: str) -> tuple[str, int]:
         return f"{first} ({_KNOWN_ELSEWHERE[first]}) isn't read", line.upper().index(first) + 1
     if {"LPAR", "EQUAL"} <= set(error.expected) and not line[: error.column - 1].split()[1:]:
         name = first[:40]
-        return f"{name} is no statement of KRL: a call has brackets, an assignment =", line.upper().index(
-            name
-        ) + 1
+        return (
+            f"{name} is no statement of KRL: a call has brackets, an assignment =",
+            line.upper().index(name) + 1,
+        )
     word = str(error.token).strip()
     found = f"{word[:40]!r}" if word else "the line ends, or the file"
     expected = sorted(_spelled(name) for name in error.expected)

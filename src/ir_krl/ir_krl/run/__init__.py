@@ -1,4 +1,6 @@
-"""A program followed without a robot: values, control structures, and the commands that come out."""
+"""A program followed without a robot: values, control structures, and the commands that come
+out.
+"""
 
 from ir_krl.run.commands import (
     Blend,

@@ -1,4 +1,6 @@
-"""Assignments as statements: to variables, to outputs and to the groups of signals that name them."""
+"""Assignments as statements: to variables, to outputs and to the groups of signals that name
+them.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ class Assigning(Control):
 
     def _assignment(self, tree: Tree) -> None:
         access, expression = tree.children
-        path, value = self.expressions.path(access), self.expressions.value(expression)
+        path = self.expressions.path(access)
+        value = self.expressions.value(expression)
         (name, index), where = path[0], self.place(tree)
         if name in self._signals.groups and index is None:
             for number, level in self._signals.group_bits(name, value, where):
@@ -30,7 +33,9 @@ class Assigning(Control):
             self._set_output(index[0], value, where)
             return
         if name == "$IPO_MODE" and value != Symbol("BASE"):
-            raise KrlRunError(f"$IPO_MODE {kind_of(value)}: a tool that stands in the cell isn't read", where)
+            raise KrlRunError(
+                f"$IPO_MODE {kind_of(value)}: a tool that stands in the cell isn't read", where
+            )
         if name.startswith("$") and name not in MODELLED and name not in HARMLESS:
             self.note(tree, f"{name} isn't modelled")
         self.memory.set(path, value, where)
@@ -38,7 +43,9 @@ class Assigning(Control):
     def _set_output(self, number: float, level: bool, place: Place, pulse: float = 0.0) -> None:
         """Set a digital output. Raises KrlRunError for one that no controller has."""
         if number != int(number) or not 1 <= number <= SIGNALS:
-            raise KrlRunError(f"$OUT[{number:g}]: outputs have whole numbers from 1 to {SIGNALS}", place)
+            raise KrlRunError(
+                f"$OUT[{number:g}]: outputs have whole numbers from 1 to {SIGNALS}", place
+            )
         self.commands.append(SetOutput(int(number), level, place, pulse, self.continuing))
         if pulse == 0.0:
             self.memory.set(((OUTPUT, (int(number),)),), level, place)

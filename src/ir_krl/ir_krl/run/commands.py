@@ -13,12 +13,14 @@ Kind = Literal["ptp", "lin", "circ", "spl"]
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """Where a motion goes: axis angles [rad] or components of a frame [m, rad as written in degrees].
+    """Where a motion goes: axis angles [rad] or components of a frame [m, rad as written in
+    degrees].
 
-    axes: A1..A6 [rad], those that are given; None for a frame. frame: X, Y, Z [mm], A, B, C [deg], those
-    that are given: the rest stays as it is. status, turn: S and T, None where not given. relative: from where
-    the robot stands; in_tool: in the directions of the tool instead of the base's. base, tool: poses (4, 4)
-    [m] of $BASE in the robot's foot and of $TOOL at the flange.
+    axes: A1..A6 [rad], those that are given; None for a frame. frame: X, Y, Z [mm], A, B, C [deg],
+    those
+    that are given: the rest stays as it is. status, turn: S and T, None where not given. relative:
+    from where the robot stands; in_tool: in the directions of the tool instead of the base's. base,
+    tool: poses (4, 4) [m] of $BASE in the robot's foot and of $TOOL at the flange.
     """
 
     axes: dict[str, float] | None
@@ -34,9 +36,9 @@ class Target:
 
 @dataclass(frozen=True)
 class Speeds:
-    """How fast: shares (6,) of the axes' speeds and accelerations; velocity [m/s] and acceleration [m/s^2] of
-    the tool, turning [rad/s] and turning_acceleration [rad/s^2] of its orientation; override: share of all
-    speeds.
+    """How fast: shares (6,) of the axes' speeds and accelerations; velocity [m/s] and acceleration
+    [m/s^2] of the tool, turning [rad/s] and turning_acceleration [rad/s^2] of its orientation;
+    override: share of all speeds.
     """
 
     axis_velocity: tuple[float, ...]
@@ -50,8 +52,8 @@ class Speeds:
 
 @dataclass(frozen=True)
 class Blend:
-    """Approximate positioning: how (C_PTP, C_DIS, C_VEL, C_ORI, C_SPL), within `distance` [m] or `share` of
-    the motion, whichever the word asks for.
+    """Approximate positioning: how (C_PTP, C_DIS, C_VEL, C_ORI, C_SPL), within `distance` [m] or
+    `share` of the motion, whichever the word asks for.
     """
 
     how: str
@@ -77,8 +79,8 @@ class Motion:
 
 @dataclass(frozen=True)
 class TimeBlock:
-    """Parts of a spline from `first` to before `last` take `seconds`; marks: before which part how many per
-    cent of them have passed since the mark before.
+    """Parts of a spline from `first` to before `last` take `seconds`; marks: before which part how
+    many per cent of them have passed since the mark before.
     """
 
     first: int
@@ -90,7 +92,9 @@ class TimeBlock:
 
 @dataclass(frozen=True, eq=False)
 class SplineBlock:
-    """SPLINE (tool path) or PTP_SPLINE (axis path): parts that are driven through without a stop."""
+    """SPLINE (tool path) or PTP_SPLINE (axis path): parts that are driven through without a
+    stop.
+    """
 
     axis: bool
     parts: tuple[Motion, ...]
@@ -117,8 +121,8 @@ class WaitFor:
 
 @dataclass(frozen=True)
 class SetOutput:
-    """A digital output is set; `pulse` [s] later it goes back, 0 = it stays. on_path: while the robot moves
-    (by a TRIGGER, or after CONTINUE), so that it needn't stop.
+    """A digital output is set; `pulse` [s] later it goes back, 0 = it stays. on_path: while the
+    robot moves (by a TRIGGER, or after CONTINUE), so that it needn't stop.
     """
 
     number: int

@@ -13,7 +13,9 @@ from ir_krl.run.memory import Memory, Step
 from ir_krl.run.values import Value, integer
 
 STATEMENTS_MAX = 200_000
-"""Statements that one run may take: a loop that never ends is named instead of followed for ever."""
+"""Statements that one run may take: a loop that never ends is named instead of followed for
+ever.
+"""
 WAIT_MAX = 604_800.0  # s
 
 
@@ -57,7 +59,8 @@ class Control:
             self.statements += 1
             if self.statements > STATEMENTS_MAX:
                 raise KrlRunError(
-                    f"more than {STATEMENTS_MAX} statements: does a loop never end?", self.place(statement)
+                    f"more than {STATEMENTS_MAX} statements: does a loop never end?",
+                    self.place(statement),
                 )
             getattr(self, f"_{statement.data}")(statement)
             self.continuing = statement.data == "continue_"
@@ -86,7 +89,8 @@ class Control:
     def _for_(self, tree: Tree) -> None:
         name, first, last, step, body = tree.children
         value, end = (
-            integer(self.expressions.value(one), "a bound of FOR", self.place(one)) for one in (first, last)
+            integer(self.expressions.value(one), "a bound of FOR", self.place(one))
+            for one in (first, last)
         )
         by = 1 if step is None else integer(self.expressions.value(step), "STEP", self.place(step))
         if by == 0:
@@ -156,13 +160,18 @@ class Control:
         raise LoopExit
 
     def _return_(self, tree: Tree) -> None:
-        raise Returned(None if tree.children[0] is None else self.expressions.value(tree.children[0]))
+        raise Returned(
+            None if tree.children[0] is None else self.expressions.value(tree.children[0])
+        )
 
     def _halt(self, tree: Tree) -> None:
         self.note(tree, "HALT waits for the operator: taken as no pause")
 
     def _const_vel(self, tree: Tree) -> None:
-        self.note(tree, "CONST_VEL isn't modelled: the tool accelerates and brakes within the range as well")
+        self.note(
+            tree,
+            "CONST_VEL isn't modelled: the tool accelerates and brakes within the range as well",
+        )
 
     def _stop_when(self, tree: Tree) -> None:
         self.note(tree, "STOP WHEN isn't followed: taken as not stopping")
@@ -180,7 +189,8 @@ class Control:
         seconds = self.expressions.number(tree.children[0], "the time of WAIT SEC")
         if seconds > WAIT_MAX:
             raise KrlRunError(
-                f"WAIT SEC {seconds:g}: a wait is read up to {WAIT_MAX:g} s, a week", self.place(tree)
+                f"WAIT SEC {seconds:g}: a wait is read up to {WAIT_MAX:g} s, a week",
+                self.place(tree),
             )
         if seconds > 0.0:  # negative times are passed at once, as on the controller
             self.commands.append(Wait(seconds, self.place(tree)))
@@ -193,7 +203,8 @@ class Control:
         """Raise KrlRunError for a name in a condition that nothing is known of."""
         if isinstance(tree, Tree) and tree.data == "access":
             name = str(tree.children[0])
-            signals, memory = self.expressions.signals, self.memory
+            signals = self.expressions.signals
+            memory = self.memory
             declared = name in signals.aliases or name in signals.groups or memory.declared(name)
             if not declared and not name.startswith("$"):
                 raise KrlRunError(f"{name} isn't declared", self.place(tree))

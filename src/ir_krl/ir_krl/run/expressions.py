@@ -70,7 +70,9 @@ class Expressions:
         steps: list[Step] = []
         for name, index in zip(access.children[::2], access.children[1::2], strict=True):
             steps.append((str(name), None if index is None else self.index(index)))
-        return self.signals.aliases.get(steps[0][0], tuple(steps)) if len(steps) == 1 else tuple(steps)
+        return (
+            self.signals.aliases.get(steps[0][0], tuple(steps)) if len(steps) == 1 else tuple(steps)
+        )
 
     def index(self, tree: Tree) -> tuple[int, ...] | None:
         """Whole numbers of an index; None for []."""
@@ -96,7 +98,9 @@ class Expressions:
     def _number(self, tree: Tree, place: Place) -> Value:
         text = str(tree.children[0])
         if text.isdigit() and len(text) > DIGITS_MAX:
-            raise KrlRunError(f"an INT is at most {INT_MAX}; this one has {len(text)} digits", place)
+            raise KrlRunError(
+                f"an INT is at most {INT_MAX}; this one has {len(text)} digits", place
+            )
         return in_range(int(text) if text.isdigit() else float(text), place)
 
     def _true(self, tree: Tree, place: Place) -> Value:
@@ -168,18 +172,22 @@ class Expressions:
     def _joined(self, tree: Tree, place: Place) -> Value:
         """AND, OR, EXOR of truth values; B_AND, B_OR, B_EXOR of the bits of whole numbers."""
         left, word, right = tree.children
-        a, b = self.value(left), self.value(right)
+        a = self.value(left)
+        b = self.value(right)
         what = _LOGICAL[str(word).removeprefix("B_")]
         wanted = int if word.startswith("B_") else bool
         if type(a) is wanted and type(b) is wanted:
             return wanted(what(a, b))
         raise KrlRunError(
-            f"{word} joins {kind_of(a)} and {kind_of(b)}; a comparison is weaker: put it in brackets", place
+            f"{word} joins {kind_of(a)} and {kind_of(b)}; a comparison is weaker: put it in "
+            "brackets",
+            place,
         )
 
     def _compared(self, tree: Tree, place: Place) -> Value:
         left, sign, right = tree.children
-        a, b = self.value(left), self.value(right)
+        a = self.value(left)
+        b = self.value(right)
         if sign in ("==", "<>"):
             return (a == b) is (sign == "==")
         return _COMPARED[str(sign)](
@@ -188,7 +196,8 @@ class Expressions:
 
     def _composed(self, tree: Tree, place: Place) -> Value:
         first, second = tree.children
-        a, b = self.value(first), self.value(second)
+        a = self.value(first)
+        b = self.value(second)
         result = frame(pose(a, "the left of :", place) @ pose(b, "the right of :", place))
         if isinstance(b, Structure):  # S, T and the external axes are those of the right side
             rest = {name: value for name, value in b.fields.items() if name not in FRAME_NAMES}

@@ -1,4 +1,6 @@
-"""FRAME values [mm, deg] to poses (4, 4) [m] and back, and what a position says beside its frame."""
+"""FRAME values [mm, deg] to poses (4, 4) [m] and back, and what a position says beside its
+frame.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ def components(value: Structure, names: tuple[str, ...], place: Place) -> dict[s
 
 
 def pose(value: Value, what: str, place: Place) -> FloatArray:
-    """The pose (4, 4) [m] of a FRAME, POS or E6POS; components that are missing are 0. Raises KrlRunError."""
+    """The pose (4, 4) [m] of a FRAME, POS or E6POS; components that are missing are 0. Raises
+    KrlRunError.
+    """
     if not isinstance(value, Structure) or is_axis_value(value):
         raise KrlRunError(f"{what} is {kind_of(value)}, not a FRAME", place)
     found = components(value, FRAME_NAMES, place)
@@ -39,9 +43,14 @@ def pose(value: Value, what: str, place: Place) -> FloatArray:
 def frame(transform: FloatArray, kind: str = "FRAME") -> Structure:
     """The FRAME [mm, deg] of a pose (4, 4) [m]."""
     values = [*(transform[:3, 3] / _MM), *abc_from_rotation(transform[:3, :3])]
-    return Structure({name: float(value) for name, value in zip(FRAME_NAMES, values, strict=True)}, kind)
+    return Structure(
+        {name: float(value) for name, value in zip(FRAME_NAMES, values, strict=True)}, kind
+    )
 
 
 def axes(value: Structure, place: Place) -> dict[str, float]:
     """Axis angles [rad] by name."""
-    return {name: float(np.radians(angle)) for name, angle in components(value, AXIS_NAMES, place).items()}
+    return {
+        name: float(np.radians(angle))
+        for name, angle in components(value, AXIS_NAMES, place).items()
+    }

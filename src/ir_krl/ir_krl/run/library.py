@@ -30,7 +30,9 @@ WITHOUT_EFFECT = frozenset(
         "USE_CM_PRO_VALUES",
     }
 )
-"""Called in nearly every program; neither the path nor the speeds of a motion follows from them here."""
+"""Called in nearly every program; neither the path nor the speeds of a motion follows from them
+here.
+"""
 
 _MATHEMATICS: dict[str, Callable[..., float]] = {
     "ABS": abs,
@@ -76,7 +78,9 @@ class Library:
             return 0
         if name not in _MATHEMATICS:
             return self._named[name](arguments, place)
-        numbers = [number(_given(one, name, place), f"an argument of {name}", place) for one in arguments]
+        numbers = [
+            number(_given(one, name, place), f"an argument of {name}", place) for one in arguments
+        ]
         try:
             return _MATHEMATICS[name](*numbers)
         except (TypeError, ValueError):
@@ -84,11 +88,13 @@ class Library:
                 f"{name} can't be computed of {', '.join(f'{one:g}' for one in numbers)}", place
             ) from None
 
-    def _bas(self, arguments: Arguments, place: Place) -> Value:  # long: one case per command
+    def _bas(self, arguments: Arguments, place: Place) -> Value:  # noqa: C901, PLR0912
         command = _first(arguments, "BAS", place)
         value = arguments[1] if len(arguments) > 1 else None
         if not isinstance(command, Symbol):
-            raise KrlRunError(f"BAS is given {kind_of(command)}, not a command such as #INITMOV", place)
+            raise KrlRunError(
+                f"BAS is given {kind_of(command)}, not a command such as #INITMOV", place
+            )
 
         def amount() -> float:
             return number(_given(value, f"BAS({command})", place), f"BAS({command})", place)
@@ -132,8 +138,12 @@ class Library:
     def _frames(self, place: Place) -> None:
         """Tool and base that the inline form's FDAT_ACT names."""
         if self._memory.has("FDAT_ACT"):
-            self._set("$TOOL", self._tool(round(self._noted("FDAT_ACT", "TOOL_NO", 0.0, place)), place))
-            self._set("$BASE", self._base(round(self._noted("FDAT_ACT", "BASE_NO", 0.0, place)), place))
+            self._set(
+                "$TOOL", self._tool(round(self._noted("FDAT_ACT", "TOOL_NO", 0.0, place)), place)
+            )
+            self._set(
+                "$BASE", self._base(round(self._noted("FDAT_ACT", "BASE_NO", 0.0, place)), place)
+            )
 
     def _noted(self, variable: str, component: str, otherwise: float, place: Place) -> float:
         """A number of what an inline form left in PDAT_ACT, LDAT_ACT or FDAT_ACT."""
@@ -150,14 +160,18 @@ class Library:
             for j in range(1, AXES + 1):
                 held.elements[(j,)] = value
             return
-        path: tuple[Step, ...] = ((variable, None), (component, None)) if component else ((variable, None),)
+        path: tuple[Step, ...] = (
+            ((variable, None), (component, None)) if component else ((variable, None),)
+        )
         self._memory.set(path, value, Place())
 
     def _state(self, arguments: Arguments, place: Place) -> Value:
         """VARSTATE("NAME"): whether a variable has a value."""
         name = _first(arguments, "VARSTATE", place)
         if not isinstance(name, str):
-            raise KrlRunError(f"VARSTATE is given {kind_of(name)}, not the name of a variable", place)
+            raise KrlRunError(
+                f"VARSTATE is given {kind_of(name)}, not the name of a variable", place
+            )
         if self._memory.has(name.upper()):
             return Symbol("INITIALIZED")
         return Symbol("DECLARED" if self._memory.declared(name.upper()) else "UNDEFINED")
@@ -212,7 +226,9 @@ def _whole(arguments: Arguments, what: str, place: Place) -> int:
 
 
 def _component(arguments: Arguments, name: str, place: Place) -> int:
-    """A component of a form's data, such as TOOL_NO of an FDAT: the last argument that is a structure."""
+    """A component of a form's data, such as TOOL_NO of an FDAT: the last argument that is a
+    structure.
+    """
     for value in reversed(arguments):
         if isinstance(value, Structure) and name in value.fields:
             return integer(value.fields[name], name, place)

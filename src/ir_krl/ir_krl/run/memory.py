@@ -1,7 +1,8 @@
-"""Variables by name, as they stand while a program runs: of the routine that runs, of its module, of all.
+"""Variables by name, as they stand while a program runs: of the routine that runs, of its module,
+of all.
 
-A module is a .src with its .dat. A variable of a data list is known in its module, one that is GLOBAL or
-stands in $CONFIG everywhere; where two have the same name the nearest one counts.
+A module is a .src with its .dat. A variable of a data list is known in its module, one that is
+GLOBAL or stands in $CONFIG everywhere; where two have the same name the nearest one counts.
 """
 
 from __future__ import annotations
@@ -27,8 +28,9 @@ class Scope:
 
 @dataclass
 class Memory:
-    """`shared` holds what is known everywhere, `modules` the data lists by the names of their modules,
-    `scopes` the calls that run. module: whose statements run; listed: all names that data lists declare.
+    """`shared` holds what is known everywhere, `modules` the data lists by the names of their
+    modules, `scopes` the calls that run. module: whose statements run; listed: all names that data
+    lists declare.
     """
 
     shared: dict[str, Value]
@@ -61,7 +63,9 @@ class Memory:
         return name in self._home(name)
 
     def declared(self, name: str) -> bool:
-        """Whether a variable of this name is declared where statements run, with or without a value."""
+        """Whether a variable of this name is declared where statements run, with or without a
+        value.
+        """
         own = self.scopes[-1].names if self.scopes else set()
         return self.has(name) or name in own or name in self.listed
 
@@ -72,7 +76,8 @@ class Memory:
         if name not in home:
             if name in STANDING:
                 raise KrlRunError(
-                    f"{name} is known on the controller only: a program that computes with it isn't read",
+                    f"{name} is known on the controller only: a program that computes with it "
+                    "isn't read",
                     place,
                 )
             where = ": it is known on the controller only" if name.startswith("$") else ""
@@ -89,7 +94,9 @@ class Memory:
         return value
 
     def set(self, path: tuple[Step, ...], value: Value, place: Place) -> None:
-        """Put a copy of `value` there; variables, elements and components are made where they lack."""
+        """Put a copy of `value` there; variables, elements and components are made where they
+        lack.
+        """
         (name, index), *rest = path
         home: dict[str, Value] = self._home(name)
         if not rest and index is None:
@@ -122,7 +129,9 @@ class Memory:
             return self._own()
         if name in self.shared or name.startswith("$"):
             return self.shared
-        elsewhere = [one for one in self.modules.values() if name in one]  # a data list of another name
+        elsewhere = [
+            one for one in self.modules.values() if name in one
+        ]  # a data list of another name
         if elsewhere:
             return elsewhere[0]
         return self.shared if self.scopes else self._own()
@@ -132,11 +141,15 @@ class Memory:
 
 
 def _merged(before: Value | None, value: Value) -> Value:
-    """The new value of a variable: components that an aggregate leaves out stay, and so does INT or REAL."""
+    """The new value of a variable: components that an aggregate leaves out stay, and so does INT or
+    REAL.
+    """
     new = copied(value)
     if isinstance(new, Structure) and isinstance(before, Structure):
         return Structure(
-            {**before.fields, **new.fields} if before.kind == new.kind or not new.kind else new.fields,
+            {**before.fields, **new.fields}
+            if before.kind == new.kind or not new.kind
+            else new.fields,
             new.kind or before.kind,
         )
     if isinstance(before, float) and isinstance(new, int) and not isinstance(new, bool):

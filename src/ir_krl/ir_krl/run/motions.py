@@ -1,4 +1,6 @@
-"""Motions of a program as commands: targets, speeds and approximation as the system variables stand."""
+"""Motions of a program as commands: targets, speeds and approximation as the system variables
+stand.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,15 @@ from ir_krl.errors import KrlRunError, Place
 from ir_krl.language import Tree, place_of
 from ir_krl.run.commands import Blend, Kind, Motion, Speeds, Target
 from ir_krl.run.expressions import Expressions
-from ir_krl.run.frames import AXIS_NAMES, EXTERNAL_NAMES, FRAME_NAMES, axes, components, is_axis_value, pose
+from ir_krl.run.frames import (
+    AXIS_NAMES,
+    EXTERNAL_NAMES,
+    FRAME_NAMES,
+    axes,
+    components,
+    is_axis_value,
+    pose,
+)
 from ir_krl.run.memory import Memory
 from ir_krl.run.system import AXES, FULL, STANDING
 from ir_krl.run.values import Structure, Symbol, integer, kind_of, number
@@ -23,10 +33,16 @@ _BLEND_WORDS = {"C_PTP": "CPTP", "C_DIS": "CDIS", "C_ORI": "CORI", "C_VEL": "CVE
 
 
 class Motions:
-    """Builds motions from trees; `expressions` evaluates what stands in them, `noted` hears assumptions."""
+    """Builds motions from trees; `expressions` evaluates what stands in them, `noted` hears
+    assumptions.
+    """
 
-    def __init__(self, expressions: Expressions, memory: Memory, noted: Callable[[Place, str], None]) -> None:
-        self._expressions, self._memory, self._noted = expressions, memory, noted
+    def __init__(
+        self, expressions: Expressions, memory: Memory, noted: Callable[[Place, str], None]
+    ) -> None:
+        self._expressions = expressions
+        self._memory = memory
+        self._noted = noted
         self._external: dict[str, float] = {}  # where the external axes stand, as the program says
 
     def motion(self, tree: Tree) -> Motion:
@@ -35,17 +51,30 @@ class Motions:
         word = str(tree.children[0]) if kind != "spl" else "SPL"
         place = place_of(tree, self._expressions.file)
         relative = word.endswith("_REL")
-        frames = [child for child in tree.children if isinstance(child, Tree) and child.data not in _OTHERS]
+        frames = [
+            child
+            for child in tree.children
+            if isinstance(child, Tree) and child.data not in _OTHERS
+        ]
         in_tool = str(tree.children[-1]) == "#TOOL" if word in ("LIN_REL", "SLIN_REL") else False
         if kind == "circ":
-            via, end = self.target(frames[0], relative, in_tool), self.target(frames[1], relative, in_tool)
-            angle = math.radians(self._expressions.number(frames[2], "CA")) if len(frames) > 2 else None
+            via = self.target(frames[0], relative, in_tool)
+            end = self.target(frames[1], relative, in_tool)
+            angle = (
+                math.radians(self._expressions.number(frames[2], "CA")) if len(frames) > 2 else None
+            )
         else:
-            via, end, angle = None, self.target(frames[0], relative, in_tool), None
+            via = None
+            end = self.target(frames[0], relative, in_tool)
+            angle = None
         if kind in ("lin", "circ", "spl") and end.axes is not None:
             raise KrlRunError(f"{word} goes to a frame, not to axis angles", place)
-        blend = next((self.blend(child) for child in tree.children if _is(child, "approximation")), None)
-        return Motion(kind, end, self.speeds(place), place, blend, via, angle, self._keeps_orientation())
+        blend = next(
+            (self.blend(child) for child in tree.children if _is(child, "approximation")), None
+        )
+        return Motion(
+            kind, end, self.speeds(place), place, blend, via, angle, self._keeps_orientation()
+        )
 
     def target(self, tree: Tree, relative: bool, in_tool: bool) -> Target:
         """Where an expression leads to."""
@@ -57,7 +86,8 @@ class Motions:
             raise KrlRunError(f"a motion can't go to {kind_of(value)}", place)
         self._check_components(value, relative, place)
         base, tool = (
-            pose(self._memory.get(((name, None),), place), name, place) for name in ("$BASE", "$TOOL")
+            pose(self._memory.get(((name, None),), place), name, place)
+            for name in ("$BASE", "$TOOL")
         )
         name = str(tree.children[0]) if tree.data == "access" else ""
         if is_axis_value(value):
@@ -66,21 +96,29 @@ class Motions:
         if not frame:
             raise KrlRunError(f"a motion can't go to {kind_of(value)}", place)
         status, turn = (
-            integer(value.fields[part], part, place) if part in value.fields else None for part in ("S", "T")
+            integer(value.fields[part], part, place) if part in value.fields else None
+            for part in ("S", "T")
         )
         return Target(None, frame, status, turn, relative, in_tool, base, tool, name)
 
     def _check_components(self, value: Structure, relative: bool, place: Place) -> None:
-        """Raise KrlRunError for a component that no position has, and for an external axis that moves."""
+        """Raise KrlRunError for a component that no position has, and for an external axis that
+        moves.
+        """
         unknown = next((name for name in value.fields if name not in _COMPONENTS), None)
         if unknown is not None:
             raise KrlRunError(f"{unknown} is no component of a position", place)
         for name, at in components(value, EXTERNAL_NAMES, place).items():
             before = self._external.setdefault(name, 0.0 if relative else at)
             if abs(at if relative else at - before) > _STANDS:
-                raise KrlRunError(f"{name} moves from {before:g} to {at:g}: external axes aren't read", place)
+                raise KrlRunError(
+                    f"{name} moves from {before:g} to {at:g}: external axes aren't read", place
+                )
             if before != 0.0:
-                self._noted(place, f"{name} stays at {before:g}: external axes are taken as part of the cell")
+                self._noted(
+                    place,
+                    f"{name} stays at {before:g}: external axes are taken as part of the cell",
+                )
 
     def _here(self, name: str, place: Place) -> Target:
         """Where the robot stands: PTP $AXIS_ACT, as programs begin."""
@@ -88,8 +126,11 @@ class Motions:
             axis: dict[str, float] | None = {"A1": 0.0}
             frame = None
         else:
-            axis, frame = None, dict.fromkeys(FRAME_NAMES[:3], 0.0)
-        base, tool = (pose(self._memory.get(((n, None),), place), n, place) for n in ("$BASE", "$TOOL"))
+            axis = None
+            frame = dict.fromkeys(FRAME_NAMES[:3], 0.0)
+        base, tool = (
+            pose(self._memory.get(((n, None),), place), n, place) for n in ("$BASE", "$TOOL")
+        )
         return Target(axis, frame, None, None, True, False, base, tool, name)
 
     def speeds(self, place: Place) -> Speeds:

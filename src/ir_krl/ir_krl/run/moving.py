@@ -1,4 +1,6 @@
-"""Motions and spline blocks as statements, with what triggers do meanwhile and what stands after WITH."""
+"""Motions and spline blocks as statements, with what triggers do meanwhile and what stands after
+WITH.
+"""
 
 from __future__ import annotations
 
@@ -26,11 +28,14 @@ class Moving(Assigning):
         when, where, delay, action = tree.children[0], *tree.children[1:4]
         at = self.expressions.number(where, str(when))
         if str(when) not in ("DISTANCE", "PATH") or self.expressions.number(delay, "DELAY") != 0.0:
-            self.note(tree, "a TRIGGER acts at an end of its motion: path and delay aren't modelled")
+            self.note(
+                tree, "a TRIGGER acts at an end of its motion: path and delay aren't modelled"
+            )
         self._triggers.append((at if str(when) == "DISTANCE" else 1.0, action))
 
     def _ptp(self, tree: Tree) -> None:
-        due, self._triggers = self._triggers, []
+        due = self._triggers
+        self._triggers = []
         self._act(action for at, action in due if at == 0.0)
         self.commands.append(self._with_settings(tree, lambda: self._motions.motion(tree)))
         self._act(action for at, action in due if at != 0.0)
@@ -45,16 +50,19 @@ class Moving(Assigning):
     _lin = _circ = _ptp
 
     def _spline_block(self, tree: Tree) -> None:
-        """A block with its triggers: what they switch on first counts from its start, the rest from its end,
-        so that no part of a process is taken for positioning.
+        """A block with its triggers: what they switch on first counts from its start, the rest from
+        its end, so that no part of a process is taken for positioning.
         """
-        due, self._triggers = self._triggers, []
+        due = self._triggers
+        self._triggers = []
         block = self._with_settings(tree, lambda: self._block(tree))
-        inside, self._triggers = self._triggers, []
+        inside = self._triggers
+        self._triggers = []
         self._act(action for at, action in due if at == 0.0)
         before = len(self.commands)
         self._act(action for _, action in inside)
-        made, self.commands[before:] = self.commands[before:], []
+        made = self.commands[before:]
+        self.commands[before:] = []
         first = {one.number: one for one in reversed(made) if isinstance(one, SetOutput)}
         early = [one for one in first.values() if one.value]
         late = [one for one in made if one not in early]
@@ -79,7 +87,7 @@ class Moving(Assigning):
         shared.update(before)
         return built
 
-    def _block(self, tree: Tree) -> SplineBlock:  # long: one case per line of a block
+    def _block(self, tree: Tree) -> SplineBlock:
         word, _, *parts, approximation = tree.children
         motions: list[Motion] = []
         times: list[TimeBlock] = []
@@ -88,16 +96,22 @@ class Moving(Assigning):
         for part in parts:
             match part.data:
                 case "time_start":
-                    start, marks = len(motions), []
+                    start = len(motions)
+                    marks = []
                 case "time_part":
-                    marks.append((len(motions), self.expressions.number(part.children[0], "TIME_BLOCK PART")))
+                    marks.append(
+                        (len(motions), self.expressions.number(part.children[0], "TIME_BLOCK PART"))
+                    )
                 case "time_end":
                     seconds = self.expressions.number(part.children[0], "TIME_BLOCK END")
                     if start is None or seconds <= 0.0 or start == len(motions):
                         raise KrlRunError(
-                            "TIME_BLOCK END needs a START, motions and a time above 0 s", self.place(part)
+                            "TIME_BLOCK END needs a START, motions and a time above 0 s",
+                            self.place(part),
                         )
-                    times.append(TimeBlock(start, len(motions), tuple(marks), seconds, self.place(part)))
+                    times.append(
+                        TimeBlock(start, len(motions), tuple(marks), seconds, self.place(part))
+                    )
                     start = None
                 case "assignment" | "trigger" | "const_vel" | "stop_when":
                     getattr(self, f"_{part.data}")(part)

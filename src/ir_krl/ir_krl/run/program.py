@@ -1,4 +1,6 @@
-"""Follows a program statement by statement; what reaches the controller is the list of its commands."""
+"""Follows a program statement by statement; what reaches the controller is the list of its
+commands.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,8 @@ from ir_krl.run.system import system_variables
 from ir_krl.run.values import Array, Value, copied, typed
 from ir_msgs_py.arrays import FloatArray
 
-GLOBAL, CONFIGURATION = "GLOBAL", "$CONFIG"
+GLOBAL = "GLOBAL"
+CONFIGURATION = "$CONFIG"
 NESTED = "brackets, signs or blocks are nested too deeply"
 DEPTH_MAX = 60
 """Calls within calls."""
@@ -47,9 +50,9 @@ def follow(
 ) -> Followed:
     """Run `routine` (the first of the sources where "") without moving anything.
 
-    home (6,) [rad] is XHOME; tool (4, 4) [m] stands for tools whose data the program doesn't bring. inputs:
-    what $IN[n] reads; one that isn't given and decides something is an error. A LOOP without EXIT is run
-    `loop_passes` times. Raises KrlRunError with the place.
+    home (6,) [rad] is XHOME; tool (4, 4) [m] stands for tools whose data the program doesn't bring.
+    inputs: what $IN[n] reads; one that isn't given and decides something is an error. A LOOP
+    without EXIT is run `loop_passes` times. Raises KrlRunError with the place.
     """
     routines = Routines(sources)
     name = routine.upper() or next(iter(routines.names), "")
@@ -71,9 +74,12 @@ def follow(
 class _Run(Moving):
     """Calls, declarations and motions, beside the control structures."""
 
-    def __init__(self, routines: Routines, memory: Memory, inputs: dict[int, bool], loop_passes: int) -> None:
+    def __init__(
+        self, routines: Routines, memory: Memory, inputs: dict[int, bool], loop_passes: int
+    ) -> None:
         super().__init__(memory, loop_passes)
-        self._routines, self._library = routines, Library(memory)
+        self._routines = routines
+        self._library = Library(memory)
         self._signals = Signals(memory, inputs, self.note_at)
         self.expressions = Expressions(memory, self._signals, self._called)
         self._motions = Motions(self.expressions, memory, self.note_at)
@@ -86,15 +92,20 @@ class _Run(Moving):
 
     def _at(self, file: str) -> None:
         """Statements of this file run from here on."""
-        self.expressions.file, self.memory.module = file, module_of(file)
+        self.expressions.file = file
+        self.memory.module = module_of(file)
 
     def routine(self, routine: Routine, arguments: list[Value | None], place: Place) -> Value:
-        """Run a routine; the value of its RETURN, 0 without one. OUT parameters are read by the caller."""
+        """Run a routine; the value of its RETURN, 0 without one. OUT parameters are read by the
+        caller.
+        """
         if len(self.memory.scopes) >= DEPTH_MAX:
             raise KrlRunError(f"{routine.name} is the {DEPTH_MAX}th call within calls", place)
         if len(arguments) > len(routine.parameters):
             raise KrlRunError(
-                f"{routine.name} takes {len(routine.parameters)} arguments, {len(arguments)} are given", place
+                f"{routine.name} takes {len(routine.parameters)} arguments, {len(arguments)} are "
+                "given",
+                place,
             )
         before = self.expressions.file
         named = zip(routine.parameters, arguments, strict=False)
@@ -106,7 +117,9 @@ class _Run(Moving):
         except Returned as returned:
             return 0 if returned.value is None else returned.value
         except LoopExit:
-            raise KrlRunError("EXIT stands outside of a loop", place_of(routine.body, routine.file)) from None
+            raise KrlRunError(
+                "EXIT stands outside of a loop", place_of(routine.body, routine.file)
+            ) from None
         finally:
             self._at(before)
         return 0
@@ -151,11 +164,18 @@ class _Run(Moving):
             return self._library.call(name, values, place)
         if routine is None:
             raise KrlRunError(f"there is no routine {name} in the files that are given", place)
-        values = [None if one is None else self._argument(one, k, routine) for k, one in enumerate(trees)]
+        values = [
+            None if one is None else self._argument(one, k, routine) for k, one in enumerate(trees)
+        ]
         result = self.routine(routine, values, place)
         left = self.memory.leave()
         for parameter, tree in zip(routine.parameters, trees, strict=False):
-            if parameter.out and parameter.name in left and tree is not None and tree.data == "access":
+            if (
+                parameter.out
+                and parameter.name in left
+                and tree is not None
+                and tree.data == "access"
+            ):
                 self.memory.set(self.expressions.path(tree), left[parameter.name], place)
         return result
 

@@ -15,8 +15,8 @@ def module_of(file: str) -> str:
 
 
 class Routines:
-    """All routines of the sources. Raises KrlRunError where a file has two of one name, or two files begin
-    with one of the same name, which other files then can't call.
+    """All routines of the sources. Raises KrlRunError where a file has two of one name, or two
+    files begin with one of the same name, which other files then can't call.
     """
 
     def __init__(self, sources: Sequence[Source]) -> None:

@@ -9,7 +9,10 @@ from ir_krl.errors import KrlRunError, Place
 from ir_krl.run.memory import Memory, Step
 from ir_krl.run.values import Array, Value, integer, number
 
-INPUT, OUTPUT, TIMER, TIMER_FLAG = "$IN", "$OUT", "$TIMER", "$TIMER_FLAG"
+INPUT = "$IN"
+OUTPUT = "$OUT"
+TIMER = "$TIMER"
+TIMER_FLAG = "$TIMER_FLAG"
 SINGLE = frozenset((INPUT, OUTPUT, TIMER_FLAG, "$FLAG", "$CYCFLAG"))
 """What is TRUE or FALSE by its number."""
 SIGNALS = 8192
@@ -33,7 +36,8 @@ class Group:
 
 @dataclass
 class Signals:
-    """What is known of signals. inputs: what $IN[n] reads; noted: hears what is assumed, with its place;
+    """What is known of signals. inputs: what $IN[n] reads; noted: hears what is assumed, with its
+    place;
     aliases and groups: what SIGNAL declares, by name.
     """
 
@@ -47,7 +51,9 @@ class Signals:
         """One signal or flag. Raises KrlRunError for an input that isn't given."""
         if name == INPUT:
             if index not in self.inputs:
-                raise KrlRunError(f"the value of $IN[{index}] decides something here and isn't given", place)
+                raise KrlRunError(
+                    f"the value of $IN[{index}] decides something here and isn't given", place
+                )
             return self.inputs[index]
         if name == TIMER_FLAG:
             self.noted(place, f"$TIMER[{index}] stands still: no time passes for a timer")
@@ -66,12 +72,17 @@ class Signals:
         return sum(self.read(group.kind, n, place) << k for k, n in enumerate(group.numbers))
 
     def group_bits(self, name: str, value: Value, place: Place) -> list[tuple[int, bool]]:
-        """Outputs of a group and what they are set to. Raises KrlRunError for a number that it can't hold."""
-        group, wanted = self.groups[name], integer(value, f"what {name} is set to", place)
+        """Outputs of a group and what they are set to. Raises KrlRunError for a number that it
+        can't hold.
+        """
+        group = self.groups[name]
+        wanted = integer(value, f"what {name} is set to", place)
         if group.kind != OUTPUT:
             raise KrlRunError(f"{name} is a group of inputs: it can't be set", place)
         if not 0 <= wanted < 1 << len(group.numbers):
-            raise KrlRunError(f"{name} has {len(group.numbers)} bits: it can't hold {wanted}", place)
+            raise KrlRunError(
+                f"{name} has {len(group.numbers)} bits: it can't hold {wanted}", place
+            )
         return [(n, bool(wanted >> k & 1)) for k, n in enumerate(group.numbers)]
 
     def declare(
@@ -84,7 +95,9 @@ class Signals:
         (kind, begin), (other, end) = first[0], last[0]
         there = kind == other and kind in (INPUT, OUTPUT) and begin is not None and end is not None
         if not there or begin is None or end is None or not 0 <= end[0] - begin[0] < _GROUP_MAX:
-            raise KrlRunError(f"{name} must be a group of 1 to {_GROUP_MAX} inputs or outputs", place)
+            raise KrlRunError(
+                f"{name} must be a group of 1 to {_GROUP_MAX} inputs or outputs", place
+            )
         self.groups[name] = Group(kind, begin[0], end[0])
 
     def _held(self, name: str, index: int) -> Value | None:

@@ -1,4 +1,6 @@
-"""What a controller brings along: system variables with the values they have at the start of a program."""
+"""What a controller brings along: system variables with the values they have at the start of a
+program.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +12,29 @@ from ir_msgs_py.arrays import FloatArray
 
 AXES = 6
 FULL = 100.0  # %
-TOOL_VELOCITY = 2.0  # m/s, assumed where a program sets no $VEL.CP: the usual value of the configuration file
-TOOL_ACCELERATION = 2.3  # m/s^2, likewise of $ACC.CP; what 100 % of an inline form's acceleration means
+TOOL_VELOCITY = (
+    2.0  # m/s, assumed where a program sets no $VEL.CP: the usual value of the configuration file
+)
+TOOL_ACCELERATION = (
+    2.3  # m/s^2, likewise of $ACC.CP; what 100 % of an inline form's acceleration means
+)
 TURNING_VELOCITY = 200.0  # deg/s, likewise of $VEL.ORI1
 TURNING_ACCELERATION = 100.0  # deg/s^2, likewise of $ACC.ORI1
 TOOLS = 16  # numbers of TOOL_DATA
 BASES = 32  # numbers of BASE_DATA
 MODELLED = frozenset(
-    ("$VEL_AXIS", "$ACC_AXIS", "$VEL", "$ACC", "$APO", "$OV_PRO", "$TOOL", "$BASE", "$OUT", "$ORI_TYPE")
+    (
+        "$VEL_AXIS",
+        "$ACC_AXIS",
+        "$VEL",
+        "$ACC",
+        "$APO",
+        "$OV_PRO",
+        "$TOOL",
+        "$BASE",
+        "$OUT",
+        "$ORI_TYPE",
+    )
 )
 """System variables that motions follow from."""
 HARMLESS = frozenset(
@@ -40,7 +57,9 @@ NULL: dict[str, Value] = dict.fromkeys(FRAME_NAMES, 0.0)
 
 
 def system_speeds() -> dict[str, Value]:
-    """Speeds, accelerations and approximation distances as BAS(#INITMOV) leaves them; override as it is."""
+    """Speeds, accelerations and approximation distances as BAS(#INITMOV) leaves them; override as
+    it is.
+    """
     turning = {"ORI1": TURNING_VELOCITY, "ORI2": TURNING_VELOCITY}
     turning_up = {"ORI1": TURNING_ACCELERATION, "ORI2": TURNING_ACCELERATION}
     return {
@@ -53,10 +72,12 @@ def system_speeds() -> dict[str, Value]:
 
 
 def system_variables(home: FloatArray, tool: FloatArray) -> dict[str, Value]:
-    """Variables at the start: `home` (6,) [rad] is XHOME, `tool` (4, 4) [m] in the flange every tool number
-    whose data the program doesn't bring.
+    """Variables at the start: `home` (6,) [rad] is XHOME, `tool` (4, 4) [m] in the flange every
+    tool number whose data the program doesn't bring.
     """
-    angles: dict[str, Value] = {f"A{j + 1}": float(angle) for j, angle in enumerate(np.degrees(home))}
+    angles: dict[str, Value] = {
+        f"A{j + 1}": float(angle) for j, angle in enumerate(np.degrees(home))
+    }
     tool_frame = frame(tool)
     return {
         **system_speeds(),

@@ -20,7 +20,9 @@ class Symbol:
 
 @dataclass(eq=True)
 class Structure:
-    """Components by name; `kind` is the type where the text or a declaration gives it (E6POS), else ""."""
+    """Components by name; `kind` is the type where the text or a declaration gives it (E6POS), else
+    "".
+    """
 
     fields: dict[str, Value]
     kind: str = ""
@@ -55,9 +57,13 @@ REAL_MAX = 3.4e38
 
 
 def in_range(value: int | float, place: Place) -> int | float:
-    """An INT of 32 bits or a REAL of single range, as the controller has them. Raises KrlRunError."""
+    """An INT of 32 bits or a REAL of single range, as the controller has them. Raises
+    KrlRunError.
+    """
     if isinstance(value, int) and abs(value) > INT_MAX:
-        raise KrlRunError(f"an INT is at most {INT_MAX}; this one has {value.bit_length()} bits", place)
+        raise KrlRunError(
+            f"an INT is at most {INT_MAX}; this one has {value.bit_length()} bits", place
+        )
     if isinstance(value, float) and not abs(value) <= REAL_MAX:
         raise KrlRunError(f"a REAL is at most {REAL_MAX:g}; this one is {value:g}", place)
     return value

@@ -9,7 +9,11 @@ import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import PlannedMovement, PlanningInfo, TrajectoryReport
-from ir_msgs_py.ros.convert_report import planned_movement_from_msg, planning_info_from_msg, report_from_msg
+from ir_msgs_py.ros.convert_report import (
+    planned_movement_from_msg,
+    planning_info_from_msg,
+    report_from_msg,
+)
 from ir_msgs_py.ros.convert_savings import program_point_from_msg, program_savings_from_msg
 from ir_msgs_py.ros.convert_trajectory import trajectory_from_msg, trajectory_given
 from ir_msgs_py.savings import ProgramPoint, ProgramSavings
@@ -39,8 +43,8 @@ class MovementPlan:
 
 @dataclass(frozen=True, eq=False)
 class OptimizedTrajectory:
-    """A trajectory made cheaper; trajectory is None unless the options asked for points. durations [s] and
-    energies [J], each (P,): the trade of time for energy, the fastest first.
+    """A trajectory made cheaper; trajectory is None unless the options asked for points. durations
+    [s] and energies [J], each (P,): the trade of time for energy, the fastest first.
     """
 
     trajectory_id: str
@@ -68,8 +72,9 @@ class OptimizedTrajectory:
 
 @dataclass(frozen=True, eq=False)
 class ProgramPlan:
-    """A planned program: its steps, the report of the whole, and what it saves; gap [%]: how far above the
-    best chain of configurations it can be. front: programs by cycle time, where they were asked for.
+    """A planned program: its steps, the report of the whole, and what it saves; gap [%]: how far
+    above the best chain of configurations it can be. front: programs by cycle time, where they were
+    asked for.
     """
 
     program_id: str

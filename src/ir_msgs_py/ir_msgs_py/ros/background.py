@@ -1,7 +1,7 @@
 """An executor that spins in its own thread, so that scripts and tests can call and wait.
 
-Whatever touches a node's entities is handed over with `run`: clients, and action clients above all, race
-when they are used from two threads.
+Whatever touches a node's entities is handed over with `run`: clients, and action clients above all,
+race when they are used from two threads.
 """
 
 from __future__ import annotations
@@ -77,7 +77,9 @@ class BackgroundExecutor:
         return True
 
     def close(self) -> None:
-        """Stop spinning and destroy the nodes; raises what a callback raised and nobody has heard of yet."""
+        """Stop spinning and destroy the nodes; raises what a callback raised and nobody has heard
+        of yet.
+        """
         self._spinning.end()  # first, so that nobody spins what is taken apart
         self._thread.join(_LAST_CALLBACK)
         self._executor.shutdown(timeout_sec=5.0)
@@ -94,7 +96,8 @@ class BackgroundExecutor:
 
     def _raise_failure(self) -> None:
         if self._failure is not None:
-            failure, self._failure = self._failure, None
+            failure = self._failure
+            self._failure = None
             raise failure
 
     def _spin(self) -> None:

@@ -1,7 +1,9 @@
-"""What a node was asked and what it answered, for recordings: one message per request on its topic `~/calls`.
+"""What a node was asked and what it answered, for recordings: one message per request on its topic
+`~/calls`.
 
-Where nobody subscribes, nothing is done. A message that is longer than MOST_BYTES is left out (its field is
-empty), and it is measured before it is copied: a recorder must not cost a node the memory of its answers.
+Where nobody subscribes, nothing is done. A message that is longer than MOST_BYTES is left out (its
+field is empty), and it is measured before it is copied: a recorder must not cost a node the memory
+of its answers.
 """
 
 from __future__ import annotations
@@ -19,8 +21,9 @@ from ir_msgs.msg import RecordedCall
 from ir_msgs_py import names
 
 MOST_BYTES = 2 * 2**20
-"""Of a request or an answer: the points of forty movements. What the middleware keeps for a recorder that is
-busy is at most WAITING of these twice."""
+"""Of a request or an answer: the points of forty movements. What the middleware keeps for a
+recorder that is busy is at most WAITING of these twice.
+"""
 WAITING = 100
 _NUMBER = 8  # bytes; what a number takes at most
 
@@ -31,8 +34,11 @@ class Calls:
     _known: ClassVar[WeakKeyDictionary[Node, Calls]] = WeakKeyDictionary()
 
     def __init__(self, node: Node) -> None:
-        self._clock, self._name = node.get_clock(), node.get_fully_qualified_name()
-        self._publisher = node.create_publisher(RecordedCall, f"~/{names.CALLS}", QoSProfile(depth=WAITING))
+        self._clock = node.get_clock()
+        self._name = node.get_fully_qualified_name()
+        self._publisher = node.create_publisher(
+            RecordedCall, f"~/{names.CALLS}", QoSProfile(depth=WAITING)
+        )
 
     @classmethod
     def of(cls, node: Node) -> Calls:
@@ -42,8 +48,9 @@ class Calls:
         return cls._known[node]
 
     def taken(self, name: str, kind: str, request: Any) -> Callable[[Any], None]:
-        """A request of the service or action `name` of the type `kind` is taken now: what to call with its
-        answer. A handler may change the request, so it is copied first where somebody listens by then.
+        """A request of the service or action `name` of the type `kind` is taken now: what to call
+        with its answer. A handler may change the request, so it is copied first where somebody
+        listens by then.
         """
         stamp = self._clock.now().to_msg()
         data = _bounded(request) if self._publisher.get_subscription_count() else None

@@ -47,16 +47,18 @@ from ir_msgs_py.ros.quality import SERVICE
 from ir_msgs_py.ros.types import owner_of
 from ir_msgs_py.trajectory import JointTrajectory
 
-_KEPT_WITHIN = 0.1  # s between two messages that a publisher has kept; they are sent without a pause
+_KEPT_WITHIN = (
+    0.1  # s between two messages that a publisher has kept; they are sent without a pause
+)
 _CANCEL_GRACE = 5.0  # s that a canceled goal may take to stop along the path
 
 
 class Client:
     """Calls services, sends goals and listens to topics of a cell.
 
-    namespace: of the cell's nodes. domain_id: None = ROS_DOMAIN_ID. context: somebody else's, as that of a
-    test, instead of its own. timeout: longest wait for a service to appear and to answer [s]; long work has
-    a timeout of its own.
+    namespace: of the cell's nodes. domain_id: None = ROS_DOMAIN_ID. context: somebody else's, as
+    that of a test, instead of its own. timeout: longest wait for a service to appear and to answer
+    [s]; long work has a timeout of its own.
     """
 
     def __init__(
@@ -76,7 +78,10 @@ class Client:
             # a script's own words are none for ROS, which takes every "a:=b" for a remapping
             rclpy.init(args=[], context=self._context, domain_id=domain_id)
         self.node = Node(
-            node_name, namespace=namespace or None, context=self._context, start_parameter_services=False
+            node_name,
+            namespace=namespace or None,
+            context=self._context,
+            start_parameter_services=False,
         )
         self._executor = BackgroundExecutor(self._context)
         self._executor.add_node(self.node)
@@ -100,7 +105,8 @@ class Client:
     def call(self, service: str, request: Any, timeout: float | None = None) -> Any:
         """Send a request (a `SetCell.Request(...)`) and return the response.
 
-        Raises ServiceUnavailableError or CallTimedOutError; the response's status is the caller's to read.
+        Raises ServiceUnavailableError or CallTimedOutError; the response's status is the caller's
+        to read.
         """
         limit = self.timeout if timeout is None else timeout
         service_type = owner_of(request, "Request", "srv")
@@ -108,7 +114,9 @@ class Client:
         deadline = time.monotonic() + limit
         if not self._executor.wait_until(client.service_is_ready, limit):
             other = self.graph.other_type(service, service_type)
-            raise ServiceUnavailableError(f"no node offers the service {service} (waited {limit:g} s){other}")
+            raise ServiceUnavailableError(
+                f"no node offers the service {service} (waited {limit:g} s){other}"
+            )
         future: Future = self._executor.run(lambda: client.call_async(request))
         if not self._executor.wait(future, max(0.0, deadline - time.monotonic())):
             self._executor.run(lambda: client.remove_pending_request(future))
@@ -116,7 +124,9 @@ class Client:
         return future.result()
 
     def ask(self, service: str, request: Any, timeout: float | None = None) -> Any:
-        """Like `call`, and raise RequestRefusedError with the sentence of a status that is not SUCCESS."""
+        """Like `call`, and raise RequestRefusedError with the sentence of a status that is not
+        SUCCESS.
+        """
         response = self.call(service, request, timeout)
         _check(service, response)
         return response
@@ -130,14 +140,19 @@ class Client:
     ) -> Any:
         """Send a goal (a `RunProgram.Goal(...)`) and return its result; Ctrl-C cancels the goal.
 
-        timeout: for the result [s]; the goal is canceled when it is over and CallTimedOutError raised.
+        timeout: for the result [s]; the goal is canceled when it is over and CallTimedOutError
+        raised.
         """
         return self._goals.send(action, goal, feedback, self.timeout, timeout, _CANCEL_GRACE)
 
     def subscribe(self, topic: str, message_type: Any, callback: Callable[[Any], object]) -> None:
-        """Call back on the spinning thread for each message; the quality of service fits the publishers."""
+        """Call back on the spinning thread for each message; the quality of service fits the
+        publishers.
+        """
         qos = self.graph.qos_of_publishers(topic)
-        self._executor.run(lambda: self.node.create_subscription(message_type, topic, callback, qos))
+        self._executor.run(
+            lambda: self.node.create_subscription(message_type, topic, callback, qos)
+        )
 
     def next_message(self, topic: str, message_type: Any, timeout: float | None = None) -> Any:
         """Return the next message of a topic, or the newest one where its publishers keep some."""
@@ -152,13 +167,17 @@ class Client:
             if not self._executor.wait_until(lambda: bool(received), limit):
                 other = self.graph.other_type(topic, message_type)
                 raise CallTimedOutError(f"no message on {topic} within {limit:g} s{other}")
-            if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL:  # the kept ones come one after another
+            if (
+                qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
+            ):  # the kept ones come one after another
                 deadline = time.monotonic() + limit
                 while time.monotonic() < deadline:
                     grown = _grown(received)
                     if self._executor.wait_until(grown, _KEPT_WITHIN):
                         continue
-                    for _ in range(2):  # a whole turn: that thread may have got no processor meanwhile
+                    for _ in range(
+                        2
+                    ):  # a whole turn: that thread may have got no processor meanwhile
                         self._executor.run(_nothing)
                     if not grown():
                         break
@@ -167,16 +186,24 @@ class Client:
         return received[-1]
 
     def set_cell(self, cell: str) -> tuple[str, ...]:
-        """Load a cell: the name of a bundled one, a path, or the text of a cell file; its stations' names."""
-        request = SetCell.Request(cell_yaml=cell) if "\n" in cell else SetCell.Request(cell_file=cell)
+        """Load a cell: the name of a bundled one, a path, or the text of a cell file; its stations'
+        names.
+        """
+        request = (
+            SetCell.Request(cell_yaml=cell) if "\n" in cell else SetCell.Request(cell_file=cell)
+        )
         response = self.ask(names.SET_CELL, request, timeout=max(self.timeout, 30.0))
         return tuple(station.name for station in response.stations)
 
     def plan_to(self, goal: str, options: PlanOptions | None = None) -> MovementPlan:
-        """Plan a movement from where the robot is to a goal as it is typed: "lathe", "A1 0 A2 -90 ..."."""
+        """Plan a movement from where the robot is to a goal as it is typed: "lathe", "A1 0 A2 -90
+        ...".
+        """
         chosen = options or PlanOptions()
         request = PlanRegionalMovement.Request(goal=goal, options=plan_options_to_msg(chosen))
-        response = self.ask(names.PLAN_REGIONAL_MOVEMENT, request, self.timeout + chosen.planning_time)
+        response = self.ask(
+            names.PLAN_REGIONAL_MOVEMENT, request, self.timeout + chosen.planning_time
+        )
         return MovementPlan.from_msg(response)
 
     def optimize(
@@ -202,9 +229,9 @@ class Client:
         savings: bool = True,
         front_points: int = 0,
     ) -> ProgramPlan:
-        """Plan a program over stations (none: the cell's own); progress gets the action's feedback. savings:
-        hold it against the common program; front_points: programs from the shortest cycle time to twice the
-        free one.
+        """Plan a program over stations (none: the cell's own); progress gets the action's feedback.
+        savings: hold it against the common program; front_points: programs from the shortest cycle
+        time to twice the free one.
         """
         goal = Plan.Goal(
             stations=list(stations),
@@ -219,7 +246,9 @@ class Client:
 
     def get_trajectory(self, trajectory_id: str) -> JointTrajectory:
         """Fetch the points of a planned trajectory."""
-        response = self.ask(names.GET_TRAJECTORY, GetTrajectory.Request(trajectory_id=trajectory_id))
+        response = self.ask(
+            names.GET_TRAJECTORY, GetTrajectory.Request(trajectory_id=trajectory_id)
+        )
         return trajectory_from_msg(response.trajectory)
 
     def run_program(
@@ -229,7 +258,9 @@ class Client:
         timeout: float = float("inf"),
     ) -> ProgramRun:
         """Run a planned program; progress gets the action's feedback."""
-        result = self.send_goal(names.RUN_PROGRAM, RunProgram.Goal(program_id=program_id), progress, timeout)
+        result = self.send_goal(
+            names.RUN_PROGRAM, RunProgram.Goal(program_id=program_id), progress, timeout
+        )
         _check(names.RUN_PROGRAM, result)
         return ProgramRun(int(result.executed), float(result.duration), float(result.energy))
 
@@ -244,11 +275,13 @@ class Client:
         states: Sequence[str] = (),
         allow_collision: bool = False,
     ) -> Execution:
-        """Drive a trajectory; RequestRefusedError with the driver's code and sentence when it was aborted.
+        """Drive a trajectory; RequestRefusedError with the driver's code and sentence when it was
+        aborted.
 
-        report: of its plan; the driver refuses what was planned in another cell or with another load.
-        station: whose contacts are allowed; states: of machines that it relies on; allow_collision: start it
-        although it is known to collide.
+        report: of its plan; the driver refuses what was planned in another cell or with another
+        load.
+        station: whose contacts are allowed; states: of machines that it relies on; allow_collision:
+        start it although it is known to collide.
         """
         goal = ExecuteTrajectory.Goal(
             trajectory=trajectory_to_msg(trajectory),
@@ -258,7 +291,8 @@ class Client:
             allow_collision=allow_collision,
         )
         if report is not None:
-            goal.cell_hash, goal.load = report.cell_hash, report.load
+            goal.cell_hash = report.cell_hash
+            goal.load = report.load
         result = self.send_goal(names.EXECUTE_TRAJECTORY, goal, feedback, timeout)
         if result.error_code != ExecuteTrajectory.Result.SUCCESSFUL:
             raise RequestRefusedError(

@@ -1,4 +1,6 @@
-"""Times before 1970 on /clock are ignored: rclpy raises at each, and a node that only fails ends."""
+"""Times before 1970 on /clock are ignored: rclpy raises at each, and a node that only fails
+ends.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,9 @@ _SAID_AGAIN = 60.0  # s
 
 
 def heed_times_only(node: Node) -> None:
-    """Let the node follow no /clock that says a negative time, whenever it begins to listen to one."""
+    """Let the node follow no /clock that says a negative time, whenever it begins to listen to
+    one.
+    """
     source = node._time_source
     take = source.clock_callback
 

@@ -19,7 +19,7 @@ _HELP = """usage: {name} [--ros-args [-p NAME:=VALUE ...] [--params-file FILE] [
 
 It runs until SIGINT or SIGTERM. Its parameters, with units and ranges, are in docs/parameters.md;
 `ros2 param describe /{name} NAME` says the same while it runs. `ir up` starts all nodes of a cell.
-"""
+"""  # noqa: E501
 
 
 class CommandLineError(Exception):
@@ -27,20 +27,26 @@ class CommandLineError(Exception):
 
 
 def answer_before_start(name: str, words: Sequence[str], about: str) -> int | None:
-    """Exit code where the words ask for help or are no words of a node, None where it shall start."""
+    """Exit code where the words ask for help or are no words of a node, None where it shall
+    start.
+    """
     own = list(words[: words.index("--ros-args")] if "--ros-args" in words else words)
     if {"-h", "--help"} & set(own):
         sys.stdout.write(_HELP.format(name=name, about=about))
         return 0
     if own:
-        sentence = f"unknown argument {own[0][:100]!a}; parameters are given by --ros-args -p NAME:=VALUE"
+        sentence = (
+            f"unknown argument {own[0][:100]!a}; parameters are given by --ros-args -p NAME:=VALUE"
+        )
         sys.stderr.write(f"{name}: {sentence} ({name} --help)\n")
         return 2
     return None
 
 
 def init_ros(words: Sequence[str] | None) -> None:
-    """rclpy.init without its signal handlers; CommandLineError with one line for words that it can't read."""
+    """rclpy.init without its signal handlers; CommandLineError with one line for words that it
+    can't read.
+    """
     try:
         rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
     except _UNREADABLE as error:

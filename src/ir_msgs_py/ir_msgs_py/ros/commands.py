@@ -1,4 +1,6 @@
-"""A topic of commands: every message counts once, from publishers that latch and from those that do not."""
+"""A topic of commands: every message counts once, from publishers that latch and from those that do
+not.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +16,8 @@ from ir_msgs_py.ros.quality import COMMANDS, REQUESTS_WAITING
 
 
 class CommandTopic:
-    """Calls back with the messages of each turn, at least one, in the order in which they were sent; what
-    latching publishers said before `node` started is heard too.
+    """Calls back with the messages of each turn, at least one, in the order in which they were
+    sent; what latching publishers said before `node` started is heard too.
 
     A turn takes all that wait: on a busy machine a command would come behind seconds of older ones.
     of: what a message commands; history of it that comes after something newer is dropped.
@@ -29,11 +31,16 @@ class CommandTopic:
         take: Callable[[Sequence[Any]], None],
         of: Callable[[Any], Hashable] = lambda msg: None,
     ) -> None:
-        self._take, self._of, self._started = take, of, time.time_ns()
+        self._take = take
+        self._of = of
+        self._started = time.time_ns()
         self._heard: deque[tuple[int, Any]] = deque(maxlen=REQUESTS_WAITING)
         self._newest: dict[Hashable, int] = {}
         self._subscriptions = [
-            (latching, node.create_subscription(msg_type, topic, partial(self._hear, latching), quality))
+            (
+                latching,
+                node.create_subscription(msg_type, topic, partial(self._hear, latching), quality),
+            )
             for latching, quality in zip((True, False), COMMANDS, strict=True)
         ]
 

@@ -19,7 +19,8 @@ _UPPER = np.triu_indices(3)
 
 def controller_timers_to_msg(timers: ControllerTimers) -> ControllerTimersMsg:
     """Timers of a controller."""
-    times, names = timers.transitions, [row.mode.name for row in RESTS]
+    times = timers.transitions
+    names = [row.mode.name for row in RESTS]
     return ControllerTimersMsg(
         brakes_after=timers.brakes_after,
         modes=[int(row.mode) for row in RESTS],
@@ -34,7 +35,9 @@ def controller_timers_from_msg(msg: ControllerTimersMsg) -> ControllerTimers:
     lists = (msg.modes, msg.enter, msg.stay, msg.leave)
     if len({len(values) for values in lists}) != 1:
         lengths = ", ".join(str(len(values)) for values in lists)
-        raise InvalidValueError(f"modes, enter, stay and leave have {lengths} values: as many of each")
+        raise InvalidValueError(
+            f"modes, enter, stay and leave have {lengths} values: as many of each"
+        )
     modes = [checked_mode(int(mode)) for mode in msg.modes]
     missing = [row.mode.name for row in RESTS if row.mode not in modes]
     if missing:

@@ -55,7 +55,9 @@ def status_from_msg(msg: StatusMsg) -> Status:
     return Status(int(msg.code), msg.message, msg.source)
 
 
-def configuration_to_msg(joint_names: Sequence[str], q: FloatArray, stamp_ns: int = 0) -> JointState:
+def configuration_to_msg(
+    joint_names: Sequence[str], q: FloatArray, stamp_ns: int = 0
+) -> JointState:
     """Joint values q (n,) [rad] with their names."""
     msg = JointState(name=list(joint_names), position=float_array(q))
     msg.header.stamp = time_to_msg(stamp_ns)
@@ -68,13 +70,16 @@ def configuration_given(msg: JointState) -> bool:
 
 
 def configuration_from_msg(msg: JointState, joint_names: Sequence[str]) -> FloatArray:
-    """Joint values (n,) [rad] in the order of joint_names; names may be missing (then that order is meant).
+    """Joint values (n,) [rad] in the order of joint_names; names may be missing (then that order is
+    meant).
 
     Raises JointNamesError for foreign, missing or double names, InvalidValueError for the values.
     """
     names = _checked_names(msg, joint_names)
     if len(msg.position) != len(names):
-        raise InvalidValueError(f"position has {len(msg.position)} values: {len(names)} joints need as many")
+        raise InvalidValueError(
+            f"position has {len(msg.position)} values: {len(names)} joints need as many"
+        )
     return _in_order(msg.position, "position", names, joint_names)
 
 
@@ -88,7 +93,8 @@ def velocity_from_msg(msg: JointState, joint_names: Sequence[str]) -> FloatArray
         return None
     if len(msg.velocity) != len(names):
         raise InvalidValueError(
-            f"velocity has {len(msg.velocity)} values: it must have none or as many as {len(names)} joints"
+            f"velocity has {len(msg.velocity)} values: it must have none or as many as "
+            f"{len(names)} joints"
         )
     return _in_order(msg.velocity, "velocity", names, joint_names)
 
@@ -109,7 +115,9 @@ def _checked_names(msg: JointState, joint_names: Sequence[str]) -> list[str]:
     return names
 
 
-def _in_order(values: Sequence[float], what: str, names: list[str], joint_names: Sequence[str]) -> FloatArray:
+def _in_order(
+    values: Sequence[float], what: str, names: list[str], joint_names: Sequence[str]
+) -> FloatArray:
     """Finite values of `names` in the order of joint_names."""
     finite = read_only(values, what, (len(names),))
     return read_only(finite[[names.index(name) for name in joint_names]], what, (len(names),))

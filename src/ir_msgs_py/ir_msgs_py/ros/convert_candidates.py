@@ -18,7 +18,11 @@ from ir_msgs_py.ros.convert_report import (
     report_from_msg,
     report_to_msg,
 )
-from ir_msgs_py.ros.convert_trajectory import trajectory_from_msg, trajectory_given, trajectory_to_msg
+from ir_msgs_py.ros.convert_trajectory import (
+    trajectory_from_msg,
+    trajectory_given,
+    trajectory_to_msg,
+)
 
 _OPTIONS = tuple(field.name for field in fields(PlanOptions))
 _IK_NUMBERS = ("position_error", "rotation_error", "clearance", "movement_cost")
@@ -57,7 +61,9 @@ def ik_solution_from_msg(msg: IkSolutionMsg) -> IkSolution:
     )
 
 
-def service_candidate_to_msg(candidate: ServiceCandidate, include_points: bool = True) -> ServiceCandidateMsg:
+def service_candidate_to_msg(
+    candidate: ServiceCandidate, include_points: bool = True
+) -> ServiceCandidateMsg:
     """Withdrawal or entry; without points only the id of the trajectory."""
     points = candidate.trajectory if include_points else None
     return ServiceCandidateMsg(
@@ -79,6 +85,8 @@ def service_candidate_from_msg(msg: ServiceCandidateMsg) -> ServiceCandidate:
         work=configuration_from_msg(msg.work_configuration, names),
         outside=configuration_from_msg(msg.outside_configuration, names),
         trajectory_id=msg.trajectory_id,
-        trajectory=trajectory_from_msg(msg.trajectory) if trajectory_given(msg.trajectory) else None,
+        trajectory=trajectory_from_msg(msg.trajectory)
+        if trajectory_given(msg.trajectory)
+        else None,
         report=report_from_msg(msg.report),
     )

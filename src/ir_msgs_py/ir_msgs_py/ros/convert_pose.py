@@ -1,6 +1,8 @@
-"""Poses (4, 4) to and from geometry_msgs: a quaternion that is no rotation and an unknown frame are named.
+"""Poses (4, 4) to and from geometry_msgs: a quaternion that is no rotation and an unknown frame are
+named.
 
-A quaternion off by up to 1e-3 is a rounding of the sender and is normalised; beyond that it is a mistake.
+A quaternion off by up to 1e-3 is a rounding of the sender and is normalised; beyond that it is a
+mistake.
 """
 
 from __future__ import annotations
@@ -24,7 +26,9 @@ NORM_TOLERANCE = 1e-3
 def pose_to_msg(T: FloatArray) -> Pose:
     """Pose (4, 4) [m]; the quaternion has w >= 0."""
     pose = read_only(T, "pose", (4, 4))
-    rotation = Rotation.from_matrix(pose[:3, :3].copy())  # SciPy before 1.12 refuses read-only arrays
+    rotation = Rotation.from_matrix(
+        pose[:3, :3].copy()
+    )  # SciPy before 1.12 refuses read-only arrays
     x, y, z, w = (float(value) for value in rotation.as_quat(canonical=True))
     return Pose(position=point_to_msg(pose[:3, 3]), orientation=Quaternion(x=x, y=y, z=z, w=w))
 
@@ -34,10 +38,13 @@ def pose_from_msg(msg: Pose) -> FloatArray:
     rotation.
     """
     position = np.array([msg.position.x, msg.position.y, msg.position.z])
-    quaternion = np.array([msg.orientation.x, msg.orientation.y, msg.orientation.z, msg.orientation.w])
+    quaternion = np.array(
+        [msg.orientation.x, msg.orientation.y, msg.orientation.z, msg.orientation.w]
+    )
     if not np.isfinite(position).all():
         raise PoseError(
-            f"position is {_text(position)} m: it must be finite", StatusCode.INVALID_GOAL_CONSTRAINTS
+            f"position is {_text(position)} m: it must be finite",
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
         )
     norm = float(np.linalg.norm(quaternion))
     if not abs(norm - 1.0) <= NORM_TOLERANCE:
@@ -64,8 +71,11 @@ def stamped_pose_given(msg: PoseStamped) -> bool:
     return bool(msg.header.frame_id)
 
 
-def stamped_pose_from_msg(msg: PoseStamped, frames: Mapping[str, FloatArray] | None = None) -> FloatArray:
-    """Pose (4, 4) [m] in the cell; frames: poses (4, 4) in the cell of the frames that are known besides it.
+def stamped_pose_from_msg(
+    msg: PoseStamped, frames: Mapping[str, FloatArray] | None = None
+) -> FloatArray:
+    """Pose (4, 4) [m] in the cell; frames: poses (4, 4) in the cell of the frames that are known
+    besides it.
 
     Raises PoseError with FRAME_TRANSFORM_FAILURE for an unknown frame, which lists the known ones.
     """

@@ -1,4 +1,6 @@
-"""Power modes, the mains meter, PLC levels, signals and events of a program, to and from messages."""
+"""Power modes, the mains meter, PLC levels, signals and events of a program, to and from
+messages.
+"""
 
 from __future__ import annotations
 

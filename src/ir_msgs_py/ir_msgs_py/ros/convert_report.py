@@ -18,8 +18,17 @@ from ir_msgs_py.report import (
     Rejection,
     TrajectoryReport,
 )
-from ir_msgs_py.ros.convert_basics import configuration_to_msg, float_array, point_from_msg, point_to_msg
-from ir_msgs_py.ros.convert_trajectory import trajectory_from_msg, trajectory_given, trajectory_to_msg
+from ir_msgs_py.ros.convert_basics import (
+    configuration_to_msg,
+    float_array,
+    point_from_msg,
+    point_to_msg,
+)
+from ir_msgs_py.ros.convert_trajectory import (
+    trajectory_from_msg,
+    trajectory_given,
+    trajectory_to_msg,
+)
 
 _NUMBERS = (
     "duration",
@@ -37,7 +46,16 @@ _NUMBERS = (
     "torque_reserve",
 )
 _PER_JOINT = ("joint_energy", "velocity_ratio", "acceleration_ratio", "jerk_ratio", "torque_ratio")
-_TEXTS = ("kind", "from_station", "to_station", "trajectory_id", "power_mode", "attach", "detach", "load")
+_TEXTS = (
+    "kind",
+    "from_station",
+    "to_station",
+    "trajectory_id",
+    "power_mode",
+    "attach",
+    "detach",
+    "load",
+)
 
 
 def distance_pair_to_msg(pair: DistancePair | None) -> DistancePairMsg:
@@ -129,7 +147,9 @@ def planning_info_from_msg(msg: PlanningInfoMsg) -> PlanningInfo:
     )
 
 
-def planned_movement_to_msg(movement: PlannedMovement, include_points: bool = True) -> PlannedMovementMsg:
+def planned_movement_to_msg(
+    movement: PlannedMovement, include_points: bool = True
+) -> PlannedMovementMsg:
     """Step of a program; without points only the id of the trajectory."""
     points = movement.trajectory if include_points else None
     return PlannedMovementMsg(
@@ -147,7 +167,9 @@ def planned_movement_from_msg(msg: PlannedMovementMsg) -> PlannedMovement:
     """Step of a program; trajectory None where the message carries no points."""
     return PlannedMovement(
         **{name: getattr(msg, name) for name in _TEXTS},
-        trajectory=trajectory_from_msg(msg.trajectory) if trajectory_given(msg.trajectory) else None,
+        trajectory=trajectory_from_msg(msg.trajectory)
+        if trajectory_given(msg.trajectory)
+        else None,
         report=report_from_msg(msg.report),
         duration=msg.duration,
         wait_for=tuple(msg.wait_for),

@@ -51,7 +51,9 @@ def program_savings_from_msg(msg: ProgramSavingsMsg) -> ProgramSavings:
 
 def program_point_to_msg(point: ProgramPoint) -> ProgramPointMsg:
     """A point of a front."""
-    return ProgramPointMsg(cycle_time=point.cycle_time, energy=point.energy, program_id=point.program_id)
+    return ProgramPointMsg(
+        cycle_time=point.cycle_time, energy=point.energy, program_id=point.program_id
+    )
 
 
 def program_point_from_msg(msg: ProgramPointMsg) -> ProgramPoint:

@@ -1,4 +1,6 @@
-"""JointTrajectory to and from trajectory_msgs: every fault of the message is named by point and joint."""
+"""JointTrajectory to and from trajectory_msgs: every fault of the message is named by point and
+joint.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ def trajectory_to_msg(
     msg.points = [
         JointTrajectoryPoint(
             positions=float_array(trajectory.positions[k]),
-            velocities=[] if trajectory.velocities is None else float_array(trajectory.velocities[k]),
+            velocities=[]
+            if trajectory.velocities is None
+            else float_array(trajectory.velocities[k]),
             accelerations=[]
             if trajectory.accelerations is None
             else float_array(trajectory.accelerations[k]),
@@ -48,8 +52,9 @@ def trajectory_from_msg(
 ) -> JointTrajectory:
     """Read a trajectory; with joint_names also put it into this joint order.
 
-    Raises TrajectoryError: no names or points, more than max_points, a wrong count at point k, a value
-    that is not finite, times that don't increase, efforts (not used here: torque follows from the motion).
+    Raises TrajectoryError: no names or points, more than max_points, a wrong count at point k, a
+    value that is not finite, times that don't increase, efforts (not used here: torque follows from
+    the motion).
     JointNamesError: a joint that is unknown, missing or double.
     """
     names = tuple(msg.joint_names)
@@ -58,7 +63,9 @@ def trajectory_from_msg(
     if not msg.points:
         raise TrajectoryError("the trajectory has no points")
     if len(msg.points) > max_points:
-        raise TrajectoryError(f"the trajectory has {len(msg.points)} points: at most {max_points} are taken")
+        raise TrajectoryError(
+            f"the trajectory has {len(msg.points)} points: at most {max_points} are taken"
+        )
     for k, point in enumerate(msg.points):
         if len(point.effort):
             sentence = f"point {k} has effort: torque follows from the motion, leave it empty"
@@ -86,7 +93,8 @@ def _build(msg: JointTrajectoryMsg, names: tuple[str, ...], times_ns: IntArray) 
 def _time_ns(duration: Duration, k: int) -> int:
     if duration.nanosec >= NS_PER_S:
         raise TrajectoryError(
-            f"point {k}: nanosec of time_from_start is {duration.nanosec}: it must be below {NS_PER_S} ns",
+            f"point {k}: nanosec of time_from_start is {duration.nanosec}: it must be below "
+            f"{NS_PER_S} ns",
             point=k,
         )
     return int(duration.sec) * NS_PER_S + int(duration.nanosec)

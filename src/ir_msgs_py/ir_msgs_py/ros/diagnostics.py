@@ -22,7 +22,9 @@ OK, WARN, ERROR = (
 
 @dataclass(frozen=True)
 class Condition:
-    """The state of a node or of a part of it; level: a number of diagnostic_msgs/DiagnosticStatus."""
+    """The state of a node or of a part of it; level: a number of
+    diagnostic_msgs/DiagnosticStatus.
+    """
 
     name: str
     level: int
@@ -48,13 +50,14 @@ class Diagnostics:
 
     def _doubled(self) -> list[Condition]:
         """What there is to say where other nodes have this node's name."""
-        name, namespace = self._node.get_name(), self._node.get_namespace()
+        name = self._node.get_name()
+        namespace = self._node.get_namespace()
         count = self._node.get_node_names_and_namespaces().count((name, namespace))
         if count < 2:
             return []
         sentence = (
-            f"{count} nodes are named {self._node.get_fully_qualified_name()}, and each takes what is sent "
-            "to that name: end all but one, or start it in another namespace"
+            f"{count} nodes are named {self._node.get_fully_qualified_name()}, and each takes "
+            "what is sent to that name: end all but one, or start it in another namespace"
         )
         return [Condition(f"{name}: name", WARN, sentence)]
 
@@ -65,5 +68,7 @@ def _status(namespace: str, condition: Condition) -> DiagnosticStatus:
         level=bytes([condition.level]),
         message=one_line(condition.sentence),
         hardware_id=condition.hardware,
-        values=[KeyValue(key=key, value=one_line(str(value))) for key, value in condition.values.items()],
+        values=[
+            KeyValue(key=key, value=one_line(str(value))) for key, value in condition.values.items()
+        ],
     )

@@ -1,7 +1,8 @@
-"""The driver as a program sees it: its services, its action and its meter, for coroutines of one node.
+"""The driver as a program sees it: its services, its action and its meter, for coroutines of one
+node.
 
-Every answer is a Status; nothing blocks, and nothing is waited for without end: while the meter is heard the
-driver is alive, and when it falls silent every wait ends.
+Every answer is a Status; nothing blocks, and nothing is waited for without end: while the meter is
+heard the driver is alive, and when it falls silent every wait ends.
 """
 
 from __future__ import annotations
@@ -38,14 +39,17 @@ from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 
 _UNSEEN = 1.5
-"""s without a look at the meter: nodes look once a second at least, so that this process was stopped."""
+"""s without a look at the meter: nodes look once a second at least, so that this process was
+stopped.
+"""
 
 
 class Driver:
     """Clients of one driver; times in s.
 
-    response_timeout: for services, and to take a goal. silence_timeout: without a reading of the meter the
-    driver counts as gone. cancel_timeout: to stop along the path. The meter is read when something is asked
+    response_timeout: for services, and to take a goal. silence_timeout: without a reading of the
+    meter the driver counts as gone. cancel_timeout: to stop along the path. The meter is read when
+    something is asked
     of it: a node that waits for nothing is not woken a hundred times a second.
     timers: those of the controller, None before they came.
     """
@@ -72,9 +76,13 @@ class Driver:
         self._plc = node.create_client(SetPlcInputSrv, f"{name}/set_plc_input", qos_profile=SERVICE)
         self._load = node.create_client(SetLoadSrv, f"{name}/set_load", qos_profile=SERVICE)
         self._modes = node.create_client(QueryModes, f"{name}/query_modes", qos_profile=SERVICE)
-        self._execute = ActionClient(node, ExecuteTrajectory, f"{name}/execute_trajectory", **ACTION_SERVICES)
+        self._execute = ActionClient(
+            node, ExecuteTrajectory, f"{name}/execute_trajectory", **ACTION_SERVICES
+        )
         self._meter = LatestMessage(node, PowerStateMsg, f"{name}/power_state")
-        node.create_subscription(ControllerTimersMsg, f"{name}/controller_timers", self._read_timers, LATCHED)
+        node.create_subscription(
+            ControllerTimersMsg, f"{name}/controller_timers", self._read_timers, LATCHED
+        )
 
     @property
     def mode(self) -> Mode | None:
@@ -123,7 +131,9 @@ class Driver:
         response = await self.ask(self._modes, QueryModes.Request())
         if isinstance(response, Status):
             return response, ()
-        return status_from_msg(response.status), tuple(power_mode_from_msg(mode) for mode in response.modes)
+        return status_from_msg(response.status), tuple(
+            power_mode_from_msg(mode) for mode in response.modes
+        )
 
     async def drive(
         self,
@@ -134,15 +144,19 @@ class Driver:
         station: str = "",
         states: Sequence[str] = (),
     ) -> Status:
-        """Execute a trajectory; `stop` is looked at all the time, and when it is true the goal is canceled.
+        """Execute a trajectory; `stop` is looked at all the time, and when it is true the goal is
+        canceled.
 
-        SUCCESS, PREEMPTED when it was stopped along the path, else the driver's code and sentence. The
-        duration is not limited: speed scaling may prolong or hold a movement. cell_hash, load: what it was
-        planned with, "": the driver doesn't compare. station: whose contacts are allowed; states: of machines
-        that the movement relies on.
+        SUCCESS, PREEMPTED when it was stopped along the path, else the driver's code and sentence.
+        The
+        duration is not limited: speed scaling may prolong or hold a movement. cell_hash, load: what
+        it was planned with, "": the driver doesn't compare. station: whose contacts are allowed;
+        states: of machines that the movement relies on.
         """
         if not await self._waiting.until(self._execute.server_is_ready, self._response_timeout):
-            return _timed_out(f"no node offers {self.name}/execute_trajectory", self._response_timeout)
+            return _timed_out(
+                f"no node offers {self.name}/execute_trajectory", self._response_timeout
+            )
         goal = ExecuteTrajectory.Goal(
             trajectory=trajectory_to_msg(trajectory),
             trajectory_id=trajectory.trajectory_id,
@@ -160,7 +174,9 @@ class Driver:
             return Status(StatusCode.FAILURE, f"{self.name} rejected the trajectory")
         result: Future = handle.get_result_async()
         result.add_done_callback(lambda done: self._waiting.look())
-        await self._waiting.until(lambda: result.done() or stop() or self.silent or self.off_the_network)
+        await self._waiting.until(
+            lambda: result.done() or stop() or self.silent or self.off_the_network
+        )
         if result.done():
             return _status_of_result(result.result().result)
         return await self._give_up(handle, result, stop())
@@ -180,10 +196,14 @@ class Driver:
             return alive if not alive.ok else Status(StatusCode.INVALID_ROBOT_STATE, asleep)
         if not await self._waiting.answer(result, self._cancel_timeout):
             return _timed_out(f"{self.name} did not confirm the stop", self._cancel_timeout)
-        return Status(StatusCode.PREEMPTED, result.result().result.error_string or "stopped along the path")
+        return Status(
+            StatusCode.PREEMPTED, result.result().result.error_string or "stopped along the path"
+        )
 
     def _read_timers(self, message: ControllerTimersMsg) -> None:
-        with contextlib.suppress(InvalidValueError):  # of a driver of another kind: the settings' count
+        with contextlib.suppress(
+            InvalidValueError
+        ):  # of a driver of another kind: the settings' count
             self.timers = controller_timers_from_msg(message)
 
     def _read_meter(self) -> None:
@@ -210,7 +230,9 @@ def _status_of(response: Any) -> Status:
 def _status_of_result(result: Any) -> Status:
     if result.error_code == ExecuteTrajectory.Result.SUCCESSFUL:
         return Status.success(result.error_string)
-    return Status(StatusCode.FAILURE, f"the driver aborted with {result.error_code}: {result.error_string}")
+    return Status(
+        StatusCode.FAILURE, f"the driver aborted with {result.error_code}: {result.error_string}"
+    )
 
 
 def _timed_out(what: str, limit: float) -> Status:

@@ -1,4 +1,6 @@
-"""Goals sent from the spinning thread: an ActionClient races with its executor when used from another one."""
+"""Goals sent from the spinning thread: an ActionClient races with its executor when used from
+another one.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +19,9 @@ from ir_msgs_py.ros.types import owner_of
 from ir_msgs_py.status import StatusCode
 
 GONE = 10.0
-"""s without anybody who offers an action before its goal is given up. The middleware forgets a process that
-died, or was stopped, after 5 s."""
+"""s without anybody who offers an action before its goal is given up. The middleware forgets a
+process that died, or was stopped, after 5 s.
+"""
 
 
 class GoalSender:
@@ -38,7 +41,9 @@ class GoalSender:
         result_timeout: float,
         cancel_grace: float,
     ) -> Any:
-        """Send the goal and return its result; cancel it on timeout [s] and on an exception while waiting."""
+        """Send the goal and return its result; cancel it on timeout [s] and on an exception while
+        waiting.
+        """
         action_type = owner_of(goal, "Goal", "action")
         client = self._executor.run(lambda: self._client(action, action_type))
         if not self._executor.wait_until(client.server_is_ready, response_timeout):
@@ -46,7 +51,9 @@ class GoalSender:
                 f"no node offers the action {action} (waited {response_timeout:g} s)"
             )
         on_feedback = None if feedback is None else lambda message: feedback(message.feedback)
-        sent: Future = self._executor.run(lambda: client.send_goal_async(goal, feedback_callback=on_feedback))
+        sent: Future = self._executor.run(
+            lambda: client.send_goal_async(goal, feedback_callback=on_feedback)
+        )
         if not self._executor.wait(sent, response_timeout):
             raise CallTimedOutError(f"{action} did not take the goal within {response_timeout:g} s")
         handle = sent.result()
@@ -55,7 +62,9 @@ class GoalSender:
         result: Future = self._executor.run(handle.get_result_async)
         try:
             if self._ended(action, client, result, result_timeout):
-                self._executor.run(_nothing)  # feedback that came with the result is called back after it
+                self._executor.run(
+                    _nothing
+                )  # feedback that came with the result is called back after it
                 return result.result().result
         except ServiceUnavailableError:  # nobody is there to cancel it
             raise
@@ -63,7 +72,11 @@ class GoalSender:
             self._cancel(handle, result, cancel_grace)
             raise
         ended = self._cancel(handle, result, cancel_grace)
-        since = "the goal was canceled" if ended else f"canceled, it has not ended within {cancel_grace:g} s"
+        since = (
+            "the goal was canceled"
+            if ended
+            else f"canceled, it has not ended within {cancel_grace:g} s"
+        )
         raise CallTimedOutError(f"{action} had no result within {result_timeout:g} s: {since}")
 
     def destroy(self) -> None:
@@ -73,15 +86,20 @@ class GoalSender:
         self._clients.clear()
 
     def _ended(self, action: str, client: ActionClient, result: Future, timeout: float) -> bool:
-        """Whether the goal's result has come within `timeout` [s]; raises where its node has gone."""
+        """Whether the goal's result has come within `timeout` [s]; raises where its node has
+        gone.
+        """
         now = time.monotonic()
-        deadline, seen = now + timeout, now
+        deadline = now + timeout
+        seen = now
         while not self._executor.wait(result, min(0.1 * GONE, deadline - now)):
             now = time.monotonic()
             if client.server_is_ready():
                 seen = now
             elif now - seen >= GONE:
-                raise ServiceUnavailableError(f"the node that ran {action} has gone: no result will come")
+                raise ServiceUnavailableError(
+                    f"the node that ran {action} has gone: no result will come"
+                )
             if now >= deadline:
                 return False
         return True

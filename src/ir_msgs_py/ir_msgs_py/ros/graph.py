@@ -47,12 +47,15 @@ class Graph:
         return [f"{namespace.rstrip('/')}/{name}" for name, namespace in found]
 
     def other_type(self, name: str, kind: Any) -> str:
-        """What to add to a sentence when nobody offers the service or topic `name` as the class `kind`: the
-        type that somebody has it with, "" when nobody does.
+        """What to add to a sentence when nobody offers the service or topic `name` as the class
+        `kind`: the type that somebody has it with, "" when nobody does.
         """
-        full, own = self._node.resolve_service_name(name), type_text(kind)
+        full = self._node.resolve_service_name(name)
+        own = type_text(kind)
         known = (*self._node.get_service_names_and_types(), *self._node.get_topic_names_and_types())
-        found = [each for offered, types in known if offered == full for each in types if each != own]
+        found = [
+            each for offered, types in known if offered == full for each in types if each != own
+        ]
         return f"; somebody in the graph has it as {found[0]}" if found else ""
 
     def publishers(self, topic: str) -> list[Any]:
@@ -61,10 +64,14 @@ class Graph:
         return infos
 
     def qos_of_publishers(self, topic: str) -> QoSProfile:
-        """Quality of service with which all present publishers are heard, as `ros2 topic echo` chooses it."""
+        """Quality of service with which all present publishers are heard, as `ros2 topic echo`
+        chooses it.
+        """
         offered = [info.qos_profile for info in self.publishers(topic)]
         reliable = all(qos.reliability == ReliabilityPolicy.RELIABLE for qos in offered)
-        kept = bool(offered) and all(qos.durability == DurabilityPolicy.TRANSIENT_LOCAL for qos in offered)
+        kept = bool(offered) and all(
+            qos.durability == DurabilityPolicy.TRANSIENT_LOCAL for qos in offered
+        )
         return QoSProfile(
             depth=_DEPTH,
             reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,

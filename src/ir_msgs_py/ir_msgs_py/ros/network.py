@@ -2,12 +2,14 @@
 
 IR_NETWORK chooses, whatever starts the node:
 
-    loopback   (or unset) this host only: discovery and transport are bound to 127.0.0.1 and shared memory
-    secure     as ROS's own variables say, with DDS security enforced (ROS_SECURITY_ENABLE=true and
+    loopback   (or unset) this host only: discovery and transport are bound to 127.0.0.1 and shared
+    memory secure     as ROS's own variables say, with DDS security enforced
+    (ROS_SECURITY_ENABLE=true and
                ROS_SECURITY_STRATEGY=Enforce); a build without security then refuses to start
     insecure   as ROS's own variables say: whoever reaches the network can command the robot
 
-The variables are read by the middleware when a context starts, so `apply_network` comes before `rclpy.init`.
+The variables are read by the middleware when a context starts, so `apply_network` comes before
+`rclpy.init`.
 """
 
 from __future__ import annotations
@@ -38,29 +40,41 @@ def profile(name: str) -> str:
 def network_variables(environment: Mapping[str, str]) -> tuple[dict[str, str], tuple[str, ...]]:
     """Variables to set for the choice in `environment`, and those to remove.
 
-    Raises ParameterError for an unknown choice, for `secure` where security isn't enforced, and for a
-    domain that is none.
+    Raises ParameterError for an unknown choice, for `secure` where security isn't enforced, and for
+    a domain that is none.
     """
     domain = environment.get(DOMAIN, "")
     if domain and not (domain.isascii() and domain.isdigit() and int(domain) <= MOST_DOMAIN):
-        raise ParameterError(f"{DOMAIN} is {domain[:60]!a}: it must be a whole number 0 .. {MOST_DOMAIN}")
+        raise ParameterError(
+            f"{DOMAIN} is {domain[:60]!a}: it must be a whole number 0 .. {MOST_DOMAIN}"
+        )
     choice = environment.get(VARIABLE, "") or "loopback"
     if choice not in CHOICES:
         raise ParameterError(f"{VARIABLE} is {choice[:60]!a}: known are {', '.join(CHOICES)}")
     if choice == "loopback":
         narrow = environment.get(RANGE, "").upper()
-        return {RANGE: narrow if narrow in _NARROW else "LOCALHOST", PROFILES: profile("loopback")}, (PEERS,)
-    missing = [f"{name}={value}" for name, value in _SECURITY.items() if environment.get(name) != value]
+        return {
+            RANGE: narrow if narrow in _NARROW else "LOCALHOST",
+            PROFILES: profile("loopback"),
+        }, (PEERS,)
+    missing = [
+        f"{name}={value}" for name, value in _SECURITY.items() if environment.get(name) != value
+    ]
     if choice == "secure" and missing:
         raise ParameterError(f"{VARIABLE} is secure: {' and '.join(missing)} must be set as well")
     return ({} if environment.get(PROFILES) else {PROFILES: profile("fast_discovery")}), ()
 
 
 def apply_network(environment: MutableMapping[str, str] = os.environ) -> None:
-    """Set the variables in this process; a line on stderr says which of the user's own are not followed."""
+    """Set the variables in this process; a line on stderr says which of the user's own are not
+    followed.
+    """
     wanted, removed = network_variables(environment)
     ignored = [f"{PEERS}={environment[PEERS]}" for name in removed if environment.get(name)]
-    if environment.get(RANGE, "").upper() not in ("", "SYSTEM_DEFAULT", *_NARROW) and RANGE in wanted:
+    if (
+        environment.get(RANGE, "").upper() not in ("", "SYSTEM_DEFAULT", *_NARROW)
+        and RANGE in wanted
+    ):
         ignored.append(f"{RANGE}={environment[RANGE]}")
     if ignored:
         sys.stderr.write(

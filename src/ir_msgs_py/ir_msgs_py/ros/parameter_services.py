@@ -1,7 +1,8 @@
-"""rclpy's services for parameters, so that each of their requests is answered, and in bounded sentences.
+"""rclpy's services for parameters, so that each of their requests is answered, and in bounded
+sentences.
 
-rclpy converts what comes without a look at it: a type of value that is none raises in its callback, and the
-client waits for ever. A reason repeats the name or the value, however long they are.
+rclpy converts what comes without a look at it: a type of value that is none raises in its callback,
+and the client waits for ever. A reason repeats the name or the value, however long they are.
 """
 
 from __future__ import annotations
@@ -23,11 +24,13 @@ Callback = Callable[[Any, Any], Any]
 def answer_always(node: Node) -> None:
     """Let every request for parameters of the node be answered; once is enough.
 
-    What can't be set is refused with what was raised, and what comes after it in the request with it. Whoever
-    asks for values gets none.
+    What can't be set is refused with what was raised, and what comes after it in the request with
+    it. Whoever asks for values gets none.
     """
     for service in node.services:
-        if service.srv_type.__module__.startswith(PACKAGE) and not hasattr(service.callback, "guarded"):
+        if service.srv_type.__module__.startswith(PACKAGE) and not hasattr(
+            service.callback, "guarded"
+        ):
             service.callback = _guarded(service.callback)
 
 
@@ -47,7 +50,9 @@ def _guarded(callback: Callback) -> Callback:
 
 def _refused(request: Any, response: Any, reason: str) -> Any:
     refusal = SetParametersResult(successful=False, reason=reason)
-    if isinstance(request, SetParameters.Request):  # those before the one that raised have their results
+    if isinstance(
+        request, SetParameters.Request
+    ):  # those before the one that raised have their results
         missing = len(request.parameters) - len(response.results)
         response.results = [*response.results, *[refusal] * missing]
     elif isinstance(request, SetParametersAtomically.Request):

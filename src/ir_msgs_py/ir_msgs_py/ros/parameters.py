@@ -1,6 +1,7 @@
 """A frozen settings class as ROS parameters: described, with ranges, and never half changed.
 
-A change that a range or the class itself refuses is answered with the reason, and the old values stay.
+A change that a range or the class itself refuses is answered with the reason, and the old values
+stay.
 """
 
 from __future__ import annotations
@@ -11,7 +12,12 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any, Generic, TypeVar
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -25,11 +31,13 @@ _INT64 = 2**63
 
 
 class Parameters(Generic[T]):
-    """The parameters of one settings class, its stages included, on a node; `value` is what they say now.
+    """The parameters of one settings class, its stages included, on a node; `value` is what they
+    say now.
 
-    prefix: put before each name ("search."). read_only: all are fixed at the start, also those that the class
-    lets change. refuse: asked with the names to be changed, returns the reason why not now ("" = go on), for
-    changes that must wait until the robot stands. on_change: called with the new settings.
+    prefix: put before each name ("search."). read_only: all are fixed at the start, also those that
+    the class lets change. refuse: asked with the names to be changed, returns the reason why not
+    now ("" = go on), for changes that must wait until the robot stands. on_change: called with the
+    new settings.
 
     Raises ParameterError when a value that the node was started with is refused.
     """
@@ -52,7 +60,9 @@ class Parameters(Generic[T]):
             name: replace(each, read_only=read_only or each.read_only)
             for name, each in tree(defaults).items()
         }
-        started_with = {name: self._declare(node, name, each) for name, each in self._settings.items()}
+        started_with = {
+            name: self._declare(node, name, each) for name, each in self._settings.items()
+        }
         self._value = changed(defaults, started_with)
         self._check(started_with.items())
         node.add_on_set_parameters_callback(self._answer)
@@ -66,7 +76,9 @@ class Parameters(Generic[T]):
 
     def _declare(self, node: Node, name: str, each: Setting) -> Any:
         try:
-            parameter = node.declare_parameter(self._prefix + name, _default(each), _descriptor(each))
+            parameter = node.declare_parameter(
+                self._prefix + name, _default(each), _descriptor(each)
+            )
         except InvalidParameterTypeException as error:
             raise ParameterError(f"{self._prefix}{name}: {error}") from error
         except InvalidParameterValueException as error:
@@ -109,13 +121,17 @@ class Parameters(Generic[T]):
 def _descriptor(each: Setting) -> ParameterDescriptor:
     unit = f" [{each.unit}]" if each.unit else ""
     descriptor = ParameterDescriptor(
-        description=each.sentence + unit, additional_constraints=each.bounds, read_only=each.read_only
+        description=each.sentence + unit,
+        additional_constraints=each.bounds,
+        read_only=each.read_only,
     )
     bounded = each.minimum is not None or each.maximum is not None
     low = -math.inf if each.minimum is None else each.minimum
     high = math.inf if each.maximum is None else each.maximum
     if bounded and each.type is float:
-        descriptor.floating_point_range = [FloatingPointRange(from_value=float(low), to_value=float(high))]
+        descriptor.floating_point_range = [
+            FloatingPointRange(from_value=float(low), to_value=float(high))
+        ]
     elif bounded and each.type is int:
         ends = (int(max(low, -_INT64)), int(min(high, _INT64 - 1)))
         descriptor.integer_range = [IntegerRange(from_value=ends[0], to_value=ends[1])]

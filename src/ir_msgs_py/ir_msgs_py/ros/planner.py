@@ -1,4 +1,6 @@
-"""The planner as a program runner sees it: programs and trajectories by id, for coroutines of one node."""
+"""The planner as a program runner sees it: programs and trajectories by id, for coroutines of one
+node.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,11 @@ from rclpy.node import Node
 from ir_msgs.srv import GetProgram, GetTrajectory
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.report import PlannedMovement
-from ir_msgs_py.ros.conversions import planned_movement_from_msg, status_from_msg, trajectory_from_msg
+from ir_msgs_py.ros.conversions import (
+    planned_movement_from_msg,
+    status_from_msg,
+    trajectory_from_msg,
+)
 from ir_msgs_py.ros.quality import SERVICE
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
@@ -25,7 +31,9 @@ class Planner:
         self._waiting = waiting
         self._timeout = timeout
         self._program = node.create_client(GetProgram, f"{name}/get_program", qos_profile=SERVICE)
-        self._trajectory = node.create_client(GetTrajectory, f"{name}/get_trajectory", qos_profile=SERVICE)
+        self._trajectory = node.create_client(
+            GetTrajectory, f"{name}/get_trajectory", qos_profile=SERVICE
+        )
 
     async def program(self, program_id: str) -> Fetched:
         """Fetch the steps of a planned program, with the points of its movements."""
@@ -49,7 +57,9 @@ class Planner:
             if movement.trajectory_id and movement.trajectory is None:
                 request = GetTrajectory.Request(trajectory_id=movement.trajectory_id)
                 response = await self._waiting.ask(self._trajectory, request, self._timeout)
-                status = response if isinstance(response, Status) else status_from_msg(response.status)
+                status = (
+                    response if isinstance(response, Status) else status_from_msg(response.status)
+                )
                 if not status.ok:
                     return status, ()
                 try:

@@ -1,7 +1,7 @@
 """Topics that a node looks at when it wants to, instead of being woken by every message.
 
-Waking an rclpy executor 500 times a second takes a third of a core; taking what has arrived takes nothing
-until somebody asks. The middleware keeps the messages and notes when they came.
+Waking an rclpy executor 500 times a second takes a third of a core; taking what has arrived takes
+nothing until somebody asks. The middleware keeps the messages and notes when they came.
 """
 
 from __future__ import annotations

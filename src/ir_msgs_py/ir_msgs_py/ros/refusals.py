@@ -1,6 +1,7 @@
 """The one place where what goes wrong in a request becomes its status, so that the node lives on.
 
-No descriptor left, a full disk, 1e308 in a field, a bug: whatever is raised, the request is answered.
+No descriptor left, a full disk, 1e308 in a field, a bug: whatever is raised, the request is
+answered.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ def answered(
 ) -> Any:
     """The response with the status that `work` returns, or that of what it raises.
 
-    source: the node. status_of: the status of an error that a request may end with, None for all others,
-    which are logged with their traceback.
+    source: the node. status_of: the status of an error that a request may end with, None for all
+    others, which are logged with their traceback.
     """
     try:
         status = work()

@@ -1,8 +1,9 @@
-"""A node as a process: made, spun until SIGINT or SIGTERM, cleaned up while its context is still whole.
+"""A node as a process: made, spun until SIGINT or SIGTERM, cleaned up while its context is still
+whole.
 
-rclpy's own signal handlers end the context under the executor and the clean-up, which then fail in many ways
-(ExternalShutdownException, RCLError, KeyboardInterrupt in any line). Here a signal only ends the spinning,
-and a second one finds nothing to cut short.
+rclpy's own signal handlers end the context under the executor and the clean-up, which then fail in
+many ways (ExternalShutdownException, RCLError, KeyboardInterrupt in any line). Here a signal only
+ends the spinning, and a second one finds nothing to cut short.
 """
 
 from __future__ import annotations
@@ -18,7 +19,12 @@ from typing import TypeVar
 
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError
-from rclpy.executors import Executor, ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.executors import (
+    Executor,
+    ExternalShutdownException,
+    ShutdownException,
+    SingleThreadedExecutor,
+)
 from rclpy.node import Node
 
 from ir_msgs_py.checks import one_line
@@ -29,8 +35,11 @@ from ir_msgs_py.ros.network import apply_network
 
 N = TypeVar("N", bound=Node)
 LOOK = 0.1  # s between two looks whether a node goes on
-FAILURES_MAX, FAILURES_WITHIN = 50, 60.0
-"""So many callbacks may fail within so many seconds: a node that fails more often does nothing useful."""
+FAILURES_MAX = 50
+FAILURES_WITHIN = 60.0
+"""So many callbacks may fail within so many seconds: a node that fails more often does nothing
+useful.
+"""
 
 
 class Spinning:
@@ -40,9 +49,11 @@ class Spinning:
         self._ended = threading.Event()
         self._executor: Executor | None = None
 
-    def run(self, executor: Executor, goes_on: Callable[[], bool] | None = None, look: float = LOOK) -> None:
-        """Return after `end`, when the executor's context has ended, or at most `look` [s] after goes_on() is
-        False.
+    def run(
+        self, executor: Executor, goes_on: Callable[[], bool] | None = None, look: float = LOOK
+    ) -> None:
+        """Return after `end`, when the executor's context has ended, or at most `look` [s] after
+        goes_on() is False.
 
         Raises what a callback raises; `run` may be called again then.
         """
@@ -79,11 +90,13 @@ def run_node(
     look: float = LOOK,
     about: str = "",
 ) -> int:
-    """Make a node, spin it until a signal or until `look` [s] after goes_on(node) is False; the exit code.
+    """Make a node, spin it until a signal or until `look` [s] after goes_on(node) is False; the
+    exit code.
 
-    Each look holds the interpreter for about a millisecond. about: what the node does, for --help; "" where
-    its own words were read before. refusals: what `make` or the clean-up raises for reasons that a sentence
-    on stderr explains (exit code 1). Call it in the main thread, last of all: its signals stay taken.
+    Each look holds the interpreter for about a millisecond. about: what the node does, for --help;
+    "" where its own words were read before. refusals: what `make` or the clean-up raises for
+    reasons that a sentence on stderr explains (exit code 1). Call it in the main thread, last of
+    all: its signals stay taken.
     """
     words = sys.argv[1:] if arguments is None else arguments
     if about and (answer := answer_before_start(name, words, about)) is not None:
@@ -122,7 +135,9 @@ def spin(
     goes_on: Callable[[], bool] | None,
     look: float = LOOK,
 ) -> None:
-    """Spin to the end; what a callback raises is logged, and ends the node only when it comes too often."""
+    """Spin to the end; what a callback raises is logged, and ends the node only when it comes too
+    often.
+    """
     failures: deque[float] = deque(maxlen=FAILURES_MAX)
     heed_times_only(node)
     while True:
@@ -137,7 +152,9 @@ def spin(
 
 
 def _on_signals(act: Callable[[], None]) -> None:
-    """Call `act` in a thread of its own at each SIGINT or SIGTERM, also while the main thread is in C."""
+    """Call `act` in a thread of its own at each SIGINT or SIGTERM, also while the main thread is in
+    C.
+    """
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
 

@@ -1,8 +1,9 @@
-"""Services that answer every request: what comes while too many wait is refused, nothing is dropped.
+"""Services that answer every request: what comes while too many wait is refused, nothing is
+dropped.
 
-The middleware keeps only so many requests and drops the oldest without a word. Here each turn of the executor
-takes all that have come into a queue of its own, refuses what exceeds it with a sentence, and answers one.
-What was answered is published for recordings (calls.py).
+The middleware keeps only so many requests and drops the oldest without a word. Here each turn of
+the executor takes all that have come into a queue of its own, refuses what exceeds it with a
+sentence, and answers one. What was answered is published for recordings (calls.py).
 """
 
 from __future__ import annotations
@@ -32,18 +33,22 @@ from ir_msgs_py.status import Status, StatusCode
 Handler = Callable[[Any, Any], Any]
 
 UNDISCOVERED = 0.09
-"""Seconds that the middleware waits, less a tenth, for a client that it has not discovered (0.1 s)."""
+"""Seconds that the middleware waits, less a tenth, for a client that it has not discovered (0.1
+s).
+"""
 
 SENDS = 10
-"""A second: more than a busy machine takes to discover a client, and no longer than a dead one may hold up
-the others."""
+"""A second: more than a busy machine takes to discover a client, and no longer than a dead one may
+hold up the others.
+"""
 
 
 class BoundedService(Waitable):
     """A service of `node` whose responses have a `status`; at most `waiting` requests wait in it.
 
-    handler: from request and response to the response; requests are answered in the order in which they came.
-    What it raises, and a response that can't be sent, is answered as a failure and logged.
+    handler: from request and response to the response; requests are answered in the order in which
+    they came. What it raises, and a response that can't be sent, is answered as a failure and
+    logged.
     """
 
     def __init__(
@@ -56,8 +61,11 @@ class BoundedService(Waitable):
         waiting: int = REQUESTS_WAITING,
     ) -> None:
         super().__init__(group or node.default_callback_group)
-        self._type, self._handler, self._most = service_type, handler, waiting
-        self._source, self._log = node.get_name(), node.get_logger().error
+        self._type = service_type
+        self._handler = handler
+        self._most = waiting
+        self._source = node.get_name()
+        self._log = node.get_logger().error
         untouched = PolledGroup()  # the executor does not take from the service, this does
         self._service = node.create_service(
             service_type, name, handler, qos_profile=SERVICE, callback_group=untouched
@@ -119,7 +127,9 @@ class BoundedService(Waitable):
             self._say(unexpected(error), header)
 
     def _refuse(self, header: Any) -> None:
-        sentence = f"{self._most} requests of {self._service.service_name} are waiting: send fewer at once"
+        sentence = (
+            f"{self._most} requests of {self._service.service_name} are waiting: send fewer at once"
+        )
         self._say(Status(StatusCode.FAILURE, sentence), header)
 
     def _say(self, status: Status, header: Any) -> None:
@@ -169,8 +179,11 @@ _MAKING = threading.Lock()
 class RecordedActionServer(ActionServer):
     """An ActionServer whose goals and results are published for recordings."""
 
-    def __init__(self, node: Node, action_type: Any, name: str, *arguments: Any, **options: Any) -> None:
-        self._calls, self._type_text = Calls.of(node), type_text(action_type)
+    def __init__(
+        self, node: Node, action_type: Any, name: str, *arguments: Any, **options: Any
+    ) -> None:
+        self._calls = Calls.of(node)
+        self._type_text = type_text(action_type)
         self._full_name = node.resolve_topic_name(name)
         with _MAKING, _made_of(_PatientHandle):
             super().__init__(node, action_type, name, *arguments, **options)
@@ -189,13 +202,19 @@ class RecordedActionServer(ActionServer):
 class PatientSender:
     """Sends a response again where the server has not discovered its client yet.
 
-    A client may see the server before the server sees it. The middleware then waits UNDISCOVERED, drops the
-    response and warns; only the time it took shows it. A client ignores an answer that it has already. One
-    that is never discovered has died: what follows is sent once, until a client takes its answer at once.
+    A client may see the server before the server sees it. The middleware then waits UNDISCOVERED,
+    drops the response and warns; only the time it took shows it. A client ignores an answer that it
+    has already. One
+    that is never discovered has died: what follows is sent once, until a client takes its answer at
+    once.
     """
 
-    def __init__(self, send: Callable[[Any, Any], None], clock: Callable[[], float] = time.monotonic) -> None:
-        self._send, self._clock, self._patient = send, clock, True
+    def __init__(
+        self, send: Callable[[Any, Any], None], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._send = send
+        self._clock = clock
+        self._patient = True
 
     def send(self, response: Any, header: Any) -> None:
         """Send it, for about a second at most."""
@@ -211,7 +230,8 @@ class PatientSender:
 @contextmanager
 def _made_of(handle: type) -> Iterator[None]:
     """rclpy makes its action servers of this class meanwhile."""
-    plain, _rclpy.ActionServer = _rclpy.ActionServer, handle
+    plain = _rclpy.ActionServer
+    _rclpy.ActionServer = handle
     try:
         yield
     finally:

@@ -1,7 +1,9 @@
-"""Fixtures for tests of nodes without launch files: a context of their own, a spinning executor, waiting.
+"""Fixtures for tests of nodes without launch files: a context of their own, a spinning executor,
+waiting.
 
-A pytest plugin (entry point `ir_msgs_py`); every test is alone on its context, and without discovery, so
-tests run in parallel. A test over processes overrides `ros_discovery_range` with "LOCALHOST".
+A pytest plugin (entry point `ir_msgs_py`); every test is alone on its context, and without
+discovery, so tests run in parallel. A test over processes overrides `ros_discovery_range` with
+"LOCALHOST".
 
     def test_my_node_answers(ros_context, ros_executor, ros_node, wait_for):
         ros_executor.add_node(MyNode(context=ros_context))
@@ -30,21 +32,27 @@ _DOMAINS = 101  # ids above need other ports than the system leaves free
 _RESERVED: list[socket.socket] = []
 _POLL = 0.005
 _PATIENCE = 120.0
-"""Longest wait [s] where a test chooses none: a busy machine does within it what a free one does at once."""
+"""Longest wait [s] where a test chooses none: a busy machine does within it what a free one does at
+once.
+"""
 
 
 class WaitFor(Protocol):
     """Wait until the condition holds and return what it gave; fail the test after `timeout` [s]."""
 
-    def __call__(self, condition: Callable[[], Any], timeout: float = _PATIENCE, what: str = "") -> Any:
+    def __call__(
+        self, condition: Callable[[], Any], timeout: float = _PATIENCE, what: str = ""
+    ) -> Any:
         """Wait."""
 
 
 @cache
 def own_domain() -> int:
-    """ROS domain, 1 to 101, that no other test process of this host has: reserved until this process ends.
+    """ROS domain, 1 to 101, that no other test process of this host has: reserved until this
+    process ends.
 
-    The reservation is a name among the host's abstract sockets. Raises RuntimeError when none is left.
+    The reservation is a name among the host's abstract sockets. Raises RuntimeError when none is
+    left.
     """
     for k in range(_DOMAINS):
         domain = 1 + (os.getpid() + k) % _DOMAINS
@@ -105,7 +113,9 @@ def ros_node(ros_context: Context, ros_executor: BackgroundExecutor) -> Node:
 
 @pytest.fixture
 def wait_for() -> WaitFor:
-    """Wait for a condition, never for a duration: `wait_for(lambda: received, what="the answer")`."""
+    """Wait for a condition, never for a duration: `wait_for(lambda: received, what="the
+    answer")`.
+    """
 
     def wait(condition: Callable[[], Any], timeout: float = _PATIENCE, what: str = "") -> Any:
         deadline = time.monotonic() + timeout

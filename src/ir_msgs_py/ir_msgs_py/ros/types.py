@@ -11,11 +11,16 @@ _KINDS = ("msg", "srv", "action")
 
 
 def interface_type(name: str, kind: str) -> Any:
-    """Return the class of a "msg", "srv" or "action"; "ir_msgs/SetCell" is enough where the kind is known."""
+    """Return the class of a "msg", "srv" or "action"; "ir_msgs/SetCell" is enough where the kind is
+    known.
+    """
     parts = name.split("/")
-    package, interface = parts[0], parts[-1]
+    package = parts[0]
+    interface = parts[-1]
     if kind not in _KINDS or len(parts) not in (2, 3) or (len(parts) == 3 and parts[1] != kind):
-        raise UnknownTypeError(f'"{name[:80]}" is not the name of a {kind}: write package/{kind}/Name')
+        raise UnknownTypeError(
+            f'"{name[:80]}" is not the name of a {kind}: write package/{kind}/Name'
+        )
     try:
         return getattr(import_module(f"{package}.{kind}"), interface)
     except (ModuleNotFoundError, AttributeError, ValueError) as error:

@@ -1,7 +1,8 @@
 """Waiting in a callback without blocking it: `await waiting.until(condition, timeout)`.
 
-For coroutines on a SingleThreadedExecutor. A condition is looked at whenever something arrives (`look`) and
-at least every `period`; time is the steady clock, so a jump of /clock neither ends nor prolongs a wait. A
+For coroutines on a SingleThreadedExecutor. A condition is looked at whenever something arrives
+(`look`) and at least every `period`; time is the steady clock, so a jump of /clock neither ends nor
+prolongs a wait. A
 process that was held up gets that time again: what came meanwhile is not late.
 """
 
@@ -35,7 +36,9 @@ class Waiting:
     def __init__(self, node: Node, period: float = 0.02) -> None:
         self._waits: list[_Wait] = []
         self._looked = 0.0
-        self._timer = node.create_timer(period, self.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._timer = node.create_timer(
+            period, self.look, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
         self._timer.cancel()
 
     async def until(self, condition: Callable[[], bool], timeout: float = float("inf")) -> bool:
@@ -50,22 +53,32 @@ class Waiting:
         return bool(await wait.future)
 
     async def answer(self, future: Future, timeout: float) -> bool:
-        """Wait for a service's or action's future; False when it is not done within `timeout` [s]."""
+        """Wait for a service's or action's future; False when it is not done within `timeout`
+        [s].
+        """
         future.add_done_callback(lambda done: self.look())
         return await self.until(future.done, timeout)
 
     async def ask(self, client: Any, request: Any, timeout: float) -> Any:
-        """Call a service: its response, or a TIMED_OUT Status when there is none in `timeout` [s]."""
+        """Call a service: its response, or a TIMED_OUT Status when there is none in `timeout`
+        [s].
+        """
         if not await self.until(client.service_is_ready, timeout):
-            return Status(StatusCode.TIMED_OUT, f"no node offers {client.service_name} within {timeout:g} s")
+            return Status(
+                StatusCode.TIMED_OUT, f"no node offers {client.service_name} within {timeout:g} s"
+            )
         future: Future = client.call_async(request)
         if not await self.answer(future, timeout):
             client.remove_pending_request(future)
-            return Status(StatusCode.TIMED_OUT, f"{client.service_name} did not answer within {timeout:g} s")
+            return Status(
+                StatusCode.TIMED_OUT, f"{client.service_name} did not answer within {timeout:g} s"
+            )
         return future.result()
 
     def look(self) -> None:
-        """Look at all conditions again; call it where something arrives that a condition depends on."""
+        """Look at all conditions again; call it where something arrives that a condition depends
+        on.
+        """
         now = time.monotonic()
         self._give_back(now)
         for wait in list(self._waits):
@@ -78,6 +91,7 @@ class Waiting:
 
     def _give_back(self, now: float) -> None:
         """Prolong all waits by the time in which nobody looked."""
-        lost, self._looked = now - self._looked - _HELD_UP, now
+        lost = now - self._looked - _HELD_UP
+        self._looked = now
         for wait in self._waits:
             wait.deadline += max(0.0, lost)

@@ -28,15 +28,20 @@ _FALSE = frozenset({"false", "no", "off", "0"})
 
 
 class _Text(yaml.BaseLoader):
-    """Text alone, no guesses of its type. A field that stands twice is refused: one would not count."""
+    """Text alone, no guesses of its type. A field that stands twice is refused: one would not
+    count.
+    """
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         """The fields of a mapping."""
         seen: dict[str, int] = {}
         for key, _ in node.value:
-            name, line = str(key.value), key.start_mark.line + 1
+            name = str(key.value)
+            line = key.start_mark.line + 1
             if name in seen:
-                where = f"line {seen[name]} and line {line}" if seen[name] != line else f"line {line}"
+                where = (
+                    f"line {seen[name]} and line {line}" if seen[name] != line else f"line {line}"
+                )
                 raise MessageTextError(f'field "{name[:60]}" stands twice, in {where}')
             seen[name] = line
         return super().construct_mapping(node, deep)
@@ -45,8 +50,8 @@ class _Text(yaml.BaseLoader):
 def message_from_yaml(message_type: Any, text: str) -> Any:
     """Message of this type; missing fields keep their defaults, "" is the default message.
 
-    Raises MessageTextError naming the field: unknown (lists the known ones), of a wrong kind, out of range or
-    there twice.
+    Raises MessageTextError naming the field: unknown (lists the known ones), of a wrong kind, out
+    of range or there twice.
     """
     try:
         content = yaml.load(text, Loader=_Text)
@@ -61,7 +66,8 @@ def message_from_yaml(message_type: Any, text: str) -> Any:
 def message_to_plain(message: Any, max_elements: int | None = None) -> dict[str, Any]:
     """Message as nested dicts and lists; arrays longer than max_elements end in "..."."""
     return {
-        name: _plain(getattr(message, name), max_elements) for name in message.get_fields_and_field_types()
+        name: _plain(getattr(message, name), max_elements)
+        for name in message.get_fields_and_field_types()
     }
 
 
@@ -84,7 +90,9 @@ def _fill(message: Any, content: Any, where: str) -> None:
     for name, value in content.items():
         path = f"{where}.{name}" if where else str(name)
         if name not in types:
-            raise MessageTextError(f'unknown field "{path[:80]}": known are {", ".join(names) or "none"}')
+            raise MessageTextError(
+                f'unknown field "{path[:80]}": known are {", ".join(names) or "none"}'
+            )
         setattr(message, name, _value(types[name], value, path))
 
 
@@ -106,7 +114,9 @@ def _value(kind: Any, value: Any, path: str) -> Any:
         raise MessageTextError(f"{path} is {_short(value)}: it must be a single value")
     if isinstance(kind, (AbstractString, AbstractWString)):
         if "\0" in value:  # ROS would cut the text there without a word
-            raise MessageTextError(f"{path} is {value[:40]!a}: it must not contain the character NUL")
+            raise MessageTextError(
+                f"{path} is {value[:40]!a}: it must not contain the character NUL"
+            )
         return value
     return _scalar(kind, value, path)
 

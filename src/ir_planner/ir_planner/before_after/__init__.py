@@ -1,4 +1,6 @@
-"""Today's program against the planner's: the same stations and pauses, at its cycle time and at others."""
+"""Today's program against the planner's: the same stations and pauses, at its cycle time and at
+others.
+"""
 
 from ir_planner.before_after.compared import before_after, before_after_common
 from ir_planner.before_after.stood import assumed_doors

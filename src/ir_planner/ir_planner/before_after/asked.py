@@ -1,8 +1,9 @@
 """Where today's program stops to work, as steps that a planner can be asked for.
 
 A standstill at a station, at a posture, before a pause, and where outputs are set, is a stop. Other
-standstills are only passed through: no program needs them. A stop that is nowhere in the cell becomes a
-station of its own there. A process is a stop that is a path: it begins where the path does.
+standstills are only passed through: no program needs them. A stop that is nowhere in the cell
+becomes a station of its own there. A process is a stop that is a path: it begins where the path
+does.
 """
 
 from dataclasses import dataclass, replace
@@ -67,7 +68,8 @@ def asked_program(today: Today, scene: PlanningScene) -> AskedProgram:
             steps.append(Asked(pause, (one,)))
     if not any(step.step.kind != "PAUSE" for step in steps):
         raise RequestError(
-            StatusCode.INVALID_MOTION_PLAN, f"{today.name} has no movement: there is nothing to compare"
+            StatusCode.INVALID_MOTION_PLAN,
+            f"{today.name} has no movement: there is nothing to compare",
         )
     steps, notes = _handled(steps, scene.cell)
     cell = replace(stops.cell(), program=tuple(step.step for step in steps))
@@ -110,13 +112,16 @@ class _Stops:
             if np.abs(known - pose).max() < 2e-3:
                 return name
         taken = {station.name for station in self._scene.cell.stations}
-        name = next(n for k in range(1, 10_000) if (n := f"point_{k}") not in {*taken, *dict(self._added)})
+        taken |= set(dict(self._added))
+        name = next(name for k in range(1, 10_000) for name in [f"point_{k}"] if name not in taken)
         self._added.append((name, pose))
         return name
 
     def path(self, driven: CellPath) -> str:
         """Of the path that today's program drives: the cell's own where it has the same poses."""
-        own = next((one for one in self._scene.cell.paths if same_poses(one.path, driven.path)), None)
+        own = next(
+            (one for one in self._scene.cell.paths if same_poses(one.path, driven.path)), None
+        )
         named = driven if own is None else driven_as(own, driven)
         taken = {one.name for one in self._paths}
         if named.name in taken:  # the cell's own once more: perhaps at another speed
@@ -126,7 +131,9 @@ class _Stops:
 
     def step(self, name: str) -> ProgramStep:
         """The step that goes there."""
-        postures = name in ("home", "park") and name not in [s.name for s in self._scene.cell.stations]
+        postures = name in ("home", "park") and name not in [
+            s.name for s in self._scene.cell.stations
+        ]
         return ProgramStep("POSTURE" if postures else "STATION", name)
 
     def cell(self) -> Cell:

@@ -1,4 +1,6 @@
-"""The changes from one program to another: which movement, which pause, how, and how much that saves."""
+"""The changes from one program to another: which movement, which pause, how, and how much that
+saves.
+"""
 
 from collections.abc import Iterator, Sequence
 
@@ -10,7 +12,10 @@ from ir_msgs_py.report import MovementKind
 from ir_planner.before_after.costs_of import Costed, CostedHop, hops_of, saving
 
 MOST = 5
-MODE, TIMES, PATH = 1, 2, 3  # the work of a change
+# the work of a change
+MODE = 1
+TIMES = 2
+PATH = 3
 _WORTH_IT = 1.0  # J
 _SAME_PATH = 0.05  # rad: within this a joint follows the same path
 _SAME_TIME = 0.005  # s
@@ -18,10 +23,15 @@ _SAMPLES = 200
 
 
 def changes(today: Costed, planned: Costed, most: int = MOST) -> tuple[Change, ...]:
-    """The changes that save most from today's program to the planned one, those of least work first."""
-    before, after = dict(_keyed(hops_of(today))), dict(_keyed(hops_of(planned)))
+    """The changes that save most from today's program to the planned one, those of least work
+    first.
+    """
+    before = dict(_keyed(hops_of(today)))
+    after = dict(_keyed(hops_of(planned)))
     found = [_change(before[key], after[key]) for key in before if key in after]
-    worth = sorted((one for one in found if one.saving.saved >= _WORTH_IT), key=lambda one: -one.saving.saved)
+    worth = sorted(
+        (one for one in found if one.saving.saved >= _WORTH_IT), key=lambda one: -one.saving.saved
+    )
     return tuple(sorted(worth[:most], key=lambda one: (one.work, -one.saving.saved)))
 
 
@@ -49,16 +59,22 @@ def _paused(before: CostedHop, after: CostedHop) -> tuple[int, str]:
 
 def _moved(before: CostedHop, after: CostedHop) -> tuple[int, str]:
     times = f"{after.seconds:.2f} s instead of {before.seconds:.2f} s"
-    along = before.steps[0].kind == MovementKind.CARTESIAN  # one movement, at rest at its corners as well
+    along = (
+        before.steps[0].kind == MovementKind.CARTESIAN
+    )  # one movement, at rest at its corners as well
     passed = 0 if along else len(before.steps) - len(after.steps)
     if passed > 0:
         times += f", {passed} stop{'s' if passed > 1 else ''} less on it"
-    first, second = _path(before), _path(after)
+    first = _path(before)
+    second = _path(after)
     if np.abs(first[-1] - second[-1]).max() > _SAME_PATH:
         return PATH, f"another configuration at its end, {times}"
     away = _distance(second, first)
     if away > _SAME_PATH:
-        return PATH, f"another path (a joint up to {np.degrees(away):.0f} deg from today's), {times}"
+        return (
+            PATH,
+            f"another path (a joint up to {np.degrees(away):.0f} deg from today's), {times}",
+        )
     if abs(after.seconds - before.seconds) > _SAME_TIME or passed > 0:
         return TIMES, f"the same path in {times}"
     return TIMES, "the same path in the same time, other speeds along it"
@@ -67,7 +83,9 @@ def _moved(before: CostedHop, after: CostedHop) -> tuple[int, str]:
 def _path(hop: CostedHop) -> FloatArray:
     """Points (M, n) along all movements of a hop."""
     points = [
-        step.trajectory.sample(np.linspace(step.trajectory.times[0], step.trajectory.duration, _SAMPLES)).q
+        step.trajectory.sample(
+            np.linspace(step.trajectory.times[0], step.trajectory.duration, _SAMPLES)
+        ).q
         for step in hop.steps
         if step.trajectory is not None
     ]

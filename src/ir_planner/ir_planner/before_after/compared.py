@@ -24,7 +24,10 @@ from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
 from ir_planner.program import AUTO, ProgramPlan, ProgramRequest, Progress, Spreads, nobody
 
-TODAY, SAME, FREE, LINE = "today", "same cycle time", "free", "for the line"
+TODAY = "today"
+SAME = "same cycle time"
+FREE = "free"
+LINE = "for the line"
 PTP = "synchronous S-curve PTP at 100 %"
 _NO_DIFFERENCE = 1e-3  # s
 
@@ -36,7 +39,8 @@ def before_after(
     options: PlanOptions | None = None,
     progress: Progress = nobody,
 ) -> BeforeAfter:
-    """Today's program against the planner's for the same stops and pauses; cycle_time [s]: what the line
+    """Today's program against the planner's for the same stops and pauses; cycle_time [s]: what the
+    line
     needs, 0: nobody said.
 
     Raises RequestError where today's program can't be asked for, and where nothing is found.
@@ -46,18 +50,24 @@ def before_after(
     own = Planner(planner.clock, planner.settings, read_cell=lambda _text, _name: asked.cell)
     own.set_cell("cell", "")
     doors, stood = doors_at_the_start(today, asked, own.cell)
-    own.heard.machines = tuple(MachineState(name, states[0], "".join(states[1:])) for name, states in doors)
+    own.heard.machines = tuple(
+        MachineState(name, states[0], "".join(states[1:])) for name, states in doors
+    )
     asking = _Asking(own, (), today.start, chosen, progress)
     before = asking.costed(costed_steps(asked.steps, asking.request))
     waiting = before
     if cycle_time > before.seconds + _NO_DIFFERENCE:
         left = cycle_time - before.seconds
-        wait = Asked(ProgramStep("PAUSE", dwell=left, power_mode=AUTO), (Stretch(None, today.start, left),))
+        wait = Asked(
+            ProgramStep("PAUSE", dwell=left, power_mode=AUTO), (Stretch(None, today.start, left),)
+        )
         waiting = asking.costed(costed_steps((*asked.steps, wait), asking.request))
     sides = [asking.planned(SAME, before.seconds, before), asking.planned(FREE, 0.0, before)]
     if _differs(cycle_time, before.seconds):
         sides.append(asking.planned(LINE, cycle_time, waiting))
-    return asking.answer(today.name, today.kind, before, sides, (*today.notes, *asked.notes, *stood))
+    return asking.answer(
+        today.name, today.kind, before, sides, (*today.notes, *asked.notes, *stood)
+    )
 
 
 def before_after_common(
@@ -68,14 +78,15 @@ def before_after_common(
     options: PlanOptions | None = None,
     progress: Progress = nobody,
 ) -> BeforeAfter:
-    """PTP at 100 % through stations (the cell's program where there are none), from start (n,), against the
-    planner's.
+    """PTP at 100 % through stations (the cell's program where there are none), from start (n,),
+    against the planner's.
 
     Raises RequestError where nothing is found.
     """
     asking = _Asking(planner, tuple(stations), start, options or PlanOptions(), progress)
     free = asking.plan(0.0, savings=True)
-    common, same = free.common, free.compared
+    common = free.common
+    same = free.compared
     if common is None or same is None:
         reason = free.status.message if not free.status.ok else free.savings.sentence
         raise RequestError(StatusCode.PLANNING_FAILED, reason)
@@ -87,10 +98,13 @@ def before_after_common(
     if _differs(cycle_time, before.seconds):
         line = asking.plan(cycle_time, savings=True)
         longer = cycle_time > before.seconds and line.common is not None
-        waiting = asking.costed(line.common.movements) if longer and line.common is not None else before
+        waiting = (
+            asking.costed(line.common.movements) if longer and line.common is not None else before
+        )
         sides.append(asking.side(LINE, cycle_time, line, waiting))
     around = (
-        f"{free.savings.around} of {free.savings.across} movements of the common program run around bodies"
+        f"{free.savings.around} of {free.savings.across} movements of the common program "
+        "run around bodies"
     )
     notes = (*((around,) if free.savings.around else ()), *assumed_doors(planner.cell))
     return asking.answer(PTP, "common program", before, sides, notes)
@@ -111,9 +125,12 @@ class _Asking:
         options: PlanOptions,
         progress: Progress,
     ) -> None:
-        self._planner, self._options, self._progress = planner, options, progress
+        self._planner = planner
+        self._options = options
+        self._progress = progress
         settings = replace(planner.settings, transitions=planner.heard.transitions)
-        power, start = planner.scene("").power, np.asarray(start)
+        power = planner.scene("").power
+        start = np.asarray(start)
         self.request = ProgramRequest(
             planner.cell,
             power,
@@ -138,8 +155,8 @@ class _Asking:
         return costed(steps, self._spreads)
 
     def planned(self, name: str, cycle_time: float, against: Costed) -> Side:
-        """The side of a program that is planned now, or why it can't be asked for: today's motion may be
-        faster than the limits allow.
+        """The side of a program that is planned now, or why it can't be asked for: today's motion
+        may be faster than the limits allow.
         """
         try:
             plan = self.plan(cycle_time)
@@ -160,7 +177,9 @@ class _Asking:
         """All sides and the changes to the first that was found."""
         towards = next((side.name for side in sides if side.found), "")
         if not towards:
-            raise RequestError(StatusCode.PLANNING_FAILED, "; ".join(dict.fromkeys(s.problem for s in sides)))
+            raise RequestError(
+                StatusCode.PLANNING_FAILED, "; ".join(dict.fromkeys(s.problem for s in sides))
+            )
         made = changes(before, self._found[towards])
         today = side_of(
             TODAY, 0.0, before, self.request, Saving(before.joules, before.joules, before.seconds)

@@ -1,5 +1,5 @@
-"""Today's program costed as a planned one is: the same loads, the same doors, the capacitor's charge carried
-from step to step, pauses as the controller spends them by itself.
+"""Today's program costed as a planned one is: the same loads, the same doors, the capacitor's
+charge carried from step to step, pauses as the controller spends them by itself.
 """
 
 from ir_msgs_py.arrays import FloatArray
@@ -12,10 +12,11 @@ from ir_planner.scene import PlanningScene
 
 
 def costed_steps(asked: tuple[Asked, ...], request: ProgramRequest) -> tuple[PlannedMovement, ...]:
-    """The steps of today's program from the request's start. Raises RequestError for one that handles what
-    isn't there.
+    """The steps of today's program from the request's start. Raises RequestError for one that
+    handles what isn't there.
     """
-    cell, times = request.cell, request.settings.transitions
+    cell = request.cell
+    times = request.settings.transitions
     steps = tuple(step.step for step in asked)
     placed = placed_steps(cell, steps, cell.parts_at_start(), request.doors)
     scenes = Scenes(cell, request.power, request.settings.drives)
@@ -39,7 +40,8 @@ class _Costing:
 
     def __init__(self, request: ProgramRequest, charge: Charge) -> None:
         self.steps: list[PlannedMovement] = []
-        self._request, self._charge = request, charge
+        self._request = request
+        self._charge = charge
         self._q: FloatArray = request.start
 
     def movement(self, stretch: Stretch, here: str, there: str, scene: PlanningScene) -> None:

@@ -1,4 +1,6 @@
-"""Steps with what their uncertainty leaves open, as a side of the comparison: hops, power over time."""
+"""Steps with what their uncertainty leaves open, as a side of the comparison: hops, power over
+time.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -72,7 +74,9 @@ def saving(before: Costed, after: Costed) -> Saving:
     return Saving(before.joules, after.joules, after.seconds, within.low, within.high)
 
 
-def side_of(name: str, cycle_time: float, program: Costed, request: ProgramRequest, saved: Saving) -> Side:
+def side_of(
+    name: str, cycle_time: float, program: Costed, request: ProgramRequest, saved: Saving
+) -> Side:
     """A side with the intervals of its energies and its power over time."""
     parameters = request.settings.drives.parameters
     steps = tuple(
@@ -89,12 +93,14 @@ def side_of(name: str, cycle_time: float, program: Costed, request: ProgramReque
     time, watts = _power(steps, request)
     hops = tuple(_hop(hop) for hop in hops_of(program))
     peak = peak_interval(steps, request)
-    return Side(name, cycle_time, steps, report, hops, time, watts, saved, "", (peak.low, peak.high))
+    return Side(
+        name, cycle_time, steps, report, hops, time, watts, saved, "", (peak.low, peak.high)
+    )
 
 
 def hops_of(program: Costed) -> list[CostedHop]:
-    """A hop ends at a pause, before a line out of a station, where the stops of a movement change, and at
-    both ends of a path, which today's program may drive in several movements.
+    """A hop ends at a pause, before a line out of a station, where the stops of a movement change,
+    and at both ends of a path, which today's program may drive in several movements.
     """
     hops: list[CostedHop] = []
     for step, added in zip(program.steps, program.added, strict=True):
@@ -130,13 +136,19 @@ def _hop(hop: CostedHop) -> Hop:
     return Hop(hop.title, hop.is_pause, hop.seconds, hop.joules, within.low, within.high, mode)
 
 
-def _power(steps: Sequence[PlannedMovement], request: ProgramRequest) -> tuple[FloatArray, FloatArray]:
+def _power(
+    steps: Sequence[PlannedMovement], request: ProgramRequest
+) -> tuple[FloatArray, FloatArray]:
     """Times (N,) [s] and power at the mains (N,) [W]; a pause has its mean."""
-    ends, spent = [0.0], [0.0]
+    ends = [0.0]
+    spent = [0.0]
     for step in steps:
-        at, joules = ends[-1], spent[-1]
+        at = ends[-1]
+        joules = spent[-1]
         if step.trajectory is not None:
-            scene = scene_with(request.cell, step.load or "none", request.power, request.settings.drives)
+            scene = scene_with(
+                request.cell, step.load or "none", request.power, request.settings.drives
+            )
             energy = movement_energy(step.trajectory, scene)
             shares = np.cumsum(energy.watts) * (step.report.energy / max(energy.watts.sum(), 1e-9))
             ends += (at + energy.times[:-1] + 0.5 * energy.dt - step.trajectory.times[0]).tolist()

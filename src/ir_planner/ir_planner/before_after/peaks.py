@@ -21,12 +21,16 @@ def peak_interval(steps: Sequence[PlannedMovement], request: ProgramRequest) -> 
     for step in steps:
         if step.trajectory is None or step.report.peak_power < _NEAR * peak:
             continue
-        scene = scene_with(request.cell, step.load or "none", request.power, request.settings.drives)
+        scene = scene_with(
+            request.cell, step.load or "none", request.power, request.settings.drives
+        )
         if scene.parameters is None:
             continue
         nominal = movement_energy(step.trajectory, scene).watts.max()
         drawn = [movement_energy(step.trajectory, one).watts.max() for one in _drawn(scene)]
-        worst = np.maximum(worst, step.report.peak_power * np.array(drawn) / max(float(nominal), 1e-9))
+        worst = np.maximum(
+            worst, step.report.peak_power * np.array(drawn) / max(float(nominal), 1e-9)
+        )
     if not worst.any():
         return Interval(peak, peak)
     return interval(peak, worst - peak)
@@ -36,6 +40,8 @@ def _drawn(scene: PlanningScene) -> list[PlanningScene]:
     """The same scene with each of the drawn robots."""
     sets = [replace(scene.parameters, mean=row) for row in robots(scene.parameters)[:ROBOTS]]
     return [
-        replace(scene, drives=replace(scene.drives, parameters=one), power=one.power_with(scene.power))
+        replace(
+            scene, drives=replace(scene.drives, parameters=one), power=one.power_with(scene.power)
+        )
         for one in sets
     ]

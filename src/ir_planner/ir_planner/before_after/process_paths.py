@@ -1,7 +1,7 @@
 """What today's program works along: processes of a KRL program as paths of the tool.
 
-A saving may not come from cutting a process short: its motions become paths that every planned program
-drives, or the program is refused.
+A saving may not come from cutting a process short: its motions become paths that every planned
+program drives, or the program is refused.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,9 @@ from ir_planner.errors import RequestError
 from ir_planner.krl import DrivenStep, ToolMotion
 
 Lines = Sequence[tuple[int, int]]
-_AS_SLOW_AS_NEEDED = 1.0  # speed tolerance: where an axis can't follow the controller slows the tool as well
+_AS_SLOW_AS_NEEDED = (
+    1.0  # speed tolerance: where an axis can't follow the controller slows the tool as well
+)
 _SAME_PLACE = 2e-3  # m, and of the rotation's entries: as for stations
 _NAMED = 6  # places in a note
 _SAME_CORNER = 0.1  # mm
@@ -57,21 +59,24 @@ def process_notes(steps: Sequence[DrivenStep], paths: Sequence[CellPath | None])
         notes += [sentence] if (sentence := _corners(name, run)) else []
     if free:
         notes.append(
-            f"motions of the tool taken for positioning, which the planner replaces: {_listed(free)}; "
-            "where they are a process, name their lines (--process)"
+            "motions of the tool taken for positioning, which the planner replaces: "
+            f"{_listed(free)}; where they are a process, name their lines (--process)"
         )
     return notes
 
 
 def _corners(name: str, run: Sequence[DrivenStep]) -> str:
-    """What is changed at the corners of a path whose motions have different ones; "" where nothing is."""
+    """What is changed at the corners of a path whose motions have different ones; "" where nothing
+    is.
+    """
     corners = [1e3 * one.corner for one in _drawn(run)[:-1]]
     if not corners or max(corners) - min(corners) < _SAME_CORNER:
         return ""
     kept = "exactly" if min(corners) == 0.0 else f"with {min(corners):.3g} mm"
     return (
-        f"{name}: its corners are approximated by {min(corners):.3g} to {max(corners):.3g} mm today; a path "
-        f"has one distance for all: the planner's programs drive them {kept}, which takes them longer"
+        f"{name}: its corners are approximated by {min(corners):.3g} to {max(corners):.3g} mm "
+        f"today; a path has one distance for all: the planner's programs drive them {kept}, "
+        "which takes them longer"
     )
 
 
@@ -82,14 +87,19 @@ def _drawn(run: Sequence[DrivenStep]) -> list[ToolMotion]:
 def same_poses(first: CartesianPath, second: CartesianPath) -> bool:
     """Whether two paths have the same segments through the same poses."""
     kinds = [[one.kind for one in path.segments] for path in (first, second)]
-    poses = [[path.start, *(pose for one in path.segments for pose in one.poses)] for path in (first, second)]
+    poses = [
+        [path.start, *(pose for one in path.segments for pose in one.poses)]
+        for path in (first, second)
+    ]
     if kinds[0] != kinds[1] or len(poses[0]) != len(poses[1]):
         return False
     return float(np.abs(np.array(poses[0]) - np.array(poses[1])).max()) < _SAME_PLACE
 
 
 def driven_as(own: CellPath, driven: CellPath) -> CellPath:
-    """The cell's own path, with what may be touched and how it may turn, as today's program drives it."""
+    """The cell's own path, with what may be touched and how it may turn, as today's program drives
+    it.
+    """
     kept = own.path
     path = replace(
         driven.path,
@@ -103,7 +113,8 @@ def driven_as(own: CellPath, driven: CellPath) -> CellPath:
 
 def lines_of(places: Sequence[Place]) -> str:
     """Where motions stand in their source."""
-    first, last = places[0], places[-1]
+    first = places[0]
+    last = places[-1]
     return f"{first}" if first.line == last.line else f"{first} to line {last.line}"
 
 
@@ -122,7 +133,9 @@ def _worked(step: DrivenStep, lines: Lines | None) -> tuple[Place, ...]:
     """Places of its motions that belong to a process."""
     if lines is None or not step.moves:
         return step.process
-    return tuple(one for one in step.places if any(first <= one.line <= last for first, last in lines))
+    return tuple(
+        one for one in step.places if any(first <= one.line <= last for first, last in lines)
+    )
 
 
 def _may_work(step: DrivenStep) -> bool:
@@ -137,10 +150,10 @@ def _check_alone(step: DrivenStep, worked: tuple[Place, ...]) -> None:
         return
     raise RequestError(
         StatusCode.INVALID_MOTION_PLAN,
-        f"{lines_of(worked)} is a process, but the movement {lines_of(step.places)} that it is driven in has "
-        "parts that no path of the tool describes (a PTP that is blended into it, a turn on the spot, a "
-        "tool that isn't the cell's): end these in exact stops, or name the lines of processes or none "
-        "(--process)",
+        f"{lines_of(worked)} is a process, but the movement {lines_of(step.places)} that it is "
+        "driven in has parts that no path of the tool describes (a PTP that is blended into it, "
+        "a turn on the spot, a tool that isn't the cell's): end these in exact stops, or name "
+        "the lines of processes or none (--process)",
     )
 
 
@@ -148,9 +161,12 @@ def _path(run: Sequence[DrivenStep], names: set[str]) -> CellPath:
     """The path through all motions of steps that follow each other."""
     motions = _drawn(run)
     segments = tuple(segment for motion in motions for segment in motion.segments)
-    first, last = run[0].places[0].line, run[-1].places[-1].line
+    first = run[0].places[0].line
+    last = run[-1].places[-1].line
     base = f"lines_{first}_to_{last}" if first != last else f"line_{first}"
-    name = next(n for k in range(1, 10_000) if (n := base if k == 1 else f"{base}_{k}") not in names)
+    name = next(
+        n for k in range(1, 10_000) if (n := base if k == 1 else f"{base}_{k}") not in names
+    )
     names.add(name)
     try:
         path = CartesianPath(
@@ -161,7 +177,9 @@ def _path(run: Sequence[DrivenStep], names: set[str]) -> CellPath:
             blending_radius=min((one.corner for one in motions[:-1]), default=0.0),
         )
     except InvalidValueError as error:
-        raise RequestError(StatusCode.INVALID_MOTION_PLAN, f"{lines_of(run[0].places)}: {error}") from error
+        raise RequestError(
+            StatusCode.INVALID_MOTION_PLAN, f"{lines_of(run[0].places)}: {error}"
+        ) from error
     return CellPath(name, path)
 
 

@@ -1,4 +1,6 @@
-"""What a robot does today, wherever that is known from: movements between standstills, and waits."""
+"""What a robot does today, wherever that is known from: movements between standstills, and
+waits.
+"""
 
 from dataclasses import dataclass
 
@@ -16,10 +18,11 @@ from ir_planner.program import Doors
 class Stretch:
     """One movement, or a standstill of `seconds` (trajectory None), that ends at q (n,) [rad].
 
-    works: something is done where it ends (an output, a wait for a machine), so that the stop is not only
-    passed through. label: where it stands in its source. doors: machines that were not as the cell has them
-    meanwhile; None: nobody recorded it, they are as the program's own signals move them. process: the path of
-    the tool that it drives, alone or with neighbours that have the same one.
+    works: something is done where it ends (an output, a wait for a machine), so that the stop is
+    not only passed through. label: where it stands in its source. doors: machines that were not as
+    the cell has them meanwhile; None: nobody recorded it, they are as the program's own signals
+    move them. process: the path of the tool that it drives, alone or with neighbours that have the
+    same one.
     """
 
     trajectory: JointTrajectory | None
@@ -33,7 +36,9 @@ class Stretch:
 
 @dataclass(frozen=True, eq=False)
 class Today:
-    """A program as it runs, from `start` (n,) [rad]; kind: what it is read from; notes: what was assumed."""
+    """A program as it runs, from `start` (n,) [rad]; kind: what it is read from; notes: what was
+    assumed.
+    """
 
     name: str
     kind: str
@@ -55,16 +60,20 @@ class Today:
 def today_of_krl(found: EvaluatedProgram, process: Lines | None = None) -> Today:
     """A KRL program as a KR C4 drives it.
 
-    process: lines (first, last) whose motions are a process; None: those between an output's on and off, ():
-    none. Raises RequestError for a process that can't be asked for as paths of the tool.
+    process: lines (first, last) whose motions are a process; None: those between an output's on and
+    off, (): none. Raises RequestError for a process that can't be asked for as paths of the tool.
     """
     paths = process_paths([one.step for one in found.steps], process)
-    stretches = tuple(_stretch(one.step, path) for one, path in zip(found.steps, paths, strict=True))
+    stretches = tuple(
+        _stretch(one.step, path) for one, path in zip(found.steps, paths, strict=True)
+    )
     start = np.asarray(found.steps[0].step.trajectory.positions[0])
     notes = [str(note) for note in found.notes]
     waits = [step.step for step in found.steps if step.step.waits_for]
     if waits:
-        notes.append(f"{len(waits)} waits for machines count no time: how long they take is not in a program")
+        notes.append(
+            f"{len(waits)} waits for machines count no time: how long they take is not in a program"
+        )
     notes += process_notes([one.step for one in found.steps], paths)
     return Today(found.name, "KRL program", start, stretches, tuple(notes))
 

@@ -1,4 +1,6 @@
-"""Paths of the tool at a given speed: lines, circles, splines; all configurations, and a free angle."""
+"""Paths of the tool at a given speed: lines, circles, splines; all configurations, and a free
+angle.
+"""
 
 from ir_planner.cartesian.answer import CartesianPlan
 from ir_planner.cartesian.choices import Choice, choices_along

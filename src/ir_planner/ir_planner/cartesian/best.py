@@ -1,6 +1,8 @@
-"""The best movement along a path: the cheapest chains of configurations with their times, certified.
+"""The best movement along a path: the cheapest chains of configurations with their times,
+certified.
 
-A chain that isn't certified loses its configurations near the place where it isn't, and the search goes on.
+A chain that isn't certified loses its configurations near the place where it isn't, and the search
+goes on.
 """
 
 import itertools
@@ -28,18 +30,22 @@ from ir_planner.timing import Movement, within_torque
 T1_SPEED = 0.25  # m/s at the tcp and at the centre of the flange
 COMPARED = 3  # movements, over the cheapest chains by the estimate
 _SAME = 1e-6  # relative joules
-_COSTLIER, _COSTLIER_J = 1.2, 100.0  # estimates of joules leave out ramps, which cost about the same in all
+# estimates of joules leave out ramps, which cost about the same in all
+_COSTLIER = 1.2
+_COSTLIER_J = 100.0
 _TRIED = 12  # chains at most: where one can't keep the speed, the next is tried
 _ROUNDS = 6  # of chains that aren't certified
 _AROUND = 0.02  # m along the path, and
 _NEAR = 0.3  # rad around a configuration that isn't certified: not asked again
 _SHRUNK = 0.999
-_LIMITS, _FARTHER = ("velocity", "acceleration", "jerk"), 0.93
+_LIMITS = ("velocity", "acceleration", "jerk")
+_FARTHER = 0.93
 
 
 @dataclass(frozen=True, eq=False)
 class DrivenPath:
-    """A chain as a movement, and what it keeps of the path; slower: the share of its speed that T1 leaves;
+    """A chain as a movement, and what it keeps of the path; slower: the share of its speed that T1
+    leaves;
     longer: its ramps reach as far as it takes.
     """
 
@@ -86,8 +92,8 @@ def best_along(asked: Asked, layers: Layers) -> DrivenPath:
 
 
 def _driven(asked: Asked, found: list[Chain]) -> tuple[list[DrivenPath], PathRefusedError | None]:
-    """The first chains that keep the speed, by longer ramps if none does with short ones, and why the first
-    of the others doesn't.
+    """The first chains that keep the speed, by longer ramps if none does with short ones, and why
+    the first of the others doesn't.
     """
     driven, reason = _driven_with(asked, found, longer=False)
     return (driven, reason) if driven else (_driven_with(asked, found, longer=True)[0], reason)
@@ -113,8 +119,8 @@ def _driven_with(
 
 
 def _worth(chain: Chain, driven: list[DrivenPath], objective: str) -> bool:
-    """Whether a chain may be cheaper than those that are driven. One of the same joules is their mirror image
-    with the wrist turned over; where joules decide, those that cost far more lose.
+    """Whether a chain may be cheaper than those that are driven. One of the same joules is their
+    mirror image with the wrist turned over; where joules decide, those that cost far more lose.
     """
     known = [one.chain.joules for one in driven]
     if any(abs(chain.joules - joules) <= _SAME * joules for joules in known):
@@ -124,7 +130,9 @@ def _worth(chain: Chain, driven: list[DrivenPath], objective: str) -> bool:
 
 
 def within_limits(asked: Asked, one: DrivenPath) -> DrivenPath:
-    """The same with more distance from the limits where the interpolant between points exceeds one."""
+    """The same with more distance from the limits where the interpolant between points exceeds
+    one.
+    """
     violation = one.movement.violation
     if violation is None or violation.what not in _LIMITS:
         return one
@@ -138,7 +146,9 @@ def _uncertified(one: DrivenPath) -> PathRefusedError:
     violation = one.movement.violation
     assert violation is not None  # that is why it is asked
     place = _place_at(one.sent, violation.time)
-    return PathRefusedError(f"at {place:.3f} m: {violation.sentence}", StatusCode.INVALID_MOTION_PLAN)
+    return PathRefusedError(
+        f"at {place:.3f} m: {violation.sentence}", StatusCode.INVALID_MOTION_PLAN
+    )
 
 
 def _place_at(path: SentPath, time: float) -> float:
@@ -160,10 +170,12 @@ def _without(layers: Layers, one: DrivenPath) -> Layers:
 
 
 def timed(asked: Asked, chain: Chain, share: float = 1.0, *, longer: bool = False) -> DrivenPath:
-    """A chain with its time, within a share of the limits; longer: ramps reach as far as it takes. Raises
-    PathRefusedError.
+    """A chain with its time, within a share of the limits; longer: ramps reach as far as it takes.
+    Raises PathRefusedError.
     """
-    path, whole, scene = asked.path, asked.whole, asked.context.scene
+    path = asked.path
+    whole = asked.whole
+    scene = asked.context.scene
     angle, chain = angle_along(whole, chain, path.free_angle, asked.space, asked.fixed)
     ends = _strokes(whole)
     curves = [curve_of(whole, chain, angle, (whole.ends[a], whole.ends[b]), scene) for a, b in ends]
@@ -202,8 +214,8 @@ def _strokes(whole: ToolPath) -> list[tuple[int, int]]:
 
 
 def _spans(whole: ToolPath, first: int, last: int, slower: float) -> tuple[Span, ...]:
-    """Parts of a stroke; those that follow each other at one speed are one, so that ramps may reach over
-    them.
+    """Parts of a stroke; those that follow each other at one speed are one, so that ramps may reach
+    over them.
     """
     spans: list[Span] = []
     for part, length in zip(whole.parts[first:last], np.diff(whole.ends)[first:last], strict=True):
@@ -216,14 +228,20 @@ def _spans(whole: ToolPath, first: int, last: int, slower: float) -> tuple[Span,
 
 def _flange_share(asked: Asked, curves: list[JointCurve]) -> float:
     """What share of the speed keeps the centre of the flange at T1's speed too."""
-    path, context, fastest = asked.path, asked.context, 0.0
+    path = asked.path
+    context = asked.context
+    fastest = 0.0
     for curve in curves:
         s = np.linspace(curve.begin, curve.end, _FLANGE_SAMPLES)
         q, first, _, _ = curve.at(s)
-        here, ahead = (context.scene.chain.link_poses(at)[:, -1, :3, 3] for at in (q, q + _STEP * first))
+        here, ahead = (
+            context.scene.chain.link_poses(at)[:, -1, :3, 3] for at in (q, q + _STEP * first)
+        )
         fastest = max(fastest, float(np.linalg.norm(ahead - here, axis=1).max()) / _STEP)
     top = max([path.tool_speed, *(one.tool_speed for one in path.segments)])
     return min(1.0, _SHRUNK * T1_SPEED / max(fastest * top, 1e-12))
 
 
-_FLANGE_SAMPLES, _STEP = 400, 1e-6  # of a stroke; m of a difference quotient along the path
+# of a stroke; m of a difference quotient along the path
+_FLANGE_SAMPLES = 400
+_STEP = 1e-6

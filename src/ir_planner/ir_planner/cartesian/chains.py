@@ -1,7 +1,9 @@
-"""The cheapest chains of configurations along a path: edges from sample to sample where no axis jumps.
+"""The cheapest chains of configurations along a path: edges from sample to sample where no axis
+jumps.
 
-Complete up to its resolution: what passes no sample without a jump isn't found. Joules of an edge are those
-of its even motion at the tool's speed; accelerations are left out, they come with the timing.
+Complete up to its resolution: what passes no sample without a jump isn't found. Joules of an edge
+are those of its even motion at the tool's speed; accelerations are left out, they come with the
+timing.
 """
 
 from dataclasses import dataclass
@@ -19,7 +21,9 @@ from ir_planner.checks import FreeSpace
 from ir_planner.scene import PlanningScene
 
 JUMP = 0.35  # rad from sample to sample: more is another branch, or a singularity
-_WIDE, _WIDE_FEW = 1.0, 3.3  # rad that a chain may jump where samples can be closer: many and few edges
+# rad that a chain may jump where samples can be closer: many and few edges
+_WIDE = 1.0
+_WIDE_FEW = 3.3
 _SAME = 1e-6  # relative cost of chains that differ by whole turns only
 _APART = 0.3  # rad: ends of chains with a free angle that are nearer are smoothed to one
 _OVERSPEED_WATTS = 2000.0  # what an axis at its speed limit costs in the search; far more beyond
@@ -29,8 +33,8 @@ _LAYER = 10.0  # between layers in the tree of neighbours, further than any jump
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Configurations q (N, n) and angles (N,) rad about the tool's axis at the samples s (N,) m; joules as
-    estimated.
+    """Configurations q (N, n) and angles (N,) rad about the tool's axis at the samples s (N,) m;
+    joules as estimated.
     """
 
     s: FloatArray
@@ -40,15 +44,24 @@ class Chain:
 
 
 def chains(
-    layers: Layers, speed: float, space: FreeSpace, most: int, *, by_start: bool = False, wide: float = 0.0
+    layers: Layers,
+    speed: float,
+    space: FreeSpace,
+    most: int,
+    *,
+    by_start: bool = False,
+    wide: float = 0.0,
 ) -> list[Chain]:
-    """The cheapest chains through all layers, at most `most`, each with another end, or start (whole turns
-    apart count once), at the tool's speed [m/s]. Raises NoChainError where none leads through.
+    """The cheapest chains through all layers, at most `most`, each with another end, or start
+    (whole turns apart count once), at the tool's speed [m/s]. Raises NoChainError where none leads
+    through.
 
     wide: samples that are farther apart than this [m] may be joined by far larger steps, 0: none.
     """
-    nodes, scene = np.flatnonzero(layers.free), space.scene
-    q, layer = layers.q[nodes], layers.layer[nodes]
+    nodes = np.flatnonzero(layers.free)
+    scene = space.scene
+    q = layers.q[nodes]
+    layer = layers.layer[nodes]
     turning = layers.turning
     before, after = _neighbours(q, layer, turning, np.diff(layers.s) > wide if wide else None)
     family = _families(len(q), before, after)
@@ -58,7 +71,9 @@ def chains(
     if by_start:  # the same edges from the end
         before, after, layer = after, before, len(layers.s) - 1 - layer
         order = np.lexsort((before, after, layer[after]))
-        before, after, joules = before[order], after[order], joules[order]
+        before = before[order]
+        after = after[order]
+        joules = joules[order]
     cost, parent = _cheapest(layer, before, after, joules, len(layers.s))
     last = np.flatnonzero((layer == len(layers.s) - 1) & np.isfinite(cost))
     if len(last) == 0:
@@ -76,15 +91,18 @@ def chains(
 def _neighbours(
     q: FloatArray, layer: IntArray, turning: BoolArray, wide: BoolArray | None
 ) -> tuple[IntArray, IntArray]:
-    """Edges (E,) from one layer to the next with no axis beyond JUMP, ordered by where they lead. wide
-    (N - 1,): where they may be longer.
+    """Edges (E,) from one layer to the next with no axis beyond JUMP, ordered by where they lead.
+    wide (N - 1,): where they may be longer.
     """
     few = int(np.bincount(layer).max(initial=0)) <= _FEW
     jump = JUMP if wide is None else _WIDE_FEW if few else _WIDE
     before, after = (_by_pairs if few else _by_tree)(q, layer, turning, jump)
     if wide is not None:
-        kept = wide[layer[before]] | (np.abs(difference(q[before], q[after], turning)).max(axis=1) <= JUMP)
-        before, after = before[kept], after[kept]
+        kept = wide[layer[before]] | (
+            np.abs(difference(q[before], q[after], turning)).max(axis=1) <= JUMP
+        )
+        before = before[kept]
+        after = after[kept]
     order = np.lexsort((before, after))
     return before[order], after[order]
 
@@ -95,7 +113,9 @@ def _families(count: int, before: IntArray, after: IntArray) -> IntArray:
     return np.asarray(connected_components(edges, directed=False)[1])
 
 
-def _by_pairs(q: FloatArray, layer: IntArray, turning: BoolArray, jump: float) -> tuple[IntArray, IntArray]:
+def _by_pairs(
+    q: FloatArray, layer: IntArray, turning: BoolArray, jump: float
+) -> tuple[IntArray, IntArray]:
     """The same in any order, all pairs compared axis by axis: quicker where layers are small."""
     count = np.bincount(layer)
     begin = np.cumsum(count) - count
@@ -105,14 +125,18 @@ def _by_pairs(q: FloatArray, layer: IntArray, turning: BoolArray, jump: float) -
     first = np.where(number >= 0, q[number, axes[0]], np.nan)
     step = difference(first[:-1, :, None], first[1:, None, :], turning[axes[0]])
     k, i, j = np.nonzero(np.abs(step) <= jump)
-    before, after = number[k, i], number[k + 1, j]
+    before = number[k, i]
+    after = number[k + 1, j]
     for axis in axes[1:]:
         near = np.abs(difference(q[before, axis], q[after, axis], turning[axis])) <= jump
-        before, after = before[near], after[near]
+        before = before[near]
+        after = after[near]
     return before, after
 
 
-def _by_tree(q: FloatArray, layer: IntArray, turning: BoolArray, jump: float) -> tuple[IntArray, IntArray]:
+def _by_tree(
+    q: FloatArray, layer: IntArray, turning: BoolArray, jump: float
+) -> tuple[IntArray, IntArray]:
     """The same by a tree of all configurations: where layers are large."""
     box = np.append(np.where(turning, TURN / jump, 0.0), 0.0)  # 0: not periodic
     ahead, place = (
@@ -123,9 +147,11 @@ def _by_tree(q: FloatArray, layer: IntArray, turning: BoolArray, jump: float) ->
     return near["i"].astype(np.int64), near["j"].astype(np.int64)
 
 
-def _edge_joules(q: FloatArray, steps: FloatArray, seconds: FloatArray, scene: PlanningScene) -> FloatArray:
-    """What the drives take along edges (E,) from q (E, n) by steps (E, n) in seconds (E,) [J], and what keeps
-    the search from too fast ones.
+def _edge_joules(
+    q: FloatArray, steps: FloatArray, seconds: FloatArray, scene: PlanningScene
+) -> FloatArray:
+    """What the drives take along edges (E,) from q (E, n) by steps (E, n) in seconds (E,) [J], and
+    what keeps the search from too fast ones.
     """
     if len(q) == 0:
         return np.zeros(0)
@@ -138,7 +164,9 @@ def _edge_joules(q: FloatArray, steps: FloatArray, seconds: FloatArray, scene: P
 def _cheapest(
     layer: IntArray, before: IntArray, after: IntArray, joules: FloatArray, count: int
 ) -> tuple[FloatArray, IntArray]:
-    """Least joules (M,) to each node, inf where none leads there, and the node before (M,), -1: none."""
+    """Least joules (M,) to each node, inf where none leads there, and the node before (M,), -1:
+    none.
+    """
     cost = np.where(layer == 0, 0.0, np.inf)
     parent = np.full(len(layer), -1, dtype=np.int64)
     bounds = np.searchsorted(layer[after], np.arange(count + 1))
@@ -146,11 +174,13 @@ def _cheapest(
         edges = slice(bounds[k], bounds[k + 1])
         if edges.start == edges.stop:
             break
-        to, total = after[edges], cost[before[edges]] + joules[edges]
+        to = after[edges]
+        total = cost[before[edges]] + joules[edges]
         order = np.lexsort((before[edges], total, to))
         first = order[np.concatenate([[True], np.diff(to[order]) > 0])]
         kept = first[np.isfinite(total[first])]
-        cost[to[kept]], parent[to[kept]] = total[kept], before[edges][kept]
+        cost[to[kept]] = total[kept]
+        parent[to[kept]] = before[edges][kept]
     return cost, parent
 
 
@@ -162,9 +192,9 @@ def _different(
     scene: PlanningScene,
     bounds: tuple[float, int],
 ) -> IntArray:
-    """Ends (K,) of chains: the cheapest of each family, then the others, cheapest first; of those that differ
-    by whole turns, the one most within the axis limits. bounds: about how many rad they are apart, and how
-    many at most.
+    """Ends (K,) of chains: the cheapest of each family, then the others, cheapest first; of those
+    that differ by whole turns, the one most within the axis limits. bounds: about how many rad they
+    are apart, and how many at most.
     """
     robot = scene.cell.robot
     middle = 0.5 * (robot.position_min + robot.position_max)

@@ -1,7 +1,8 @@
-"""Certified movements along a path from and to different configurations, for a program to choose among.
+"""Certified movements along a path from and to different configurations, for a program to choose
+among.
 
-Candidates are the cheapest chain to each different end and from each different start; those that differ by
-whole turns of joints are one movement, shifted.
+Candidates are the cheapest chain to each different end and from each different start; those that
+differ by whole turns of joints are one movement, shifted.
 """
 
 import itertools
@@ -35,9 +36,11 @@ class Choice:
     movement: Movement
 
 
-def choices_along(path: CartesianPath, context: Context, after: FreeSpace, most: int) -> list[Choice]:
-    """Certified movements whose ends keep the safety distance from everything, at their end also in the space
-    `after`; at most `most`. Raises PathRefusedError, HeadingError, RequestError.
+def choices_along(
+    path: CartesianPath, context: Context, after: FreeSpace, most: int
+) -> list[Choice]:
+    """Certified movements whose ends keep the safety distance from everything, at their end also in
+    the space `after`; at most `most`. Raises PathRefusedError, HeadingError, RequestError.
     """
     whole = drawn(path, None, False, context)
     whole = replace(whole, layers=replace(whole.layers, free=_ends_free(whole, after)))
@@ -61,7 +64,8 @@ def choices_along(path: CartesianPath, context: Context, after: FreeSpace, most:
 
 def _ends_free(whole: Drawn, after: FreeSpace) -> BoolArray:
     """Which configurations take part (M,): at the ends those that nothing is allowed to touch."""
-    layers, context = whole.layers, whole.asked.context
+    layers = whole.layers
+    context = whole.asked.context
     free = layers.free.copy()
     plain = FreeSpace.of(context.scene, context.safety_distance, context.work)
     for k, spaces in ((0, (plain,)), (len(layers.s) - 1, (plain, after))):
@@ -73,14 +77,16 @@ def _ends_free(whole: Drawn, after: FreeSpace) -> BoolArray:
         if not free[there].any():
             end = "its end: give it a retract" if k else "its beginning: give it an approach"
             raise PathRefusedError(
-                f"no configuration keeps {1e3 * context.safety_distance:g} mm from everything at {end}"
+                f"no configuration keeps {1e3 * context.safety_distance:g} mm from everything at "
+                f"{end}"
             )
     return free
 
 
 def _different(whole: Drawn) -> list[Chain]:
     """The cheapest chains by their ends and by their starts, each once, cheapest first."""
-    asked, layers = whole.asked, whole.layers
+    asked = whole.asked
+    layers = whole.layers
     by_end, layers = chains_through(asked, layers, _OF_EACH)
     by_start, _ = chains_through(asked, layers, _OF_EACH, by_start=True)
     kept: list[Chain] = []
@@ -93,9 +99,11 @@ def _different(whole: Drawn) -> list[Chain]:
 def _turned(driven: DrivenPath) -> Iterator[Choice]:
     """A movement as it is, then by whole turns of joints as far as their limits allow."""
     movement = driven.movement
-    robot, trajectory = movement.context.scene.cell.robot, movement.trajectory
+    robot = movement.context.scene.cell.robot
+    trajectory = movement.trajectory
     largest = extremes(*trajectory.coefficients())
-    low, high = largest.lowest.min(axis=0), largest.highest.max(axis=0)
+    low = largest.lowest.min(axis=0)
+    high = largest.highest.max(axis=0)
     turns = [
         [k for k in _TURNS if a + 2.0 * np.pi * k >= least and b + 2.0 * np.pi * k <= most]
         for a, b, least, most in zip(low, high, robot.position_min, robot.position_max, strict=True)

@@ -1,4 +1,6 @@
-"""How parts of a path are joined at the corner between them, and by how much that leaves the parts."""
+"""How parts of a path are joined at the corner between them, and by how much that leaves the
+parts.
+"""
 
 import itertools
 from dataclasses import dataclass
@@ -11,7 +13,9 @@ from ir_msgs_py.cartesian import TANGENT, CartesianPath
 from ir_planner.cartesian.parts import Part
 from ir_planner.cartesian.tool_path import ToolPath, covered, joint_bend
 
-SMOOTHING = 2e-5  # m by which a smoothed joint may leave the parts, well below the 0.1 mm of the whole
+SMOOTHING = (
+    2e-5  # m by which a smoothed joint may leave the parts, well below the 0.1 mm of the whole
+)
 SMOOTHING_TURN = 5e-4  # rad
 SHORTEST_JOINT = 1e-3  # m: a smaller radius is a corner
 _LONGEST_JOINT = 0.05  # m
@@ -23,8 +27,8 @@ _SAMPLES = 129
 
 @dataclass(frozen=True)
 class Joint:
-    """radius [m], 0: the tool stops; angle [rad] of the corner; leaves, turns: by what smoothing leaves the
-    parts [m, rad]; rounded: as asked for, which leaves them on purpose.
+    """radius [m], 0: the tool stops; angle [rad] of the corner; leaves, turns: by what smoothing
+    leaves the parts [m, rad]; rounded: as asked for, which leaves them on purpose.
     """
 
     radius: float
@@ -35,7 +39,9 @@ class Joint:
 
 
 def joined(path: CartesianPath, parts: tuple[Part, ...]) -> tuple[ToolPath, tuple[Joint, ...]]:
-    """The parts one after the other, and the joints between them; approach and retract are not rounded."""
+    """The parts one after the other, and the joints between them; approach and retract are not
+    rounded.
+    """
     joints = tuple(
         joint_between(before, after, path.blending_radius if before.kept and after.kept else 0.0)
         for before, after in itertools.pairwise(parts)
@@ -65,11 +71,12 @@ def joint_between(before: Part, after: Part, asked: float) -> Joint:
 
 
 def _left_by(before: Part, after: Part, radius: float) -> tuple[float, float]:
-    """A bound of the distance [m], and the largest turn [rad], between joined and unjoined parts at the same
-    length.
+    """A bound of the distance [m], and the largest turn [rad], between joined and unjoined parts at
+    the same length.
     """
     u = np.linspace(-radius, radius, _SAMPLES)
-    left, right = before.length - covered(-u, radius), covered(u, radius)
+    left = before.length - covered(-u, radius)
+    right = covered(u, radius)
     corner = after.places.at(np.array([0.0]))
     place = before.places.at(left) + after.places.at(right) - corner
     exact = np.where(

@@ -1,4 +1,6 @@
-"""Why no chain of configurations leads on along a path: collisions, an axis limit or a singularity."""
+"""Why no chain of configurations leads on along a path: collisions, an axis limit or a
+singularity.
+"""
 
 import numpy as np
 
@@ -17,10 +19,13 @@ _DAMPED = 1e-6  # of the squared singular values
 
 
 def dead_end(asked: Asked, layers: Layers, reached: IntArray) -> PathRefusedError:
-    """The refusal with place, axis and what may help; reached (M,): configurations that chains lead to."""
+    """The refusal with place, axis and what may help; reached (M,): configurations that chains lead
+    to.
+    """
     last = int(layers.layer[reached].max())
     at = reached[layers.layer[reached] == last]
-    here, ahead = layers.q[at], layers.q[layers.layer == last + 1]
+    here = layers.q[at]
+    ahead = layers.q[layers.layer == last + 1]
     jumps = np.abs(difference(here[None], ahead[:, None], layers.turning))
     away = jumps.max(axis=2)
     if (near := away.min(axis=1) <= JUMP).any():
@@ -33,19 +38,24 @@ def dead_end(asked: Asked, layers: Layers, reached: IntArray) -> PathRefusedErro
     step = _steps(asked, layers, at, last)
     why = _beyond_limit(here, step, scene) or _jump(here, jumps, scene)
     return PathRefusedError(
-        f"no configuration leads past {layers.s[last]:.3f} m without a jump of an axis: {why}; {_help(asked)}"
+        f"no configuration leads past {layers.s[last]:.3f} m without a jump of an axis: {why}; "
+        f"{_help(asked)}"
     )
 
 
 def _steps(asked: Asked, layers: Layers, at: IntArray, last: int) -> FloatArray:
-    """What the axes (M, n) would turn from configurations `at` (M,) to the next sample, by the Jacobian."""
+    """What the axes (M, n) would turn from configurations `at` (M,) to the next sample, by the
+    Jacobian.
+    """
     poses = asked.whole.poses(layers.s[last : last + 2])
     turned = poses[:, None, :3, :3] @ about_tool(layers.angle[at])[None]
     chain = asked.context.scene.chain
     twist = np.zeros((len(at), 6))
     twist[:, :3] = poses[1, :3, 3] - poses[0, :3, 3]
     rotation = turned[1] @ turned[0].transpose(0, 2, 1)
-    twist[:, 3:] = 0.5 * np.stack([rotation[:, b, a] - rotation[:, a, b] for a, b in _CYCLIC], axis=1)
+    twist[:, 3:] = 0.5 * np.stack(
+        [rotation[:, b, a] - rotation[:, a, b] for a, b in _CYCLIC], axis=1
+    )
     jacobian = chain.jacobian(layers.q[at])
     square = jacobian.transpose(0, 2, 1) @ jacobian + _DAMPED * np.eye(jacobian.shape[2])
     right = np.einsum("mji,mj->mi", jacobian, twist)
@@ -56,7 +66,9 @@ _CYCLIC = ((1, 2), (2, 0), (0, 1))
 
 
 def _beyond_limit(here: FloatArray, step: FloatArray, scene: PlanningScene) -> str:
-    """The axis limit that the configuration with the smallest step (M, n) would pass, if it passes one."""
+    """The axis limit that the configuration with the smallest step (M, n) would pass, if it passes
+    one.
+    """
     robot = scene.cell.robot
     k = int(np.argmin(np.abs(step).max(axis=1)))
     there = here[k] + step[k]
@@ -69,8 +81,8 @@ def _beyond_limit(here: FloatArray, step: FloatArray, scene: PlanningScene) -> s
 
 
 def _jump(here: FloatArray, jumps: FloatArray, scene: PlanningScene) -> str:
-    """The axis that would jump where configurations here (M, n) and those ahead differ least, by jumps
-    (A, M, n).
+    """The axis that would jump where configurations here (M, n) and those ahead differ least, by
+    jumps (A, M, n).
     """
     away = jumps.max(axis=2)
     a, h = np.unravel_index(int(np.argmin(away)), away.shape)
@@ -80,7 +92,8 @@ def _jump(here: FloatArray, jumps: FloatArray, scene: PlanningScene) -> str:
 
 
 def _help(asked: Asked) -> str:
-    angle, helping = asked.path.free_angle, ["another orientation there"]
+    angle = asked.path.free_angle
+    helping = ["another orientation there"]
     if angle < np.pi - 1e-6:
         helping.append("a wider free_angle" if angle > 0.0 else "a free_angle")
     if asked.fixed:

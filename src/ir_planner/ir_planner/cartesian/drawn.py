@@ -1,4 +1,6 @@
-"""A request's path as it is drawn, with all configurations along it, and what a movement keeps of it."""
+"""A request's path as it is drawn, with all configurations along it, and what a movement keeps of
+it.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -79,15 +81,21 @@ def _reduced(path: CartesianPath, whole: ToolPath, joints: tuple[Joint, ...]) ->
 
 
 def _check_corners(path: CartesianPath, whole: ToolPath, joints: tuple[Joint, ...]) -> None:
-    """Raise PathRefusedError at a corner within the path where the tool would have to stop and may not."""
+    """Raise PathRefusedError at a corner within the path where the tool would have to stop and may
+    not.
+    """
     for k, joint in enumerate(joints, start=1):
-        before, after = whole.parts[k - 1], whole.parts[k]
+        before = whole.parts[k - 1]
+        after = whole.parts[k]
         if joint.radius > 0.0 or not (before.kept and after.kept):
             continue
-        corner = f"at {whole.ends[k]:.3f} m the path has a corner of {np.degrees(joint.angle):.1f} deg"
+        corner = (
+            f"at {whole.ends[k]:.3f} m the path has a corner of {np.degrees(joint.angle):.1f} deg"
+        )
         if path.orientation == TANGENT:
             raise PathRefusedError(
-                f"{corner}: a tool that turns with the path can't follow it; give a blending_radius",
+                f"{corner}: a tool that turns with the path can't follow it; give a "
+                "blending_radius",
                 StatusCode.INVALID_MOTION_PLAN,
             )
         if path.speed_tolerance < 1.0:

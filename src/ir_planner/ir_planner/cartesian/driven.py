@@ -1,4 +1,6 @@
-"""What the axes do where the tool moves along a curve of theirs, and how much of the limits that takes."""
+"""What the axes do where the tool moves along a curve of theirs, and how much of the limits that
+takes.
+"""
 
 from dataclasses import dataclass
 
@@ -12,7 +14,9 @@ from ir_planner.timing import lasting_longer
 
 @dataclass(frozen=True, eq=False)
 class Driven:
-    """Motion at M instants: t (M,) s, s (M,) m along the path, speed (M,) m/s; q, qd, qdd, qddd (M, n)."""
+    """Motion at M instants: t (M,) s, s (M,) m along the path, speed (M,) m/s; q, qd, qdd, qddd (M,
+    n).
+    """
 
     t: FloatArray
     s: FloatArray
@@ -32,11 +36,18 @@ def driven(
 
 
 def with_speed(
-    along: tuple[FloatArray, ...], t: FloatArray, s: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray
+    along: tuple[FloatArray, ...],
+    t: FloatArray,
+    s: FloatArray,
+    v: FloatArray,
+    a: FloatArray,
+    j: FloatArray,
 ) -> Driven:
     """The same from q and its derivatives by s (M, n)."""
     q, first, second, third = along
-    v1, a1, j1 = v[:, None], a[:, None], j[:, None]
+    v1 = v[:, None]
+    a1 = a[:, None]
+    j1 = j[:, None]
     qd = first * v1
     qdd = second * v1**2 + first * a1
     qddd = third * v1**3 + 3.0 * second * v1 * a1 + first * j1
@@ -46,4 +57,6 @@ def with_speed(
 def use_of(motion: Driven, limits: MotionLimits, scene: PlanningScene) -> FloatArray:
     """By what factor (M,) a motion would have to last longer; at most 1: within the limits."""
     torque = torque_use(scene.dynamics, motion.q, motion.qd, motion.qdd)
-    return lasting_longer(limits, np.abs(motion.qd), np.abs(motion.qdd), np.abs(motion.qddd), torque)
+    return lasting_longer(
+        limits, np.abs(motion.qd), np.abs(motion.qdd), np.abs(motion.qddd), torque
+    )

@@ -1,5 +1,5 @@
-"""Samples of a path closer to each other where no chain leads on: near a singularity axes turn far within
-millimetres, and a slow tool has the time for it.
+"""Samples of a path closer to each other where no chain leads on: near a singularity axes turn far
+within millimetres, and a slow tool has the time for it.
 """
 
 from dataclasses import replace
@@ -23,19 +23,22 @@ _LOOKED_AT = 3  # chains that jump, whose intervals are divided
 def chains_through(
     asked: Asked, layers: Layers, most: int, *, by_start: bool = False
 ) -> tuple[list[Chain], Layers]:
-    """The cheapest chains as `chains` finds them, at finer samples where it takes them, and the layers with
-    these. Raises PathRefusedError where no chain leads on.
+    """The cheapest chains as `chains` finds them, at finer samples where it takes them, and the
+    layers with these. Raises PathRefusedError where no chain leads on.
 
-    Where one leaves the limits in every turn, another one may lead to its end: all turns are looked at. They
+    Where one leaves the limits in every turn, another one may lead to its end: all turns are looked
+    at. They
     are too where none leads on from a start beyond half a turn: a limit may be what comes first.
     """
-    scene, fixed = asked.context.scene, asked.fixed
+    scene = asked.context.scene
+    fixed = asked.fixed
     try:
         found, finer = _chains_through(asked, layers, most, by_start=by_start)
     except PathRefusedError:
         if not (fixed and (layers.turning & (np.abs(layers.q[0]) > np.pi)).any()):
             raise
-        found, finer = [], layers
+        found = []
+        finer = layers
     turned = [turned_into_limits(chain.q, finer.turning, scene, fixed=fixed) for chain in found]
     within = [replace(chain, q=q) for chain, q in zip(found, turned, strict=True) if q is not None]
     if found and len(within) == len(found):
@@ -43,9 +46,12 @@ def chains_through(
     return chains_through(asked, with_all_turns(finer, scene, fixed=fixed), most, by_start=by_start)
 
 
-def _chains_through(asked: Asked, layers: Layers, most: int, *, by_start: bool) -> tuple[list[Chain], Layers]:
+def _chains_through(
+    asked: Asked, layers: Layers, most: int, *, by_start: bool
+) -> tuple[list[Chain], Layers]:
     """The same, without regard to the limits of axes whose whole turns are left out."""
-    speed, space = asked.path.tool_speed, asked.space
+    speed = asked.path.tool_speed
+    space = asked.space
     try:
         return chains(layers, speed, space, most, by_start=by_start), layers
     except NoChainError:
@@ -57,8 +63,8 @@ def _chains_through(asked: Asked, layers: Layers, most: int, *, by_start: bool) 
 
 
 def _divided(asked: Asked, layers: Layers) -> Layers:
-    """The layers with finer samples wherever the cheapest chains jump, of those that may, until one jumps
-    nowhere or nothing is left to divide.
+    """The layers with finer samples wherever the cheapest chains jump, of those that may, until one
+    jumps nowhere or nothing is left to divide.
     """
     for _ in range(_ROUNDS):
         asked.context.work.check()
@@ -91,7 +97,9 @@ def _between(s: FloatArray, open_: BoolArray) -> FloatArray:
 def _with(layers: Layers, between: FloatArray, asked: Asked) -> Layers:
     """The layers with all configurations at further samples (B,) m."""
     s = np.union1d(layers.s, between)
-    more = configurations_at(asked.whole, between, asked.path.free_angle, asked.space, layers.turning)
+    more = configurations_at(
+        asked.whole, between, asked.path.free_angle, asked.space, layers.turning
+    )
     layer = np.concatenate(
         [np.searchsorted(s, layers.s)[layers.layer], np.searchsorted(s, between)[more.layer]]
     )

@@ -1,9 +1,9 @@
-"""The angle about the tool's axis along the path, where it is free: from the steps of the search to a smooth
-function.
+"""The angle about the tool's axis along the path, where it is free: from the steps of the search to
+a smooth function.
 
-It is a cubic B-spline whose control points lie within the free angle, so it does too. Gauss-Newton steps
-minimise what the axes move and bend along the path, as shares of their speeds; each step must keep the
-configurations free and joined.
+It is a cubic B-spline whose control points lie within the free angle, so it does too. Gauss-Newton
+steps minimise what the axes move and bend along the path, as shares of their speeds; each step must
+keep the configurations free and joined.
 """
 
 from collections.abc import Iterator
@@ -22,18 +22,20 @@ from ir_planner.scene import PlanningScene
 
 WHOLE = np.pi - 1e-6  # rad: from here on any angle will do
 _SPACING = 0.05  # m between control points
-_FEWEST, _MOST = 4, 200
+_FEWEST = 4
+_MOST = 200
 _BENDING = 0.05  # m: what bends more sharply counts more than what moves
 _FITS = (1.0, 0.1, 1e-2, 1e-3, 1e-5)  # weights of bending while the search's steps are fitted
-_STEPS, _HALVINGS = 8, 3
+_STEPS = 8
+_HALVINGS = 3
 _FARTHEST = 0.3  # rad of a step
 _BETTER = 1e-3  # relative: below, no further step is worth it
 
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """basis (N, C): angles at the chain's samples by control points; free_angle [rad]; fixed: the first
-    control point stays.
+    """basis (N, C): angles at the chain's samples by control points; free_angle [rad]; fixed: the
+    first control point stays.
     """
 
     path: ToolPath
@@ -49,7 +51,8 @@ class _Problem:
 
     def reached(self, control: FloatArray, near: Chain) -> Chain | None:
         """The chain with other angles; None where it isn't free or jumps."""
-        angle, s = self.angle(control), self.chain.s
+        angle = self.angle(control)
+        s = self.chain.s
         try:
             q = followed(tool_poses(self.path, angle, s), s, near, self.space.scene)
         except PathRefusedError:
@@ -62,7 +65,9 @@ class _Problem:
 def angle_along(
     path: ToolPath, chain: Chain, free_angle: float, space: FreeSpace, fixed: bool
 ) -> tuple[Angle | None, Chain]:
-    """The angle over the arc length, None: not free, and the chain with it. fixed: it begins as it does."""
+    """The angle over the arc length, None: not free, and the chain with it. fixed: it begins as it
+    does.
+    """
     if free_angle == 0.0:
         return None, chain
     chain = replace(chain, angles=np.unwrap(chain.angles))
@@ -78,18 +83,24 @@ def angle_along(
             trial = problem.reached(control + step, smooth)
             if trial is not None and _cost(trial, space.scene) < cost:
                 break
-            step, trial = 0.5 * step, None
+            step = 0.5 * step
+            trial = None
         if trial is None:
             break
-        before, cost = cost, _cost(trial, space.scene)
-        control, smooth = control + step, trial
+        before = cost
+        cost = _cost(trial, space.scene)
+        control = control + step
+        smooth = trial
         if cost > before * (1.0 - _BETTER):
             break
     return problem.angle(control), smooth
 
 
-def _problem(path: ToolPath, chain: Chain, free_angle: float, space: FreeSpace, fixed: bool) -> _Problem:
-    begin, end = float(chain.s[0]), float(chain.s[-1])
+def _problem(
+    path: ToolPath, chain: Chain, free_angle: float, space: FreeSpace, fixed: bool
+) -> _Problem:
+    begin = float(chain.s[0])
+    end = float(chain.s[-1])
     count = int(np.clip(np.ceil((end - begin) / _SPACING), _FEWEST, _MOST))
     knots = np.concatenate([[begin] * 3, np.linspace(begin, end, count + 1), [end] * 3])
     basis = BSpline.design_matrix(chain.s, knots, 3).toarray()
@@ -99,7 +110,8 @@ def _problem(path: ToolPath, chain: Chain, free_angle: float, space: FreeSpace, 
 
 def _fitted(problem: _Problem) -> tuple[FloatArray, Chain] | None:
     """Control points near the search's steps, as smooth as configurations allow."""
-    basis, wanted = problem.basis, problem.chain.angles
+    basis = problem.basis
+    wanted = problem.chain.angles
     bend = np.diff(np.eye(basis.shape[1]), n=2, axis=0)
     for weight in _FITS:
         normal = basis.T @ basis + weight * len(wanted) * bend.T @ bend
@@ -114,7 +126,9 @@ def _fitted(problem: _Problem) -> tuple[FloatArray, Chain] | None:
 
 
 def _rates(chain: Chain, scene: PlanningScene) -> tuple[FloatArray, FloatArray]:
-    """How much axes move (N - 1, n) and bend (N - 2, n) along the chain, as shares of their speeds."""
+    """How much axes move (N - 1, n) and bend (N - 2, n) along the chain, as shares of their
+    speeds.
+    """
     h = np.diff(chain.s)[:, None]
     moves = np.diff(chain.q, axis=0) / h / scene.limits.velocity
     bends = _BENDING * np.diff(moves, axis=0) / (0.5 * (h[1:] + h[:-1]))
@@ -128,7 +142,8 @@ def _cost(chain: Chain, scene: PlanningScene) -> float:
 
 def _step(problem: _Problem, control: FloatArray, chain: Chain) -> FloatArray:
     """The Gauss-Newton step (C,) within the free angle, none farther than _FARTHEST."""
-    scene, columns = problem.space.scene, list(_columns(problem, chain))
+    scene = problem.space.scene
+    columns = list(_columns(problem, chain))
     moves, bends = _rates(chain, scene)
     residual = np.concatenate([moves.ravel(), bends.ravel()])
     slopes = np.column_stack(columns)
@@ -136,9 +151,11 @@ def _step(problem: _Problem, control: FloatArray, chain: Chain) -> FloatArray:
     high = np.minimum(problem.bound - control, _FARTHEST)
     if problem.fixed:
         low[0] = high[0] = 0.0
-    normal, right = slopes.T @ slopes, -slopes.T @ residual
+    normal = slopes.T @ slopes
+    right = -slopes.T @ residual
     normal += 1e-9 * np.trace(normal) / len(normal) * np.eye(len(normal))
-    step, open_ = np.zeros(len(control)), np.ones(len(control), dtype=bool)
+    step = np.zeros(len(control))
+    open_ = np.ones(len(control), dtype=bool)
     for _ in range(4):  # what meets a bound stays there
         rest = right - normal[:, ~open_] @ step[~open_]
         step[open_] = np.linalg.solve(normal[np.ix_(open_, open_)], rest[open_])

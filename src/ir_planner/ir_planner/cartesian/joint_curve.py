@@ -1,4 +1,6 @@
-"""The axes along a path: configurations of one chain at dense samples, joined by a spline of degree five."""
+"""The axes along a path: configurations of one chain at dense samples, joined by a spline of degree
+five.
+"""
 
 import math
 from dataclasses import dataclass
@@ -59,8 +61,8 @@ class JointCurve:
 
     @cached_property
     def _pieces(self) -> tuple[FloatArray, FloatArray]:
-        """Where its polynomials begin (K,), and their coefficients (6, K, n), highest power first: looked up
-        they are evaluated three times as fast as by basis functions.
+        """Where its polynomials begin (K,), and their coefficients (6, K, n), highest power first:
+        looked up they are evaluated three times as fast as by basis functions.
         """
         begins = np.unique(self.spline.t)[:-1]
         orders = range(_DEGREE, -1, -1)
@@ -90,20 +92,26 @@ def tool_poses(path: ToolPath, angle: Angle | None, s: FloatArray) -> FloatArray
 
 
 def curve_of(
-    path: ToolPath, chain: Chain, angle: Angle | None, ends: tuple[float, float], scene: PlanningScene
+    path: ToolPath,
+    chain: Chain,
+    angle: Angle | None,
+    ends: tuple[float, float],
+    scene: PlanningScene,
 ) -> JointCurve:
     """The axes between two arc lengths [m] of a path, near a chain. Raises PathRefusedError."""
     inside = (chain.s > ends[0] + 1e-9) & (chain.s < ends[1] - 1e-9)
     rough = np.concatenate([ends[:1], chain.s[inside], ends[1:]])
     rough = _at_least(rough, _FEWEST)
-    worst, place = np.inf, 0.0
+    worst = np.inf
+    place = 0.0
     for finer in _FINER:
         s = _divided(rough, finer)
         q = followed(tool_poses(path, angle, s), s, chain, scene)
         curve = JointCurve(make_interp_spline(s, q, k=_DEGREE), *ends)
         middle = 0.5 * (s[1:] + s[:-1])
         error = _errors(curve.spline(middle), tool_poses(path, angle, middle), scene)
-        worst, place = float(error.max()), float(middle[int(np.argmax(error))])
+        worst = float(error.max())
+        place = float(middle[int(np.argmax(error))])
         if worst <= (1.0 if finer < _FINER[-1] else _LAST):
             return curve
     why = singularity(curve.spline(place), scene) or _SHARP
@@ -120,7 +128,11 @@ def followed(poses: FloatArray, s: FloatArray, chain: Chain, scene: PlanningScen
     every = turned_towards(found.q, near[found.pose_index], scene)
     away = np.abs(every - near[found.pose_index]).max(axis=1)
     order = np.lexsort((away, found.pose_index))
-    first = order[np.concatenate([[True], np.diff(found.pose_index[order]) > 0])] if len(order) else order
+    first = (
+        order[np.concatenate([[True], np.diff(found.pose_index[order]) > 0])]
+        if len(order)
+        else order
+    )
     reached = np.zeros(len(s), dtype=bool)
     reached[found.pose_index[first]] = away[first] <= JUMP
     if not reached.all():

@@ -22,8 +22,8 @@ _FEWEST = 8
 
 @dataclass(frozen=True, eq=False)
 class Layers:
-    """s (N,): samples; q (M, n), layer (M,), angle (M,) rad: configurations within the limits; free (M,).
-    turning (n,): axes whose whole turns are left out.
+    """s (N,): samples; q (M, n), layer (M,), angle (M,) rad: configurations within the limits; free
+    (M,). turning (n,): axes whose whole turns are left out.
     """
 
     s: FloatArray
@@ -43,7 +43,9 @@ def samples(path: ToolPath, spacing: float) -> FloatArray:
     turns = np.arccos(np.clip(0.5 * (np.trace(turned, axis1=1, axis2=2) - 1.0), -1.0, 1.0))
     steps = np.ceil(np.maximum(np.diff(rough) / spacing, turns / SPACING_TURN) - 1e-9).astype(int)
     steps = np.maximum(steps, 1)
-    parts = [np.linspace(a, b, k + 1)[:-1] for a, b, k in zip(rough[:-1], rough[1:], steps, strict=True)]
+    parts = [
+        np.linspace(a, b, k + 1)[:-1] for a, b, k in zip(rough[:-1], rough[1:], steps, strict=True)
+    ]
     return np.append(np.concatenate(parts), rough[-1])
 
 
@@ -57,9 +59,12 @@ def angles_of(free_angle: float) -> FloatArray:
     return np.linspace(-free_angle, free_angle, 2 * count + 1)
 
 
-def layers_of(path: ToolPath, free_angle: float, space: FreeSpace, start: FloatArray | None) -> Layers:
-    """All configurations along a path, but for whole turns. start (n,): the only one at its beginning. Raises
-    PathRefusedError where the path leaves the reach or every configuration collides.
+def layers_of(
+    path: ToolPath, free_angle: float, space: FreeSpace, start: FloatArray | None
+) -> Layers:
+    """All configurations along a path, but for whole turns. start (n,): the only one at its
+    beginning. Raises PathRefusedError where the path leaves the reach or every configuration
+    collides.
     """
     angles = angles_of(free_angle)
     s = samples(path, SPACING if len(angles) == 1 else _SPACING_FREE)
@@ -78,19 +83,24 @@ def layers_of(path: ToolPath, free_angle: float, space: FreeSpace, start: FloatA
 def configurations_at(
     path: ToolPath, s: FloatArray, free_angle: float, space: FreeSpace, turning: BoolArray
 ) -> Layers:
-    """All configurations at arc lengths s (N,) m of a path, but for whole turns of the axes `turning` (n,):
-    all that turn twice, or none.
+    """All configurations at arc lengths s (N,) m of a path, but for whole turns of the axes
+    `turning` (n,): all that turn twice, or none.
     """
     angles = angles_of(free_angle)
     poses = np.repeat(path.poses(s), len(angles), axis=0)
     poses[:, :3, :3] = poses[:, :3, :3] @ about_tool(np.tile(angles, len(s)))
     scene = space.scene
-    found = (scene.inverse_kinematics_once if turning.any() else scene.inverse_kinematics).solve(poses)
-    layer, angle = found.pose_index // len(angles), angles[found.pose_index % len(angles)]
+    found = (scene.inverse_kinematics_once if turning.any() else scene.inverse_kinematics).solve(
+        poses
+    )
+    layer = found.pose_index // len(angles)
+    angle = angles[found.pose_index % len(angles)]
     return Layers(s, found.q, layer, angle, space.states_free(found.q), turning)
 
 
-def _begun(layers: Layers, path: ToolPath, free_angle: float, space: FreeSpace, start: FloatArray) -> Layers:
+def _begun(
+    layers: Layers, path: ToolPath, free_angle: float, space: FreeSpace, start: FloatArray
+) -> Layers:
     """The layers with one configuration in the first: the start."""
     wanted = path.poses(layers.s[:1])[0]
     there = space.scene.chain.tcp_poses(start[None])[0]
@@ -100,9 +110,9 @@ def _begun(layers: Layers, path: ToolPath, free_angle: float, space: FreeSpace, 
     tilt = float(np.arccos(np.clip(turned[0, 0], -1.0, 1.0)))
     if away > _START_M or tilt > _START_RAD or abs(angle) > free_angle + _START_RAD:
         raise PathRefusedError(
-            f"the tcp of start is {away * 1e3:.3g} mm and {np.degrees(max(tilt, abs(angle))):.3g} deg from "
-            f"where the path begins: it must be within {_START_M * 1e3:g} mm and "
-            f"{np.degrees(_START_RAD):.2g} deg",
+            f"the tcp of start is {away * 1e3:.3g} mm and "
+            f"{np.degrees(max(tilt, abs(angle))):.3g} deg from where the path begins: it must be "
+            f"within {_START_M * 1e3:g} mm and {np.degrees(_START_RAD):.2g} deg",
             StatusCode.START_STATE_INVALID,
         )
     later = layers.layer > 0
@@ -115,11 +125,15 @@ def _begun(layers: Layers, path: ToolPath, free_angle: float, space: FreeSpace, 
     )
 
 
-_START_M, _START_RAD = 1e-5, 1e-5  # how near the start must be to the path's beginning
+# how near the start must be to the path's beginning
+_START_M = 1e-5
+_START_RAD = 1e-5
 
 
 def _check_reached(layers: Layers, space: FreeSpace) -> None:
-    """Raise PathRefusedError at the first place that no configuration reaches, or none that is free."""
+    """Raise PathRefusedError at the first place that no configuration reaches, or none that is
+    free.
+    """
     count = np.bincount(layers.layer, minlength=len(layers.s))
     free = np.bincount(layers.layer[layers.free], minlength=len(layers.s))
     if count.all() and free.all():
@@ -128,12 +142,13 @@ def _check_reached(layers: Layers, space: FreeSpace) -> None:
     at = f"at {layers.s[k]:.3f} m"
     if count[k] == 0:
         raise PathRefusedError(
-            f"the path leaves the reach or an axis limit {at}: no configuration brings the tool there in the "
-            "orientation asked for",
+            f"the path leaves the reach or an axis limit {at}: no configuration brings the tool "
+            "there in the orientation asked for",
             StatusCode.NO_IK_SOLUTION,
         )
     raise PathRefusedError(
-        f"all {count[k]} configurations collide {at}: {nearest_sentence(layers.q[layers.layer == k], space)}",
+        f"all {count[k]} configurations collide {at}: "
+        f"{nearest_sentence(layers.q[layers.layer == k], space)}",
         StatusCode.INVALID_MOTION_PLAN,
     )
 

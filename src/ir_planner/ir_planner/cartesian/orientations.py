@@ -12,7 +12,8 @@ from ir_msgs_py.arrays import FloatArray
 
 @dataclass(frozen=True)
 class Rates:
-    """Bounds of a rotation's derivatives along a path, |R'| [rad/m] and |R''| [rad/m^2], as 1 / sqrt(2) of
+    """Bounds of a rotation's derivatives along a path, |R'| [rad/m] and |R''| [rad/m^2], as 1 /
+    sqrt(2) of
     their Frobenius norms: of turning about one axis that is the angle's rate.
     """
 
@@ -21,12 +22,16 @@ class Rates:
 
     def then(self, other: "Rates") -> "Rates":
         """Of the product of two rotations."""
-        return Rates(self.first + other.first, self.second + other.second + 2.0 * self.first * other.first)
+        return Rates(
+            self.first + other.first, self.second + other.second + 2.0 * self.first * other.first
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Evenly:
-    """From the rotation `start` (3, 3), turning by `turn` (3,) rad (in the tool's frame) over `length` m."""
+    """From the rotation `start` (3, 3), turning by `turn` (3,) rad (in the tool's frame) over
+    `length` m.
+    """
 
     start: FloatArray
     turn: FloatArray
@@ -52,7 +57,9 @@ class Evenly:
 
 
 class ThroughPoses:
-    """The rotation spline through rotations (N, 3, 3) at s (N,) m: its acceleration is continuous."""
+    """The rotation spline through rotations (N, 3, 3) at s (N,) m: its acceleration is
+    continuous.
+    """
 
     def __init__(self, s: FloatArray, rotations: FloatArray) -> None:
         self._spline = RotationSpline(s, Rotation.from_matrix(rotations))
@@ -90,9 +97,11 @@ def turn_between(first: FloatArray, second: FloatArray) -> float:
 
 def about_tool(angle: FloatArray) -> FloatArray:
     """Rotations (M, 3, 3) by angles (M,) rad about the tool's axis, x."""
-    c, s = np.cos(angle), np.sin(angle)
+    c = np.cos(angle)
+    s = np.sin(angle)
     turned = np.zeros((len(angle), 3, 3))
     turned[:, 0, 0] = 1.0
     turned[:, 1, 1] = turned[:, 2, 2] = c
-    turned[:, 1, 2], turned[:, 2, 1] = -s, s
+    turned[:, 1, 2] = -s
+    turned[:, 2, 1] = s
     return turned

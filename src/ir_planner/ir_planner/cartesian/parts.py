@@ -1,4 +1,6 @@
-"""The parts of a tool's path: what a request's segments, approach and retract draw, each by itself."""
+"""The parts of a tool's path: what a request's segments, approach and retract draw, each by
+itself.
+"""
 
 import itertools
 from dataclasses import dataclass
@@ -20,7 +22,8 @@ _OPPOSITE = np.radians(179.0)  # beyond, the shortest turn isn't known
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A curve of the tool with its orientations, the speed that is asked for [m/s], and whether that has to
+    """A curve of the tool with its orientations, the speed that is asked for [m/s], and whether
+    that has to
     be kept: on an approach and a retract it needn't.
     """
 
@@ -55,7 +58,9 @@ def parts_of(path: CartesianPath) -> tuple[Part, ...]:
     total = sum(part.length for part in parts)
     if total > FARTHEST:
         raise _refused(f"the path is {total:g} m long: it must be at most {FARTHEST:g} m")
-    before = (_along_axis(path.start, -path.approach, path, "approach"),) if path.approach > 0.0 else ()
+    before = (
+        (_along_axis(path.start, -path.approach, path, "approach"),) if path.approach > 0.0 else ()
+    )
     after = (_along_axis(here, -path.retract, path, "retract"),) if path.retract > 0.0 else ()
     return (*before, *parts, *after)
 
@@ -77,27 +82,34 @@ def _segment(segment: CartesianSegment, here: FloatArray, name: str, path: Carte
         arc = arc_through(*places)
         if arc is None:
             raise _refused(
-                f"{name}: start, the point between and the end lie on a line, or two of them are one place: "
-                "that is no circle; a whole turn is two arcs"
+                f"{name}: start, the point between and the end lie on a line, or two of them are "
+                "one place: that is no circle; a whole turn is two arcs"
             )
-        curve, poses = arc, [poses[0], poses[2]]
+        curve = arc
+        poses = [poses[0], poses[2]]
     else:
         curve = Through(places)
     _check_turns(poses, name)
     if isinstance(curve, Through) and len(poses) > 2:
         rotations = np.array([pose[:3, :3] for pose in poses])
         return Part(name, curve, ThroughPoses(curve.at_points, rotations), speed)
-    return Part(name, curve, Evenly.between(poses[0][:3, :3], poses[-1][:3, :3], curve.length), speed)
+    return Part(
+        name, curve, Evenly.between(poses[0][:3, :3], poses[-1][:3, :3], curve.length), speed
+    )
 
 
 def _along_axis(pose: FloatArray, by: float, path: CartesianPath, name: str) -> Part:
     """The line between a pose (4, 4) and the place `by` m along the tool's axis."""
     ends = [pose[:3, 3] + by * pose[:3, 0], pose[:3, 3]]
     if abs(by) < SHORTEST:
-        raise _refused(f"{name} is {abs(by):g} m: it must be 0 m or in [{SHORTEST:g}, {LENGTH_MAX:g}] m")
+        raise _refused(
+            f"{name} is {abs(by):g} m: it must be 0 m or in [{SHORTEST:g}, {LENGTH_MAX:g}] m"
+        )
     first, last = ends if name == "approach" else ends[::-1]
     line = Line(np.array(first), np.array(last))
-    return Part(name, line, Evenly(np.array(pose[:3, :3]), np.zeros(3), line.length), path.tool_speed, False)
+    return Part(
+        name, line, Evenly(np.array(pose[:3, :3]), np.zeros(3), line.length), path.tool_speed, False
+    )
 
 
 def _check_place(pose: FloatArray, name: str) -> None:
@@ -111,7 +123,8 @@ def _check_steps(places: FloatArray, name: str) -> None:
     k = int(np.argmin(steps))
     if steps[k] < SHORTEST * _ROUNDED:
         raise _refused(
-            f"{name}.poses[{k}] is {steps[k]:g} m from the pose before it: it must be at least {SHORTEST:g} m"
+            f"{name}.poses[{k}] is {steps[k]:g} m from the pose before it: it must be at least "
+            f"{SHORTEST:g} m"
         )
 
 
@@ -120,8 +133,9 @@ def _check_turns(poses: list[FloatArray], name: str) -> None:
         turn = turn_between(before[:3, :3], after[:3, :3])
         if turn > _OPPOSITE:
             raise _refused(
-                f"{name} turns the tool by {np.degrees(turn):.1f} deg from one pose to the next: it must be "
-                f"at most {np.degrees(_OPPOSITE):g} deg, or the direction is open; give a pose between"
+                f"{name} turns the tool by {np.degrees(turn):.1f} deg from one pose to the next: "
+                f"it must be at most {np.degrees(_OPPOSITE):g} deg, or the direction is open; "
+                "give a pose between"
             )
 
 

@@ -1,4 +1,6 @@
-"""Where a tool goes, as curves over their arc length: straight lines, arcs, splines through places."""
+"""Where a tool goes, as curves over their arc length: straight lines, arcs, splines through
+places.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -75,7 +77,9 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Arc:
-    """Places centre + cos(phi) radius + sin(phi) across, (3,) each [m], for phi from 0 to angle [rad]."""
+    """Places centre + cos(phi) radius + sin(phi) across, (3,) each [m], for phi from 0 to angle
+    [rad].
+    """
 
     centre: FloatArray
     radius: FloatArray
@@ -105,7 +109,9 @@ class Arc:
     def tangent(self, s: FloatArray) -> FloatArray:
         """Unit tangents (M, 3) at s (M,)."""
         turned = np.asarray(s)[:, None] * self._rate
-        return np.asarray((np.cos(turned) * self.across - np.sin(turned) * self.radius) * self._rate)
+        return np.asarray(
+            (np.cos(turned) * self.across - np.sin(turned) * self.radius) * self._rate
+        )
 
     @property
     def _rate(self) -> float:
@@ -116,10 +122,11 @@ class Arc:
 def arc_through(
     start: FloatArray, via: FloatArray, end: FloatArray, angle: float | None = None
 ) -> Arc | None:
-    """The circle through three places (3,) [m], up to the end or to an angle [rad]; None where they lie on a
-    line, or the end where the start is.
+    """The circle through three places (3,) [m], up to the end or to an angle [rad]; None where they
+    lie on a line, or the end where the start is.
     """
-    a, b = via - start, end - start
+    a = via - start
+    b = end - start
     normal = np.cross(a, b)
     size = float(normal @ normal)
     nearest = min(float(a @ a), float(b @ b))
@@ -135,8 +142,8 @@ def arc_through(
 
 
 class Through:
-    """The interpolating spline through places (N, 3) m, over its own arc length: cubic, its second derivative
-    is continuous.
+    """The interpolating spline through places (N, 3) m, over its own arc length: cubic, its second
+    derivative is continuous.
     """
 
     def __init__(self, places: FloatArray) -> None:
@@ -154,8 +161,9 @@ class Through:
 
     @cached_property
     def curvature(self) -> float:
-        """A bound of it [1/m]: |p''| / |p'|^2, of which p'' is linear between knots, so largest at an end of
-        each part of a piece, and p' is shorter than at both ends by half of what p'' makes of it at most.
+        """A bound of it [1/m]: |p''| / |p'|^2, of which p'' is linear between knots, so largest at
+        an end of each part of a piece, and p' is shorter than at both ends by half of what p''
+        makes of it at most.
         """
         u = self._arc.samples
         bent = np.linalg.norm(self._curve(u, nu=2), axis=1)
@@ -180,7 +188,9 @@ class Through:
 
 
 class ArcLength:
-    """Arc length over a parameter u, and back: speed(u) = |dp/du| is smooth between `breaks` (K,)."""
+    """Arc length over a parameter u, and back: speed(u) = |dp/du| is smooth between `breaks`
+    (K,).
+    """
 
     def __init__(self, breaks: FloatArray, speed: "_Speed") -> None:
         share = np.linspace(0.0, 1.0, _PER_PIECE + 1)[:-1]

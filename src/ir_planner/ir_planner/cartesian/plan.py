@@ -1,4 +1,6 @@
-"""A path of the tool as a certified movement: the chain of configurations of least J that keeps the speed."""
+"""A path of the tool as a certified movement: the chain of configurations of least J that keeps the
+speed.
+"""
 
 import numpy as np
 
@@ -19,12 +21,16 @@ from ir_planner.request import Context, checked_options, chosen
 PLANNER_ID = "cartesian"
 
 
-def plan_path(path: CartesianPath, start: FloatArray | None, t1: bool, context: Context) -> CartesianPlan:
-    """Plan a path from the configuration `start` (n,), None: the one of least J. t1: at most 250 mm/s.
+def plan_path(
+    path: CartesianPath, start: FloatArray | None, t1: bool, context: Context
+) -> CartesianPlan:
+    """Plan a path from the configuration `start` (n,), None: the one of least J. t1: at most 250
+    mm/s.
 
     Raises RequestError for a request that makes no sense, CancelledError when asked to stop.
     """
-    context.journal.planner_id, context.journal.timing = PLANNER_ID, "synchronous"
+    context.journal.planner_id = PLANNER_ID
+    context.journal.timing = "synchronous"
     try:
         return _planned(path, start, t1, context)
     except PathRefusedError as error:
@@ -33,7 +39,9 @@ def plan_path(path: CartesianPath, start: FloatArray | None, t1: bool, context: 
         return _answer(heading_status(error), context)
 
 
-def _planned(path: CartesianPath, start: FloatArray | None, t1: bool, context: Context) -> CartesianPlan:
+def _planned(
+    path: CartesianPath, start: FloatArray | None, t1: bool, context: Context
+) -> CartesianPlan:
     if start is not None:
         start = _checked_start(start, context)
     whole = drawn(path, start, t1, context)
@@ -59,7 +67,8 @@ def _planned(path: CartesianPath, start: FloatArray | None, t1: bool, context: C
 
 def _checked_start(start: FloatArray, context: Context) -> FloatArray:
     """The configuration (n,) that is given, within the axis limits. Raises RequestError."""
-    robot, q = context.scene.cell.robot, np.asarray(start, dtype=float)
+    robot = context.scene.cell.robot
+    q = np.asarray(start, dtype=float)
     if q.shape != (robot.n,) or not np.isfinite(q).all():
         raise RequestError(
             StatusCode.START_STATE_INVALID,
@@ -86,12 +95,14 @@ def heading_status(error: HeadingError) -> Status:
 
 
 def _answer(status: Status, context: Context) -> CartesianPlan:
-    return CartesianPlan(status, context.journal.info(None, context.joint_names), TrajectoryReport())
+    return CartesianPlan(
+        status, context.journal.info(None, context.joint_names), TrajectoryReport()
+    )
 
 
 def checked_path_options(options: PlanOptions) -> tuple[PlanOptions, str]:
-    """The options within the planner's bounds, and a note ("" mostly). Raises RequestError for those that a
-    path at a given speed can't meet.
+    """The options within the planner's bounds, and a note ("" mostly). Raises RequestError for
+    those that a path at a given speed can't meet.
     """
     chosen(options.planner_id, ("", PLANNER_ID), "planner_id")
     if options.duration > 0.0:
@@ -102,6 +113,7 @@ def checked_path_options(options: PlanOptions) -> tuple[PlanOptions, str]:
     if options.timing != "synchronous":
         raise RequestError(
             StatusCode.INVALID_GOAL_CONSTRAINTS,
-            f"timing is {options.timing}: along a path all axes move together, it must be synchronous",
+            f"timing is {options.timing}: along a path all axes move together, it must be "
+            "synchronous",
         )
     return checked_options(options)

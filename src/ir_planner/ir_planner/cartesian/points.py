@@ -1,4 +1,6 @@
-"""A timed path as the trajectory that is sent: so many points that the tool keeps to the path between."""
+"""A timed path as the trajectory that is sent: so many points that the tool keeps to the path
+between.
+"""
 
 from dataclasses import dataclass
 
@@ -23,8 +25,8 @@ _SHORTEST_NS = 400_000
 
 @dataclass(frozen=True, eq=False)
 class SentPath:
-    """The trajectory with its strokes, when each begins (K,) s, and the law's instants of its points (K of
-    (P,) s).
+    """The trajectory with its strokes, when each begins (K,) s, and the law's instants of its
+    points (K of (P,) s).
     """
 
     trajectory: JointTrajectory
@@ -38,11 +40,14 @@ def sent(strokes: tuple[TimedStroke, ...], limits: MotionLimits, scene: Planning
     names = scene.cell.robot.joint_names
     times: list[IntArray] = []
     rows: list[tuple[FloatArray, ...]] = []
-    begins, instants, begin_ns = [], [], 0
+    begins = []
+    instants = []
+    begin_ns = 0
     for stroke in strokes:
         tau = _dense_enough(stroke, limits, scene)
         motion = stroke.at(tau)
-        qd, qdd = motion.qd.copy(), motion.qdd.copy()
+        qd = motion.qd.copy()
+        qdd = motion.qdd.copy()
         qd[[0, -1]] = qdd[[0, -1]] = 0.0
         first = 1 if times else 0
         begins.append(begin_ns / NS_PER_S)
@@ -76,7 +81,9 @@ def _dense_enough(stroke: TimedStroke, limits: MotionLimits, scene: PlanningScen
 def _first_points(stroke: TimedStroke) -> FloatArray:
     law = stroke.law
     rates = np.maximum(law.first, law.last)
-    counts = np.ceil(np.maximum(law.duration * rates / _SPACING, law.duration / _LONGEST)).astype(int)
+    counts = np.ceil(np.maximum(law.duration * rates / _SPACING, law.duration / _LONGEST)).astype(
+        int
+    )
     counts = np.maximum(counts, np.where(law.first == law.last, 1, _PER_RAMP))
     inner = [
         np.linspace(begin, end, count + 1)[:-1]
@@ -86,25 +93,39 @@ def _first_points(stroke: TimedStroke) -> FloatArray:
 
 
 def _between(
-    stroke: TimedStroke, tau: FloatArray, which: IntArray, limits: MotionLimits, scene: PlanningScene
+    stroke: TimedStroke,
+    tau: FloatArray,
+    which: IntArray,
+    limits: MotionLimits,
+    scene: PlanningScene,
 ) -> FloatArray:
-    """How far the interpolant leaves the stroke, or the jerk its limit, between points `which` (W,) and the
+    """How far the interpolant leaves the stroke, or the jerk its limit, between points `which` (W,)
+    and the
     next: 1 is allowed.
     """
     ends = stroke.at(tau)
     inside = tau[which, None] + _INSIDE * np.diff(tau)[which, None]
     asked = stroke.at(inside.ravel())
     trajectory = JointTrajectory(
-        scene.cell.robot.joint_names, np.rint(ends.t * NS_PER_S).astype(np.int64), ends.q, ends.qd, ends.qdd
+        scene.cell.robot.joint_names,
+        np.rint(ends.t * NS_PER_S).astype(np.int64),
+        ends.q,
+        ends.qd,
+        ends.qdd,
     )
     motion = trajectory.sample(asked.t)
-    off, away = motion.q - asked.q, motion.qd - asked.qd
+    off = motion.q - asked.q
+    away = motion.qd - asked.qd
     jacobian = scene.chain.jacobian(asked.q)
-    place, turn = (np.linalg.norm(np.einsum("mij,mj->mi", jacobian[:, rows], off), axis=1) for rows in _ROWS)
+    place, turn = (
+        np.linalg.norm(np.einsum("mij,mj->mi", jacobian[:, rows], off), axis=1) for rows in _ROWS
+    )
     speed = np.linalg.norm(np.einsum("mij,mj->mi", jacobian[:, :3], away), axis=1)
     top = max(float(asked.speed.max()), 1e-9)
     jerk = (np.abs(motion.qddd) / limits.jerk).max(axis=1) / _JERK_USED
-    worst = np.maximum.reduce([place / POINT_ERROR, turn / _POINT_TURN, speed / (_SPEED_ERROR * top), jerk])
+    worst = np.maximum.reduce(
+        [place / POINT_ERROR, turn / _POINT_TURN, speed / (_SPEED_ERROR * top), jerk]
+    )
     return np.asarray(worst.reshape(len(which), -1).max(axis=1))
 
 

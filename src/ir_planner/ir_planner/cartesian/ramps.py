@@ -14,7 +14,8 @@ USED = 0.97  # of a limit: the interpolant between points needs a little more th
 PER_RAMP = 13
 ENOUGH = 1.0 + 1e-4
 _RAMPS = np.geomspace(0.01, 10.0, 13)  # s
-_FINER, _ZOOMS = 8, 3
+_FINER = 8
+_ZOOMS = 3
 
 
 def ramps_of(
@@ -26,9 +27,9 @@ def ramps_of(
     slow: bool,
     used: float = USED,
 ) -> FloatArray:
-    """The shortest ramps (K + 1,) s between the speeds at all boundaries that need no more of the limits than
-    the constant speed beside them does, or `used`. slow: where that is too much, one that keeps them, if
-    there is one; a path that begins near a singularity is driven slowly there.
+    """The shortest ramps (K + 1,) s between the speeds at all boundaries that need no more of the
+    limits than the constant speed beside them does, or `used`. slow: where that is too much, one
+    that keeps them, if there is one; a path that begins near a singularity is driven slowly there.
     """
     found = [_ramp(curve, spans, k, limits, scene, slow, used) for k in range(len(spans) + 1)]
     return np.array(found)
@@ -81,14 +82,19 @@ def _ramps_use(
     limits: MotionLimits,
     scene: PlanningScene,
 ) -> tuple[FloatArray, FloatArray]:
-    """What ramps of these durations (R,) s need of the limits (R,), and the constant speed there (R,)."""
+    """What ramps of these durations (R,) s need of the limits (R,), and the constant speed there
+    (R,).
+    """
     begin, first, last = ramp_places(spans, k, durations)
-    x, T = np.linspace(0.0, 1.0, PER_RAMP), durations[:, None]
+    x = np.linspace(0.0, 1.0, PER_RAMP)
+    T = durations[:, None]
     rise = last - first
     s = curve.begin + begin[:, None] + T * x * (first + rise * x**2 * (1.0 - 0.5 * x))
     v = np.broadcast_to(first + rise * x**2 * (3.0 - 2.0 * x), s.shape)
-    a, j = rise / T * 6.0 * x * (1.0 - x), rise / T**2 * (6.0 - 12.0 * x)
-    none, places = np.zeros(s.size), s.ravel()
+    a = rise / T * 6.0 * x * (1.0 - x)
+    j = rise / T**2 * (6.0 - 12.0 * x)
+    none = np.zeros(s.size)
+    places = s.ravel()
     even = np.full(s.size, max(first, last))
     along = curve.at(np.clip(places, curve.begin, curve.end))
     ramp = use_of(with_speed(along, none, places, v.ravel(), a.ravel(), j.ravel()), limits, scene)

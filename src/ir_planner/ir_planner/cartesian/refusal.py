@@ -18,7 +18,9 @@ class PathRefusedError(Exception):
 
 
 class NoChainError(Exception):
-    """No chain of configurations leads through all layers; reached (M,): those to which one leads."""
+    """No chain of configurations leads through all layers; reached (M,): those to which one
+    leads.
+    """
 
     def __init__(self, reached: IntArray) -> None:
         super().__init__(f"chains lead to {len(reached)} configurations, and not to the last layer")

@@ -17,7 +17,10 @@ def remarks(path: CartesianPath, found: DrivenPath) -> Iterator[tuple[str, str]]
     asked = found.slower * max(part.tool_speed or path.tool_speed for part in path.segments)
     top = max(float(stroke.law.last.max()) for stroke in found.sent.strokes)
     if top < _REACHED * asked:
-        yield "speed", f"the path is too short for {asked:.4g} m/s: the tool moves at {top:.4g} m/s at most"
+        yield (
+            "speed",
+            f"the path is too short for {asked:.4g} m/s: the tool moves at {top:.4g} m/s at most",
+        )
 
 
 def _kept_between(found: DrivenPath) -> str:

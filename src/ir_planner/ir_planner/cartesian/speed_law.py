@@ -1,5 +1,5 @@
-"""The tool's speed over time: constant along each part, and between two speeds a ramp without jumps of
-acceleration. A ramp lies in the faster part, so the tool is nowhere faster than asked for.
+"""The tool's speed over time: constant along each part, and between two speeds a ramp without jumps
+of acceleration. A ramp lies in the faster part, so the tool is nowhere faster than asked for.
 """
 
 import itertools
@@ -25,13 +25,14 @@ class TooShortError(Exception):
 
     def __init__(self, index: int, missing: float) -> None:
         super().__init__(f"span {index} lacks {missing:g} m")
-        self.index, self.missing = index, missing
+        self.index = index
+        self.missing = missing
 
 
 @dataclass(frozen=True, eq=False)
 class SpeedLaw:
-    """Phases (P,): duration [s], speed at the beginning and the end [m/s]; even: constant speed that is to be
-    kept.
+    """Phases (P,): duration [s], speed at the beginning and the end [m/s]; even: constant speed
+    that is to be kept.
     """
 
     duration: FloatArray
@@ -61,7 +62,9 @@ class SpeedLaw:
     def at(self, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """s [m], speed, acceleration and jerk (M,) at t (M,) s."""
         k = self.phase(t)
-        T, v, dv = self.duration[k], self.first[k], (self.last - self.first)[k]
+        T = self.duration[k]
+        v = self.first[k]
+        dv = (self.last - self.first)[k]
         x = np.clip((t - self.times[k]) / T, 0.0, 1.0)
         s = self.places[k] + T * x * (v + dv * x * x * (1.0 - 0.5 * x))
         speed = v + dv * x * x * (3.0 - 2.0 * x)
@@ -69,7 +72,8 @@ class SpeedLaw:
 
 
 def law_of(spans: tuple[Span, ...], ramps: FloatArray) -> SpeedLaw:
-    """From rest to rest; ramps (K + 1,) s: how long the changes of speed take at the ends of the spans.
+    """From rest to rest; ramps (K + 1,) s: how long the changes of speed take at the ends of the
+    spans.
 
     Raises TooShortError.
     """
@@ -92,10 +96,15 @@ def law_of(spans: tuple[Span, ...], ramps: FloatArray) -> SpeedLaw:
     return SpeedLaw(duration, first, last, even.astype(bool))
 
 
-def ramp_places(spans: tuple[Span, ...], k: int, duration: FloatArray) -> tuple[FloatArray, float, float]:
-    """Where the ramp before span k (or after the last) begins (D,) m for durations (D,) s; both speeds."""
+def ramp_places(
+    spans: tuple[Span, ...], k: int, duration: FloatArray
+) -> tuple[FloatArray, float, float]:
+    """Where the ramp before span k (or after the last) begins (D,) m for durations (D,) s; both
+    speeds.
+    """
     speeds = [0.0, *(span.speed for span in spans), 0.0]
     ends = [0.0, *itertools.accumulate(span.length for span in spans)]
-    first, last = speeds[k], speeds[k + 1]
+    first = speeds[k]
+    last = speeds[k + 1]
     covered = 0.5 * (first + last) * duration
     return (ends[k] - covered if first > last else np.full_like(duration, ends[k])), first, last

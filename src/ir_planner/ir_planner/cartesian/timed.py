@@ -1,5 +1,6 @@
-"""The time along one stroke of a path, from rest to rest: the tool's speed as asked for where the axes can
-follow; within the tolerance slower where they can't, else refused with the place and the axis.
+"""The time along one stroke of a path, from rest to rest: the tool's speed as asked for where the
+axes can follow; within the tolerance slower where they can't, else refused with the place and the
+axis.
 """
 
 from contextlib import suppress
@@ -19,20 +20,30 @@ from ir_planner.cartesian.refusal import PathRefusedError
 from ir_planner.cartesian.speed_law import Span, SpeedLaw, TooShortError, law_of
 from ir_planner.scene import MotionLimits, PlanningScene, torque_use
 
-_STEP_S, _SAMPLES_MIN, _SAMPLES_MAX = 4e-3, 200, 6000
-_WARP_S, _WARP_MIN, _WARP_MAX = 0.02, 60, 1500  # of the slowness' knots
-_ROUNDS, _AROUND = 25, 4
+_STEP_S = 4e-3
+_SAMPLES_MIN = 200
+_SAMPLES_MAX = 6000
+# of the slowness' knots
+_WARP_S = 0.02
+_WARP_MIN = 60
+_WARP_MAX = 1500
+_ROUNDS = 25
+_AROUND = 4
 _USED_AT_MOST = 0.995  # of a limit, by ramps that are too long for their part otherwise
-_GROWTH, _GROWTHS = 1.2, 30  # of a ramp
+# of a ramp
+_GROWTH = 1.2
+_GROWTHS = 30
 _SLOWER = 0.85
 _SHORTER = 0.999  # of ramps that would just fit
-_SHOWN = 0.95  # of the tolerance: what is shown of the speed is a bound, a little above what it is at samples
+# of the tolerance: what is shown of the speed is a bound, a little above what it is at samples
+_SHOWN = 0.95
 _SLOWEST = 1e-4  # m/s
 
 
 @dataclass(frozen=True, eq=False)
 class TimedStroke:
-    """A curve of the axes with its law; slowness: by how much longer each instant of the law takes, None:
+    """A curve of the axes with its law; slowness: by how much longer each instant of the law takes,
+    None:
     1.
     """
 
@@ -58,7 +69,9 @@ class TimedStroke:
             g = 1.0 / self.slowness(tau)
             g1 = -self.slowness(tau, nu=1) * g**2  # by tau
             g2 = -self.slowness(tau, nu=2) * g**2 + 2.0 * self.slowness(tau, nu=1) ** 2 * g**3
-            first, second, third = g, g * g1, g * g1**2 + g**2 * g2
+            first = g
+            second = g * g1
+            third = g * g1**2 + g**2 * g2
             v, a, j = (
                 v * first,
                 a * first**2 + v * second,
@@ -125,8 +138,8 @@ def _grown(
     limits: MotionLimits,
     scene: PlanningScene,
 ) -> TimedStroke | None:
-    """The stroke with longer ramps to the ends that are nearest to where it exceeds the limits; None where
-    they don't fit.
+    """The stroke with longer ramps to the ends that are nearest to where it exceeds the limits;
+    None where they don't fit.
     """
     ends = np.concatenate([[0.0], np.cumsum([span.length for span in spans])])
     speeds = np.array([0.0, *(span.speed for span in spans), 0.0])
@@ -146,8 +159,12 @@ def _grown(
     return None
 
 
-def _slower(spans: tuple[Span, ...], error: TooShortError, tolerance: float) -> tuple[Span, ...] | None:
-    """The spans with a lower speed where one is too short for it; None where it may not be lower."""
+def _slower(
+    spans: tuple[Span, ...], error: TooShortError, tolerance: float
+) -> tuple[Span, ...] | None:
+    """The spans with a lower speed where one is too short for it; None where it may not be
+    lower.
+    """
     k = error.index
     span = spans[k]
     if (span.kept and tolerance < 1.0) or span.speed < _SLOWEST:
@@ -164,7 +181,8 @@ def _too_short(
     scene: PlanningScene,
 ) -> PathRefusedError:
     """Why a span can't be driven at its speed: where it lies, and the axis that lacks something."""
-    k, span = error.index, spans[error.index]
+    k = error.index
+    span = spans[error.index]
     begin = curve.begin + sum(one.length for one in spans[:k])
     fits = span.length / (span.length + error.missing)
     axis = ""
@@ -175,9 +193,10 @@ def _too_short(
         worst = _worst(motion, at, limits, scene)
         axis = f"; with shorter ramps {worst} at {motion.s[at]:.3f} m"
     return PathRefusedError(
-        f"a part of the path, from {begin:.3f} to {begin + span.length:.3f} m, is {span.length:.4g} m long: "
-        f"reaching {span.speed:g} m/s and braking take {span.length + error.missing:.4g} m{axis}; "
-        f"a tool_speed of about {span.speed * fits ** (2.0 / 3.0):.2g} m/s, or speed_tolerance 1, may help",
+        f"a part of the path, from {begin:.3f} to {begin + span.length:.3f} m, is "
+        f"{span.length:.4g} m long: reaching {span.speed:g} m/s and braking take "
+        f"{span.length + error.missing:.4g} m{axis}; a tool_speed of about "
+        f"{span.speed * fits ** (2.0 / 3.0):.2g} m/s, or speed_tolerance 1, may help",
         StatusCode.INVALID_MOTION_PLAN,
     )
 
@@ -189,7 +208,9 @@ def _instants(law: SpeedLaw) -> FloatArray:
     return np.unique(np.concatenate([np.linspace(0.0, law.total, count), inner]))
 
 
-def _slowed(made: TimedStroke, tolerance: float, limits: MotionLimits, scene: PlanningScene) -> TimedStroke:
+def _slowed(
+    made: TimedStroke, tolerance: float, limits: MotionLimits, scene: PlanningScene
+) -> TimedStroke:
     """The stroke with more time where a limit is exceeded, as far as the tolerance allows."""
     law = made.law
     most = np.inf if tolerance >= 1.0 else 1.0 / (1.0 - _SHOWN * tolerance)
@@ -224,7 +245,8 @@ def _refused(
     speed = motion.speed[k]
     slowest = f"; there it could do about {speed / factor[k]:.3g} m/s" if speed > 0.0 else ""
     return PathRefusedError(
-        f"{_worst(motion, k, limits, scene)} at {motion.s[k]:.3f} m, where the tool moves at {speed:.3g} m/s"
+        f"{_worst(motion, k, limits, scene)} at {motion.s[k]:.3f} m, where the tool moves at "
+        f"{speed:.3g} m/s"
         f"{singularity(motion.q[k], scene)}{slowest}; speed_tolerance is {tolerance:g}",
         StatusCode.INVALID_MOTION_PLAN,
     )
@@ -232,7 +254,9 @@ def _refused(
 
 def _worst(motion: Driven, k: int, limits: MotionLimits, scene: PlanningScene) -> str:
     """The axis that lacks most at instant k of a motion, and what it lacks."""
-    torque = torque_use(scene.dynamics, motion.q[k : k + 1], motion.qd[k : k + 1], motion.qdd[k : k + 1])[0]
+    torque = torque_use(
+        scene.dynamics, motion.q[k : k + 1], motion.qd[k : k + 1], motion.qdd[k : k + 1]
+    )[0]
     shares = {
         "velocity": np.abs(motion.qd[k]) / limits.velocity,
         "acceleration": np.abs(motion.qdd[k]) / limits.acceleration,

@@ -1,9 +1,11 @@
-"""How well the tool keeps to its path: bounds of its distance, its turn and its speed at every instant.
+"""How well the tool keeps to its path: bounds of its distance, its turn and its speed at every
+instant.
 
-Between two instants a curve leaves the chord of its places by at most T^2 / 8 times a bound of its second
-derivative, and the path leaves its own chord by at most du^2 / 8 times a bound of its. The chords are nowhere
-farther apart than at their ends. So the largest distance at the instants with these two sags is a bound of
-the distance at all times. The same holds for rotations as matrices, and for the tool's velocity.
+Between two instants a curve leaves the chord of its places by at most T^2 / 8 times a bound of its
+second derivative, and the path leaves its own chord by at most du^2 / 8 times a bound of its. The
+chords are nowhere farther apart than at their ends. So the largest distance at the instants with
+these two sags is a bound of the distance at all times. The same holds for rotations as matrices,
+and for the tool's velocity.
 """
 
 from dataclasses import astuple, dataclass
@@ -20,14 +22,18 @@ from ir_planner.scene import PlanningScene
 _BETWEEN = 2e-5  # m that the bound may add between samples,
 _BETWEEN_TURN = 1e-4  # rad,
 _BETWEEN_SPEED = 5e-4  # and share of the speed
-_STEP_MAX, _STEP_MIN = 0.02, 1e-4  # s
+# s
+_STEP_MAX = 0.02
+_STEP_MIN = 1e-4
 _PIECE = 20_000
 _ROOT = np.sqrt(2.0)
 
 
 @dataclass(frozen=True)
 class Kept:
-    """Bounds: tool_error [m]; rotation_error [rad]; speed_deviation: share of the speed asked for."""
+    """Bounds: tool_error [m]; rotation_error [rad]; speed_deviation: share of the speed asked
+    for.
+    """
 
     tool_error: float = 0.0
     rotation_error: float = 0.0
@@ -40,7 +46,8 @@ class Kept:
 
 def kept_of(sent: SentPath, path: ToolPath, angle: Angle | None, scene: PlanningScene) -> Kept:
     """What the trajectory that is sent keeps of the path."""
-    motion, kept = tool_motion(sent.trajectory, scene), Kept()
+    motion = tool_motion(sent.trajectory, scene)
+    kept = Kept()
     for k in range(len(sent.strokes)):
         judged = _Stroke(sent, k, path, angle, scene, motion)
         tau = judged.instants()
@@ -62,12 +69,14 @@ class _Stroke:
 
     def times(self, tau: FloatArray) -> FloatArray:
         """Seconds (M,) of the trajectory at instants tau (M,) s of the law."""
-        stroke, last = self.sent.strokes[self.k], self.sent.trajectory.duration
+        stroke = self.sent.strokes[self.k]
+        last = self.sent.trajectory.duration
         return np.asarray(np.minimum(self.sent.begins[self.k] + stroke.at(tau).t, last))
 
     def instants(self) -> FloatArray:
         """Instants (M,) s of the law, near enough to each other for the bounds to be close."""
-        law, motion = self.sent.strokes[self.k].law, self.motion
+        law = self.sent.strokes[self.k].law
+        motion = self.motion
         tau = np.union1d(self.sent.instants[self.k], law.times)
         points = self.times(tau)
         slowest = float(law.first[law.even].min()) if law.even.any() else np.inf
@@ -76,19 +85,26 @@ class _Stroke:
             (_BETWEEN_TURN, motion.turning),
             (_BETWEEN_SPEED * slowest, motion.jerk),
         )
-        steps = [8.0 * most / np.maximum(motion.between(value, points), 1e-9) for most, value in allowed]
+        steps = [
+            8.0 * most / np.maximum(motion.between(value, points), 1e-9) for most, value in allowed
+        ]
         step = np.clip(np.sqrt(np.min(steps, axis=0)), _STEP_MIN, _STEP_MAX)
         count = np.maximum(np.ceil(np.diff(points) / step), 1).astype(int)
         pieces = zip(tau[:-1], tau[1:], count, strict=True)
-        return np.append(np.concatenate([np.linspace(a, b, n + 1)[:-1] for a, b, n in pieces]), tau[-1])
+        return np.append(
+            np.concatenate([np.linspace(a, b, n + 1)[:-1] for a, b, n in pieces]), tau[-1]
+        )
 
     def kept(self, tau: FloatArray) -> Kept:
         """The bounds from the first of tau (M,) s to the last."""
-        asked, times = self.sent.strokes[self.k].at(tau), self.times(tau)
+        asked = self.sent.strokes[self.k].at(tau)
+        times = self.times(tau)
         moved = self.sent.trajectory.sample(times)
-        wanted, poses = tool_poses(self.path, self.angle, asked.s), self.scene.chain.tcp_poses(moved.q)
+        wanted = tool_poses(self.path, self.angle, asked.s)
+        poses = self.scene.chain.tcp_poses(moved.q)
         difference = poses - wanted
-        u, squared = self.path.parameter(asked.s), np.diff(times) ** 2
+        u = self.path.parameter(asked.s)
+        squared = np.diff(times) ** 2
         sags = squared * self.motion.between(self.motion.acceleration, times)
         sags += np.diff(u) ** 2 * self.path.bends(u)
         away = _at_most(np.linalg.norm(difference[:, :3, 3], axis=1), sags / 8.0)
@@ -101,18 +117,23 @@ class _Stroke:
         return Kept(away, float(turn), self._off(tau, velocity, sags))
 
     def _turned(self, u: FloatArray) -> FloatArray:
-        """By how much (M - 1,) rotations asked for leave their chords between u (M,) m and the next."""
+        """By how much (M - 1,) rotations asked for leave their chords between u (M,) m and the
+        next.
+        """
         first, second = self.path.turns(u)
         h = np.diff(u)
         if self.angle is None:
             return np.asarray(h**2 / 8.0 * second)
-        rates, bends = self.angle.rates, self.path.bends(u)
+        rates = self.angle.rates
+        bends = self.path.bends(u)
         second = second + rates.second + rates.first * bends + 2.0 * first * rates.first
         kinks = 0.0 if self.angle.smooth else rates.first * h / 2.0
         return np.asarray(h**2 / 8.0 * second + kinks)
 
     def _off(self, tau: FloatArray, velocity: FloatArray, sags: FloatArray) -> float:
-        """The share that velocity (M, 3) m/s at tau (M,) s is off the speed where that is to be kept."""
+        """The share that velocity (M, 3) m/s at tau (M,) s is off the speed where that is to be
+        kept.
+        """
         law = self.sent.strokes[self.k].law
         phase = law.phase(0.5 * (tau[1:] + tau[:-1]))
         even = law.even[phase] & (tau[:-1] >= law.times[phase]) & (tau[1:] <= law.times[phase + 1])

@@ -1,9 +1,9 @@
 """Bounds of the tool's motion on each segment of a trajectory, from those of its axes.
 
-A place at the distance r from an axis moves by at most r per radian. By the chain rule a derivative of the
-tool's place is a sum over axes, over pairs of them and over triples, each at most the product of the axes'
-derivatives and the distance from the outermost axis of the term; with all distances 1 it holds for its
-rotation.
+A place at the distance r from an axis moves by at most r per radian. By the chain rule a derivative
+of the tool's place is a sum over axes, over pairs of them and over triples, each at most the
+product of the axes' derivatives and the distance from the outermost axis of the term; with all
+distances 1 it holds for its rotation.
 """
 
 from dataclasses import dataclass
@@ -18,8 +18,8 @@ from ir_planner.scene import PlanningScene
 
 @dataclass(frozen=True, eq=False)
 class ToolMotion:
-    """Bounds (S,) on each segment: of |p''| [m/s^2] and |p'''| [m/s^3] of the tcp's place, and of |R''|
-    [rad/s^2] of its rotation, as 1 / sqrt(2) of the Frobenius norm; times (S + 1,) s.
+    """Bounds (S,) on each segment: of |p''| [m/s^2] and |p'''| [m/s^3] of the tcp's place, and of
+    |R''| [rad/s^2] of its rotation, as 1 / sqrt(2) of the Frobenius norm; times (S + 1,) s.
     """
 
     times: FloatArray
@@ -28,7 +28,9 @@ class ToolMotion:
     turning: FloatArray
 
     def between(self, values: FloatArray, times: FloatArray) -> FloatArray:
-        """The largest of values (S,) between times (M,) s and the next (M - 1,), at most a segment apart."""
+        """The largest of values (S,) between times (M,) s and the next (M - 1,), at most a segment
+        apart.
+        """
         last = len(values) - 1
         first = np.clip(np.searchsorted(self.times, times[:-1], side="right") - 1, 0, last)
         second = np.clip(np.searchsorted(self.times, times[1:], side="left") - 1, 0, last)
@@ -37,11 +39,16 @@ class ToolMotion:
 
 def tool_motion(trajectory: JointTrajectory, scene: PlanningScene) -> ToolMotion:
     """Bounds of the tool's motion along a trajectory."""
-    largest, reach = extremes(*trajectory.coefficients()), _reach(scene)
-    v, a, j = (np.cumsum(one, axis=1) for one in (largest.velocity, largest.acceleration, largest.jerk))
+    largest = extremes(*trajectory.coefficients())
+    reach = _reach(scene)
+    v, a, j = (
+        np.cumsum(one, axis=1) for one in (largest.velocity, largest.acceleration, largest.jerk)
+    )
 
     def outermost(sums: FloatArray) -> FloatArray:
-        """Sums (S,) of terms times the distance from their outermost axes, from those up to each axis."""
+        """Sums (S,) of terms times the distance from their outermost axes, from those up to each
+        axis.
+        """
         return np.asarray(np.diff(sums, axis=1, prepend=0.0) @ reach)
 
     return ToolMotion(

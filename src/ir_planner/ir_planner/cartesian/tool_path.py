@@ -1,9 +1,11 @@
-"""A path of the tool over its arc length: parts that follow each other, corners between them rounded.
+"""A path of the tool over its arc length: parts that follow each other, corners between them
+rounded.
 
-Within its radius around a corner the next part begins while the last one ends: the place is the sum of what
-both have covered. How much of each is covered rises by a polynomial whose fourth derivative is continuous, so
-curvature is too. Parts that meet almost tangentially, or where only the curvature or the turning of the tool
-jumps, are joined in the same manner within micrometres; at any other corner without a radius the tool stops.
+Within its radius around a corner the next part begins while the last one ends: the place is the sum
+of what both have covered. How much of each is covered rises by a polynomial whose fourth derivative
+is continuous, so curvature is too. Parts that meet almost tangentially, or where only the curvature
+or the turning of the tool jumps, are joined in the same manner within micrometres; at any other
+corner without a radius the tool stops.
 """
 
 from dataclasses import dataclass
@@ -24,7 +26,9 @@ _ALONG_AXIS = np.radians(3.0)  # a path nearer to the tool's axis than this give
 
 
 def covered(u: FloatArray, radius: float) -> FloatArray:
-    """How much of the next part is covered at u (M,) m from a corner: 0 before -radius, u beyond radius."""
+    """How much of the next part is covered at u (M,) m from a corner: 0 before -radius, u beyond
+    radius.
+    """
     y = np.clip((u + radius) / (2.0 * radius), 0.0, 1.0)
     inside = 2.0 * radius * y**5 * (7.0 + y * (-14.0 + y * (10.0 - 2.5 * y)))
     return np.where(u >= radius, u, inside)
@@ -39,17 +43,22 @@ def covering(u: FloatArray, radius: float) -> FloatArray:
 def joint_bend(before: Part, after: Part, radius: float) -> float:
     """A bound [1/m] of the second derivative by u of the place within a radius [m] around a corner.
 
-    There p'' = k1 c1'^2 + k2 c2'^2 + (t2 - t1) c'', with c' <= 1, c'' <= 35 / (32 radius), and tangents that
-    turn by no more than the curvatures times the radius.
+    There p'' = k1 c1'^2 + k2 c2'^2 + (t2 - t1) c'', with c' <= 1, c'' <= 35 / (32 radius), and
+    tangents that turn by no more than the curvatures times the radius.
     """
-    ends = before.places.tangent(np.array([before.length]))[0], after.places.tangent(np.array([0.0]))[0]
+    ends = (
+        before.places.tangent(np.array([before.length]))[0],
+        after.places.tangent(np.array([0.0]))[0],
+    )
     bends = before.places.curvature + after.places.curvature
     corner = float(np.linalg.norm(ends[1] - ends[0]))
     return bends + 35.0 / (32.0 * radius) * (corner + bends * radius)
 
 
 def _apart(u: FloatArray) -> FloatArray:
-    """Different values of u (M,) in order; none nearer to the one before than rounding brings it."""
+    """Different values of u (M,) in order; none nearer to the one before than rounding brings
+    it.
+    """
     values = np.unique(u)
     kept = values[np.concatenate([[True], np.diff(values) > _SAME])]
     return np.append(kept[:-1], values[-1])
@@ -57,8 +66,8 @@ def _apart(u: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class ToolPath:
-    """parts (K): one after the other; radius (K + 1,) m around the corner before each and at the end, 0: the
-    tool stops there. headings: whether the tool turns with the path.
+    """parts (K): one after the other; radius (K + 1,) m around the corner before each and at the
+    end, 0: the tool stops there. headings: whether the tool turns with the path.
     """
 
     parts: tuple[Part, ...]
@@ -74,7 +83,10 @@ class ToolPath:
     def _arc(self) -> ArcLength | None:
         if not self.radius.any():
             return None
-        breaks = [part.places.breaks + begin for part, begin in zip(self.parts, self.corners, strict=False)]
+        breaks = [
+            part.places.breaks + begin
+            for part, begin in zip(self.parts, self.corners, strict=False)
+        ]
         zones = [
             corner + radius * np.linspace(-1.0, 1.0, 2 * _PER_ZONE + 1)
             for corner, radius in zip(self.corners, self.radius, strict=True)
@@ -95,13 +107,18 @@ class ToolPath:
     @cached_property
     def breaks(self) -> FloatArray:
         """Arc lengths (B,) between which places and orientations are smooth [m]."""
-        inner = [part.places.breaks + begin for part, begin in zip(self.parts, self.corners, strict=False)]
+        inner = [
+            part.places.breaks + begin
+            for part, begin in zip(self.parts, self.corners, strict=False)
+        ]
         zones = [self.corners - self.radius, self.corners, self.corners + self.radius]
         u = _apart(np.clip(np.concatenate([*inner, *zones]), 0.0, self.corners[-1]))
         return u if self._arc is None else self._arc.of(u)
 
     def bends(self, u: FloatArray) -> FloatArray:
-        """A bound (M - 1,) [1/m] of the second derivative of the place by u between u (M,) and the next."""
+        """A bound (M - 1,) [1/m] of the second derivative of the place by u between u (M,) and the
+        next.
+        """
         result = np.zeros(len(u) - 1)
         for k, part in enumerate(self.parts):
             within = (u[1:] >= self.corners[k]) & (u[:-1] <= self.corners[k + 1])
@@ -114,10 +131,14 @@ class ToolPath:
         return result
 
     def turns(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Bounds (M - 1,) of how fast the tool turns between u (M,) and the next, as those of Rates, by u."""
-        first, second = np.zeros(len(u) - 1), np.zeros(len(u) - 1)
+        """Bounds (M - 1,) of how fast the tool turns between u (M,) and the next, as those of
+        Rates, by u.
+        """
+        first = np.zeros(len(u) - 1)
+        second = np.zeros(len(u) - 1)
         zones = [
-            (self.corners[k], self.corners[k + 1], part.turning.rates) for k, part in enumerate(self.parts)
+            (self.corners[k], self.corners[k + 1], part.turning.rates)
+            for k, part in enumerate(self.parts)
         ]
         for corner, radius, parts in zip(
             self.corners[1:-1], self.radius[1:-1], pairwise(self.parts), strict=True
@@ -171,9 +192,13 @@ class ToolPath:
 
     def _moving(self, k: int, u: FloatArray) -> list[tuple[Part, FloatArray, FloatArray]]:
         """Parts under way where part k is: how far each is (M,) m, and its rate (M,) by u."""
-        part, first, last = self.parts[k], u - self.corners[k], u - self.corners[k + 1]
-        begin, end = float(self.radius[k]), float(self.radius[k + 1])
-        progress, rate = np.clip(first, 0.0, part.length), np.ones_like(u)
+        part = self.parts[k]
+        first = u - self.corners[k]
+        last = u - self.corners[k + 1]
+        begin = float(self.radius[k])
+        end = float(self.radius[k + 1])
+        progress = np.clip(first, 0.0, part.length)
+        rate = np.ones_like(u)
         found = []
         if begin > 0.0:
             near = first < begin
@@ -192,12 +217,14 @@ class ToolPath:
     def _of_part(self, k: int, u: FloatArray) -> FloatArray:
         (part, progress, _), *others = self._moving(k, u)
         poses = np.tile(np.eye(4), (len(u), 1, 1))
-        poses[:, :3, 3], poses[:, :3, :3] = part.places.at(progress), part.turning.at(progress)
+        poses[:, :3, 3] = part.places.at(progress)
+        poses[:, :3, :3] = part.turning.at(progress)
         for other, along, _ in others:
             earlier = k > 0 and other is self.parts[k - 1]
             corner = np.array([other.length if earlier else 0.0])
             poses[:, :3, 3] += other.places.at(along) - other.places.at(corner)
-            turned, there = other.turning.at(along), other.turning.at(corner)[0]
+            turned = other.turning.at(along)
+            there = other.turning.at(corner)[0]
             if earlier:
                 poses[:, :3, :3] = turned @ there.T @ poses[:, :3, :3]
             else:
@@ -225,7 +252,9 @@ class ToolPath:
         across = np.hypot(local[:, 1], local[:, 2])
         if across.min() < np.sin(_ALONG_AXIS):
             place = float(u[int(np.argmin(across))])
-            raise HeadingError(place if self._arc is None else float(self._arc.of(np.array([place]))[0]))
+            raise HeadingError(
+                place if self._arc is None else float(self._arc.of(np.array([place]))[0])
+            )
         angle = np.unwrap(np.arctan2(local[:, 2], local[:, 1]))
         return make_interp_spline(u, angle - angle[0], k=3)
 

@@ -1,5 +1,6 @@
-"""Axes that turn twice: configurations along a path are looked for without their whole turns, and what is
-found is turned into the limits. Where such an axis moves by at most a whole turn, that always works.
+"""Axes that turn twice: configurations along a path are looked for without their whole turns, and
+what is found is turned into the limits. Where such an axis moves by at most a whole turn, that
+always works.
 """
 
 from dataclasses import replace
@@ -29,12 +30,13 @@ def without_turns(q: FloatArray, turning: BoolArray) -> FloatArray:
 
 
 def turned_towards(q: FloatArray, near: FloatArray, scene: PlanningScene) -> FloatArray:
-    """q (M, n) with the axes that turn twice in the turns nearest to `near` (M, n); inf where these lie
-    beyond the limits.
+    """q (M, n) with the axes that turn twice in the turns nearest to `near` (M, n); inf where these
+    lie beyond the limits.
     """
     if not scene.turning.any():
         return q
-    low, high = scene.cell.robot.position_min, scene.cell.robot.position_max
+    low = scene.cell.robot.position_min
+    high = scene.cell.robot.position_max
     turned = near + difference(near, q, scene.turning)
     beyond = (turned < low - _ROUNDED) | (turned > high + _ROUNDED)
     turned = np.where(scene.turning, np.where(beyond, np.inf, np.clip(turned, low, high)), q)
@@ -44,14 +46,17 @@ def turned_towards(q: FloatArray, near: FloatArray, scene: PlanningScene) -> Flo
 def turned_into_limits(
     q: FloatArray, turning: BoolArray, scene: PlanningScene, *, fixed: bool
 ) -> FloatArray | None:
-    """A chain q (N, n) joined over whole turns of the axes that turn (n,): from its first configuration if
-    that is fixed, else where it is most within the limits. None: it leaves them in every turn.
+    """A chain q (N, n) joined over whole turns of the axes that turn (n,): from its first
+    configuration if that is fixed, else where it is most within the limits. None: it leaves them in
+    every turn.
     """
     if not turning.any():
         return q
-    low, high = scene.cell.robot.position_min, scene.cell.robot.position_max
+    low = scene.cell.robot.position_min
+    high = scene.cell.robot.position_max
     joined = np.where(turning, np.unwrap(q, axis=0), q)
-    least, most = joined.min(axis=0), joined.max(axis=0)
+    least = joined.min(axis=0)
+    most = joined.max(axis=0)
     shift = TURN * np.rint(0.5 * (low + high - least - most) / TURN) * (turning & (not fixed))
     beyond = (least + shift < low - _ROUNDED) | (most + shift > high + _ROUNDED)
     return None if (turning & beyond).any() else np.clip(joined + shift, low, high)
@@ -59,8 +64,10 @@ def turned_into_limits(
 
 def with_all_turns(layers: Layers, scene: PlanningScene, *, fixed: bool) -> Layers:
     """The layers with all whole turns within the limits; fixed: the first one stays as it is."""
-    low, high = scene.cell.robot.position_min, scene.cell.robot.position_max
-    q, node = layers.q, np.arange(len(layers.q))
+    low = scene.cell.robot.position_min
+    high = scene.cell.robot.position_max
+    q = layers.q
+    node = np.arange(len(layers.q))
     for axis in np.flatnonzero(layers.turning):
         most = int(np.ceil((high[axis] - low[axis]) / TURN))
         shifts = TURN * np.arange(-most, most + 1)
@@ -69,7 +76,8 @@ def with_all_turns(layers: Layers, scene: PlanningScene, *, fixed: bool) -> Laye
         if fixed:
             within[layers.layer[node] == 0] = shifts == 0.0
         row, _ = np.nonzero(within)
-        q, node = q[row], node[row]
+        q = q[row]
+        node = node[row]
         q[:, axis] = np.clip(values[within], low[axis], high[axis])
     return replace(
         layers,

@@ -1,4 +1,6 @@
-"""What is known about a configuration or a trajectory: free, limits, torque, clearance, energy, proof."""
+"""What is known about a configuration or a trajectory: free, limits, torque, clearance, energy,
+proof.
+"""
 
 from ir_planner.checks.clearance import nearest_pair, nearest_pairs, pair_value
 from ir_planner.checks.clearance_checks import clearance_violation
@@ -15,7 +17,15 @@ from ir_planner.checks.free_space import FreeSpace
 from ir_planner.checks.intervals import ROBOTS, Interval, interval, movement_spread, robots, spread
 from ir_planner.checks.limit_checks import AT_REST, SLACK, Violation
 from ir_planner.checks.peak_power import peak_power
-from ir_planner.checks.shapes import CLOSEST, PATH, ZONES, Colour, Shape, cell_shapes, movement_shapes
+from ir_planner.checks.shapes import (
+    CLOSEST,
+    PATH,
+    ZONES,
+    Colour,
+    Shape,
+    cell_shapes,
+    movement_shapes,
+)
 from ir_planner.checks.states import (
     StateCheck,
     end_in_collision,

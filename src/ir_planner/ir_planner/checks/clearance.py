@@ -1,5 +1,5 @@
-"""Metric distances at configurations and along a trajectory: the nearest pair, its closest points, a
-profile.
+"""Metric distances at configurations and along a trajectory: the nearest pair, its closest points,
+a profile.
 """
 
 from dataclasses import dataclass
@@ -14,21 +14,29 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import motion_at
 from ir_planner.scene import PlanningScene
 
-_STEP, _FEWEST, _MOST = 0.01, 32, 2000  # s between the samples of a profile, and how many of them
-_ZOOMS, _PER_ZOOM = 4, 9  # each zoom looks at a fourth of the time before: 0.04 ms at last
+# s between the samples of a profile, and how many of them
+_STEP = 0.01
+_FEWEST = 32
+_MOST = 2000
+# each zoom looks at a fourth of the time before: 0.04 ms at last
+_ZOOMS = 4
+_PER_ZOOM = 9
 _MINIMA = 4  # local minima of the samples that are looked at closely; the proof meets the others
-_TIGHT = 1e-5  # m by which the bound lies below the smallest distance found: finer costs, and nobody needs it
+# m by which the bound lies below the smallest distance found: finer costs, and nobody needs it
+_TIGHT = 1e-5
 _LOOSER = 4.0  # times as much where that can't be proved
 _PROOFS = 12
 
 
 @dataclass(frozen=True, eq=False)
 class ClearanceProfile:
-    """times (N,) s and distances (N,) m of the nearest pair without an allowed contact (inf: no pair).
+    """times (N,) s and distances (N,) m of the nearest pair without an allowed contact (inf: no
+    pair).
 
-    bound [m]: proved, no distance at any instant is smaller; it lies 1e-5 m below the smallest one found.
-    smallest: that pair where it is nearest (None: no pair), and when. contacts: the pairs with a safety
-    distance of their own, where they are nearest. path_length [m] of the tcp.
+    bound [m]: proved, no distance at any instant is smaller; it lies 1e-5 m below the smallest one
+    found.
+    smallest: that pair where it is nearest (None: no pair), and when. contacts: the pairs with a
+    safety distance of their own, where they are nearest. path_length [m] of the tcp.
     """
 
     times: FloatArray
@@ -61,7 +69,9 @@ def pair_value(scene: PlanningScene, q: FloatArray, z: int, allowed: bool = Fals
 def nearest_pair(
     scene: PlanningScene, q: FloatArray, offset: FloatArray | None = None
 ) -> DistancePair | None:
-    """The pair nearest to violating its distance `offset` (Z,) at q (n,); None where there is no pair."""
+    """The pair nearest to violating its distance `offset` (Z,) at q (n,); None where there is no
+    pair.
+    """
     near = scene.collision.min_distance(q[None], offset)
     return _pair(scene, near, 0, False) if near.pair[0] >= 0 else None
 
@@ -69,7 +79,9 @@ def nearest_pair(
 def nearest_pairs(
     scene: PlanningScene, q: FloatArray, offset: FloatArray, count: int, station: str = ""
 ) -> tuple[DistancePair, ...]:
-    """The `count` pairs at q (n,) nearest to violating their distance `offset` (Z,), nearest first."""
+    """The `count` pairs at q (n,) nearest to violating their distance `offset` (Z,), nearest
+    first.
+    """
     distance = scene.collision.distances(q[None])[0]
     order = np.argsort(distance - offset, kind="stable")[:count]
     if len(order) == 0:
@@ -82,8 +94,11 @@ def nearest_pairs(
 def clearance_profile(
     trajectory: JointTrajectory, scene: PlanningScene, station: str = ""
 ) -> ClearanceProfile:
-    """Distances along a trajectory, sampled every 10 ms or finer, and a proved bound of the smallest one."""
-    begin, span = float(trajectory.times[0]), trajectory.duration - float(trajectory.times[0])
+    """Distances along a trajectory, sampled every 10 ms or finer, and a proved bound of the
+    smallest one.
+    """
+    begin = float(trajectory.times[0])
+    span = trajectory.duration - float(trajectory.times[0])
     count = int(np.clip(np.ceil(span / _STEP), _FEWEST, _MOST)) + 1
     times = np.linspace(begin, begin + span, count)
     q = motion_at(trajectory, times).q
@@ -94,7 +109,9 @@ def clearance_profile(
     contacts: list[DistancePair] = []
     if allowed.any():
         closest = np.argmin(scene.collision.distances(q), axis=0)
-        contacts.extend(pair_value(scene, q[closest[z]], int(z), True) for z in np.flatnonzero(allowed))
+        contacts.extend(
+            pair_value(scene, q[closest[z]], int(z), True) for z in np.flatnonzero(allowed)
+        )
     tcp = scene.chain.tcp_poses(q)[:, :3, 3]
     return ClearanceProfile(
         times=times,
@@ -109,8 +126,8 @@ def clearance_profile(
 
 @dataclass(frozen=True, eq=False)
 class _Lowest:
-    """When the nearest pair is nearest [s], its distance there, and what no distance at any instant is
-    below.
+    """When the nearest pair is nearest [s], its distance there, and what no distance at any instant
+    is below.
     """
 
     time: float
@@ -125,8 +142,8 @@ def _nearest_between(
     times: FloatArray,
     distances: FloatArray,
 ) -> _Lowest:
-    """The smallest distance at any instant, from samples (N,): looked for around the lowest samples, then
-    proved; where the proof meets a smaller one, from there again.
+    """The smallest distance at any instant, from samples (N,): looked for around the lowest
+    samples, then proved; where the proof meets a smaller one, from there again.
     """
     step = float(times[1] - times[0])
     time = _zoomed(trajectory, scene, offset, times[_local_minima(distances)], step)
@@ -144,7 +161,8 @@ def _nearest_between(
         there = _zoomed(trajectory, scene, offset, np.array([0.5 * (first + last)]), last - first)
         again = scene.collision.min_distance(motion_at(trajectory, np.array([there])).q, offset)
         if again.distance[0] < near.distance[0]:
-            time, near = there, again
+            time = there
+            near = again
         else:
             tight *= _LOOSER
     return _Lowest(time, near, -np.inf)  # nothing is proved, so nothing is promised
@@ -158,18 +176,29 @@ def _local_minima(distance: FloatArray) -> NDArray[np.intp]:
 
 
 def _zoomed(
-    trajectory: JointTrajectory, scene: PlanningScene, offset: FloatArray, centres: FloatArray, half: float
+    trajectory: JointTrajectory,
+    scene: PlanningScene,
+    offset: FloatArray,
+    centres: FloatArray,
+    half: float,
 ) -> float:
-    """The instant [s] of the smallest distance found within `half` s of an instant of `centres` (M,)."""
-    begin, end = float(trajectory.times[0]), float(trajectory.times[-1])
-    best, time = np.inf, float(centres[0])
+    """The instant [s] of the smallest distance found within `half` s of an instant of `centres`
+    (M,).
+    """
+    begin = float(trajectory.times[0])
+    end = float(trajectory.times[-1])
+    best = np.inf
+    time = float(centres[0])
     for _ in range(_ZOOMS):
         zoom = np.clip(centres[:, None] + np.linspace(-half, half, _PER_ZOOM), begin, end)
-        distance = scene.collision.min_distance(motion_at(trajectory, zoom.ravel()).q, offset).distance
+        distance = scene.collision.min_distance(
+            motion_at(trajectory, zoom.ravel()).q, offset
+        ).distance
         lowest = np.argmin(distance.reshape(zoom.shape), axis=1)
         centres = zoom[np.arange(len(zoom)), lowest]
         k = int(np.argmin(distance))
         if distance[k] < best:
-            best, time = float(distance[k]), float(zoom.ravel()[k])
+            best = float(distance[k])
+            time = float(zoom.ravel()[k])
         half /= (_PER_ZOOM - 1) / 2
     return time

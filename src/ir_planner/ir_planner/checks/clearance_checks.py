@@ -1,6 +1,7 @@
 """Proof of clearance along a trajectory: no instant between samples is left out.
 
-At a station its allowed contacts hold while the tcp is in the machine's zone; outside every pair keeps S_m.
+At a station its allowed contacts hold while the tcp is in the machine's zone; outside every pair
+keeps S_m.
 """
 
 from ir_kernels.collision import COLLIDES, FREE
@@ -8,17 +9,26 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.clearance import pair_value
 from ir_planner.checks.limit_checks import Violation, segment_at
-from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, polynomials_between, spans_outside, tcp_inside
+from ir_planner.scene import (
+    PROOF_TOLERANCE,
+    PlanningScene,
+    polynomials_between,
+    spans_outside,
+    tcp_inside,
+)
 
 
 def clearance_violation(
     trajectory: JointTrajectory, scene: PlanningScene, safety_distance: float, station: str = ""
 ) -> Violation | None:
-    """The first instant at which a pair is too near, or not proved to be far enough; None: proved."""
+    """The first instant at which a pair is too near, or not proved to be far enough; None:
+    proved.
+    """
     plain = scene.thresholds(safety_distance) - PROOF_TOLERANCE
     if len(trajectory.times_ns) == 1:
         return _of_point(trajectory, scene, safety_distance, station)
-    begin, end = float(trajectory.times[0]), float(trajectory.times[-1])
+    begin = float(trajectory.times[0])
+    end = float(trajectory.times[-1])
     if not station or not scene.allowed(station).any():
         return _of_part(trajectory, (begin, end), plain, scene, "")
     relaxed = scene.thresholds(safety_distance, station) - PROOF_TOLERANCE
@@ -46,7 +56,9 @@ def _of_part(
         return None
     first, last = (span[0] + t for t in found.interval)
     q = trajectory.sample([last]).q[0]
-    return _violation(trajectory, q, (first, last), found.verdict, found.pair, threshold, scene, station)
+    return _violation(
+        trajectory, q, (first, last), found.verdict, found.pair, threshold, scene, station
+    )
 
 
 def _of_point(

@@ -1,9 +1,10 @@
-"""Energy of a trajectory at the mains: torque of every axis, their common DC bus, and what is always drawn.
+"""Energy of a trajectory at the mains: torque of every axis, their common DC bus, and what is
+always drawn.
 
-Energy = base + sum of the axes (signed) + dissipated + change of the capacitor, and what the rectifier loses
-where its efficiency is below 1. The power is taken at the
-middles of steps of at most 1 ms. Alone, a movement starts with an empty capacitor; what is left in it at the
-end is not credited, but given to the next movement of a program (`carried`).
+Energy = base + sum of the axes (signed) + dissipated + change of the capacitor, and what the
+rectifier loses where its efficiency is below 1. The power is taken at the
+middles of steps of at most 1 ms. Alone, a movement starts with an empty capacitor; what is left in
+it at the end is not credited, but given to the next movement of a program (`carried`).
 """
 
 from dataclasses import dataclass
@@ -22,11 +23,12 @@ _PIECE = 20_000  # samples at a time: an hour has millions
 
 @dataclass(frozen=True)
 class MovementEnergy:
-    """Joules of a movement: total at the mains, base load, per joint (n,) at the DC bus (signed), dissipated,
-    capacitor.
+    """Joules of a movement: total at the mains, base load, per joint (n,) at the DC bus (signed),
+    dissipated, capacitor.
 
     dt [s]: of the steps; times (N,) s (their middles) and watts (N,) at the mains: its
-    profile; axes (N,) W: what all joints together take from the DC bus (none: where nothing is shared).
+    profile; axes (N,) W: what all joints together take from the DC bus (none: where nothing is
+    shared).
     """
 
     total: float
@@ -53,7 +55,9 @@ def movement_energy(
     axes = np.concatenate([_axis_power(trajectory, scene, piece) for piece in pieces])
     if dt <= 0.0:  # a single point: nothing lasts
         nothing = np.zeros(0)
-        return MovementEnergy(0.0, 0.0, np.zeros(axes.shape[1]), 0.0, 0.0, dt, nothing, nothing, nothing)
+        return MovementEnergy(
+            0.0, 0.0, np.zeros(axes.shape[1]), 0.0, 0.0, dt, nothing, nothing, nothing
+        )
     bus = dc_bus(axes, dt, scene.dc_bus)
     shares = scene.dc_bus.regeneration != "none"
     taken = axes.sum(axis=1) if shares else np.zeros(0)
@@ -69,9 +73,15 @@ def carried(energy: MovementEnergy, charge: float, scene: PlanningScene) -> Move
 
 
 def _on_bus(
-    bus: DcBus, dt: float, scene: PlanningScene, joints: FloatArray, times: FloatArray, axes: FloatArray
+    bus: DcBus,
+    dt: float,
+    scene: PlanningScene,
+    joints: FloatArray,
+    times: FloatArray,
+    axes: FloatArray,
 ) -> MovementEnergy:
-    base, efficiency = scene.base_watts, scene.drives.rectifier_efficiency
+    base = scene.base_watts
+    efficiency = scene.drives.rectifier_efficiency
     watts = np.where(bus.mains > 0.0, bus.mains / efficiency, bus.mains * efficiency) + base
     return MovementEnergy(
         total=float(watts.sum() * dt),
@@ -94,7 +104,9 @@ def _axis_power(trajectory: JointTrajectory, scene: PlanningScene, times: FloatA
 
 
 def holding_watts(q: FloatArray, scene: PlanningScene) -> float:
-    """Mains power [W] while the motors hold the arm still at q (n,): base load and copper losses."""
+    """Mains power [W] while the motors hold the arm still at q (n,): base load and copper
+    losses.
+    """
     rest = np.zeros((1, len(q)))
     torque = scene.dynamics.inverse_dynamics(q[None], rest, rest)
     holding = float(scene.dynamics.axis_power(rest, torque).sum())

@@ -1,9 +1,10 @@
-"""How the energy of a movement changes with each power parameter: its derivative at the scene's parameters.
+"""How the energy of a movement changes with each power parameter: its derivative at the scene's
+parameters.
 
-Mains energy is piecewise linear in powers. What a joule more from the bus costs at the mains is 1 while the
-mains feed it, 0 while the surplus is dissipated, and what the next such time says while the capacitor does
-both. So one pass over the samples of a movement gives its slope, and the energies of many robots are one
-product with it.
+Mains energy is piecewise linear in powers. What a joule more from the bus costs at the mains is 1
+while the mains feed it, 0 while the surplus is dissipated, and what the next such time says while
+the capacitor does both. So one pass over the samples of a movement gives its slope, and the
+energies of many robots are one product with it.
 """
 
 from dataclasses import dataclass
@@ -120,9 +121,12 @@ def _price(power: FloatArray, bus: DcBus, scene: PlanningScene) -> FloatArray:
 
 def _axis_slope(at: _States, scene: PlanningScene) -> FloatArray:
     """The part of friction, losses and masses; rectifier and constant watts are zero."""
-    parameters, model, d = scene.parameters, scene.dynamics, scene.dynamics.data
+    parameters = scene.parameters
+    model = scene.dynamics
+    d = scene.dynamics.data
     q, qd, qdd, _ = at.motion
-    speed, size = np.abs(qd), np.abs(at.torque)
+    speed = np.abs(qd)
+    size = np.abs(at.torque)
     ratio = np.abs(d.gear_ratio)
     sign = np.sign(at.torque)
     losses = d.inverter_loss / ratio + d.gear_loss * speed
@@ -140,7 +144,8 @@ def _axis_slope(at: _States, scene: PlanningScene) -> FloatArray:
     for term in AXIS_UNITS:
         slope[parameters.places(term)] = axes[term].sum(axis=0)
     slope[parameters.index(IDLE)] = at.price.mean(axis=1).sum()  # of all axes alike
-    rotor, balance = d.rotor_inertia * qdd, model.counterbalance(q)
+    rotor = d.rotor_inertia * qdd
+    balance = model.counterbalance(q)
     body = at.torque - rotor - d.viscous * qd - d.coulomb * direction + balance
     carried = _carried(at, scene)
     scaled = {"rotor_inertia": rotor, "counterbalance": -balance, "load_mass": carried}

@@ -1,5 +1,5 @@
-"""The report of a trajectory: what it costs, how near it comes to its limits, and whether all that is
-proved.
+"""The report of a trajectory: what it costs, how near it comes to its limits, and whether all that
+is proved.
 """
 
 from dataclasses import dataclass, replace
@@ -19,7 +19,9 @@ from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
 
 @dataclass(frozen=True)
 class Consumption:
-    """What objectives count of a movement, named as in its report; known before distances and peaks are."""
+    """What objectives count of a movement, named as in its report; known before distances and peaks
+    are.
+    """
 
     duration: float
     movement_cost: float
@@ -29,7 +31,9 @@ class Consumption:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Everything that is known about a trajectory. advice: where a violation may come from, else ""."""
+    """Everything that is known about a trajectory. advice: where a violation may come from, else
+    "".
+    """
 
     report: TrajectoryReport
     verification: Verification
@@ -90,7 +94,9 @@ def measured(
 
 
 def _reserve(torque: FloatArray, scene: PlanningScene) -> float:
-    """What a trajectory that needs the shares (n,) of the torque leaves of the reserve that plans keep."""
+    """What a trajectory that needs the shares (n,) of the torque leaves of the reserve that plans
+    keep.
+    """
     return min(scene.drives.torque_reserve, max(1.0 - float(torque.max(initial=0.0)), 0.0))
 
 
@@ -104,9 +110,11 @@ def _least_clearance(
     return max(clearance.bound, proved)
 
 
-def total_report(reports: tuple[TrajectoryReport, ...], elapsed: tuple[float, ...]) -> TrajectoryReport:
-    """Report of steps one after the other; `elapsed` (N,) s: when each starts. Pauses have a report as
-    well.
+def total_report(
+    reports: tuple[TrajectoryReport, ...], elapsed: tuple[float, ...]
+) -> TrajectoryReport:
+    """Report of steps one after the other; `elapsed` (N,) s: when each starts. Pauses have a report
+    as well.
     """
     moving = [report for report in reports if len(report.velocity_ratio)]
     if not reports or not moving:

@@ -1,5 +1,5 @@
-"""Where a search may go: configurations and straight joint movements whose distances all exceed their
-thresholds.
+"""Where a search may go: configurations and straight joint movements whose distances all exceed
+their thresholds.
 """
 
 from dataclasses import dataclass
@@ -14,18 +14,24 @@ from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
 
 @dataclass(frozen=True, eq=False)
 class FreeSpace:
-    """Scene, thresholds (Z,) m of its pairs, and the budget that every certified edge is charged to."""
+    """Scene, thresholds (Z,) m of its pairs, and the budget that every certified edge is charged
+    to.
+    """
 
     scene: PlanningScene
     threshold: FloatArray
     work: Work
 
     @staticmethod
-    def of(scene: PlanningScene, safety_distance: float, work: Work, station: str = "") -> "FreeSpace":
-        """Free space for S_m, or what `station` allows its pairs; half of the proof's tolerance is kept in
-        hand.
+    def of(
+        scene: PlanningScene, safety_distance: float, work: Work, station: str = ""
+    ) -> "FreeSpace":
+        """Free space for S_m, or what `station` allows its pairs; half of the proof's tolerance is
+        kept in hand.
         """
-        return FreeSpace(scene, scene.thresholds(safety_distance, station) - PROOF_TOLERANCE / 2, work)
+        return FreeSpace(
+            scene, scene.thresholds(safety_distance, station) - PROOF_TOLERANCE / 2, work
+        )
 
     @property
     def low(self) -> FloatArray:
@@ -49,15 +55,17 @@ class FreeSpace:
         return self.scene.collision.certify_edges(q0, q1, self.threshold)
 
     def straight_free(self, q0: FloatArray, q1: FloatArray) -> BoolArray:
-        """Which of the straight movements (N, n) to (N, n) are proved free, also where no work is left: they
-        take what there is of it.
+        """Which of the straight movements (N, n) to (N, n) are proved free, also where no work is
+        left: they take what there is of it.
         """
         self.work.spend(min(len(q0), self.work.left))
-        return np.asarray(self.scene.collision.certify_edges(q0, q1, self.threshold).verdict == FREE)
+        return np.asarray(
+            self.scene.collision.certify_edges(q0, q1, self.threshold).verdict == FREE
+        )
 
     def edges_free(self, q0: FloatArray, q1: FloatArray) -> BoolArray:
-        """Which of the straight movements (N, n) to (N, n) are proved free; those are not for which no work
-        is left.
+        """Which of the straight movements (N, n) to (N, n) are proved free; those are not for which
+        no work is left.
         """
         result = np.zeros(len(q0), dtype=bool)
         count = min(len(q0), self.work.left)
@@ -66,8 +74,8 @@ class FreeSpace:
         return result
 
     def paths_free(self, paths: list[FloatArray]) -> BoolArray:
-        """Which paths (M_k, n) are free in all their steps; configurations are asked first, they are
-        cheaper.
+        """Which paths (M_k, n) are free in all their steps; configurations are asked first, they
+        are cheaper.
         """
         result = np.ones(len(paths), dtype=bool)
         inner = [path[1:-1] for path in paths]

@@ -1,10 +1,11 @@
 """Intervals of energies: what the uncertainty of the power parameters leaves open.
 
-Powers change linearly with the parameters, but the bus does not: slopes are taken at the mean of the drawn
-robots, where optimised movements no longer balance between drawing power and dissipating it.
+Powers change linearly with the parameters, but the bus does not: slopes are taken at the mean of
+the drawn robots, where optimised movements no longer balance between drawing power and dissipating
+it.
 
-All energies of one set of parameters are sampled over the same drawn robots, so that a difference of two
-energies has an interval of its own, mostly far narrower than theirs.
+All energies of one set of parameters are sampled over the same drawn robots, so that a difference
+of two energies has an interval of its own, mostly far narrower than theirs.
 """
 
 from dataclasses import dataclass, replace
@@ -36,7 +37,9 @@ def robots(parameters: PowerParameters) -> FloatArray:
 
 @lru_cache(maxsize=16)
 def expected(parameters: PowerParameters) -> PowerParameters:
-    """The mean of the drawn robots: more than the parameters' mean where a loss can only be larger."""
+    """The mean of the drawn robots: more than the parameters' mean where a loss can only be
+    larger.
+    """
     return replace(parameters, mean=robots(parameters).mean(axis=0))
 
 
@@ -55,14 +58,15 @@ def spread(slope: FloatArray, parameters: PowerParameters) -> FloatArray:
 
 def movement_spread(trajectory: JointTrajectory, scene: PlanningScene) -> FloatArray:
     """What the drawn robots add (ROBOTS,) J to the energy of a movement."""
-    at, there = Sampled.of(trajectory), expected_scene(scene)
+    at = Sampled.of(trajectory)
+    there = expected_scene(scene)
     expected_energy, slope = energy_and_slope(at, there)
     drawn = robots(scene.parameters) - there.parameters.mean
     return expected_energy - sampled_energy(at, scene) + drawn @ slope
 
 
 def interval(nominal: float, added: FloatArray) -> Interval:
-    """The 90 % interval of an energy [J] to which the drawn robots add `added` (ROBOTS,) J; it holds the
-    nominal one.
+    """The 90 % interval of an energy [J] to which the drawn robots add `added` (ROBOTS,) J; it
+    holds the nominal one.
     """
     return Interval(*interval_over(nominal, added))

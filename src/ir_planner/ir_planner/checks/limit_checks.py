@@ -1,4 +1,6 @@
-"""Limits along a trajectory: where position, rest, continuity or a joint's limit is first violated."""
+"""Limits along a trajectory: where position, rest, continuity or a joint's limit is first
+violated.
+"""
 
 from dataclasses import dataclass
 
@@ -18,8 +20,8 @@ AT_REST = 1e-6  # rad/s and rad/s^2 that count as rest
 
 @dataclass(frozen=True)
 class Violation:
-    """The first one: time [s] and segment (waypoint index before it), what, value, limit and unit, and a
-    sentence.
+    """The first one: time [s] and segment (waypoint index before it), what, value, limit and unit,
+    and a sentence.
     """
 
     time: float
@@ -41,7 +43,8 @@ def position_violation(
 ) -> Violation | None:
     """Where a joint leaves its range."""
     robot = scene.cell.robot
-    low, high = largest.lowest, largest.highest
+    low = largest.lowest
+    high = largest.highest
     if len(low) == 0:
         low = high = trajectory.positions
     excess = np.maximum(low * -1.0 + robot.position_min, high - robot.position_max)
@@ -51,9 +54,9 @@ def position_violation(
     k, j = (int(i) for i in beyond[0])
     reached = low[k, j] if robot.position_min[j] - low[k, j] > POSITION_SLACK else high[k, j]
     sentence = (
-        f"{robot.joint_names[j]} reaches {np.degrees(reached):.6g} deg after waypoint {k}: it must be in "
-        f"[{np.degrees(robot.position_min[j]):g}, {np.degrees(robot.position_max[j]):g}] deg "
-        f"(excess {np.degrees(excess[k, j]):.3g} deg)"
+        f"{robot.joint_names[j]} reaches {np.degrees(reached):.6g} deg after waypoint {k}: it "
+        f"must be in [{np.degrees(robot.position_min[j]):g}, "
+        f"{np.degrees(robot.position_max[j]):g}] deg (excess {np.degrees(excess[k, j]):.3g} deg)"
     )
     return Violation(float(trajectory.times[k]), k, "position", float(excess[k, j]), sentence)
 
@@ -68,23 +71,31 @@ def rest_violation(trajectory: JointTrajectory, scene: PlanningScene) -> Violati
     first = (coefficients[0, :, 1], 2.0 * coefficients[0, :, 2])
     final = (ends.qd[-1], ends.qdd[-1])
     for (speed, acceleration), k in ((first, 0), (final, len(durations))):
-        for what, values, unit in (("velocity", speed, "rad/s"), ("acceleration", acceleration, "rad/s^2")):
+        for what, values, unit in (
+            ("velocity", speed, "rad/s"),
+            ("acceleration", acceleration, "rad/s^2"),
+        ):
             j = int(np.argmax(np.abs(values)))
             if abs(values[j]) > AT_REST:
                 where = "starts" if k == 0 else "ends"
                 sentence = (
-                    f"the movement {where} with {what} {values[j]:.4g} {unit} of {names[j]} "
-                    f"at waypoint {k}: it must "
-                    f"be 0 {unit} within {AT_REST:g}"
+                    f"the movement {where} with {what} {values[j]:.4g} {unit} of {names[j]} at "
+                    f"waypoint {k}: it must be 0 {unit} within {AT_REST:g}"
                 )
                 return Violation(
-                    float(trajectory.times[k]), k, f"{what} at rest", abs(float(values[j])), sentence
+                    float(trajectory.times[k]),
+                    k,
+                    f"{what} at rest",
+                    abs(float(values[j])),
+                    sentence,
                 )
     return None
 
 
 def jump_violation(trajectory: JointTrajectory, joint_names: tuple[str, ...]) -> Violation | None:
-    """Where the interpolant's velocity or acceleration jumps: the next derivative has no bound there."""
+    """Where the interpolant's velocity or acceleration jumps: the next derivative has no bound
+    there.
+    """
     coefficients, durations = trajectory.coefficients()
     if len(durations) < 2:
         return None
@@ -92,7 +103,12 @@ def jump_violation(trajectory: JointTrajectory, joint_names: tuple[str, ...]) ->
     order = np.arange(6)
     before = coefficients[:-1] * powers
     ends = (
-        ("velocity", "rad/s", (before * order).sum(axis=2) / durations[:-1, None], coefficients[1:, :, 1]),
+        (
+            "velocity",
+            "rad/s",
+            (before * order).sum(axis=2) / durations[:-1, None],
+            coefficients[1:, :, 1],
+        ),
         (
             "acceleration",
             "rad/s^2",
@@ -109,7 +125,9 @@ def jump_violation(trajectory: JointTrajectory, joint_names: tuple[str, ...]) ->
                 f"{what} of {joint_names[j]} jumps by {jump[k, j]:.4g} {unit} at waypoint {k + 1}: "
                 "it must be continuous"
             )
-            return Violation(float(trajectory.times[k + 1]), k + 1, what, float(jump[k, j]), sentence)
+            return Violation(
+                float(trajectory.times[k + 1]), k + 1, what, float(jump[k, j]), sentence
+            )
     return None
 
 
@@ -122,8 +140,7 @@ def share_violation(
         return None
     k, j = (int(i) for i in beyond[0])
     sentence = (
-        f"{joint_names[j]} needs {share[k, j]:.3f} times its {name} limit after waypoint {k}: "
-        "it must be at most 1 "
-        f"(excess {100.0 * (share[k, j] - 1.0):.1f} %)"
+        f"{joint_names[j]} needs {share[k, j]:.3f} times its {name} limit after waypoint {k}: it "
+        f"must be at most 1 (excess {100.0 * (share[k, j] - 1.0):.1f} %)"
     )
     return Violation(float(trajectory.times[k]), k, name, float(share[k, j] - 1.0), sentence)

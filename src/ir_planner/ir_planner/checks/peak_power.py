@@ -1,8 +1,8 @@
 """The largest power at the mains along a trajectory: a bound that holds at every instant.
 
-Over short pieces of time the power of the axes is bounded by interval arithmetic. The bus' capacitor gives
-what it has before the mains do. With those bounds as powers it is emptied sooner than it is, so where it is
-not empty after a piece, the mains gave nothing in it.
+Over short pieces of time the power of the axes is bounded by interval arithmetic. The bus'
+capacitor gives what it has before the mains do. With those bounds as powers it is emptied sooner
+than it is, so where it is not empty after a piece, the mains gave nothing in it.
 """
 
 import numpy as np
@@ -23,7 +23,8 @@ def peak_power(trajectory: JointTrajectory, scene: PlanningScene, charge: float 
         return 0.0
     longest = max(_PIECE_S, float(durations.sum()) / _MOST)
     bounds = scene.dynamics.power_bounds(coefficients, durations, longest)
-    further, efficiency = _further(trajectory, scene), scene.drives.rectifier_efficiency
+    further = _further(trajectory, scene)
+    efficiency = scene.drives.rectifier_efficiency
     if scene.dc_bus.regeneration == "none":
         return scene.base_watts + max(float(bounds.taken.max()) + further, 0.0) / efficiency
     net = bounds.net + further
@@ -33,7 +34,9 @@ def peak_power(trajectory: JointTrajectory, scene: PlanningScene, charge: float 
 
 
 def _further(trajectory: JointTrajectory, scene: PlanningScene) -> float:
-    """Watts that the losses of iron, inverters and gears never exceed: at full speed with the full torque."""
+    """Watts that the losses of iron, inverters and gears never exceed: at full speed with the full
+    torque.
+    """
     if not scene.dynamics.lossy:
         return 0.0
     coefficients, durations = trajectory.coefficients()

@@ -1,4 +1,6 @@
-"""What RViz and Foxglove see of a cell: its bodies, zones and stations, and the path of the last movement."""
+"""What RViz and Foxglove see of a cell: its bodies, zones and stations, and the path of the last
+movement.
+"""
 
 from dataclasses import dataclass
 
@@ -24,8 +26,8 @@ CLOSEST: Colour = (0.9, 0.1, 0.1, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """kind "box", "cylinder", "sphere", "line", "triangles" or "text"; pose (4, 4), size (3,) m, points (P,
-    3).
+    """kind "box", "cylinder", "sphere", "line", "triangles" or "text"; pose (4, 4), size (3,) m,
+    points (P, 3).
     """
 
     namespace: str
@@ -60,7 +62,9 @@ def cell_shapes(cell: Cell) -> tuple[Shape, ...]:
         for m in cell.equipment
         if m.enabled
     ]
-    stations = [shape for station in cell.stations for shape in station_shapes(station.name, station.pose)]
+    stations = [
+        shape for station in cell.stations for shape in station_shapes(station.name, station.pose)
+    ]
     return (*machines, *lying, *zones, *stations)
 
 
@@ -74,7 +78,12 @@ def body_shapes(body: Body, namespace: str, colour: Colour) -> tuple[Shape, ...]
     if body.kind in ("cylinder", "capsule"):
         width = 2 * size[0]
         round_ = Shape(
-            namespace, "cylinder", body.pose, np.array([width, width, max(size[1], 1e-6)]), colour, _NONE
+            namespace,
+            "cylinder",
+            body.pose,
+            np.array([width, width, max(size[1], 1e-6)]),
+            colour,
+            _NONE,
         )
         if body.kind == "cylinder":
             return (round_,)
@@ -97,11 +106,15 @@ def station_shapes(name: str, pose: FloatArray) -> tuple[Shape, ...]:
     """The approach direction of a pose (4, 4) as a line, and the name."""
     tip = np.asarray(pose)[:3, 3]
     back = tip - 0.15 * np.asarray(pose)[:3, 0]
-    line = Shape("stations", "line", np.eye(4), np.array([0.01, 0.0, 0.0]), PATH, np.stack([back, tip]))
+    line = Shape(
+        "stations", "line", np.eye(4), np.array([0.01, 0.0, 0.0]), PATH, np.stack([back, tip])
+    )
     label = np.eye(4)
     label[:3, 3] = tip
     label[2, 3] += 0.12
-    return line, Shape("stations", "text", label, np.full(3, 0.08), (1.0, 1.0, 1.0, 1.0), _NONE, name)
+    return line, Shape(
+        "stations", "text", label, np.full(3, 0.08), (1.0, 1.0, 1.0, 1.0), _NONE, name
+    )
 
 
 def movement_shapes(
@@ -114,5 +127,7 @@ def movement_shapes(
     pair = clearance.smallest if clearance is not None else None
     if pair is not None:
         ends = np.stack([pair.point_a, pair.point_b])
-        shapes.append(Shape("closest", "line", np.eye(4), np.array([0.012, 0.0, 0.0]), CLOSEST, ends))
+        shapes.append(
+            Shape("closest", "line", np.eye(4), np.array([0.012, 0.0, 0.0]), CLOSEST, ends)
+        )
     return tuple(shapes)

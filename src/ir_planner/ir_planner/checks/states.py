@@ -57,13 +57,15 @@ def too_near(q: FloatArray, space: FreeSpace, what: str, safety_distance: float)
     z = int(space.scene.collision.min_distance(q[None], space.threshold).pair[0])
     if z < 0:
         return f"{what} is not free"
-    kept = min(safety_distance, float(space.threshold[z]) + PROOF_TOLERANCE / 2)  # a contact has its own
+    kept = min(
+        safety_distance, float(space.threshold[z]) + PROOF_TOLERANCE / 2
+    )  # a contact has its own
     return f"{what}: {too_near_sentence(pair_value(space.scene, q, z), kept)}"
 
 
 def first_too_near(path: FloatArray, space: FreeSpace) -> str:
-    """The first pair along a path (M, n) that is nearer than it may be, as counts of what was rejected name
-    it.
+    """The first pair along a path (M, n) that is nearer than it may be, as counts of what was
+    rejected name it.
     """
     near = space.scene.collision.min_distance(path, space.threshold)
     for distance, z in zip(near.distance, near.pair, strict=True):

@@ -1,6 +1,6 @@
-"""What holds along a trajectory, for every instant of its interpolant: limits by exact extremes of the
-polynomials, torque by guaranteed bounds, clearance by a certificate. The first violation of every kind is
-named with place, limit and excess.
+"""What holds along a trajectory, for every instant of its interpolant: limits by exact extremes of
+the polynomials, torque by guaranteed bounds, clearance by a certificate. The first violation of
+every kind is named with place, limit and excess.
 """
 
 from dataclasses import dataclass
@@ -26,8 +26,8 @@ from ir_planner.scene import PlanningScene, torque_use
 
 @dataclass(frozen=True, eq=False)
 class Verification:
-    """violation: the first one, None: everything is proved; others: the first of every other kind, in the
-    order of their times. Largest used shares of the limits, each (n,).
+    """violation: the first one, None: everything is proved; others: the first of every other kind,
+    in the order of their times. Largest used shares of the limits, each (n,).
     """
 
     violation: Violation | None
@@ -51,8 +51,8 @@ class Verification:
 
     @property
     def status(self) -> Status:
-        """SUCCESS, or INVALID_MOTION_PLAN with the first violation and, after "also:", the other kinds: a
-        small one at the start hides no collision.
+        """SUCCESS, or INVALID_MOTION_PLAN with the first violation and, after "also:", the other
+        kinds: a small one at the start hides no collision.
         """
         if self.violation is None:
             return Status.success()
@@ -63,8 +63,8 @@ class Verification:
 
 @dataclass(frozen=True, eq=False)
 class TorqueProof:
-    """upper (n,): guaranteed bound of the share of the torque envelope that is used; the violation where it
-    exceeds what may be used.
+    """upper (n,): guaranteed bound of the share of the torque envelope that is used; the violation
+    where it exceeds what may be used.
     """
 
     upper: FloatArray
@@ -74,17 +74,23 @@ class TorqueProof:
 def verify(
     trajectory: JointTrajectory, scene: PlanningScene, safety_distance: float, station: str = ""
 ) -> Verification:
-    """Check a trajectory against the robot's limits and S_m (or what `station` allows its pairs)."""
+    """Check a trajectory against the robot's limits and S_m (or what `station` allows its
+    pairs).
+    """
     clearance = clearance_violation(trajectory, scene, safety_distance, station)
     return verified(trajectory, scene, clearance, torque_proof(trajectory, scene))
 
 
 def verified(
-    trajectory: JointTrajectory, scene: PlanningScene, clearance: Violation | None, torque: TorqueProof
+    trajectory: JointTrajectory,
+    scene: PlanningScene,
+    clearance: Violation | None,
+    torque: TorqueProof,
 ) -> Verification:
     """The verification of a trajectory whose clearance and torque have been examined."""
     largest = extremes(*trajectory.coefficients())
-    robot, limits = scene.cell.robot, scene.limits
+    robot = scene.cell.robot
+    limits = scene.limits
     share = {
         "velocity": largest.velocity / limits.velocity,
         "acceleration": largest.acceleration / limits.acceleration,
@@ -95,7 +101,10 @@ def verified(
         rest_violation(trajectory, scene),
         jump_violation(trajectory, robot.joint_names),
         torque.violation,
-        *(share_violation(name, values, trajectory, robot.joint_names) for name, values in share.items()),
+        *(
+            share_violation(name, values, trajectory, robot.joint_names)
+            for name, values in share.items()
+        ),
         clearance,
     ]
     violations = sorted((v for v in found if v is not None), key=lambda violation: violation.time)
@@ -111,12 +120,18 @@ def verified(
     )
 
 
-def torque_proof(trajectory: JointTrajectory, scene: PlanningScene, most: float = 1.0) -> TorqueProof:
-    """Bounds of the torque that a trajectory needs; `most`: the share of the envelope that it may use."""
+def torque_proof(
+    trajectory: JointTrajectory, scene: PlanningScene, most: float = 1.0
+) -> TorqueProof:
+    """Bounds of the torque that a trajectory needs; `most`: the share of the envelope that it may
+    use.
+    """
     coefficients, durations = trajectory.coefficients()
     if len(durations) == 0:
         rest = np.zeros_like(trajectory.positions)
-        return TorqueProof(torque_use(scene.dynamics, trajectory.positions, rest, rest).max(axis=0), None)
+        return TorqueProof(
+            torque_use(scene.dynamics, trajectory.positions, rest, rest).max(axis=0), None
+        )
     bounds = scene.dynamics.torque_bounds(coefficients, durations)
     upper = np.asarray(bounds.upper)
     if upper.max() <= most + SLACK:
@@ -125,8 +140,8 @@ def torque_proof(trajectory: JointTrajectory, scene: PlanningScene, most: float 
     time = float(trajectory.times[0]) + float(bounds.time[j])
     k = segment_at(trajectory, time)
     sentence = (
-        f"{scene.cell.robot.joint_names[j]} needs {bounds.sampled[j]:.3f} (at most {upper[j]:.3f}) times its "
-        f"torque limit after waypoint {k} at {time:.3f} s: it must be at most {most:g} "
-        f"(excess {100.0 * (upper[j] - most):.1f} %)"
+        f"{scene.cell.robot.joint_names[j]} needs {bounds.sampled[j]:.3f} (at most "
+        f"{upper[j]:.3f}) times its torque limit after waypoint {k} at {time:.3f} s: it must be "
+        f"at most {most:g} (excess {100.0 * (upper[j] - most):.1f} %)"
     )
     return TorqueProof(upper, Violation(time, k, "torque", float(upper[j] - most), sentence))

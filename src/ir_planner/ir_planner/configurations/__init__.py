@@ -1,4 +1,6 @@
-"""Configurations that reach a pose: closed form, and the paper's coordinate descent (eqs. 1 to 6)."""
+"""Configurations that reach a pose: closed form, and the paper's coordinate descent (eqs. 1 to
+6).
+"""
 
 from ir_planner.configurations.answer import IK_METHODS, IkAnswer, configurations_at
 from ir_planner.configurations.interaction_point import STARTS_MAX, searched_configurations

@@ -31,7 +31,8 @@ class IkAnswer:
 def configurations_at(
     goal: Goal, near: FloatArray, context: Context, starts: int, settings: InteractionSettings
 ) -> IkAnswer:
-    """Free configurations that reach the goal's pose, ranked by W from `near` (n,), by the method that the
+    """Free configurations that reach the goal's pose, ranked by W from `near` (n,), by the method
+    that the
     journal names: all of them (analytic), or those found from random starts (ccd).
 
     Raises RequestError for a goal without a pose.
@@ -41,7 +42,8 @@ def configurations_at(
             StatusCode.INVALID_GOAL_CONSTRAINTS,
             "goal is a configuration: compute_ik takes a pose or a station",
         )
-    scene, journal = context.scene, context.journal
+    scene = context.scene
+    journal = context.journal
     threshold = context.at(goal.station).thresholds()
     with journal.stage("closed form" if journal.planner_id == "analytic" else "ccd") as notes:
         if journal.planner_id == "analytic":
@@ -55,4 +57,6 @@ def configurations_at(
     info = journal.info(near, context.joint_names)
     if len(found.q) == 0:
         return IkAnswer(no_configuration(goal.pose, scene, found, goal.text or "goal"), (), info)
-    return IkAnswer(Status.success(), ranked_solutions(found, goal.pose, scene, threshold, near), info)
+    return IkAnswer(
+        Status.success(), ranked_solutions(found, goal.pose, scene, threshold, near), info
+    )

@@ -1,9 +1,10 @@
-"""Cyclic coordinate descent among machines: eqs. (2) and (3) with the metric distances of every step.
+"""Cyclic coordinate descent among machines: eqs. (2) and (3) with the metric distances of every
+step.
 
-From the tool to the base each joint takes the value within its limits that minimises Psi; where that step
-brings a pair nearer than its safety distance, the joint is set back (eq. 5) until it is far enough, or stays
-where it was. A start that begins in collision moves on until it is out of it. Where the descent gets slow,
-Newton's steps finish it. All starts at once, in arrays.
+From the tool to the base each joint takes the value within its limits that minimises Psi; where
+that step brings a pair nearer than its safety distance, the joint is set back (eq. 5) until it is
+far enough, or stays where it was. A start that begins in collision moves on until it is out of it.
+Where the descent gets slow, Newton's steps finish it. All starts at once, in arrays.
 """
 
 from collections import Counter
@@ -28,8 +29,8 @@ _PATIENCE = 3  # sweeps without that gain
 class Descent:
     """q (K, n) of the accepted starts (eq. 6), the rejected by reason, and the sweeps done.
 
-    tracks: the configurations (M, n) of each start from sweep to sweep. outcome: of each start, why it was
-    rejected, "": accepted.
+    tracks: the configurations (M, n) of each start from sweep to sweep. outcome: of each start, why
+    it was rejected, "": accepted.
     """
 
     q: FloatArray
@@ -56,27 +57,43 @@ def descend(
 
 class _Descent:
     def __init__(
-        self, pose: FloatArray, scene: PlanningScene, threshold: FloatArray, settings: InteractionSettings
+        self,
+        pose: FloatArray,
+        scene: PlanningScene,
+        threshold: FloatArray,
+        settings: InteractionSettings,
     ) -> None:
-        self.pose, self.scene, self.threshold, self.settings = np.array(pose), scene, threshold, settings
+        self.pose = np.array(pose)
+        self.scene = scene
+        self.threshold = threshold
+        self.settings = settings
         robot = scene.cell.robot
-        self.low, self.high, self.axis = robot.position_min, robot.position_max, robot.joint_axis
+        self.low = robot.position_min
+        self.high = robot.position_max
+        self.axis = robot.joint_axis
         self.rejected: Counter[str] = Counter()
         self.outcome: list[str] = []
 
     def run(self, starts: FloatArray, work: Work) -> Descent:
-        q, found, start = starts.copy(), [starts[:0]], np.arange(len(starts))
+        q = starts.copy()
+        found = [starts[:0]]
+        start = np.arange(len(starts))
         self.outcome = [""] * len(starts)
         tracks = [[one] for one in starts]
         distance = self.scene.collision.distances(q)
-        psi, stalled = self._psi(q), np.zeros(len(q), dtype=int)
+        psi = self._psi(q)
+        stalled = np.zeros(len(q), dtype=int)
         blocked = np.full(len(q), -1)  # the pair that last set a start back
         sweeps = 0
         while len(q) and sweeps < self.settings.sweeps and not work.exhausted:
             affordable = np.arange(len(q)) < work.left
             self._reject(start[~affordable], blocked[~affordable], "not converged, set back")
-            q, distance, psi, start = q[affordable], distance[affordable], psi[affordable], start[affordable]
-            stalled, blocked = stalled[affordable], blocked[affordable]
+            q = q[affordable]
+            distance = distance[affordable]
+            psi = psi[affordable]
+            start = start[affordable]
+            stalled = stalled[affordable]
+            blocked = blocked[affordable]
             work.spend(len(q))
             q, distance, blocked = self._sweep(q, distance, blocked)
             sweeps += 1
@@ -93,24 +110,35 @@ class _Descent:
             given_up = keep & (stalled >= _PATIENCE)
             self._reject(start[given_up], blocked[given_up], "set back for good")
             keep &= ~given_up
-            q, distance, psi, start = q[keep], distance[keep], psi[keep], start[keep]
-            stalled, blocked = stalled[keep], blocked[keep]
+            q = q[keep]
+            distance = distance[keep]
+            psi = psi[keep]
+            start = start[keep]
+            stalled = stalled[keep]
+            blocked = blocked[keep]
         self._reject(start, blocked, "not converged, set back")
         return Descent(
-            np.concatenate(found), sweeps, self.rejected, [np.array(track) for track in tracks], self.outcome
+            np.concatenate(found),
+            sweeps,
+            self.rejected,
+            [np.array(track) for track in tracks],
+            self.outcome,
         )
 
     def _sweep(
         self, q: FloatArray, distance: FloatArray, blocked: IntArray
     ) -> tuple[FloatArray, FloatArray, IntArray]:
         """One pass over the joints, tool to base: a joint does not move the links before it."""
-        q, blocked = q.copy(), blocked.copy()
+        q = q.copy()
+        blocked = blocked.copy()
         links = self.scene.chain.link_poses(q)
         tcp = np.array(self.scene.chain.tcp_poses(q))
         for i in reversed(range(q.shape[1])):
             z = links[:, i + 1, :3, :3] @ self.axis[i]
             o = links[:, i + 1, :3, 3]
-            value = best_value(q[:, i], *self._k(z, o, tcp), float(self.low[i]), float(self.high[i]))
+            value = best_value(
+                q[:, i], *self._k(z, o, tcp), float(self.low[i]), float(self.high[i])
+            )
             before = q[:, i].copy()
             q, distance, pair = self._stepped(q, i, value, distance)
             blocked = np.where(pair >= 0, pair, blocked)
@@ -119,23 +147,28 @@ class _Descent:
             tcp[:, :3, :3] = turn @ tcp[:, :3, :3]
         return q, distance, blocked
 
-    def _k(self, z: FloatArray, o: FloatArray, tcp: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _k(
+        self, z: FloatArray, o: FloatArray, tcp: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """k1, k2, k3 (P,) of eq. (3), from the moment M = w_p Pt Pc^T + w_o sum ut_j uc_j^T."""
-        current, target = tcp[:, :3, 3] - o, self.pose[:3, 3] - o
+        current = tcp[:, :3, 3] - o
+        target = self.pose[:3, 3] - o
         wo = ROTATION_LENGTH**2 / 2.0
         M = target[:, :, None] * current[:, None, :] + wo * (
             self.pose[:3, :3] @ tcp[:, :3, :3].transpose(0, 2, 1)
         )
         k1 = ((M @ z[:, :, None])[:, :, 0] * z).sum(axis=1)
         k2 = np.trace(M, axis1=1, axis2=2)
-        curl = np.stack([M[:, 2, 1] - M[:, 1, 2], M[:, 0, 2] - M[:, 2, 0], M[:, 1, 0] - M[:, 0, 1]], axis=1)
+        curl = np.stack(
+            [M[:, 2, 1] - M[:, 1, 2], M[:, 0, 2] - M[:, 2, 0], M[:, 1, 0] - M[:, 0, 1]], axis=1
+        )
         return k1, k2, (z * curl).sum(axis=1)
 
     def _stepped(
         self, q: FloatArray, i: int, value: FloatArray, before: FloatArray
     ) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Joint i at `value` (P,), or as far as it may; distances (P, Z) there, unless none set it back; the
-        pair that did, or -1.
+        """Joint i at `value` (P,), or as far as it may; distances (P, Z) there, unless none set it
+        back; the pair that did, or -1.
         """
         old = q[:, i].copy()
         q[:, i] = value
@@ -145,10 +178,14 @@ class _Descent:
         after = self.scene.collision.distances(q)
         rows = np.flatnonzero(((after <= self.threshold) & (before > self.threshold)).any(axis=1))
         for attempt in range(self.settings.repairs + 1):
-            start, end = before[rows], after[rows]
-            share = shares_back(start, end, self.threshold, self.settings.set_back, self.settings.overshoot)
+            start = before[rows]
+            end = after[rows]
+            share = shares_back(
+                start, end, self.threshold, self.settings.set_back, self.settings.overshoot
+            )
             back = share > 0.0
-            rows, share = rows[back], share[back]
+            rows = rows[back]
+            share = share[back]
             if len(rows) == 0:
                 break
             blocked[rows] = np.argmin(end[back] - self.threshold, axis=1)
@@ -161,8 +198,8 @@ class _Descent:
     def _finish(
         self, q: FloatArray, start: IntArray, tracks: list[list[FloatArray]]
     ) -> tuple[BoolArray, FloatArray]:
-        """Which of `start` (K,) arrive by Newton's steps, and the configurations among them that are free
-        (eq. 6).
+        """Which of `start` (K,) arrive by Newton's steps, and the configurations among them that
+        are free (eq. 6).
         """
         settings = CcdSettings(ROTATION_LENGTH, self.settings.xi, 0, self.settings.newton_steps)
         end = ccd(self.scene.chain, self.pose, q, self.low, self.high, settings)
@@ -180,12 +217,15 @@ class _Descent:
     def _psi(self, q: FloatArray) -> FloatArray:
         """Eq. (2), m^2."""
         tcp = self.scene.chain.tcp_poses(q)
-        step, turn = tcp[:, :3, 3] - self.pose[:3, 3], tcp[:, :3, :3] - self.pose[:3, :3]
+        step = tcp[:, :3, 3] - self.pose[:3, 3]
+        turn = tcp[:, :3, :3] - self.pose[:3, :3]
         wo = ROTATION_LENGTH**2 / 2.0
         return np.asarray((step**2).sum(axis=1) + wo * (turn**2).sum(axis=(1, 2)))
 
     def _reject(self, starts: IntArray, pairs: IntArray, what: str) -> None:
-        """Count starts (K,) out, each by the pair (K,) that was too near; -1: not converged, by no pair."""
+        """Count starts (K,) out, each by the pair (K,) that was too near; -1: not converged, by no
+        pair.
+        """
         for k, z in zip(starts.tolist(), pairs.tolist(), strict=True):
             pair = self.scene.collision.pairs[z] if z >= 0 else None
             named = f"{what}: {pair.body_a} too near {pair.body_b}" if pair else "not converged"
@@ -196,7 +236,12 @@ class _Descent:
 def _rotations(axis: FloatArray, angle: FloatArray) -> FloatArray:
     """Rotation matrices (P, 3, 3) about unit axes (P, 3)."""
     K = np.zeros((len(axis), 3, 3))
-    K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -axis[:, 2], axis[:, 1], -axis[:, 0]
-    K[:, 1, 0], K[:, 2, 0], K[:, 2, 1] = axis[:, 2], -axis[:, 1], axis[:, 0]
-    sine, versine = np.sin(angle)[:, None, None], (1.0 - np.cos(angle))[:, None, None]
+    K[:, 0, 1] = -axis[:, 2]
+    K[:, 0, 2] = axis[:, 1]
+    K[:, 1, 2] = -axis[:, 0]
+    K[:, 1, 0] = axis[:, 2]
+    K[:, 2, 0] = -axis[:, 1]
+    K[:, 2, 1] = axis[:, 0]
+    sine = np.sin(angle)[:, None, None]
+    versine = (1.0 - np.cos(angle))[:, None, None]
     return np.asarray(np.eye(3) + sine * K + versine * (K @ K))

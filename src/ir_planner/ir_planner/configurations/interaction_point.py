@@ -1,8 +1,9 @@
-"""Service movement, stage one: the goal configurations at the interaction point by the paper's search.
+"""Service movement, stage one: the goal configurations at the interaction point by the paper's
+search.
 
-p random starts (eq. 1), cyclic coordinate descent with metric distances (eqs. 2 to 5), acceptance and
-rejection (eq. 6). It needs no closed form, so it works for any chain; what it finds is a sample of the
-complete set, made distinct and ranked as that is.
+p random starts (eq. 1), cyclic coordinate descent with metric distances (eqs. 2 to 5), acceptance
+and rejection (eq. 6). It needs no closed form, so it works for any chain; what it finds is a sample
+of the complete set, made distinct and ranked as that is.
 """
 
 import numpy as np
@@ -22,7 +23,9 @@ _SAME = 1e-3  # rad: configurations nearer to each other are one
 def random_starts(
     low: FloatArray, high: FloatArray, count: int, distribution: str, rng: np.random.Generator
 ) -> FloatArray:
-    """Eq. (1): starts (p, n) within [low, high] (n,): truncated normal about mid-range, or uniform."""
+    """Eq. (1): starts (p, n) within [low, high] (n,): truncated normal about mid-range, or
+    uniform.
+    """
     if distribution == "uniform":
         return rng.uniform(low, high, (count, len(low)))
     z = rng.standard_normal((count, len(low)))
@@ -49,7 +52,9 @@ def searched_configurations(
     """
     robot = scene.cell.robot
     rng = np.random.default_rng(seed)
-    first = random_starts(robot.position_min, robot.position_max, starts, settings.distribution, rng)
+    first = random_starts(
+        robot.position_min, robot.position_max, starts, settings.distribution, rng
+    )
     limit = threshold - PROOF_TOLERANCE / 2
     found = descend(pose, first, scene, limit, settings, work)
     q = distinct_configurations(found.q)

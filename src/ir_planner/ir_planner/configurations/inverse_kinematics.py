@@ -1,7 +1,8 @@
-"""Configurations that reach a pose: the complete closed-form set, filtered by clearance, ranked by cost.
+"""Configurations that reach a pose: the complete closed-form set, filtered by clearance, ranked by
+cost.
 
-Rank: W of eq. (9) from a given configuration, then clearance. What is dropped is counted by the obstructing
-pair.
+Rank: W of eq. (9) from a given configuration, then clearance. What is dropped is counted by the
+obstructing pair.
 """
 
 from collections import Counter
@@ -21,7 +22,8 @@ from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, movement_cost
 class Configurations:
     """Free configurations q (K, n), ranked; branch (K,); and why the others were dropped.
 
-    nearest: where none is free, the obstructing pair of the one that lacks least ("" where it is not known).
+    nearest: where none is free, the obstructing pair of the one that lacks least ("" where it is
+    not known).
     tracks, outcome: of a search from random starts, as in `Descent`; else empty.
     """
 
@@ -37,7 +39,9 @@ class Configurations:
 def free_configurations(
     pose: FloatArray, scene: PlanningScene, threshold: FloatArray, near: FloatArray
 ) -> Configurations:
-    """All configurations that bring the tcp to `pose` (4, 4) with every pair above its threshold (Z,)."""
+    """All configurations that bring the tcp to `pose` (4, 4) with every pair above its threshold
+    (Z,).
+    """
     found = scene.inverse_kinematics.solve(np.asarray(pose)[None])
     rejected: Counter[str] = Counter()
     if len(found.q) == 0:
@@ -49,8 +53,12 @@ def free_configurations(
         if z >= 0 and closest.distance[k] <= limit[z]:
             pair = scene.collision.pairs[z]
             rejected[f"{pair.body_a} too near {pair.body_b}"] += 1
-    free = np.array([z < 0 or d > limit[z] for z, d in zip(closest.pair, closest.distance, strict=True)])
-    q, branch, margin = found.q[free], found.branch[free], closest.distance[free]
+    free = np.array(
+        [z < 0 or d > limit[z] for z, d in zip(closest.pair, closest.distance, strict=True)]
+    )
+    q = found.q[free]
+    branch = found.branch[free]
+    margin = closest.distance[free]
     order = np.lexsort((-margin, np.round(movement_cost(scene.weights, near, q), 6)))
     nearest = "" if len(q) else _least_lacking(scene, closest, threshold)
     return Configurations(q[order], branch[order], len(found.q), rejected, nearest)
@@ -59,14 +67,17 @@ def free_configurations(
 def _least_lacking(scene: PlanningScene, closest: MinDistance, threshold: FloatArray) -> str:
     lacking = threshold[closest.pair] - closest.distance
     k = int(np.argmin(lacking))
-    pair, kept = scene.collision.pairs[int(closest.pair[k])], float(threshold[closest.pair[k]])
+    pair = scene.collision.pairs[int(closest.pair[k])]
+    kept = float(threshold[closest.pair[k]])
     return (
-        f"in the best of them {pair.body_a} and {pair.body_b} come to {closest.distance[k] * 1e3:.1f} mm, "
-        f"they must keep more than {kept * 1e3:.1f} mm"
+        f"in the best of them {pair.body_a} and {pair.body_b} come to "
+        f"{closest.distance[k] * 1e3:.1f} mm, they must keep more than {kept * 1e3:.1f} mm"
     )
 
 
-def no_configuration(pose: FloatArray, scene: PlanningScene, found: Configurations, what: str) -> Status:
+def no_configuration(
+    pose: FloatArray, scene: PlanningScene, found: Configurations, what: str
+) -> Status:
     """The status for a pose (4, 4) that no configuration reaches, or none that is free."""
     x, y, z = (float(v) for v in np.asarray(pose)[:3, 3])
     place = f"{what} at ({x:.3f}, {y:.3f}, {z:.3f}) m"
@@ -75,9 +86,8 @@ def no_configuration(pose: FloatArray, scene: PlanningScene, found: Configuratio
         away = float(np.linalg.norm(np.array([x, y, z]) - wrist))
         return Status(
             StatusCode.NO_IK_SOLUTION,
-            f"{place} can't be reached in this orientation within the joint limits "
-            f"(the tcp would be {away:.2f} m from "
-            "the robot's base)",
+            f"{place} can't be reached in this orientation within the joint limits (the tcp "
+            f"would be {away:.2f} m from the robot's base)",
         )
     reasons = ", ".join(f"{reason} ({count})" for reason, count in found.rejected.most_common(4))
     return Status(
@@ -88,7 +98,11 @@ def no_configuration(pose: FloatArray, scene: PlanningScene, found: Configuratio
 
 
 def ranked_solutions(
-    found: Configurations, pose: FloatArray, scene: PlanningScene, threshold: FloatArray, near: FloatArray
+    found: Configurations,
+    pose: FloatArray,
+    scene: PlanningScene,
+    threshold: FloatArray,
+    near: FloatArray,
 ) -> tuple[IkSolution, ...]:
     """The configurations with errors, branch, turns, clearance and cost from `near` (n,)."""
     names = scene.cell.robot.joint_names

@@ -1,4 +1,6 @@
-"""What became of every random start of a search for configurations, as it travels with an answer."""
+"""What became of every random start of a search for configurations, as it travels with an
+answer.
+"""
 
 import numpy as np
 
@@ -9,8 +11,12 @@ from ir_planner.scene import PlanningScene
 _TRACKS = 64  # starts whose positions are kept: more than a picture shows
 
 
-def configuration_log(station: str, found: Configurations, scene: PlanningScene) -> ConfigurationLog:
-    """The starts of a search at a station: where the tool was from sweep to sweep, and what ended them."""
+def configuration_log(
+    station: str, found: Configurations, scene: PlanningScene
+) -> ConfigurationLog:
+    """The starts of a search at a station: where the tool was from sweep to sweep, and what ended
+    them.
+    """
     tracks = tuple(
         Track(outcome, scene.chain.tcp_poses(np.ascontiguousarray(q))[:, :3, 3])
         for q, outcome in zip(found.tracks[:_TRACKS], found.outcome, strict=False)

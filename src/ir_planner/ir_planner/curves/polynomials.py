@@ -1,9 +1,10 @@
 """Exact extremes of a trajectory between its points: what a limit is compared with.
 
-A trajectory is q(t) = sum_k c_k t^k in the local time of each segment, coefficients (S, n, K). Extremes are
-those of the compiled core. The travel of a joint is the distance between its ends, or where it turns in
-between, that between its turning points: they are bracketed between the roots of the next derivative, down to
-a line, so none is missed and no sampling takes part.
+A trajectory is q(t) = sum_k c_k t^k in the local time of each segment, coefficients (S, n, K).
+Extremes are those of the compiled core. The travel of a joint is the distance between its ends, or
+where it turns in
+between, that between its turning points: they are bracketed between the roots of the next
+derivative, down to a line, so none is missed and no sampling takes part.
 """
 
 from dataclasses import dataclass
@@ -14,7 +15,9 @@ import numpy as np
 from ir_kernels import Extrema, polynomial_extrema
 from ir_msgs_py.arrays import BoolArray, FloatArray
 
-_NOTHING = 1e-9  # rad: what higher powers may add to a cubic, as a point per knot of a spline rounds them
+_NOTHING = (
+    1e-9  # rad: what higher powers may add to a cubic, as a point per knot of a spline rounds them
+)
 _HALVINGS = 15  # a root to 3e-5 of the segment: the value at an extreme is off by its square
 
 
@@ -22,7 +25,8 @@ _HALVINGS = 15  # a root to 3e-5 of the segment: the value at an extreme is off 
 class Extremes:
     """Largest values per segment and joint, each (S, n): rad, rad/s, rad/s^2, rad/s^3.
 
-    positions (S, n, K): polynomials over the share of their segment; turning (S, n): where a joint turns.
+    positions (S, n, K): polynomials over the share of their segment; turning (S, n): where a joint
+    turns.
     """
 
     lowest: FloatArray
@@ -35,7 +39,9 @@ class Extremes:
 
     @cached_property
     def travel(self) -> FloatArray:
-        """Sum |dq| (S, n) rad; found when it is asked for, because it costs more than all the others."""
+        """Sum |dq| (S, n) rad; found when it is asked for, because it costs more than all the
+        others.
+        """
         travel = np.abs(self.positions[:, :, 1:].sum(axis=2))
         if self.turning.any():
             turning = self.positions[self.turning]
@@ -70,7 +76,8 @@ def roots_between(polynomial: FloatArray, turning: FloatArray) -> FloatArray:
     """
     rows = len(polynomial)
     edges = np.concatenate([np.zeros((rows, 1)), turning, np.ones((rows, 1))], axis=1)
-    low, high = edges[:, :-1].copy(), edges[:, 1:].copy()
+    low = edges[:, :-1].copy()
+    high = edges[:, 1:].copy()
     value = evaluate(polynomial, edges)
     sign_low = np.sign(value[:, :-1])
     crossing = sign_low * np.sign(value[:, 1:]) < 0
@@ -78,7 +85,10 @@ def roots_between(polynomial: FloatArray, turning: FloatArray) -> FloatArray:
     if not crossing.any():
         return low
     active = np.flatnonzero(crossing.any(axis=1))
-    part, lo, hi, sign = polynomial[active], low[active], high[active], sign_low[active]
+    part = polynomial[active]
+    lo = low[active]
+    hi = high[active]
+    sign = sign_low[active]
     for _ in range(_HALVINGS):
         middle = 0.5 * (lo + hi)
         left = np.sign(evaluate(part, middle)) == sign
@@ -94,7 +104,9 @@ def extremes(coefficients: FloatArray, durations: FloatArray) -> Extremes:
         nothing = np.zeros(coefficients.shape[:2])
         still = nothing.astype(np.bool_)
         return Extremes(nothing, nothing, nothing, nothing, nothing, coefficients, still)
-    position, speed, change, jerk = (polynomial_extrema(coefficients, durations, k) for k in range(4))
+    position, speed, change, jerk = (
+        polynomial_extrema(coefficients, durations, k) for k in range(4)
+    )
     return Extremes(
         lowest=position.minimum,
         highest=position.maximum,
@@ -114,7 +126,10 @@ def _cubic_travel(position: FloatArray) -> FloatArray:
     """Travel (P,) of polynomials (P, K) over u in [0, 1] that are cubic, or less."""
     c = np.zeros((4, len(position)))
     c[: min(position.shape[1], 4)] = position[:, :4].T
-    a, half, b = 3.0 * c[3], c[2], c[1]  # of the speed a u^2 + 2 half u + b
+    # of the speed a u^2 + 2 half u + b
+    a = 3.0 * c[3]
+    half = c[2]
+    b = c[1]
     root = np.sqrt(np.maximum(half * half - a * b, 0.0))
     larger = -(half + np.copysign(root, half))  # without cancellation
     with np.errstate(divide="ignore", invalid="ignore"):

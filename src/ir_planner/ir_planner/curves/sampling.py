@@ -1,4 +1,6 @@
-"""Where a trajectory is at many instants: the interpolant that everything rests on, by the compiled core."""
+"""Where a trajectory is at many instants: the interpolant that everything rests on, by the compiled
+core.
+"""
 
 import numpy as np
 from numpy.typing import NDArray

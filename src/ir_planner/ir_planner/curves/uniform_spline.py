@@ -1,8 +1,9 @@
-"""Motions along uniform cubic B-splines: control points with one interval of time between all knots.
+"""Motions along uniform cubic B-splines: control points with one interval of time between all
+knots.
 
-Three equal control points at an end mean rest there. Acceleration is linear and jerk constant between knots,
-so a point per knot with position, velocity and acceleration is the motion exactly, and its largest values are
-closed forms.
+Three equal control points at an end mean rest there. Acceleration is linear and jerk constant
+between knots, so a point per knot with position, velocity and acceleration is the motion exactly,
+and its largest values are closed forms.
 """
 
 from dataclasses import dataclass
@@ -42,19 +43,23 @@ class UniformSpline:
 
     def knots(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """q, qd, qdd (K - 2, n) at the knots; exactly at rest at both ends."""
-        c, h = self.control, self.interval
+        c = self.control
+        h = self.interval
         q = (c[:-2] + 4.0 * c[1:-1] + c[2:]) / 6.0
-        q[0], q[-1] = c[0], c[-1]
+        q[0] = c[0]
+        q[-1] = c[-1]
         return q, (c[2:] - c[:-2]) / (2.0 * h), (c[:-2] - 2.0 * c[1:-1] + c[2:]) / h**2
 
     def samples(self, per_interval: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """q, qd, qdd (S * per_interval, n) at evenly spaced instants, the beginnings of the intervals
-        included.
+        """q, qd, qdd (S * per_interval, n) at evenly spaced instants, the beginnings of the
+        intervals included.
         """
         q, qd, qdd = (values[:, None, :] for values in self.knots())
         t = (np.arange(per_interval) / per_interval * self.interval)[None, :, None]
         jerk = np.diff(qdd, axis=0) / self.interval
-        a, v, s = qdd[:-1] + t * jerk, qd[:-1], q[:-1]
+        a = qdd[:-1] + t * jerk
+        v = qd[:-1]
+        s = q[:-1]
         speed = v + t * (qdd[:-1] + 0.5 * t * jerk)
         place = s + t * (v + t * (0.5 * qdd[:-1] + t * jerk / 6.0))
         n = self.control.shape[1]
@@ -77,7 +82,9 @@ class UniformSpline:
         finer = np.empty((2 * len(c) - 3, c.shape[1]))
         finer[0::2] = 0.5 * (c[:-1] + c[1:])
         finer[1::2] = 0.125 * (c[:-2] + 6.0 * c[1:-1] + c[2:])
-        finer[:3], finer[-3:] = c[0], c[-1]  # rounding must not move the ends
+        # rounding must not move the ends
+        finer[:3] = c[0]
+        finer[-3:] = c[-1]
         return UniformSpline(finer, 0.5 * self.interval)
 
     def lasting(self, duration: float) -> "UniformSpline":
@@ -85,37 +92,48 @@ class UniformSpline:
         return UniformSpline(self.control, duration / self.intervals)
 
     def trajectory(self, joint_names: tuple[str, ...]) -> JointTrajectory:
-        """The motion as it is sent, a point per knot; the interval is rounded up to a nanosecond."""
+        """The motion as it is sent, a point per knot; the interval is rounded up to a
+        nanosecond.
+        """
         step = int(np.ceil(self.interval * 1e9 - 1e-3))
         q, qd, qdd = UniformSpline(self.control, step * 1e-9).knots()
         return JointTrajectory(joint_names, np.arange(len(q), dtype=np.int64) * step, q, qd, qdd)
 
 
 def along_motion(trajectory: JointTrajectory, count: int, duration: float) -> UniformSpline:
-    """Spline with `count` control points between its ends along a trajectory, with its speed profile but
-    for the duration [s].
+    """Spline with `count` control points between its ends along a trajectory, with its speed
+    profile but for the duration [s].
     """
     begin = float(trajectory.times[0])
-    q = trajectory.sample(begin + np.linspace(0.0, 1.0, count + 4) * (trajectory.duration - begin)).q
-    q[0], q[-1] = trajectory.positions[0], trajectory.positions[-1]
+    q = trajectory.sample(
+        begin + np.linspace(0.0, 1.0, count + 4) * (trajectory.duration - begin)
+    ).q
+    q[0] = trajectory.positions[0]
+    q[-1] = trajectory.positions[-1]
     bend = np.zeros_like(q)
-    bend[1:-1] = (q[:-2] - 2.0 * q[1:-1] + q[2:]) / 6.0  # a control point lies outside its curve by that
+    bend[1:-1] = (
+        q[:-2] - 2.0 * q[1:-1] + q[2:]
+    ) / 6.0  # a control point lies outside its curve by that
     inner = (q - bend)[2:-2]
     control = np.concatenate([np.repeat(q[:1], 3, axis=0), inner, np.repeat(q[-1:], 3, axis=0)])
     return UniformSpline(control, duration / (count + 3))
 
 
 def along_path(path: FloatArray, count: int, duration: float) -> UniformSpline:
-    """Spline with `count` control points between its ends along a path (M, n), slow at both ends of it."""
+    """Spline with `count` control points between its ends along a path (M, n), slow at both ends of
+    it.
+    """
     share = np.arange(1, count + 1) / (count + 1)
     inner = at_shares(path, share * share * (3.0 - 2.0 * share))
-    control = np.concatenate([np.repeat(path[:1], 3, axis=0), inner, np.repeat(path[-1:], 3, axis=0)])
+    control = np.concatenate(
+        [np.repeat(path[:1], 3, axis=0), inner, np.repeat(path[-1:], 3, axis=0)]
+    )
     return UniformSpline(control, duration / (count + 3))
 
 
 def fewest_seconds(path: FloatArray, velocity: FloatArray, acceleration: FloatArray) -> float:
-    """A guess that is seldom too long: a path (M, n) at full speed, or from rest to rest as its longest
-    joint.
+    """A guess that is seldom too long: a path (M, n) at full speed, or from rest to rest as its
+    longest joint.
     """
     steps = np.abs(np.diff(path, axis=0))
     at_speed = float((steps / velocity).max(axis=1).sum())

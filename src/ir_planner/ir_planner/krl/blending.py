@@ -1,9 +1,10 @@
 """Moves that follow each other without a stop: the next begins while the last one brakes.
 
-As `timing.blending` does for straight steps: q(t) is the sum of what the moves have covered, so that the
-arm cuts the corner. Moves that are blended have half the jerk each, so that both together keep the limit.
-How early the next may begin follows from the approximation distance: what is left of the one and what the
-other has covered stay within it, and within half of each move.
+As `timing.blending` does for straight steps: q(t) is the sum of what the moves have covered, so
+that the arm cuts the corner. Moves that are blended have half the jerk each, so that both together
+keep the limit.
+How early the next may begin follows from the approximation distance: what is left of the one and
+what the other has covered stay within it, and within half of each move.
 """
 
 import itertools
@@ -53,7 +54,9 @@ def _share(move: Move, blend: Blend) -> float:
 def _within(corner: JointTrajectory, scene: PlanningScene) -> bool:
     """Whether two moves that overlap keep the limits and the torque."""
     limits = scene.limits
-    motion = corner.sample(np.linspace(0.0, corner.duration, max(round(corner.duration * _SAMPLES_PER_S), 2)))
+    motion = corner.sample(
+        np.linspace(0.0, corner.duration, max(round(corner.duration * _SAMPLES_PER_S), 2))
+    )
     return bool(
         (np.abs(motion.qd) <= limits.velocity).all()
         and (np.abs(motion.qdd) <= limits.acceleration).all()
@@ -65,11 +68,17 @@ def _within(corner: JointTrajectory, scene: PlanningScene) -> bool:
 def joined(
     moves: Sequence[Move], overlaps: Sequence[int]
 ) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
-    """Grid steps (M,), and q, qd, qdd (M, n) there, of moves of which each overlaps the one before."""
+    """Grid steps (M,), and q, qd, qdd (M, n) there, of moves of which each overlaps the one
+    before.
+    """
     lasting = [move.law.total for move in moves]
     begins = [0, *itertools.accumulate(a - b for a, b in zip(lasting[:-1], overlaps, strict=True))]
-    knots = np.unique(np.concatenate([move.switches() + at for move, at in zip(moves, begins, strict=True)]))
-    total = [np.zeros((len(knots), len(moves[0].at(np.zeros(1, np.int64))[0][0]))) for _ in range(3)]
+    knots = np.unique(
+        np.concatenate([move.switches() + at for move, at in zip(moves, begins, strict=True)])
+    )
+    total = [
+        np.zeros((len(knots), len(moves[0].at(np.zeros(1, np.int64))[0][0]))) for _ in range(3)
+    ]
     for k, (move, at) in enumerate(zip(moves, begins, strict=True)):
         q, qd, qdd = move.at(knots - at)
         start = q[0] if k == 0 else move.at(np.zeros(1, np.int64))[0][0]
@@ -80,7 +89,9 @@ def joined(
     return knots, q, qd, qdd
 
 
-def trajectory(moves: Sequence[Move], overlaps: Sequence[int], names: tuple[str, ...]) -> JointTrajectory:
+def trajectory(
+    moves: Sequence[Move], overlaps: Sequence[int], names: tuple[str, ...]
+) -> JointTrajectory:
     """The trajectory of moves that are driven through, at rest at both ends."""
     knots, q, qd, qdd = joined(moves, overlaps)
     return JointTrajectory(names, knots * GRID_NS, q, qd, qdd)

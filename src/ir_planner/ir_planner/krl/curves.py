@@ -1,4 +1,6 @@
-"""What motions draw: straight lines of the axes, and lines, arcs and splines of the tool as joint curves."""
+"""What motions draw: straight lines of the axes, and lines, arcs and splines of the tool as joint
+curves.
+"""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -14,7 +16,8 @@ from ir_planner.krl.geometry import Arm
 
 _STEP_M = 4e-3  # between samples of a tool path
 _STEP_RAD = np.radians(1.0)
-_SAMPLES_MIN, _SAMPLES_MAX = 17, 20_001
+_SAMPLES_MIN = 17
+_SAMPLES_MAX = 20_001
 _JUMP = np.radians(20.0)  # of an axis between samples: the path passes a singularity
 _DEGREE = 5
 
@@ -72,9 +75,11 @@ def through_axes(points: FloatArray) -> AxisCurve:
     return AxisCurve(make_interp_spline(u, points, k=min(_DEGREE, len(points) - 1)), 0.0, 0.0)
 
 
-def tool_ends(motion: Motion, start: FloatArray, arm: Arm) -> tuple[FloatArray, FloatArray, Arc | Line]:
-    """Where a LIN or CIRC from the configuration `start` (n,) begins and ends, poses (4, 4) of its tool in
-    its base, and the places between. Raises KrlMotionError.
+def tool_ends(
+    motion: Motion, start: FloatArray, arm: Arm
+) -> tuple[FloatArray, FloatArray, Arc | Line]:
+    """Where a LIN or CIRC from the configuration `start` (n,) begins and ends, poses (4, 4) of its
+    tool in its base, and the places between. Raises KrlMotionError.
     """
     first = arm.tool_pose(motion.target, start)
     last, path = drawn_from(motion, first, arm)
@@ -82,7 +87,9 @@ def tool_ends(motion: Motion, start: FloatArray, arm: Arm) -> tuple[FloatArray, 
 
 
 def drawn_from(motion: Motion, first: FloatArray, arm: Arm) -> tuple[FloatArray, Arc | Line]:
-    """The same from a pose (4, 4) of its tool in its base: where it ends, and the places between."""
+    """The same from a pose (4, 4) of its tool in its base: where it ends, and the places
+    between.
+    """
     last = arm.pose(motion.target, first)
     if motion.keeps_orientation:
         last[:3, :3] = first[:3, :3]
@@ -109,8 +116,8 @@ def tool_curve(motion: Motion, start: FloatArray, arm: Arm) -> AxisCurve:
 
 
 def followed(poses: FloatArray, motion: Motion, start: FloatArray, arm: Arm) -> FloatArray:
-    """Configurations (N, n) along tool poses (N, 4, 4), each the nearest to the one before; the first is
-    `start`. Raises KrlMotionError where the path leaves the reach or an axis jumps.
+    """Configurations (N, n) along tool poses (N, 4, 4), each the nearest to the one before; the
+    first is `start`. Raises KrlMotionError where the path leaves the reach or an axis jumps.
     """
     q = np.empty((len(poses), len(start)))
     q[0] = start
@@ -125,8 +132,8 @@ def followed(poses: FloatArray, motion: Motion, start: FloatArray, arm: Arm) -> 
         if jump.max() > _JUMP:
             j = int(jump.argmax())
             raise KrlMotionError(
-                f"{_name(motion)}: A{j + 1} would have to jump by {np.degrees(jump[j]):.0f} deg {where}: "
-                "a singularity, or an axis limit that asks for another configuration",
+                f"{_name(motion)}: A{j + 1} would have to jump by {np.degrees(jump[j]):.0f} deg "
+                f"{where}: a singularity, or an axis limit that asks for another configuration",
                 motion.place,
             )
         q[k] = nearest

@@ -1,4 +1,6 @@
-"""A KRL program as a KR C4 drives it: a trajectory from one standstill to the next, waits, outputs."""
+"""A KRL program as a KR C4 drives it: a trajectory from one standstill to the next, waits,
+outputs.
+"""
 
 from dataclasses import dataclass, field, replace
 
@@ -37,9 +39,9 @@ _BLENDED_JERK = 0.5  # of the limit: while two moves overlap their jerks add up
 class DrivenStep:
     """One step from standstill to standstill: a movement, or a wait.
 
-    places: of its motions in the program; outputs: set at its end, number and value; waits_for: a condition
-    that ends a wait; tool: for each motion what the tool draws, None for a PTP and where no segment describes
-    it; process: places of the motions that belong to a process.
+    places: of its motions in the program; outputs: set at its end, number and value; waits_for: a
+    condition that ends a wait; tool: for each motion what the tool draws, None for a PTP and where
+    no segment describes it; process: places of the motions that belong to a process.
     """
 
     trajectory: JointTrajectory
@@ -54,10 +56,11 @@ class DrivenStep:
 def drive(
     program: Followed, scene: PlanningScene, start: FloatArray
 ) -> tuple[tuple[DrivenStep, ...], tuple[Note, ...]]:
-    """All steps of the program, and what was assumed; `start` (n,) is where the robot stands before.
+    """All steps of the program, and what was assumed; `start` (n,) is where the robot stands
+    before.
 
-    As on the controller, the first motion brings the robot onto the programmed path (block coincidence): it
-    is no part of the cycle. Raises KrlMotionError.
+    As on the controller, the first motion brings the robot onto the programmed path (block
+    coincidence): it is no part of the cycle. Raises KrlMotionError.
     """
     run = _Drive(scene, np.array(start), list(program.notes))
     process = process_motions(program.commands)
@@ -122,14 +125,20 @@ class _Drive:
             tool=tuple(self._tool),
             process=tuple(self._process),
         )
-        self._moves, self._overlaps, self._places, self._blend, self._outputs = [], [], [], None, []
-        self._tool, self._process = [], []
+        self._moves = []
+        self._overlaps = []
+        self._places = []
+        self._blend = None
+        self._outputs = []
+        self._tool = []
+        self._process = []
 
     def _motion(self, motion: Motion) -> None:
         if not self._on_path:
             if motion.kind != "ptp":
                 raise KrlMotionError(
-                    "the first motion must be a PTP: where does the robot stand before?", motion.place
+                    "the first motion must be a PTP: where does the robot stand before?",
+                    motion.place,
                 )
             self.here = self.arm.reached(motion.target, self.here, motion.place)
             self._on_path = True
@@ -159,7 +168,9 @@ class _Drive:
             return
         curve = block_curve(block, self.here, self.arm)
         if any(part.speeds != block.parts[0].speeds for part in block.parts):
-            self.notes.append(Note(block.place, "parts have speeds of their own: driven as its first part"))
+            self.notes.append(
+                Note(block.place, "parts have speeds of their own: driven as its first part")
+            )
         least = sum(one.seconds for one in block.times)
         drawn = None if block.axis else tool_spline(block, self.here, self.arm)
         self._drive(curve, block, block.parts[0].speeds, drawn, least)
@@ -194,6 +205,11 @@ class _Drive:
         self._step(standing(self.here, names, seconds), (place,), moves=False, waits_for=condition)
 
     def _step(
-        self, driven: JointTrajectory, places: tuple[Place, ...], *, moves: bool, waits_for: str = ""
+        self,
+        driven: JointTrajectory,
+        places: tuple[Place, ...],
+        *,
+        moves: bool,
+        waits_for: str = "",
     ) -> None:
         self.steps.append(DrivenStep(driven, moves, places, (), waits_for))

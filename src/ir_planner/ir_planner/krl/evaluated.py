@@ -1,4 +1,6 @@
-"""What a driven program costs in the cell: seconds, joules and clearance of every step, and its stations."""
+"""What a driven program costs in the cell: seconds, joules and clearance of every step, and its
+stations.
+"""
 
 from dataclasses import dataclass
 
@@ -15,7 +17,9 @@ from ir_planner.scene import PlanningScene
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedStep:
-    """A step, where it begins and ends (stations, postures, "" elsewhere), and what is known about it."""
+    """A step, where it begins and ends (stations, postures, "" elsewhere), and what is known about
+    it.
+    """
 
     step: DrivenStep
     from_station: str
@@ -30,7 +34,9 @@ class EvaluatedStep:
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedProgram:
-    """All steps, the report of all together, the stations in the order of their visits, what was assumed."""
+    """All steps, the report of all together, the stations in the order of their visits, what was
+    assumed.
+    """
 
     name: str
     steps: tuple[EvaluatedStep, ...]
@@ -49,7 +55,8 @@ def evaluate_program(
 ) -> EvaluatedProgram:
     """The program driven from `start` (n,) and judged with S_m `margin` [m]. Raises KrlMotionError.
 
-    A movement may touch what its station allows: the one where it ends, else the one where it begins.
+    A movement may touch what its station allows: the one where it ends, else the one where it
+    begins.
     """
     driven, notes = drive(program, scene, start)
     steps = []
@@ -57,7 +64,8 @@ def evaluate_program(
         ends = [step.trajectory.positions[k] for k in (0, -1)]
         first, last = (station_at(scene, q) for q in ends)
         found = evaluate_trajectory(step.trajectory, scene, margin, last or first)
-        first, last = first or posture_at(scene, ends[0]), last or posture_at(scene, ends[1])
+        first = first or posture_at(scene, ends[0])
+        last = last or posture_at(scene, ends[1])
         steps.append(EvaluatedStep(step, first, last, found))
     elapsed = np.cumsum([0.0, *(step.report.duration for step in steps)])[:-1]
     report = total_report(tuple(step.report for step in steps), tuple(elapsed.tolist()))

@@ -1,8 +1,9 @@
-"""Programs and trajectories written as KRL, read back, driven by the controller's model and proved again.
+"""Programs and trajectories written as KRL, read back, driven by the controller's model and proved
+again.
 
-A movement becomes a PTP_SPLINE through points of its trajectory with a TIME_BLOCK that gives each its time.
-As many points are taken as the movement needs to stay certified and near to what was planned. They are passed
-at the planned times as far as the limits allow.
+A movement becomes a PTP_SPLINE through points of its trajectory with a TIME_BLOCK that gives each
+its time. As many points are taken as the movement needs to stay certified and near to what was
+planned. They are passed at the planned times as far as the limits allow.
 """
 
 import itertools
@@ -41,11 +42,14 @@ from ir_planner.timing import GRID_S
 
 DEVIATION_MAX = 2e-3  # rad, of a joint from the planned movement
 _SPACING = 0.2  # s between points at first
-_POINTS_MIN, _POINTS_MAX = 6, 400
+_POINTS_MIN = 6
+_POINTS_MAX = 400
 _SLOWINGS = 4  # per number of points
 _CLOSE = 1.001
 _ROUNDING = 1e-6  # grid steps
-_ENOUGH, _ENOUGH_J = 1.01, 1.02  # of the planned duration and energy
+# of the planned duration and energy
+_ENOUGH = 1.01
+_ENOUGH_J = 1.02
 _FINEST = 0.04  # s between points, where more of them no longer help
 _SAMPLES_PER_S = 250
 _ASKS = {"BUS_POWER_OFF": "AB", "HIBERNATION": "HIB", "STAND_ON_BRAKES": ""}
@@ -53,8 +57,8 @@ _ASKS = {"BUS_POWER_OFF": "AB", "HIBERNATION": "HIB", "STAND_ON_BRAKES": ""}
 
 @dataclass(frozen=True, eq=False)
 class KrlExport:
-    """Texts of the program; the largest deviation [rad] of a joint from the plan, and the reports of what was
-    planned and of what the controller drives.
+    """Texts of the program; the largest deviation [rad] of a joint from the plan, and the reports
+    of what was planned and of what the controller drives.
     """
 
     source: str
@@ -67,10 +71,11 @@ class KrlExport:
 def export(
     steps: Sequence[PlannedMovement], name: str, scene: PlanningScene, judge: Judge, charge: Charge
 ) -> KrlExport:
-    """Write steps (movements with their points, and pauses) as program `name`; charge: of the capacitor, as
-    the program begins.
+    """Write steps (movements with their points, and pauses) as program `name`; charge: of the
+    capacitor, as the program begins.
 
-    Raises RequestError where a movement can't be written so that it stays certified, KrlError for the name.
+    Raises RequestError where a movement can't be written so that it stays certified, KrlError for
+    the name.
     """
     moving = [step for step in steps if not step.is_pause]
     if not moving:
@@ -83,7 +88,9 @@ def export(
     from_home = bool(np.abs(start - scene.cell.machine_home).max() < STILL)
     source, data = written(name, start, parts, attached(scene), header, from_home=from_home)
     driven = (step.trajectory for step in _driven(source, data, scene) if step.moves)
-    after, deviation, here = [], 0.0, start
+    after = []
+    deviation = 0.0
+    here = start
     for step in steps:
         if step.is_pause:
             charge.stood(step, Pause(step.to_station, step.duration, "", here, judge.scene(step)))
@@ -102,7 +109,9 @@ def export(
         )
         after.append(moved.report)
         here = again.positions[-1]
-    return KrlExport(source, data, deviation, _together([one.report for one in moving]), _together(after))
+    return KrlExport(
+        source, data, deviation, _together([one.report for one in moving]), _together(after)
+    )
 
 
 def attached(scene: PlanningScene) -> Attached:
@@ -137,8 +146,8 @@ def _deviation_of(step: PlannedMovement, parts: Sequence[Part], again: JointTraj
 
 
 def _fitted(step: PlannedMovement, scene: PlanningScene, judge: Judge) -> WrittenSpline:
-    """The movement through as many points as it needs, doubled from `_SPACING`, to be certified, near to the
-    plan, and hardly slower or dearer.
+    """The movement through as many points as it needs, doubled from `_SPACING`, to be certified,
+    near to the plan, and hardly slower or dearer.
     """
     planned = _points_of(step)
     joules = judge(planned, step).report.energy
@@ -149,7 +158,8 @@ def _fitted(step: PlannedMovement, scene: PlanningScene, judge: Judge) -> Writte
         fits, reason = _slowed(step, planned, count, scene, judge)
         if fits is not None:
             spline, spent = fits
-            longer, more = spline.seconds / planned.duration, spent / joules
+            longer = spline.seconds / planned.duration
+            more = spent / joules
             found.append((longer + more, spline))
             if longer <= _ENOUGH and more <= _ENOUGH_J:
                 return spline
@@ -167,10 +177,11 @@ def _fitted(step: PlannedMovement, scene: PlanningScene, judge: Judge) -> Writte
 def _slowed(
     step: PlannedMovement, planned: JointTrajectory, count: int, scene: PlanningScene, judge: Judge
 ) -> tuple[tuple[WrittenSpline, float] | None, str]:
-    """The movement through `count` points, slowed until it is certified, and its joules; else None, and the
-    reason.
+    """The movement through `count` points, slowed until it is certified, and its joules; else None,
+    and the reason.
     """
-    slower, reason = 1.0, ""
+    slower = 1.0
+    reason = ""
     times = np.linspace(0.0, planned.duration, count + 1)
     passed = passing_times(planned.sample(times).q, times, judge.scene(step))
     for _ in range(_SLOWINGS):
@@ -180,7 +191,8 @@ def _slowed(
         if away > DEVIATION_MAX:
             return (
                 None,
-                f"with {count} points a joint is {away:.4f} rad off; {DEVIATION_MAX:g} rad are allowed",
+                f"with {count} points a joint is {away:.4f} rad off; {DEVIATION_MAX:g} rad are "
+                "allowed",
             )
         found = judge(again, step)
         if found.verification.certified:
@@ -195,17 +207,28 @@ def _slowed(
 
 def _needed(report: TrajectoryReport) -> float:
     """By how much the time has to grow for the limits of speed, acceleration, jerk and torque."""
-    ratios = (report.velocity_ratio, report.acceleration_ratio, report.jerk_ratio, report.torque_ratio)
+    ratios = (
+        report.velocity_ratio,
+        report.acceleration_ratio,
+        report.jerk_ratio,
+        report.torque_ratio,
+    )
     roots = (1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 2.0)
-    return max(float(ratio.max(initial=0.0) ** root) for ratio, root in zip(ratios, roots, strict=True))
+    return max(
+        float(ratio.max(initial=0.0) ** root) for ratio, root in zip(ratios, roots, strict=True)
+    )
 
 
 def _spline(step: PlannedMovement, planned: JointTrajectory, passed: FloatArray) -> WrittenSpline:
-    """Points at equal planned times, passed at shares of the times (M + 1,) s, the last one whole steps of
-    the grid after the start.
+    """Points at equal planned times, passed at shares of the times (M + 1,) s, the last one whole
+    steps of the grid after the start.
     """
-    seconds, report = GRID_S * np.ceil(float(passed[-1]) / GRID_S - _ROUNDING), step.report
-    comment = f"{_called(step)}: {seconds:.2f} s, planned {report.duration:.2f} s and {report.energy:.0f} J"
+    seconds = GRID_S * np.ceil(float(passed[-1]) / GRID_S - _ROUNDING)
+    report = step.report
+    comment = (
+        f"{_called(step)}: {seconds:.2f} s, planned {report.duration:.2f} s and "
+        f"{report.energy:.0f} J"
+    )
     if np.isfinite(report.min_clearance):
         comment += f", clearance {1e3 * report.min_clearance:.0f} mm"
     points = planned.sample(np.linspace(0.0, planned.duration, len(passed))[1:]).q
@@ -223,7 +246,9 @@ def _parts(step: PlannedMovement, fitted: dict[int, list[Part]]) -> list[Part]:
     parts: list[Part] = [WrittenSignals(wait_for=_signals(step.wait_for))] if step.wait_for else []
     if step.is_pause:
         mode = step.power_mode or "STAND_ON_MOTORS"
-        parts.append(WrittenPause(f"pause {step.duration:g} s: {mode}", step.duration, _ASKS.get(mode, "")))
+        parts.append(
+            WrittenPause(f"pause {step.duration:g} s: {mode}", step.duration, _ASKS.get(mode, ""))
+        )
     else:
         parts.extend(fitted[id(step)])
     if step.set_signals:
@@ -239,7 +264,9 @@ def _signals(texts: Sequence[str]) -> tuple[tuple[str, bool], ...]:
 def _driven(source: str, data: str, scene: PlanningScene) -> tuple[DrivenStep, ...]:
     home = scene.cell.machine_home
     program = follow(
-        [parse(source, "export.src"), parse(data, "export.dat")], home, tool_in_flange(scene.cell.tcp)
+        [parse(source, "export.src"), parse(data, "export.dat")],
+        home,
+        tool_in_flange(scene.cell.tcp),
     )
     return drive(program, scene, home)[0]
 
@@ -248,7 +275,9 @@ def _deviation(spline: WrittenSpline, driven: JointTrajectory, planned: JointTra
     """Largest difference of a joint [rad], each point passed when the spline passes it."""
     passed = np.concatenate([[0.0], np.cumsum(spline.shares)]) / spline.shares.sum()
     share = np.linspace(0.0, 1.0, max(round(planned.duration * _SAMPLES_PER_S), 2))
-    meanwhile = np.clip(PchipInterpolator(np.linspace(0.0, 1.0, len(passed)), passed)(share), 0.0, 1.0)
+    meanwhile = np.clip(
+        PchipInterpolator(np.linspace(0.0, 1.0, len(passed)), passed)(share), 0.0, 1.0
+    )
     away = driven.sample(meanwhile * driven.duration).q - planned.sample(share * planned.duration).q
     return float(np.abs(away).max())
 

@@ -1,8 +1,9 @@
-"""A movement along a path of the tool as KRL: one SPLINE of the tool from rest to rest, at its speed.
+"""A movement along a path of the tool as KRL: one SPLINE of the tool from rest to rest, at its
+speed.
 
-Points lie on the planned path at equal distances. They are doubled until the path that the controller's model
-drives through them keeps to the planned one, and the tool's acceleration is lowered until the axes follow
-without losing the tool's speed.
+Points lie on the planned path at equal distances. They are doubled until the path that the
+controller's model drives through them keeps to the planned one, and the tool's acceleration is
+lowered until the axes follow without losing the tool's speed.
 """
 
 import itertools
@@ -24,12 +25,17 @@ from ir_planner.scene import PlanningScene
 TOOL_MAX = 1e-4  # m, of the tool from the planned path
 JOINT_MAX = 2e-3  # rad, of a joint from the planned path
 SPEED_MAX = 0.01  # share of the tool's speed
-_SPACING, _FEWEST, _MOST = 0.04, 6, 2000  # m between points at first, how many at least and at most
+# m between points at first, how many at least and at most
+_SPACING = 0.04
+_FEWEST = 6
+_MOST = 2000
 _DENSE = 2e-5  # m between the places of the planned path that others are held against
 _FINER = (1, 2, 4, 8, 16)
 _ACCELERATIONS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15)  # shares of the planned one
 _EVEN = 0.97  # of its speed that the tool keeps between its ramps
-_RAMP, _LEVEL = 0.05, 0.02  # shares of its speed and of its largest acceleration
+# shares of its speed and of its largest acceleration
+_RAMP = 0.05
+_LEVEL = 0.02
 _RATE = 500.0  # Hz
 
 ReadBack = Callable[[list[Part]], list[JointTrajectory]]
@@ -38,7 +44,9 @@ ReadBack = Callable[[list[Part]], list[JointTrajectory]]
 
 @dataclass(frozen=True, eq=False)
 class _Stroke:
-    """Part of the movement from rest to rest: times (M,) s, the tcp's places (M, 3) m, its speed (M,) m/s."""
+    """Part of the movement from rest to rest: times (M,) s, the tcp's places (M, 3) m, its speed
+    (M,) m/s.
+    """
 
     times: FloatArray
     places: FloatArray
@@ -59,7 +67,9 @@ class _Stroke:
 def fitted_path(
     step: PlannedMovement, planned: JointTrajectory, scene: PlanningScene, back: ReadBack
 ) -> list[Part]:
-    """A SPLINE for each stroke of a movement along a path. Raises RequestError where none keeps to it."""
+    """A SPLINE for each stroke of a movement along a path. Raises RequestError where none keeps to
+    it.
+    """
     strokes = list(_strokes(planned, scene))
     for stroke in strokes:
         _check_even(step, stroke)
@@ -92,14 +102,16 @@ def _strokes(planned: JointTrajectory, scene: PlanningScene) -> Iterator[_Stroke
 
 
 def _check_even(step: PlannedMovement, stroke: _Stroke) -> None:
-    share, gain = stroke.speed / stroke.top, np.abs(np.gradient(stroke.speed, stroke.times))
+    share = stroke.speed / stroke.top
+    gain = np.abs(np.gradient(stroke.speed, stroke.times))
     lost = (share > _RAMP) & (share < _EVEN)
     level = lost & (gain < _LEVEL * gain.max())  # a ramp is level at its ends only
     reached = np.flatnonzero(share >= 1.0 - SPEED_MAX)
     if level.any() or share[reached[0] : reached[-1] + 1].min() < _EVEN:
         raise RequestError(
             StatusCode.INVALID_MOTION_PLAN,
-            f"along {step.to_station}: the tool's speed changes along the path; a SPLINE is written with one",
+            f"along {step.to_station}: the tool's speed changes along the path; a SPLINE is "
+            "written with one",
         )
 
 
@@ -122,10 +134,13 @@ def _written(
 
 
 def _objection(
-    driven: list[JointTrajectory], planned: JointTrajectory, strokes: list[_Stroke], scene: PlanningScene
+    driven: list[JointTrajectory],
+    planned: JointTrajectory,
+    strokes: list[_Stroke],
+    scene: PlanningScene,
 ) -> tuple[str, bool]:
-    """Why what is driven isn't the planned path at its speed ("": it is), and whether a lower acceleration
-    may help.
+    """Why what is driven isn't the planned path at its speed ("": it is), and whether a lower
+    acceleration may help.
     """
     for one, stroke in zip(driven, strokes, strict=True):
         (again,) = _strokes(one, scene)
@@ -136,7 +151,8 @@ def _objection(
         times = np.interp(np.arange(0.0, along[-1] + _DENSE, _DENSE), along, stroke.times)
         dense = planned.sample(times).q
         found = cKDTree(scene.chain.tcp_poses(dense)[:, :3, 3]).query(again.places)
-        away, nearest = float(np.max(found[0])), np.asarray(found[1])
+        away = float(np.max(found[0]))
+        nearest = np.asarray(found[1])
         if away > TOOL_MAX:
             return f"the tool is {1e3 * away:.3g} mm off, {1e3 * TOOL_MAX:g} mm are allowed", False
         joints = float(np.abs(one.sample(again.times).q - dense[nearest]).max())
@@ -146,8 +162,12 @@ def _objection(
 
 
 def deviation_along(driven: JointTrajectory, planned: JointTrajectory) -> float:
-    """Largest difference of a joint [rad] from the nearest configuration of the planned movement."""
-    dense = planned.sample(np.linspace(0.0, planned.duration, max(int(planned.duration * _RATE), 2) * 4)).q
+    """Largest difference of a joint [rad] from the nearest configuration of the planned
+    movement.
+    """
+    dense = planned.sample(
+        np.linspace(0.0, planned.duration, max(int(planned.duration * _RATE), 2) * 4)
+    ).q
     at = driven.sample(np.linspace(0.0, driven.duration, max(int(driven.duration * _RATE), 2))).q
     nearest = cKDTree(dense).query(at)[1]
     return float(np.abs(at - dense[nearest]).max())

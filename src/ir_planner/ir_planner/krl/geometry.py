@@ -1,4 +1,6 @@
-"""Between KRL's frames and the cell's: the flange, the tool, where the robot stands, and targets as poses."""
+"""Between KRL's frames and the cell's: the flange, the tool, where the robot stands, and targets as
+poses.
+"""
 
 from dataclasses import dataclass
 
@@ -11,7 +13,9 @@ from ir_planner.krl.status_turn import meeting
 from ir_planner.scene import PlanningScene
 
 # KUKA's flange looks along its z axis, this project's along x: a quarter turn about y.
-FLANGE = np.array([[0.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+FLANGE = np.array(
+    [[0.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+)
 _MM = 1e-3
 _WITHIN = 1e-9  # rad beyond a limit that rounding may leave
 
@@ -42,32 +46,42 @@ class Arm:
         return np.asarray(inverse(target.base) @ self.flange(q[None])[0] @ target.tool)
 
     def pose(self, target: Target, now: FloatArray) -> FloatArray:
-        """The target's frame as a pose (4, 4) [m] in its base; what it leaves open is as in `now` (4, 4)."""
+        """The target's frame as a pose (4, 4) [m] in its base; what it leaves open is as in `now`
+        (4, 4).
+        """
         given = target.frame or {}
         xyz = np.array([given.get(name, 0.0) * _MM for name in FRAME_NAMES[:3]])
         abc = np.array([given.get(name, 0.0) for name in FRAME_NAMES[3:]])
         found = np.eye(4)
         if target.relative:
             step = found.copy()
-            step[:3, 3], step[:3, :3] = xyz, rotation_from_abc(abc)
+            step[:3, 3] = xyz
+            step[:3, :3] = rotation_from_abc(abc)
             if target.in_tool:
                 return np.asarray(now @ step)
-            found[:3, 3], found[:3, :3] = now[:3, 3] + xyz, step[:3, :3] @ now[:3, :3]
+            found[:3, 3] = now[:3, 3] + xyz
+            found[:3, :3] = step[:3, :3] @ now[:3, :3]
             return found
         here = abc_from_rotation(now[:3, :3])
         full = [given.get(name, here[k]) for k, name in enumerate(FRAME_NAMES[3:])]
         found[:3, :3] = rotation_from_abc(full)
-        found[:3, 3] = [given[n] * _MM if n in given else now[k, 3] for k, n in enumerate(FRAME_NAMES[:3])]
+        found[:3, 3] = [
+            given[n] * _MM if n in given else now[k, 3] for k, n in enumerate(FRAME_NAMES[:3])
+        ]
         return found
 
     def configurations(self, poses: FloatArray, target: Target) -> list[FloatArray]:
-        """All configurations (m, n) within the limits for each tool pose (N, 4, 4) in the target's base."""
+        """All configurations (m, n) within the limits for each tool pose (N, 4, 4) in the target's
+        base.
+        """
         tcp = self.tcp(target.base @ poses @ inverse(target.tool))
         found = self.scene.inverse_kinematics.solve(tcp)
         return [found.of_pose(k) for k in range(len(poses))]
 
     def reached(self, target: Target, q: FloatArray, place: Place) -> FloatArray:
-        """The configuration (n,) that a PTP from q (n,) to the target ends in. Raises KrlMotionError."""
+        """The configuration (n,) that a PTP from q (n,) to the target ends in. Raises
+        KrlMotionError.
+        """
         if target.axes is not None:
             end = np.array(q)
             for name, angle in target.axes.items():
@@ -82,19 +96,23 @@ class Arm:
         fits = found[meeting(self.scene.chain, found, target.status, target.turn)]
         if len(fits) == 0:
             raise KrlMotionError(
-                f"{_called(target)}no configuration within the limits has S {target.status}, T {target.turn}",
+                f"{_called(target)}no configuration within the limits has S {target.status}, T "
+                f"{target.turn}",
                 place,
             )
         return np.asarray(fits[np.argmin(np.abs(fits - q).max(axis=1))])
 
     def _check_limits(self, q: FloatArray, target: Target, place: Place) -> None:
         robot = self.scene.cell.robot
-        beyond = np.flatnonzero((q < robot.position_min - _WITHIN) | (q > robot.position_max + _WITHIN))
+        beyond = np.flatnonzero(
+            (q < robot.position_min - _WITHIN) | (q > robot.position_max + _WITHIN)
+        )
         if len(beyond):
             j = int(beyond[0])
             low, high = np.degrees([robot.position_min[j], robot.position_max[j]])
             raise KrlMotionError(
-                f"{_called(target)}A{j + 1} {np.degrees(q[j]):.6g} deg is not within {low:g} to {high:g} deg",
+                f"{_called(target)}A{j + 1} {np.degrees(q[j]):.6g} deg is not within {low:g} to "
+                f"{high:g} deg",
                 place,
             )
 

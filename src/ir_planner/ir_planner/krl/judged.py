@@ -1,5 +1,5 @@
-"""Steps of a planned program, each judged as it was planned: with its load, its parts where they lie, doors
-as its signals move them, sweeping while they do, and what its station allows.
+"""Steps of a planned program, each judged as it was planned: with its load, its parts where they
+lie, doors as its signals move them, sweeping while they do, and what its station allows.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,7 +15,8 @@ from ir_planner.scene import Drives, PlanningScene, with_parts
 
 @dataclass(frozen=True, eq=False)
 class Judge:
-    """Evaluates trajectories as the steps that they belong to: with their load, their parts, their station.
+    """Evaluates trajectories as the steps that they belong to: with their load, their parts, their
+    station.
 
     scenes: of each step by its id(); margin: S_m [m].
     """
@@ -54,11 +55,14 @@ def scenes_of(
     steps: Sequence[PlannedMovement], cell: Cell, power: PowerData, drives: Drives
 ) -> list[PlanningScene]:
     """The scene of each step: what is held, where the parts lie, how the doors stand or sweep."""
-    scenes, places = [], cell.parts_at_start()
+    scenes = []
+    places = cell.parts_at_start()
     doors = [dict(before) for before, _ in doors_along(cell, [_signalling(step) for step in steps])]
     for step, moved in zip(steps, doors, strict=True):
         standing = cell_in(with_parts(cell, places), moved)
-        for text in step.states:  # of machines that no signal moves: those that the step was planned with
+        for (
+            text
+        ) in step.states:  # of machines that no signal moves: those that the step was planned with
             machine, _, state = text.partition("=")
             if machine not in moved:
                 standing = standing.with_equipment(machine, state=state)

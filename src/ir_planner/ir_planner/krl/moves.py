@@ -1,9 +1,9 @@
 """One motion with its law: how a controller drives a curve of the axes.
 
-Assumptions, where a data sheet says nothing: all axes follow one seven-phase law (synchronous PTP); axes
-keep their shares of the data's speed, acceleration and jerk; the tool keeps $VEL and $ACC, whose
-acceleration builds up within `RAMP` seconds; where an axis or its torque can't follow, the whole motion is
-slowed. A TIME_BLOCK slows a motion to the time it asks for.
+Assumptions, where a data sheet says nothing: all axes follow one seven-phase law (synchronous PTP);
+axes keep their shares of the data's speed, acceleration and jerk; the tool keeps $VEL and $ACC,
+whose acceleration builds up within `RAMP` seconds; where an axis or its torque can't follow, the
+whole motion is slowed. A TIME_BLOCK slows a motion to the time it asks for.
 """
 
 from dataclasses import dataclass, replace
@@ -49,8 +49,10 @@ class Move:
         """q, qd, qdd and the jerk but for the law's own, (M, n) each, at grid steps (M,)."""
         s, sd, sdd = self.law.at(steps)
         q, first, second, third = self.curve.at(s)
-        sd, sdd = sd[:, None], sdd[:, None]
-        qd, qdd = first * sd, second * sd**2 + first * sdd
+        sd = sd[:, None]
+        sdd = sdd[:, None]
+        qd = first * sd
+        qdd = second * sd**2 + first * sdd
         return q, qd, qdd, third * sd**3 + 3.0 * second * sd * sdd
 
 
@@ -63,8 +65,8 @@ def move(
     least: float = 0.0,
     jerk_share: float = 1.0,
 ) -> Move:
-    """The quickest law of a curve that keeps the speeds, lasts at least `least` s and uses `jerk_share` of
-    the axes' jerk. Raises KrlMotionError.
+    """The quickest law of a curve that keeps the speeds, lasts at least `least` s and uses
+    `jerk_share` of the axes' jerk. Raises KrlMotionError.
     """
     limits = _axis_limits(speeds, scene.limits)
     limits = replace(limits, jerk=limits.jerk * jerk_share)
@@ -96,7 +98,9 @@ def _law_bounds(curve: Curve, speeds: Speeds, limits: MotionLimits) -> tuple[flo
     """Bounds of s' [1/s], s'' and s''' before the axes are looked at along the path."""
     _, first, _, _ = curve.at(np.linspace(0.0, 1.0, 65))
     rate = np.maximum(np.abs(first).max(axis=0), STILL)
-    v, a, j = (float(np.min(bound / rate)) for bound in (limits.velocity, limits.acceleration, limits.jerk))
+    v, a, j = (
+        float(np.min(bound / rate)) for bound in (limits.velocity, limits.acceleration, limits.jerk)
+    )
     for size, speed, acceleration in (
         (curve.length, speeds.velocity, speeds.acceleration),
         (curve.turning, speeds.turning, speeds.turning_acceleration),

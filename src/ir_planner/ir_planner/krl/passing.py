@@ -1,9 +1,10 @@
 """When a PTP_SPLINE passes its points: near the planned times as far as the limits allow.
 
-A spline through points of a planned movement overshoots where the plan's jerk steps from one limit to the
-other, so that at the planned times it exceeds them. A sequence of linear programs changes the times between
-points, by a piecewise linear slowness over the movement: within the limits, not longer than planned where
-that can be, with the least changes.
+A spline through points of a planned movement overshoots where the plan's jerk steps from one limit
+to the other, so that at the planned times it exceeds them. A sequence of linear programs changes
+the times between
+points, by a piecewise linear slowness over the movement: within the limits, not longer than planned
+where that can be, with the least changes.
 """
 
 from dataclasses import dataclass
@@ -35,7 +36,9 @@ def resting_spline(times: FloatArray, points: FloatArray) -> BSpline:
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """points (M + 1, n) at times that follow from steps (M,) s and what basis (M, K) makes of a slowness."""
+    """points (M + 1, n) at times that follow from steps (M,) s and what basis (M, K) makes of a
+    slowness.
+    """
 
     points: FloatArray
     steps: FloatArray
@@ -61,16 +64,20 @@ class _Problem:
 
 
 def passing_times(points: FloatArray, times: FloatArray, scene: PlanningScene) -> FloatArray:
-    """Times (M,) s at which points (M, n) are passed within the limits, from those that were planned."""
+    """Times (M,) s at which points (M, n) are passed within the limits, from those that were
+    planned.
+    """
     steps = np.diff(times)
     problem = _Problem(points, steps, _hats(len(steps)), scene)
     slowness = np.zeros(problem.basis.shape[1])
-    used, trust = problem.used(slowness), _TRUST[0]
+    used = problem.used(slowness)
+    trust = _TRUST[0]
     for _ in range(_ROUNDS):
         change = _change(problem, slowness, used, trust)
         trial = problem.used(slowness + change)
         if _cost(problem, slowness + change, trial) < _cost(problem, slowness, used):
-            slowness, used = slowness + change, trial
+            slowness = slowness + change
+            used = trial
             if np.abs(change).max() < _TRUST[1]:
                 break
         else:
@@ -89,22 +96,29 @@ def _cost(problem: _Problem, slowness: FloatArray, used: FloatArray) -> float:
 def _change(problem: _Problem, slowness: FloatArray, used: FloatArray, trust: float) -> FloatArray:
     """The change (K,) of the slowness that a linear program finds.
 
-    Its variables are the change, the sizes of the slowness, what limits are exceeded by, and by what share
-    the movement is longer than planned.
+    Its variables are the change, the sizes of the slowness, what limits are exceeded by, and by
+    what share the movement is longer than planned.
     """
-    rows, count = np.flatnonzero(used > _NEAR), len(slowness)
+    rows = np.flatnonzero(used > _NEAR)
+    count = len(slowness)
     slopes = np.empty((len(rows), count))
     for k, beside in enumerate(slowness + _STEP * np.eye(count)):
         slopes[:, k] = (problem.used(beside)[rows] - used[rows]) / _STEP
-    planned, lasting = problem.steps.sum(), problem.lasting(slowness)
-    one, none = np.eye(count), np.zeros((count, 1))
-    limits = np.column_stack([slopes, np.zeros_like(slopes), -np.ones(len(rows)), np.zeros(len(rows))])
+    planned = problem.steps.sum()
+    lasting = problem.lasting(slowness)
+    one = np.eye(count)
+    none = np.zeros((count, 1))
+    limits = np.column_stack(
+        [slopes, np.zeros_like(slopes), -np.ones(len(rows)), np.zeros(len(rows))]
+    )
     longer = np.concatenate([lasting @ problem.basis / planned, np.zeros(count), [0.0, -1.0]])
     above, below = (np.column_stack([sign * one, -one, none, none]) for sign in (1.0, -1.0))
     found = linprog(
         np.concatenate([np.zeros(count), np.full(count, _CHANGED / count), [_MISSED, 1.0]]),
         A_ub=np.vstack([limits, longer, above, below]),
-        b_ub=np.concatenate([_USED - used[rows], [1.0 - lasting.sum() / planned], -slowness, slowness]),
+        b_ub=np.concatenate(
+            [_USED - used[rows], [1.0 - lasting.sum() / planned], -slowness, slowness]
+        ),
         bounds=[*[(-trust, trust)] * count, *[(0.0, None)] * (count + 2)],
         method="highs",
     )

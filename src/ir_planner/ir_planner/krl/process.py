@@ -1,4 +1,6 @@
-"""Which motions of a program are its process: what the tool does between switching an output on and off."""
+"""Which motions of a program are its process: what the tool does between switching an output on and
+off.
+"""
 
 from collections.abc import Sequence
 
@@ -8,9 +10,9 @@ from ir_krl import Command, Motion, SetOutput, SplineBlock
 def process_motions(commands: Sequence[Command]) -> frozenset[int]:
     """Places in `commands` of the motions of a process.
 
-    A process begins where an output is switched on and ends where the same one is switched off, and only the
-    tool is led meanwhile (LIN, CIRC, SPLINE and their relatives; waits don't matter). A PTP ends it: what is
-    switched around one is a gripper or a message. A pulse switches nothing.
+    A process begins where an output is switched on and ends where the same one is switched off, and
+    only the tool is led meanwhile (LIN, CIRC, SPLINE and their relatives; waits don't matter). A
+    PTP ends it: what is switched around one is a gripper or a message. A pulse switches nothing.
     """
     found: set[int] = set()
     since: dict[int, set[int]] = {}  # by output: motions since it was switched on

@@ -22,7 +22,8 @@ ASYNCHRONOUS = "asynchronous"
 def evaluate_krl(
     planner: Planner, program: Followed, margin: float = 0.02, load: str = ""
 ) -> EvaluatedProgram:
-    """A program as a KR C4 drives it from machine home, S_m `margin` [m], with `load` attached all along.
+    """A program as a KR C4 drives it from machine home, S_m `margin` [m], with `load` attached all
+    along.
 
     Raises RequestError, KrlMotionError.
     """
@@ -39,9 +40,13 @@ def evaluate_krl(
 
 
 def export_krl(
-    planner: Planner, movements: Sequence[PlannedMovement], name: str, options: PlanOptions | None = None
+    planner: Planner,
+    movements: Sequence[PlannedMovement],
+    name: str,
+    options: PlanOptions | None = None,
 ) -> KrlExport:
-    """Planned movements as a KRL program, read back, driven by the controller's model and certified again.
+    """Planned movements as a KRL program, read back, driven by the controller's model and certified
+    again.
 
     options: those that were planned with. Raises RequestError where that can't be.
     """
@@ -49,10 +54,13 @@ def export_krl(
     if chosen.timing == ASYNCHRONOUS:
         raise RequestError(
             StatusCode.INVALID_MOTION_PLAN,
-            "timing is asynchronous: a controller's motions end all axes together, plan with synchronous",
+            "timing is asynchronous: a controller's motions end all axes together, plan with "
+            "synchronous",
         )
     scene = planner.scene("")
-    judge = judge_of(movements, planner.cell, scene.power, planner.settings.drives, chosen.safety_distance)
+    judge = judge_of(
+        movements, planner.cell, scene.power, planner.settings.drives, chosen.safety_distance
+    )
     try:
         return export(movements, name, scene, judge, Charge(planner.settings.transitions))
     except KrlError as error:

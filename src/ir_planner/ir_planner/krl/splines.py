@@ -1,9 +1,10 @@
 """Spline blocks: several parts driven through without a stop.
 
-Assumptions, where KUKA publishes no formula: a PTP_SPLINE is the interpolating spline of degree five through
-its points; with one TIME_BLOCK over all of its parts it passes them at the marked times, at rest at both
-ends. A SPLINE is the same of the tool, straight between the ends of its SLIN parts and round along its SCIRC
-parts as far as a spline through their points is, at the speeds of its first part.
+Assumptions, where KUKA publishes no formula: a PTP_SPLINE is the interpolating spline of degree
+five through its points; with one TIME_BLOCK over all of its parts it passes them at the marked
+times, at rest at both ends. A SPLINE is the same of the tool, straight between the ends of its SLIN
+parts and round along its SCIRC parts as far as a spline through their points is, at the speeds of
+its first part.
 """
 
 import numpy as np
@@ -24,7 +25,8 @@ _ARC_STEP = np.radians(
     5.0
 )  # between points of an SCIRC part: the spline leaves the arc by 1e-6 of its radius
 _STEP_M = 4e-3
-_SAMPLES_MIN, _SAMPLES_MAX = 33, 20_001
+_SAMPLES_MIN = 33
+_SAMPLES_MAX = 20_001
 _DEGREE = 5
 _KNOTS_PER_S = 125
 
@@ -37,7 +39,9 @@ def block_curve(block: SplineBlock, start: FloatArray, arm: Arm) -> AxisCurve:
 
 
 def timed_block(block: SplineBlock, start: FloatArray, arm: Arm) -> JointTrajectory | None:
-    """The trajectory from `start` (n,) of a PTP_SPLINE whose TIME_BLOCK times all its parts; else None."""
+    """The trajectory from `start` (n,) of a PTP_SPLINE whose TIME_BLOCK times all its parts; else
+    None.
+    """
     whole = [one for one in block.times if one.first == 0 and one.last == len(block.parts)]
     if not block.axis or len(block.times) != 1 or not whole:
         return None
@@ -45,14 +49,19 @@ def timed_block(block: SplineBlock, start: FloatArray, arm: Arm) -> JointTraject
     times = _passing_times(whole[0], len(block.parts))
     if times is None:
         return None
-    times = times * (round(times[-1] / GRID_S) * GRID_S / times[-1])  # at rest where the last point lies
+    times = times * (
+        round(times[-1] / GRID_S) * GRID_S / times[-1]
+    )  # at rest where the last point lies
     spline = resting_spline(times, points)
-    inner = zip(times[:-1], times[1:], np.ceil(np.diff(times) * _KNOTS_PER_S).astype(int), strict=True)
+    inner = zip(
+        times[:-1], times[1:], np.ceil(np.diff(times) * _KNOTS_PER_S).astype(int), strict=True
+    )
     fine = np.concatenate([np.linspace(a, b, count + 1) for a, b, count in inner])
     steps = np.unique(np.rint(fine / GRID_S)).astype(np.int64)
     q, qd, qdd = (np.asarray(spline(steps * GRID_S, nu=k)) for k in range(3))
     qd[[0, -1]] = qdd[[0, -1]] = 0.0
-    q[0], q[-1] = points[0], points[-1]
+    q[0] = points[0]
+    q[-1] = points[-1]
     return JointTrajectory(arm.scene.cell.robot.joint_names, steps * GRID_NS, q, qd, qdd)
 
 
@@ -82,8 +91,8 @@ def _axis_points(block: SplineBlock, start: FloatArray, arm: Arm) -> FloatArray:
 
 
 def spline_poses(block: SplineBlock, start: FloatArray, arm: Arm) -> FloatArray:
-    """Poses (N, 4, 4) of the tool in its base that a SPLINE passes, from the configuration `start` (n,).
-    Raises KrlMotionError.
+    """Poses (N, 4, 4) of the tool in its base that a SPLINE passes, from the configuration `start`
+    (n,). Raises KrlMotionError.
     """
     first = block.parts[0]
     poses = [arm.tool_pose(first.target, start)]
@@ -99,7 +108,9 @@ def spline_poses(block: SplineBlock, start: FloatArray, arm: Arm) -> FloatArray:
 
 
 def _part(part: Motion, now: FloatArray, arm: Arm) -> list[FloatArray]:
-    """Poses (4, 4) after `now` (4, 4) that a part passes: its end, and before it what makes it round."""
+    """Poses (4, 4) after `now` (4, 4) that a part passes: its end, and before it what makes it
+    round.
+    """
     if part.kind == "spl":
         end = arm.pose(part.target, now)
         end[:3, :3] = now[:3, :3] if part.keeps_orientation else end[:3, :3]

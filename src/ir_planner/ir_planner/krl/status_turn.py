@@ -1,7 +1,8 @@
 """Status and turn, S and T: which of the configurations that reach a pose a position means.
 
-S: bit 0 the wrist centre lies behind axis 1, bit 1 the elbow is bent towards positive angles of A3, bit 2
-A5 is negative. T: bit n is set where the angle of axis n + 1 is negative. Bits of an angle that is 0 mean
+S: bit 0 the wrist centre lies behind axis 1, bit 1 the elbow is bent towards positive angles of A3,
+bit 2 A5 is negative. T: bit n is set where the angle of axis n + 1 is negative. Bits of an angle
+that is 0 mean
 nothing: a position that was taught there may carry either.
 """
 
@@ -14,7 +15,9 @@ _UNDECIDED = 1e-4  # rad or m: nearer to 0 than this, either bit is taken
 
 
 def _signs(chain: Chain, q: FloatArray) -> FloatArray:
-    """(N, 9): what the bits are signs of, a set bit is negative: three of the status, six of the turn."""
+    """(N, 9): what the bits are signs of, a set bit is negative: three of the status, six of the
+    turn.
+    """
     poses = chain.link_poses(q)
     shoulder, elbow, wrist = (poses[:, k, :3, 3] for k in (2, 3, 5))
     foot = chain.base_pose

@@ -1,4 +1,6 @@
-"""Motions of the tool as segments of a path of the cell's tcp, with the speed that the program allows."""
+"""Motions of the tool as segments of a path of the cell's tcp, with the speed that the program
+allows.
+"""
 
 from dataclasses import dataclass
 
@@ -29,7 +31,8 @@ _EVEN = 1e-6  # rad: below, the orientation is constant
 
 @dataclass(frozen=True, eq=False)
 class ToolMotion:
-    """Segments from `start` (4, 4) [m] of the tcp in the cell; corner [m]: how far around its end the tool
+    """Segments from `start` (4, 4) [m] of the tcp in the cell; corner [m]: how far around its end
+    the tool
     may leave them for the next motion, 0: it passes its end exactly.
     """
 
@@ -39,8 +42,9 @@ class ToolMotion:
 
 
 def tool_motion(motion: Motion, start: FloatArray, arm: Arm) -> ToolMotion | None:
-    """A LIN or CIRC from the configuration `start` (n,); None for one that no segment describes: it turns on
-    the spot, it leads another tool than the cell's, which turns, or its speed is out of bounds.
+    """A LIN or CIRC from the configuration `start` (n,); None for one that no segment describes: it
+    turns on the spot, it leads another tool than the cell's, which turns, or its speed is out of
+    bounds.
     """
     first, last, path = tool_ends(motion, start, arm)
     pieces = 1 if isinstance(path, Line) else max(int(np.ceil(abs(path.angle) / np.pi)), 1)
@@ -57,7 +61,9 @@ def tool_motion(motion: Motion, start: FloatArray, arm: Arm) -> ToolMotion | Non
     if isinstance(path, Line):
         segments = [CartesianSegment(LINE, (tcp[-1],), speed)]
     else:
-        segments = [CartesianSegment(CIRCLE, (tcp[k], tcp[k + 1]), speed) for k in range(1, 2 * pieces, 2)]
+        segments = [
+            CartesianSegment(CIRCLE, (tcp[k], tcp[k + 1]), speed) for k in range(1, 2 * pieces, 2)
+        ]
     return ToolMotion(tcp[0], tuple(segments), _corner(motion.blend, path.length))
 
 
@@ -82,7 +88,9 @@ def _in_cell(poses: FloatArray, target: Target, arm: Arm) -> FloatArray:
 
 
 def _described(target: Target, turning: float, speed: float, arm: Arm) -> bool:
-    """Whether the cell's tcp draws what the program's tool does, at a speed that a path may have."""
+    """Whether the cell's tcp draws what the program's tool does, at a speed that a path may
+    have.
+    """
     own = tool_in_flange(arm.scene.chain.tcp)
     same = turning < _EVEN or float(np.abs(target.tool - own).max()) < _SAME_TOOL
     return same and SPEED_MIN <= speed <= SPEED_MAX

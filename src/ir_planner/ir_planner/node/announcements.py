@@ -1,4 +1,6 @@
-"""What planner and driver announce to each other: cell out; timers, load and machines in; latched."""
+"""What planner and driver announce to each other: cell out; timers, load and machines in;
+latched.
+"""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -27,10 +29,13 @@ _T = TypeVar("_T")
 
 
 class Announcements:
-    """Publishes the planner's cell, and lets the planner hear what a driver publishes while there is one."""
+    """Publishes the planner's cell, and lets the planner hear what a driver publishes while there
+    is one.
+    """
 
     def __init__(self, node: Node, planner: Planner, group: CallbackGroup) -> None:
-        self._node, self._planner = node, planner
+        self._node = node
+        self._planner = planner
         self._cells = node.create_publisher(CellStateMsg, names.CELL, LATCHED)
         for kind, topic, hear in (
             (ControllerTimersMsg, names.CONTROLLER_TIMERS, self._hear_timers),
@@ -47,7 +52,8 @@ class Announcements:
 
     def forget_the_gone(self) -> None:
         """What a driver said counts no more when it is no longer there."""
-        heard, publishers = self._planner.heard, self._node.count_publishers
+        heard = self._planner.heard
+        publishers = self._node.count_publishers
         if heard.timers is not None and not publishers(names.CONTROLLER_TIMERS):
             heard.timers = None
         if heard.load is not None and not publishers(names.CARRIED_LOAD):
@@ -62,7 +68,9 @@ class Announcements:
 
     def _hear_load(self, message: Any) -> None:
         heard = self._planner.heard
-        heard.load = self._understood(carried_load_from_msg, message, names.CARRIED_LOAD) or heard.load
+        heard.load = (
+            self._understood(carried_load_from_msg, message, names.CARRIED_LOAD) or heard.load
+        )
 
     def _hear_machines(self, message: Any) -> None:
         heard = self._planner.heard

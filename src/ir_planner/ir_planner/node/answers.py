@@ -94,7 +94,8 @@ def fill_movement(response: Any, plan: MovementPlan | CartesianPlan, include_poi
 def fill_cartesian(response: Any, plan: CartesianPlan, include_points: bool) -> None:
     """plan_cartesian_movement."""
     fill_movement(response, plan, include_points)
-    response.tool_error, response.rotation_error = plan.tool_error, plan.rotation_error
+    response.tool_error = plan.tool_error
+    response.rotation_error = plan.rotation_error
     response.speed_deviation = plan.speed_deviation
     response.lengths = float_array(plan.lengths)
     response.configurations = plan.configurations
@@ -124,7 +125,9 @@ def fill_service(response: Any, plan: ServicePlan, include_points: bool) -> None
 def fill_program(response: Any, plan: ProgramPlan, include_points: bool) -> None:
     """plan_program and the result of the plan action."""
     response.program_id = plan.program_id
-    response.movements = [planned_movement_to_msg(movement, include_points) for movement in plan.movements]
+    response.movements = [
+        planned_movement_to_msg(movement, include_points) for movement in plan.movements
+    ]
     response.report = report_to_msg(plan.report)
     response.info = planning_info_to_msg(plan.info)
     response.gap = plan.gap
@@ -139,21 +142,26 @@ def _point(program: ProgramPlan) -> ProgramPoint:
 
 def fill_stored_program(response: Any, program: StoredProgram, include_points: bool) -> None:
     """get_program."""
-    response.movements = [planned_movement_to_msg(movement, include_points) for movement in program.movements]
+    response.movements = [
+        planned_movement_to_msg(movement, include_points) for movement in program.movements
+    ]
     response.report = report_to_msg(program.report)
 
 
 def fill_export(response: Any, export: KrlExport) -> None:
     """export_program."""
-    response.text, response.data = export.source, export.data
+    response.text = export.source
+    response.data = export.data
     response.deviation = export.deviation
-    response.planned, response.exported = report_to_msg(export.planned), report_to_msg(export.exported)
+    response.planned = report_to_msg(export.planned)
+    response.exported = report_to_msg(export.exported)
 
 
 def fill_evaluation(response: Any, evaluation: Evaluation) -> None:
     """evaluate_trajectory: report and both profiles on the times of the clearance profile."""
     response.report = report_to_msg(evaluation.report)
-    clearance, energy = evaluation.clearance, evaluation.energy
+    clearance = evaluation.clearance
+    energy = evaluation.energy
     response.times = float_array(clearance.times)
     response.distances = float_array(clearance.distances)
     watts = np.zeros(len(clearance.times))
@@ -164,16 +172,21 @@ def fill_evaluation(response: Any, evaluation: Evaluation) -> None:
 
 def fill_standby(response: Any, standby: Standby, timers: str) -> None:
     """plan_standby; timers: where the controller's timers are from."""
-    response.timers, response.controller_timer = timers, standby.timer
+    response.timers = timers
+    response.controller_timer = standby.timer
     response.saving_on_motors = standby.saving_on_motors
     response.chosen = power_mode_to_msg(standby.chosen)
     response.wake_at = standby.wake_at
     response.energy = standby.energy
-    response.modes, response.switch_times = list(standby.modes), list(standby.switch_times)
-    response.expected, response.worst = standby.expected, standby.worst
+    response.modes = list(standby.modes)
+    response.switch_times = list(standby.switch_times)
+    response.expected = standby.expected
+    response.worst = standby.worst
     response.clairvoyant = standby.clairvoyant
-    response.posture, response.posture_energies = standby.posture, list(standby.posture_energies)
+    response.posture = standby.posture
+    response.posture_energies = list(standby.posture_energies)
     response.saving = standby.saving
-    response.saving_low, response.saving_high = standby.saving_low, standby.saving_high
+    response.saving_low = standby.saving_low
+    response.saving_high = standby.saving_high
     response.alternatives = [power_mode_to_msg(mode) for mode in standby.alternatives]
     response.alternative_energies = [float(energy) for energy in standby.energies]

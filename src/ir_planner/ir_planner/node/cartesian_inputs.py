@@ -27,13 +27,16 @@ _FIELDS = (
 
 
 def path_of(request: Any, cell: Cell) -> CartesianPath | CellPath:
-    """The path of a request, by name or by its poses: settings of a named one are those of the cell file,
-    but for those that the request changes from their defaults. Raises RequestError, PoseError.
+    """The path of a request, by name or by its poses: settings of a named one are those of the cell
+    file, but for those that the request changes from their defaults. Raises RequestError,
+    PoseError.
     """
     given = stamped_pose_given(request.start_pose) or bool(request.segments)
     if bool(request.path) == given:
         which = "both are" if given else "neither is"
-        raise RequestError(_CODE, f"exactly one of path and start_pose with segments must be given, {which}")
+        raise RequestError(
+            _CODE, f"exactly one of path and start_pose with segments must be given, {which}"
+        )
     if request.path:
         own = cell.own_path(request.path)
         changed = {name: getattr(request, name) for name in _FIELDS if _changed(request, name)}

@@ -1,4 +1,6 @@
-"""Goals of an action are executed one after the other: those that wait take no thread from anybody else."""
+"""Goals of an action are executed one after the other: those that wait take no thread from anybody
+else.
+"""
 
 import threading
 from collections import deque
@@ -12,13 +14,16 @@ Execute = Callable[[ServerGoalHandle], Any]
 
 
 class GoalQueue:
-    """`accepted` and `cancel` are callbacks of an action server, `execute` what it calls for a goal.
+    """`accepted` and `cancel` are callbacks of an action server, `execute` what it calls for a
+    goal.
 
     most: goals that may wait; one beyond is answered by `refuse`.
     """
 
     def __init__(self, execute: Execute, refuse: Execute, most: int) -> None:
-        self._execute, self._refuse, self._most = execute, refuse, most
+        self._execute = execute
+        self._refuse = refuse
+        self._most = most
         self._lock = threading.Lock()
         self._running: ServerGoalHandle | None = None
         self._waiting: deque[ServerGoalHandle] = deque()

@@ -1,4 +1,6 @@
-"""What requests say, as values: states, goals, poses, options, trajectories. Nothing here is planned."""
+"""What requests say, as values: states, goals, poses, options, trajectories. Nothing here is
+planned.
+"""
 
 import time
 from collections.abc import Callable, Sequence
@@ -31,15 +33,20 @@ from ir_planner.planner import Planner
 from ir_planner.request import POSITION_MAX, Goal, one_goal
 from ir_planner.trajectories import POINTS_MAX, Reference
 
-AT_REST = 0.01  # rad/s: a measured state that is slower stands; ends of planned movements are at rest
-LOOK, LOOKS = 0.02, 200  # s; 4 s for a driver that publishes 500 times a second
+AT_REST = (
+    0.01  # rad/s: a measured state that is slower stands; ends of planned movements are at rest
+)
+# s; 4 s for a driver that publishes 500 times a second
+LOOK = 0.02
+LOOKS = 200
 MEASURED = 9  # decimals of rad: finer than any encoder, and less than what counts as movement
 
 
 @dataclass
 class LastState:
-    """The last joint_states (n,), and when it came [s on the node's clock]; written and read by different
-    threads. look: takes what has come since the last look. offered: whether somebody publishes them.
+    """The last joint_states (n,), and when it came [s on the node's clock]; written and read by
+    different threads. look: takes what has come since the last look. offered: whether somebody
+    publishes them.
     """
 
     look: Callable[[], None] = lambda: None
@@ -51,24 +58,33 @@ class LastState:
     _lock: Lock = field(default_factory=Lock)
 
     def take(self, q: FloatArray, now: float, velocity: FloatArray | None = None) -> None:
-        """A state came; velocity None: it has none. It is kept to MEASURED decimals: a robot that stands
-        is one start, not a new one with every measurement, so the same request gives the same trajectory.
+        """A state came; velocity None: it has none. It is kept to MEASURED decimals: a robot that
+        stands is one start, not a new one with every measurement, so the same request gives the
+        same trajectory.
         """
         with self._lock:
-            self.q, self.came = np.round(q, MEASURED) + 0.0, now  # + 0.0: no negative zeros
+            # + 0.0: no negative zeros
+            self.q = np.round(q, MEASURED) + 0.0
+            self.came = now
             self.velocity = velocity
 
-    def known(self, now: float, max_age: float, joints_at_rest: tuple[str, ...] = ()) -> FloatArray | None:
+    def known(
+        self, now: float, max_age: float, joints_at_rest: tuple[str, ...] = ()
+    ) -> FloatArray | None:
         """The last state (n,) however old, None while there is none.
 
-        Raises RequestError where the joints of these names must stand and one that isn't older than max_age
-        [s] moves.
+        Raises RequestError where the joints of these names must stand and one that isn't older than
+        max_age [s] moves.
         """
         self.look()
         with self._lock:
-            q, velocity, age = self.q, self.velocity, now - self.came
+            q = self.q
+            velocity = self.velocity
+            age = now - self.came
         if joints_at_rest and velocity is not None and age <= max_age:
-            check_at_rest(velocity, joints_at_rest, "the robot is moving", StatusCode.START_STATE_INVALID)
+            check_at_rest(
+                velocity, joints_at_rest, "the robot is moving", StatusCode.START_STATE_INVALID
+            )
         return q
 
     def soon(
@@ -78,8 +94,8 @@ class LastState:
         joints_at_rest: tuple[str, ...] = (),
         sleep: Callable[[float], None] = time.sleep,
     ) -> FloatArray:
-        """The same as `fresh`, after a wait for a state where somebody publishes them: on a busy machine a
-        driver that has just started, or was held up, is heard a moment later.
+        """The same as `fresh`, after a wait for a state where somebody publishes them: on a busy
+        machine a driver that has just started, or was held up, is heard a moment later.
         """
         for _ in range(LOOKS):
             self.look()
@@ -89,26 +105,28 @@ class LastState:
         return self.fresh(now(), max_age, joints_at_rest)
 
     def fresh(self, now: float, max_age: float, joints_at_rest: tuple[str, ...] = ()) -> FloatArray:
-        """The same where it must not be older: raises RequestError when there is none, or an old one."""
+        """The same where it must not be older: raises RequestError when there is none, or an old
+        one.
+        """
         q = self.known(now, max_age, joints_at_rest)
         if q is None:
             raise RequestError(
-                StatusCode.ROBOT_STATE_STALE, "no joint_states have come yet: give the state in the request"
+                StatusCode.ROBOT_STATE_STALE,
+                "no joint_states have come yet: give the state in the request",
             )
         age = now - self.came
         if age > max_age:
             raise RequestError(
                 StatusCode.ROBOT_STATE_STALE,
                 f"the last joint_states came {age:.1f} s ago: it must be at most {max_age:g} s; "
-                "give the state in "
-                "the request",
+                "give the state in the request",
             )
         return q
 
 
 def measured_velocity(msg: Any, joint_names: tuple[str, ...]) -> FloatArray | None:
-    """Velocities (n,) rad/s of joint_states, None where they are missing: drivers that measure none leave
-    them out or say NaN.
+    """Velocities (n,) rad/s of joint_states, None where they are missing: drivers that measure none
+    leave them out or say NaN.
     """
     try:
         return velocity_from_msg(msg, joint_names)
@@ -116,33 +134,38 @@ def measured_velocity(msg: Any, joint_names: tuple[str, ...]) -> FloatArray | No
         return None
 
 
-def check_at_rest(velocity: FloatArray, joint_names: tuple[str, ...], what: str, code: StatusCode) -> None:
+def check_at_rest(
+    velocity: FloatArray, joint_names: tuple[str, ...], what: str, code: StatusCode
+) -> None:
     """Raise RequestError where a joint is faster than AT_REST: velocity (n,) rad/s."""
     j = int(np.argmax(np.abs(velocity)))
     if abs(velocity[j]) > AT_REST:
         raise RequestError(
             code,
-            f"{what}: {joint_names[j]} has a velocity of {velocity[j]:.4g} rad/s, it must be 0 rad/s within "
-            f"{AT_REST:g}; movements start and end at rest",
+            f"{what}: {joint_names[j]} has a velocity of {velocity[j]:.4g} rad/s, it must be 0 "
+            f"rad/s within {AT_REST:g}; movements start and end at rest",
         )
 
 
 def state_of(msg: Any, cell: Cell, code: StatusCode, at_rest: str = "") -> FloatArray | None:
-    """Joint values (n,) rad of a JointState, None where it is empty. Velocities must be finite where there
-    are any, and those of a state that `at_rest` names ("start") about 0; efforts are not looked at.
+    """Joint values (n,) rad of a JointState, None where it is empty. Velocities must be finite
+    where there are any, and those of a state that `at_rest` names ("start") about 0; efforts are
+    not looked at.
     """
     if not configuration_given(msg) and not msg.velocity:
         return None
     names = cell.robot.joint_names
     try:
-        q, velocity = configuration_from_msg(msg, names), velocity_from_msg(msg, names)
+        q = configuration_from_msg(msg, names)
+        velocity = velocity_from_msg(msg, names)
     except InvalidValueError as error:
         raise RequestError(code, str(error)) from error
     j = int(np.argmax(np.abs(q)))
     if abs(q[j]) > POSITION_MAX:
         raise RequestError(
             code,
-            f"{names[j]} is {q[j]:g} rad: no joint turns that far, it must be within {POSITION_MAX:g} rad",
+            f"{names[j]} is {q[j]:g} rad: no joint turns that far, it must be within "
+            f"{POSITION_MAX:g} rad",
         )
     if at_rest and velocity is not None:
         check_at_rest(velocity, names, at_rest, code)
@@ -150,7 +173,9 @@ def state_of(msg: Any, cell: Cell, code: StatusCode, at_rest: str = "") -> Float
 
 
 def states_of(messages: Sequence[Any], cell: Cell) -> FloatArray:
-    """Joint values (N, n) rad of at most STATES_MAX states; RequestError names the first bad one."""
+    """Joint values (N, n) rad of at most STATES_MAX states; RequestError names the first bad
+    one.
+    """
     code = StatusCode.INVALID_ROBOT_STATE
     if len(messages) > STATES_MAX:
         raise RequestError(code, f"states has {len(messages)} states: it must be 1 to {STATES_MAX}")
@@ -167,8 +192,8 @@ def states_of(messages: Sequence[Any], cell: Cell) -> FloatArray:
 
 
 def pose_of(msg: Any, cell: Cell) -> FloatArray | None:
-    """Pose (4, 4) in the cell of a PoseStamped in the frame "cell" or "base_link", None where it is not
-    given.
+    """Pose (4, 4) in the cell of a PoseStamped in the frame "cell" or "base_link", None where it is
+    not given.
     """
     if not stamped_pose_given(msg):
         return None
@@ -180,7 +205,9 @@ def goal_of(request: Any, cell: Cell) -> Goal:
     forms = tuple(name for name in ("goal", "goal_state", "goal_pose") if hasattr(request, name))
     configuration = None
     if "goal_state" in forms:
-        configuration = state_of(request.goal_state, cell, StatusCode.GOAL_STATE_INVALID, "goal_state")
+        configuration = state_of(
+            request.goal_state, cell, StatusCode.GOAL_STATE_INVALID, "goal_state"
+        )
     return one_goal(request.goal, configuration, pose_of(request.goal_pose, cell), cell, forms)
 
 

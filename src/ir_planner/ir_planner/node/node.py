@@ -1,7 +1,8 @@
-"""The planner's node: services, the plan action, the cell as markers. It parses, calls the core and replies.
+"""The planner's node: services, the plan action, the cell as markers. It parses, calls the core and
+replies.
 
-Quick questions, planning and the action have callback groups of their own: a long plan holds up neither
-other services nor its own cancel.
+Quick questions, planning and the action have callback groups of their own: a long plan holds up
+neither other services nor its own cancel.
 """
 
 import random
@@ -45,7 +46,11 @@ from ir_msgs.srv import (
 )
 from ir_msgs_py import names
 from ir_msgs_py.errors import InvalidValueError, MsgsError
-from ir_msgs_py.ros.conversions import configuration_from_msg, program_savings_to_msg, trajectory_to_msg
+from ir_msgs_py.ros.conversions import (
+    configuration_from_msg,
+    program_savings_to_msg,
+    trajectory_to_msg,
+)
 from ir_msgs_py.ros.diagnostics import OK, WARN, Condition, Diagnostics
 from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.ros.polled import LatestMessage
@@ -68,11 +73,15 @@ from ir_planner.service import ServicePlan, service_shapes
 from ir_planner.settings import PlannerSettings
 
 _GOALS_WAITING = 100  # beyond, a client is in a loop: each takes seconds
-_THREADS = 8  # quick and long requests, texts and points, changes, standby, the goal, cancelling, a spare
+_THREADS = (
+    8  # quick and long requests, texts and points, changes, standby, the goal, cancelling, a spare
+)
 
 
 class PlannerNode(Node):
-    """Answers requests about one cell; `make_planner`: another core than the usual one, for tests."""
+    """Answers requests about one cell; `make_planner`: another core than the usual one, for
+    tests.
+    """
 
     def __init__(
         self,
@@ -82,9 +91,13 @@ class PlannerNode(Node):
     ) -> None:
         super().__init__(names.PLANNER, context=context, **options)
         parameters = Parameters(self, PlannerSettings, on_change=self._change_settings)
-        make = make_planner or (lambda settings: Planner(time.monotonic, settings, read_cell=read_cell_apart))
+        make = make_planner or (
+            lambda settings: Planner(time.monotonic, settings, read_cell=read_cell_apart)
+        )
         self.planner = make(parameters.value)
-        self._last_state = LastState(self._look, lambda: self.count_publishers(names.JOINT_STATES) > 0)
+        self._last_state = LastState(
+            self._look, lambda: self.count_publishers(names.JOINT_STATES) > 0
+        )
         self._requests = Requests(
             self.planner,
             self._last_state,
@@ -96,7 +109,9 @@ class PlannerNode(Node):
             self._show_service,
             self._show_savings,
         )
-        self._trajectories = self.create_publisher(JointTrajectoryMsg, names.PLANNED_TRAJECTORY, LATCHED)
+        self._trajectories = self.create_publisher(
+            JointTrajectoryMsg, names.PLANNED_TRAJECTORY, LATCHED
+        )
         self._savings = self.create_publisher(ProgramSavingsMsg, names.PROGRAM_SAVINGS, LATCHED)
         self._markers = self.create_publisher(MarkerArray, names.PLANNER_MARKERS, LATCHED)
         self._diagnostics = Diagnostics(self)
@@ -112,10 +127,14 @@ class PlannerNode(Node):
 
     def _offer(self) -> None:
         """Advertise what works."""
-        ask, quick, long = self._requests, self._quick, self._long
+        ask = self._requests
+        quick = self._quick
+        long = self._long
         changes = MutuallyExclusiveCallbackGroup()  # a large cell holds up nobody but other changes
         texts = MutuallyExclusiveCallbackGroup()  # as long as what was loaded or planned
-        waiting = MutuallyExclusiveCallbackGroup()  # plans movements to postures where it is asked to
+        waiting = (
+            MutuallyExclusiveCallbackGroup()
+        )  # plans movements to postures where it is asked to
         for kind, name, handler, group in (
             (SetCell, names.SET_CELL, ask.set_cell, changes),
             (GetCell, names.GET_CELL, ask.get_cell, texts),
@@ -152,7 +171,9 @@ class PlannerNode(Node):
 
         def progress(phase: str, done: int, total: int, best_cost: float) -> None:
             cost = float(best_cost) if np.isfinite(best_cost) else 0.0
-            goal.publish_feedback(Plan.Feedback(phase=phase, done=done, total=total, best_cost=cost))
+            goal.publish_feedback(
+                Plan.Feedback(phase=phase, done=done, total=total, best_cost=cost)
+            )
 
         ask = self._requests
         plan = ask.guarded(
@@ -185,7 +206,9 @@ class PlannerNode(Node):
         except InvalidValueError as error:
             self._last_state.problem = str(error)
             return
-        self._last_state.take(q, time.monotonic() - received.age, measured_velocity(received.message, joints))
+        self._last_state.take(
+            q, time.monotonic() - received.age, measured_velocity(received.message, joints)
+        )
 
     def _change_settings(self, settings: PlannerSettings) -> None:
         self.planner.settings = settings
@@ -206,7 +229,9 @@ class PlannerNode(Node):
 
     def _show_movement(self, trajectory: JointTrajectory) -> None:
         self._trajectories.publish(trajectory_to_msg(trajectory))
-        self._markers.publish(self._shown.beside_cell(movement_shapes(trajectory, self.planner.scene())))
+        self._markers.publish(
+            self._shown.beside_cell(movement_shapes(trajectory, self.planner.scene()))
+        )
 
     def _show_savings(self, savings: ProgramSavings) -> None:
         self._savings.publish(program_savings_to_msg(savings))

@@ -52,7 +52,7 @@ from ir_planner.request import chosen
 from ir_planner.service import ServicePlan
 
 
-def known_status(error: Exception) -> Status | None:
+def known_status(error: Exception) -> Status | None:  # noqa: PLR0911
     """The status of a request that an error ended, None for one that nobody thought of."""
     if isinstance(error, RequestError):
         return error.status
@@ -77,9 +77,10 @@ def refused(error: Exception) -> Status:
 class Requests:
     """Handlers of the planner's services.
 
-    now: the node's clock [s]. cell_changed and planned: called after the cell changed or a trajectory was
-    planned; service_planned: the same for the candidates at a station, program_saves: for the savings of a
-    program. draw_seed: for random_seed. log: takes what nobody expected.
+    now: the node's clock [s]. cell_changed and planned: called after the cell changed or a
+    trajectory was planned; service_planned: the same for the candidates at a station,
+    program_saves: for the savings of a program. draw_seed: for random_seed. log: takes what nobody
+    expected.
     """
 
     def __init__(
@@ -94,16 +95,25 @@ class Requests:
         service_planned: Callable[[str, ServicePlan], None] = lambda station, plan: None,
         program_saves: Callable[[ProgramSavings], None] = lambda savings: None,
     ) -> None:
-        self.planner, self.last_state, self.now = planner, last_state, now
-        self.cell_changed, self.planned, self.log = cell_changed, planned, log
+        self.planner = planner
+        self.last_state = last_state
+        self.now = now
+        self.cell_changed = cell_changed
+        self.planned = planned
+        self.log = log
         self.draw_seed = draw_seed
-        self.service_planned, self.program_saves = service_planned, program_saves
+        self.service_planned = service_planned
+        self.program_saves = program_saves
 
     def guarded(self, handler: Callable[[Any, Any], Status]) -> Callable[[Any, Any], Any]:
-        """The handler as a service callback: its status goes into the response, whatever happens."""
+        """The handler as a service callback: its status goes into the response, whatever
+        happens.
+        """
 
         def callback(request: Any, response: Any) -> Any:
-            return answered(response, PLANNER, lambda: handler(request, response), known_status, self.log)
+            return answered(
+                response, PLANNER, lambda: handler(request, response), known_status, self.log
+            )
 
         return callback
 
@@ -113,14 +123,16 @@ class Requests:
         if is_path(file):
             file = str(self.planner.settings.file_roots.inside(file))
         cell = self.planner.set_cell(request.cell_yaml, file)
-        response.cell_name, response.stations = cell.name, stations_to_msg(cell)
+        response.cell_name = cell.name
+        response.stations = stations_to_msg(cell)
         self.cell_changed()
         return Status.success()
 
     def get_cell(self, request: Any, response: Any) -> Status:
         """The cell as it stands."""
         cell = self.planner.cell
-        response.cell_yaml, response.stations = cell_to_yaml(cell), stations_to_msg(cell)
+        response.cell_yaml = cell_to_yaml(cell)
+        response.stations = stations_to_msg(cell)
         response.robot_description = robot_urdf(cell.robot, cell.tool, cell.tcp, cell.base_pose)
         return Status.success()
 
@@ -134,7 +146,8 @@ class Requests:
     def check_state(self, request: Any, response: Any) -> Status:
         """Is this state free."""
         q = self._state(request.state, StatusCode.INVALID_ROBOT_STATE)
-        margin, station = request.safety_distance, request.station
+        margin = request.safety_distance
+        station = request.station
         check = self.planner.check_state(q, margin, request.max_pairs, request.load, station)
         fill_state_check(response, check)
         return check.status
@@ -155,7 +168,13 @@ class Requests:
             near = self._known_or_home()
         goal = goal_of(request, cell)
         answer = self.planner.compute_ik(
-            goal, request.method, request.safety_distance, near, request.load, request.starts, request.seed
+            goal,
+            request.method,
+            request.safety_distance,
+            near,
+            request.load,
+            request.starts,
+            request.seed,
         )
         fill_ik(response, answer)
         return answer.status
@@ -174,7 +193,8 @@ class Requests:
         options = options_of(request.options, self.draw_seed)
         cell = self.planner.cell
         configuration = state_of(request.configuration, cell, StatusCode.INVALID_ROBOT_STATE)
-        here, most = self._known_or_home(), request.max_candidates
+        here = self._known_or_home()
+        most = request.max_candidates
         plan = self.planner.plan_service(
             request.station, request.direction, configuration, here, most, options
         )
@@ -193,7 +213,8 @@ class Requests:
 
     def plan_cartesian(self, request: Any, response: Any) -> Status:
         """The tool along a path."""
-        options, cell = options_of(request.options, self.draw_seed), self.planner.cell
+        options = options_of(request.options, self.draw_seed)
+        cell = self.planner.cell
         start = state_of(request.start, cell, StatusCode.START_STATE_INVALID, "start")
         plan = self.planner.plan_cartesian(path_of(request, cell), options, start, t1=request.t1)
         fill_cartesian(response, plan, options.include_points)
@@ -246,14 +267,18 @@ class Requests:
 
     def get_program(self, request: Any, response: Any) -> Status:
         """A program planned before."""
-        fill_stored_program(response, self.planner.programs.get(request.program_id), request.include_points)
+        fill_stored_program(
+            response, self.planner.programs.get(request.program_id), request.include_points
+        )
         return Status.success()
 
     def export_program(self, request: Any, response: Any) -> Status:
         """A program or a trajectory planned before, as KRL."""
         chosen(request.language, ("krl",), "language")
         if bool(request.program_id) == bool(request.trajectory_id):
-            raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, "give a program_id or a trajectory_id")
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS, "give a program_id or a trajectory_id"
+            )
         if request.program_id:
             movements = self.planner.programs.get(request.program_id).movements
         else:
@@ -264,19 +289,24 @@ class Requests:
     def evaluate_trajectory(self, request: Any, response: Any) -> Status:
         """What a trajectory costs and where it first breaks a bound."""
         trajectory = trajectory_of(request, self.planner)
-        evaluation = self.planner.evaluate(trajectory, request.safety_distance, request.load, request.station)
+        evaluation = self.planner.evaluate(
+            trajectory, request.safety_distance, request.load, request.station
+        )
         fill_evaluation(response, evaluation)
         return evaluation.status
 
     def get_trajectory(self, request: Any, response: Any) -> Status:
         """The points of a trajectory planned before."""
-        response.trajectory = trajectory_to_msg(self.planner.trajectories.get(request.trajectory_id))
+        response.trajectory = trajectory_to_msg(
+            self.planner.trajectories.get(request.trajectory_id)
+        )
         return Status.success()
 
     def plan_standby(self, request: Any, response: Any) -> Status:
         """Where to rest during a pause."""
         q = state_of(request.state, self.planner.cell, StatusCode.INVALID_ROBOT_STATE)
-        samples, quantiles = np.array(request.pause_samples), np.array(request.pause_quantiles)
+        samples = np.array(request.pause_samples)
+        quantiles = np.array(request.pause_quantiles)
         lengths = lengths_of(request.pause, samples, quantiles)
         standby = self.planner.standby(lengths, q, request.load, tuple(request.postures))
         fill_standby(response, standby, self.planner.heard.source)
@@ -291,8 +321,8 @@ class Requests:
         return self.last_state.soon(self.now, self.planner.settings.state_max_age, standing)
 
     def _known_or_home(self, at_rest: bool = False) -> FloatArray:
-        """The last known state, however old; machine home where no state was received. at_rest: a robot that
-        moves now is refused.
+        """The last known state, however old; machine home where no state was received. at_rest: a
+        robot that moves now is refused.
         """
         cell = self.planner.cell
         standing = cell.robot.joint_names if at_rest else ()

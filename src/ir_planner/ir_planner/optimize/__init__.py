@@ -1,4 +1,6 @@
-"""Optimisation: path and time scaling are optimised together to certified movements; several are compared."""
+"""Optimisation: path and time scaling are optimised together to certified movements; several are
+compared.
+"""
 
 from ir_planner.optimize.descents import Descents, path_of
 from ir_planner.optimize.estimate import estimate

@@ -19,7 +19,10 @@ from ir_planner.request import Context
 from ir_planner.scene import PlanningScene
 from ir_planner.timing import Movement
 
-_FEW = (12, 18)  # control points that leave the path in tight corners, but are often faster in the end
+_FEW = (
+    12,
+    18,
+)  # control points that leave the path in tight corners, but are often faster in the end
 _NEAR = 0.02  # rad that a fit may leave its path by, unless that takes too many points
 _SLOWEST = 3.0  # times the path at full speed: the longest duration that a descent starts from
 _REFINED = 3  # coarse solutions that are refined
@@ -30,10 +33,13 @@ _ALONG = 256  # points of a path
 
 def path_of(trajectory: JointTrajectory, scene: PlanningScene) -> FloatArray:
     """Points (256, n) at even distances along a trajectory, within the joints' ranges."""
-    begin, span = float(trajectory.times[0]), trajectory.duration - float(trajectory.times[0])
+    begin = float(trajectory.times[0])
+    span = trajectory.duration - float(trajectory.times[0])
     dense = trajectory.sample(begin + np.linspace(0.0, 1.0, 8 * _ALONG) * span).q
     robot = scene.cell.robot
-    dense = np.clip(np.concatenate([trajectory.positions[:1], dense]), robot.position_min, robot.position_max)
+    dense = np.clip(
+        np.concatenate([trajectory.positions[:1], dense]), robot.position_min, robot.position_max
+    )
     dense[-1] = trajectory.positions[-1]
     return evenly_spaced(dense, _ALONG)
 
@@ -46,24 +52,29 @@ class Descents:
         self._refinement = Refinement(context)
 
     def starts(self, trajectory: JointTrajectory, path: FloatArray) -> list[UniformSpline]:
-        """Coarse splines along a trajectory: with its own speed profile, and with an even one, also with so
-        few control points that they leave it; path (M, n): its points.
+        """Coarse splines along a trajectory: with its own speed profile, and with an even one, also
+        with so few control points that they leave it; path (M, n): its points.
         """
         least, count = self._least(path)
         own = trajectory.duration - float(trajectory.times[0])
         requested = self.context.options.duration
         robot = self.context.scene.cell.robot
-        motion = along_motion(trajectory, count, requested or float(np.clip(own, least, _SLOWEST * least)))
+        motion = along_motion(
+            trajectory, count, requested or float(np.clip(own, least, _SLOWEST * least))
+        )
         kept = np.clip(motion.control, robot.position_min, robot.position_max)
         counts = sorted({count, *(few for few in _FEW if few < count and not requested)})
         even = [along_path(path, few, requested or SLOWER * least) for few in counts]
         return [UniformSpline(kept, motion.interval), *even]
 
     def improved(
-        self, trajectory: JointTrajectory, more: list[UniformSpline] | None = None, rounds: int = _ROUNDS
+        self,
+        trajectory: JointTrajectory,
+        more: list[UniformSpline] | None = None,
+        rounds: int = _ROUNDS,
     ) -> Movement | None:
-        """The best certified movement by descents from a trajectory and `more` starts, and again from what
-        was found; None where none can be certified.
+        """The best certified movement by descents from a trajectory and `more` starts, and again
+        from what was found; None where none can be certified.
         """
         found: Movement | None = None
         starts = list(more or [])
@@ -95,14 +106,16 @@ class Descents:
         return least, count
 
     def best(self, starts: list[UniformSpline], path: FloatArray) -> Movement | None:
-        """The best certified movement from the starts whose coarse solutions cost least; None where none can
-        be certified. path (M, n): what they came from.
+        """The best certified movement from the starts whose coarse solutions cost least; None where
+        none can be certified. path (M, n): what they came from.
         """
         work = self.context.work
         coarse: list[Solution] = []
         for k, start in enumerate(starts):
             if not coarse or not work.exhausted:
-                share = work.left / (EDGES_PER_INTERVAL * start.intervals * (len(starts) - k + _REFINED))
+                share = work.left / (
+                    EDGES_PER_INTERVAL * start.intervals * (len(starts) - k + _REFINED)
+                )
                 evaluations = max(min(THOROUGH.coarse, int(share)), 1)
                 coarse.append(self._refinement.coarse_from(start, path, evaluations))
         found: list[Movement] = []
@@ -125,5 +138,7 @@ def _deviation(spline: UniformSpline, path: FloatArray) -> float:
 
 
 def _step(knots: FloatArray) -> float:
-    """Half the longest step between knots: how far a point of the path may be from the next one [rad]."""
+    """Half the longest step between knots: how far a point of the path may be from the next one
+    [rad].
+    """
     return 0.5 * float(np.abs(np.diff(knots, axis=0)).max())

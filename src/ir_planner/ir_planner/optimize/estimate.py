@@ -1,7 +1,7 @@
 """What a movement will cost, in a few per cent of the work of the certified answer.
 
-A first look at all paths says which is the cheapest; it descends further on a spline with twice the knots.
-Its cost includes penalties, nothing is proved.
+A first look at all paths says which is the cheapest; it descends further on a spline with twice the
+knots. Its cost includes penalties, nothing is proved.
 """
 
 from dataclasses import replace
@@ -28,9 +28,14 @@ ALONE = 30  # from a path that has no rivals
 _FURTHER = replace(THOROUGH.stages[1], evaluations=140)
 
 
-def first_looks(paths: list[FloatArray], refinement: Refinement, evaluations: int) -> list[Solution]:
-    """Coarse solutions near paths (M, n), which need not be free; in one call where all have one cost."""
-    work, options = refinement.context.work, refinement.context.options
+def first_looks(
+    paths: list[FloatArray], refinement: Refinement, evaluations: int
+) -> list[Solution]:
+    """Coarse solutions near paths (M, n), which need not be free; in one call where all have one
+    cost.
+    """
+    work = refinement.context.work
+    options = refinement.context.options
     most = len(paths) * evaluations * MOST * EDGES_PER_INTERVAL
     begin = refinement.begun(along_path(paths[0], FEWEST, 1.0), evaluations) if paths else None
     alike = begin is not None and len(begin.kept) == 1 and options.objective != "movement_cost"
@@ -50,7 +55,9 @@ def first_looks(paths: list[FloatArray], refinement: Refinement, evaluations: in
 
 
 def estimate(paths: list[FloatArray], refinement: Refinement) -> Solution:
-    """The coarse solution that is cheapest, from paths (M, n), at least one, which need not be free."""
+    """The coarse solution that is cheapest, from paths (M, n), at least one, which need not be
+    free.
+    """
     looks = first_looks(paths, refinement, FIRST_LOOK if len(paths) > 1 else ALONE)
     k = min(range(len(looks)), key=lambda k: looks[k].cost)
     return refinement.staged(looks[k], _FURTHER, paths[k])

@@ -1,4 +1,6 @@
-"""A path p(s) that stays as it is: the configurations that a trajectory passes, at any speed profile."""
+"""A path p(s) that stays as it is: the configurations that a trajectory passes, at any speed
+profile.
+"""
 
 from functools import lru_cache
 
@@ -15,7 +17,9 @@ from ir_planner.curves import UniformSpline
 
 _PLACES = 2000  # of the path, between which it is interpolated
 _STANDING = 0.001  # share of the mean speed by which places part where the given motion stands
-_APART = 0.3  # of the distance between places: what is nearer to a point of the trajectory is left out
+_APART = (
+    0.3  # of the distance between places: what is nearer to a point of the trajectory is left out
+)
 _SAME = 1e-9  # rad
 _FIRST = 0.125  # of the second control point's rise: the least of the first; 0.25 with an even jerk
 _NEAREST = 8  # samples per interval for the deviation
@@ -25,16 +29,20 @@ class FixedPath:
     """p(s), s in [0, 1], from the points (N, n) that a trajectory passes."""
 
     def __init__(self, given: JointTrajectory, points: FloatArray) -> None:
-        begin, span = float(given.times[0]), given.duration - float(given.times[0])
+        begin = float(given.times[0])
+        span = given.duration - float(given.times[0])
         self.duration = span
         knots = (given.times - begin) / span
         places = np.linspace(0.0, 1.0, _PLACES)
         near = np.abs(knots[np.clip(np.searchsorted(knots, places), 1, len(knots) - 1)] - places)
-        near = np.minimum(near, np.abs(knots[np.clip(np.searchsorted(knots, places) - 1, 0, None)] - places))
+        near = np.minimum(
+            near, np.abs(knots[np.clip(np.searchsorted(knots, places) - 1, 0, None)] - places)
+        )
         self._share = np.sort(np.concatenate([knots, places[near > _APART / _PLACES]]))
         motion = given.sample(begin + self._share * span)
         q = motion.q
-        q[0], q[-1] = given.positions[0], given.positions[-1]
+        q[0] = given.positions[0]
+        q[-1] = given.positions[-1]
         speed = np.linalg.norm(motion.qd, axis=1)
         density = speed + _STANDING * speed.mean()
         middle = 0.5 * (density[1:] + density[:-1])
@@ -67,7 +75,9 @@ class FixedPath:
         return np.clip(profile(np.arange(2.0, 2.0 * len(s) + 5.0) / 2.0), 0.0, 1.0)
 
     def knots_at_points(self, s: FloatArray) -> FloatArray:
-        """Where inner points are passed, in knots from the beginning (M - 2,); s (C,) at the inner knots."""
+        """Where inner points are passed, in knots from the beginning (M - 2,); s (C,) at the inner
+        knots.
+        """
         rising = np.concatenate([[0.0], np.maximum.accumulate(s), [1.0]])
         knots = np.concatenate([[0.0], np.arange(2.0, len(s) + 2.0), [len(s) + 3.0]])
         return np.asarray(np.interp(self._passed[1:-1], rising, knots))
@@ -79,7 +89,8 @@ class FixedPath:
         right[0] -= self.q[0]
         right[-1] -= self.q[-1]
         control = np.empty((len(inner) + 6, inner.shape[1]))
-        control[:3], control[-3:] = self.q[0], self.q[-1]
+        control[:3] = self.q[0]
+        control[-3:] = self.q[-1]
         control[3:-3] = from_knots(right)
         return UniformSpline(control, duration / (len(inner) + 3))
 
@@ -88,28 +99,33 @@ class FixedPath:
         two knots.
         """
         q = spline.samples(_NEAREST)[0]
-        around = np.concatenate([[0.0, 0.0], np.maximum.accumulate(np.clip(s, 0.0, 1.0)), [1.0, 1.0]])
+        around = np.concatenate(
+            [[0.0, 0.0], np.maximum.accumulate(np.clip(s, 0.0, 1.0)), [1.0, 1.0]]
+        )
         k = np.arange(len(around) - 1)
-        first, last = around[np.maximum(k - 1, 0)], around[np.minimum(k + 2, len(around) - 1)]
+        first = around[np.maximum(k - 1, 0)]
+        last = around[np.minimum(k + 2, len(around) - 1)]
         near = self.at(np.linspace(first, last, 16 * _NEAREST, axis=1).ravel())
         near = near.reshape(len(k), 1, 16 * _NEAREST, -1)
         mine = q[: len(k) * _NEAREST].reshape(len(k), _NEAREST, 1, -1)
         away = np.zeros(1)
-        for joint in range(q.shape[1]):  # the largest of all joints, without an array of all of them
+        for joint in range(
+            q.shape[1]
+        ):  # the largest of all joints, without an array of all of them
             away = np.maximum(away, np.abs(mine[..., joint] - near[..., joint]))
         return float(away.min(axis=2).max())
 
 
 def from_knots(right: FloatArray) -> FloatArray:
-    """The control points (C, n) whose values at their knots, times 6, are `right` (C, n); the matrix is
-    symmetric.
+    """The control points (C, n) whose values at their knots, times 6, are `right` (C, n); the
+    matrix is symmetric.
     """
     return np.asarray(dpbtrs(_knot_factor(len(right)), right)[0])
 
 
 def never_back(s: FloatArray) -> FloatArray:
-    """s (C,) at the inner knots of a spline over s from 0 to 1 that nowhere falls: as given where that is so,
-    else with control points that rise, from the first interval on.
+    """s (C,) at the inner knots of a spline over s from 0 to 1 that nowhere falls: as given where
+    that is so, else with control points that rise, from the first interval on.
     """
     right = 6.0 * s
     right[-1] -= 1.0
@@ -131,13 +147,16 @@ def _knot_factor(count: int) -> FloatArray:
 
 
 def _in_order(positions: FloatArray, points: FloatArray) -> NDArray[np.int64]:
-    """Indices (M,) at which `points` (M, n) are among `positions` (N, n), each after the one before; of a
-    point that isn't among them that of the nearest one, which leaves some for the points after it.
+    """Indices (M,) at which `points` (M, n) are among `positions` (N, n), each after the one
+    before; of a point that isn't among them that of the nearest one, which leaves some for the
+    points after it.
     """
     found = [0]
     for k, point in enumerate(points[1:-1], start=1):
         first = min(found[-1] + 1, len(positions) - 1)
-        away = np.abs(positions[first : max(len(positions) - len(points) + 1 + k, first + 1)] - point)
+        away = np.abs(
+            positions[first : max(len(positions) - len(points) + 1 + k, first + 1)] - point
+        )
         here = np.flatnonzero(away.max(axis=1) < _SAME)
         found.append(first + int(here[0] if len(here) else np.argmin(away.max(axis=1))))
     return np.array([*found, len(positions) - 1])

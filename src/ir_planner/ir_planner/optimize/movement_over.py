@@ -8,10 +8,12 @@ from ir_planner.timing import Movement, distinct, straight_steps
 
 
 def movement_over(path: FloatArray, context: Context) -> Movement:
-    """The movement over a free path (M, n): optimised, or in straight steps where that isn't certified;
-    where the joints are to take their own time, in straight steps if that serves no worse.
+    """The movement over a free path (M, n): optimised, or in straight steps where that isn't
+    certified; where the joints are to take their own time, in straight steps if that serves no
+    worse.
 
-    Raises TimingError when a torque does not suffice, RequestError when the requested duration is too short.
+    Raises TimingError when a torque does not suffice, RequestError when the requested duration is
+    too short.
     """
     if context.options.timing == "asynchronous":
         common = movement_over(path, context.with_timing("synchronous"))
@@ -20,7 +22,10 @@ def movement_over(path: FloatArray, context: Context) -> Movement:
     path = distinct(path)
     if len(path) > 1:
         refinement = Refinement(context)
-        for effort in (THOROUGH, QUICK):  # the second ends elsewhere, where the first isn't certified
+        for effort in (
+            THOROUGH,
+            QUICK,
+        ):  # the second ends elsewhere, where the first isn't certified
             found = refinement.refined(refinement.coarse(path, effort.coarse), path, effort)
             if found is not None and found.certified:
                 return found

@@ -1,4 +1,6 @@
-"""A movement that is known, optimised again for another objective, value of a second or duration."""
+"""A movement that is known, optimised again for another objective, value of a second or
+duration.
+"""
 
 from collections.abc import Sequence
 
@@ -13,7 +15,7 @@ def optimised_near(known: Movement, context: Context) -> Movement | None:
 
 
 def optimised_near_best(known: Sequence[Movement], context: Context) -> Movement | None:
-    """The movement by descent from that of known ones, at least one, whose coarse solution costs least; None
-    where that can't be certified.
+    """The movement by descent from that of known ones, at least one, whose coarse solution costs
+    least; None where that can't be certified.
     """
     return Refinement(context).near(known)

@@ -1,4 +1,6 @@
-"""Points that a uniform spline passes exactly: the correction of its control points of least jerk."""
+"""Points that a uniform spline passes exactly: the correction of its control points of least
+jerk.
+"""
 
 from dataclasses import dataclass
 
@@ -17,7 +19,9 @@ _STEPS = 3  # of Newton's towards the nearest place
 
 @dataclass(frozen=True, eq=False)
 class Passing:
-    """points (P, n) are passed `at` (P,), in knots from the beginning; none where they were too dense."""
+    """points (P, n) are passed `at` (P,), in knots from the beginning; none where they were too
+    dense.
+    """
 
     at: FloatArray
     points: FloatArray
@@ -29,7 +33,9 @@ class Passing:
 
     @staticmethod
     def of(spline: UniformSpline, near: FloatArray, points: FloatArray) -> "Passing":
-        """Where a spline comes nearest to the inner points of `points` (M, n); near (M - 2,): about there."""
+        """Where a spline comes nearest to the inner points of `points` (M, n); near (M - 2,): about
+        there.
+        """
         inner = points[1:-1]
         if len(inner) == 0 or len(spline.control) - 6 < _PER_POINT * len(inner):
             return Passing.nothing(points)
@@ -61,16 +67,19 @@ class Passing:
     def sent(
         self, spline: UniformSpline, joint_names: tuple[str, ...]
     ) -> tuple[JointTrajectory, UniformSpline]:
-        """The motion with a point wherever one is passed beside a knot, and its spline: corrected for the
-        nanoseconds that these times have.
+        """The motion with a point wherever one is passed beside a knot, and its spline: corrected
+        for the nanoseconds that these times have.
         """
         step = int(np.ceil(spline.interval * 1e9 - 1e-3))
         times = np.rint(self.at * step).astype(np.int64)
-        exact = Passing(times / step, self.points).corrected(UniformSpline(spline.control, step * 1e-9))
+        exact = Passing(times / step, self.points).corrected(
+            UniformSpline(spline.control, step * 1e-9)
+        )
         q, qd, qdd = exact.knots()
         knots = np.arange(len(q), dtype=np.int64) * step
         between = times[times % step != 0]
-        k, after = between // step, ((between % step) * 1e-9)[:, None]
+        k = between // step
+        after = ((between % step) * 1e-9)[:, None]
         jerk = (qdd[k + 1] - qdd[k]) / exact.interval
         more = (
             q[k] + after * (qd[k] + after * (qdd[k] / 2.0 + after * jerk / 6.0)),
@@ -99,13 +108,18 @@ def _values(control: FloatArray, at: FloatArray) -> tuple[FloatArray, FloatArray
     u = (at - k)[:, None]
     c = [control[k + i] for i in range(4)]
     slope = (
-        -((1 - u) ** 2) * c[0] + (3 * u**2 - 4 * u) * c[1] + (-3 * u**2 + 2 * u + 1) * c[2] + u**2 * c[3]
+        -((1 - u) ** 2) * c[0]
+        + (3 * u**2 - 4 * u) * c[1]
+        + (-3 * u**2 + 2 * u + 1) * c[2]
+        + u**2 * c[3]
     ) / 2.0
     return _basis(at, len(control)) @ control, slope
 
 
 def jerk_bands(count: int, weight: float, size: float) -> FloatArray:
-    """size + weight D' D with the third differences D of `count` values, (4, count) in banded form, upper."""
+    """size + weight D' D with the third differences D of `count` values, (4, count) in banded form,
+    upper.
+    """
     third = np.array([-1.0, 3.0, -3.0, 1.0])
     bands = np.zeros((4, count))
     for i in range(4):

@@ -1,11 +1,12 @@
-"""Time scaling of a path that stays as it is: the fastest within speed, acceleration, jerk and torque, or
-the one that serves the objective best.
+"""Time scaling of a path that stays as it is: the fastest within speed, acceleration, jerk and
+torque, or the one that serves the objective best.
 
-The path parameter s(t) along the path p(s) is chosen at the knots of a fine uniform cubic B-spline that
-passes p(s_k) there. So energy and what exceeds a limit are those of SplineCost, and their derivatives by s_k
-follow by the chain rule; L-BFGS optimises all s_k and the duration in a metric in which the jerk of s
-counts. Between its knots the spline leaves the path by little; by how much is measured. Points are then
-passed exactly by the correction of least jerk, where that costs little time.
+The path parameter s(t) along the path p(s) is chosen at the knots of a fine uniform cubic B-spline
+that passes p(s_k) there. So energy and what exceeds a limit are those of SplineCost, and their
+derivatives by s_k follow by the chain rule; L-BFGS optimises all s_k and the duration in a metric
+in which the jerk of s counts. Between its knots the spline leaves the path by little; by how much
+is measured. Points are then passed exactly by the correction of least jerk, where that costs little
+time.
 """
 
 from dataclasses import dataclass
@@ -27,7 +28,9 @@ from ir_planner.scene import MotionLimits, PlanningScene, torque_use
 from ir_planner.timing import lasting_longer
 
 _STEP = 0.1  # s between the knots of the coarsest spline
-_FEWEST, _MOST = 12, 150  # its intervals
+# its intervals
+_FEWEST = 12
+_MOST = 150
 _SLOWINGS = 12  # rounds, each where a limit is exceeded and
 _AROUND = 4  # intervals around
 _ENOUGH = 1.001  # use of a limit; what is left is slowed everywhere
@@ -38,15 +41,17 @@ _LONGER = 1.03  # what passing points exactly may cost in time
 
 @dataclass(frozen=True)
 class TimingEffort:
-    """Evaluations of the cost per descent; in each the stiffness of the penalties, against the objective's
-    power, and the W over which the bus' switch is rounded. Each has twice the knots of the one before.
+    """Evaluations of the cost per descent; in each the stiffness of the penalties, against the
+    objective's power, and the W over which the bus' switch is rounded. Each has twice the knots of
+    the one before.
     """
 
     evaluations: int
     descents: tuple[tuple[float, float], ...]
 
 
-# service lines of the bundled cells: not more J than with the thorough effort, in two thirds of the time
+# service lines of the bundled cells: not more J than with the thorough effort, in two thirds of the
+# time
 QUICK_TIMING = TimingEffort(250, ((40.0, 100.0), (400.0, 5.0)))
 THOROUGH_TIMING = TimingEffort(250, ((40.0, 100.0), (40.0, 20.0), (400.0, 3.0)))
 
@@ -66,10 +71,11 @@ def along_its_path(
     context: Context,
     effort: TimingEffort = THOROUGH_TIMING,
 ) -> PathTiming | None:
-    """The path of a trajectory from rest to rest with the best time scaling for the objective, or in the
-    requested duration; torque at samples, the proof comes after. None where none is found.
+    """The path of a trajectory from rest to rest with the best time scaling for the objective, or
+    in the requested duration; torque at samples, the proof comes after. None where none is found.
 
-    points (M, n) of the trajectory are passed exactly, unless that takes much longer: where they are dense.
+    points (M, n) of the trajectory are passed exactly, unless that takes much longer: where they
+    are dense.
 
     Raises CancelledError when asked to stop.
     """
@@ -90,8 +96,11 @@ def _along(
     effort: TimingEffort,
     context: Context,
 ) -> tuple[UniformSpline, Passing, FloatArray] | None:
-    """The spline within the limits, what it passes exactly, and s at its knots; None where it is too slow."""
-    requested, scene = context.options.duration, context.scene
+    """The spline within the limits, what it passes exactly, and s at its knots; None where it is
+    too slow.
+    """
+    requested = context.options.duration
+    scene = context.scene
     limits, speed = bounds
     s, total = _profile(path, limits.for_speed(speed), effort, context)
     s, total = _slowed_where_needed(path, s, total, limits, scene)
@@ -100,16 +109,21 @@ def _along(
     passing = Passing.of(spline, path.knots_at_points(s), points)
     fitted = slowed_to_limits(passing.corrected(spline), limits, scene)
     if near is not None and (fitted is None or fitted.duration > _LONGER * near.duration):
-        passing, fitted = Passing.nothing(points), near
+        passing = Passing.nothing(points)
+        fitted = near
     if fitted is not None and requested > 0.0:
-        fitted = fitted.lasting(requested) if fitted.duration <= requested * (1.0 + _ROUNDING) else None
+        fitted = (
+            fitted.lasting(requested) if fitted.duration <= requested * (1.0 + _ROUNDING) else None
+        )
     return None if fitted is None else (fitted, passing, s)
 
 
 def _profile(
     path: FixedPath, limits: MotionLimits, effort: TimingEffort, context: Context
 ) -> tuple[FloatArray, float]:
-    """s at the inner knots of the finest spline, and the duration [s], by descents on finer ones."""
+    """s at the inner knots of the finest spline, and the duration [s], by descents on finer
+    ones.
+    """
     total = context.options.duration or path.duration
     count = int(np.clip(np.ceil(total / _STEP), _FEWEST, _MOST))
     s = path.places(count)
@@ -120,7 +134,8 @@ def _profile(
         if most < 1 or context.work.exhausted:
             break
         if k > 0:
-            s, count = path.finer(s), finer
+            s = path.finer(s)
+            count = finer
         s, total, evaluations = optimised_profile(
             path, s, total, limits, (stiffness, smoothing, most), context
         )
@@ -131,8 +146,8 @@ def _profile(
 def _slowed_where_needed(
     path: FixedPath, s: FloatArray, duration: float, limits: MotionLimits, scene: PlanningScene
 ) -> tuple[FloatArray, float]:
-    """s and duration with more time around the intervals in which a limit is exceeded: the best of some
-    rounds.
+    """s and duration with more time around the intervals in which a limit is exceeded: the best of
+    some rounds.
     """
     window = np.hanning(2 * _AROUND + 3)[1:-1]
     knots = np.concatenate([[0], np.arange(2, len(s) + 2), [len(s) + 3]])

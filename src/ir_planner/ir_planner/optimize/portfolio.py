@@ -1,11 +1,12 @@
-"""Paths of several homotopy classes, found by several searches, each optimised to the cheapest movement near
-it.
+"""Paths of several homotopy classes, found by several searches, each optimised to the cheapest
+movement near it.
 
-Each new free path is shortened and gets a coarse solution: a short descent on a coarse spline estimates what
-it may come to, and paths whose coarse solutions are alike count once. Guesses, which need not be free,
-descend too: a few evaluations show which of them are worth as many as a free path gets. The cheapest coarse
-solutions are refined, which is where the clearance is proved; the best refined movement is the answer, and
-more work makes it better.
+Each new free path is shortened and gets a coarse solution: a short descent on a coarse spline
+estimates what it may come to, and paths whose coarse solutions are alike count once. Guesses, which
+need not be free,
+descend too: a few evaluations show which of them are worth as many as a free path gets. The
+cheapest coarse solutions are refined, which is where the clearance is proved; the best refined
+movement is the answer, and more work makes it better.
 """
 
 from dataclasses import dataclass
@@ -29,8 +30,8 @@ Look = tuple[Solution, FloatArray]  # a coarse solution, and the guess (M, n) th
 
 @dataclass(frozen=True)
 class _Shares:
-    """Evaluations from every guess, then from those that are followed; how many of these get as many as a
-    free path.
+    """Evaluations from every guess, then from those that are followed; how many of these get as
+    many as a free path.
     """
 
     first: int
@@ -38,15 +39,17 @@ class _Shares:
     promising: int
 
 
-# A guess that begins deep in a body shows late what it may come to. At a duration that is short or requested
-# classes are nearer to each other, and where a best is known that a guess has to be near, one look decides.
-_PATIENT, _BRIEF = _Shares(24, 13, 2), _Shares(12, 25, 3)
+# A guess that begins deep in a body shows late what it may come to. At a duration that is short or
+# requested classes are nearer to each other, and where a best is known that a guess has to be near,
+# one look decides.
+_PATIENT = _Shares(24, 13, 2)
+_BRIEF = _Shares(12, 25, 3)
 
 
 @dataclass(eq=False)
 class Candidate:
-    """A path (M, n) found by `method`, its coarse solution, and how much it was refined: 1 quickly, 2
-    thoroughly.
+    """A path (M, n) found by `method`, its coarse solution, and how much it was refined: 1 quickly,
+    2 thoroughly.
     """
 
     method: str
@@ -59,8 +62,10 @@ class Portfolio:
     """The paths of one request, and the movements that came of them: the best first."""
 
     def __init__(self, space: FreeSpace, refinement: Refinement) -> None:
-        self.space, self.refinement = space, refinement
-        self.context, self.journal = refinement.context, refinement.context.journal
+        self.space = space
+        self.refinement = refinement
+        self.context = refinement.context
+        self.journal = refinement.context.journal
         self.candidates: list[Candidate] = []
         self.found: list[tuple[str, Movement]] = []
 
@@ -84,22 +89,29 @@ class Portfolio:
         return True
 
     def descend(self, method: str, guesses: list[FloatArray], worth: float = np.inf) -> int:
-        """Optimise guesses (M, n), which need not be free: all of them a little; then the cheapest that
-        differ, if they cost less than `worth` times the best candidate; and the cheapest of these as far as
-        free paths are. The number of them that are new.
+        """Optimise guesses (M, n), which need not be free: all of them a little; then the cheapest
+        that differ, if they cost less than `worth` times the best candidate; and the cheapest of
+        these as far as free paths are. The number of them that are new.
         """
         most = worth * self.candidates[0].solution.cost if self.candidates else np.inf
         options = self.context.options
         hurried = np.isfinite(most) or options.duration > 0.0 or options.objective == "time"
         shares = _BRIEF if hurried else _PATIENT
         seen = zip(first_looks(guesses, self.refinement, shares.first), guesses, strict=True)
-        looks = sorted((look for look in seen if look[0].cost < most), key=lambda look: look[0].cost)
-        followed, left = first_different(looks, _FOLLOWED, COARSE, lambda look: look[0].places), QUICK.coarse
+        looks = sorted(
+            (look for look in seen if look[0].cost < most), key=lambda look: look[0].cost
+        )
+        followed = first_different(looks, _FOLLOWED, COARSE, lambda look: look[0].places)
+        left = QUICK.coarse
         if len(followed) > shares.promising:
-            followed = sorted(self._further(followed, shares.following), key=lambda look: look[0].cost)
+            followed = sorted(
+                self._further(followed, shares.following), key=lambda look: look[0].cost
+            )
             left -= shares.following
         followed[: shares.promising] = self._further(followed[: shares.promising], left)
-        found = [Candidate(method, solution.spline.knots()[0], solution) for solution, _ in followed]
+        found = [
+            Candidate(method, solution.spline.knots()[0], solution) for solution, _ in followed
+        ]
         return sum(self._take(candidate) for candidate in found)
 
     def _further(self, looks: list[Look], evaluations: int) -> list[Look]:
@@ -108,8 +120,11 @@ class Portfolio:
         return [(coarse(solution.spline, guess, evaluations), guess) for solution, guess in looks]
 
     def adopt(self, other: "Portfolio") -> int:
-        """Optimise the candidates of another objective at the requested duration; how many are new."""
-        duration, new = self.context.options.duration, 0
+        """Optimise the candidates of another objective at the requested duration; how many are
+        new.
+        """
+        duration = self.context.options.duration
+        new = 0
         for candidate in other.candidates:
             start = candidate.solution.spline.lasting(duration)
             solution = self.refinement.coarse_from(start, candidate.path, QUICK.coarse)
@@ -117,11 +132,16 @@ class Portfolio:
         return new
 
     def refine_best(self, count: int, effort: Effort = QUICK) -> int:
-        """Refine up to `count` of the cheapest coarse solutions that were not; how many were certified."""
+        """Refine up to `count` of the cheapest coarse solutions that were not; how many were
+        certified.
+        """
         done = 0
         wanted = [c for c in self.candidates if c.refined == 0]
         for candidate in wanted[:count]:
-            if self.found and candidate.solution.cost > _OUT_OF_REACH * self.candidates[0].solution.cost:
+            if (
+                self.found
+                and candidate.solution.cost > _OUT_OF_REACH * self.candidates[0].solution.cost
+            ):
                 break
             done += self._refine(candidate, effort)
         return done
@@ -142,7 +162,9 @@ class Portfolio:
         for candidate in self.candidates:
             if candidate.refined == 1:
                 spline = candidate.solution.spline
-                candidate.solution = self.refinement.coarse_from(spline, candidate.path, THOROUGH.coarse)
+                candidate.solution = self.refinement.coarse_from(
+                    spline, candidate.path, THOROUGH.coarse
+                )
                 self._refine(candidate, THOROUGH)
                 return True
         return False
@@ -167,8 +189,8 @@ class Portfolio:
         return None
 
     def in_straight_steps(self, paths: list[tuple[str, FloatArray]]) -> tuple[str, Movement] | None:
-        """Straight steps (M, n) with blended corners: for asynchronous joints, and where no descent was
-        certified.
+        """Straight steps (M, n) with blended corners: for asynchronous joints, and where no descent
+        was certified.
         """
         best: tuple[str, Movement] | None = None
         for method, path in paths:

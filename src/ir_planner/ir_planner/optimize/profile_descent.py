@@ -1,4 +1,6 @@
-"""The descent on the speed profile along a fixed path: s at the knots of a uniform spline; its duration."""
+"""The descent on the speed profile along a fixed path: s at the knots of a uniform spline; its
+duration.
+"""
 
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.optimize.fixed_path import FixedPath
@@ -19,9 +21,9 @@ def optimised_profile(
     effort: tuple[float, float, int],
     context: Context,
 ) -> tuple[FloatArray, float, int]:
-    """s (count - 3,) at the inner knots, duration [s] and evaluations, from a profile s and its duration,
-    which stays where the request has one. effort: stiffness of penalties, against the power that the
-    objective is about, smoothing of the bus [W], and evaluations.
+    """s (count - 3,) at the inner knots, duration [s] and evaluations, from a profile s and its
+    duration, which stays where the request has one. effort: stiffness of penalties, against the
+    power that the objective is about, smoothing of the bus [W], and evaluations.
     """
     weights = objective_weights(context, path.q[::_SPARSE])
     stiffness, smoothing, most = effort

@@ -1,10 +1,11 @@
-"""From a free path to the cheapest movement near it: a cubic B-spline is optimised by its control points and
-its duration.
+"""From a free path to the cheapest movement near it: a cubic B-spline is optimised by its control
+points and its duration.
 
-Path and time scaling are chosen together: the cost is the objective's, and what exceeds a bound of speed,
-acceleration, jerk, torque or clearance is penalised. The descent runs on a coarse spline first and on finer
-ones then. The result is slowed until every limit holds exactly, and its clearance is proved; a pair that
-comes too near gets a larger clearance margin, and the descent continues.
+Path and time scaling are chosen together: the cost is the objective's, and what exceeds a bound of
+speed, acceleration, jerk, torque or clearance is penalised. The descent runs on a coarse spline
+first and on finer ones then. The result is slowed until every limit holds exactly, and its
+clearance is proved; a pair that comes too near gets a larger clearance margin, and the descent
+continues.
 """
 
 from collections.abc import Sequence
@@ -37,7 +38,9 @@ from ir_planner.timing import (
 )
 
 SPACING = 0.1  # s between the knots of the coarsest spline
-FEWEST, MOST = 12, 64  # control points of the coarsest spline
+# control points of the coarsest spline
+FEWEST = 12
+MOST = 64
 _FINE = 0.02  # s between knots: enough
 SLOWER = 1.3  # than the path at full speed: where the descent starts
 _STIFFNESS = 4.0  # of penalties, against the power that the objective is about: at least
@@ -51,18 +54,25 @@ _TIGHTER = 0.999  # than what was exceeded
 # shares of the speed tried where a duration is requested, until it is met
 SPEED_MARGINS = (0.9995, 0.95, 0.9)
 _ROUNDING = 1e-9  # relative
-_STIFFER = 10.0  # penalties where a duration is requested: a second may be worth much more than usual
+_STIFFER = (
+    10.0  # penalties where a duration is requested: a second may be worth much more than usual
+)
 _LEAST_COST = 1.0  # J: of a movement that takes next to nothing
 _ZONE_SAMPLES = 4  # per interval
 _WITHIN_REACH = 1.06  # of a requested duration: from there more effort may get to it
-SHARE_OF_WORK = 0.4  # of what is left, that one descent may take: finer ones and repairs come after it
-EDGES_PER_INTERVAL = 0.25  # work of one evaluation, in certified edges: about what it takes beside one
+SHARE_OF_WORK = (
+    0.4  # of what is left, that one descent may take: finer ones and repairs come after it
+)
+EDGES_PER_INTERVAL = (
+    0.25  # work of one evaluation, in certified edges: about what it takes beside one
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A spline under optimisation: the stage it went through, its cost, the distances (R, Z) m that its pairs
-    are to keep, and the shares of the limits' speed and of the torque that it is optimised for.
+    """A spline under optimisation: the stage it went through, its cost, the distances (R, Z) m that
+    its pairs are to keep, and the shares of the limits' speed and of the torque that it is
+    optimised for.
     """
 
     spline: UniformSpline
@@ -88,7 +98,8 @@ class Refinement:
     def __init__(self, context: Context) -> None:
         self.context = context
         self.limits = context.limits
-        scene, options = context.scene, context.options
+        scene = context.scene
+        options = context.options
         rows = [scene.thresholds(options.safety_distance) - PROOF_TOLERANCE / 2]
         if context.station and scene.allowed(context.station).any():
             rows.append(context.thresholds() - PROOF_TOLERANCE / 2)
@@ -105,7 +116,9 @@ class Refinement:
         return self.coarse_from(start, path, evaluations)
 
     def coarse_from(self, spline: UniformSpline, path: FloatArray, evaluations: int) -> Solution:
-        """The coarse solution by descent from a spline of any origin; path (M, n): what it came from."""
+        """The coarse solution by descent from a spline of any origin; path (M, n): what it came
+        from.
+        """
         return self._optimised(self.begun(spline, evaluations), path)
 
     def begun(self, spline: UniformSpline, evaluations: int) -> Solution:
@@ -114,8 +127,12 @@ class Refinement:
         stage = replace(QUICK.stages[0], evaluations=evaluations)
         return Solution(spline, stage, np.inf, self._kept, speed)
 
-    def refined(self, solution: Solution, path: FloatArray, effort: Effort = QUICK) -> Movement | None:
-        """The movement that a coarse solution on a path (M, n) becomes, proved; None if none can be."""
+    def refined(
+        self, solution: Solution, path: FloatArray, effort: Effort = QUICK
+    ) -> Movement | None:
+        """The movement that a coarse solution on a path (M, n) becomes, proved; None if none can
+        be.
+        """
         found = self._refined(solution, path, effort)
         if self.context.options.duration > 0.0:
             for speed in SPEED_MARGINS[1:]:
@@ -127,14 +144,17 @@ class Refinement:
         return found
 
     def near(self, known: Sequence[Movement]) -> Movement | None:
-        """By descent from the known one whose coarse solution costs least; None if it isn't certified."""
+        """By descent from the known one whose coarse solution costs least; None if it isn't
+        certified.
+        """
         starts = [(self._coarse_near(one), one.path) for one in known]
         coarse, path = min(starts, key=lambda start: start[0].cost)
         found = self.refined(coarse, path)
         return found if found is not None and found.certified else None
 
     def _coarse_near(self, known: Movement) -> Solution:
-        robot, path = self.context.scene.cell.robot, known.path
+        robot = self.context.scene.cell.robot
+        path = known.path
         least = fewest_seconds(path, self.limits.velocity, self.limits.acceleration)
         count = int(np.clip(np.ceil(least / SPACING), FEWEST, MOST))
         own = max(known.trajectory.duration, least)
@@ -143,8 +163,8 @@ class Refinement:
         return self.coarse_from(UniformSpline(control, start.interval), path, QUICK.coarse)
 
     def _within_limits(self, path: FloatArray) -> Movement | None:
-        """The movement near a path at a requested duration that hardly leaves joules to choose: the fastest
-        one stretched, or a cheaper one.
+        """The movement near a path at a requested duration that hardly leaves joules to choose: the
+        fastest one stretched, or a cheaper one.
         """
         requested = self.context.options.duration
         fastest = Refinement(self.context.asking("time"))
@@ -155,25 +175,36 @@ class Refinement:
             duration = found.trajectory.duration
             self.shortest = min(self.shortest, duration)
             if duration <= requested * (1.0 + DURATION_SLACK):
-                movement = replace(found, context=self.context).stretched_by(max(requested / duration, 1.0))
+                movement = replace(found, context=self.context).stretched_by(
+                    max(requested / duration, 1.0)
+                )
                 if movement.clearance is None:
                     cheaper = within_duration(
                         found, self.context, lambda one, asked: Refinement(asked).near([one])
                     )
-                    return min((m for m in (movement, cheaper) if m is not None), key=lambda m: m.cost)
+                    return min(
+                        (m for m in (movement, cheaper) if m is not None), key=lambda m: m.cost
+                    )
             if duration > _WITHIN_REACH * requested:
                 break
         return None
 
     def check_requested(self) -> None:
-        """Raise RequestError where the requested duration is shorter than the fastest movement found."""
+        """Raise RequestError where the requested duration is shorter than the fastest movement
+        found.
+        """
         if np.isfinite(self.shortest):
             check_requested(self.shortest, self.context.options)
 
     def _refined(self, solution: Solution, path: FloatArray, effort: Effort) -> Movement | None:
         for stage in effort.after(solution.stage.level):
-            solution = self.staged(solution, decisive(stage, effort.last, self._rounding(solution)), path)
-            if stage.level == effort.last.level and solution.stage.stiffness == effort.last.stiffness:
+            solution = self.staged(
+                solution, decisive(stage, effort.last, self._rounding(solution)), path
+            )
+            if (
+                stage.level == effort.last.level
+                and solution.stage.stiffness == effort.last.stiffness
+            ):
                 break
         solution = self._as_fast_as_requested(solution, path)
         for _ in range(_REPAIRS + 1):
@@ -182,7 +213,9 @@ class Refinement:
                 return found
             if found.pair is None:
                 return None
-            solution = self._repaired(self._with_larger_margin(solution, found), path, _REPAIR_EVALUATIONS)
+            solution = self._repaired(
+                self._with_larger_margin(solution, found), path, _REPAIR_EVALUATIONS
+            )
         return None
 
     def staged(self, solution: Solution, stage: Stage, path: FloatArray) -> Solution:
@@ -203,10 +236,11 @@ class Refinement:
         return worth * solution.spline.duration / max(solution.cost, _LEAST_COST)
 
     def _as_fast_as_requested(self, solution: Solution, path: FloatArray) -> Solution:
-        """The solution with bounds that are tightened by as much as its motion exceeds them (between samples,
-        by softness of the penalties) until it needs no more time than requested.
+        """The solution with bounds that are tightened by as much as its motion exceeds them
+        (between samples, by softness of the penalties) until it needs no more time than requested.
         """
-        limits, scene = self.limits.with_torque_share(TORQUE_SHARES[0]), self.context.scene
+        limits = self.limits.with_torque_share(TORQUE_SHARES[0])
+        scene = self.context.scene
         for _ in range(_TIGHTENINGS if self.context.options.duration > 0.0 else 0):
             torque, longer = beyond_limits(solution.spline, limits, scene)
             if max(torque, longer) <= 1.0:
@@ -215,11 +249,15 @@ class Refinement:
             share = solution.torque * (_TIGHTER / torque if torque > 1.0 else 1.0)
             if min(speed, share) < _TIGHTEST:
                 break
-            solution = self._repaired(replace(solution, speed=speed, torque=share), path, _TIGHTENED)
+            solution = self._repaired(
+                replace(solution, speed=speed, torque=share), path, _TIGHTENED
+            )
         return solution
 
     def _optimised(self, solution: Solution, path: FloatArray) -> Solution:
-        work, robot, spline = self.context.work, self.context.scene.cell.robot, solution.spline
+        work = self.context.work
+        robot = self.context.scene.cell.robot
+        spline = solution.spline
         work.check()
         affordable = int(SHARE_OF_WORK * work.left / (EDGES_PER_INTERVAL * spline.intervals))
         if affordable < 1:
@@ -240,7 +278,8 @@ class Refinement:
     def cost(self, solution: Solution, path: FloatArray) -> SplineCost:
         """What a solution on a path (M, n) is optimised for."""
         weights = objective_weights(self.context, path)
-        stage, stiffer = solution.stage, _STIFFER if self.context.options.duration > 0.0 else 1.0
+        stage = solution.stage
+        stiffer = _STIFFER if self.context.options.duration > 0.0 else 1.0
         penalty = weights.power * max(stiffer * stage.stiffness, _STIFFNESS)
         key = (penalty, stage.smoothing, solution.speed, solution.torque, weights.travel.tobytes())
         known = self._costs.get(key) if solution.kept is self._kept else None
@@ -253,14 +292,18 @@ class Refinement:
         return cost
 
     def _rows(self, spline: UniformSpline) -> RowArray | None:
-        """Which row of thresholds holds in each interval: the station's in its zone; None: there is one."""
+        """Which row of thresholds holds in each interval: the station's in its zone; None: there is
+        one.
+        """
         if len(self._kept) == 1:
             return None
         context = self.context
         q, _, _ = spline.samples(_ZONE_SAMPLES)
         inside = tcp_inside(q, context.scene, context.station, context.safety_distance)
         whole: BoolArray = np.asarray(inside.reshape(spline.intervals, -1).all(axis=1))
-        until = np.append(whole[1:], whole[-1])  # the end of an interval is the beginning of the next
+        until = np.append(
+            whole[1:], whole[-1]
+        )  # the end of an interval is the beginning of the next
         return np.asarray(whole & until, np.int32)
 
     def _with_larger_margin(self, solution: Solution, found: Violation) -> Solution:
@@ -285,8 +328,8 @@ class Refinement:
         return movement if movement.torque.violation is None else None
 
     def _slowed(self, spline: UniformSpline, limits: MotionLimits) -> JointTrajectory | None:
-        """The motion as it is sent, slowed to its limits; None where that is not enough, or slower than the
-        requested duration.
+        """The motion as it is sent, slowed to its limits; None where that is not enough, or slower
+        than the requested duration.
         """
         slowed = slowed_to_limits(spline, limits, self.context.scene)
         if slowed is None:

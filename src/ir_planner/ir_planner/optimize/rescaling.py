@@ -8,9 +8,11 @@ from ir_planner.timing import Movement, within_torque
 KEPT = 1e-3  # rad by which a time scaling may leave its path: some millimetres of the tool at most
 
 
-def rescaled(movement: Movement, context: Context, effort: TimingEffort = THOROUGH_TIMING) -> Movement | None:
-    """The certified movement with the best time scaling along a movement's path; None where there is none, or
-    no work left for it. Raises CancelledError when asked to stop.
+def rescaled(
+    movement: Movement, context: Context, effort: TimingEffort = THOROUGH_TIMING
+) -> Movement | None:
+    """The certified movement with the best time scaling along a movement's path; None where there
+    is none, or no work left for it. Raises CancelledError when asked to stop.
     """
 
     def along(limits: MotionLimits) -> Movement | None:
@@ -25,6 +27,8 @@ def rescaled(movement: Movement, context: Context, effort: TimingEffort = THOROU
 
     found = within_torque(along, context)
     if found is not None and found.violation is not None:
-        context.journal.reject(f"a time scaling along the path isn't certified: {found.violation.what}")
+        context.journal.reject(
+            f"a time scaling along the path isn't certified: {found.violation.what}"
+        )
         return None
     return found

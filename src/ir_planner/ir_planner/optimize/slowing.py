@@ -1,4 +1,6 @@
-"""A uniform spline within the limits: the same path and speed profile, as much slower as they ask for."""
+"""A uniform spline within the limits: the same path and speed profile, as much slower as they ask
+for.
+"""
 
 import numpy as np
 
@@ -9,14 +11,18 @@ from ir_planner.timing import lasting_longer
 
 _TORQUE_SAMPLES = 6  # per interval; the proof comes after
 _ROUNDS = 25
-_PLAIN = 3  # rounds as if all of the torque fell with the speed: enough unless weight takes much of it
+_PLAIN = (
+    3  # rounds as if all of the torque fell with the speed: enough unless weight takes much of it
+)
 _CREEPING = 1e-6  # of the speed: weight and dry friction are left of the torque
 _BELOW = 1.0005  # a little slower than asked for, so that few rounds end it
 
 
-def beyond_limits(spline: UniformSpline, limits: MotionLimits, scene: PlanningScene) -> tuple[float, float]:
-    """By what factor a spline exceeds its share of torque (at samples), and by what factor it would have to
-    last longer for its speed, acceleration and jerk.
+def beyond_limits(
+    spline: UniformSpline, limits: MotionLimits, scene: PlanningScene
+) -> tuple[float, float]:
+    """By what factor a spline exceeds its share of torque (at samples), and by what factor it would
+    have to last longer for its speed, acceleration and jerk.
     """
     top = spline.extremes()
     torque = torque_use(scene.dynamics, *spline.samples(_TORQUE_SAMPLES)).max()
@@ -28,11 +34,12 @@ def beyond_limits(spline: UniformSpline, limits: MotionLimits, scene: PlanningSc
 def slowed_to_limits(
     spline: UniformSpline, limits: MotionLimits, scene: PlanningScene
 ) -> UniformSpline | None:
-    """The spline at its own duration or longer, within the limits; torque at samples. None where no duration
-    carries it.
+    """The spline at its own duration or longer, within the limits; torque at samples. None where no
+    duration carries it.
     """
     for k in range(_ROUNDS):
-        top, samples = spline.extremes(), spline.samples(_TORQUE_SAMPLES)
+        top = spline.extremes()
+        samples = spline.samples(_TORQUE_SAMPLES)
         torque = torque_use(scene.dynamics, *samples)
         share = torque.max(axis=0)
         longer = float(lasting_longer(limits, top.velocity, top.acceleration, top.jerk, share))
@@ -50,8 +57,9 @@ def _longer_by_inertia(
     limits: MotionLimits,
     scene: PlanningScene,
 ) -> float:
-    """By what factor a motion should last longer, as weight and dry friction don't fall with its speed; 1
-    where they alone are more than the joints may give. torque: share (N, n) of the samples q, qd, qdd.
+    """By what factor a motion should last longer, as weight and dry friction don't fall with its
+    speed; 1 where they alone are more than the joints may give. torque: share (N, n) of the samples
+    q, qd, qdd.
     """
     q, qd, _ = samples
     still = torque_use(scene.dynamics, q, _CREEPING * qd, np.zeros_like(q))

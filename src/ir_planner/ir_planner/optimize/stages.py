@@ -1,8 +1,10 @@
-"""The stages of a descent: from a coarse spline and a smooth cost to a fine one and the bus as it is.
+"""The stages of a descent: from a coarse spline and a smooth cost to a fine one and the bus as it
+is.
 
-A movement of least energy holds the power of the common bus near zero for long: what one joint gives,
-another takes. There the cost of a joule jumps from nothing to its full price, and a descent on the exact bus
-ends at the kink long before the least energy. So the switch is rounded, less from stage to stage, until the
+A movement of least energy holds the power of the common bus near zero for long: what one joint
+gives, another takes. There the cost of a joule jumps from nothing to its full price, and a descent
+on the exact bus ends at the kink long before the least energy. So the switch is rounded, less from
+stage to stage, until the
 rounding weighs less than NEGLIGIBLE of the cost: movements of few joules take more stages.
 """
 
@@ -14,8 +16,9 @@ NEGLIGIBLE = 5e-3  # share of the cost
 
 @dataclass(frozen=True)
 class Stage:
-    """One descent: halvings of the coarse spline's intervals (level), W over which the switch of the bus is
-    rounded, stiffness of the penalties, evaluations of the cost, and the gain of ten steps that ends it.
+    """One descent: halvings of the coarse spline's intervals (level), W over which the switch of
+    the bus is rounded, stiffness of the penalties, evaluations of the cost, and the gain of ten
+    steps that ends it.
     """
 
     level: int
@@ -47,8 +50,8 @@ class Effort:
 
 
 def decisive(stage: Stage, last: Stage, rounding: float) -> Stage:
-    """The stage itself, or the last one at once where the rounding of the bus, in shares of the cost per W of
-    smoothing, doesn't matter any more.
+    """The stage itself, or the last one at once where the rounding of the bus, in shares of the
+    cost per W of smoothing, doesn't matter any more.
     """
     return replace(last, level=stage.level) if stage.smoothing * rounding < NEGLIGIBLE else stage
 
@@ -70,8 +73,10 @@ THOROUGH = Effort(
         Stage(2, 1.5, 40.0, 60, 5e-5),
     )
 )
-# Where a duration is requested there are joules alone to gain. Movements of few joules need long descents at
-# every stage: one that ended early on a coarse spline ends elsewhere on the fine one, 2 to 8 % above.
+# Where a duration is requested there are joules alone to gain. Movements of few joules need long
+# descents at
+# every stage: one that ended early on a coarse spline ends elsewhere on the fine one, 2 to 8 %
+# above.
 EXACT = Effort(
     (
         *(

@@ -21,12 +21,14 @@ def spline_cost(
     threshold: FloatArray | None = None,
     smoothing: float = 0.0,
 ) -> SplineCost:
-    """Cost of splines by the objective; what exceeds the limits costs `penalty` W for a relative excess of 1.
+    """Cost of splines by the objective; what exceeds the limits costs `penalty` W for a relative
+    excess of 1.
 
-    threshold (R, Z) m: what the pairs must keep; None: path and clearance are given and cost nothing.
-    smoothing [W]: of the bus' switch.
+    threshold (R, Z) m: what the pairs must keep; None: path and clearance are given and cost
+    nothing. smoothing [W]: of the bus' switch.
     """
-    scene, robot = context.scene, context.scene.cell.robot
+    scene = context.scene
+    robot = context.scene.cell.robot
     given = threshold is None
     terms = SplineTerms(
         limits.velocity,

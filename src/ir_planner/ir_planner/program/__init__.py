@@ -1,4 +1,6 @@
-"""Whole programs: configurations at the stations, all movements and pauses between them, power modes."""
+"""Whole programs: configurations at the stations, all movements and pauses between them, power
+modes.
+"""
 
 from ir_planner.program.asked_searches import unknown_searches
 from ir_planner.program.charge import Charge

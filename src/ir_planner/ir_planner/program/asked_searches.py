@@ -11,8 +11,12 @@ from ir_planner.search import not_installed
 from ir_planner.service import EXIT_SEARCHES
 
 
-def unknown_searches(cell: Cell, steps: Sequence[ProgramStep], searches: Searches) -> Iterator[Finding]:
-    """Steps, and stations that they visit, with the name of a search that is not known or not installed."""
+def unknown_searches(
+    cell: Cell, steps: Sequence[ProgramStep], searches: Searches
+) -> Iterator[Finding]:
+    """Steps, and stations that they visit, with the name of a search that is not known or not
+    installed.
+    """
     for k, step in enumerate(steps, start=1):
         yield from _unknown(f"step {k}", step.planner, searches, "planner")
         if step.planner in searches and (how := not_installed(searches[step.planner])):
@@ -20,13 +24,17 @@ def unknown_searches(cell: Cell, steps: Sequence[ProgramStep], searches: Searche
     visited = {step.target for step in steps}
     for station in cell.stations:
         if station.name in visited:
-            yield from _unknown(station.name, station.search.withdrawal, EXIT_SEARCHES, "withdrawal")
+            yield from _unknown(
+                station.name, station.search.withdrawal, EXIT_SEARCHES, "withdrawal"
+            )
 
 
 def check_searches(cell: Cell, steps: Sequence[ProgramStep], searches: Searches) -> None:
     """Raise RequestError for a step or a station that asks for a search nobody has."""
     for finding in unknown_searches(cell, steps, searches):
-        raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, f"{finding.subject}: {finding.sentence}")
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS, f"{finding.subject}: {finding.sentence}"
+        )
 
 
 def _unknown(subject: str, value: str, known: Iterable[str], name: str) -> Iterator[Finding]:

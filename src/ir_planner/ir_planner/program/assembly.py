@@ -1,4 +1,6 @@
-"""The steps of a program as they are sent: movements with what is held, pauses with their power mode."""
+"""The steps of a program as they are sent: movements with what is held, pauses with their power
+mode.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -44,7 +46,9 @@ MakePause = Callable[[Pause], PlannedMovement]
 
 
 class Complete(Protocol):
-    """Adds to a step what is said about its movement in a scene, at a station, after what left `charge`."""
+    """Adds to a step what is said about its movement in a scene, at a station, after what left
+    `charge`.
+    """
 
     def __call__(
         self, step: PlannedMovement, movement: Movement, leg: Leg, station: str, charge: Charge
@@ -53,7 +57,9 @@ class Complete(Protocol):
 
 
 def in_full(reliance: Reliance) -> Complete:
-    """As an answer needs it: everything that is known, and the states of machines that it relies on."""
+    """As an answer needs it: everything that is known, and the states of machines that it relies
+    on.
+    """
 
     def complete(
         step: PlannedMovement, movement: Movement, leg: Leg, station: str, charge: Charge
@@ -92,7 +98,7 @@ def _kind_of(part: Part, route: Route) -> MovementKind:
     return MovementKind.CARTESIAN if along else _KINDS[part.kind]
 
 
-def assembled(  # long: what a step does, in its order
+def assembled(
     steps: tuple[PlacedStep, ...],
     legs: Legs,
     scenes: Scenes,
@@ -101,14 +107,15 @@ def assembled(  # long: what a step does, in its order
     charge: Charge,
     complete: Complete,
 ) -> tuple[PlannedMovement, ...]:
-    """Movements and pauses in order, from start (n,). `legs`: by the step they belong to. pause: how pauses
-    are spent. charge: what the capacitor holds at first; carried from step to step. complete: adds
-    to each movement what is said about it.
+    """Movements and pauses in order, from start (n,). `legs`: by the step they belong to. pause:
+    how pauses are spent. charge: what the capacitor holds at first; carried from step to step.
+    complete: adds to each movement what is said about it.
 
     A step runs in this order: wait for signals, move, attach or detach, set signals, dwell.
     """
     result: list[PlannedMovement] = []
-    here, q = "", start
+    here = ""
+    q = start
     for k, placed in enumerate(steps):
         step = placed.step
         waiting = tuple(signal_text(signal) for signal in step.wait_for)
@@ -121,7 +128,9 @@ def assembled(  # long: what a step does, in its order
         handling = bool(step.attach or step.detach or setting)
         if moves:
             moves[0] = replace(moves[0], wait_for=waiting)
-            moves[-1] = replace(moves[-1], attach=step.attach, detach=step.detach, set_signals=setting)
+            moves[-1] = replace(
+                moves[-1], attach=step.attach, detach=step.detach, set_signals=setting
+            )
         result.extend(moves)
         if step.dwell > 0.0 or (not moves and (handling or waiting)):
             late = not moves

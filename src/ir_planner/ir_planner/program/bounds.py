@@ -1,9 +1,10 @@
 """What a movement costs at least, whatever its path: proved from limits, friction and weight.
 
-Every joint covers at least the straight distance. That takes at least the time of a bang-bang law within its
-speed and acceleration, and does at least the work of Coulomb friction over the distance and of viscous
-friction at an even speed. The potential energy (weight less counterbalance) changes by what the ends say.
-Losses in the motors and what the brake resistor takes are not counted, so the bound is below the true cost.
+Every joint covers at least the straight distance. That takes at least the time of a bang-bang law
+within its speed and acceleration, and does at least the work of Coulomb friction over the distance
+and of viscous friction at an even speed. The potential energy (weight less counterbalance) changes
+by what the ends say. Losses in the motors and what the brake resistor takes are not counted, so the
+bound is below the true cost.
 """
 
 from dataclasses import dataclass
@@ -13,7 +14,8 @@ import numpy as np
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.scene import MotionLimits, PlanningScene
 
-_PLACES = 64  # of the line over which static torque is integrated: smooth over a few rad, error below 0.01 J
+# of the line over which static torque is integrated: smooth over a few rad, error below 0.01 J
+_PLACES = 64
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,9 @@ class Rates:
 
 
 def potential_energy(q: FloatArray, scene: PlanningScene) -> FloatArray:
-    """Weight's potential less the counterbalance's (K,) [J] at q (K, n), relative to all joints at 0."""
+    """Weight's potential less the counterbalance's (K,) [J] at q (K, n), relative to all joints at
+    0.
+    """
     share = (np.arange(_PLACES) + 0.5) / _PLACES
     places = (q[:, None, :] * share[None, :, None]).reshape(-1, q.shape[1])
     still = np.zeros_like(places)
@@ -34,8 +38,11 @@ def potential_energy(q: FloatArray, scene: PlanningScene) -> FloatArray:
 
 
 def least_seconds(distance: FloatArray, limits: MotionLimits) -> FloatArray:
-    """Fewest seconds (...) from rest to rest over distances (..., n) rad within speed and acceleration."""
-    speed, acceleration = limits.velocity, limits.acceleration
+    """Fewest seconds (...) from rest to rest over distances (..., n) rad within speed and
+    acceleration.
+    """
+    speed = limits.velocity
+    acceleration = limits.acceleration
     ramps = 2.0 * np.sqrt(distance / acceleration)
     cruise = distance / speed + speed / acceleration
     return np.asarray(np.where(distance >= speed**2 / acceleration, cruise, ramps).max(axis=-1))
@@ -46,10 +53,13 @@ def least_cost(
 ) -> FloatArray:
     """Lower bounds (A, B) of movements from rest at `first` (A, n) to rest at `second` (B, n)."""
     distance = np.abs(second[None] - first[:, None])
-    robot, seconds = scene.cell.robot, least_seconds(distance, limits)
+    robot = scene.cell.robot
+    seconds = least_seconds(distance, limits)
     rise = potential_energy(second, scene)[None] - potential_energy(first, scene)[:, None]
     work = rise + distance @ robot.friction_coulomb
-    viscous = (distance**2) @ robot.friction_viscous  # J s: joules at an even speed, times the duration
+    viscous = (
+        distance**2
+    ) @ robot.friction_viscous  # J s: joules at an even speed, times the duration
     with np.errstate(divide="ignore", invalid="ignore"):
         best = np.sqrt(rates.joule * viscous / rates.second) if rates.second > 0.0 else np.inf
         if scene.dc_bus.regeneration != "fed_back":  # energy from the mains is never negative

@@ -1,5 +1,5 @@
-"""One configuration for every stop of a route: layers of those that can be entered and left, and the
-cheapest chain through them.
+"""One configuration for every stop of a route: layers of those that can be entered and left, and
+the cheapest chain through them.
 """
 
 from collections.abc import Mapping
@@ -22,10 +22,13 @@ from ir_planner.service import ExitSearch, ServiceLine
 # with the default work for better answers, and in proportion with more of it
 _DEFAULT_WORK = 8_000
 TOLERANCE = 2e-3  # of the cost: a cheaper chain than that isn't looked for
-# movements that may be planned once there is a chain: so many besides, and for each stop; small programs with
-# many chains need more per stop than large ones have time for
-_PLANNED, _PLANNED_PER_STOP = 24, 8
-_LATE_PER_STOP, _LATE = 8, 100  # once time or work have ended: movements planned, and chains looked at
+# movements that may be planned once there is a chain: so many besides, and for each stop; small
+# programs with many chains need more per stop than large ones have time for
+_PLANNED = 24
+_PLANNED_PER_STOP = 8
+# once time or work have ended: movements planned, and chains looked at
+_LATE_PER_STOP = 8
+_LATE = 100
 _PLANNED_PER_STOP_BY_W = 32  # the same by W, whose bound says little where segments are not free
 
 
@@ -37,14 +40,16 @@ def layers_of(
     progress: Progress,
     interaction: InteractionSettings = INTERACTION,
 ) -> list[list[Node]]:
-    """Nodes of the start (n,) and of every stop; searches: for paths out of stations; interaction: for their
-    configurations, where a station asks for that. Raises StageError for a stop that has none.
+    """Nodes of the start (n,) and of every stop; searches: for paths out of stations; interaction:
+    for their configurations, where a station asks for that. Raises StageError for a stop that has
+    none.
     """
     layers = [[Node(ServiceLine(start[None]))]]
     with context.journal.stage("configurations") as notes:
         for place in range(len(route)):
             progress("configurations", place, len(route), 0.0)
-            step, arriving = route.at(place).step, context.inside(route.arriving(place))
+            step = route.at(place).step
+            arriving = context.inside(route.arriving(place))
             if step.kind == "POSTURE":
                 found, status = posture_nodes(step.target, arriving)
             elif step.kind == "PATH":
@@ -65,14 +70,17 @@ def cheapest_chain(movements: Movements, improvement: int, progress: Progress) -
 
     Raises StageError where none connects the stops.
     """
-    context, count = movements.context, len(movements.route)
+    context = movements.context
+    count = len(movements.route)
     if not count:
         return Chain([0], 0.0, 0.0, 0.0)
     travel = context.options.objective == "movement_cost"
     edges = (TravelEdges if travel else CostEdges)(movements, improvement)
 
     effort = max(context.work.improvement / _DEFAULT_WORK, 1.0)
-    most = count * (3 + effort * (_PLANNED_PER_STOP_BY_W if travel else _PLANNED_PER_STOP)) + _PLANNED
+    most = (
+        count * (3 + effort * (_PLANNED_PER_STOP_BY_W if travel else _PLANNED_PER_STOP)) + _PLANNED
+    )
 
     late: list[int] = []  # how many movements were planned when time or work had ended
 
@@ -82,7 +90,9 @@ def cheapest_chain(movements: Movements, improvement: int, progress: Progress) -
     def must_end() -> bool:
         if context.work.exhausted:
             late.append(movements.planned)
-        return bool(late) and (movements.planned - late[0] > count * _LATE_PER_STOP or len(late) > _LATE)
+        return bool(late) and (
+            movements.planned - late[0] > count * _LATE_PER_STOP or len(late) > _LATE
+        )
 
     with context.journal.stage("station graph") as notes:
         graph = StationGraph(edges.hops(), edges.settle, TOLERANCE / effort, may_go_on, must_end)
@@ -90,7 +100,11 @@ def cheapest_chain(movements: Movements, improvement: int, progress: Progress) -
         unit = "W" if travel else "cost"
         notes.append(
             f"{unit} {chain.cost:.0f}, at most {100 * chain.gap:.2f} % above the best chain"
-            + ("" if travel else f" (measured bounds; {100 * chain.proved_gap:.1f} % by proved ones)")
+            + (
+                ""
+                if travel
+                else f" (measured bounds; {100 * chain.proved_gap:.1f} % by proved ones)"
+            )
             + f"; {movements.planned} movements planned"
         )
     if not np.isfinite(chain.cost):
@@ -102,8 +116,10 @@ def parts_of(chain: Chain, movements: Movements) -> list[list[Part]]:
     """The parts of every hop along a chain that move."""
     result = []
     for hop in range(len(movements.route)):
-        first, second = chain.chosen[hop], chain.chosen[hop + 1]
-        a, b = movements.layers[hop][first], movements.layers[hop + 1][second]
+        first = chain.chosen[hop]
+        second = chain.chosen[hop + 1]
+        a = movements.layers[hop][first]
+        b = movements.layers[hop + 1][second]
         parts = [
             (Part(hop, LEAVE, first, -1), a.leaves),
             (Part(hop, ACROSS, first, second), not _same(a.departure, b.arrival)),

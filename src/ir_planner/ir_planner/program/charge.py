@@ -1,7 +1,7 @@
 """The charge of the DC link's capacitor, carried from step to step of a program.
 
-A movement leaves what its braking gave, the next one takes it first. While the motors hold the arm the charge
-feeds the holding torque; with the brakes closed it stays.
+A movement leaves what its braking gave, the next one takes it first. While the motors hold the arm
+the charge feeds the holding torque; with the brakes closed it stays.
 """
 
 from dataclasses import replace
@@ -18,18 +18,24 @@ class Charge:
     """stored [J] after the steps so far; empty at first."""
 
     def __init__(self, times: TransitionTimes) -> None:
-        self.stored, self._times = 0.0, times
+        self.stored = 0.0
+        self._times = times
 
-    def moved(self, step: PlannedMovement, alone: MovementEnergy, scene: PlanningScene) -> PlannedMovement:
-        """The step of a movement with the energy that it takes from the mains now; alone: what it takes with
-        an empty capacitor.
+    def moved(
+        self, step: PlannedMovement, alone: MovementEnergy, scene: PlanningScene
+    ) -> PlannedMovement:
+        """The step of a movement with the energy that it takes from the mains now; alone: what it
+        takes with an empty capacitor.
         """
         assert step.trajectory is not None  # it moves
-        charge, energy = self.stored, self.taken(alone, scene)
+        charge = self.stored
+        energy = self.taken(alone, scene)
         report = step.report
         if energy is not alone:
             peak = peak_power(step.trajectory, scene, charge)
-            report = replace(report, energy=energy.total, burnt_energy=energy.dissipated, peak_power=peak)
+            report = replace(
+                report, energy=energy.total, burnt_energy=energy.dissipated, peak_power=peak
+            )
         return replace(step, report=report)
 
     def taken(self, alone: MovementEnergy, scene: PlanningScene) -> MovementEnergy:
@@ -49,10 +55,11 @@ class Charge:
         return replace(step, report=replace(report, energy=energy, base_energy=energy))
 
     def _holding(self, step: PlannedMovement, pause: Pause) -> float:
-        """How long the motors hold the arm [s]; the controller's own timer closes the brakes long after the
-        charge has gone.
+        """How long the motors hold the arm [s]; the controller's own timer closes the brakes long
+        after the charge has gone.
         """
-        modes, times = modes_of(step.power_mode), self._times
+        modes = modes_of(step.power_mode)
+        times = self._times
         if not modes:
             return pause.seconds
         return min(times.enter(modes[0].name) + times.leave(modes[-1].name), pause.seconds)

@@ -1,11 +1,20 @@
-"""The chain that a request chose, its steps with given movements, and the wait that fills a cycle."""
+"""The chain that a request chose, its steps with given movements, and the wait that fills a
+cycle.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 from ir_msgs_py.report import PlannedMovement
-from ir_planner.program.assembly import Complete, MakePause, assembled, energies_only, in_full, legs_of
+from ir_planner.program.assembly import (
+    Complete,
+    MakePause,
+    assembled,
+    energies_only,
+    in_full,
+    legs_of,
+)
 from ir_planner.program.chain import parts_of
 from ir_planner.program.charge import Charge
 from ir_planner.program.ladder import Ladder
@@ -49,12 +58,15 @@ class Choice:
 
     def found(self, progress: Progress) -> dict[Part, Movement]:
         """The movements of all parts. Raises StageError where one of them isn't found."""
-        movements, result = self.movements, dict[Part, Movement]()
+        movements = self.movements
+        result = dict[Part, Movement]()
         journal = movements.context.journal
         with journal.stage("movements") as notes:
             for hop, parts in enumerate(parts_of(self.chain, movements)):
                 progress("movements", hop, len(movements.route), self.chain.cost)
-                for part, found in zip(parts, movements.plan(parts, self.ladder.improvement), strict=True):
+                for part, found in zip(
+                    parts, movements.plan(parts, self.ladder.improvement), strict=True
+                ):
                     if isinstance(found, Failure):
                         raise StageError(found.status)
                     result[part] = found
@@ -64,20 +76,25 @@ class Choice:
         return result
 
     def steps(self, found: Found, *, until: float = 0.0, by_itself: bool = False) -> Steps:
-        """The steps of the program with these movements, and a wait at its end that lasts until `until` s.
+        """The steps of the program with these movements, and a wait at its end that lasts until
+        `until` s.
         by_itself: pauses as the controller spends them when nobody asks for a mode.
         """
         return self._steps(found, until, self._pause(by_itself), in_full(self._reliance))
 
     def energies(self, found: Found, *, until: float = 0.0) -> Steps:
-        """The same steps with what they last and cost alone, in a fraction of the time: to compare."""
+        """The same steps with what they last and cost alone, in a fraction of the time: to
+        compare.
+        """
         return self._steps(found, until, self._pause(by_itself=False), energies_only)
 
     def _steps(self, found: Found, until: float, pause: MakePause, complete: Complete) -> Steps:
         route = self.movements.route
         charge = Charge(self.request.settings.transitions)
         legs = legs_of(route, parts_of(self.chain, self.movements), found)
-        steps = assembled(route.steps, legs, route.scenes, self.request.start, pause, charge, complete)
+        steps = assembled(
+            route.steps, legs, route.scenes, self.request.start, pause, charge, complete
+        )
         left = until - duration_of(steps)
         if left <= _NO_WAIT:
             return steps

@@ -1,9 +1,12 @@
-"""What a movement would cost if nothing were in its path: a coarse solution that never meets a body.
+"""What a movement would cost if nothing were in its path: a coarse solution that never meets a
+body.
 
-The descent is that of movements, on a spline with fewer points, without clearance. A movement that keeps
-clear of everything has one constraint more, so it costs as much or more, but for two things: the descent may
-end in a poorer local minimum than the planner's, and a coarse spline bends less. MARGIN is for both;
-benchmarks/program.py judges it by what chosen chains cost above the best of all chains.
+The descent is that of movements, on a spline with fewer points, without clearance. A movement that
+keeps
+clear of everything has one constraint more, so it costs as much or more, but for two things: the
+descent may end in a poorer local minimum than the planner's, and a coarse spline bends less. MARGIN
+is for both; benchmarks/program.py judges it by what chosen chains cost above the best of all
+chains.
 """
 
 import numpy as np
@@ -17,7 +20,9 @@ from ir_planner.timing import objective_weights
 
 MARGIN = 0.04  # share of a coarse cost by which the planner's movement may be cheaper
 _SPACING = 0.1  # s between the knots of the coarse spline
-_FEWEST, _MOST = 12, 64  # its control points
+# its control points
+_FEWEST = 12
+_MOST = 64
 _SLOWER = 1.3  # than the straight segment at full speed: where the descent starts
 _STIFFNESS = 4.0  # of penalties, against the objective's power: limits may be exceeded a little
 _EVALUATIONS = (80, 60)  # on the coarse spline, and on one with a knot more in every interval
@@ -27,9 +32,12 @@ class CoarseCost:
     """Costs of movements in one scene, whatever stands there."""
 
     def __init__(self, context: Context, rates: Rates) -> None:
-        self.context, self.rates = context, rates
-        scene, limits = context.scene, context.limits
-        robot, nobody = scene.cell.robot, np.full((1, len(scene.collision.pairs)), -np.inf)
+        self.context = context
+        self.rates = rates
+        scene = context.scene
+        limits = context.limits
+        robot = scene.cell.robot
+        nobody = np.full((1, len(scene.collision.pairs)), -np.inf)
         ends = np.zeros((2, robot.n))
         self.weights = weights = objective_weights(context, ends)
         terms = SplineTerms(
@@ -52,7 +60,8 @@ class CoarseCost:
 
     def between(self, first: FloatArray, second: FloatArray) -> float:
         """Cost of the coarse movement from rest at first (n,) to rest at second (n,)."""
-        ends, limits = np.stack([first, second]), self.context.limits
+        ends = np.stack([first, second])
+        limits = self.context.limits
         least = fewest_seconds(ends, limits.velocity, limits.acceleration)
         count = int(np.clip(np.ceil(least / _SPACING), _FEWEST, _MOST))
         spline = along_path(ends, count, _SLOWER * least)

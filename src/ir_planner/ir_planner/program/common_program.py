@@ -1,9 +1,11 @@
-"""The common program: what a commissioned robot would do at the same stations, to hold savings against.
+"""The common program: what a commissioned robot would do at the same stations, to hold savings
+against.
 
-Baseline movements (straight joint segments as synchronous S-curves at full speed) through the same stations,
-at each stop the configuration that is nearest to the one before by W, turns included; the same service lines,
-as fast as they can; the same pauses, left to the controller's own timers. Where a segment is not free, the
-movement runs along the planner's path in straight steps with blended corners; `around` counts these.
+Baseline movements (straight joint segments as synchronous S-curves at full speed) through the same
+stations, at each stop the configuration that is nearest to the one before by W, turns included; the
+same service lines, as fast as they can; the same pauses, left to the controller's own timers. Where
+a segment is not free, the movement runs along the planner's path in straight steps with blended
+corners; `around` counts these.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -28,8 +30,8 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True, eq=False)
 class CommonProgram:
-    """Its chain with the movements of all parts; `around` of its `across` regional movements run around
-    bodies.
+    """Its chain with the movements of all parts; `around` of its `across` regional movements run
+    around bodies.
     """
 
     choice: Choice
@@ -47,17 +49,21 @@ class CommonProgram:
 
 
 def common_program(choice: Choice) -> CommonProgram:
-    """The common program of a request, which moves as fast as it can; it needs the request's layers only.
+    """The common program of a request, which moves as fast as it can; it needs the request's layers
+    only.
 
     Raises StageError where it has a movement that isn't found.
     """
-    fastest, improvement = choice.ladder.at(FASTEST), choice.ladder.improvement
+    fastest = choice.ladder.at(FASTEST)
+    improvement = choice.ladder.improvement
     nearest = choice.along(nearest_chain(fastest))
     parts = nearest.parts
     across = [part for part in parts if part.kind == ACROSS]
     lines = [part for part in parts if part.kind != ACROSS]
     chosen = dict(zip(lines, _all_found(lines, fastest, improvement), strict=True))
-    plain = dict(zip(across, _side_by_side(lambda part: _plain(part, fastest), across, fastest), strict=True))
+    plain = dict(
+        zip(across, _side_by_side(lambda part: _plain(part, fastest), across, fastest), strict=True)
+    )
     around = [part for part, movement in plain.items() if movement is None]
     chosen |= {part: movement for part, movement in plain.items() if movement is not None}
     own = Movements(fastest.route, fastest.layers, fastest.context, fastest.searches)
@@ -68,7 +74,8 @@ def common_program(choice: Choice) -> CommonProgram:
 
 def nearest_chain(movements: Movements) -> Chain:
     """At each stop the configuration nearest to the one before by W."""
-    chosen, total = [0], 0.0
+    chosen = [0]
+    total = 0.0
     for hop in range(len(movements.route)):
         weights = movements.route.arriving(hop).weights
         here = movements.layers[hop][chosen[-1]].departure

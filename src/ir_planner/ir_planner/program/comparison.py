@@ -1,7 +1,7 @@
 """A program held against the common program, over the same seconds.
 
-Without a cycle time, and within one that the common program can't keep, the planner's program is planned for
-the time that the common program takes. In a longer cycle both wait at their ends.
+Without a cycle time, and within one that the common program can't keep, the planner's program is
+planned for the time that the common program takes. In a longer cycle both wait at their ends.
 """
 
 from dataclasses import dataclass
@@ -29,10 +29,15 @@ class Comparison:
 
 
 def held_against_common(
-    choice: Choice, own: Steps, cycle_time: float, standing: float, spreads: Spreads, progress: Progress
+    choice: Choice,
+    own: Steps,
+    cycle_time: float,
+    standing: float,
+    spreads: Spreads,
+    progress: Progress,
 ) -> Comparison | str:
-    """The comparison of a program; own: its steps in a cycle time (0: free), of which `standing` s are
-    pauses. Where there is none, the sentence why.
+    """The comparison of a program; own: its steps in a cycle time (0: free), of which `standing` s
+    are pauses. Where there is none, the sentence why.
     """
     progress("savings", 0, 1, choice.chain.cost)
     context = choice.movements.context
@@ -48,7 +53,10 @@ def held_against_common(
                 waiting = common.steps(until=cycle_time)
                 words = f"both in the cycle time of {cycle_time:g} s"
                 if len(waiting) > len(plain):
-                    words += f", of which the common program waits {waiting[-1].duration:.2f} s at its end"
+                    words += (
+                        f", of which the common program waits {waiting[-1].duration:.2f} s "
+                        "at its end"
+                    )
                 savings = savings_of(waiting, own, _pauses(plain), common, spreads.of)
                 return Comparison(savings, own, words, waiting)
             if context.work.exhausted:
@@ -60,7 +68,9 @@ def held_against_common(
             return f"no savings: {error}"
         words = f"both in the common program's {seconds:.2f} s"
         words += f", which can't keep {cycle_time:g} s" if cycle_time > 0.0 else ""
-        return Comparison(savings_of(plain, steps, _pauses(plain), common, spreads.of), steps, words, plain)
+        return Comparison(
+            savings_of(plain, steps, _pauses(plain), common, spreads.of), steps, words, plain
+        )
 
 
 def _pauses(steps: Steps) -> int:

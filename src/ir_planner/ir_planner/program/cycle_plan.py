@@ -1,4 +1,6 @@
-"""Which chain of configurations and which movements fill a cycle time with the least energy at the mains."""
+"""Which chain of configurations and which movements fill a cycle time with the least energy at the
+mains.
+"""
 
 from dataclasses import dataclass
 
@@ -19,20 +21,22 @@ from ir_planner.request import DURATION_MAX
 from ir_planner.timing import Movement
 
 _ROUNDING = 1e-6  # s: durations are whole nanoseconds, stretched by millionths
-_SAME_CHAIN = 1  # rungs from the request's own value, over which its chain is taken to stay the best
+_SAME_CHAIN = (
+    1  # rungs from the request's own value, over which its chain is taken to stay the best
+)
 
 
 _CUT = "no program of {:g} s found"
 _LITTLE = (
-    "no program of {:g} s found, the shortest is {:.3f} s; max_iterations ended before all was tried: "
-    "more of it may help"
+    "no program of {:g} s found, the shortest is {:.3f} s; max_iterations ended before all was "
+    "tried: more of it may help"
 )
 
 
 @dataclass(frozen=True, eq=False)
 class TimedChoice:
-    """A chain with movements that fill a cycle; bound: the least that movements and wait can take from the
-    mains [J].
+    """A chain with movements that fill a cycle; bound: the least that movements and wait can take
+    from the mains [J].
     """
 
     choice: Choice
@@ -49,7 +53,8 @@ class TimedChoice:
     def energy(self) -> float:
         """Joules of all steps at the mains, carried charge included."""
         return sum(
-            step.report.energy for step in self.choice.energies(self.timed.movements, until=self._until)
+            step.report.energy
+            for step in self.choice.energies(self.timed.movements, until=self._until)
         )
 
     @property
@@ -57,21 +62,26 @@ class TimedChoice:
         return self.cycle_time if self.timed.wait > 0.0 else 0.0
 
 
-def timed_choice(choice: Choice, cycle_time: float, standing: float, progress: Progress) -> TimedChoice:
-    """The cheapest movements for a cycle [s] of which `standing` s are pauses. Candidates are the given
-    chain, and the one that is cheapest at the value that a second has in the cycle.
+def timed_choice(  # noqa: C901
+    choice: Choice, cycle_time: float, standing: float, progress: Progress
+) -> TimedChoice:
+    """The cheapest movements for a cycle [s] of which `standing` s are pauses. Candidates are the
+    given chain, and the one that is cheapest at the value that a second has in the cycle.
 
-    Raises RequestError where the cycle is shorter than the fastest movements, StageError where more work
-    could find faster ones.
+    Raises RequestError where the cycle is shorter than the fastest movements, StageError where more
+    work could find faster ones.
     """
     seconds = cycle_time - standing + _ROUNDING
     first = _tried(choice, seconds, standing, None)
-    rates, rung = rates_of(choice.movements.context), first.rung
+    rates = rates_of(choice.movements.context)
+    rung = first.rung
     bound = 0.0
     if rates.joule and choice.movements.context.options.objective != "movement_cost":
         bound = first.bound(choice.chain, rates.second, seconds)
     if first.timed is not None and rung == FASTEST:
-        rung = FASTEST - 1  # the chain that is fastest of all is not needed, and says nothing of joules
+        rung = (
+            FASTEST - 1
+        )  # the chain that is fastest of all is not needed, and says nothing of joules
     other = None
     if abs(rung - choice.ladder.first) > _SAME_CHAIN:
         other = _cheapest_at(rung, choice, progress)
@@ -85,7 +95,8 @@ def timed_choice(choice: Choice, cycle_time: float, standing: float, progress: P
     if best.timed is None:
         best = _fastest(best, seconds, standing, progress)
     if best.timed is None:
-        work, shortest = choice.movements.context.work, best.values.shortest
+        work = choice.movements.context.work
+        shortest = best.values.shortest
         if work.exhausted:
             raise StageError(Status(StatusCode.PLANNING_FAILED, _CUT.format(cycle_time)))
         if work.left < work.improvement:  # the last movements had less than they can use
@@ -101,7 +112,9 @@ def timed_choice(choice: Choice, cycle_time: float, standing: float, progress: P
 
 @dataclass(frozen=True, eq=False)
 class _Tried:
-    """A chain in a cycle: its movements by value, the rung that it needs, its program (None: too slow)."""
+    """A chain in a cycle: its movements by value, the rung that it needs, its program (None: too
+    slow).
+    """
 
     choice: Choice
     values: TimeValues
@@ -114,8 +127,8 @@ class _Tried:
         return np.inf if self.timed is None else self.timed.energy
 
     def bound(self, chain: Chain, value: float, seconds: float) -> float:
-        """Least energy [J] in a cycle, by the bound of the cheapest chain at a value; movements of other
-        values that are cheaper at this one show that the bound is too high.
+        """Least energy [J] in a cycle, by the bound of the cheapest chain at a value; movements of
+        other values that are cheaper at this one show that the bound is too high.
         """
         return cycle_bound(self.choice, min(chain.bound, self.values.least(value)), value, seconds)
 
@@ -130,9 +143,9 @@ def _tried(choice: Choice, seconds: float, standing: float, rung: int | None) ->
 
 
 def _fastest(best: _Tried, seconds: float, standing: float, progress: Progress) -> _Tried:
-    """The chain that is fastest of all, where that is faster than the best so far, which is too slow; once
-    work has ended, the one of straight segments. At high values of a second some movements are faster than
-    those for time alone, which are all that a request for time has tried.
+    """The chain that is fastest of all, where that is faster than the best so far, which is too
+    slow; once work has ended, the one of straight segments. At high values of a second some
+    movements are faster than those for time alone, which are all that a request for time has tried.
     """
     own = best.choice
     again = [own] if own.ladder.first == FASTEST else []
@@ -153,7 +166,9 @@ def _cheapest_at(rung: int, choice: Choice, progress: Progress) -> Choice | None
 
 
 def task_of(choice: Choice, seconds: float, standing: float) -> Task:
-    """What is to be shared out over a chain's movements and the wait; standing [s]: of pauses besides."""
+    """What is to be shared out over a chain's movements and the wait; standing [s]: of pauses
+    besides.
+    """
 
     def spent(timed: Timed) -> float:
         return TimedChoice(choice, timed, seconds + standing).energy
@@ -162,8 +177,8 @@ def task_of(choice: Choice, seconds: float, standing: float) -> Task:
 
 
 def _slower(movement: Movement, duration: float) -> Movement | None:
-    """The same movement in `duration` s, verified again; None where it isn't certified, lasts too long, or
-    keeps a tool's speed.
+    """The same movement in `duration` s, verified again; None where it isn't certified, lasts too
+    long, or keeps a tool's speed.
     """
     if duration > DURATION_MAX or movement.fixed_time:
         return None

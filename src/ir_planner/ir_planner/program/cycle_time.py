@@ -1,10 +1,10 @@
 """A program within a cycle time: the seconds there are go where they save most joules.
 
-The movements of the chain are known at several values of a second (time_values). From the fastest of all,
-parts are slowed down in the order of joules saved per second; a step that takes more than the time left is
-passed over. Every stage of that is a program that ends early and waits, in the mode of least energy for the
-wait's length; the cheapest of them is the answer. What is left of the time is given to the next part in turn
-where that is cheaper than waiting.
+The movements of the chain are known at several values of a second (time_values). From the fastest
+of all, parts are slowed down in the order of joules saved per second; a step that takes more than
+the time left is passed over. Every stage of that is a program that ends early and waits, in the
+mode of least energy for the wait's length; the cheapest of them is the answer. What is left of the
+time is given to the next part in turn where that is cheaper than waiting.
 """
 
 from collections.abc import Callable
@@ -15,7 +15,9 @@ from ir_planner.program.time_values import Point, SlowDown, TimeValues, slow_dow
 from ir_planner.timing import Movement
 
 _NEAREST = 8  # programs that are cheapest without carried charge: with it one of them is
-SHORTEST_WAIT = 0.05  # s: less is given to a movement, so that a program doesn't end with a twitch of a pause
+SHORTEST_WAIT = (
+    0.05  # s: less is given to a movement, so that a program doesn't end with a twitch of a pause
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +31,9 @@ class Timed:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """seconds: for movements and the wait. waiting(seconds): joules of the wait. slower(movement, seconds):
-    the same in more seconds, None where that isn't certified. spent: joules of a whole program, with carried
-    charge.
+    """seconds: for movements and the wait. waiting(seconds): joules of the wait. slower(movement,
+    seconds): the same in more seconds, None where that isn't certified. spent: joules of a whole
+    program, with carried charge.
     """
 
     seconds: float
@@ -65,19 +67,27 @@ def shared_out(values: TimeValues, task: Task) -> Timed | None:
 
 
 def _to_slow(point: Point) -> tuple[bool, float]:
-    """The last to be slowed down is the longest movement, but none along a path at a tool's speed."""
+    """The last to be slowed down is the longest movement, but none along a path at a tool's
+    speed.
+    """
     return not point.movement.fixed_time, point.seconds
 
 
-def _filled(chosen: dict[Part, Point], left: float, open_steps: list[SlowDown], task: Task) -> list[Timed]:
-    """Programs of these points: one that waits at the end, and one in which a part takes the time left."""
+def _filled(
+    chosen: dict[Part, Point], left: float, open_steps: list[SlowDown], task: Task
+) -> list[Timed]:
+    """Programs of these points: one that waits at the end, and one in which a part takes the time
+    left.
+    """
     movements = {part: point.movement for part, point in chosen.items()}
     energy = sum(movement.energy.total for movement in movements.values())
     found = [Timed(movements, left, energy + task.waiting(left))] if left >= SHORTEST_WAIT else []
     last = bool(open_steps) and left <= open_steps[0].seconds
     if not (last or not open_steps or left < SHORTEST_WAIT):
         return found  # a whole step fits: that program comes next
-    part = open_steps[0].part if open_steps else max(chosen, key=lambda part: _to_slow(chosen[part]))
+    part = (
+        open_steps[0].part if open_steps else max(chosen, key=lambda part: _to_slow(chosen[part]))
+    )
     before = movements[part]
     after = task.slower(before, before.trajectory.duration + left)
     if after is not None:

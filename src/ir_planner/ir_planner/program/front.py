@@ -1,7 +1,7 @@
 """A program's energy at the mains over its cycle time: every point a certified program.
 
-All points go along the chain of the free plan, which is not the cheapest for every cycle time; a request with
-a point's cycle time looks for a better one as well.
+All points go along the chain of the free plan, which is not the cheapest for every cycle time; a
+request with a point's cycle time looks for a better one as well.
 """
 
 import numpy as np
@@ -16,13 +16,14 @@ _FULLEST = 1.001  # of the movements' shortest time: durations are rounded to na
 
 
 def front_of(choice: Choice, count: int, standing: float, progress: Progress) -> list[TimedChoice]:
-    """`count` programs from the shortest cycle time to twice the free one, shortest first; standing: seconds
-    of the pauses in the program.
+    """`count` programs from the shortest cycle time to twice the free one, shortest first;
+    standing: seconds of the pauses in the program.
 
-    Energy falls to the cheapest cycle time and rises from there, by what a second of waiting costs. There is
-    none where time or work have ended.
+    Energy falls to the cheapest cycle time and rises from there, by what a second of waiting costs.
+    There is none where time or work have ended.
     """
-    work, values = choice.movements.context.work, TimeValues(choice.ladder, choice.parts)
+    work = choice.movements.context.work
+    values = TimeValues(choice.ladder, choice.parts)
     if work.exhausted:
         return []
     values.bracket(0.0)

@@ -1,9 +1,10 @@
-"""The movements of a program at many values of a second: a fixed ladder of them, so that requests that differ
-in their cycle time choose among the same movements.
+"""The movements of a program at many values of a second: a fixed ladder of them, so that requests
+that differ in their cycle time choose among the same movements.
 
-Movements are searched at the request's own value, at one in the middle of the ladder and for time alone; at
-the rungs beside these they are optimised again from the best of the movements there. Along service lines,
-which hardly change with the value, they are those of the searched rungs, slowed down.
+Movements are searched at the request's own value, at one in the middle of the ladder and for time
+alone; at the rungs beside these they are optimised again from the best of the movements there.
+Along service lines, which hardly change with the value, they are those of the searched rungs,
+slowed down.
 """
 
 from collections.abc import Mapping
@@ -18,9 +19,11 @@ from ir_planner.request import Context
 from ir_planner.timing import Movement
 
 _LEAST = 250.0  # W: a second less of moving and more of waiting on brakes saves more than that
-_STEP = 2.0**0.5  # between two rungs: a mixture of neighbours is within about a percent of the rung between
-# up to 181 kW: from 22 kW on movements are within a percent of the fastest, but a cycle just above the
-# shortest lies there, and the last of that percent costs more than anything before
+_STEP = (
+    2.0**0.5
+)  # between two rungs: a mixture of neighbours is within about a percent of the rung between
+# up to 181 kW: from 22 kW on movements are within a percent of the fastest, but a cycle just above
+# the shortest lies there, and the last of that percent costs more than anything before
 _RUNGS = 20
 LADDER = tuple(_LEAST * _STEP**k for k in range(_RUNGS))
 FASTEST = _RUNGS  # the rung on which time alone counts
@@ -44,7 +47,8 @@ class Ladder:
     """Movements by rung; own: those of the request. improvement: work of each movement."""
 
     def __init__(self, own: Movements, improvement: int) -> None:
-        self.own, self.improvement = own, improvement
+        self.own = own
+        self.improvement = improvement
         self._rungs: dict[tuple[int, int], Movements] = {}
         rates = rates_of(own.context)
         value = rates.second / rates.joule if rates.joule else np.inf
@@ -91,20 +95,24 @@ class Ladder:
         return rates_of(self._context(rung))
 
     def from_others(self, rung: int, known: Mapping[Part, Movement]) -> dict[Part, Movement]:
-        """Movements across at a rung, by descent from given ones; those of the parts for which one is found.
-        None where movements are not found by descent.
+        """Movements across at a rung, by descent from given ones; those of the parts for which one
+        is found. None where movements are not found by descent.
         """
         own = self.own
-        again = Movements(own.route, own.layers, self._context(rung), own.searches, Near((Kept(known),)))
+        again = Movements(
+            own.route, own.layers, self._context(rung), own.searches, Near((Kept(known),))
+        )
         if not again.descends:
             return {}
         planned = zip(known, again.plan(list(known), self.improvement), strict=True)
         return {part: found for part, found in planned if not isinstance(found, Failure)}
 
     def _searched(self, rung: int) -> tuple[Movements, ...]:
-        """Searched movements, of the nearest value first, from which those of a rung are optimised; none
-        where these are searched. They are the same for every cycle time, so that a longer one knows what a
-        shorter one does: the local minimum of one value may be better at another than that one's own.
+        """Searched movements, of the nearest value first, from which those of a rung are optimised;
+        none where these are searched. They are the same for every cycle time, so that a longer one
+        knows what a
+        shorter one does: the local minimum of one value may be better at another than that one's
+        own.
         """
         places: dict[float, Movements | None] = {FASTEST: None}
         if abs(_MIDDLE - self._place) >= _REACH:
@@ -117,7 +125,9 @@ class Ladder:
         return tuple(places[place] or self.at(int(place)) for place in searched)
 
     def _lines(self, rung: int) -> tuple[Movements, ...]:
-        """Movements along service lines that are slowed down at a rung; none where they are searched."""
+        """Movements along service lines that are slowed down at a rung; none where they are
+        searched.
+        """
         if rung in (_MIDDLE, FASTEST):
             return ()
         if rung < self._place <= _MIDDLE:

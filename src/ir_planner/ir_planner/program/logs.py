@@ -1,4 +1,6 @@
-"""What the searches that a cell asks for at its stations and steps did for the chain that was chosen."""
+"""What the searches that a cell asks for at its stations and steps did for the chain that was
+chosen.
+"""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -26,8 +28,11 @@ _SAME = 1e-6  # rad
 
 
 def logs_of(choice: Choice, steps: Sequence[PlannedMovement]) -> Iterator[SearchLog]:
-    """Of the withdrawals and genetic corrections along a chain, each once; steps: of its program."""
-    movements, seen = choice.movements, set[int]()
+    """Of the withdrawals and genetic corrections along a chain, each once; steps: of its
+    program.
+    """
+    movements = choice.movements
+    seen = set[int]()
     for place, row in enumerate(choice.chain.chosen):
         node: Node = movements.layers[place][row]
         found = node.line.exit
@@ -44,8 +49,11 @@ def logs_of(choice: Choice, steps: Sequence[PlannedMovement]) -> Iterator[Search
 
 
 def _driven(part: Part, movements: Movements, steps: Sequence[PlannedMovement]) -> FloatArray:
-    """Positions (M, 3) of the tool along the step that a part became; none where no step has its ends."""
-    ends, scene = np.stack(movements.ends(part)), movements.route.arriving(part.hop)
+    """Positions (M, 3) of the tool along the step that a part became; none where no step has its
+    ends.
+    """
+    ends = np.stack(movements.ends(part))
+    scene = movements.route.arriving(part.hop)
     for step in steps:
         motion = step.trajectory
         if step.kind != MovementKind.REGIONAL or motion is None:
@@ -67,7 +75,8 @@ def _withdrawal_log(place: int, node: Node, found: ExitPath, movements: Movement
     share = np.linspace(0.0, 1.0, _BETWEEN)[:, None, None]
     steps = found.points[:-1] + share * np.diff(found.points, axis=0)
     along = steps.transpose(1, 0, 2).reshape(-1, found.points.shape[1])
-    walk, rejected = found.search.walk, found.search.rejected
+    walk = found.search.walk
+    rejected = found.search.rejected
     kept = found.points[:1] if walk is None else walk.kept
     dropped = kept[:0] if walk is None else walk.dropped
     every = max(-(-len(dropped) // _DROPPED), 1)
@@ -85,13 +94,15 @@ def _withdrawal_log(place: int, node: Node, found: ExitPath, movements: Movement
         dropped=_tool(dropped[::every], scene),
         path=_tool(along, scene),
         asked=station.search.withdrawal != "",
-        blocked=_blocked(node.interaction, (arriving, arriving.inside(movements.route.leaving(place)))),
+        blocked=_blocked(
+            node.interaction, (arriving, arriving.inside(movements.route.leaving(place)))
+        ),
     )
 
 
 def _blocked(q: FloatArray, both: tuple[Context, Context]) -> str:
-    """Why the straight line back along the tool from q (n,) leads nowhere, on arriving or on leaving; "": it
-    is free and leaves the zone.
+    """Why the straight line back along the tool from q (n,) leads nowhere, on arriving or on
+    leaving; "": it is free and leaves the zone.
     """
     uncounted = Journal(Work(_EDGES, np.inf, both[0].work.clock), both[0].journal.seed)
     contexts = [replace(context, journal=uncounted) for context in both]

@@ -1,9 +1,9 @@
 """What more work buys: one program first, then better ones while work is left.
 
-The first program is looked for with the same effort whatever the request allows, so that a request with more
-work knows everything that one with less knows. Then the chain is chosen again with more withdrawals and a
-finer tolerance, and the regional movements of the best chain are planned again with more work, both in steps
-of fixed size. What is cheaper is kept: more work never costs more.
+The first program is looked for with the same effort whatever the request allows, so that a request
+with more work knows everything that one with less knows. Then the chain is chosen again with more
+withdrawals and a finer tolerance, and the regional movements of the best chain are planned again
+with more work, both in steps of fixed size. What is cheaper is kept: more work never costs more.
 """
 
 from collections.abc import Iterator
@@ -24,7 +24,9 @@ from ir_planner.program.time_values import TimeValues
 from ir_planner.request import Context, Work
 from ir_planner.service import exit_searches
 
-_CHOOSING = 2_500  # work of a movement while configurations are chosen; more of it improves the chosen ones
+_CHOOSING = (
+    2_500  # work of a movement while configurations are chosen; more of it improves the chosen ones
+)
 _FIRST = 8_000  # max_iterations of a stop that buy no more than the first program
 _DEEPER = tuple(16_000 * 4**k for k in range(9))  # that buy a chain chosen with more effort
 _MORE = tuple(8_000 * 4**k for k in range(9))  # work of a movement of the chosen chain
@@ -42,19 +44,24 @@ class Answer:
 
     @property
     def cost(self) -> float:
-        """By the objective: of the movements, carried charge included; in a cycle time the joules of all."""
+        """By the objective: of the movements, carried charge included; in a cycle time the joules
+        of all.
+        """
         context = self.choice.movements.context
         if self.choice.request.cycle_time > 0.0:
             return sum(step.report.energy for step in self.steps)
-        moving, rates = [step.report for step in self.steps if not step.is_pause], rates_of(context)
+        moving = [step.report for step in self.steps if not step.is_pause]
+        rates = rates_of(context)
         if context.options.objective == "movement_cost":
             return sum(report.movement_cost for report in moving)
         return sum(cost_of(report, rates) for report in moving)
 
 
-def best_answer(request: ProgramRequest, route: Route, context: Context, progress: Progress) -> Answer:
-    """The best program that the work of a request buys. The synchronous one is a candidate of an asynchronous
-    request too, unless that names a planner and isn't for the fastest.
+def best_answer(
+    request: ProgramRequest, route: Route, context: Context, progress: Progress
+) -> Answer:
+    """The best program that the work of a request buys. The synchronous one is a candidate of an
+    asynchronous request too, unless that names a planner and isn't for the fastest.
 
     Raises StageError where none is found, RequestError where the cycle is too short.
     """
@@ -94,13 +101,18 @@ def _best(request: ProgramRequest, route: Route, context: Context, progress: Pro
 
 
 def _first(request: ProgramRequest, route: Route, context: Context, progress: Progress) -> Answer:
-    """The first program. A cycle time that is too short along the cheapest chain may do along that of the
+    """The first program. A cycle time that is too short along the cheapest chain may do along that
+    of the
     fastest program: what one objective can do is refused by none.
     """
     try:
         return planned(chosen(request, route, context, progress), progress)
     except RequestError:
-        if request.cycle_time <= 0.0 or context.options.objective == "time" or context.work.exhausted:
+        if (
+            request.cycle_time <= 0.0
+            or context.options.objective == "time"
+            or context.work.exhausted
+        ):
             raise
     return planned(chosen(request, route, context.asking("time"), progress), progress)
 
@@ -108,7 +120,8 @@ def _first(request: ProgramRequest, route: Route, context: Context, progress: Pr
 def chosen(request: ProgramRequest, route: Route, context: Context, progress: Progress) -> Choice:
     """The cheapest chain of configurations. Raises StageError where there is none."""
     settings = request.settings
-    exits, searches = exit_searches(settings.withdrawal), settings.searches
+    exits = exit_searches(settings.withdrawal)
+    searches = settings.searches
     layers = layers_of(route, request.start, context, exits, progress, settings.interaction)
     near = None
     if context.options.objective == "time":  # the fastest lines are found from slower ones
@@ -125,19 +138,22 @@ def planned(choice: Choice, progress: Progress) -> Answer:
     found: Found = choice.found(progress)
     if cycle <= 0.0 and choice.parts and choice.movements.context.options.objective == "time":
         found = _fastest(choice, found)
-    standing, steps = choice.standing(found), choice.steps(found)
+    standing = choice.standing(found)
+    steps = choice.steps(found)
     if cycle <= 0.0 or not choice.parts:
         return Answer(choice, steps, standing, free_gap(choice, found, steps))
     timed = timed_choice(choice, cycle, standing, progress)
     pauses = [step for step in timed.steps if step.is_pause][: sum(step.is_pause for step in steps)]
-    spent = sum(step.report.energy for step in timed.steps) - sum(pause.report.energy for pause in pauses)
+    spent = sum(step.report.energy for step in timed.steps) - sum(
+        pause.report.energy for pause in pauses
+    )
     gap = cycle_gap(timed.choice, len(timed.timed.movements), spent, timed.bound)
     return Answer(choice, timed.steps, standing, gap)
 
 
 def _fastest(choice: Choice, found: Found) -> Found:
-    """The movements of a chain, or faster ones by descent for values at which joules hardly count: within a
-    cycle time these are known too.
+    """The movements of a chain, or faster ones by descent for values at which joules hardly count:
+    within a cycle time these are known too.
     """
     movements = choice.movements
     if not movements.descends or movements.context.work.exhausted:
@@ -150,8 +166,8 @@ def _fastest(choice: Choice, found: Found) -> Found:
 def _again(
     request: ProgramRequest, route: Route, context: Context, progress: Progress, improvement: int
 ) -> Answer | None:
-    """The program along a chain chosen with more effort; None where that isn't done with half of what is
-    left.
+    """The program along a chain chosen with more effort; None where that isn't done with half of
+    what is left.
     """
     work = context.work
     with _limited(work, int(_HALF * work.left), improvement):
@@ -164,10 +180,16 @@ def _again(
 
 def _with_better_movements(best: Answer, progress: Progress) -> Answer:
     """The program with its regional movements planned again, with more work at every turn."""
-    movements, work = best.choice.movements, best.choice.movements.context.work
+    movements = best.choice.movements
+    work = best.choice.movements.context.work
     across = [part for part in best.choice.parts if part.kind == ACROSS]
     for more in _MORE:
-        if not across or more > work.improvement or more * len(across) > work.left or work.exhausted:
+        if (
+            not across
+            or more > work.improvement
+            or more * len(across) > work.left
+            or work.exhausted
+        ):
             break
         with movements.context.journal.stage("improve"):
             movements.better(across, more)
@@ -180,7 +202,8 @@ def _with_better_movements(best: Answer, progress: Progress) -> Answer:
 def _limited(work: Work, most: int, improvement: int) -> Iterator[None]:
     """With at most so much more work, of which `improvement` goes into better answers."""
     whole = work.max_iterations, work.improvement
-    work.max_iterations, work.improvement = work.iterations + most, improvement
+    work.max_iterations = work.iterations + most
+    work.improvement = improvement
     try:
         yield
     finally:

@@ -1,5 +1,5 @@
-"""The movements of a program: out of one stop, across, into the next. Each is planned once, however often the
-program makes it.
+"""The movements of a program: out of one stop, across, into the next. Each is planned once, however
+often the program makes it.
 """
 
 from collections.abc import Sequence
@@ -56,9 +56,9 @@ class Known(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Near:
-    """Known movements from which others are made, instead of searched: across, by descent from the best of
-    those of `across`; along service lines, those of `lines` slowed down, or by descent from those of
-    `scaling`. Those of them that can plan do so first.
+    """Known movements from which others are made, instead of searched: across, by descent from the
+    best of those of `across`; along service lines, those of `lines` slowed down, or by descent from
+    those of `scaling`. Those of them that can plan do so first.
     """
 
     across: tuple[Known, ...] = ()
@@ -67,8 +67,8 @@ class Near:
 
 
 class Movements:
-    """Movements between the configurations in `layers` of a route, by the objective of `context`; `near`
-    those that are known, where that is given.
+    """Movements between the configurations in `layers` of a route, by the objective of `context`;
+    `near` those that are known, where that is given.
     """
 
     def __init__(
@@ -79,7 +79,10 @@ class Movements:
         searches: Searches,
         near: Near | None = None,
     ) -> None:
-        self.route, self.layers, self.context, self.searches = route, layers, context, searches
+        self.route = route
+        self.layers = layers
+        self.context = context
+        self.searches = searches
         # whether movements may be made from known ones by descent
         self.descends = context.options.planner_id == "" and context.options.timing == "synchronous"
         self._near = near if near is not None and self.descends else Near()
@@ -97,7 +100,8 @@ class Movements:
     def plan(self, parts: Sequence[Part], improvement: int) -> list[Movement | Failure]:
         """The movements of parts of hops; those that aren't known yet side by side."""
         new = {key: part for part in parts if (key := self._key(part)) not in self._found}
-        near, lines = self._near, [part for part in new.values() if part.kind != ACROSS]
+        near = self._near
+        lines = [part for part in new.values() if part.kind != ACROSS]
         for known in (*near.lines, *([near.scaling] if near.scaling else [])):
             known.plan(lines, improvement)
         for known in (each for each in near.across if isinstance(each, Movements)):
@@ -110,12 +114,15 @@ class Movements:
         return [self._found[self._key(part)] for part in parts]
 
     def _shared(self, parts: list[Part], improvement: int) -> list[Movement | Failure]:
-        """Movements of parts that share the work left: all the same, but those along service lines, which are
-        known without any, no more than if the whole program was still to plan. What isn't found with its
-        share gets the work that the others left: at least half of their shares, which isn't for improvement.
+        """Movements of parts that share the work left: all the same, but those along service lines,
+        which are known without any, no more than if the whole program was still to plan. What isn't
+        found with its
+        share gets the work that the others left: at least half of their shares, which isn't for
+        improvement.
         """
         left = self.context.work.left
-        of_one, of_line = left // max(len(parts), 1), left // (_PARTS * max(len(self.route), 1))
+        of_one = left // max(len(parts), 1)
+        of_line = left // (_PARTS * max(len(self.route), 1))
         most = [of_one if part.kind == ACROSS else min(of_one, of_line) for part in parts]
         planned = mapped(self._planned, parts, self.context, min(improvement, of_one // 2), most)
         failed = [k for k, found in enumerate(planned) if isinstance(found, Failure)]
@@ -153,7 +160,9 @@ class Movements:
         first, second = self.nodes(part)
         names = self.route.name(part.hop - 1), self.route.name(part.hop)
         lines = first.line.points.tobytes(), second.line.points.tobytes()
-        ends = lines if part.kind != ACROSS else (first.departure.tobytes(), second.arrival.tobytes())
+        ends = (
+            lines if part.kind != ACROSS else (first.departure.tobytes(), second.arrival.tobytes())
+        )
         kind = part.kind if part.kind != ACROSS else f"{part.kind} {self._planner(part)}"
         return id(self.route.arriving(part.hop)), kind, names, ends
 
@@ -164,7 +173,11 @@ class Movements:
     def nodes(self, part: Part) -> tuple[Node, Node]:
         """The configurations of a part; the same twice where it is a service movement."""
         layers = self.layers
-        first = layers[part.hop][part.first] if part.kind != ENTER else layers[part.hop + 1][part.second]
+        first = (
+            layers[part.hop][part.first]
+            if part.kind != ENTER
+            else layers[part.hop + 1][part.second]
+        )
         second = layers[part.hop + 1][part.second] if part.kind != LEAVE else first
         return first, second
 
@@ -189,7 +202,8 @@ class Movements:
         asked = context.planned_by(self._planner(part))
         status, found = search_regional(first, second, asked, self.searches)
         self._logs[self._key(part)] = context.journal.logs
-        here, there = self.route.name(part.hop - 1), self.route.name(part.hop)
+        here = self.route.name(part.hop - 1)
+        there = self.route.name(part.hop)
         what = f"from {here or 'the start'} to {there}"
         return found or Failure(Status(status.code, f"{what}: {status.message}"))
 
@@ -199,17 +213,22 @@ class Movements:
         driven = self.nodes(part)[0].driven
         if entry and driven is not None:
             return driven.asked_by(context)
-        what, at = f"{'entering' if entry else 'leaving'} {station}", context.at(station)
+        what = f"{'entering' if entry else 'leaving'} {station}"
+        at = context.at(station)
         slower = slowed_near(_known(self._near.lines, part), at)
         if slower is not None:
             return slower
         scaling = _known((self._near.scaling,), part)
         try:
-            found = timed_service(self.nodes(part)[0].line, entry, at, scaling[0] if scaling else None)
+            found = timed_service(
+                self.nodes(part)[0].line, entry, at, scaling[0] if scaling else None
+            )
         except TimingError as error:
             return Failure(Status(StatusCode.PLANNING_FAILED, f"{what}: {error}"))
         if found.violation is not None:
-            return Failure(Status(StatusCode.PLANNING_FAILED, f"{what}: {found.violation.sentence}"))
+            return Failure(
+                Status(StatusCode.PLANNING_FAILED, f"{what}: {found.violation.sentence}")
+            )
         same = slowed_near(scaling, at)
         return same if same is not None and same.cost < found.cost else found
 

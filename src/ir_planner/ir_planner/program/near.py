@@ -1,5 +1,5 @@
-"""Movements that are known, made again for another value of a second: near the path of one, from its own
-time scaling.
+"""Movements that are known, made again for another value of a second: near the path of one, from
+its own time scaling.
 """
 
 from collections.abc import Sequence
@@ -10,8 +10,8 @@ from ir_planner.timing import Movement, best_stretch, stretched
 
 
 def optimised_near(known: Sequence[Movement], context: Context) -> Movement | None:
-    """The cheapest certified movement by descent from known ones, at least one, or the cheapest of them
-    slowed down; None where neither is certified.
+    """The cheapest certified movement by descent from known ones, at least one, or the cheapest of
+    them slowed down; None where neither is certified.
     """
     found = (optimize.optimised_near_best(known, context), slowed_near(known, context))
     certified = [movement for movement in found if movement is not None and movement.certified]
@@ -19,8 +19,8 @@ def optimised_near(known: Sequence[Movement], context: Context) -> Movement | No
 
 
 def slowed_near(known: Sequence[Movement], context: Context) -> Movement | None:
-    """The cheapest of known movements between the same ends, each slowed down evenly as far as that pays;
-    None where none is certified.
+    """The cheapest of known movements between the same ends, each slowed down evenly as far as that
+    pays; None where none is certified.
     """
     slower = [_slowed(one, best_stretch(one.trajectory, context), context) for one in known]
     cheapest = sorted(slower, key=lambda movement: movement.coarse_cost)

@@ -1,4 +1,6 @@
-"""A configuration at a stop with its service line: what the layers of the station graph consist of."""
+"""A configuration at a stop with its service line: what the layers of the station graph consist
+of.
+"""
 
 from dataclasses import dataclass
 
@@ -9,10 +11,11 @@ from ir_planner.timing import Movement
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """Where the arm works at a stop, and where nothing else may be near it (the outer end of its line).
+    """Where the arm works at a stop, and where nothing else may be near it (the outer end of its
+    line).
 
-    driven: the movement along a stop that is a path. Its line leads from the path's beginning to its end, and
-    the arm leaves from there.
+    driven: the movement along a stop that is a path. Its line leads from the path's beginning to
+    its end, and the arm leaves from there.
     """
 
     line: ServiceLine

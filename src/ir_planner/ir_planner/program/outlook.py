@@ -1,5 +1,5 @@
-"""What to expect of a program before it is planned: whether its stops can be reached at all, and what coarse
-movements cost that meet nothing. That takes a small part of the work of planning it.
+"""What to expect of a program before it is planned: whether its stops can be reached at all, and
+what coarse movements cost that meet nothing. That takes a small part of the work of planning it.
 """
 
 from dataclasses import dataclass, replace
@@ -19,8 +19,9 @@ from ir_planner.service import exit_searches
 
 @dataclass(frozen=True)
 class Outlook:
-    """status: why a stop has no configuration that can be entered and left. cost: by the objective, without a
-    cycle time, of the cheapest chain of coarse movements, less their margin; inf where the status says why.
+    """status: why a stop has no configuration that can be entered and left. cost: by the objective,
+    without a cycle time, of the cheapest chain of coarse movements, less their margin; inf where
+    the status says why.
     """
 
     status: Status
@@ -28,7 +29,9 @@ class Outlook:
 
 
 def outlook(request: ProgramRequest, work: Work) -> Outlook:
-    """The outlook of a request; its cycle time doesn't count. Raises RequestError for one without sense."""
+    """The outlook of a request; its cycle time doesn't count. Raises RequestError for one without
+    sense.
+    """
     route, context = prepared(replace(request, cycle_time=0.0), Journal(work, request.options.seed))
     settings = request.settings
     searches = exit_searches(settings.withdrawal)

@@ -1,5 +1,5 @@
-"""Work of one request done by several threads: every item has work of its own, so that answers don't depend
-on how many there are or which one is first.
+"""Work of one request done by several threads: every item has work of its own, so that answers
+don't depend on how many there are or which one is first.
 """
 
 import os
@@ -21,10 +21,11 @@ def mapped(
     most: Sequence[int],
     threads: int = 0,
 ) -> list[Result]:
-    """task(item, context of its own) for every item, in order; what each did is added to `context`'s journal.
+    """task(item, context of its own) for every item, in order; what each did is added to
+    `context`'s journal.
 
-    improvement: work of each for better answers; most: of each at all. threads: 0: those of the context's
-    work. Raises what the first failing task raises, CancelledError when asked to stop.
+    improvement: work of each for better answers; most: of each at all. threads: 0: those of the
+    context's work. Raises what the first failing task raises, CancelledError when asked to stop.
     """
     own = [_own(context, improvement, left) for left in most]
     count = min(threads or context.work.threads or len(os.sched_getaffinity(0)), len(items))
@@ -45,4 +46,6 @@ def _own(context: Context, improvement: int, left: int) -> Context:
     """The context with so much work and a journal of its own."""
     work = context.work
     mine = Work(left, work.deadline, work.clock, work.cancelled, improvement, work.threads)
-    return Context(context.scene, context.options, Journal(mine, context.journal.seed), context.station)
+    return Context(
+        context.scene, context.options, Journal(mine, context.journal.seed), context.station
+    )

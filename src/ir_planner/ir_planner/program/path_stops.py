@@ -13,8 +13,8 @@ _MOST = 64  # movements along a path that take part, as many as configurations o
 
 
 def path_nodes(arriving: Context, leaving: PlanningScene) -> tuple[list[Node], Status]:
-    """Certified movements along the context's path, each from and to where nothing may be touched; or none
-    and why.
+    """Certified movements along the context's path, each from and to where nothing may be touched;
+    or none and why.
     """
     name = arriving.station
     path = arriving.scene.cell.path(name)

@@ -1,4 +1,6 @@
-"""How long a pause lasts: known, or as equally likely lengths, or as quantiles; checked at the door."""
+"""How long a pause lasts: known, or as equally likely lengths, or as quantiles; checked at the
+door.
+"""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -11,15 +13,16 @@ from ir_planner.errors import RequestError
 
 PAUSE_MAX = 604_800.0  # s: a week
 SAMPLES_MAX = 10_000  # planned in 40 ms of processor time
-_BETWEEN = 1000  # equally likely lengths that quantiles are taken as: the mean of a law with jumps to 0.1 %
+# equally likely lengths that quantiles are taken as: the mean of a law with jumps to 0.1 %
+_BETWEEN = 1000
 
 _NONE: FloatArray = np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
 class Lengths:
-    """likely (n,) [s]: equally likely lengths, sorted. most [s]: no pause is longer. known: there is one
-    only.
+    """likely (n,) [s]: equally likely lengths, sorted. most [s]: no pause is longer. known: there
+    is one only.
     """
 
     likely: FloatArray
@@ -27,12 +30,17 @@ class Lengths:
     known: bool = False
 
     def less(self, seconds: float) -> "Lengths":
-        """What is left of each pause when `seconds` are taken from it; nothing is left of shorter ones."""
-        return Lengths(np.maximum(self.likely - seconds, 0.0), max(self.most - seconds, 0.0), self.known)
+        """What is left of each pause when `seconds` are taken from it; nothing is left of shorter
+        ones.
+        """
+        return Lengths(
+            np.maximum(self.likely - seconds, 0.0), max(self.most - seconds, 0.0), self.known
+        )
 
     def extreme(self, switches: tuple[float, ...]) -> FloatArray:
-        """Lengths at which a policy with these switch times [s] may cost most: all that are likely, the
-        longest, and where lengths between the likely ones are possible, those just longer than a switch.
+        """Lengths at which a policy with these switch times [s] may cost most: all that are likely,
+        the longest, and where lengths between the likely ones are possible, those just longer than
+        a switch.
         """
         if self.most == self.likely[-1]:
             return self.likely
@@ -42,15 +50,17 @@ class Lengths:
 
 
 def lengths_of(pause: float, samples: FloatArray = _NONE, quantiles: FloatArray = _NONE) -> Lengths:
-    """Lengths of a request that gives one of the three: pause [s], samples (n,) or quantiles (n,) [s]. Raises
-    RequestError for what is no pause.
+    """Lengths of a request that gives one of the three: pause [s], samples (n,) or quantiles (n,)
+    [s]. Raises RequestError for what is no pause.
     """
     given = {"pause_samples": samples, "pause_quantiles": quantiles}
     lists = [name for name, values in given.items() if len(values)]
     if len(lists) + (pause != 0.0) > 1:
         counts = [f"{name} ({len(given[name])} values)" for name in lists]
         named = " and ".join([*([f"pause ({pause:g} s)"] if pause != 0.0 else []), *counts])
-        raise _refused(f"{named} are given: exactly one of pause, pause_samples and pause_quantiles must be")
+        raise _refused(
+            f"{named} are given: exactly one of pause, pause_samples and pause_quantiles must be"
+        )
     if not lists:
         _check(pause, "pause")
         return Lengths(np.array([pause]), pause, known=True)
@@ -68,7 +78,9 @@ def lengths_of(pause: float, samples: FloatArray = _NONE, quantiles: FloatArray 
 def _between(quantiles: FloatArray) -> Lengths:
     """Equally likely lengths between neighbouring quantiles."""
     if len(quantiles) < 2:
-        raise _refused("pause_quantiles has 1 value: at least 2 are needed, those of the levels 0 and 1")
+        raise _refused(
+            "pause_quantiles has 1 value: at least 2 are needed, those of the levels 0 and 1"
+        )
     for k, (a, b) in enumerate(pairwise(quantiles)):
         if b < a:
             raise _refused(

@@ -1,7 +1,7 @@
 """How the energy of a pause changes with each power parameter.
 
-With given switch times the energy is linear in the powers of the modes, so the seconds that count for a mode
-are the energy of a robot that draws 1 W in it and nothing in the others.
+With given switch times the energy is linear in the powers of the modes, so the seconds that count
+for a mode are the energy of a robot that draws 1 W in it and nothing in the others.
 """
 
 from collections.abc import Callable

@@ -16,8 +16,8 @@ AUTO = "AUTO"
 
 @dataclass(frozen=True, eq=False)
 class Pause:
-    """Where (a name, and q (n,)), how long [s], in which mode it was asked for (AUTO; "": not said), and what
-    is held.
+    """Where (a name, and q (n,)), how long [s], in which mode it was asked for (AUTO; "": not
+    said), and what is held.
     """
 
     here: str
@@ -28,11 +28,12 @@ class Pause:
 
 
 def planned_pause(pause: Pause, times: TransitionTimes) -> PlannedMovement:
-    """In the mode that is asked for, where the pause is long enough for it, the sequence of least energy
-    (AUTO), or on motors; longer than the controller stands on motors: on brakes, which it would close anyway,
-    so that they are open again in time.
+    """In the mode that is asked for, where the pause is long enough for it, the sequence of least
+    energy (AUTO), or on motors; longer than the controller stands on motors: on brakes, which it
+    would close anyway, so that they are open again in time.
     """
-    rests, mode = rests_at(pause.q, pause.scene, times), pause.requested
+    rests = rests_at(pause.q, pause.scene, times)
+    mode = pause.requested
     if pause.requested == AUTO:
         mode = DEEPER.join(step.rest.name for step in rests.known(pause.seconds)[1]) or MOTORS
     elif not np.isfinite(_rested(pause, mode, rests)) and rests.cost((), pause.seconds)[1] > 0.0:
@@ -46,16 +47,22 @@ def pause_by_itself(pause: Pause, times: TransitionTimes) -> PlannedMovement:
 
 
 def _rested(pause: Pause, mode: str, rests: Rests) -> float:
-    """Energy [J] in a mode that is entered and left in time; inf: on motors, or the pause is too short."""
+    """Energy [J] in a mode that is entered and left in time; inf: on motors, or the pause is too
+    short.
+    """
     sequence = tuple(rests.named(each.name) for each in modes_of(mode))
     return rests.in_time(sequence, pause.seconds) if sequence else np.inf
 
 
 def _spent(pause: Pause, mode: str, rests: Rests) -> PlannedMovement:
     energy = _rested(pause, mode, rests)
-    if not np.isfinite(energy):  # on motors, also where it is asked for by name though it is too short
+    if not np.isfinite(
+        energy
+    ):  # on motors, also where it is asked for by name though it is too short
         energy = rests.cost((), pause.seconds)[0]
-    report = TrajectoryReport(duration=pause.seconds, energy=energy, base_energy=energy, certified=True)
+    report = TrajectoryReport(
+        duration=pause.seconds, energy=energy, base_energy=energy, certified=True
+    )
     return PlannedMovement(
         kind=MovementKind.PAUSE,
         from_station=pause.here,

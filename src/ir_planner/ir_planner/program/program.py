@@ -1,8 +1,8 @@
-"""A whole program: configurations at the stations, all movements and pauses between them, loads and power
-modes.
+"""A whole program: configurations at the stations, all movements and pauses between them, loads and
+power modes.
 
-The chain of configurations that costs least by the objective, with the movements that it consists of, each
-with what is held at that moment.
+The chain of configurations that costs least by the objective, with the movements that it consists
+of, each with what is held at that moment.
 """
 
 import hashlib
@@ -34,8 +34,9 @@ from ir_planner.timing import at_the_mains
 _SENTENCES = 4  # of a failure
 _ENDED = "{}; {} ended before all was tried: more of it may help"
 _SLOW = (
-    "objective energy counts the drives alone, which take least when they are slow: the movements take "
-    "{:.1f} s; for the least energy at the mains give a cycle_time, or a price of time by time_and_energy"
+    "objective energy counts the drives alone, which take least when they are slow: the "
+    "movements take {:.1f} s; for the least energy at the mains give a cycle_time, or a price of "
+    "time by time_and_energy"
 )
 
 
@@ -60,11 +61,13 @@ def plan_program(
 def _answered(
     request: ProgramRequest, route: Route, context: Context, progress: Progress, spreads: Spreads
 ) -> ProgramPlan:
-    """The program, what it saves, and its front, as they were asked for. Raises StageError where a stage
-    finds nothing.
+    """The program, what it saves, and its front, as they were asked for. Raises StageError where a
+    stage finds nothing.
     """
     answer = best_answer(request, route, context, progress)
-    choice, steps, standing = answer.choice, answer.steps, answer.standing
+    choice = answer.choice
+    steps = answer.steps
+    standing = answer.standing
     cycle = request.cycle_time
     if not choice.parts and (cycle > 0.0 or request.front_points):
         raise RequestError(
@@ -85,7 +88,9 @@ def _answered(
         else:
             compared = _planned(comparison.steps)
             savings = named(comparison.savings, compared.program_id, comparison.compared)
-            plan = replace(plan, savings=savings, compared=compared, common=_planned(comparison.common))
+            plan = replace(
+                plan, savings=savings, compared=compared, common=_planned(comparison.common)
+            )
     if request.front_points:
         with context.journal.stage("pareto front"):
             front = front_of(choice, request.front_points, standing, progress)
@@ -123,12 +128,17 @@ def _info(request: ProgramRequest, context: Context) -> PlanningInfo:
 
 
 def prepared(request: ProgramRequest, journal: Journal) -> tuple[Route, Context]:
-    """The route of a request and what its stages need to know. Raises RequestError for one without sense."""
+    """The route of a request and what its stages need to know. Raises RequestError for one without
+    sense.
+    """
     request.check()
     cell = request.cell
-    steps = placed_steps(cell, steps_of(cell, request.stations), cell.parts_at_start(), request.doors)
+    steps = placed_steps(
+        cell, steps_of(cell, request.stations), cell.parts_at_start(), request.doors
+    )
     check_searches(cell, [placed.step for placed in steps], request.settings.searches)
-    settings, bare = request.settings, request.options.load == NO_LOAD
+    settings = request.settings
+    bare = request.options.load == NO_LOAD
     scenes = Scenes(cell, request.power, settings.drives, bare)
     context = Context(scenes.of(cell.parts_at_start()), request.options, journal)
     if request.cycle_time > 0.0 and request.options.objective == "energy":
@@ -140,7 +150,14 @@ def program_hash(movements: tuple[PlannedMovement, ...]) -> str:
     """Id of a program: hash of its steps and the ids of their trajectories."""
     digest = hashlib.sha256()
     for m in movements:
-        texts = (m.kind, m.from_station, m.to_station, m.trajectory_id, repr(m.duration), m.power_mode)
+        texts = (
+            m.kind,
+            m.from_station,
+            m.to_station,
+            m.trajectory_id,
+            repr(m.duration),
+            m.power_mode,
+        )
         handling = (m.attach, m.detach, m.load, *m.wait_for, "|", *m.set_signals)
         digest.update("\0".join(str(value) for value in (*texts, *handling)).encode() + b"\n")
     return digest.hexdigest()[:16]

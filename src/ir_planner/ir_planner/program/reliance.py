@@ -1,4 +1,6 @@
-"""Which states of machines a movement relies on: those without which its clearance would be violated."""
+"""Which states of machines a movement relies on: those without which its clearance would be
+violated.
+"""
 
 from dataclasses import dataclass, field, replace
 
@@ -9,8 +11,8 @@ from ir_planner.scene import PlanningScene
 
 @dataclass
 class Reliance:
-    """Of movements that keep `safety_distance` [m]; each is checked once, in every other state of every
-    machine.
+    """Of movements that keep `safety_distance` [m]; each is checked once, in every other state of
+    every machine.
     """
 
     safety_distance: float
@@ -19,7 +21,9 @@ class Reliance:
     )
     _found: dict[tuple[int, str, str], tuple[str, ...]] = field(default_factory=dict)
 
-    def of(self, trajectory: JointTrajectory, scene: PlanningScene, station: str) -> tuple[str, ...]:
+    def of(
+        self, trajectory: JointTrajectory, scene: PlanningScene, station: str
+    ) -> tuple[str, ...]:
         """States that a movement in a scene relies on, such as "lathe=door_open"."""
         key = id(scene), trajectory.trajectory_id, station
         if key not in self._found:
@@ -32,8 +36,8 @@ class Reliance:
         return self._found[key]
 
     def _otherwise(self, scene: PlanningScene) -> tuple[tuple[str, PlanningScene], ...]:
-        """The scene in every other state of its machines, with the state that it is in; it is kept, so that
-        nobody else gets its id.
+        """The scene in every other state of its machines, with the state that it is in; it is kept,
+        so that nobody else gets its id.
         """
         if id(scene) not in self._scenes:
             others = tuple(

@@ -24,9 +24,9 @@ Progress = Callable[[str, int, int, float], None]  # phase, done, total, cost of
 class ProgramPlan:
     """The answer: movements and pauses in order; empty unless the status is SUCCESS.
 
-    gap [%]: how far above the best chain of configurations it can be at most. savings: with `compared`, the
-    program that they are of, and `common`, the program that it is held against. front: programs by cycle
-    time.
+    gap [%]: how far above the best chain of configurations it can be at most. savings: with
+    `compared`, the program that they are of, and `common`, the program that it is held against.
+    front: programs by cycle time.
     """
 
     status: Status
@@ -44,8 +44,9 @@ class ProgramPlan:
 @dataclass(frozen=True, eq=False)
 class ProgramRequest:
     """What to plan: the cell, its stations to visit (empty: its program), from `start` (n,), in
-    `cycle_time` s (0: free). savings: hold it against the common program; front_points: programs from the
-    shortest cycle time to twice the free one. doors: machines that are not as the cell has them at the start.
+    `cycle_time` s (0: free). savings: hold it against the common program; front_points: programs
+    from the shortest cycle time to twice the free one. doors: machines that are not as the cell has
+    them at the start.
     """
 
     cell: Cell
@@ -62,11 +63,13 @@ class ProgramRequest:
     def check(self) -> None:
         """Raise RequestError for options that a program doesn't take."""
         bounded(self.front_points, 0, FRONT_MAX, "front_points")
-        load, duration = self.options.load, self.options.duration
+        load = self.options.load
+        duration = self.options.duration
         if load not in ("", NO_LOAD):
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"load is {load[:80]!a}: in a program the steps say what is attached, leave it empty",
+                f"load is {load[:80]!a}: in a program the steps say what is attached, leave it "
+                "empty",
             )
         if duration > 0.0:
             raise RequestError(

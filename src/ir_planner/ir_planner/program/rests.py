@@ -1,9 +1,10 @@
 """The modes that a robot can rest in at a posture, and what a sequence of them costs.
 
-A sequence goes from motors deeper and deeper, each mode asked for at a switch time. While a mode is entered
-the power is that of the mode that is left; while it is left it is that of standing on motors. A mode can be
-left, deeper or back to motors, when it was entered and its shortest stay is over. Left alone on motors, the
-controller closes its brakes after `timer` s. These conventions of the power data decide every break-even.
+A sequence goes from motors deeper and deeper, each mode asked for at a switch time. While a mode is
+entered the power is that of the mode that is left; while it is left it is that of standing on
+motors. A mode can be left, deeper or back to motors, when it was entered and its shortest stay is
+over. Left alone on motors, the controller closes its brakes after `timer` s. These conventions of
+the power data decide every break-even.
 """
 
 from collections.abc import Sequence
@@ -19,7 +20,8 @@ from ir_msgs_py.transitions import TransitionTimes
 from ir_planner.checks import holding_watts
 from ir_planner.scene import PlanningScene
 
-MOTORS, BRAKES = "STAND_ON_MOTORS", "STAND_ON_BRAKES"
+MOTORS = "STAND_ON_MOTORS"
+BRAKES = "STAND_ON_BRAKES"
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,9 @@ class Rest:
 
 @dataclass(frozen=True)
 class Step:
-    """A mode that is asked for at a time [s] from the start of the pause, if the pause is still on then."""
+    """A mode that is asked for at a time [s] from the start of the pause, if the pause is still on
+    then.
+    """
 
     rest: Rest
     at: float
@@ -67,8 +71,8 @@ class Rests:
         return next(rest for rest in self.modes if rest.name == name)
 
     def cost(self, steps: Steps, pause: float) -> tuple[float, float]:
-        """Energy [J] from the start of a pause [s] until the robot is ready, when its end wakes the robot,
-        and how late that is [s].
+        """Energy [J] from the start of a pause [s] until the robot is ready, when its end wakes the
+        robot, and how late that is [s].
         """
         reached = tuple(step for step in self._with_timer(steps) if step.at < pause)
         if not reached:
@@ -78,23 +82,30 @@ class Rests:
         return self._energy(reached, awake), awake + last.rest.leave - pause
 
     def in_time(self, rests: Sequence[Rest], pause: float) -> float:
-        """Energy [J] of a pause of known length [s] with these modes, ready at its end; inf: too short."""
+        """Energy [J] of a pause of known length [s] with these modes, ready at its end; inf: too
+        short.
+        """
         steps = at_once(rests)
         awake = pause - steps[-1].rest.leave
         return self._energy(steps, awake) if awake >= steps[-1].free else float("inf")
 
     def _energy(self, steps: Steps, awake: float) -> float:
-        """Energy [J] from motors through the steps, woken at a time [s], until the robot is ready."""
-        energy, since, watts = 0.0, 0.0, self.motors
+        """Energy [J] from motors through the steps, woken at a time [s], until the robot is
+        ready.
+        """
+        energy = 0.0
+        since = 0.0
+        watts = self.motors
         for step in steps:
             entered = step.at + step.rest.enter
             energy += watts * (entered - since)
-            since, watts = entered, step.rest.watts
+            since = entered
+            watts = step.rest.watts
         return energy + watts * (awake - since) + self.motors * steps[-1].rest.leave
 
     def known(self, pause: float) -> tuple[float, Steps]:
-        """Least energy [J] of a pause of known length [s], ready at its end, and the sequence; no steps: on
-        motors, as the controller spends it by itself.
+        """Least energy [J] of a pause of known length [s], ready at its end, and the sequence; no
+        steps: on motors, as the controller spends it by itself.
         """
         best = (self.cost((), pause)[0], Steps())
         for rests in self.sequences:
@@ -104,8 +115,8 @@ class Rests:
         return best
 
     def clairvoyant(self, pause: float) -> float:
-        """Least energy [J] of a pause whose length [s] is known at its start, ready as early as the sequence
-        allows.
+        """Least energy [J] of a pause whose length [s] is known at its start, ready as early as the
+        sequence allows.
         """
         energies = [self.cost((), pause)[0]]
         for steps in map(at_once, self.sequences):
@@ -116,12 +127,15 @@ class Rests:
     @cached_property
     def sequences(self) -> tuple[tuple[Rest, ...], ...]:
         """All sequences of modes, each deeper than the one before and drawing less."""
-        chosen = (each for n in range(1, len(self.modes) + 1) for each in combinations(self.modes, n))
+        chosen = (
+            each for n in range(1, len(self.modes) + 1) for each in combinations(self.modes, n)
+        )
         return tuple(
             rests
             for rests in chosen
             if all(
-                b.watts <= a for a, b in zip((self.motors, *(r.watts for r in rests)), rests, strict=False)
+                b.watts <= a
+                for a, b in zip((self.motors, *(r.watts for r in rests)), rests, strict=False)
             )
         )
 
@@ -134,7 +148,11 @@ class Rests:
         brakes = Step(self.named(BRAKES), self.timer)
         return (
             brakes,
-            *(replace(step, at=max(step.at, brakes.free)) for step in steps if step.rest != brakes.rest),
+            *(
+                replace(step, at=max(step.at, brakes.free))
+                for step in steps
+                if step.rest != brakes.rest
+            ),
         )
 
 
@@ -147,8 +165,8 @@ def at_once(rests: Sequence[Rest]) -> Steps:
 
 
 def mode_watts(name: str, q: FloatArray, scene: PlanningScene) -> float:
-    """Mains power [W] in a mode at q (n,): controller, tool (its bus share while the drive bus is up),
-    holding torque.
+    """Mains power [W] in a mode at q (n,): controller, tool (its bus share while the drive bus is
+    up), holding torque.
     """
     if name == MOTORS:
         return holding_watts(q, scene)

@@ -1,4 +1,6 @@
-"""The stops of a program in order: which steps go somewhere, and what is held where when they do."""
+"""The stops of a program in order: which steps go somewhere, and what is held where when they
+do.
+"""
 
 from dataclasses import dataclass
 
@@ -8,8 +10,8 @@ from ir_planner.scene import PlanningScene
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """All steps, and `stops`: indices of those that go somewhere; a step at the place of the one before stays
-    there, but a path is driven again.
+    """All steps, and `stops`: indices of those that go somewhere; a step at the place of the one
+    before stays there, but a path is driven again.
     """
 
     steps: tuple[PlacedStep, ...]
@@ -19,9 +21,11 @@ class Route:
     @staticmethod
     def over(steps: tuple[PlacedStep, ...], scenes: Scenes) -> "Route":
         """The route that visits the targets of the steps."""
-        stops, here = [], ""
+        stops = []
+        here = ""
         for k, placed in enumerate(steps):
-            kind, target = placed.step.kind, placed.step.target
+            kind = placed.step.kind
+            target = placed.step.target
             if kind == "PATH" or (kind != "PAUSE" and target != here):
                 stops.append(k)
                 here = target

@@ -1,8 +1,8 @@
 """What a program saves, in three figures that stand up: movements, pauses, total.
 
-Movements are held against the common program at equal cycle time; a wait at the end counts as movement.
-Pauses are held against what the controller does by itself. All energies are those at the mains, controller
-and tool included.
+Movements are held against the common program at equal cycle time; a wait at the end counts as
+movement. Pauses are held against what the controller does by itself. All energies are those at the
+mains, controller and tool included.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,8 +23,9 @@ Added = Callable[[Steps], list[FloatArray]]
 def savings_of(
     common: Steps, planned: Steps, pauses: int, program: CommonProgram, added: Added
 ) -> ProgramSavings:
-    """The savings of `planned` steps over those of the common `program` in the same time; the first `pauses`
-    of both are the program's own, one more is a wait at the end. added: what the drawn robots add to steps.
+    """The savings of `planned` steps over those of the common `program` in the same time; the first
+    `pauses` of both are the program's own, one more is a wait at the end. added: what the drawn
+    robots add to steps.
     """
     standing, own = (_first_pauses(steps, pauses) for steps in (common, planned))
     seconds = duration_of(common) - duration_of(standing)
@@ -44,9 +45,12 @@ def savings_of(
     )
 
 
-def _spreads(common: Steps, planned: Steps, pauses: int, added: Added) -> tuple[FloatArray, FloatArray]:
+def _spreads(
+    common: Steps, planned: Steps, pauses: int, added: Added
+) -> tuple[FloatArray, FloatArray]:
     """What the drawn robots add (ROBOTS,) J to what movements save, and to what pauses save."""
-    moved, rested = np.zeros(ROBOTS), np.zeros(ROBOTS)
+    moved = np.zeros(ROBOTS)
+    rested = np.zeros(ROBOTS)
     for steps, sign in ((common, 1.0), (planned, -1.0)):
         standing = {id(step) for step in _first_pauses(steps, pauses)}
         for step, robots in zip(steps, added(steps), strict=True):
@@ -72,15 +76,16 @@ def named(savings: ProgramSavings, program_id: str, compared: str) -> ProgramSav
 
 def sentence_of(savings: ProgramSavings) -> str:
     """All three figures, each with its baseline."""
-    movements, pauses = savings.movements, savings.pauses
+    movements = savings.movements
+    pauses = savings.pauses
     standing = (
         f"pauses {_percent(pauses)} in {pauses.seconds:.1f} s against the controller's own timers"
         if pauses.seconds > 0.0
         else "no pauses"
     )
     return (
-        f"movements {_percent(movements)} in {movements.seconds:.2f} s against synchronous S-curve PTP "
-        f"at 100 % ({savings.around} of {savings.across} around bodies); {standing}; "
+        f"movements {_percent(movements)} in {movements.seconds:.2f} s against synchronous "
+        f"S-curve PTP at 100 % ({savings.around} of {savings.across} around bodies); {standing}; "
         f"total {_percent(savings.total)}"
     )
 

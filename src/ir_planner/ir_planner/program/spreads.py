@@ -1,7 +1,8 @@
-"""What the uncertainty of the power parameters leaves open of a program's joules, and of what it saves.
+"""What the uncertainty of the power parameters leaves open of a program's joules, and of what it
+saves.
 
-Every step, movement or pause, is followed over the same drawn robots, so sums and differences have intervals
-of their own.
+Every step, movement or pause, is followed over the same drawn robots, so sums and differences have
+intervals of their own.
 """
 
 from collections.abc import Sequence
@@ -30,7 +31,8 @@ class Spreads:
 
     def of(self, steps: Sequence[PlannedMovement]) -> list[FloatArray]:
         """What the drawn robots add (ROBOTS,) J to the energy of each step."""
-        q, found = self._request.start, list[FloatArray]()
+        q = self._request.start
+        found = list[FloatArray]()
         for step in steps:
             if step.trajectory is None:
                 found.append(self._paused(step, q))
@@ -69,7 +71,9 @@ class Spreads:
         names = [mode.name for mode in modes_of(step.power_mode)]
 
         def energy(of: Rests) -> float:
-            spent = of.in_time([of.named(name) for name in names], step.duration) if names else np.inf
+            spent = (
+                of.in_time([of.named(name) for name in names], step.duration) if names else np.inf
+            )
             return spent if np.isfinite(spent) else of.cost((), step.duration)[0]
 
         return spread(pause_slope(q, scene, rests, energy), scene.parameters)

@@ -1,8 +1,8 @@
 """How a pause should be spent: a sequence of power modes with its switch times, and when to wake.
 
-Of a pause of known length the modes are entered one after the other, each as soon as it can be, so that most
-of it is spent in the deepest, and the robot is woken in time. A pause whose end is not known has a timeout
-policy (timeouts), and its end wakes the robot, which is ready later then.
+Of a pause of known length the modes are entered one after the other, each as soon as it can be, so
+that most of it is spent in the deepest, and the robot is woken in time. A pause whose end is not
+known has a timeout policy (timeouts), and its end wakes the robot, which is ready later then.
 """
 
 from dataclasses import dataclass
@@ -24,18 +24,19 @@ from ir_planner.scene import PlanningScene
 
 @dataclass(frozen=True, eq=False)
 class Standby:
-    """The advice. energy [J]: over the pause, where its length is not known the mean over the lengths.
+    """The advice. energy [J]: over the pause, where its length is not known the mean over the
+    lengths.
 
-    chosen: the deepest mode that is asked for. wake_at [s] from the start of the pause, inf: its end wakes
-    the robot. saving [J]: against what the controller does by itself (`timer` s on motors, then on brakes);
-    saving_low, saving_high [J]: its 90 % interval. saving_on_motors [J]: against standing on motors all the
-    time. alternatives: all modes, shallow to deep, each alone and at once, and their energies [J] (inf: the
-    pause is too short); on motors with what the controller does by itself. modes: the sequence, each asked
-    for at its switch time [s]. expected, worst,
-    clairvoyant [J]: mean and largest energy, and the mean with each length known at the start. late, latest
-    [s]: mean and largest time from the end of the pause until the robot is ready. posture: where to wait, "":
-    where the robot stands; posture_energies [J]: at each of the postures; trips: what moving there takes, in
-    words.
+    chosen: the deepest mode that is asked for. wake_at [s] from the start of the pause, inf: its
+    end wakes the robot. saving [J]: against what the controller does by itself (`timer` s on
+    motors, then on brakes); saving_low, saving_high [J]: its 90 % interval. saving_on_motors [J]:
+    against standing on motors all the time. alternatives: all modes, shallow to deep, each alone
+    and at once, and their energies [J] (inf: the pause is too short); on motors with what the
+    controller does by itself. modes: the sequence, each asked for at its switch time [s]. expected,
+    worst, clairvoyant [J]: mean and largest energy, and the mean with each length known at the
+    start. late, latest [s]: mean and largest time from the end of the pause until the robot is
+    ready. posture: where to wait, "": where the robot stands; posture_energies [J]: at each of the
+    postures; trips: what moving there takes, in words.
     """
 
     chosen: PowerMode
@@ -61,13 +62,15 @@ class Standby:
 
     @property
     def sentence(self) -> str:
-        """How the pause is spent, what is saved against what, and what it costs that its end is not known."""
+        """How the pause is spent, what is saved against what, and what it costs that its end is not
+        known.
+        """
         steps = ", ".join(
             f"{mode} at {at:g} s" for mode, at in zip(self.modes, self.switch_times, strict=True)
         )
         parts = [
-            f"{steps}: saves {self.saving:.0f} J (predicted, 90 % interval {self._within}) against the "
-            f"controller's own timer (brakes after {self.timer:g} s on motors), "
+            f"{steps}: saves {self.saving:.0f} J (predicted, 90 % interval {self._within}) "
+            f"against the controller's own timer (brakes after {self.timer:g} s on motors), "
             f"{self.saving_on_motors:.0f} J against standing on motors"
         ]
         if np.isinf(self.wake_at):
@@ -82,35 +85,47 @@ class Standby:
     def _within(self) -> str:
         within = f"{self.saving_low:.0f} to {self.saving_high:.0f} J"
         doubtful = self.saving_low <= 0.0 <= self.saving_high and self.saving != 0.0
-        return f"{within}, zero lies in it: it is open whether anything is saved" if doubtful else within
+        return (
+            f"{within}, zero lies in it: it is open whether anything is saved"
+            if doubtful
+            else within
+        )
 
 
 def pause_energy(
     name: str, pause: float, q: FloatArray, scene: PlanningScene, times: TransitionTimes
 ) -> float:
-    """Energy [J] of a pause [s] in a mode until the next movement can start, inf when it is too short for it.
+    """Energy [J] of a pause [s] in a mode until the next movement can start, inf when it is too
+    short for it.
 
     The robot stands at q (n,). On motors: with what the controller does by itself.
     """
     rests = rests_at(q, scene, times)
-    return rests.cost((), pause)[0] if name == MOTORS else rests.in_time((rests.named(name),), pause)
+    return (
+        rests.cost((), pause)[0] if name == MOTORS else rests.in_time((rests.named(name),), pause)
+    )
 
 
 def late_start(pause: float, scene: PlanningScene, times: TransitionTimes) -> float:
-    """How much later than the end of a pause [s] on motors the next movement starts: the brakes that the
-    controller has closed must open.
+    """How much later than the end of a pause [s] on motors the next movement starts: the brakes
+    that the controller has closed must open.
     """
     return rests_at(np.array(scene.cell.machine_home), scene, times).cost((), pause)[1]
 
 
-def plan_standby(pause: float, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> Standby:
+def plan_standby(
+    pause: float, q: FloatArray, scene: PlanningScene, times: TransitionTimes
+) -> Standby:
     """How to spend a pause [s] at q (n,). Raises RequestError for a pause that is none."""
     return advice(lengths_of(pause), q, scene, times)
 
 
-def advice(lengths: Lengths, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> Standby:
+def advice(
+    lengths: Lengths, q: FloatArray, scene: PlanningScene, times: TransitionTimes
+) -> Standby:
     """How to spend a pause of these lengths at q (n,)."""
-    rests, pause = rests_at(q, scene, times), lengths.most
+    rests = rests_at(q, scene, times)
+    pause = lengths.most
     steps, cost = _known(rests, pause) if lengths.known else _policy(rests, lengths)
     by_itself = _mean(rests, (), lengths)
     modes, switches = _shown(rests, steps, pause)
@@ -183,7 +198,9 @@ def _mean(rests: Rests, steps: Steps, lengths: Lengths) -> float:
 
 
 def _alone(rests: Rests, lengths: Lengths, by_itself: float) -> tuple[float, ...]:
-    """Energies [J] of every mode alone, asked for at once; inf where a pause of known length is too short."""
+    """Energies [J] of every mode alone, asked for at once; inf where a pause of known length is too
+    short.
+    """
     if lengths.known:
         return (by_itself, *(rests.in_time((rest,), lengths.most) for rest in rests.modes))
     return (by_itself, *(_mean(rests, (Step(rest, 0.0),), lengths) for rest in rests.modes))
@@ -202,7 +219,9 @@ def _shown(rests: Rests, steps: Steps, most: float) -> tuple[tuple[str, ...], tu
 def _mode(name: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> PowerMode:
     data = scene.power.mode(name)
     motors = mode_watts(MOTORS, q, scene)
-    enter, leave, stay = times.enter(name), times.leave(name), times.minimum_stay(name)
+    enter = times.enter(name)
+    leave = times.leave(name)
+    stay = times.minimum_stay(name)
     return PowerMode(
         mode=Mode[name],
         name=name,
@@ -224,7 +243,8 @@ def _known_modes(scene: PlanningScene) -> list[str]:
 
 
 def break_even(name: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> float:
-    """Pause [s] at q (n,) from which a mode saves against the next shallower one, both entered from motors;
+    """Pause [s] at q (n,) from which a mode saves against the next shallower one, both entered from
+    motors;
     inf: never.
     """
     known = _known_modes(scene)
@@ -232,7 +252,8 @@ def break_even(name: str, q: FloatArray, scene: PlanningScene, times: Transition
     if k == 0:
         return 0.0
     motors = mode_watts(MOTORS, q, scene)
-    shallower, deeper = known[k - 1], name
+    shallower = known[k - 1]
+    deeper = name
     watts = [mode_watts(mode, q, scene) for mode in (shallower, deeper)]
     extra = [
         (motors - power) * (times.enter(mode) + times.leave(mode))

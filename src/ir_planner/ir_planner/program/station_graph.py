@@ -1,10 +1,13 @@
-"""Which configuration at which station: the cheapest chain over stations x configurations, settled lazily.
+"""Which configuration at which station: the cheapest chain over stations x configurations, settled
+lazily.
 
-A hop leads from one stop to the next in three parts: leaving the first (service line), across, entering the
-second. Every part starts with a lower bound of its cost. The cheapest chain is found with what is known, its
-open parts are settled (to a higher bound or to their true cost), and that repeats until the cheapest chain is
-settled as a whole: then it is the cheapest of all, because no other can cost less than its bounds. Where work
-ends first, the cheapest settled chain is the answer, and `bound` says what the best could still cost.
+A hop leads from one stop to the next in three parts: leaving the first (service line), across,
+entering the second. Every part starts with a lower bound of its cost. The cheapest chain is found
+with what is known, its open parts are settled (to a higher bound or to their true cost), and that
+repeats until the cheapest chain is
+settled as a whole: then it is the cheapest of all, because no other can cost less than its bounds.
+Where work ends first, the cheapest settled chain is the answer, and `bound` says what the best
+could still cost.
 """
 
 from collections.abc import Callable
@@ -14,13 +17,15 @@ import numpy as np
 
 from ir_msgs_py.arrays import BoolArray, FloatArray
 
-LEAVE, ACROSS, ENTER = "leave", "across", "enter"
+LEAVE = "leave"
+ACROSS = "across"
+ENTER = "enter"
 
 
 @dataclass(frozen=True, order=True)
 class Part:
-    """Part of a hop: from configuration `first` of its first stop and to `second` of its second one; -1: of
-    all of them, where only the other counts.
+    """Part of a hop: from configuration `first` of its first stop and to `second` of its second
+    one; -1: of all of them, where only the other counts.
     """
 
     hop: int
@@ -31,8 +36,8 @@ class Part:
 
 @dataclass(frozen=True)
 class Settled:
-    """A lower bound of a part's cost, or (exact) the cost itself; inf: the part is impossible. proved: the
-    bound isn't only measured.
+    """A lower bound of a part's cost, or (exact) the cost itself; inf: the part is impossible.
+    proved: the bound isn't only measured.
     """
 
     cost: float
@@ -41,12 +46,16 @@ class Settled:
 
 
 class Hop:
-    """Lower bounds of leaving (A,), across (A, B) and entering (B,), and which are exact. `cost`: with bounds
-    that are measured, `proved`: without.
+    """Lower bounds of leaving (A,), across (A, B) and entering (B,), and which are exact. `cost`:
+    with bounds that are measured, `proved`: without.
     """
 
     def __init__(self, leave: FloatArray, across: FloatArray, enter: FloatArray) -> None:
-        self.cost = {LEAVE: leave.copy()[:, None], ACROSS: across.copy(), ENTER: enter.copy()[None, :]}
+        self.cost = {
+            LEAVE: leave.copy()[:, None],
+            ACROSS: across.copy(),
+            ENTER: enter.copy()[None, :],
+        }
         self.proved = {kind: cost.copy() for kind, cost in self.cost.items()}
         self.exact: dict[str, BoolArray] = {
             kind: np.zeros(cost.shape, dtype=bool) for kind, cost in self.cost.items()
@@ -78,14 +87,18 @@ class Hop:
 
     def open_parts(self, hop: int, first: int, second: int) -> list[Part]:
         """Parts of one pair that aren't exact yet."""
-        parts = (Part(hop, LEAVE, first, -1), Part(hop, ACROSS, first, second), Part(hop, ENTER, -1, second))
+        parts = (
+            Part(hop, LEAVE, first, -1),
+            Part(hop, ACROSS, first, second),
+            Part(hop, ENTER, -1, second),
+        )
         return [p for p in parts if not self.exact[p.kind][max(p.first, 0), max(p.second, 0)]]
 
 
 @dataclass(frozen=True)
 class Chain:
-    """Index of the configuration at every stop, its cost (inf: there is none), and the least that any chain
-    can cost; proved: by bounds that are proved alone.
+    """Index of the configuration at every stop, its cost (inf: there is none), and the least that
+    any chain can cost; proved: by bounds that are proved alone.
     """
 
     chosen: list[int]
@@ -110,8 +123,8 @@ class Chain:
 
 
 def shortest(costs: list[FloatArray]) -> tuple[list[int], float]:
-    """Indices of the cheapest chain through layers with costs (A, B) between them, and its cost (inf:
-    none).
+    """Indices of the cheapest chain through layers with costs (A, B) between them, and its cost
+    (inf: none).
     """
     total = np.zeros(len(costs[0]))
     came = []
@@ -129,8 +142,8 @@ def shortest(costs: list[FloatArray]) -> tuple[list[int], float]:
 class StationGraph:
     """Hops in order. settle(parts): what was found of each, every one a higher bound or exact.
 
-    tolerance: share of the cost by which the answer may exceed the best. may_go_on: asked while a settled
-    chain is known; must_end: while none is.
+    tolerance: share of the cost by which the answer may exceed the best. may_go_on: asked while a
+    settled chain is known; must_end: while none is.
     """
 
     hops: list[Hop]

@@ -1,5 +1,5 @@
-"""A program as its planner sees it: every step with what is held, where the parts lie and how the doors stand
-before and after it.
+"""A program as its planner sees it: every step with what is held, where the parts lie and how the
+doors stand before and after it.
 """
 
 from dataclasses import dataclass, field
@@ -43,7 +43,9 @@ class Scenes:
     power: PowerData
     drives: Drives = field(default_factory=Drives)
     bare: bool = False
-    _built: dict[tuple[str, tuple[tuple[str, str], ...], Doors], PlanningScene] = field(default_factory=dict)
+    _built: dict[tuple[str, tuple[tuple[str, str], ...], Doors], PlanningScene] = field(
+        default_factory=dict
+    )
 
     def before(self, placed: PlacedStep) -> PlanningScene:
         """The scene in which a step moves."""
@@ -92,8 +94,8 @@ def steps_of(cell: Cell, stations: tuple[str, ...]) -> tuple[ProgramStep, ...]:
 def placed_steps(
     cell: Cell, steps: tuple[ProgramStep, ...], places: PartPlaces, begin: Doors = ()
 ) -> tuple[PlacedStep, ...]:
-    """The steps with the parts before and after each; begin: doors that are not as the cell has them. Raises
-    RequestError for a step that can't be done.
+    """The steps with the parts before and after each; begin: doors that are not as the cell has
+    them. Raises RequestError for a step that can't be done.
     """
     result = []
     for k, (step, doors) in enumerate(zip(steps, doors_along(cell, steps, begin), strict=True), 1):

@@ -1,10 +1,12 @@
-"""The movements of one chain at many values of a second: a Pareto front of time and energy for every part.
+"""The movements of one chain at many values of a second: a Pareto front of time and energy for
+every part.
 
-What a second is worth decides how fast a movement is: planned at the same value, all movements of a program
-trade seconds for joules at the same rate, which is the best distribution of the time there is.
+What a second is worth decides how fast a movement is: planned at the same value, all movements of a
+program trade seconds for joules at the same rate, which is the best distribution of the time there
+is.
 
-A movement of one value may be in a poorer local minimum than that of another: near the cycle time that is
-asked for, such a one is optimised again from the better one.
+A movement of one value may be in a poorer local minimum than that of another: near the cycle time
+that is asked for, such a one is optimised again from the better one.
 """
 
 import itertools
@@ -20,7 +22,8 @@ from ir_planner.program.request import StageError
 from ir_planner.program.station_graph import ACROSS, Part
 from ir_planner.timing import Movement
 
-_POOR = 1e-3  # of the cost at a value: a movement that costs more than another one by that is optimised again
+# of the cost at a value: a movement that costs more than another one by that is optimised again
+_POOR = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +59,8 @@ class TimeValues:
     """Points of the parts of one chain on a ladder of values."""
 
     def __init__(self, ladder: Ladder, parts: Sequence[Part]) -> None:
-        self.ladder, self.parts = ladder, tuple(parts)
+        self.ladder = ladder
+        self.parts = tuple(parts)
         self._points: dict[Part, list[Point]] = {part: [] for part in self.parts}
         self._seconds: dict[int, float] = {}
         self._exchanged: set[tuple[int, Part]] = set()
@@ -76,7 +80,10 @@ class TimeValues:
     @property
     def fastest(self) -> dict[Part, Movement]:
         """The fastest movements that are known."""
-        return {part: min(points, key=lambda p: p.seconds).movement for part, points in self._points.items()}
+        return {
+            part: min(points, key=lambda p: p.seconds).movement
+            for part, points in self._points.items()
+        }
 
     @property
     def own_seconds(self) -> float:
@@ -97,18 +104,23 @@ class TimeValues:
         return seconds
 
     def bracket(self, seconds: float, first: int | None = None) -> int:
-        """Plan at neighbouring rungs between which the movements take `seconds`; the faster of both. first:
+        """Plan at neighbouring rungs between which the movements take `seconds`; the faster of
+        both. first:
         the rung to begin at, None: at the request's own value.
         """
-        slow, fast, work = -1, FASTEST, self.ladder.own.context.work
-        rung, step = self.ladder.first if first is None else first, 1
+        slow = -1
+        fast = FASTEST
+        work = self.ladder.own.context.work
+        rung = self.ladder.first if first is None else first
+        step = 1
         while True:  # in growing steps
             late = self.seconds(rung) > seconds
             slow, fast = (max(slow, rung), fast) if late else (slow, min(fast, rung))
             beyond = rung + step if late else rung - step
             if not slow < beyond < fast or work.exhausted:
                 break
-            rung, step = beyond, 2 * step
+            rung = beyond
+            step = 2 * step
         while fast - slow > 1 and not work.exhausted:
             middle = (slow + fast) // 2
             slow, fast = (middle, fast) if self.seconds(middle) > seconds else (slow, middle)
@@ -117,10 +129,13 @@ class TimeValues:
         return fast
 
     def _exchange(self, rungs: Iterable[int]) -> None:
-        """Movements that cost more at a rung than one of another value does are optimised again from it."""
+        """Movements that cost more at a rung than one of another value does are optimised again
+        from it.
+        """
         ladder = self.ladder
         for rung in rungs:
-            rates, poor = ladder.rates(rung), dict[Part, Movement]()
+            rates = ladder.rates(rung)
+            poor = dict[Part, Movement]()
             for part, points in self._points.items():
                 own = ladder.at(rung).movement(part)
                 best = min(points, key=lambda point: point.cost(rates))
@@ -135,7 +150,9 @@ class TimeValues:
 
     def least(self, value: float) -> float:
         """What the chain costs at a value of a second [W], by all movements that are known."""
-        return sum(min(p.joules + value * p.seconds for p in points) for points in self._points.values())
+        return sum(
+            min(p.joules + value * p.seconds for p in points) for points in self._points.values()
+        )
 
     def fronts(self) -> dict[Part, list[Point]]:
         """The convex Pareto front of every part, fastest first."""
@@ -143,8 +160,8 @@ class TimeValues:
 
 
 def convex_front(points: Sequence[Point]) -> list[Point]:
-    """Points below which no mixture of two others lies, fastest first: each slower one saves joules, and
-    fewer per second than the one before.
+    """Points below which no mixture of two others lies, fastest first: each slower one saves
+    joules, and fewer per second than the one before.
     """
     front: list[Point] = []
     for point in sorted(points, key=lambda p: (p.seconds, p.joules)):

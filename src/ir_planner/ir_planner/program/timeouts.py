@@ -1,11 +1,13 @@
-"""When to rest deeper in a pause whose end is not known: the timeout policy of least expected energy.
+"""When to rest deeper in a pause whose end is not known: the timeout policy of least expected
+energy.
 
-The lengths of the pause are given as equally likely samples. A policy is a sequence of modes with switch
-times; the end of the pause wakes the robot, whatever mode it is in. The best switch times are among few: the
-expected energy grows with a switch time between two samples (every pause that reaches it stays longer in the
-mode that draws more, or is ready later), and drops only where a sample is passed, because that pause ends
-before the switch. So a switch is at 0, at a sample (of the pauses longer than that), at the controller's own
-timer, or at the moment when the mode before can be left. Over these times the policy is found backwards, mode
+The lengths of the pause are given as equally likely samples. A policy is a sequence of modes with
+switch times; the end of the pause wakes the robot, whatever mode it is in. The best switch times
+are among few: the expected energy grows with a switch time between two samples (every pause that
+reaches it stays longer in the mode that draws more, or is ready later), and drops only where a
+sample is passed, because that pause ends before the switch. So a switch is at 0, at a sample (of
+the pauses longer than that), at the controller's own timer, or at the moment when the mode before
+can be left. Over these times the policy is found backwards, mode
 by mode, by dynamic programming: exact, in n log n.
 """
 
@@ -34,7 +36,8 @@ class Timeouts:
 
     def _first(self) -> Steps:
         """The first mode and its switch time; none: no pause outlasts standing on motors."""
-        rests, lengths = self.rests, self.lengths
+        rests = self.rests
+        lengths = self.lengths
         times = np.concatenate(([0.0], lengths[lengths <= rests.timer]))
         best = float("inf"), Steps()
         if lengths[-1] <= rests.timer:
@@ -49,14 +52,17 @@ class Timeouts:
 
     def _next(self, step: Step) -> Step | None:
         """The mode after a step and its switch time; None: it is the last."""
-        rest, lengths = step.rest, self.lengths
+        rest = step.rest
+        lengths = self.lengths
         at = np.concatenate(([step.free], lengths[lengths >= step.free]))
-        least, best = self._until(lengths[-1:], rest.watts, rest.leave)[0], None
+        least = self._until(lengths[-1:], rest.watts, rest.leave)[0]
+        best = None
         for deeper in self._deeper(rest):
             costs = self._until(at, rest.watts, rest.leave) + self._from(at, deeper, rest.watts)
             k = int(np.argmin(costs))
             if self._longer(at)[k] and costs[k] < least:
-                least, best = costs[k], Step(deeper, float(at[k]))
+                least = costs[k]
+                best = Step(deeper, float(at[k]))
         return best
 
     def _deeper(self, rest: Rest) -> tuple[Rest, ...]:
@@ -75,8 +81,8 @@ class Timeouts:
         return len(self.lengths) - self._shorter(times)
 
     def _until(self, times: FloatArray, watts: float, leave: float) -> FloatArray:
-        """Energy of all pauses in one mode from time 0 until each of these times, and back to motors of those
-        that end before; differences of two times are the energy between them.
+        """Energy of all pauses in one mode from time 0 until each of these times, and back to
+        motors of those that end before; differences of two times are the energy between them.
         """
         ended = self._shorter(times)
         lengths = self._sums[ended.astype(np.intp)]
@@ -85,27 +91,32 @@ class Timeouts:
         return staying + back
 
     def _from(self, times: FloatArray, rest: Rest, watts: float) -> FloatArray:
-        """Least energy, of all pauses that are longer, of entering a mode at each of these times from one
-        that draws `watts`, until the robot is ready.
+        """Least energy, of all pauses that are longer, of entering a mode at each of these times
+        from one that draws `watts`, until the robot is ready.
         """
-        longer, free = self._longer(times), times + rest.busy
+        longer = self._longer(times)
+        free = times + rest.busy
         entering = longer * (watts * rest.enter + rest.watts * rest.stay)
         early = (longer - self._longer(free)) * (self.rests.motors * rest.leave)
         return entering + early + self._after(free, rest)
 
     def _after(self, free: FloatArray, rest: Rest) -> FloatArray:
-        """Least energy from each of the times on, from which a mode can be left, of all pauses that are
-        longer.
+        """Least energy from each of the times on, from which a mode can be left, of all pauses that
+        are longer.
         """
         ends = self._onward(self.lengths, rest)
         later = np.minimum.accumulate(ends[::-1])[::-1]
         following = np.searchsorted(self.lengths, free, side="left")
         at_samples = np.append(later, np.inf)[following]
-        best = np.minimum(at_samples, self._onward(free, rest)) - self._until(free, rest.watts, rest.leave)
+        best = np.minimum(at_samples, self._onward(free, rest)) - self._until(
+            free, rest.watts, rest.leave
+        )
         return np.where(self._longer(free) > 0, best, 0.0)
 
     def _onward(self, times: FloatArray, rest: Rest) -> FloatArray:
-        """Energy in the mode from time 0 until each of these times, then deeper; the last: to the end."""
+        """Energy in the mode from time 0 until each of these times, then deeper; the last: to the
+        end.
+        """
         staying = self._until(times, rest.watts, rest.leave)
         options = [self._from(times, deeper, rest.watts) for deeper in self._deeper(rest)]
         nobody = self._longer(times) == 0

@@ -1,7 +1,7 @@
 """Where to wait: at which of some postures a pause costs least, moving there and back included.
 
-The movement there is the beginning of the pause. Of a pause of known length the movement back is its end;
-where the end is not known, the robot is woken at the end and ready when it is back.
+The movement there is the beginning of the pause. Of a pause of known length the movement back is
+its end; where the end is not known, the robot is woken at the end and ready when it is back.
 """
 
 from dataclasses import dataclass, replace
@@ -15,7 +15,8 @@ from ir_planner.scene import PlanningScene
 
 @dataclass(frozen=True, eq=False)
 class Trip:
-    """To a posture q (n,) and back: seconds and joules at the mains of both; ids of the trajectories.
+    """To a posture q (n,) and back: seconds and joules at the mains of both; ids of the
+    trajectories.
 
     problem: why it isn't possible, "" where it is.
     """
@@ -45,13 +46,21 @@ class Trip:
 
 
 def best_posture(
-    lengths: Lengths, q: FloatArray, trips: tuple[Trip, ...], scene: PlanningScene, times: TransitionTimes
+    lengths: Lengths,
+    q: FloatArray,
+    trips: tuple[Trip, ...],
+    scene: PlanningScene,
+    times: TransitionTimes,
 ) -> Standby:
-    """How to spend a pause of these lengths, and where: at q (n,), where the robot stands, or elsewhere."""
+    """How to spend a pause of these lengths, and where: at q (n,), where the robot stands, or
+    elsewhere.
+    """
     here = advice(lengths, q, scene, times)
     options = [_after(trip, here, lengths, scene, times) for trip in trips]
     energies = tuple(float("inf") if option is None else option.energy for option in options)
-    best = min((here, *(option for option in options if option is not None)), key=lambda each: each.energy)
+    best = min(
+        (here, *(option for option in options if option is not None)), key=lambda each: each.energy
+    )
     return replace(best, posture_energies=energies, trips=tuple(trip.sentence for trip in trips))
 
 

@@ -1,7 +1,8 @@
-"""Withdrawals for a program: at stations that lie in a zone which the straight service line does not leave.
+"""Withdrawals for a program: at stations that lie in a zone which the straight service line does
+not leave.
 
-Some searches per branch; configurations that differ by whole turns share their paths, shifted by the turns. A
-path must be free both with what is held on arriving and with what is held on leaving.
+Some searches per branch; configurations that differ by whole turns share their paths, shifted by
+the turns. A path must be free both with what is held on arriving and with what is held on leaving.
 """
 
 from collections import Counter
@@ -17,14 +18,19 @@ from ir_planner.search import EXIT, first_different
 from ir_planner.service import Exit, ExitPath, ExitSearch, ServiceLine, WorkArea, withdrawal
 
 _WANTED = 2  # paths per search: the second is for the scene in which the first collides
-_SEARCHES = 3  # per branch, whatever the seed, which adds to them: chance decided up to 2 % of a program's J
-_FOR_ANOTHER, _MOST = 16_000, 16  # max_iterations that buy another search, and another path; at most
+# per branch, whatever the seed, which adds to them: chance decided up to 2 % of a program's J
+_SEARCHES = 3
+# max_iterations that buy another search, and another path; at most
+_FOR_ANOTHER = 16_000
+_MOST = 16
 _KEPT = 6  # paths per branch: each is a configuration of its own for the chain
 _SAME = 1e-6  # rad
 
 
 def leaves_zone(lines: list[ServiceLine], context: Context) -> list[bool]:
-    """Which service lines end outside the zone of the station's machine; all where its work is outside."""
+    """Which service lines end outside the zone of the station's machine; all where its work is
+    outside.
+    """
     if not lines:
         return []
     area = WorkArea.of(context.scene, context.scene.station(context.station))
@@ -40,7 +46,9 @@ def withdrawn_lines(
     searches: Mapping[str, ExitSearch],
     rejected: Counter[str],
 ) -> list[ServiceLine]:
-    """Paths out of the zone from interaction configurations (K, n), free on arriving and on leaving."""
+    """Paths out of the zone from interaction configurations (K, n), free on arriving and on
+    leaving.
+    """
     found: list[ServiceLine] = []
     searched: list[tuple[FloatArray, list[ExitPath]]] = []
     robot = both[0].scene.cell.robot
@@ -66,8 +74,8 @@ def _turned(a: FloatArray, b: FloatArray) -> bool:
 def _exit_paths(
     q: FloatArray, both: tuple[Context, Context], searches: Mapping[str, ExitSearch]
 ) -> list[ExitPath]:
-    """Different paths (M, n) that are free in both scenes, of several searches in each of them; which serves
-    best is decided with the chain.
+    """Different paths (M, n) that are free in both scenes, of several searches in each of them;
+    which serves best is decided with the chain.
     """
     found: list[ExitPath] = []
     method = both[0].scene.station(both[0].station).search.withdrawal
@@ -76,7 +84,8 @@ def _exit_paths(
         inside = FreeSpace.of(here.scene, here.safety_distance, here.work, here.station)
         if here.work.exhausted or not inside.states_free(q[None])[0]:
             return []
-        problem, other = Exit.of(q, here), Exit.of(q, there)
+        problem = Exit.of(q, here)
+        other = Exit.of(q, there)
         for seed in dict.fromkeys(
             (*range(_SEARCHES), here.journal.seed, *range(_SEARCHES, _SEARCHES + more))
         ):

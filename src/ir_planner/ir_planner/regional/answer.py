@@ -10,8 +10,8 @@ from ir_msgs_py.trajectory import JointTrajectory
 
 @dataclass(frozen=True, eq=False)
 class MovementPlan:
-    """The answer to a request for a movement; trajectory and waypoints (M, n) None unless the status is
-    SUCCESS.
+    """The answer to a request for a movement; trajectory and waypoints (M, n) None unless the
+    status is SUCCESS.
     """
 
     status: Status

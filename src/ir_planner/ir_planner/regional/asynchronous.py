@@ -1,5 +1,5 @@
-"""Asynchronous movements: each joint with a law of its own, beside the synchronous answer to the same
-request.
+"""Asynchronous movements: each joint with a law of its own, beside the synchronous answer to the
+same request.
 """
 
 from collections.abc import Callable
@@ -18,8 +18,9 @@ SYNCHRONOUS = "timing is synchronous: own laws for the joints serve no better"
 
 
 def with_own_laws(context: Context, synchronous: Callable[[], Found]) -> Found:
-    """The better of the synchronous answer and of the same free path in straight steps, each joint with its
-    own law; it notes when it is the synchronous one. The synchronous one too where planning_time is over.
+    """The better of the synchronous answer and of the same free path in straight steps, each joint
+    with its own law; it notes when it is the synchronous one. The synchronous one too where
+    planning_time is over.
 
     Raises what `synchronous` raises where own laws don't serve either.
     """
@@ -27,13 +28,19 @@ def with_own_laws(context: Context, synchronous: Callable[[], Found]) -> Found:
     try:
         status, common = synchronous()
     except RequestError as error:
-        status, common, refused = Status.success(), None, error
+        status = Status.success()
+        common = None
+        refused = error
     with context.journal.stage("asynchronous") as notes:
         if common is not None and _too_late(context):
             notes.append(LATE)
             return status, common
         own = None if common is None else _own(common, context)
-        if own is not None and common is not None and (_as_named(context) or own.cost <= common.cost):
+        if (
+            own is not None
+            and common is not None
+            and (_as_named(context) or own.cost <= common.cost)
+        ):
             notes.append(own.note or "each joint has its own law")
             context.journal.timing = own.timing
             return status, own
@@ -54,8 +61,8 @@ def _as_named(context: Context) -> bool:
 
 
 def _own(common: Movement, context: Context) -> Movement | None:
-    """The movement over the free path that the synchronous one came from; None where no joint has a law of
-    its own, or it isn't certified.
+    """The movement over the free path that the synchronous one came from; None where no joint has a
+    law of its own, or it isn't certified.
     """
     try:
         space = FreeSpace.of(context.scene, context.safety_distance, context.work)

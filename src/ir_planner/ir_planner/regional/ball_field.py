@@ -1,7 +1,9 @@
-"""Where a ball of the robot may be: clearance on a grid of cubes, never below what is true within them.
+"""Where a ball of the robot may be: clearance on a grid of cubes, never below what is true within
+them.
 
-A point fixed to a link moves on a continuous curve, within the reach of the arm and outside the bodies by its
-capsule's radius and what the pair must keep. So does the ball around it, from cube to neighbouring cube.
+A point fixed to a link moves on a continuous curve, within the reach of the arm and outside the
+bodies by its capsule's radius and what the pair must keep. So does the ball around it, from cube to
+neighbouring cube.
 """
 
 from collections.abc import Sequence
@@ -24,8 +26,9 @@ Index = tuple[int, int, int]
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """Where joint 2 of an arm may be, a circle about the axis (3,) of joint 1 through its origin (3,): height
-    above the origin and radius [m]; steps (n - 1,): from each later joint to the next, added up.
+    """Where joint 2 of an arm may be, a circle about the axis (3,) of joint 1 through its origin
+    (3,): height above the origin and radius [m]; steps (n - 1,): from each later joint to the next,
+    added up.
     """
 
     origin: FloatArray
@@ -42,18 +45,22 @@ class Reach:
         shoulder = frame[:3, :3] @ robot.joint_origin[1][:3, 3]
         height = float(shoulder @ axis)
         steps = np.cumsum(np.append(0.0, np.linalg.norm(robot.joint_origin[2:, :3, 3], axis=1)))
-        return Reach(frame[:3, 3], axis, height, float(np.linalg.norm(shoulder - height * axis)), steps)
+        return Reach(
+            frame[:3, 3], axis, height, float(np.linalg.norm(shoulder - height * axis)), steps
+        )
 
     def beyond_circle(self, link: int, offset: float) -> float:
-        """How far from the circle a point of a link >= 2 can be, `offset` m from the origin of its frame."""
+        """How far from the circle a point of a link >= 2 can be, `offset` m from the origin of its
+        frame.
+        """
         return float(self.steps[link - 2]) + offset
 
 
 @dataclass(frozen=True, eq=False)
 class BallField:
-    """left (X, Y, Z) m: distance of each cube's centre from the bodies less what they must keep, `_FAR` where
-    that is more than any ball needs; nearest (X, Y, Z): number of that body; low (3,): the first centre;
-    circle (X, Y, Z) m: distance from where joint 2 may be.
+    """left (X, Y, Z) m: distance of each cube's centre from the bodies less what they must keep,
+    `_FAR` where that is more than any ball needs; nearest (X, Y, Z): number of that body; low (3,):
+    the first centre; circle (X, Y, Z) m: distance from where joint 2 may be.
     """
 
     left: FloatArray32
@@ -65,8 +72,8 @@ class BallField:
     def of(
         bodies: Sequence[Body], kept: FloatArray, reach: Reach, farthest: float, most: float
     ) -> "BallField":
-        """Of bodies in the world that must be kept off by kept (B,) m; for points up to `farthest` m from
-        where joint 2 may be, and balls of radius up to `most` m.
+        """Of bodies in the world that must be kept off by kept (B,) m; for points up to `farthest`
+        m from where joint 2 may be, and balls of radius up to `most` m.
         """
         half = reach.circle + farthest + abs(reach.height)
         count = int(np.ceil(2.0 * half / _EDGE)) + 1
@@ -92,8 +99,8 @@ class BallField:
         return i, j, k
 
     def components(self, needed: float, beyond: float) -> NDArray[np.int32]:
-        """Number of the connected component of each cube (X, Y, Z) in which a ball that needs so many m may
-        be, up to `beyond` m from where joint 2 may be; 0: in none.
+        """Number of the connected component of each cube (X, Y, Z) in which a ball that needs so
+        many m may be, up to `beyond` m from where joint 2 may be; 0: in none.
         """
         there = (self.left > needed - _CORNER) & (self.circle <= beyond + _CORNER)
         return np.asarray(label(there, _NEIGHBOURS)[0], np.int32)
@@ -107,8 +114,12 @@ class BallField:
 
 def _from_circle(low: FloatArray, count: int, reach: Reach) -> FloatArray32:
     """Distance (X, Y, Z) m of the cubes' centres from where joint 2 may be."""
-    lines = [(low[k] - reach.origin[k] + _EDGE * np.arange(count)).astype(np.float32) for k in range(3)]
-    x, y, z = lines[0][:, None, None], lines[1][:, None], lines[2]
+    lines = [
+        (low[k] - reach.origin[k] + _EDGE * np.arange(count)).astype(np.float32) for k in range(3)
+    ]
+    x = lines[0][:, None, None]
+    y = lines[1][:, None]
+    z = lines[2]
     a, b, c = (np.float32(value) for value in reach.axis)
     along = a * x + b * y + c * z
     across = np.sqrt(np.maximum(x * x + y * y + z * z - along * along, np.float32(0.0)))
@@ -116,7 +127,8 @@ def _from_circle(low: FloatArray, count: int, reach: Reach) -> FloatArray32:
 
 
 def distance_at_most(body: Body, points: FloatArray) -> FloatArray:
-    """A length (...) m that the distance of points (..., 3) from a body does not exceed; not negative. Exact,
+    """A length (...) m that the distance of points (..., 3) from a body does not exceed; not
+    negative. Exact,
     but for meshes: the distance from their nearest vertex.
     """
     local = (points - body.pose[:3, 3]) @ body.pose[:3, :3]
@@ -126,7 +138,9 @@ def distance_at_most(body: Body, points: FloatArray) -> FloatArray:
     if body.kind == "box":
         return np.asarray(np.linalg.norm(np.maximum(np.abs(local) - 0.5 * body.size, 0.0), axis=-1))
     if body.kind == "mesh":
-        return np.asarray(np.min([np.linalg.norm(local - v, axis=-1) for v in body.vertices], axis=0))
+        return np.asarray(
+            np.min([np.linalg.norm(local - v, axis=-1) for v in body.vertices], axis=0)
+        )
     radius, length, _ = body.size
     if body.kind == "cylinder":
         beside = np.maximum(np.hypot(x, y) - radius, 0.0)
@@ -138,7 +152,9 @@ def distance_at_most(body: Body, points: FloatArray) -> FloatArray:
 def _box_around(
     body: Body, more: float, low: FloatArray, count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """First and past-the-last indices (3,) of the cubes that may be nearer than `more` m to a body."""
+    """First and past-the-last indices (3,) of the cubes that may be nearer than `more` m to a
+    body.
+    """
     least, most = body.bounds()
     first = np.clip(np.floor((least - more - low) / _EDGE), 0, count).astype(np.int64)
     last = np.clip(np.ceil((most + more - low) / _EDGE) + 1, 0, count).astype(np.int64)

@@ -1,8 +1,9 @@
-"""Proofs that no path exists: a ball within the robot or its load would have to pass where it doesn't fit.
+"""Proofs that no path exists: a ball within the robot or its load would have to pass where it
+doesn't fit.
 
-Walls that enclose an end, or that part the arm's reach, are recognised in some tenths of a second, however
-long searches would look for a path. What isn't recognised may still be impossible: only single balls are
-followed.
+Walls that enclose an end, or that part the arm's reach, are recognised in some tenths of a second,
+however long searches would look for a path. What isn't recognised may still be impossible: only
+single balls are followed.
 """
 
 from dataclasses import dataclass
@@ -21,7 +22,9 @@ _HALVINGS = 6  # of the radius, towards the widest passage
 
 @dataclass(frozen=True, eq=False)
 class Ball:
-    """A capsule's end: name and link of the capsule, the point (3,) in the link's frame, radius [m]."""
+    """A capsule's end: name and link of the capsule, the point (3,) in the link's frame, radius
+    [m].
+    """
 
     capsule: str
     link: int
@@ -31,8 +34,9 @@ class Ball:
 
 @dataclass(frozen=True, eq=False)
 class Enclosure:
-    """end: "start" or "goal", that which is in the smaller part of the space; the capsule that can't leave
-    it, the body at the widest passage out of it, the clearance there and what the pair must keep [m].
+    """end: "start" or "goal", that which is in the smaller part of the space; the capsule that
+    can't leave it, the body at the widest passage out of it, the clearance there and what the pair
+    must keep [m].
     """
 
     end: str
@@ -43,7 +47,9 @@ class Enclosure:
 
 
 def enclosure(ends: Ends, space: FreeSpace) -> Enclosure | None:
-    """What proves that no path leads from the start to any of the goals; None: nothing is proved."""
+    """What proves that no path leads from the start to any of the goals; None: nothing is
+    proved.
+    """
     scene = space.scene
     balls = _balls(space)
     kept = _kept(balls, space)
@@ -56,10 +62,13 @@ def enclosure(ends: Ends, space: FreeSpace) -> Enclosure | None:
     field = BallField.of(bodies, lengths, reach, max(beyond), max(ball.radius for ball in balls))
     links = scene.chain.link_poses(np.concatenate([ends.start[None], ends.goals]))
     for ball, farthest in zip(balls, beyond, strict=True):
-        cubes = [field.cube(pose[:3, :3] @ ball.point + pose[:3, 3]) for pose in links[:, ball.link]]
+        cubes = [
+            field.cube(pose[:3, :3] @ ball.point + pose[:3, 3]) for pose in links[:, ball.link]
+        ]
         if _joined(field, ball.radius, farthest, cubes):
             continue
-        low, high = 0.0, ball.radius
+        low = 0.0
+        high = ball.radius
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if _joined(field, middle, farthest, cubes) else (low, middle)
@@ -83,10 +92,10 @@ def refused(found: Enclosure) -> Status:
     needed = 1e3 * found.needed
     return Status(
         StatusCode.PLANNING_FAILED,
-        f"no path exists: the {found.end} is enclosed: {found.capsule} can't get out past {found.body}; "
-        f"where the passage is widest, the two come to {1e3 * found.clearance:.0f} mm at most, "
-        f"{needed - 1e3 * found.clearance:.0f} mm below the {needed:.1f} mm they must keep; "
-        "another configuration, an open door, or a smaller safety distance, may help",
+        f"no path exists: the {found.end} is enclosed: {found.capsule} can't get out past "
+        f"{found.body}; where the passage is widest, the two come to {1e3 * found.clearance:.0f} "
+        f"mm at most, {needed - 1e3 * found.clearance:.0f} mm below the {needed:.1f} mm they "
+        "must keep; another configuration, an open door, or a smaller safety distance, may help",
     )
 
 
@@ -103,7 +112,9 @@ def _kept(balls: list[Ball], space: FreeSpace) -> dict[str, float]:
 
 
 def _balls(space: FreeSpace) -> list[Ball]:
-    """The ends of the thickest capsule of the load, and of the thickest one of the wrist and forearm."""
+    """The ends of the thickest capsule of the load, and of the thickest one of the wrist and
+    forearm.
+    """
     robot = [c for c in space.scene.cell.robot.capsules if c.link >= _FIRST_LINK]
     load = [c for one in space.scene.loads for c in one.capsules]
     thickest = [max(some, key=lambda c: c.radius) for some in (load, robot) if some]

@@ -1,8 +1,9 @@
 """Which searches look for the first free path, and which for paths of other homotopy classes.
 
-A request that names a planner gets that search alone. The default portfolio asks the cheap ones first: each
-with little work, and then those that can do more. Which class is the best is decided by guesses, before the
-first refinement and whatever the seed; searches of other seeds only add to them.
+A request that names a planner gets that search alone. The default portfolio asks the cheap ones
+first: each with little work, and then those that can do more. Which class is the best is decided by
+guesses, before the first refinement and whatever the seed; searches of other seeds only add to
+them.
 """
 
 from collections import Counter
@@ -18,38 +19,50 @@ from ir_planner.search import Ends, Search, correction_log, guesses, quick
 
 Searches = Mapping[str, Search]
 Path = tuple[str, FloatArray]  # the search that found it, and its waypoints (M, n)
-# in the order of what they cost where the straight movement collides: measured by benchmarks/regional.py
+# in the order of what they cost where the straight movement collides: measured by
+# benchmarks/regional.py
 FIRST = ("direct", "tree", "detours", "retract")
 # that find other homotopy classes with another seed
 EXPLORERS = ("detours", "tree", "genetic")
 GUESS = "guess"  # the method of movements that a guess became
-_GOALS, _FEWEST_GUESSES = 6, 8  # that guesses lead to, and so many to each of them
-# Where a straight segment is free, another class is rarely cheaper: fewer guesses, and only those descend
-# further that cost less than so many times the straight one at first sight.
-_FEW_GUESSES, _WORTH_FOLLOWING = 8, 1.3
-_RIVALS = 2  # refined like the best where a duration is requested: their order in joules is less certain
-_REFINED = 2  # coarse solutions that are optimised per turn: the second is best in one of four tasks
+# that guesses lead to, and so many to each of them
+_GOALS = 6
+_FEWEST_GUESSES = 8
+# Where a straight segment is free, another class is rarely cheaper: fewer guesses, and only those
+# descend further that cost less than so many times the straight one at first sight.
+_FEW_GUESSES = 8
+_WORTH_FOLLOWING = 1.3
+_RIVALS = (
+    2  # refined like the best where a duration is requested: their order in joules is less certain
+)
+_REFINED = (
+    2  # coarse solutions that are optimised per turn: the second is best in one of four tasks
+)
 
 
 def first_paths(
     ends: Ends, space: FreeSpace, context: Context, searches: Searches, *, briefly: bool
 ) -> list[Path]:
-    """The first free paths, by the first search that finds any; none where all failed. briefly: by searches
-    with little work, of the default portfolio only.
+    """The first free paths, by the first search that finds any; none where all failed. briefly: by
+    searches with little work, of the default portfolio only.
     """
     journal = context.journal
     for name, search in _attempts(context.options.planner_id, searches, briefly):
         with journal.stage(name) as notes:
             found = search.find(ends, space, context.options.seed, space.work)
             if found.paths:
-                notes.append(f"first feasible: {len(found.paths)} free, {len(found.paths[0])} points")
+                notes.append(
+                    f"first feasible: {len(found.paths)} free, {len(found.paths[0])} points"
+                )
             else:
                 notes.append("nothing free" + (f", {found.note}" if found.note else ""))
         if found.correction is not None:
             journal.keep(correction_log(found.correction, found.paths[0], ends.start, space))
         if found.paths:
             return [(name, path) for path in found.paths]
-        if journal.work.exhausted:  # not before the first: what is free at once is found in any time
+        if (
+            journal.work.exhausted
+        ):  # not before the first: what is free at once is found in any time
             break
     return []
 
@@ -69,10 +82,12 @@ def _attempts(planner_id: str, searches: Searches, briefly: bool) -> Iterator[tu
 def improve(
     ends: Ends, paths: list[Path], portfolio: Portfolio, context: Context, searches: Searches
 ) -> None:
-    """Optimise the first paths and guesses of many homotopy classes, refine the best of them; then look for
-    other classes by chance and optimise the best of all, turn by turn, until the work is spent.
+    """Optimise the first paths and guesses of many homotopy classes, refine the best of them; then
+    look for other classes by chance and optimise the best of all, turn by turn, until the work is
+    spent.
     """
-    work, journal = context.work, context.journal
+    work = context.work
+    journal = context.journal
     until = work.iterations + work.improvement
 
     def more() -> bool:
@@ -80,12 +95,15 @@ def improve(
 
     with journal.stage("refine") as notes:
         notes.append(
-            _refined_first(ends, paths, portfolio, guided=context.options.planner_id == "", more=more)
+            _refined_first(
+                ends, paths, portfolio, guided=context.options.planner_id == "", more=more
+            )
         )
     explorers = [name for name in EXPLORERS if context.options.planner_id in ("", name)]
     turn = 0
     with journal.stage("improve") as notes:
-        new, certified = Counter[str](), 0
+        new = Counter[str]()
+        certified = 0
         while more():
             before = work.iterations
             for name in explorers:
@@ -107,13 +125,17 @@ def improve(
 def _refined_first(
     ends: Ends, paths: list[Path], portfolio: Portfolio, *, guided: bool, more: Callable[[], bool]
 ) -> str:
-    """Optimise the first paths and, where `guided` while there is more work, guesses; refine the best. A note
-    what came of it. Guesses alone lead to movements as good as those with the first path of a search beside
-    them: where it isn't straight it counts where none of them is certified, or a duration is requested.
+    """Optimise the first paths and, where `guided` while there is more work, guesses; refine the
+    best. A note what came of it. Guesses alone lead to movements as good as those with the first
+    path of a search beside
+    them: where it isn't straight it counts where none of them is certified, or a duration is
+    requested.
     """
     requested = portfolio.context.options.duration > 0.0
-    straight, guided = any(len(path) == 2 for _, path in paths), guided and more()
-    method, free = paths[0][0], [path for _, path in paths]
+    straight = any(len(path) == 2 for _, path in paths)
+    guided = guided and more()
+    method = paths[0][0]
+    free = [path for _, path in paths]
     aside = guided and not (straight or requested)
     if not aside:
         portfolio.add(method, free)
@@ -132,11 +154,13 @@ def _refined_first(
 
 
 def _guessed(ends: Ends, portfolio: Portfolio, straight: bool) -> int:
-    """Descend from guesses to the nearest goals, which share them; how many new local minima there are.
+    """Descend from guesses to the nearest goals, which share them; how many new local minima there
+    are.
     straight: a straight segment is free.
     """
     space = portfolio.space
-    park, nearest = np.array(space.scene.cell.park), ends.goals[:_GOALS]
+    park = np.array(space.scene.cell.park)
+    nearest = ends.goals[:_GOALS]
     paths = [guesses(ends.start, goal, park, space.low, space.high) for goal in nearest]
     if straight:
         share = max(_FEW_GUESSES // len(nearest), 1)
@@ -147,8 +171,8 @@ def _guessed(ends: Ends, portfolio: Portfolio, straight: bool) -> int:
 
 
 def _fast_ones(ends: Ends, paths: list[Path], portfolio: Portfolio) -> int:
-    """Local minima that the fastest movements come from: a shorter request is met by one of them, so a longer
-    one has it among its candidates too. How many are new.
+    """Local minima that the fastest movements come from: a shorter request is met by one of them,
+    so a longer one has it among its candidates too. How many are new.
     """
     fast = Portfolio(portfolio.space, Refinement(portfolio.context.asking("time")))
     fast.add(paths[0][0], [path for _, path in paths])

@@ -9,13 +9,19 @@ from ir_planner.regional.regional import plan_regional
 from ir_planner.request import Context, Goal
 
 
-def plan_to_goal(start: FloatArray, goal: Goal, context: Context, searches: Searches) -> MovementPlan:
-    """Movement from start (n,) to a configuration, or to any free one at a pose. Raises RequestError."""
+def plan_to_goal(
+    start: FloatArray, goal: Goal, context: Context, searches: Searches
+) -> MovementPlan:
+    """Movement from start (n,) to a configuration, or to any free one at a pose. Raises
+    RequestError.
+    """
     if goal.configuration is not None:
         return plan_regional(start, goal.configuration[None], context, searches)
     assert goal.pose is not None  # a Goal has one of both
     found = free_configurations(goal.pose, context.scene, context.thresholds(), start)
     if len(found.q) == 0:
         status = no_configuration(goal.pose, context.scene, found, goal.text or "goal")
-        return MovementPlan(status, context.journal.info(start, context.joint_names), TrajectoryReport())
+        return MovementPlan(
+            status, context.journal.info(start, context.joint_names), TrajectoryReport()
+        )
     return plan_regional(start, found.q, context, searches)

@@ -1,4 +1,6 @@
-"""Why no regional movement was found: the pair that blocks the straight one, where, and what was tried."""
+"""Why no regional movement was found: the pair that blocks the straight one, where, and what was
+tried.
+"""
 
 from ir_kernels.collision import FREE
 from ir_msgs_py.arrays import FloatArray
@@ -7,14 +9,20 @@ from ir_planner.checks import FreeSpace, pair_value
 from ir_planner.request import Journal
 
 
-def refusal(start: FloatArray, goal: FloatArray, space: FreeSpace, journal: Journal, *, path: bool) -> Status:
-    """The status for a movement from start to goal (n,), both free, that was not found; path: one was."""
+def refusal(
+    start: FloatArray, goal: FloatArray, space: FreeSpace, journal: Journal, *, path: bool
+) -> Status:
+    """The status for a movement from start to goal (n,), both free, that was not found; path: one
+    was.
+    """
     found = space.scene.collision.certify_edges(start[None], goal[None], space.threshold)
     tried = ", ".join(f"{stage.name} ({stage.note})" for stage in journal.stages) or "nothing"
     cut = " within planning_time" if journal.work.truncated else ""
     if found.verdict[0] == FREE:
         rejected = (f"{reason} ({count})" for reason, count in journal.rejected.items())
-        reasons = "; ".join(rejected) or "max_iterations or planning_time ended before one was timed"
+        reasons = (
+            "; ".join(rejected) or "max_iterations or planning_time ended before one was timed"
+        )
         return Status(
             StatusCode.PLANNING_FAILED,
             f"the straight path is free but no movement could be certified: {reasons}"
@@ -28,8 +36,9 @@ def refusal(start: FloatArray, goal: FloatArray, space: FreeSpace, journal: Jour
     needed = float(space.threshold[int(found.pair[0])])
     return Status(
         StatusCode.PLANNING_FAILED,
-        f"no path found{cut}: on the straight movement {pair.body_a} and {pair.body_b} ({pair.kind}) come to "
-        f"{pair.distance * 1e3:.1f} mm at {100 * share:.0f} % of it (tcp at {x:.2f}, {y:.2f}, {z:.2f} m), "
-        f"{1e3 * max(needed - pair.distance, 0.0):.1f} mm below the {needed * 1e3:.1f} mm they must keep; "
-        f"tried: {tried}; another start or goal configuration, or a smaller safety distance, may help",
+        f"no path found{cut}: on the straight movement {pair.body_a} and {pair.body_b} "
+        f"({pair.kind}) come to {pair.distance * 1e3:.1f} mm at {100 * share:.0f} % of it (tcp "
+        f"at {x:.2f}, {y:.2f}, {z:.2f} m), {1e3 * max(needed - pair.distance, 0.0):.1f} mm below "
+        f"the {needed * 1e3:.1f} mm they must keep; tried: {tried}; another start or goal "
+        "configuration, or a smaller safety distance, may help",
     )

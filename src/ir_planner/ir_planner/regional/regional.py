@@ -1,8 +1,9 @@
 """Regional movement: from one free configuration to another, around everything, at least cost.
 
-First the straight movement of all joints (PTP, cost W of eq. 9); where it collides, the searches of the
-registry. From the first free path on the answer gets better with work: guesses and paths of many homotopy
-classes descend by gradient, and the cheapest to the best path and time scaling near them, certified.
+First the straight movement of all joints (PTP, cost W of eq. 9); where it collides, the searches of
+the registry. From the first free path on the answer gets better with work: guesses and paths of
+many homotopy classes descend by gradient, and the cheapest to the best path and time scaling near
+them, certified.
 Nothing found is an answer too: which pair blocks, where, by how much, and what was tried.
 """
 
@@ -27,14 +28,19 @@ from ir_planner.scene import STILL, path_cost
 from ir_planner.search import Ends, fewest_corners, pulled
 from ir_planner.timing import Movement, check_requested
 
-_TIMED = 3  # paths that get straight steps with blended corners: the cheapest by W is rarely not best
+_TIMED = (
+    3  # paths that get straight steps with blended corners: the cheapest by W is rarely not best
+)
 
 
-def plan_regional(start: FloatArray, goals: FloatArray, context: Context, searches: Searches) -> MovementPlan:
-    """Movement from start (n,) to a goal (n,), or to the best reachable of goals (G, n), cheapest by W first.
+def plan_regional(
+    start: FloatArray, goals: FloatArray, context: Context, searches: Searches
+) -> MovementPlan:
+    """Movement from start (n,) to a goal (n,), or to the best reachable of goals (G, n), cheapest
+    by W first.
 
-    All within the limits. Raises RequestError for options that can't be met (duration), CancelledError when
-    asked to stop.
+    All within the limits. Raises RequestError for options that can't be met (duration),
+    CancelledError when asked to stop.
     """
     status, found = search_regional(start, goals, context, searches)
     info = context.journal.info(start, context.joint_names)
@@ -46,8 +52,8 @@ def plan_regional(start: FloatArray, goals: FloatArray, context: Context, search
 def search_regional(
     start: FloatArray, goals: FloatArray, context: Context, searches: Searches
 ) -> tuple[Status, Movement | None]:
-    """The best movement found, with the status that says so or says why not; start (n,), goals (n,) or
-    (G, n).
+    """The best movement found, with the status that says so or says why not; start (n,), goals (n,)
+    or (G, n).
     """
     if context.options.timing == "asynchronous":
         synchronous = context.with_timing("synchronous")
@@ -55,7 +61,7 @@ def search_regional(
     return _search(start, goals, context, searches)
 
 
-def _search(
+def _search(  # noqa: C901
     start: FloatArray, goals: FloatArray, context: Context, searches: Searches
 ) -> tuple[Status, Movement | None]:
     """The best synchronous movement found."""
@@ -73,7 +79,8 @@ def _search(
     if not paths:
         return refusal(start, ends.goals[0], space, context.journal, path=False), None
     there = np.abs(ends.goals - start).max(axis=1).min() < STILL
-    best, shortest = None, np.inf
+    best = None
+    shortest = np.inf
     if not there and context.options.planner_id != DIRECT:
         best, shortest = best_found(Exploration(ends, paths, space, searches), context)
     if context.options.planner_id == "" and not there:
@@ -92,7 +99,9 @@ def _search(
 
 
 def _impossible(ends: Ends, space: FreeSpace, context: Context) -> Status | None:
-    """The status of a request that provably can't be met, which searches would only find by giving up."""
+    """The status of a request that provably can't be met, which searches would only find by giving
+    up.
+    """
     with context.journal.stage("enclosure") as notes:
         passed = barrier(ends, space)
         enclosed = enclosure(ends, space) if passed is None else None

@@ -1,8 +1,11 @@
-"""What an answer is compared with before it is given, so that no other request would have found a better one.
+"""What an answer is compared with before it is given, so that no other request would have found a
+better one.
 
-The baseline movement is a candidate of every answer of the default portfolio. A requested duration is met by
-the cheapest movement of free duration too, and where nothing else is left by the fastest one, both stretched.
-The movements of least W have few turns: some of them are faster than what the descent for time ends in.
+The baseline movement is a candidate of every answer of the default portfolio. A requested duration
+is met by the cheapest movement of free duration too, and where nothing else is left by the fastest
+one, both stretched.
+The movements of least W have few turns: some of them are faster than what the descent for time ends
+in.
 """
 
 from collections.abc import Iterator
@@ -28,8 +31,12 @@ from ir_planner.timing import (
 )
 
 Answer = tuple[str, Movement]  # the search that found it
-_OPTIMISED_AGAIN = 2  # coarse solutions refined for another objective, and the best of them thoroughly
-_OTHER_DURATIONS, _DURATION_STEPS = (0.75, 1.33), 4  # factors tried on that of least joules, in so many steps
+_OPTIMISED_AGAIN = (
+    2  # coarse solutions refined for another objective, and the best of them thoroughly
+)
+# factors tried on that of least joules, in so many steps
+_OTHER_DURATIONS = (0.75, 1.33)
+_DURATION_STEPS = 4
 _COARSELY = 0.99  # of a bound by a few durations: the best of all is little below it
 _WORTH_PROVING = 1.01  # times the cost of the best: coarse costs are off by less
 DIRECT = "direct"  # the search that finds straight segments
@@ -46,49 +53,61 @@ class Exploration:
 
 
 def best_found(exploration: Exploration, context: Context) -> tuple[Answer | None, float]:
-    """The best answer by the searches and descents of the request and of its companions, and the shortest
-    duration [s] met where none is as short as requested.
+    """The best answer by the searches and descents of the request and of its companions, and the
+    shortest duration [s] met where none is as short as requested.
     """
     options = context.options
     own = _explored(exploration, context)
-    best, shortest = own.best(), own.refinement.shortest
+    best = own.best()
+    shortest = own.refinement.shortest
     if options.planner_id:
         return best, shortest
     if options.duration > 0.0 and best is not None:
         method, path = exploration.paths[0]
         if not (context.work.exhausted or np.array_equal(best[1].path, path)):
             own.refine_anew(method, path)
-        best, shortest = own.best(), own.refinement.shortest
+        best = own.best()
+        shortest = own.refinement.shortest
         if not np.isfinite(shortest):  # there is time for least energy
             if not context.work.exhausted:
                 own.refine_exactly()
             return own.best(), shortest
     if options.duration > 0.0:
-        free, duration = _as_asked(_optimised_again(own, context.asking("time_and_energy")), context)
-        best, shortest = _cheaper(best, free), min(shortest, duration)
+        free, duration = _as_asked(
+            _optimised_again(own, context.asking("time_and_energy")), context
+        )
+        best = _cheaper(best, free)
+        shortest = min(shortest, duration)
         if duration <= options.duration:
             return best, shortest
         own = _explored(exploration, context.asking("time"))  # there is no time for least cost
         fastest, duration = _as_asked(own.best(), context)
-        best, shortest = _cheaper(best, fastest), min(shortest, duration)
+        best = _cheaper(best, fastest)
+        shortest = min(shortest, duration)
     if options.duration > 0.0 or options.objective == "time":
         least, duration = _as_asked(_optimised_again(own, context.asking("movement_cost")), context)
-        best, shortest = _cheaper(best, least), min(shortest, duration)
+        best = _cheaper(best, least)
+        shortest = min(shortest, duration)
     if options.objective == "energy" and options.duration <= 0.0 and best is not None:
         best = best[0], _least_over_durations(best[1], context)
     return best, shortest
 
 
 def _least_over_durations(best: Movement, context: Context) -> Movement:
-    """The movement, or a faster or slower one near its path that takes less: joules depend so little on a
-    long duration that a descent ends far from the best one.
+    """The movement, or a faster or slower one near its path that takes less: joules depend so
+    little on a long duration that a descent ends far from the best one.
     """
     with context.journal.stage("other durations") as notes:
-        begin, steps = best, 0
+        begin = best
+        steps = 0
         for factor in _OTHER_DURATIONS:
             while best is begin or steps < _DURATION_STEPS:
                 duration = factor * best.trajectory.duration
-                found = None if duration > DURATION_MAX else near(best, context.asking("energy", duration))
+                found = (
+                    None
+                    if duration > DURATION_MAX
+                    else near(best, context.asking("energy", duration))
+                )
                 steps += 1
                 if found is None or found.cost >= best.cost:
                     break
@@ -99,9 +118,11 @@ def _least_over_durations(best: Movement, context: Context) -> Movement:
     return best
 
 
-def not_worse_than_baseline(best: Answer | None, paths: list[Path], context: Context) -> Answer | None:
-    """The best answer, or a movement along a free straight segment that costs less: to the goal of the best
-    answer, or to the first goal that has one. None where there is neither.
+def not_worse_than_baseline(
+    best: Answer | None, paths: list[Path], context: Context
+) -> Answer | None:
+    """The best answer, or a movement along a free straight segment that costs less: to the goal of
+    the best answer, or to the first goal that has one. None where there is neither.
     """
     straight = [path for _, path in paths if len(path) == 2]
     if best is not None:
@@ -126,7 +147,9 @@ def not_worse_than_baseline(best: Answer | None, paths: list[Path], context: Con
 
 
 def _excluded(segment: FloatArray, best: Movement, context: Context) -> bool:
-    """Whether a bound says that the baseline along a segment (2, n) costs more than the best movement."""
+    """Whether a bound says that the baseline along a segment (2, n) costs more than the best
+    movement.
+    """
     start, goal = segment
     if context.options.objective == "time" or np.abs(goal - start).max() < STILL:
         return False
@@ -134,7 +157,9 @@ def _excluded(segment: FloatArray, best: Movement, context: Context) -> bool:
 
 
 def _along(segment: FloatArray, context: Context, *, hurried: bool) -> Iterator[Movement]:
-    """The baseline along a segment (2, n), and where time is short also the fastest law that there is."""
+    """The baseline along a segment (2, n), and where time is short also the fastest law that there
+    is.
+    """
     common = baseline(segment[0], segment[1], context)
     if common is not None:
         yield common
@@ -164,13 +189,14 @@ def _optimised_again(portfolio: Portfolio, context: Context) -> Answer | None:
 
 
 def _as_asked(found: Answer | None, context: Context) -> tuple[Answer | None, float]:
-    """A movement of another objective as an answer to this request, stretched where a duration is requested;
-    None where it isn't certified or takes longer. And its own duration [s].
+    """A movement of another objective as an answer to this request, stretched where a duration is
+    requested; None where it isn't certified or takes longer. And its own duration [s].
     """
     if found is None:
         return None, np.inf
     method, other = found
-    own, requested = other.trajectory.duration, context.options.duration
+    own = other.trajectory.duration
+    requested = context.options.duration
     movement = other.asked_by(context)
     if requested > 0.0:
         if own > requested * (1.0 + DURATION_SLACK):

@@ -1,8 +1,10 @@
 """Proofs that no path exists: one joint would have to pass a value at which two links are too near.
 
-The distance of two capsules depends on the joints between them alone, and not on one that turns a capsule
-about its own axis: forearm and flange of an arm with offsets at its wrist come near at one value of axis 5,
-whatever the others do. Joints don't wrap round, so a path can't avoid a value between its ends.
+The distance of two capsules depends on the joints between them alone, and not on one that turns a
+capsule
+about its own axis: forearm and flange of an arm with offsets at its wrist come near at one value of
+axis 5, whatever the others do. Joints don't wrap round, so a path can't avoid a value between its
+ends.
 """
 
 from __future__ import annotations
@@ -23,8 +25,8 @@ _VALUES = 181  # of a joint that are tried: 2 degrees apart over a whole turn
 
 @dataclass(frozen=True)
 class Barrier:
-    """The value [rad] of a joint that no path passes, the pair that is too near there whatever the other
-    joints are, the largest distance that it has there and what it must keep [m].
+    """The value [rad] of a joint that no path passes, the pair that is too near there whatever the
+    other joints are, the largest distance that it has there and what it must keep [m].
     """
 
     joint: str
@@ -46,16 +48,19 @@ def refused(found: Barrier) -> Status:
     first, second = found.pair
     return Status(
         StatusCode.PLANNING_FAILED,
-        f"no path exists: {found.joint} would have to pass {np.degrees(found.value):.0f} deg, where "
-        f"{first} and {second} are {1e3 * found.distance:.0f} mm apart at most, below the "
-        f"{1e3 * found.needed:.1f} mm they must keep; another configuration, or a smaller safety distance, "
-        "may help",
+        f"no path exists: {found.joint} would have to pass {np.degrees(found.value):.0f} deg, "
+        f"where {first} and {second} are {1e3 * found.distance:.0f} mm apart at most, below the "
+        f"{1e3 * found.needed:.1f} mm they must keep; another configuration, or a smaller safety "
+        "distance, may help",
     )
 
 
-def _between(start: FloatArray, goal: FloatArray, space: FreeSpace, spread: FloatArray) -> Barrier | None:
+def _between(
+    start: FloatArray, goal: FloatArray, space: FreeSpace, spread: FloatArray
+) -> Barrier | None:
     """The barrier of one goal (n,) that lacks most."""
-    best, worst = None, 0.0
+    best = None
+    worst = 0.0
     for joint in np.flatnonzero(np.isfinite(spread).any(axis=1) & (start != goal)):
         q = np.tile(start, (_VALUES, 1))
         q[:, joint] = np.linspace(start[joint], goal[joint], _VALUES)
@@ -76,11 +81,13 @@ def _between(start: FloatArray, goal: FloatArray, space: FreeSpace, spread: Floa
 
 
 def spreads(scene: PlanningScene) -> FloatArray:
-    """How far (n, Z) [m] the distance of a pair changes at most while one joint keeps its value; inf where
-    that isn't bounded.
+    """How far (n, Z) [m] the distance of a pair changes at most while one joint keeps its value;
+    inf where that isn't bounded.
     """
     robot = scene.cell.robot
-    capsules = {c.name: c for c in (*robot.capsules, *(c for one in scene.loads for c in one.capsules))}
+    capsules = {
+        c.name: c for c in (*robot.capsules, *(c for one in scene.loads for c in one.capsules))
+    }
     spread = np.full((len(robot.joint_names), len(scene.collision.pairs)), np.inf)
     for number, pair in enumerate(scene.collision.pairs):
         if pair.body_b not in capsules:
@@ -96,9 +103,12 @@ def spreads(scene: PlanningScene) -> FloatArray:
 
 
 def _turned(near: Capsule, far: Capsule, scene: PlanningScene) -> dict[int, float]:
-    """How far [m] the ends of two capsules move as the joints next to them turn: nothing on their axes."""
+    """How far [m] the ends of two capsules move as the joints next to them turn: nothing on their
+    axes.
+    """
     robot = scene.cell.robot
-    first, last = near.link, far.link - 1
+    first = near.link
+    last = far.link - 1
     if first >= last:
         return {}
     origin = robot.joint_origin[first]
@@ -107,6 +117,8 @@ def _turned(near: Capsule, far: Capsule, scene: PlanningScene) -> dict[int, floa
 
 
 def _beside(capsule: Capsule, point: FloatArray, axis: FloatArray) -> float:
-    """Distance [m] of the farther end of a capsule from an axis through a point, in the capsule's frame."""
+    """Distance [m] of the farther end of a capsule from an axis through a point, in the capsule's
+    frame.
+    """
     ends = np.stack([capsule.p0, capsule.p1]) - point
     return float(np.linalg.norm(np.cross(ends, axis / np.linalg.norm(axis)), axis=1).max())

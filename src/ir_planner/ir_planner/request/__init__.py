@@ -1,6 +1,14 @@
-"""What a request asks for and what its answer says about itself: bounds, goals, counted work, the journal."""
+"""What a request asks for and what its answer says about itself: bounds, goals, counted work, the
+journal.
+"""
 
-from ir_planner.request.bounds import DURATION_MAX, bounded, checked_options, chosen, safety_distance
+from ir_planner.request.bounds import (
+    DURATION_MAX,
+    bounded,
+    checked_options,
+    chosen,
+    safety_distance,
+)
 from ir_planner.request.context import Context
 from ir_planner.request.goals import POSTURES, Goal, one_goal, parse_goal, within_limits
 from ir_planner.request.journal import Journal, noted

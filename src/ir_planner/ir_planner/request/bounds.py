@@ -36,7 +36,8 @@ def chosen(value: str, known: tuple[str, ...], name: str) -> str:
     if value not in known:
         listed = ", ".join(word or '""' for word in known)
         raise RequestError(
-            StatusCode.INVALID_GOAL_CONSTRAINTS, f"{name} {value[:60]!a} is unknown: known are {listed}"
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"{name} {value[:60]!a} is unknown: known are {listed}",
         )
     return value
 
@@ -47,7 +48,9 @@ def safety_distance(value: float) -> float:
 
 
 def checked_options(options: PlanOptions) -> tuple[PlanOptions, str]:
-    """The options within the planner's bounds, and a note where planning_time was capped ("" else)."""
+    """The options within the planner's bounds, and a note where planning_time was capped (""
+    else).
+    """
     safety_distance(options.safety_distance)
     bounded(options.time_value, 0.0, TIME_VALUE_MAX, "time_value", "W")
     if options.duration != 0.0:  # 0: free

@@ -11,8 +11,8 @@ from ir_planner.scene import MotionLimits, PlanningScene
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """scene: where the robot moves. options: as they were checked. journal: what happened so far; it counts
-    the work. station: whose allowed contacts hold in its zone; "": nobody's.
+    """scene: where the robot moves. options: as they were checked. journal: what happened so far;
+    it counts the work. station: whose allowed contacts hold in its zone; "": nobody's.
     """
 
     scene: PlanningScene
@@ -43,7 +43,9 @@ class Context:
     @property
     def limits(self) -> MotionLimits:
         """The robot's bounds times the request's scalings."""
-        return self.scene.limits.scaled(self.options.velocity_scaling, self.options.acceleration_scaling)
+        return self.scene.limits.scaled(
+            self.options.velocity_scaling, self.options.acceleration_scaling
+        )
 
     def thresholds(self) -> FloatArray:
         """Distance (Z,) m that each pair must exceed."""

@@ -1,7 +1,8 @@
-"""What a person types as a goal: a station, a posture, joint values in degrees, or a pose of the tcp.
+"""What a person types as a goal: a station, a posture, joint values in degrees, or a pose of the
+tcp.
 
-"lathe" | "park" | "home" | "A1 0 A2 -90 A3 90 A4 0 A5 0 A6 0" | "X 1.8 Y 0 Z 1.2 A 0 B 90 C 0" (m and
-degrees, KUKA's A, B, C: Z-Y'-X'').
+"lathe" | "park" | "home" | "A1 0 A2 -90 A3 90 A4 0 A5 0 A6 0" | "X 1.8 Y 0 Z 1.2 A 0 B 90 C 0" (m
+and degrees, KUKA's A, B, C: Z-Y'-X'').
 """
 
 import math
@@ -26,8 +27,8 @@ _NO_ANGLE = 1e6  # rad
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """Exactly one of configuration (n,) rad and pose (4, 4) of the tcp in the cell; station: its name, ""
-    for none.
+    """Exactly one of configuration (n,) rad and pose (4, 4) of the tcp in the cell; station: its
+    name, "" for none.
     """
 
     configuration: FloatArray | None = None
@@ -43,8 +44,10 @@ def one_goal(
     cell: Cell,
     forms: tuple[str, ...] = ("goal", "goal_state", "goal_pose"),
 ) -> Goal:
-    """The goal that a request gives in exactly one of its `forms`: configuration (n,), pose (4, 4)."""
-    given = [name for name, there in (("goal", bool(text)), ("goal_state", configuration is not None),
+    """The goal that a request gives in exactly one of its `forms`: configuration (n,), pose (4,
+    4).
+    """
+    given = [name for name, there in (("goal", bool(text)), ("goal_state", configuration is not None),  # noqa: E501
                                       ("goal_pose", pose is not None)) if there]  # fmt: skip
     if len(given) != 1:
         which = " and ".join(given) or "none (a goal_pose without a frame_id is not given)"
@@ -55,7 +58,9 @@ def one_goal(
     if text:
         return parse_goal(text, cell)
     if configuration is not None:
-        return Goal(configuration=within_limits(configuration, cell, "goal", StatusCode.GOAL_STATE_INVALID))
+        return Goal(
+            configuration=within_limits(configuration, cell, "goal", StatusCode.GOAL_STATE_INVALID)
+        )
     return Goal(pose=pose)
 
 
@@ -101,14 +106,17 @@ def _pose(values: list[float]) -> FloatArray:
 
 
 def within_limits(q: FloatArray, cell: Cell, what: str, code: StatusCode) -> FloatArray:
-    """Joint values (n,) rad within the robot's limits; else RequestError with joint, value and bounds in
-    degrees.
+    """Joint values (n,) rad within the robot's limits; else RequestError with joint, value and
+    bounds in degrees.
     """
     robot = cell.robot
     for i, value in enumerate(q):
-        low, high = float(robot.position_min[i]), float(robot.position_max[i])
+        low = float(robot.position_min[i])
+        high = float(robot.position_max[i])
         if not math.isfinite(value):
-            raise RequestError(code, f"{what}: {robot.joint_names[i]} is {value}: it must be finite")
+            raise RequestError(
+                code, f"{what}: {robot.joint_names[i]} is {value}: it must be finite"
+            )
         if not low - 1e-9 <= value <= high + 1e-9:
             raise RequestError(
                 code,

@@ -66,7 +66,9 @@ class Journal:
             truncated=self.work.truncated,
             planning_time=self.work.clock() - self.begin,
             stages=(*self.stages, *map(stage_of, self.logs)),
-            rejected=tuple(Rejection(reason, count) for reason, count in sorted(self.rejected.items())),
+            rejected=tuple(
+                Rejection(reason, count) for reason, count in sorted(self.rejected.items())
+            ),
             timing=self.timing,
         )
 

@@ -1,6 +1,7 @@
 """Which trajectories of a request are examined at all: others cost hours of proofs, or overflow.
 
-Far beyond what a robot does: a violation of its limits inside these bounds is an answer, not a refusal.
+Far beyond what a robot does: a violation of its limits inside these bounds is an answer, not a
+refusal.
 """
 
 import numpy as np
@@ -20,7 +21,9 @@ TRAVEL_MAX = 10_000.0  # rad, of all joints: of a robot at its limits in half an
 
 
 def examinable(trajectory: JointTrajectory) -> JointTrajectory:
-    """The trajectory, where its points and the motion between them are in bounds; else RequestError."""
+    """The trajectory, where its points and the motion between them are in bounds; else
+    RequestError.
+    """
     count = len(trajectory.times_ns)
     if count > POINTS_MAX:
         raise _refused(f"the trajectory has {count} points: at most {POINTS_MAX} are taken")
@@ -46,10 +49,14 @@ def _check_between(trajectory: JointTrajectory) -> None:
     _check(trajectory, "position between points", beyond, POSITION_MAX, "rad")
     travel = float(largest.travel.sum())
     if not travel <= TRAVEL_MAX:
-        raise _refused(f"its joints travel {travel:g} rad together: at most {TRAVEL_MAX:g} rad are taken")
+        raise _refused(
+            f"its joints travel {travel:g} rad together: at most {TRAVEL_MAX:g} rad are taken"
+        )
 
 
-def _check(trajectory: JointTrajectory, what: str, values: FloatArray, most: float, unit: str) -> None:
+def _check(
+    trajectory: JointTrajectory, what: str, values: FloatArray, most: float, unit: str
+) -> None:
     k, j = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
     if not abs(values[k, j]) <= most:
         raise _refused(

@@ -1,7 +1,8 @@
-"""How much work a request may cost: counted in certified edges, with time only as a ceiling, and how to
-stop it.
+"""How much work a request may cost: counted in certified edges, with time only as a ceiling, and
+how to stop it.
 
-Counting work keeps answers reproducible; a clock that cuts an answer short makes it say `truncated`.
+Counting work keeps answers reproducible; a clock that cuts an answer short makes it say
+`truncated`.
 """
 
 from collections.abc import Callable
@@ -16,10 +17,10 @@ Clock = Callable[[], float]
 class Work:
     """Work left for one request.
 
-    `max_iterations`: edges that searches may certify; the evaluations of a descent count as edges too.
-    `deadline` [s] on `clock`. `cancelled` is asked at every step. `improvement`: how much of the work may go
-    into better answers once there is one. `threads`: that may share it, 0: one per core; no answer depends on
-    it.
+    `max_iterations`: edges that searches may certify; the evaluations of a descent count as edges
+    too. `deadline` [s] on `clock`. `cancelled` is asked at every step. `improvement`: how much of
+    the work may go into better answers once there is one. `threads`: that may share it, 0: one per
+    core; no answer depends on it.
     """
 
     max_iterations: int

@@ -1,4 +1,6 @@
-"""What a request plans in: the cell, what the robot holds, their models, bounds of motion, the cost W."""
+"""What a request plans in: the cell, what the robot holds, their models, bounds of motion, the cost
+W.
+"""
 
 from ir_planner.scene.drives import Drives
 from ir_planner.scene.motion_limits import STILL, Dynamics, MotionLimits, torque_use

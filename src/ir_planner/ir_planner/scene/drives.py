@@ -1,5 +1,5 @@
-"""What a planner assumes of the drives: braking energy, the torque left to the feedback, what joules follow
-from.
+"""What a planner assumes of the drives: braking energy, the torque left to the feedback, what
+joules follow from.
 """
 
 from collections.abc import Iterable
@@ -13,8 +13,8 @@ from ir_planner.errors import RequestError
 
 @dataclass(frozen=True)
 class Drives:
-    """regeneration: what the bus does with braking energy. torque_reserve: share of the torque envelope that
-    plans leave to the feedback. parameters: None, as the data have them.
+    """regeneration: what the bus does with braking energy. torque_reserve: share of the torque
+    envelope that plans leave to the feedback. parameters: None, as the data have them.
     """
 
     regeneration: Regeneration = "shared"
@@ -27,8 +27,8 @@ class Drives:
         return 1.0 if self.parameters is None else self.parameters.value("rectifier_efficiency")
 
     def robot(self, robot: RobotModel) -> RobotModel:
-        """The robot with the friction, losses and masses of the parameters. Raises RequestError for those of
-        another robot.
+        """The robot with the friction, losses and masses of the parameters. Raises RequestError for
+        those of another robot.
         """
         own = self.parameters
         if own is None:
@@ -36,7 +36,8 @@ class Drives:
         if (own.robot, own.joints) != (robot.name, robot.joint_names):
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"power parameters {own.name!r} are of robot {own.robot!r}: the cell has {robot.name!r}",
+                f"power parameters {own.name!r} are of robot {own.robot!r}: the cell has "
+                f"{robot.name!r}",
             )
         return own.robot_with(robot)
 

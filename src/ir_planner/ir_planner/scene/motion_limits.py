@@ -22,8 +22,8 @@ class Dynamics(Protocol):
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """Bounds per joint (n,): rad/s, rad/s^2, rad/s^3; the share (0, 1] of the torque envelope to use, and the
-    share of it that is left to the feedback.
+    """Bounds per joint (n,): rad/s, rad/s^2, rad/s^3; the share (0, 1] of the torque envelope to
+    use, and the share of it that is left to the feedback.
     """
 
     velocity: FloatArray
@@ -43,8 +43,8 @@ class MotionLimits:
         )
 
     def for_speed(self, share: float) -> "MotionLimits":
-        """Tighter bounds: a motion within them keeps the true ones at 1 / share times its speed; share in
-        (0, 1].
+        """Tighter bounds: a motion within them keeps the true ones at 1 / share times its speed;
+        share in (0, 1].
         """
         return MotionLimits(
             self.velocity * share,

@@ -1,8 +1,8 @@
 """Cost of a movement by the masses that it swings: eq. (9).
 
-W = sum_i w_i |q_{s+1}^i - q_s^i| with w_i = 1/2 sum_{l=i..n} m_l qd_{l,max}^2: a joint near the base
-carries more of the arm and counts more. (As printed the lower index of the sum makes all weights equal; it
-starts at the joint.) W ranks movements; it is not their energy.
+W = sum_i w_i |q_{s+1}^i - q_s^i| with w_i = 1/2 sum_{l=i..n} m_l qd_{l,max}^2: a joint near the
+base carries more of the arm and counts more. (As printed the lower index of the sum makes all
+weights equal; it starts at the joint.) W ranks movements; it is not their energy.
 """
 
 import numpy as np
@@ -10,11 +10,13 @@ import numpy as np
 from ir_msgs_py.arrays import FloatArray
 
 
-def movement_weights(link_mass: FloatArray, velocity_max: FloatArray, load_mass: float = 0.0) -> FloatArray:
+def movement_weights(
+    link_mass: FloatArray, velocity_max: FloatArray, load_mass: float = 0.0
+) -> FloatArray:
     """Weights w (n,) of eq. (9) [kg rad^2/s^2].
 
-    `link_mass` (n+1,) kg from the base on (the base never moves and does not count), `velocity_max` (n,)
-    rad/s, `load_mass` kg is carried by the last link.
+    `link_mass` (n+1,) kg from the base on (the base never moves and does not count), `velocity_max`
+    (n,) rad/s, `load_mass` kg is carried by the last link.
     """
     mass = np.array(link_mass[1:], dtype=float)
     mass[-1] += load_mass

@@ -1,5 +1,5 @@
-"""What one request plans in: the cell as it stands, what the robot holds, and the models of both. Never
-changed.
+"""What one request plans in: the cell as it stands, what the robot holds, and the models of both.
+Never changed.
 
 A request takes its snapshot once; a cell that changes meanwhile does not reach it.
 """
@@ -50,9 +50,10 @@ def load_text(cell: Cell, held: str = "") -> str:
 
 @dataclass(frozen=True, eq=False)
 class PlanningScene:
-    """cell: its parts lie where they are for this request. loads: what is attached, in the frame of the
-    last link. drives: what is assumed of them. cell_hash: of the cell as it stood when the request came, ""
-    where nobody asked. doors: machines that are not as that cell has them, by what a driver says.
+    """cell: its parts lie where they are for this request. loads: what is attached, in the frame of
+    the last link. drives: what is assumed of them. cell_hash: of the cell as it stood when the
+    request came, "" where nobody asked. doors: machines that are not as that cell has them, by what
+    a driver says.
     """
 
     cell: Cell
@@ -100,7 +101,9 @@ class PlanningScene:
     @cached_property
     def inverse_kinematics(self) -> InverseKinematics:
         """All branches and turns, by the method that the arm allows."""
-        return inverse_kinematics(self.chain, self.cell.robot.position_min, self.cell.robot.position_max)
+        return inverse_kinematics(
+            self.chain, self.cell.robot.position_min, self.cell.robot.position_max
+        )
 
     @cached_property
     def turning(self) -> BoolArray:
@@ -111,7 +114,8 @@ class PlanningScene:
     @cached_property
     def inverse_kinematics_once(self) -> InverseKinematics:
         """The same without whole turns of the axes that turn twice: these in [-pi, pi]."""
-        robot, turning = self.cell.robot, self.turning
+        robot = self.cell.robot
+        turning = self.turning
         low = np.where(turning, -np.pi, robot.position_min)
         return inverse_kinematics(self.chain, low, np.where(turning, np.pi, robot.position_max))
 
@@ -119,7 +123,9 @@ class PlanningScene:
     def weights(self) -> FloatArray:
         """Weights (n,) of eq. (9) with the loads."""
         robot = self.cell.robot
-        return movement_weights(robot.link_mass, robot.velocity_max, sum(load.mass for load in self.loads))
+        return movement_weights(
+            robot.link_mass, robot.velocity_max, sum(load.mass for load in self.loads)
+        )
 
     @property
     def limits(self) -> MotionLimits:
@@ -131,9 +137,13 @@ class PlanningScene:
 
     @property
     def base_watts(self) -> float:
-        """Mains power [W] of controller, drives and tool while the motors are on, without the axes."""
+        """Mains power [W] of controller, drives and tool while the motors are on, without the
+        axes.
+        """
         tool = self.tool_watts(drive_bus=True)
-        return self.power.mode(RUNNING).controller_watts + self.power.drives_and_brake_release + tool
+        return (
+            self.power.mode(RUNNING).controller_watts + self.power.drives_and_brake_release + tool
+        )
 
     def tool_watts(self, *, drive_bus: bool) -> float:
         """Watts of what is attached, with its share of the drive bus where that is up."""
@@ -185,7 +195,8 @@ class PlanningScene:
         return numbers
 
     def _numbers_of(self, contact: AllowedContact) -> list[int]:
-        a, b = contact.body_a, contact.body_b
+        a = contact.body_a
+        b = contact.body_b
         return self._numbers.get((a, b), []) + self._numbers.get((b, a), [])
 
     def _contacts(self, station: str) -> tuple[AllowedContact, ...]:
@@ -194,11 +205,15 @@ class PlanningScene:
         try:
             return self.cell.contacts_at(station)
         except LookupError:
-            known = [stop.name for stop in self.cell.stations] + [path.name for path in self.cell.paths]
+            known = [stop.name for stop in self.cell.stations] + [
+                path.name for path in self.cell.paths
+            ]
             raise UnknownNameError("station", station, known) from None
 
     def zone_of(self, station: str) -> Zone | None:
-        """The forbidden zone of the machine of a station or a path, in the world; None: it has none."""
+        """The forbidden zone of the machine of a station or a path, in the world; None: it has
+        none.
+        """
         return self.cell.zone_at(station)
 
     def station(self, name: str) -> Station:
@@ -215,7 +230,9 @@ def with_parts(cell: Cell, parts: PartPlaces) -> Cell:
     return replace(cell, parts=moved, program=())
 
 
-def scene_with(cell: Cell, load: str, power: PowerData, drives: Drives | None = None) -> PlanningScene:
+def scene_with(
+    cell: Cell, load: str, power: PowerData, drives: Drives | None = None
+) -> PlanningScene:
     """Scene in which `load` ("gripper+part", "none") is attached; a part that is held lies nowhere.
 
     Raises UnknownNameError (the known loads) or RequestError (two parts at once).
@@ -234,7 +251,10 @@ def scene_with(cell: Cell, load: str, power: PowerData, drives: Drives | None = 
 
 
 def _check_load(cell: Cell, names: Iterable[str], held: list[str]) -> None:
-    known = [*((cell.tool.name,) if cell.tool is not None else ()), *(part.name for part in cell.parts)]
+    known = [
+        *((cell.tool.name,) if cell.tool is not None else ()),
+        *(part.name for part in cell.parts),
+    ]
     names = list(names)
     for name in names:
         if name not in known:

@@ -1,8 +1,8 @@
-"""Where a station's allowed contacts hold: while the tcp is in its machine's zone, or nearer to it than
-S_m.
+"""Where a station's allowed contacts hold: while the tcp is in its machine's zone, or nearer to it
+than S_m.
 
-Outside, every pair keeps S_m. A trajectory is cut where its tcp leaves or enters; the parts outside are
-checked with the plain safety distance.
+Outside, every pair keeps S_m. A trajectory is cut where its tcp leaves or enters; the parts outside
+are checked with the plain safety distance.
 """
 
 import numpy as np
@@ -13,12 +13,14 @@ from ir_planner.curves import motion_at
 from ir_planner.scene.planning_scene import PlanningScene
 
 _SAMPLES = 400
-_PARTS, _ROUNDS = 32, 6  # 2^30 parts of the time between two samples
+# 2^30 parts of the time between two samples
+_PARTS = 32
+_ROUNDS = 6
 
 
 def tcp_inside(q: FloatArray, scene: PlanningScene, station: str, margin: float) -> BoolArray:
-    """Whether the tcp at q (N, n) is in the zone of the station's machine, or within `margin` m of it; never
-    where a path belongs to no machine.
+    """Whether the tcp at q (N, n) is in the zone of the station's machine, or within `margin` m of
+    it; never where a path belongs to no machine.
     """
     zone = scene.zone_of(station)
     if zone is None:
@@ -32,8 +34,8 @@ def tcp_inside(q: FloatArray, scene: PlanningScene, station: str, margin: float)
 def spans_outside(
     trajectory: JointTrajectory, scene: PlanningScene, station: str, margin: float
 ) -> list[tuple[float, float]]:
-    """Times [s] between which the tcp is outside, found by sampling and dividing; each a little longer than
-    it is.
+    """Times [s] between which the tcp is outside, found by sampling and dividing; each a little
+    longer than it is.
     """
 
     def inside(times: FloatArray) -> BoolArray:
@@ -43,11 +45,13 @@ def spans_outside(
     flags = inside(times)
     edges = [float(times[0])] if not flags[0] else []
     for k in np.flatnonzero(flags[:-1] != flags[1:]):
-        low, high = float(times[k]), float(times[k + 1])
+        low = float(times[k])
+        high = float(times[k + 1])
         for _ in range(_ROUNDS):
             parts = np.linspace(low, high, _PARTS + 1)
             changed = int(np.argmax(np.append(inside(parts[1:-1]) != flags[k], True))) + 1
-            low, high = float(parts[changed - 1]), float(parts[changed])
+            low = float(parts[changed - 1])
+            high = float(parts[changed])
         edges.append(low if flags[k] else high)
     if not flags[-1]:
         edges.append(float(times[-1]))
@@ -57,7 +61,9 @@ def spans_outside(
 def polynomials_between(
     trajectory: JointTrajectory, begin: float, end: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Coefficients (S, n, 6) and durations (S,) of the part of a trajectory between two times [s]."""
+    """Coefficients (S, n, 6) and durations (S,) of the part of a trajectory between two times
+    [s].
+    """
     coefficients, durations = trajectory.coefficients()
     if begin <= trajectory.times[0] and end >= trajectory.times[-1]:
         return coefficients, durations

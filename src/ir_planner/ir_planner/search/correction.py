@@ -1,9 +1,11 @@
-"""The paper's regional movement: the straight movement, and the genetic correction of what collides.
+"""The paper's regional movement: the straight movement, and the genetic correction of what
+collides.
 
-The movement of least W (eq. 9) is the straight one of all joints. Where its discretised path meets a
-forbidden zone, the stretch that collides, and no more, gets vias from a population (population.py); what is
-free before and after stays. The corrected path is proved step by step and corrected again until it is clean.
-A stretch whose population finds nothing is tried again, each time wider and with more samples.
+The movement of least W (eq. 9) is the straight one of all joints. Where its discretised path meets
+a forbidden zone, the stretch that collides, and no more, gets vias from a population
+(population.py); what is free before and after stays. The corrected path is proved step by step and
+corrected again until it is clean. A stretch whose population finds nothing is tried again, each
+time wider and with more samples.
 """
 
 from dataclasses import dataclass, replace
@@ -24,8 +26,8 @@ _WIDER = 4.0  # by how much each further attempt widens the margin
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """A stretch that collided, between its free ends begin and end (n,), and the fitness of the best
-    individual of every generation that was bred for it; the straight stretch's cost counts 1.
+    """A stretch that collided, between its free ends begin and end (n,), and the fitness of the
+    best individual of every generation that was bred for it; the straight stretch's cost counts 1.
     """
 
     begin: FloatArray
@@ -37,9 +39,9 @@ class Stretch:
 class Correction:
     """Paths (M_k, n) of certified straight steps, cheapest by W first.
 
-    Without one: the best individual of a stretch that was given up lacked `shortfall` m of what pair `pair`
-    must keep, at `q` (n,); pair -1: there was none. generations: of all populations together. stretches:
-    those that were corrected, in order.
+    Without one: the best individual of a stretch that was given up lacked `shortfall` m of what
+    pair `pair` must keep, at `q` (n,); pair -1: there was none. generations: of all populations
+    together. stretches: those that were corrected, in order.
     """
 
     paths: list[FloatArray]
@@ -57,7 +59,8 @@ def corrected(
     settings: GeneticSettings,
     rng: np.random.Generator,
 ) -> Correction:
-    """Different paths from start to goal (n,), both free, within the limits; ends with settings or budget.
+    """Different paths from start to goal (n,), both free, within the limits; ends with settings or
+    budget.
 
     Raises CancelledError when asked to stop.
     """
@@ -99,8 +102,8 @@ def _round_stretch(
     rng: np.random.Generator,
     wanted: int,
 ) -> tuple[Evolution, Stretch]:
-    """Up to `wanted` different forms of the whole path, its first colliding stretch replaced; and that
-    stretch.
+    """Up to `wanted` different forms of the whole path, its first colliding stretch replaced; and
+    that stretch.
     """
     generations = 0
     fitness: list[float] = []
@@ -140,14 +143,17 @@ def colliding_stretch(
 ) -> tuple[FloatArray, FloatArray]:
     """What is kept of a path (M, n) before and after the first stretch of it that collides.
 
-    The last point before and the first after are the stretch's free ends. `proof`: certificates of the M-1
-    steps, not all of them free. The stretch is widened at both ends by `margin` times its own length.
+    The last point before and the first after are the stretch's free ends. `proof`: certificates of
+    the M-1 steps, not all of them free. The stretch is widened at both ends by `margin` times its
+    own length.
     """
     counts = _parts(path)
     first = np.concatenate([[0], np.cumsum(counts)])  # index of each waypoint among the samples
     step = np.repeat(np.arange(len(counts)), counts)
     share = (np.arange(len(step)) - first[step]) / counts[step]
-    points = np.concatenate([path[step] + share[:, None] * (path[step + 1] - path[step]), path[-1:]])
+    points = np.concatenate(
+        [path[step] + share[:, None] * (path[step + 1] - path[step]), path[-1:]]
+    )
     space.work.spend(batch_work(len(points)))
     free = space.states_free(points)
     blocked = ~(free[:-1] & free[1:])  # (K,): the parts between samples
@@ -157,7 +163,8 @@ def colliding_stretch(
     begin = int(np.argmax(blocked))
     end = begin + int(np.argmin(np.append(blocked[begin:], False)))
     wider = int(np.ceil(margin * (end - begin)))
-    begin, end = max(begin - wider, 0), min(end + wider, len(points) - 1)
+    begin = max(begin - wider, 0)
+    end = min(end + wider, len(points) - 1)
     begin -= int(np.argmax(free[begin::-1]))
     end += int(np.argmax(free[end:]))
     before = np.concatenate([path[: step[begin] + 1], points[begin : begin + 1]])

@@ -17,10 +17,11 @@ _MOST = 24  # stretches whose fitness is kept: more than a picture shows
 def correction_log(
     correction: Correction, path: FloatArray, start: FloatArray, space: FreeSpace
 ) -> CorrectionLog:
-    """The correction of the straight movement from start (n,), which became `path` (M, n); without the names
-    of its ends. It is no work: what it asks is not counted.
+    """The correction of the straight movement from start (n,), which became `path` (M, n); without
+    the names of its ends. It is no work: what it asks is not counted.
     """
-    scene, straight = space.scene, np.stack([start, path[-1]])
+    scene = space.scene
+    straight = np.stack([start, path[-1]])
     parts = _colliding_parts(straight, space)
     return CorrectionLog(
         start="",
@@ -36,15 +37,18 @@ def correction_log(
 
 
 def _colliding_parts(straight: FloatArray, space: FreeSpace) -> list[FloatArray]:
-    """Ends (2, n) of the parts of a straight movement (2, n) on which something is nearer than it may be, or
-    of those that can't be proved free.
+    """Ends (2, n) of the parts of a straight movement (2, n) on which something is nearer than it
+    may be, or of those that can't be proved free.
     """
-    begin, step = straight[0], straight[1] - straight[0]
+    begin = straight[0]
+    step = straight[1] - straight[0]
     count = max(int(np.ceil(np.abs(step).max() / _SPACING)), 1)
     share = np.linspace(0.0, 1.0, count + 1)
     blocked = ~space.states_free(begin + share[:, None] * step)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], blocked, [False]]).astype(np.int8)))
-    shares = [(share[first], share[last - 1]) for first, last in zip(edges[::2], edges[1::2], strict=True)]
+    shares = [
+        (share[first], share[last - 1]) for first, last in zip(edges[::2], edges[1::2], strict=True)
+    ]
     if not shares:
         proof = space.scene.collision.certify_edges(straight[:1], straight[1:], space.threshold)
         shares = [(float(proof.t0[0]), float(proof.t1[0]))] if proof.verdict[0] != FREE else []

@@ -1,4 +1,6 @@
-"""Simple detours: over the named postures, with the arm retracted, over scattered via configurations."""
+"""Simple detours: over the named postures, with the arm retracted, over scattered via
+configurations.
+"""
 
 from dataclasses import dataclass
 

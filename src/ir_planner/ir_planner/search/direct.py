@@ -14,14 +14,16 @@ from ir_planner.search.port import Ends, Found
 class Direct:
     """The straight movements to the goals that are free."""
 
-    paths: int = setting(3, "Straight movements that are taken, to as many goals.", minimum=1, maximum=64)
+    paths: int = setting(
+        3, "Straight movements that are taken, to as many goals.", minimum=1, maximum=64
+    )
 
     def __post_init__(self) -> None:
         check_settings(self)
 
     def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
-        """Certify the straight movement to every goal, also where no work is left: what is free at once is
-        found with any work.
+        """Certify the straight movement to every goal, also where no work is left: what is free at
+        once is found with any work.
         """
         starts = np.repeat(ends.start[None], len(ends.goals), axis=0)
         free = np.flatnonzero(space.straight_free(starts, ends.goals))[: self.paths]

@@ -1,4 +1,6 @@
-"""The paper's regional movement as a search: the straight one, what collides corrected genetically."""
+"""The paper's regional movement as a search: the straight one, what collides corrected
+genetically.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -31,8 +33,8 @@ class Genetic(GeneticSettings):
             if found.pair >= 0 and found.shortfall < nearest[0]:
                 pair = space.scene.collision.pairs[found.pair]
                 sentence = (
-                    f"the nearest of {found.generations} generations lacks {found.shortfall * 1e3:.1f} mm "
-                    f"between {pair.body_a} and {pair.body_b}"
+                    f"the nearest of {found.generations} generations lacks "
+                    f"{found.shortfall * 1e3:.1f} mm between {pair.body_a} and {pair.body_b}"
                 )
                 nearest = (found.shortfall, sentence)
         return Found([], nearest[1])

@@ -25,10 +25,17 @@ class GeneticSettings:
         minimum=1,
         maximum=64,
     )
-    generations: int = setting(20, "Generations before a stretch is given up.", minimum=1, maximum=10_000)
-    settle: int = setting(4, "Generations that follow the first free path.", minimum=0, maximum=10_000)
+    generations: int = setting(
+        20, "Generations before a stretch is given up.", minimum=1, maximum=10_000
+    )
+    settle: int = setting(
+        4, "Generations that follow the first free path.", minimum=0, maximum=10_000
+    )
     first: int = setting(
-        2, "Random individuals that are drawn for one in the first generation.", minimum=1, maximum=8
+        2,
+        "Random individuals that are drawn for one in the first generation.",
+        minimum=1,
+        maximum=8,
     )
     samples: int = setting(
         24,
@@ -45,7 +52,9 @@ class GeneticSettings:
     mutation: float = setting(
         0.2, "Standard deviation of the first mutations.", unit="rad", minimum=1e-4, maximum=3.0
     )
-    mutation_least: float = setting(0.01, "Least standard deviation.", unit="rad", minimum=0.0, maximum=3.0)
+    mutation_least: float = setting(
+        0.01, "Least standard deviation.", unit="rad", minimum=0.0, maximum=3.0
+    )
     adaptation: float = setting(
         0.4,
         "Standard deviation of the logarithm by which a child's deviation differs.",
@@ -59,7 +68,9 @@ class GeneticSettings:
     parting: float = setting(
         0.6, "Share of children pushed along the separating direction.", minimum=0.0, maximum=1.0
     )
-    tournament: int = setting(3, "Individuals that compete to be a parent.", minimum=1, maximum=1000)
+    tournament: int = setting(
+        3, "Individuals that compete to be a parent.", minimum=1, maximum=1000
+    )
     elite: int = setting(2, "Individuals per island that stay unchanged.", minimum=1, maximum=1000)
     clearance_penalty: float = setting(
         60.0,
@@ -75,8 +86,12 @@ class GeneticSettings:
         0.6, "Share of the stretch's length added at both ends.", minimum=0.0, maximum=10.0
     )
     attempts: int = setting(6, "Times a stretch is tried, each time wider.", minimum=1, maximum=50)
-    stretches: int = setting(6, "Stretches of one path that are corrected.", minimum=1, maximum=1000)
-    paths: int = setting(3, "Different homotopy classes that are looked for.", minimum=1, maximum=64)
+    stretches: int = setting(
+        6, "Stretches of one path that are corrected.", minimum=1, maximum=1000
+    )
+    paths: int = setting(
+        3, "Different homotopy classes that are looked for.", minimum=1, maximum=64
+    )
 
     difference: float = setting(
         0.3, "Paths that are nowhere farther apart are one.", unit="rad", minimum=0.0, maximum=10.0

@@ -1,8 +1,9 @@
 """Guesses: paths of many homotopy classes that need not be free, the same for every seed.
 
-Descents start from them (optimize/portfolio.py). Clearance is a part of their cost, and penetration counts
-with its depth, so a guess is pushed out of what it collides with, into the local minimum of its class. The
-arm is folded, lifted or turned to a side between start and goal, or goes over the cell's park posture. Which
+Descents start from them (optimize/portfolio.py). Clearance is a part of their cost, and penetration
+counts with its depth, so a guess is pushed out of what it collides with, into the local minimum of
+its class. The arm is folded, lifted or turned to a side between start and goal, or goes over the
+cell's park posture. Which
 guesses, and in which order, was measured on variants of cells: each adds most to those before it.
 """
 
@@ -12,7 +13,8 @@ import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
 
-# rad by which the first five joints bulge, once in the middle, or at a quarter and at three quarters
+# rad by which the first five joints bulge, once in the middle, or at a quarter and at three
+# quarters
 _MIDDLE = (
     (0.0, -0.6, 0.0, 0.0, 0.0),
     (-0.6, -0.6, -0.6, 0.0, 0.0),
@@ -41,7 +43,9 @@ _RETRACTED = 0.75  # of the joint steps to the park posture
 def guesses(
     start: FloatArray, goal: FloatArray, park: FloatArray, low: FloatArray, high: FloatArray
 ) -> list[FloatArray]:
-    """Paths (M, n) from start to goal (n,) within the limits low, high (n,); park (n,): the arm well back."""
+    """Paths (M, n) from start to goal (n,) within the limits low, high (n,); park (n,): the arm
+    well back.
+    """
     paths = [*_over_park(start, goal, park), *_bulges(start, goal), np.stack([start, goal])]
     ends = np.cumsum([len(path) for path in paths])
     within = np.clip(np.concatenate(paths), low, high)
@@ -49,11 +53,12 @@ def guesses(
 
 
 def _over_park(start: FloatArray, goal: FloatArray, park: FloatArray) -> Iterator[FloatArray]:
-    """Retracted towards park at both ends; joints 2 and 3 as in park in the middle; over park, turned
-    to where goal or start look.
+    """Retracted towards park at both ends; joints 2 and 3 as in park in the middle; over park,
+    turned to where goal or start look.
     """
     back = [q + _RETRACTED * (park - q) for q in (start, goal)]
-    back[0][0], back[1][0] = start[0], goal[0]
+    back[0][0] = start[0]
+    back[1][0] = goal[0]
     yield np.stack([start, *back, goal])
     middle = 0.5 * (start + goal)
     middle[1:3] = park[1:3]

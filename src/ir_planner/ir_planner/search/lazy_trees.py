@@ -1,8 +1,9 @@
 """Two trees of configurations whose edges are tested only when they join both (the data of SBL).
 
-A node of tree 0 leads back to the start, one of tree 1 to a goal. An edge that proves blocked moves what
-hangs behind it to the other tree, which is joined to it by the bridge of the path under test: nothing found
-is lost.
+A node of tree 0 leads back to the start, one of tree 1 to a goal. An edge that proves blocked moves
+what
+hangs behind it to the other tree, which is joined to it by the bridge of the path under test:
+nothing found is lost.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ NOBODY = -1
 
 
 class LazyTrees:
-    """Configurations in the unit cube (N, n), each with its parent and its tree; edges with how well they
-    were tested.
+    """Configurations in the unit cube (N, n), each with its parent and its tree; edges with how
+    well they were tested.
     """
 
     def __init__(self, start: FloatArray, goals: FloatArray) -> None:
@@ -46,7 +47,10 @@ class LazyTrees:
             self._tree = np.concatenate([self._tree, np.zeros_like(self._tree)])
             self.tested = np.concatenate([self.tested, np.zeros_like(self.tested)])
         node = self.count
-        self._u[node], self._parent[node], self._tree[node], self.tested[node] = u, parent, tree, 0
+        self._u[node] = u
+        self._parent[node] = parent
+        self._tree[node] = tree
+        self.tested[node] = 0
         self._children.append([])
         if parent != NOBODY:
             self._children[parent].append(node)
@@ -62,7 +66,9 @@ class LazyTrees:
         return np.flatnonzero(self._tree[: self.count] == tree)
 
     def nearest(self, node: int) -> tuple[int, float]:
-        """The node of the other tree that is nearest in the largest difference, and how far it is."""
+        """The node of the other tree that is nearest in the largest difference, and how far it
+        is.
+        """
         others = self.members(1 - self.tree_of(node))
         far = np.abs(self._u[others] - self._u[node]).max(axis=1)
         k = int(far.argmin())
@@ -76,8 +82,9 @@ class LazyTrees:
         return found
 
     def move(self, cut: int, bridge_from: int, bridge_to: int, tested: int) -> None:
-        """Take off the branch at `cut`, whose edge to its parent is blocked, and hang it into the other tree
-        by the bridge from its node `bridge_from` to `bridge_to`, which was `tested` so far.
+        """Take off the branch at `cut`, whose edge to its parent is blocked, and hang it into the
+        other tree by the bridge from its node `bridge_from` to `bridge_to`, which was `tested` so
+        far.
         """
         self._children[self._parent[cut]].remove(cut)
         self._parent[cut] = NOBODY
@@ -89,9 +96,11 @@ class LazyTrees:
             self._parent[upper] = lower
         for upper, level in zip(turned[1:], levels[:-1], strict=True):
             self.tested[upper] = level
-        self._parent[bridge_from], self.tested[bridge_from] = bridge_to, tested
+        self._parent[bridge_from] = bridge_to
+        self.tested[bridge_from] = tested
         self._children[bridge_to].append(bridge_from)
-        tree, stack = self._tree[bridge_to], [bridge_from]
+        tree = self._tree[bridge_to]
+        stack = [bridge_from]
         while stack:
             node = stack.pop()
             self._tree[node] = tree

@@ -1,11 +1,12 @@
-"""The genetic algorithm that leads round what is in the path: vias in place of a stretch that collides.
+"""The genetic algorithm that leads round what is in the path: vias in place of a stretch that
+collides.
 
-An individual is a few via configurations between the two free ends of the stretch. What runs through them is
-the cubic joint spline of eq. (10) (or straight steps), sampled: its fitness is the cost W of eq. (9) plus
-penalties for missing clearance and exceeded limits. Penetration counts with its depth, so the fitness has a
-slope in collision too. A whole generation is evaluated in one batch. The population breeds in islands, which
-keep different homotopy classes apart. Sampling decides the selection only: what leaves is a path of certified
-steps.
+An individual is a few via configurations between the two free ends of the stretch. What runs
+through them is the cubic joint spline of eq. (10) (or straight steps), sampled: its fitness is the
+cost W of eq. (9) plus penalties for missing clearance and exceeded limits. Penetration counts with
+its depth, so the fitness has a slope in collision too. A whole generation is evaluated in one
+batch. The population breeds in islands, which keep different homotopy classes apart. Sampling
+decides the selection only: what leaves is a path of certified steps.
 """
 
 from dataclasses import dataclass
@@ -30,7 +31,8 @@ _FINE = 400  # places on a spline between which its progress is interpolated
 class Evolution:
     """What a population found: certified paths (M_k, n) from a to b, cheapest by W first.
 
-    Where there is none: the individual that came nearest lacks `shortfall` m at `pair` in configuration `q`.
+    Where there is none: the individual that came nearest lacks `shortfall` m at `pair` in
+    configuration `q`.
     fitness: of the best individual of every generation; the straight stretch's cost counts 1.
     """
 
@@ -44,8 +46,9 @@ class Evolution:
 
 @dataclass(eq=False)
 class _Individuals:
-    """vias (N, V, n); spread (N,) rad of their mutations; fitness (N,); the clearance that lacks at worst,
-    shortfall (N,) m (negative: free), with sample and pair (N,); excess (N,) rad beyond joint limits.
+    """vias (N, V, n); spread (N,) rad of their mutations; fitness (N,); the clearance that lacks at
+    worst, shortfall (N,) m (negative: free), with sample and pair (N,); excess (N,) rad beyond
+    joint limits.
     """
 
     vias: FloatArray
@@ -62,12 +65,19 @@ class _Individuals:
     @staticmethod
     def joined(a: "_Individuals", b: "_Individuals") -> "_Individuals":
         return _Individuals(
-            *(np.concatenate([getattr(a, name), getattr(b, name)]) for name in a.__dataclass_fields__)
+            *(
+                np.concatenate([getattr(a, name), getattr(b, name)])
+                for name in a.__dataclass_fields__
+            )
         )
 
 
 def evolve(
-    a: FloatArray, b: FloatArray, space: FreeSpace, settings: GeneticSettings, rng: np.random.Generator
+    a: FloatArray,
+    b: FloatArray,
+    space: FreeSpace,
+    settings: GeneticSettings,
+    rng: np.random.Generator,
 ) -> Evolution:
     """Paths around between the free configurations a and b (n,) within the limits.
 
@@ -106,25 +116,34 @@ class _Breeder:
         settings: GeneticSettings,
         rng: np.random.Generator,
     ) -> None:
-        self.a, self.b, self.space, self.settings, self.rng = a, b, space, settings, rng
+        self.a = a
+        self.b = b
+        self.space = space
+        self.settings = settings
+        self.rng = rng
         self.weights = space.scene.weights
         self.straight = max(float(movement_cost(self.weights, a, b)), 1e-9)
         matrix = path_matrix(settings.shape, settings.vias, settings.samples)
         self.blend = np.ascontiguousarray(matrix[:, 1:-1])  # (S, V)
         self.fixed = matrix[:, :1] * a + matrix[:, -1:] * b  # (S, n)
         self.along = np.arange(1, settings.vias + 1)[:, None] / (settings.vias + 1)
-        self.per_island, self.elite = settings.per_island, settings.elite
+        self.per_island = settings.per_island
+        self.elite = settings.elite
         self.found: list[FloatArray] = []
         self.tried: set[bytes] = set()
 
     def run(self) -> Evolution:
-        """Breed until the free paths have settled; no generation begins that the work left can't pay."""
-        s, work = self.settings, self.space.work
+        """Breed until the free paths have settled; no generation begins that the work left can't
+        pay.
+        """
+        s = self.settings
+        work = self.space.work
         children = s.islands * (self.per_island - self.elite)
         if self._price(s.islands * self.per_island * s.first) > work.left:
             return Evolution([], np.inf, -1, self.a, 0)
         people = self._first()
-        generations, since = 1, 0
+        generations = 1
+        since = 0
         fitness: list[float] = []
         while True:
             fitness.append(float(people.fitness.min()))
@@ -135,11 +154,15 @@ class _Breeder:
                 break
             people = self._next(people)
             generations += 1
-        lack = np.where(people.shortfall < 0.0, np.inf, people.shortfall)  # free, but no better than others
+        lack = np.where(
+            people.shortfall < 0.0, np.inf, people.shortfall
+        )  # free, but no better than others
         best = int(np.argmin(lack))
         paths = sorted(self.found, key=lambda path: path_cost(self.weights, path))
         q = self.samples(people.vias[best : best + 1])[people.sample[best], 0]
-        return Evolution(paths, float(lack[best]), int(people.pair[best]), q, generations, tuple(fitness))
+        return Evolution(
+            paths, float(lack[best]), int(people.pair[best]), q, generations, tuple(fitness)
+        )
 
     def _price(self, individuals: int) -> int:
         """Work that so many new ones take."""
@@ -161,7 +184,8 @@ class _Breeder:
         near = self.space.scene.collision.min_distance(inner, self.space.threshold)
         lack = np.where(near.pair >= 0, self.space.threshold[near.pair] - near.distance, -np.inf)
         lack = lack.reshape(-1, count)
-        low, high = self.space.low, self.space.high
+        low = self.space.low
+        high = self.space.high
         excess = np.maximum(np.maximum(low - q, q - high), 0.0).sum(axis=(0, 2))
         cost = (np.abs(np.diff(q, axis=0)) @ self.weights).sum(axis=0) / self.straight
         worst = np.argmax(lack, axis=0)
@@ -184,7 +208,9 @@ class _Breeder:
 
     def _first(self) -> _Individuals:
         """Random individuals around the straight stretch, the best of each island's."""
-        s, rng, n = self.settings, self.rng, len(self.a)
+        s = self.settings
+        rng = self.rng
+        n = len(self.a)
         count = s.islands * self.per_island * s.first
         spread = np.exp(rng.uniform(np.log(s.spread_least), np.log(s.spread_most), (count, 1, 1)))
         line = self.a + self.along * (self.b - self.a)
@@ -201,8 +227,12 @@ class _Breeder:
 
     def _next(self, people: _Individuals) -> _Individuals:
         """One generation: the elite stays, the rest are children of tournament winners."""
-        s, rng, n = self.settings, self.rng, len(self.a)
-        islands, per, children = s.islands, self.per_island, self.per_island - self.elite
+        s = self.settings
+        rng = self.rng
+        n = len(self.a)
+        islands = s.islands
+        per = self.per_island
+        children = self.per_island - self.elite
         base = per * np.arange(islands)[:, None]
         # islands are sorted by fitness: the lowest of some random places wins a tournament
         won = rng.integers(0, per, (2, islands, children, s.tournament)).min(axis=3) + base
@@ -225,8 +255,12 @@ class _Breeder:
         return self._ranked(both.of(np.argsort(island, kind="stable")), per)
 
     def _parting(self, people: _Individuals, rows: IntArray) -> FloatArray:
-        """Steps (N, V, n) that part the pair which lacks most, to first order by one to two times."""
-        vias, sample, pair = people.vias[rows], people.sample[rows], np.maximum(people.pair[rows], 0)
+        """Steps (N, V, n) that part the pair which lacks most, to first order by one to two
+        times.
+        """
+        vias = people.vias[rows]
+        sample = people.sample[rows]
+        pair = np.maximum(people.pair[rows], 0)
         blend = self.blend[sample]  # (N, V)
         q = self.fixed[sample] + (blend[:, None, :] @ vias)[:, 0]
         gradient = self.space.scene.collision.gradients(q, pair)
@@ -257,16 +291,20 @@ class _Breeder:
             else:
                 self._correct(people, row, path, proof)
 
-    def _correct(self, people: _Individuals, row: int, path: FloatArray, proof: Certificates) -> None:
+    def _correct(
+        self, people: _Individuals, row: int, path: FloatArray, proof: Certificates
+    ) -> None:
         """An individual that collides between samples is one that collides."""
         step = int(np.argmax(proof.verdict != FREE))
-        share, pair = float(proof.t1[step]), int(proof.pair[step])
+        share = float(proof.t1[step])
+        pair = int(proof.pair[step])
         q = path[step] + share * (path[step + 1] - path[step])
         distance = self.space.scene.collision.witnesses(q[None], np.array([pair])).distance[0]
         lack = max(float(self.space.threshold[pair] - distance), 0.0)
         last = self.settings.samples - 1
         people.sample[row] = np.clip(round((step + share) / (len(path) - 1) * last), 1, last - 1)
-        people.pair[row], people.shortfall[row] = pair, lack
+        people.pair[row] = pair
+        people.shortfall[row] = lack
         people.fitness[row] += 1.0 + self.settings.clearance_penalty * lack
 
     def _path(self, vias: FloatArray) -> FloatArray:

@@ -1,8 +1,8 @@
 """The port of a search for free paths: what it is asked, what it answers, and what it may cost.
 
-A search is a frozen dataclass whose fields are its settings (`ir_msgs_py.settings.setting`). Registered under
-a name (registry.py) it is accepted as `planner_id`, its settings are ROS parameters under that name, and the
-documentation lists it.
+A search is a frozen dataclass whose fields are its settings (`ir_msgs_py.settings.setting`).
+Registered under a name (registry.py) it is accepted as `planner_id`, its settings are ROS
+parameters under that name, and the documentation lists it.
 """
 
 from dataclasses import dataclass
@@ -24,8 +24,9 @@ class Ends:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Free paths (M_k, n) of straight joint steps from the start to any of the goals, cheapest by W first;
-    `note`: how near a search came that found none. correction: what was corrected on a straight movement.
+    """Free paths (M_k, n) of straight joint steps from the start to any of the goals, cheapest by W
+    first; `note`: how near a search came that found none. correction: what was corrected on a
+    straight movement.
     """
 
     paths: list[FloatArray]
@@ -37,10 +38,11 @@ class Search(Protocol):
     """Looks for free paths."""
 
     def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
-        """Paths whose every step `space` certifies (which charges the step to its work, the same as `work`).
+        """Paths whose every step `space` certifies (which charges the step to its work, the same as
+        `work`).
 
-        The same ends, space and seed give the same paths; a search that can't promise that has a class
-        attribute `repeatable = False`. Ends early when `work.exhausted`; what a search
+        The same ends, space and seed give the same paths; a search that can't promise that has a
+        class attribute `repeatable = False`. Ends early when `work.exhausted`; what a search
         does beside certifying steps it charges itself. Raises CancelledError when asked to stop.
         """
 

@@ -40,7 +40,9 @@ SEARCHES: dict[str, Search] = {
 
 
 def registered() -> Mapping[str, Search]:
-    """The searches as they are registered now, with their default settings; a copy that stays as it is."""
+    """The searches as they are registered now, with their default settings; a copy that stays as it
+    is.
+    """
     return MappingProxyType(dict(SEARCHES))
 
 

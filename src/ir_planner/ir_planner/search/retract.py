@@ -1,8 +1,8 @@
 """The tool is retracted first: for ends that lie deep in something, as a box or a tunnel.
 
-From start and goal the tool is retracted along its -x, in closed form and in one branch, as far as that is
-free; between the retracted ends the simple detours are tried. (The paper's withdrawal, eq. 7, asks less of
-the machine than a straight exit; this is the cheap attempt before the trees.)
+From start and goal the tool is retracted along its -x, in closed form and in one branch, as far as
+that is free; between the retracted ends the simple detours are tried. (The paper's withdrawal, eq.
+7, asks less of the machine than a straight exit; this is the cheap attempt before the trees.)
 """
 
 from dataclasses import dataclass
@@ -29,7 +29,9 @@ class Retract:
     spacing: float = setting(
         0.05, "Distance of the configurations along it.", unit="m", minimum=0.005, maximum=0.5
     )
-    vias: int = setting(32, "Scattered via configurations per pair of ends.", minimum=1, maximum=10_000)
+    vias: int = setting(
+        32, "Scattered via configurations per pair of ends.", minimum=1, maximum=10_000
+    )
 
     def __post_init__(self) -> None:
         check_settings(self)
@@ -55,7 +57,8 @@ class Retract:
             for last in _ends(inward):
                 if first + last == 0:
                     continue
-                a, b = outward[first], inward[last]
+                a = outward[first]
+                b = inward[last]
                 between = [
                     np.stack([a, b]),
                     *over_postures(a, b, postures),
@@ -73,8 +76,8 @@ class Retract:
 
 
 def free_retraction(q: FloatArray, space: FreeSpace, length: float, spacing: float) -> FloatArray:
-    """Configurations (M, n) from q (n,) on while the tool retracts along its -x, up to `length` m in steps of
-    `spacing` m; M = 1 where it can't.
+    """Configurations (M, n) from q (n,) on while the tool retracts along its -x, up to `length` m
+    in steps of `spacing` m; M = 1 where it can't.
     """
     scene = space.scene
     tcp = scene.chain.tcp_poses(q[None])[0]
@@ -98,5 +101,7 @@ def free_retraction(q: FloatArray, space: FreeSpace, length: float, spacing: flo
 
 
 def _ends(line: FloatArray) -> list[int]:
-    """How far along a retraction (M, n) the detours may begin: not at all, or after a part of it."""
+    """How far along a retraction (M, n) the detours may begin: not at all, or after a part of
+    it.
+    """
     return sorted({0, *(round(part * (len(line) - 1)) for part in _PARTS)})

@@ -1,10 +1,11 @@
 """Two trees whose edges are tested when they join both (SBL).
 
-Sanchez and Latombe, "A single-query bi-directional probabilistic roadmap planner with lazy collision
-checking", 2001: milestones grow where few are (a grid over two joints, which change), sampled near one of the
-tree in ever smaller cubes; a new one is joined to the nearest of the other tree; the path is then tested edge
-by edge, the least tested one first. A configuration has n coordinates in the unit cube, one per joint range;
-distances are the largest difference of a coordinate.
+Sanchez and Latombe, "A single-query bi-directional probabilistic roadmap planner with lazy
+collision checking", 2001: milestones grow where few are (a grid over two joints, which change),
+sampled near one of the tree in ever smaller cubes; a new one is joined to the nearest of the other
+tree; the path is then tested edge by edge, the least tested one first. A configuration has n
+coordinates in the unit cube, one per joint range; distances are the largest difference of a
+coordinate.
 """
 
 from __future__ import annotations
@@ -21,8 +22,12 @@ from ir_planner.search.lazy_trees import LazyTrees
 from ir_planner.search.port import Ends, Found
 from ir_planner.search.variety import NEAREST_GOALS
 
-_STATES_PER_EDGE = 40  # configurations that cost as much as one certified edge, as in the genetic search
-_SIZES = np.arange(1, 65).reshape(16, 4)  # by which the cube is divided, sample by sample, in batches
+_STATES_PER_EDGE = (
+    40  # configurations that cost as much as one certified edge, as in the genetic search
+)
+_SIZES = np.arange(1, 65).reshape(
+    16, 4
+)  # by which the cube is divided, sample by sample, in batches
 _CERTIFIED = 64  # level of an edge that is proved: beyond all that pieces are counted by
 
 
@@ -36,12 +41,22 @@ class Sbl:
         minimum=0.001,
         maximum=1.0,
     )
-    cells: int = setting(10, "Cells of the grid along each of its two joints.", minimum=1, maximum=100)
-    redraw: int = setting(50, "Milestones until other joints span the grid.", minimum=1, maximum=100_000)
-    resolution: float = setting(
-        0.05, "Pieces that an edge is sampled in before it is proved.", unit="rad", minimum=0.001, maximum=1.0
+    cells: int = setting(
+        10, "Cells of the grid along each of its two joints.", minimum=1, maximum=100
     )
-    milestones: int = setting(100_000, "Milestones before it is given up.", minimum=2, maximum=10_000_000)
+    redraw: int = setting(
+        50, "Milestones until other joints span the grid.", minimum=1, maximum=100_000
+    )
+    resolution: float = setting(
+        0.05,
+        "Pieces that an edge is sampled in before it is proved.",
+        unit="rad",
+        minimum=0.001,
+        maximum=1.0,
+    )
+    milestones: int = setting(
+        100_000, "Milestones before it is given up.", minimum=2, maximum=10_000_000
+    )
 
     def __post_init__(self) -> None:
         check_settings(self)
@@ -70,7 +85,8 @@ class _Sbl:
     _states: int = field(default=0, init=False)
 
     def __post_init__(self) -> None:
-        self._low, self._range = self.space.low, self.space.high - self.space.low
+        self._low = self.space.low
+        self._range = self.space.high - self.space.low
         goals = self.ends.goals[:NEAREST_GOALS]
         goals = goals[self.space.states_free(goals)]
         self._roots = np.concatenate([self.ends.start[None], goals])
@@ -78,7 +94,8 @@ class _Sbl:
         self._grid = _Grid(self.settings.cells, self.rng)
 
     def found(self) -> Found:
-        trees, work = self._trees, self.space.work
+        trees = self._trees
+        work = self.space.work
         if trees.count > 1:
             path = self._joined(0)  # start and goal may be near each other
             while path is None and trees.count < self.settings.milestones and not work.exhausted:
@@ -92,14 +109,19 @@ class _Sbl:
         return np.asarray((q - self._low) / self._range)
 
     def _q(self, nodes: list[int]) -> FloatArray:
-        """Configurations (M, n) rad of a path's nodes; it begins and ends with roots as they were given."""
+        """Configurations (M, n) rad of a path's nodes; it begins and ends with roots as they were
+        given.
+        """
         q = self._low + self._trees.u[nodes] * self._range
         q[[0, -1]] = self._roots[[nodes[0], nodes[-1]]]
         return np.asarray(q)
 
     def _free(self, q: FloatArray) -> BoolArray:
-        """Which of q (N, n) are free; charged to the work, and not looked at where that does not suffice."""
-        work, after = self.space.work, self._states + len(q)
+        """Which of q (N, n) are free; charged to the work, and not looked at where that does not
+        suffice.
+        """
+        work = self.space.work
+        after = self._states + len(q)
         edges = after // _STATES_PER_EDGE - self._states // _STATES_PER_EDGE
         self._states = after
         if edges > work.left:
@@ -128,7 +150,9 @@ class _Sbl:
         return -1
 
     def _joined(self, node: int) -> FloatArray | None:
-        """The path over a bridge from a node to the other tree, where both are near and all of it is free."""
+        """The path over a bridge from a node to the other tree, where both are near and all of it
+        is free.
+        """
         other, far = self._trees.nearest(node)
         if far >= self.settings.near:
             return None
@@ -136,11 +160,13 @@ class _Sbl:
         return self._tested(_Bridge(ends))
 
     def _tested(self, bridge: _Bridge) -> FloatArray | None:
-        """The path from the start over the bridge to a goal; None where an edge is blocked, which is taken
-        out.
+        """The path from the start over the bridge to a goal; None where an edge is blocked, which
+        is taken out.
         """
-        trees, (left, right) = self._trees, bridge.ends
-        back, on = trees.to_root(left), trees.to_root(right)
+        trees = self._trees
+        (left, right) = bridge.ends
+        back = trees.to_root(left)
+        on = trees.to_root(right)
         nodes = [*back[::-1], *on]
         # the node that an edge belongs to, the one farther from its root; -1 for the bridge
         owners = [*back[-2::-1], -1, *on[:-1]]
@@ -161,7 +187,9 @@ class _Sbl:
         return q if self._proved(q, level, owners, bridge) else None
 
     def _proved(self, q: FloatArray, level: FloatArray, owners: list[int], bridge: _Bridge) -> bool:
-        """Whether every edge of the path q (M, n) is certified; the first that isn't is taken out."""
+        """Whether every edge of the path q (M, n) is certified; the first that isn't is taken
+        out.
+        """
         open_edges = np.flatnonzero(level < _CERTIFIED)
         free = self.space.edges_free(q[open_edges], q[open_edges + 1])
         for k in open_edges[free]:
@@ -187,10 +215,13 @@ class _Sbl:
 
 
 class _Grid:
-    """Cells over two joints: a milestone is picked from a cell that is picked among those that have any."""
+    """Cells over two joints: a milestone is picked from a cell that is picked among those that have
+    any.
+    """
 
     def __init__(self, cells: int, rng: np.random.Generator) -> None:
-        self._cells, self._rng = cells, rng
+        self._cells = cells
+        self._rng = rng
         self._joints = np.array([0, 1])
 
     def redraw(self, n: int) -> None:

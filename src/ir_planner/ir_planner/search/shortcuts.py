@@ -1,6 +1,8 @@
-"""Shorter paths through the same gap: leave waypoints out, and pull those that stay towards their neighbours.
+"""Shorter paths through the same gap: leave waypoints out, and pull those that stay towards their
+neighbours.
 
-Everything is tried in batches of certified edges, so a polished path is as free as the one it came from.
+Everything is tried in batches of certified edges, so a polished path is as free as the one it came
+from.
 """
 
 import numpy as np
@@ -18,8 +20,8 @@ _CORNER = 0.04  # what a corner costs, as a share of the straight movement's W: 
 def fewest_corners(
     path: FloatArray, space: FreeSpace, weights: FloatArray, candidates: int = _POINTS
 ) -> FloatArray:
-    """The cheapest path over points of `path` (M, n), `candidates` or as many as it has: all shortcuts
-    certified in one call, then shortest path.
+    """The cheapest path over points of `path` (M, n), `candidates` or as many as it has: all
+    shortcuts certified in one call, then shortest path.
     """
     points = densified(path, candidates)
     count = len(points)
@@ -42,8 +44,8 @@ def fewest_corners(
 
 
 def straight_along(points: FloatArray, space: FreeSpace, weights: FloatArray) -> FloatArray | None:
-    """The cheapest path of free straight steps over some of the points (N, n) of a free curve; None where
-    they are too few to follow it.
+    """The cheapest path of free straight steps over some of the points (N, n) of a free curve; None
+    where they are too few to follow it.
     """
     chosen = np.linspace(0, len(points) - 1, _POINTS).round().astype(int)
     blocked = chosen[:-1][~space.edges_free(points[chosen[:-1]], points[chosen[1:]])]
@@ -53,7 +55,8 @@ def straight_along(points: FloatArray, space: FreeSpace, weights: FloatArray) ->
         if (middle == blocked).any():
             return None
         chosen = np.union1d(chosen, middle)
-        begin, end = np.concatenate([blocked, middle]), np.concatenate([middle, following])
+        begin = np.concatenate([blocked, middle])
+        end = np.concatenate([middle, following])
         blocked = np.sort(begin[~space.edges_free(points[begin], points[end])])
     return fewest_corners(points[chosen], space, weights)
 
@@ -69,11 +72,11 @@ def densified(path: FloatArray, count: int) -> FloatArray:
 
 
 def pulled(path: FloatArray, space: FreeSpace, weights: FloatArray) -> FloatArray:
-    """The path (M, n) with every inner waypoint moved towards the straight line as far as certified edges
-    allow.
+    """The path (M, n) with every inner waypoint moved towards the straight line as far as certified
+    edges allow.
 
-    W of eq. (9) only asks that a joint does not turn back: so each joint is also moved alone into the range
-    of the neighbours.
+    W of eq. (9) only asks that a joint does not turn back: so each joint is also moved alone into
+    the range of the neighbours.
     """
     path = path.copy()
     for _ in range(_ROUNDS):
@@ -101,7 +104,8 @@ def _best_pull(
     trials = np.array([via + share * (target - via) for target in targets for share in _PULLS])
     cost = movement_cost(weights, before, trials) + movement_cost(weights, trials, after)
     now = float(movement_cost(weights, before, via) + movement_cost(weights, via, after))
-    trials, cost = trials[cost < now - 1e-9], cost[cost < now - 1e-9]
+    trials = trials[cost < now - 1e-9]
+    cost = cost[cost < now - 1e-9]
     if len(trials) == 0:
         return via
     count = len(trials)

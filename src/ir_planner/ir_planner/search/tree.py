@@ -1,7 +1,7 @@
 """Two trees grow from start and goals towards each other (RRT-Connect), over certified edges.
 
-The search itself is compiled (`ir_kernels.search`); here it is grown in slices that are charged to the
-budget, so that a request can be stopped between them.
+The search itself is compiled (`ir_kernels.search`); here it is grown in slices that are charged to
+the budget, so that a request can be stopped between them.
 """
 
 from dataclasses import dataclass, replace
@@ -20,8 +20,8 @@ _LEAST_SCALE = 0.1  # of the first joint: the wrist still counts where it carrie
 
 
 def joint_scale(space: FreeSpace) -> FloatArray:
-    """How much each joint (n,) counts in the distance of configurations: the root of its weight in eq. (9),
-    the first one's being 1.
+    """How much each joint (n,) counts in the distance of configurations: the root of its weight in
+    eq. (9), the first one's being 1.
     """
     weights = space.scene.weights
     return np.asarray(np.maximum(np.sqrt(weights / weights[0]), _LEAST_SCALE))
@@ -29,7 +29,9 @@ def joint_scale(space: FreeSpace) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Meeting:
-    """A free path (M, n), or None; then gap [rad]: how near the trees came, each joint by its scale."""
+    """A free path (M, n), or None; then gap [rad]: how near the trees came, each joint by its
+    scale.
+    """
 
     path: FloatArray | None
     gap: float
@@ -40,7 +42,10 @@ class Tree:
     """Bidirectional trees over certified edges: finds narrow passages, given work."""
 
     edges: int = setting(
-        100_000_000, "Certified edges before the trees are given up.", minimum=1, maximum=100_000_000
+        100_000_000,
+        "Certified edges before the trees are given up.",
+        minimum=1,
+        maximum=100_000_000,
     )
     quick_edges: int = setting(
         4000,
@@ -64,15 +69,25 @@ class Tree:
         return Found([], f"the trees came within {np.degrees(found.gap):.1f} deg of each other")
 
 
-def connect(start: FloatArray, goals: FloatArray, space: FreeSpace, seed: int, most: int = 2**62) -> Meeting:
-    """A free path from start (n,) to one of goals (G, n), unless the budget, or `most` edges, end before one
-    is found.
+def connect(
+    start: FloatArray, goals: FloatArray, space: FreeSpace, seed: int, most: int = 2**62
+) -> Meeting:
+    """A free path from start (n,) to one of goals (G, n), unless the budget, or `most` edges, end
+    before one is found.
 
-    Raises CancelledError when asked to stop, ir_kernels.InputError where start, or every goal, isn't free.
+    Raises CancelledError when asked to stop, ir_kernels.InputError where start, or every goal,
+    isn't free.
     """
     work = space.work
     search = BidirectionalTree(
-        space.scene.collision, start, goals, space.threshold, space.low, space.high, joint_scale(space), seed
+        space.scene.collision,
+        start,
+        goals,
+        space.threshold,
+        space.low,
+        space.high,
+        joint_scale(space),
+        seed,
     )
     while not work.exhausted and search.edges < most:
         before = search.edges

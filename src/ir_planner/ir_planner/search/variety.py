@@ -1,12 +1,14 @@
-"""Which paths differ enough to be two: in one homotopy class, optimisation leads to one local minimum.
+"""Which paths differ enough to be two: in one homotopy class, optimisation leads to one local
+minimum.
 
-Paths are compared at a few places, by the largest difference of a joint. Where, and how much is enough,
-depends on what is known of them:
+Paths are compared at a few places, by the largest difference of a joint. Where, and how much is
+enough, depends on what is known of them:
 
     candidates of one search     at their middle waypoint     0.15 rad   (MIDDLE)
     paths of the genetic search  along their whole length     a setting  (evenly)
-    coarse solutions             at nine shares of length     0.12 rad   (COARSE: nearer after a descent)
-    exit paths of a station      where they end               0.10 rad   (EXIT: they start together)
+    coarse solutions             at nine shares of length     0.12 rad   (COARSE: nearer after a
+    descent) exit paths of a station      where they end               0.10 rad   (EXIT: they start
+    together)
 """
 
 from collections.abc import Callable, Iterable
@@ -19,9 +21,14 @@ from ir_planner.curves import at_shares, evenly_spaced
 from ir_planner.scene import path_cost
 
 T = TypeVar("T")
-NEAREST_GOALS = 3  # goals that are tried by a search which takes one at a time: the rest cost more by W
+NEAREST_GOALS = (
+    3  # goals that are tried by a search which takes one at a time: the rest cost more by W
+)
 PATHS = 3  # that one search answers with: more of them rarely differ in homotopy class
-MIDDLE, COARSE, EXIT = 0.15, 0.12, 0.1  # rad
+# rad
+MIDDLE = 0.15
+COARSE = 0.12
+EXIT = 0.1
 _NINE = np.linspace(0.1, 0.9, 9)
 _EVENLY = 16
 
@@ -34,7 +41,9 @@ def apart(a: FloatArray, b: FloatArray) -> float:
 def first_different(
     paths: Iterable[T], most: int, enough: float, places: Callable[[T], FloatArray]
 ) -> list[T]:
-    """The first `most` of the paths whose places (K, n) are more than `enough` rad apart from all before."""
+    """The first `most` of the paths whose places (K, n) are more than `enough` rad apart from all
+    before.
+    """
     chosen: list[tuple[T, FloatArray]] = []
     for path in paths:
         if len(chosen) == most:
@@ -46,7 +55,9 @@ def first_different(
 
 
 def different_paths(paths: list[FloatArray], weights: FloatArray) -> list[FloatArray]:
-    """The cheapest few of paths (M_k, n) by W, weights (n,), that differ in their middle waypoint."""
+    """The cheapest few of paths (M_k, n) by W, weights (n,), that differ in their middle
+    waypoint.
+    """
     cheapest = sorted(paths, key=lambda path: path_cost(weights, path))
     return first_different(cheapest, PATHS, MIDDLE, lambda path: path[len(path) // 2])
 

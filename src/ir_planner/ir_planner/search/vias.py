@@ -1,4 +1,5 @@
-"""Candidates of simple detours: over the named postures, with the arm retracted first, or over one via.
+"""Candidates of simple detours: over the named postures, with the arm retracted first, or over one
+via.
 
 They are generated in one go and certified in one batch; which of them are free is another question.
 """
@@ -11,8 +12,12 @@ _SHARES = (0.25, 0.5, 0.75, 1.0)  # of the joint step to a posture by which the 
 _SPREADS = (0.15, 0.35, 0.7)  # rad: how far vias are scattered around the straight movement
 
 
-def over_postures(start: FloatArray, goal: FloatArray, postures: list[FloatArray]) -> list[FloatArray]:
-    """Paths (3, n) over each posture, and over each turned to where start, goal or the middle look."""
+def over_postures(
+    start: FloatArray, goal: FloatArray, postures: list[FloatArray]
+) -> list[FloatArray]:
+    """Paths (3, n) over each posture, and over each turned to where start, goal or the middle
+    look.
+    """
     paths = []
     for posture in postures:
         paths.append(np.stack([start, posture, goal]))
@@ -23,7 +28,9 @@ def over_postures(start: FloatArray, goal: FloatArray, postures: list[FloatArray
     return paths
 
 
-def over_retracted_arm(start: FloatArray, goal: FloatArray, postures: list[FloatArray]) -> list[FloatArray]:
+def over_retracted_arm(
+    start: FloatArray, goal: FloatArray, postures: list[FloatArray]
+) -> list[FloatArray]:
     """Paths (4, n) and (3, n): retract the arm towards a posture, turn, and reach out again.
 
     Once with all joints but the first, once with the arm (joints 2 and 3) alone.

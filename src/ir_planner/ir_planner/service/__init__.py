@@ -12,7 +12,13 @@ from ir_planner.service.service_lines import (
     timed_service,
 )
 from ir_planner.service.service_movement import ServicePlan, plan_service
-from ir_planner.service.withdrawals import EXIT_SEARCHES, ExitPath, exit_searches, known_method, withdrawal
+from ir_planner.service.withdrawals import (
+    EXIT_SEARCHES,
+    ExitPath,
+    exit_searches,
+    known_method,
+    withdrawal,
+)
 from ir_planner.service.work_area import WorkArea
 from ir_planner.service.work_configurations import ServiceRequest, checked_request
 

@@ -17,9 +17,12 @@ _SAMPLES = 60
 def service_shapes(
     candidates: Sequence[ServiceCandidate], station: str, scene: PlanningScene
 ) -> tuple[Shape, ...]:
-    """Shapes of ranked candidates at a station: the best path is thick, its closest pair has a label."""
+    """Shapes of ranked candidates at a station: the best path is thick, its closest pair has a
+    label.
+    """
     machine = scene.cell.machine(scene.station(station).equipment)
-    zone, shapes = machine.zone, []
+    zone = machine.zone
+    shapes = []
     if machine.enabled:
         red, green, blue, alpha = ZONES[zone.kind]
         colour = (red, green, blue, min(2.0 * alpha, 1.0))
@@ -42,7 +45,9 @@ def _closest(candidate: ServiceCandidate, labelled: bool) -> list[Shape]:
     if pair is None:
         return []
     ends = np.stack([pair.point_a, pair.point_b])
-    shapes = [Shape("service_closest", "line", np.eye(4), np.array([0.012, 0.0, 0.0]), CLOSEST, ends)]
+    shapes = [
+        Shape("service_closest", "line", np.eye(4), np.array([0.012, 0.0, 0.0]), CLOSEST, ends)
+    ]
     if labelled:
         pose = np.eye(4)
         pose[:3, 3] = ends.mean(axis=0) + np.array([0.0, 0.0, 0.05])

@@ -1,4 +1,6 @@
-"""The problem of a withdrawal: from a configuration at a station to outside its machine's forbidden zone."""
+"""The problem of a withdrawal: from a configuration at a station to outside its machine's forbidden
+zone.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,13 +13,15 @@ from ir_planner.request import Context
 from ir_planner.scene import tcp_inside
 from ir_planner.service.work_area import WorkArea
 
-_EDGE_SAMPLES = 12  # per step of a path where contacts are asked for; the proof of the movement is exact
+_EDGE_SAMPLES = (
+    12  # per step of a path where contacts are asked for; the proof of the movement is exact
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Exit:
-    """From `interaction` (n,) out of the area; free space inside (with allowed contacts) and outside
-    (without), S_m [m].
+    """From `interaction` (n,) out of the area; free space inside (with allowed contacts) and
+    outside (without), S_m [m].
     """
 
     interaction: FloatArray
@@ -29,7 +33,9 @@ class Exit:
     @staticmethod
     def of(interaction: FloatArray, context: Context) -> "Exit":
         """The problem of leaving the context's station from `interaction` (n,)."""
-        scene, margin, work = context.scene, context.safety_distance, context.work
+        scene = context.scene
+        margin = context.safety_distance
+        work = context.work
         return Exit(
             interaction,
             WorkArea.of(scene, scene.station(context.station)),
@@ -40,8 +46,8 @@ class Exit:
 
     @cached_property
     def least_distance(self) -> float:
-        """How far [m] the tcp must go: by the approach distance where the interaction configuration is
-        outside the zone already, as above a pallet; else leaving the zone is what counts.
+        """How far [m] the tcp must go: by the approach distance where the interaction configuration
+        is outside the zone already, as above a pallet; else leaving the zone is what counts.
         """
         outside = self.area.left(self.interaction[None], self.safety_distance)[0]
         return float(self.area.station.approach_distance) if outside else 0.0
@@ -61,11 +67,13 @@ class Exit:
         return out
 
     def contacts_end(self, path: FloatArray) -> bool:
-        """Whether a path (M, n) keeps S_m where its tcp is outside the zone: allowed contacts end there.
+        """Whether a path (M, n) keeps S_m where its tcp is outside the zone: allowed contacts end
+        there.
 
         Asked at samples, so that what the proof of the movement would refuse is seldom timed.
         """
-        scene, station = self.inside.scene, self.area.station.name
+        scene = self.inside.scene
+        station = self.area.station.name
         if not scene.allowed(station).any():
             return True
         share = np.linspace(0.0, 1.0, _EDGE_SAMPLES)[:, None, None]

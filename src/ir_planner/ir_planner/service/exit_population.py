@@ -1,4 +1,6 @@
-"""The population of a withdrawal: configurations on their paths out, with what the next generation needs."""
+"""The population of a withdrawal: configurations on their paths out, with what the next generation
+needs.
+"""
 
 from dataclasses import dataclass
 
@@ -9,8 +11,8 @@ from ir_msgs_py.arrays import FloatArray, IntArray
 
 @dataclass(eq=False)
 class ExitPopulation:
-    """Configurations (N, n) with D (N,), spread (N,) rad, the step (N, n) that led here, index of their
-    node.
+    """Configurations (N, n) with D (N,), spread (N,) rad, the step (N, n) that led here, index of
+    their node.
     """
 
     q: FloatArray

@@ -13,9 +13,9 @@ from ir_planner.service.exit import Exit
 
 @dataclass(frozen=True, eq=False)
 class WalkRecord:
-    """Configurations (N, n) that were kept, the interaction configuration first, each with the index of its
-    parent (N,); `dropped` (M, n): those that came too near something. distance: the total metric distance D
-    [m] at the interaction configuration and the largest one.
+    """Configurations (N, n) that were kept, the interaction configuration first, each with the
+    index of its parent (N,); `dropped` (M, n): those that came too near something. distance: the
+    total metric distance D [m] at the interaction configuration and the largest one.
     """
 
     kept: FloatArray
@@ -28,10 +28,11 @@ class WalkRecord:
 
 @dataclass(frozen=True, eq=False)
 class ExitsFound:
-    """Free paths (M_k, n) from the interaction configuration to outside the zone; `note`: what was done.
+    """Free paths (M_k, n) from the interaction configuration to outside the zone; `note`: what was
+    done.
 
-    farthest (n,): the configuration farthest out; rejected: dropped candidates by reason. walk: every step
-    of a search that goes on from configurations it has reached.
+    farthest (n,): the configuration farthest out; rejected: dropped candidates by reason. walk:
+    every step of a search that goes on from configurations it has reached.
     """
 
     paths: list[FloatArray]
@@ -48,7 +49,9 @@ class ExitSearch(Protocol):
     def title(self) -> str:
         """The name of its stage in answers."""
 
-    def find(self, problem: Exit, wanted: int, seed: np.random.SeedSequence, work: Work) -> ExitsFound:
+    def find(
+        self, problem: Exit, wanted: int, seed: np.random.SeedSequence, work: Work
+    ) -> ExitsFound:
         """Up to `wanted` paths whose every step `problem.inside` certifies.
 
         The same problem and seed give the same paths. Ends early when `work.exhausted`.

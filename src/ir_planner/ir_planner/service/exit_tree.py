@@ -1,4 +1,6 @@
-"""Exit paths by two trees: one from the interaction configuration, one from configurations outside."""
+"""Exit paths by two trees: one from the interaction configuration, one from configurations
+outside.
+"""
 
 from dataclasses import dataclass
 
@@ -29,22 +31,27 @@ class ExitTree:
         """The name of its stage in answers."""
         return "tree"
 
-    def find(self, problem: Exit, wanted: int, seed: np.random.SeedSequence, work: Work) -> ExitsFound:
+    def find(
+        self, problem: Exit, wanted: int, seed: np.random.SeedSequence, work: Work
+    ) -> ExitsFound:
         """Grow until the trees meet: one path, or none when the work ended before."""
         rng = np.random.default_rng(seed.spawn(1)[0])
         goals = self._outside(problem, rng)
         path = None
         if len(goals):
-            path = connect(problem.interaction, goals, problem.inside, int(rng.integers(2**63))).path
+            path = connect(
+                problem.interaction, goals, problem.inside, int(rng.integers(2**63))
+            ).path
         if path is None:
             return ExitsFound([], problem.interaction, "no path")
         return ExitsFound([_until_out(path, problem)], path[-1], f"{len(path)} points")
 
     def _outside(self, problem: Exit, rng: np.random.Generator) -> FloatArray:
-        """Free configurations (G, n) outside: park and machine home where they are, and the nearest of those
-        drawn.
+        """Free configurations (G, n) outside: park and machine home where they are, and the nearest
+        of those drawn.
         """
-        cell, space = problem.inside.scene.cell, problem.inside
+        cell = problem.inside.scene.cell
+        space = problem.inside
         postures = np.array([cell.park, cell.machine_home])
         drawn = rng.uniform(space.low, space.high, (self.drawn, len(postures[0])))
         drawn = drawn[problem.is_out(drawn)]

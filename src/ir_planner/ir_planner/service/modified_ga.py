@@ -1,11 +1,12 @@
-"""Withdrawal from a machine's work area by the modified genetic algorithm of eq. (7): the raw paths.
+"""Withdrawal from a machine's work area by the modified genetic algorithm of eq. (7): the raw
+paths.
 
 A population of copies of the interaction configuration is perturbed, q_i <- q_i + W_i n_i with
-n_i ~ N(mu_i, sigma). What comes nearer than S_m is dropped, with its reason; the rest is ranked by the total
-metric distance D to the machine. The mean grows with D and points where D grew and the tool leaves; the
-spread shrinks with the gain of D, and is 1 rad around a configuration whose offspring all collide, to get
-round what closes the zone. It goes on until D grows for every configuration and the zone is left. Every step
-is a certified edge.
+n_i ~ N(mu_i, sigma). What comes nearer than S_m is dropped, with its reason; the rest is ranked by
+the total metric distance D to the machine. The mean grows with D and points where D grew and the
+tool leaves; the spread shrinks with the gain of D, and is 1 rad around a configuration whose
+offspring all collide, to get round what closes the zone. It goes on until D grows for every
+configuration and the zone is left. Every step is a certified edge.
 """
 
 from collections import Counter
@@ -22,13 +23,20 @@ from ir_planner.service.exit_population import ExitPopulation, counted, joined
 from ir_planner.service.exit_search import ExitsFound, WalkRecord
 from ir_planner.service.step_weights import step_weights
 
-_DAMPING = 0.02  # m^2, of the least squares: near a singular wrist rates stay below 1 / (2 * damping)
-_ROTATION_LENGTH = 0.5  # m/rad, lambda of eq. (2): how much a turn of the tool weighs against its travel
+_DAMPING = (
+    0.02  # m^2, of the least squares: near a singular wrist rates stay below 1 / (2 * damping)
+)
+_ROTATION_LENGTH = (
+    0.5  # m/rad, lambda of eq. (2): how much a turn of the tool weighs against its travel
+)
 _WEIGHTED = np.array([1.0, 1.0, 1.0, *[_ROTATION_LENGTH] * 3])[:, None]
 _DAMPED = _DAMPING**2 * np.eye(6)
-_SHARPEST = 0.25  # the spread shrinks at most to this share in one generation, so that one step can't end it
+# the spread shrinks at most to this share in one generation, so that one step can't end it
+_SHARPEST = 0.25
 _WIDEST = 1.3  # and grows at most so, where D was lost
-_MEAN_LEAST, _MEAN_MOST = 0.25, 4.0  # of the first step: mean steps grow with D between them
+# of the first step: mean steps grow with D between them
+_MEAN_LEAST = 0.25
+_MEAN_MOST = 4.0
 _PER_PARENT = 3  # offspring of one configuration that may survive: several directions stay alive
 _FEWEST_OFFSPRING = 4  # of one configuration, however large the population
 _SMALLEST_D = 1e-3  # m: gains of D are relative to at least this
@@ -45,9 +53,15 @@ class ModifiedGa:
     )
     population: int = setting(16, "Configurations in the population.", minimum=2, maximum=1000)
     offspring: int = setting(6, "Perturbed copies of each configuration.", minimum=1, maximum=1000)
-    generations: int = setting(60, "Generations before the search is given up.", minimum=1, maximum=10_000)
+    generations: int = setting(
+        60, "Generations before the search is given up.", minimum=1, maximum=10_000
+    )
     step: float = setting(
-        0.12, "Distance that the tool moves in the first mean step.", unit="m", minimum=0.001, maximum=2.0
+        0.12,
+        "Distance that the tool moves in the first mean step.",
+        unit="m",
+        minimum=0.001,
+        maximum=2.0,
     )
     momentum: float = setting(
         0.8, "Largest share of the last step's direction in the mean.", minimum=0.0, maximum=1.0
@@ -55,7 +69,9 @@ class ModifiedGa:
     spread: float = setting(
         0.15, "Standard deviation of the first steps.", unit="rad", minimum=1e-4, maximum=3.0
     )
-    spread_least: float = setting(0.01, "Least standard deviation.", unit="rad", minimum=0.0, maximum=3.0)
+    spread_least: float = setting(
+        0.01, "Least standard deviation.", unit="rad", minimum=0.0, maximum=3.0
+    )
     spread_decades: float = setting(
         1.5, "Offspring step with 1 to 10^-this of the deviation.", minimum=0.0, maximum=6.0
     )
@@ -74,17 +90,21 @@ class ModifiedGa:
         """The name of its stage in answers."""
         return "modified GA"
 
-    def find(self, problem: Exit, wanted: int, seed: np.random.SeedSequence, work: Work) -> ExitsFound:
+    def find(
+        self, problem: Exit, wanted: int, seed: np.random.SeedSequence, work: Work
+    ) -> ExitsFound:
         """Perturb and rank until `wanted` paths have left the zone, generations or work end."""
         walk = withdraw(problem, self, np.random.default_rng(seed), wanted)
-        note = f"{len(walk.paths)} paths, {walk.generations} generations, {walk.candidates} candidates"
+        note = (
+            f"{len(walk.paths)} paths, {walk.generations} generations, {walk.candidates} candidates"
+        )
         return ExitsFound(walk.paths, walk.best, note, walk.rejected, walk.record)
 
 
 @dataclass(eq=False)
 class Walk:
-    """What a search found: paths (M_k, n) from the interaction configuration to outside, in the order they
-    came.
+    """What a search found: paths (M_k, n) from the interaction configuration to outside, in the
+    order they came.
 
     best: the configuration farthest out; rejected: dropped candidates by reason.
     """
@@ -107,8 +127,11 @@ def withdraw(problem: Exit, settings: ModifiedGa, rng: np.random.Generator, want
 
 class _Walker:
     def __init__(self, problem: Exit, settings: ModifiedGa, rng: np.random.Generator) -> None:
-        self.problem, self.area, self.inside = problem, problem.area, problem.inside
-        self.settings, self.rng = settings, rng
+        self.problem = problem
+        self.area = problem.area
+        self.inside = problem.inside
+        self.settings = settings
+        self.rng = rng
         self.scene = scene = problem.inside.scene
         loads = sum(load.mass for load in scene.loads)
         self.W = step_weights(scene.cell.robot.link_mass, loads, settings.weighting)
@@ -116,12 +139,15 @@ class _Walker:
         self.nodes: list[FloatArray] = [first]
         self.parents: list[int] = [0]
         self.dropped: list[FloatArray] = [first[None][:0]]
-        self.first_total = self.largest = max(float(self.area.total_distance(first[None])[0]), _SMALLEST_D)
+        self.first_total = self.largest = max(
+            float(self.area.total_distance(first[None])[0]), _SMALLEST_D
+        )
         self.walk = Walk([], first, 0, 0)
         self.best_zone = float(self.area.zone_distance(first[None])[0])
 
     def run(self, wanted: int) -> Walk:
-        n, count = len(self.nodes[0]), self.settings.population
+        n = len(self.nodes[0])
+        count = self.settings.population
         population = ExitPopulation(
             self.nodes[0][None],
             np.array([self.first_total]),
@@ -134,14 +160,17 @@ class _Walker:
                 break
             self.walk.generations += 1
             population = self._next(
-                population, max(self.settings.offspring * count // len(population), _FEWEST_OFFSPRING)
+                population,
+                max(self.settings.offspring * count // len(population), _FEWEST_OFFSPRING),
             )
         self.walk.record = self._record()
         return self.walk
 
     def _record(self) -> WalkRecord:
-        kept, parents = np.array(self.nodes), np.array(self.parents, dtype=np.int64)
-        counts, distance = (self.walk.generations, self.walk.candidates), (self.first_total, self.largest)
+        kept = np.array(self.nodes)
+        parents = np.array(self.parents, dtype=np.int64)
+        counts = (self.walk.generations, self.walk.candidates)
+        distance = (self.first_total, self.largest)
         return WalkRecord(kept, parents, np.concatenate(self.dropped), *counts, distance)
 
     def _next(self, parents: ExitPopulation, offspring: int) -> ExitPopulation:
@@ -152,13 +181,17 @@ class _Walker:
             -self.settings.spread_decades, 0.0, len(owner)
         )
         noise = spread[:, None] * self.rng.standard_normal((len(owner), parents.q.shape[1]))
-        away = self.rng.random(len(owner))[:, None]  # part of the mean: short steps survive where it is tight
+        away = self.rng.random(len(owner))[
+            :, None
+        ]  # part of the mean: short steps survive where it is tight
         q = parents.q[owner] + mean[owner] * away + self.W * noise
         self.walk.candidates += len(q)
         q, owner, collided = self._free(q, owner, len(parents))
         total = self.area.total_distance(q)
         order = np.argsort(-total, kind="stable")
-        q, owner, total = q[order], owner[order], total[order]
+        q = q[order]
+        owner = owner[order]
+        total = total[order]
         chosen = self._certified(parents, q, owner)
         children = self._children(parents, q[chosen], owner[chosen], total[chosen])
         survivors = len(children)
@@ -172,7 +205,9 @@ class _Walker:
         return children
 
     def _mean(self, parents: ExitPopulation) -> FloatArray:
-        """Mean steps (N, n): where the last step went, and straight out along the tool; longer as D grows."""
+        """Mean steps (N, n): where the last step went, and straight out along the tool; longer as D
+        grows.
+        """
         has_bodies = self.area.pairs > 0  # a zone without bodies has no D
         ratio = parents.total / self.first_total if has_bodies else np.ones(len(parents))
         grown = np.minimum(np.maximum(ratio, _MEAN_LEAST), _MEAN_MOST)
@@ -184,7 +219,9 @@ class _Walker:
         return np.asarray(grown[:, None] * ((1.0 - share) * out + share * momentum))
 
     def _straight_out(self, q: FloatArray) -> FloatArray:
-        """Joint rates (N, n) per metre that the tool moves along its -x, by damped least squares."""
+        """Joint rates (N, n) per metre that the tool moves along its -x, by damped least
+        squares.
+        """
         J = self.scene.chain.jacobian(q)
         J = J * _WEIGHTED
         target = np.zeros((len(q), 6, 1))
@@ -193,23 +230,30 @@ class _Walker:
         rate: FloatArray = (turned @ np.linalg.solve(J @ turned + _DAMPED, target))[:, :, 0]
         return rate
 
-    def _free(self, q: FloatArray, owner: IntArray, count: int) -> tuple[FloatArray, IntArray, BoolArray]:
-        """Candidates within the limits and free; and which parents lost all of theirs to collisions."""
-        low, high = self.inside.low, self.inside.high
+    def _free(
+        self, q: FloatArray, owner: IntArray, count: int
+    ) -> tuple[FloatArray, IntArray, BoolArray]:
+        """Candidates within the limits and free; and which parents lost all of theirs to
+        collisions.
+        """
+        low = self.inside.low
+        high = self.inside.high
         beyond = (q < low) | (q > high)
         out = beyond.any(axis=1)
         if out.any():
             names = self.scene.cell.robot.joint_names
             for j, lost in counted(np.argmax(beyond[out], axis=1)):
                 self.walk.rejected[f"{names[j]} beyond its limit"] += lost
-            q, owner = q[~out], owner[~out]
+            q = q[~out]
+            owner = owner[~out]
         if len(q) == 0:
             return q, owner, np.ones(count, dtype=bool)
         near = self.scene.collision.min_distance(q, self.inside.threshold)
         free = (near.pair < 0) | (near.distance > self.inside.threshold[near.pair])
         self._count_pairs(near.pair[~free], "too near")
         self.dropped.append(q[~free])
-        q, owner = q[free], owner[free]
+        q = q[free]
+        owner = owner[free]
         collided = np.ones(count, dtype=bool)
         collided[owner] = False
         return q, owner, collided
@@ -217,7 +261,9 @@ class _Walker:
     def _certified(self, parents: ExitPopulation, q: FloatArray, owner: IntArray) -> IntArray:
         """The best candidates, in rank order, whose step from the parent is proved free."""
         population = self.settings.population
-        most, taken, ranked = max(_PER_PARENT, population // len(parents)), [0] * len(parents), []
+        most = max(_PER_PARENT, population // len(parents))
+        taken = [0] * len(parents)
+        ranked = []
         for k, parent in enumerate(owner.tolist()):
             if taken[parent] < most:
                 taken[parent] += 1
@@ -255,7 +301,8 @@ class _Walker:
         zone = self.area.zone_distance(children.q)
         far = int(np.argmax(zone))
         if zone[far] > self.best_zone:
-            self.best_zone, self.walk.best = float(zone[far]), children.q[far]
+            self.best_zone = float(zone[far])
+            self.walk.best = children.q[far]
         done = self.problem.is_out(children.q, zone)
         grown = (children.total > self.first_total) | (self.area.pairs == 0)
         if (done & ~grown).any():

@@ -1,8 +1,9 @@
-"""Service movement: out of a station along -x of the tool (exit), or into it along the same line (entry).
+"""Service movement: out of a station along -x of the tool (exit), or into it along the same line
+(entry).
 
 The straight line of the tcp over the station's approach distance is followed through closed-form
-configurations of one branch, point by point; a joint spline (eq. 10) runs through them. On the line the
-station's allowed contacts hold; the outer end keeps S_m from everything.
+configurations of one branch, point by point; a joint spline (eq. 10) runs through them. On the line
+the station's allowed contacts hold; the outer end keeps S_m from everything.
 """
 
 from collections import Counter
@@ -21,7 +22,9 @@ from ir_planner.scene import MotionLimits
 from ir_planner.service.withdrawals import ExitPath
 from ir_planner.timing import Movement, best_stretch, stretched, time_spline, within_torque
 
-SPACING = 0.03  # m between points of the line: in between, the tool leaves it by less than a millimetre
+SPACING = (
+    0.03  # m between points of the line: in between, the tool leaves it by less than a millimetre
+)
 _JUMP = 0.35  # rad: a larger step between neighbours is another branch or a singular wrist
 
 
@@ -29,7 +32,8 @@ _JUMP = 0.35  # rad: a larger step between neighbours is another branch or a sin
 class ServiceLine:
     """Configurations (L, n) from the interaction configuration to the outer end.
 
-    straight: points of a straight line of the tool; else waypoints of a withdrawal (eq. 7), with the `exit`
+    straight: points of a straight line of the tool; else waypoints of a withdrawal (eq. 7), with
+    the `exit`
     that they are of: the same points, but for whole turns.
     """
 
@@ -55,21 +59,23 @@ class ServiceLine:
         return self.points[::-1] if entry else self.points
 
     def quickest(self, entry: bool, limits: MotionLimits, context: Context) -> JointTrajectory:
-        """The fastest spline through the points in a context's scene. It doesn't depend on the objective, so
-        requests for several find it once. Raises TimingError when a torque does not suffice.
+        """The fastest spline through the points in a context's scene. It doesn't depend on the
+        objective, so requests for several find it once. Raises TimingError when a torque does not
+        suffice.
         """
         bounds = (limits.velocity, limits.acceleration, limits.jerk)
         key = (entry, context.scene, limits.torque_share, *(bound.tobytes() for bound in bounds))
         if key not in self._quickest:
-            points, dynamics = self.along(entry), context.scene.dynamics
+            points = self.along(entry)
+            dynamics = context.scene.dynamics
             self._quickest[key] = time_spline(points, context.joint_names, limits, dynamics)
             context.work.check()
         return self._quickest[key]
 
 
 def line_poses(station: Station) -> FloatArray:
-    """Poses (L, 4, 4) of the tcp from the station backwards along its -x; one pose where the approach is 0
-    m.
+    """Poses (L, 4, 4) of the tcp from the station backwards along its -x; one pose where the
+    approach is 0 m.
     """
     count = int(np.ceil(station.approach_distance / SPACING)) + 1
     back = np.linspace(0.0, station.approach_distance, max(count, 1))
@@ -78,9 +84,11 @@ def line_poses(station: Station) -> FloatArray:
     return poses
 
 
-def service_lines(interaction: FloatArray, context: Context, rejected: Counter[str]) -> list[ServiceLine]:
-    """Lines of the context's station from interaction configurations (K, n); those that leave the limits or
-    change branch are counted and dropped.
+def service_lines(
+    interaction: FloatArray, context: Context, rejected: Counter[str]
+) -> list[ServiceLine]:
+    """Lines of the context's station from interaction configurations (K, n); those that leave the
+    limits or change branch are counted and dropped.
     """
     poses = line_poses(context.scene.station(context.station))
     found = context.scene.inverse_kinematics.solve(poses)
@@ -89,7 +97,11 @@ def service_lines(interaction: FloatArray, context: Context, rejected: Counter[s
         points = [q]
         for k in range(1, len(poses)):
             candidates = found.of_pose(k)
-            jump = np.abs(candidates - points[-1]).max(axis=1) if len(candidates) else np.array([np.inf])
+            jump = (
+                np.abs(candidates - points[-1]).max(axis=1)
+                if len(candidates)
+                else np.array([np.inf])
+            )
             nearest = int(np.argmin(jump))
             if jump[nearest] > _JUMP:
                 break
@@ -98,16 +110,23 @@ def service_lines(interaction: FloatArray, context: Context, rejected: Counter[s
             lines.append(ServiceLine(np.array(points)))
         else:
             share = len(points) / len(poses)
-            rejected[f"line out of {context.station} leaves the joint limits after {100 * share:.0f} %"] += 1
+            rejected[
+                f"line out of {context.station} leaves the joint limits after {100 * share:.0f} %"
+            ] += 1
     return lines
 
 
 def lines_free(lines: list[ServiceLine], context: Context, rejected: Counter[str]) -> list[bool]:
-    """Which lines are free: inside with the station's allowed contacts, at the outer end without."""
-    scene, margin, work = context.scene, context.safety_distance, context.work
+    """Which lines are free: inside with the station's allowed contacts, at the outer end
+    without.
+    """
+    scene = context.scene
+    margin = context.safety_distance
+    work = context.work
     if not lines:
         return []
-    allowed, plain = FreeSpace.of(scene, margin, work, context.station), FreeSpace.of(scene, margin, work)
+    allowed = FreeSpace.of(scene, margin, work, context.station)
+    plain = FreeSpace.of(scene, margin, work)
     inside = allowed.paths_free([line.points for line in lines])
     ends = plain.states_free(np.array([line.outside for line in lines]))
     for line, free, out in zip(lines, inside, ends, strict=True):
@@ -120,9 +139,12 @@ def lines_free(lines: list[ServiceLine], context: Context, rejected: Counter[str
     return [bool(free) for free in inside & ends]
 
 
-def timed_service(line: ServiceLine, entry: bool, context: Context, near: Movement | None = None) -> Movement:
-    """The movement along the line, outwards or (entry) inwards, verified with the allowed contacts of the
-    context's station. near: one along it from whose time scaling the search for a better one starts.
+def timed_service(
+    line: ServiceLine, entry: bool, context: Context, near: Movement | None = None
+) -> Movement:
+    """The movement along the line, outwards or (entry) inwards, verified with the allowed contacts
+    of the context's station. near: one along it from whose time scaling the search for a better one
+    starts.
 
     Raises TimingError when a torque does not suffice.
     """
@@ -139,7 +161,8 @@ def timed_service(line: ServiceLine, entry: bool, context: Context, near: Moveme
     assert movement is not None  # timed always makes one
     violation = movement.violation
     if violation is not None and violation.what == "clearance":
-        # the spline leaves the certified polyline where points lie far apart: refined from the polyline
+        # the spline leaves the certified polyline where points lie far apart: refined from the
+        # polyline
         return movement_over(points, context)
     if violation is not None and violation.what != "torque":
         raise TimingError(violation.sentence, 0)

@@ -1,8 +1,9 @@
 """Service movement, stage two: several certified paths out of a machine's work area, or into it.
 
-From the interaction configuration to outside the zone by `withdrawal`; the entry is the reverse. Each path
-gets its time within speed, acceleration, jerk and torque with what is held, and is verified with the
-station's allowed contacts. The best by the objective come first, then by clearance, then by time.
+From the interaction configuration to outside the zone by `withdrawal`; the entry is the reverse.
+Each path gets its time within speed, acceleration, jerk and torque with what is held, and is
+verified with the station's allowed contacts. The best by the objective come first, then by
+clearance, then by time.
 """
 
 from collections import Counter
@@ -41,18 +42,21 @@ class ServicePlan:
 def plan_service(
     request: ServiceRequest, context: Context, searches: Mapping[str, ExitSearch] = EXIT_SEARCHES
 ) -> ServicePlan:
-    """Plan a service movement. Raises RequestError for options that can't be met, CancelledError when asked
-    to stop.
+    """Plan a service movement. Raises RequestError for options that can't be met, CancelledError
+    when asked to stop.
     """
     status, candidates = _search(request, context.at(request.station.name), searches)
-    start = candidates[0].trajectory.positions[0] if candidates and candidates[0].trajectory else None
+    start = (
+        candidates[0].trajectory.positions[0] if candidates and candidates[0].trajectory else None
+    )
     return ServicePlan(status, candidates, context.journal.info(start, context.joint_names))
 
 
 def _search(
     request: ServiceRequest, context: Context, searches: Mapping[str, ExitSearch]
 ) -> tuple[Status, tuple[ServiceCandidate, ...]]:
-    journal, method = context.journal, known_method(context.options.planner_id)
+    journal = context.journal
+    method = known_method(context.options.planner_id)
     with journal.stage("configurations") as notes:
         interaction, status = work_configurations(request, context)
         notes.append(f"{len(interaction)} to try")
@@ -70,14 +74,18 @@ def _search(
             journal.planner_id = certified[0][0].method
             ranked = _ranked(certified, context)
             journal.timing = ranked[0][1].timing
-            return Status.success(), tuple(_candidate(path, movement, context) for path, movement in ranked)
+            return Status.success(), tuple(
+                _candidate(path, movement, context) for path, movement in ranked
+            )
         failed = blocked(found, problem, journal)
         if journal.work.exhausted:
             break
     return failed, ()
 
 
-def _timed(path: ExitPath, request: ServiceRequest, context: Context) -> tuple[ExitPath, Movement] | None:
+def _timed(
+    path: ExitPath, request: ServiceRequest, context: Context
+) -> tuple[ExitPath, Movement] | None:
     """The certified movement over an exit path, or None with its reason counted."""
     points = path.points[::-1] if request.direction == ENTRY else path.points
     try:
@@ -91,7 +99,9 @@ def _timed(path: ExitPath, request: ServiceRequest, context: Context) -> tuple[E
     return path, movement
 
 
-def _ranked(certified: list[tuple[ExitPath, Movement]], context: Context) -> list[tuple[ExitPath, Movement]]:
+def _ranked(
+    certified: list[tuple[ExitPath, Movement]], context: Context
+) -> list[tuple[ExitPath, Movement]]:
     """The best by the objective first, then by clearance, then by time."""
     options = context.options
 
@@ -116,8 +126,11 @@ def _candidate(path: ExitPath, movement: Movement, context: Context) -> ServiceC
 
 
 def blocked(found: Withdrawal, problem: Exit, journal: Journal) -> Status:
-    """The status where no path was found: how far out, with which clearance there, and what obstructed."""
-    scene, station = problem.inside.scene, problem.area.station
+    """The status where no path was found: how far out, with which clearance there, and what
+    obstructed.
+    """
+    scene = problem.inside.scene
+    station = problem.area.station
     pair = nearest_pair(scene, found.farthest, problem.inside.threshold)
     clearance = (
         ""
@@ -127,7 +140,9 @@ def blocked(found: Withdrawal, problem: Exit, journal: Journal) -> Status:
     depth = max(problem.safety_distance - found.zone_distance, 0.0)
     cut = " within planning_time" if journal.work.truncated else ""
     met = Counter({reason: n for reason, n in found.rejected.items() if "too near" in reason})
-    obstructing = ", ".join(f"{reason} ({count})" for reason, count in met.most_common(4)) or "nothing met"
+    obstructing = (
+        ", ".join(f"{reason} ({count})" for reason, count in met.most_common(4)) or "nothing met"
+    )
     tried = ", ".join(f"{stage.name} ({stage.note})" for stage in journal.stages if stage.note)
     reasons = "; ".join(
         f"{r} ({n})" for r, n in journal.rejected.items() if r.startswith(("torque", "not proved"))
@@ -135,7 +150,7 @@ def blocked(found: Withdrawal, problem: Exit, journal: Journal) -> Status:
     sentence = (
         f"no path out of station {station.name} found{cut}: the configuration farthest out lacks "
         f"{depth * 1e3:.0f} mm to leave the zone of {station.equipment}{clearance}; obstructing: "
-        f"{obstructing}{'; ' + reasons if reasons else ''}; tried: {tried}; another configuration, an opened "
-        "door or a smaller safety distance may help"
+        f"{obstructing}{'; ' + reasons if reasons else ''}; tried: {tried}; another "
+        "configuration, an opened door or a smaller safety distance may help"
     )
     return Status(StatusCode.PLANNING_FAILED, sentence)

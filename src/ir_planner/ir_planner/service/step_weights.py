@@ -1,7 +1,7 @@
 """How far each joint steps in the walk of eq. (7): weighted by the mass from the tool to the joint.
 
-M_i = sum_{l>=i} m_l, the load with the last link. As printed W_i is proportional to M_i ("literal"); the
-option "inverse" lets the light joints, which move little of the arm, step more.
+M_i = sum_{l>=i} m_l, the load with the last link. As printed W_i is proportional to M_i
+("literal"); the option "inverse" lets the light joints, which move little of the arm, step more.
 """
 
 import numpy as np

@@ -1,8 +1,8 @@
-"""Exit paths from an interaction configuration to outside a machine's zone: eq. (7) first, trees where it
-finds none.
+"""Exit paths from an interaction configuration to outside a machine's zone: eq. (7) first, trees
+where it finds none.
 
-What comes out is shortened: shortcuts, waypoints pulled straight, and the end retracted to where the zone
-has just been left; all of it over certified edges.
+What comes out is shortened: shortcuts, waypoints pulled straight, and the end retracted to where
+the zone has just been left; all of it over certified edges.
 """
 
 from collections import Counter
@@ -24,16 +24,20 @@ from ir_planner.service.modified_ga import ModifiedGa
 
 # Every search for exit paths by its name; the next is asked where one finds none.
 EXIT_SEARCHES: Mapping[str, ExitSearch] = {"modified_ga": ModifiedGa(), "tree": ExitTree()}
-_SEARCHED = 2  # raw paths per candidate that is wanted: shortened, some of them end at the same place
+_SEARCHED = (
+    2  # raw paths per candidate that is wanted: shortened, some of them end at the same place
+)
 _STREAM = 7  # of the request's seed, so that other stages draw other numbers
 _END_SAMPLES = 24  # of the last step, where the zone is left: about a centimetre apart
-_CORNERS = 11  # points of a path between which shortcuts are tried: their number grows with the square
+_CORNERS = (
+    11  # points of a path between which shortcuts are tried: their number grows with the square
+)
 
 
 @dataclass(frozen=True, eq=False)
 class ExitPath:
-    """A free path (M, n) from the interaction configuration to outside the zone, the method that found it,
-    and all that the method did.
+    """A free path (M, n) from the interaction configuration to outside the zone, the method that
+    found it, and all that the method did.
     """
 
     method: str
@@ -43,7 +47,8 @@ class ExitPath:
 
 @dataclass(frozen=True, eq=False)
 class Withdrawal:
-    """What was found; for a failure the configuration farthest out, and the rejected candidates by reason.
+    """What was found; for a failure the configuration farthest out, and the rejected candidates by
+    reason.
 
     zone_distance [m] of `farthest`: negative inside.
     """
@@ -67,7 +72,8 @@ def withdrawal(
     method: a key of `searches`, or "": each in turn until one finds any.
     """
     seed = np.random.SeedSequence([journal.seed % 2**63, _STREAM])
-    farthest, rejected = problem.interaction, Counter[str]()
+    farthest = problem.interaction
+    rejected = Counter[str]()
     depth = float(problem.area.zone_distance(farthest[None])[0])
     paths: list[ExitPath] = []
     for name, search in searches.items():
@@ -80,7 +86,8 @@ def withdrawal(
         rejected.update(found.rejected)
         distance = float(problem.area.zone_distance(found.farthest[None])[0])
         if distance > depth:
-            farthest, depth = found.farthest, distance
+            farthest = found.farthest
+            depth = distance
         paths = [ExitPath(name, path, found) for path in found.paths]
     if paths:
         with journal.stage("shorten") as notes:
@@ -91,7 +98,8 @@ def withdrawal(
 
 def _cheapest(paths: list[ExitPath], problem: Exit, wanted: int) -> list[ExitPath]:
     """The paths shortened, cheapest by W first, those that end at the same place once."""
-    space, weights = problem.inside, problem.inside.scene.weights
+    space = problem.inside
+    weights = problem.inside.scene.weights
 
     def cost(path: ExitPath) -> float:
         return path_cost(weights, path.points)

@@ -1,8 +1,9 @@
-"""Where a service movement begins: the machine's forbidden zone, and its bodies, which D of eq. (7) counts.
+"""Where a service movement begins: the machine's forbidden zone, and its bodies, which D of eq. (7)
+counts.
 
-Outside means that every capsule from link 3 to the tool is farther than S_m from the zone. D is the sum of
-the metric distances between what moves (robot, tool, part) and the bodies of THIS machine; pairs of the
-robot with itself never grow, so they don't take part.
+Outside means that every capsule from link 3 to the tool is farther than S_m from the zone. D is the
+sum of the metric distances between what moves (robot, tool, part) and the bodies of THIS machine;
+pairs of the robot with itself never grow, so they don't take part.
 """
 
 from dataclasses import dataclass, field
@@ -43,14 +44,17 @@ class WorkArea:
             *scene.cell.robot.capsules,
             *(capsule for load in scene.loads for capsule in load.capsules),
         ]
-        bodies, zone = machine.world_bodies(), machine.zone
+        bodies = machine.world_bodies()
+        zone = machine.zone
         inner = [capsule for capsule in capsules if capsule.link >= FIRST_LINK]
         box = Body("zone", "box", zone.pose, zone.size)
         return WorkArea(
             scene,
             station,
             zone,
-            CollisionModel(scene.chain, [c for c in capsules if c.link > 0], bodies, ()) if bodies else None,
+            CollisionModel(scene.chain, [c for c in capsules if c.link > 0], bodies, ())
+            if bodies
+            else None,
             CollisionModel(scene.chain, inner, [box], ()) if inner else None,
         )
 
@@ -66,7 +70,9 @@ class WorkArea:
         return np.asarray(self._machine.distances(q).sum(axis=1))
 
     def zone_distance(self, q: FloatArray) -> FloatArray:
-        """Distance (N,) [m] from the zone of the nearest capsule of link 3 to tool; negative: inside."""
+        """Distance (N,) [m] from the zone of the nearest capsule of link 3 to tool; negative:
+        inside.
+        """
         if self._box is None:
             return np.full(len(q), np.inf)
         return np.asarray(self._box.min_distance(q).distance)

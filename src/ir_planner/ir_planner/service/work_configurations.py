@@ -1,4 +1,6 @@
-"""Configurations at a station that a service movement may start from: one per branch, the best first."""
+"""Configurations at a station that a service movement may start from: one per branch, the best
+first.
+"""
 
 from dataclasses import dataclass
 
@@ -12,7 +14,8 @@ from ir_planner.configurations import free_configurations, no_configuration
 from ir_planner.errors import RequestError
 from ir_planner.request import Context
 
-EXIT, ENTRY = "exit", "entry"
+EXIT = "exit"
+ENTRY = "entry"
 CANDIDATES_MAX = 20  # trajectories in one answer
 _BRANCHES = 4  # configurations that are tried: each that fails costs a whole search
 _SAME_BRANCH = 1e-6  # rad
@@ -20,8 +23,8 @@ _SAME_BRANCH = 1e-6  # rad
 
 @dataclass(frozen=True, eq=False)
 class ServiceRequest:
-    """configuration (n,): at the station, None: the best. near (n,): where the cost of configurations counts
-    from.
+    """configuration (n,): at the station, None: the best. near (n,): where the cost of
+    configurations counts from.
     """
 
     station: Station
@@ -45,9 +48,15 @@ def checked_request(direction: str, max_candidates: int) -> None:
         )
 
 
-def work_configurations(request: ServiceRequest, context: Context) -> tuple[list[FloatArray], Status]:
-    """Free configurations (n,) at the station to start from, one per branch, best first; or none and why."""
-    scene, margin, name = context.scene, context.safety_distance, request.station.name
+def work_configurations(
+    request: ServiceRequest, context: Context
+) -> tuple[list[FloatArray], Status]:
+    """Free configurations (n,) at the station to start from, one per branch, best first; or none
+    and why.
+    """
+    scene = context.scene
+    margin = context.safety_distance
+    name = request.station.name
     inside = FreeSpace.of(scene, margin, context.work, name)
     if request.configuration is not None:
         q = request.configuration
@@ -60,7 +69,9 @@ def work_configurations(request: ServiceRequest, context: Context) -> tuple[list
     context.journal.rejected.update(found.rejected)
     if len(found.q) == 0:
         status = no_configuration(request.station.pose, scene, found, f"station {name}")
-        return [], Status(status.code, status.message + _best_clearance(request.station.pose, inside))
+        return [], Status(
+            status.code, status.message + _best_clearance(request.station.pose, inside)
+        )
     chosen: list[FloatArray] = []
     for q in found.q:
         if all(np.abs(np.sin(0.5 * (q - other))).max() > _SAME_BRANCH for other in chosen):
@@ -69,7 +80,9 @@ def work_configurations(request: ServiceRequest, context: Context) -> tuple[list
 
 
 def _best_clearance(pose: FloatArray, inside: FreeSpace) -> str:
-    """What the freest of the configurations that reach a pose comes to; "" where none reaches it."""
+    """What the freest of the configurations that reach a pose comes to; "" where none reaches
+    it.
+    """
     q = inside.scene.inverse_kinematics.solve(np.asarray(pose)[None]).q
     if len(q) == 0:
         return ""

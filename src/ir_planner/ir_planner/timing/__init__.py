@@ -2,7 +2,12 @@
 
 from ir_planner.timing.baseline import baseline, baseline_costs_at_least
 from ir_planner.timing.blending import TimedPath, blended, standing, stretched
-from ir_planner.timing.durations import DURATION_SLACK, at_best_duration, check_duration, check_requested
+from ir_planner.timing.durations import (
+    DURATION_SLACK,
+    at_best_duration,
+    check_duration,
+    check_requested,
+)
 from ir_planner.timing.level_timing import fastest
 from ir_planner.timing.limit_use import lasting_longer
 from ir_planner.timing.movement import Movement

@@ -1,9 +1,10 @@
 """Asynchronous PTP: every joint takes its own time and stops when it has arrived.
 
-Each joint has its own fastest law. Where all of them together ask too much of some joint's torque, single
-joints keep to the synchronous law of the step, as few as possible: the movement never takes longer than the
-synchronous one. The joints leave the straight line between start and goal. Where that is not free, joints
-keep to the synchronous law too, those first that leave the line most.
+Each joint has its own fastest law. Where all of them together ask too much of some joint's torque,
+single
+joints keep to the synchronous law of the step, as few as possible: the movement never takes longer
+than the synchronous one. The joints leave the straight line between start and goal. Where that is
+not free, joints keep to the synchronous law too, those first that leave the line most.
 """
 
 import numpy as np
@@ -18,11 +19,11 @@ _SAMPLE = 4  # grid steps
 def own_laws(
     start: FloatArray, delta: FloatArray, common: Law, limits: MotionLimits, dynamics: Dynamics
 ) -> tuple[StepLaws, frozenset[int]]:
-    """Laws of the joints from `start` by `delta` (n,), each as fast as it can with all torques within their
-    share, and the joints that keep to the `common` law instead.
+    """Laws of the joints from `start` by `delta` (n,), each as fast as it can with all torques
+    within their share, and the joints that keep to the `common` law instead.
 
-    From the joint that gains least by it to the one that gains most, each takes its own law where torque
-    allows.
+    From the joint that gains least by it to the one that gains most, each takes its own law where
+    torque allows.
     """
     own = _fastest(delta, limits)
     if _within(start, delta, own, limits, dynamics):
@@ -39,8 +40,8 @@ def own_laws(
 def farthest_from_line(
     laws: StepLaws, common: Law, delta: FloatArray, step: int, joined: frozenset[int]
 ) -> int | None:
-    """The joint of delta (n,) that is farthest from where the `common` law has it at grid step `step`, of
-    those that haven't `joined` it; None where none is left.
+    """The joint of delta (n,) that is farthest from where the `common` law has it at grid step
+    `step`, of those that haven't `joined` it; None where none is left.
     """
     s, _, _ = laws.at(np.array([step]))
     on_line, _, _ = common.at(np.array([step]))

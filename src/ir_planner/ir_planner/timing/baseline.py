@@ -1,8 +1,8 @@
 """The baseline movement: the straight joint segment, as a controller's PTP would run it.
 
-One seven-phase S-curve for all joints (synchronous) with the data's limits, uniformly slowed until torque
-keeps its share of the envelope; longer durations by uniform time scaling. Every answer of the default
-portfolio is compared with it.
+One seven-phase S-curve for all joints (synchronous) with the data's limits, uniformly slowed until
+torque keeps its share of the envelope; longer durations by uniform time scaling. Every answer of
+the default portfolio is compared with it.
 """
 
 import numpy as np
@@ -26,9 +26,9 @@ _REFINEMENTS = 8  # one to three are enough but for kinks of the torque envelope
 
 
 def baseline(start: FloatArray, goal: FloatArray, context: Context) -> Movement | None:
-    """The baseline from `start` to `goal` (n,), at the requested duration or the best for the objective;
-    None where no duration carries the load, or the requested one is too short. Its clearance is not asked
-    for here.
+    """The baseline from `start` to `goal` (n,), at the requested duration or the best for the
+    objective; None where no duration carries the load, or the requested one is too short. Its
+    clearance is not asked for here.
     """
     ends = np.stack([start, goal])
     if np.abs(goal - start).max() < STILL:
@@ -46,7 +46,9 @@ def baseline(start: FloatArray, goal: FloatArray, context: Context) -> Movement 
 
 
 def baseline_costs_at_least(start: FloatArray, goal: FloatArray, context: Context) -> float:
-    """About what the baseline from `start` to `goal` (n,) costs at least: without limits of torque."""
+    """About what the baseline from `start` to `goal` (n,) costs at least: without limits of
+    torque.
+    """
     ends = np.stack([start, goal])
     law = free_law(path_limits(goal - start, context.limits))
     at_limits = blended(TimedPath(ends, (StepLaws((law,)),), ()), context.joint_names)
@@ -60,9 +62,14 @@ def _quickest(ends: FloatArray, limits: MotionLimits, context: Context) -> Joint
 
     def use_at(factor: float) -> float:
         trajectory = stretched(at_limits, factor)
-        return float(torque_per_segment(trajectory, context.scene.dynamics).max()) / limits.torque_share
+        return (
+            float(torque_per_segment(trajectory, context.scene.dynamics).max())
+            / limits.torque_share
+        )
 
-    fast, beyond = 1.0, use_at(1.0)  # too fast, and the use of torque there
+    # too fast, and the use of torque there
+    fast = 1.0
+    beyond = use_at(1.0)
     if beyond <= 1.0:
         return at_limits
     for _ in range(_ROUNDS):
@@ -70,19 +77,22 @@ def _quickest(ends: FloatArray, limits: MotionLimits, context: Context) -> Joint
         within = use_at(slow)
         if within <= 1.0:
             break
-        fast, beyond = slow, within
+        fast = slow
+        beyond = within
     else:
         return None
     for k in range(_REFINEMENTS):
         if within >= _NEAR:
             break
-        # torque is about a constant and a part that falls with the square of the factor; its envelope has
-        # kinks, so that every second time the middle is taken
+        # torque is about a constant and a part that falls with the square of the factor; its
+        # envelope has kinks, so that every second time the middle is taken
         share = 0.5 if k % 2 else (1.0 - within) / (beyond - within)
         factor = float((slow**-2 + share * (fast**-2 - slow**-2)) ** -0.5) * _BELOW
         use = use_at(factor)
         if use <= 1.0:
-            slow, within = min(factor, slow), use
+            slow = min(factor, slow)
+            within = use
         else:
-            fast, beyond = factor, use
+            fast = factor
+            beyond = use
     return stretched(at_limits, slow)

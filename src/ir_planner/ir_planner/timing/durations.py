@@ -23,19 +23,23 @@ def check_duration(duration: float, options: PlanOptions) -> None:
 
 
 def check_requested(shortest: float, options: PlanOptions) -> None:
-    """Raise RequestError where a duration is requested that is shorter than the shortest [s] there is."""
+    """Raise RequestError where a duration is requested that is shorter than the shortest [s] there
+    is.
+    """
     if options.duration > 0.0 and shortest * (1.0 - DURATION_SLACK) > options.duration:
         raise RequestError(
             StatusCode.INVALID_GOAL_CONSTRAINTS,
-            f"duration is {options.duration:g} s: the shortest within the limits is {shortest:.4g} s",
+            f"duration is {options.duration:g} s: the shortest within the limits is "
+            f"{shortest:.4g} s",
         )
 
 
 def at_best_duration(quickest: JointTrajectory, context: Context) -> JointTrajectory:
-    """The fastest trajectory at the requested duration, or at the one that the objective likes best.
+    """The fastest trajectory at the requested duration, or at the one that the objective likes
+    best.
 
-    Raises RequestError when the requested duration is shorter than the fastest, or that longer than any may
-    be.
+    Raises RequestError when the requested duration is shorter than the fastest, or that longer than
+    any may be.
     """
     options = context.options
     check_duration(quickest.duration, options)

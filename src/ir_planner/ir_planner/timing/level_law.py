@@ -1,9 +1,9 @@
 """Time laws whose ramps step down in levels: much acceleration while slow, less near full speed.
 
-The torque envelope of a drive falls with its speed, so one acceleration for the whole ramp is either too
-much at its end or too little at its start. Here each ramp has a level per band of speed, joined by constant
-jerk. Durations are whole grid steps; the accelerations follow from the distance 1 and equal speed of both
-ramps.
+The torque envelope of a drive falls with its speed, so one acceleration for the whole ramp is
+either too much at its end or too little at its start. Here each ramp has a level per band of speed,
+joined by constant jerk. Durations are whole grid steps; the accelerations follow from the distance
+1 and equal speed of both ramps.
 """
 
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ PHASES = 4 * LEVELS + 3
 
 @dataclass(frozen=True)
 class LevelLaws:
-    """K laws: phases (K, PHASES) grid steps, accelerations (K, PHASES + 1) 1/s^2 at their ends, linear
-    between.
+    """K laws: phases (K, PHASES) grid steps, accelerations (K, PHASES + 1) 1/s^2 at their ends,
+    linear between.
     """
 
     steps: IntArray
@@ -31,14 +31,17 @@ class LevelLaws:
     @cached_property
     def speeds(self) -> FloatArray:
         """Speed (K, PHASES + 1) 1/s at the ends of the phases."""
-        t, a = self.steps * GRID_S, self.accelerations
+        t = self.steps * GRID_S
+        a = self.accelerations
         gains = 0.5 * t * (a[:, :-1] + a[:, 1:])
         return np.concatenate([np.zeros((len(t), 1)), np.cumsum(gains, axis=1)], axis=1)
 
     @cached_property
     def path_parameters(self) -> FloatArray:
         """s (K, PHASES + 1) at the ends of the phases."""
-        t, a, v = self.steps * GRID_S, self.accelerations, self.speeds
+        t = self.steps * GRID_S
+        a = self.accelerations
+        v = self.speeds
         gains = t * (v[:, :-1] + t * (2.0 * a[:, :-1] + a[:, 1:]) / 6.0)
         return np.concatenate([np.zeros((len(t), 1)), np.cumsum(gains, axis=1)], axis=1)
 
@@ -83,7 +86,10 @@ class LevelLaw:
         inside = np.clip(steps, 0, self.total)
         phase = np.clip(np.searchsorted(ends, inside, side="right") - 1, 0, PHASES - 1)
         tau = (inside - ends[phase]) * GRID_S
-        a, v, s, j = laws.accelerations[0], laws.speeds[0], laws.path_parameters[0], laws.jerks[0]
+        a = laws.accelerations[0]
+        v = laws.speeds[0]
+        s = laws.path_parameters[0]
+        j = laws.jerks[0]
         sdd = a[phase] + j[phase] * tau
         sd = v[phase] + tau * (a[phase] + j[phase] * tau / 2)
         here = s[phase] + tau * (v[phase] + tau * (a[phase] / 2 + j[phase] * tau / 6))
@@ -92,11 +98,14 @@ class LevelLaw:
 
 
 def level_laws(speed: FloatArray, up: FloatArray, down: FloatArray, jerk: float) -> LevelLaws:
-    """Laws that cruise at about `speed` (K,) and whose ramps have levels `up` and `down` (K, LEVELS), all >
+    """Laws that cruise at about `speed` (K,) and whose ramps have levels `up` and `down` (K,
+    LEVELS), all >
     0.
     """
-    rising, falling = _ramp(speed, up, jerk), _ramp(speed, down, jerk)
-    levels_up, levels_down = _at_ends(up), _at_ends(down)
+    rising = _ramp(speed, up, jerk)
+    falling = _ramp(speed, down, jerk)
+    levels_up = _at_ends(up)
+    levels_down = _at_ends(down)
     reached_up, length_up = _gains(rising, levels_up)
     reached_down, length_down = _gains(falling, levels_down)
     scale = reached_up / reached_down
@@ -104,14 +113,17 @@ def level_laws(speed: FloatArray, up: FloatArray, down: FloatArray, jerk: float)
     cruise = np.ceil(left / reached_up / GRID_S - 1e-9).astype(np.int64)
     distance = length_up + scale * length_down + reached_up * cruise * GRID_S
     steps = np.concatenate([rising, cruise[:, None], falling[:, ::-1]], axis=1)
-    # the last level before the cruise is 0, and so is the first after it: both ends of the cruising phase
+    # the last level before the cruise is 0, and so is the first after it: both ends of the cruising
+    # phase
     ends = np.concatenate([levels_up, -scale[:, None] * levels_down[:, ::-1]], axis=1)
     return LevelLaws(steps, ends / distance[:, None])
 
 
 def _ramp(speed: FloatArray, levels: FloatArray, jerk: float) -> IntArray:
     """Durations (K, 2 LEVELS + 1) of a ramp: change of level, level, change, ..., change to 0."""
-    around = np.concatenate([np.zeros((len(levels), 1)), levels, np.zeros((len(levels), 1))], axis=1)
+    around = np.concatenate(
+        [np.zeros((len(levels), 1)), levels, np.zeros((len(levels), 1))], axis=1
+    )
     change = np.abs(np.diff(around, axis=1)) / jerk
     gained = 0.5 * change * (around[:, :-1] + around[:, 1:])
     share = np.full(gained.shape, 0.5)
@@ -120,7 +132,8 @@ def _ramp(speed: FloatArray, levels: FloatArray, jerk: float) -> IntArray:
     by_change = gained[:, :-1] * share[:, :-1] + gained[:, 1:] * share[:, 1:]
     hold = np.maximum(bands - by_change, 0.0) / levels
     result = np.zeros((len(levels), 2 * LEVELS + 1))
-    result[:, ::2], result[:, 1::2] = change, hold
+    result[:, ::2] = change
+    result[:, 1::2] = hold
     steps = np.ceil(result / GRID_S - 1e-9).astype(np.int64)
     steps[:, ::2] = np.maximum(steps[:, ::2], 1)
     return steps
@@ -129,7 +142,8 @@ def _ramp(speed: FloatArray, levels: FloatArray, jerk: float) -> IntArray:
 def _at_ends(levels: FloatArray) -> FloatArray:
     """Accelerations (K, 2 LEVELS + 2) at the ends of a ramp's phases."""
     ends = np.zeros((len(levels), 2 * LEVELS + 2))
-    ends[:, 1:-1:2], ends[:, 2:-1:2] = levels, levels
+    ends[:, 1:-1:2] = levels
+    ends[:, 2:-1:2] = levels
     return ends
 
 

@@ -1,5 +1,5 @@
-"""The fastest law with levels: each level as high as the torque in its band of speed allows, found by
-halving.
+"""The fastest law with levels: each level as high as the torque in its band of speed allows, found
+by halving.
 """
 
 import numpy as np
@@ -20,7 +20,8 @@ _LOWEST = 0.02  # of the acceleration limit
 def fastest(start: FloatArray, goal: FloatArray, limits: MotionLimits, dynamics: Dynamics) -> Law:
     """The shorter of the fastest law with one level per ramp and the fastest with several.
 
-    start, goal (n,) [rad]. Raises TimingError when some joint's torque does not suffice however slowly.
+    start, goal (n,) [rad]. Raises TimingError when some joint's torque does not suffice however
+    slowly.
     """
     plain = fastest_law(start, goal, limits, dynamics)
     delta = np.asarray(goal) - np.asarray(start)
@@ -52,11 +53,14 @@ def fastest_levels(
     for k in range(_HALVINGS + 1):
         laws = level_laws(speeds, trial[:, :LEVELS], trial[:, LEVELS:], jerk)
         fits = _levels_fit(laws, start, delta, share, dynamics)
-        low, high = np.where(fits, trial, low), np.where(fits & (k > 0), high, np.where(fits, a, trial))
+        low = np.where(fits, trial, low)
+        high = np.where(fits & (k > 0), high, np.where(fits, a, trial))
         trial = 0.5 * (low + high)
     for _ in range(6):
         laws = level_laws(speeds, low[:, :LEVELS], low[:, LEVELS:], jerk)
-        good = _within(laws, bounds) & (_use(laws, start, delta, dynamics).max(axis=(1, 2)) <= share)
+        good = _within(laws, bounds) & (
+            _use(laws, start, delta, dynamics).max(axis=(1, 2)) <= share
+        )
         if good.any():
             k = int(np.argmin(np.where(good, laws.steps.sum(axis=1), np.iinfo(np.int64).max)))
             return LevelLaw(
@@ -78,7 +82,9 @@ def _use(laws: LevelLaws, start: FloatArray, delta: FloatArray, dynamics: Dynami
     t = (laws.steps * GRID_S)[:, :, None] * np.linspace(0.0, 1.0, _PER_PHASE)
     a, v, s = (x[:, :-1, None] for x in (laws.accelerations, laws.speeds, laws.path_parameters))
     j = laws.jerks[:, :, None]
-    here, sd, sdd = s + t * (v + t * (a / 2 + j * t / 6)), v + t * (a + j * t / 2), a + j * t
+    here = s + t * (v + t * (a / 2 + j * t / 6))
+    sd = v + t * (a + j * t / 2)
+    sdd = a + j * t
     flat = [x.reshape(-1, 1) * delta for x in (here, sd, sdd)]
     use = torque_use(dynamics, start + flat[0], flat[1], flat[2])
     return np.asarray(use.max(axis=1).reshape(t.shape))

@@ -1,8 +1,8 @@
 """How far a motion is from its limits: the factor by which it would have to last longer.
 
-When a motion lasts f times as long on the same path, its velocities fall by f, its accelerations by f^2 and
-its jerks by f^3. The part of the torque that accelerates falls by f^2; gravity stays, so for torque the
-factor is an estimate, to be applied again.
+When a motion lasts f times as long on the same path, its velocities fall by f, its accelerations by
+f^2 and its jerks by f^3. The part of the torque that accelerates falls by f^2; gravity stays, so
+for torque the factor is an estimate, to be applied again.
 """
 
 import numpy as np
@@ -12,9 +12,14 @@ from ir_planner.scene import MotionLimits
 
 
 def lasting_longer(
-    limits: MotionLimits, velocity: FloatArray, acceleration: FloatArray, jerk: FloatArray, torque: FloatArray
+    limits: MotionLimits,
+    velocity: FloatArray,
+    acceleration: FloatArray,
+    jerk: FloatArray,
+    torque: FloatArray,
 ) -> FloatArray:
-    """By what factor (...) each part of a motion should last longer, from its largest values (..., n); at
+    """By what factor (...) each part of a motion should last longer, from its largest values (...,
+    n); at
     most 1: within the limits. torque: share of the envelope.
     """
     factors: FloatArray = np.maximum.reduce(

@@ -1,7 +1,7 @@
 """A movement of a request: its trajectory, and what is known about it as soon as somebody asks.
 
-Proofs, report and cost are computed once, when they are first asked for: candidates that are only compared
-stay cheap.
+Proofs, report and cost are computed once, when they are first asked for: candidates that are only
+compared stay cheap.
 """
 
 from dataclasses import dataclass, replace
@@ -30,8 +30,10 @@ from ir_planner.timing.objective import coarse_cost, coarse_energy_cost, request
 
 @dataclass(frozen=True, eq=False)
 class Movement:
-    """path (M, n): the waypoints that it passes or came from. context: what it must keep and is judged by.
-    note: where it differs from what was asked. timing: "asynchronous" where joints have laws of their own.
+    """path (M, n): the waypoints that it passes or came from. context: what it must keep and is
+    judged by.
+    note: where it differs from what was asked. timing: "asynchronous" where joints have laws of
+    their own.
     fixed_time: its duration follows from a tool's speed along a path, and isn't to be changed.
     """
 
@@ -46,7 +48,9 @@ class Movement:
     def clearance(self) -> Violation | None:
         """Where a pair is too near; None: proved."""
         context = self.context
-        return clearance_violation(self.trajectory, context.scene, context.safety_distance, context.station)
+        return clearance_violation(
+            self.trajectory, context.scene, context.safety_distance, context.station
+        )
 
     @cached_property
     def torque(self) -> TorqueProof:
@@ -83,8 +87,11 @@ class Movement:
     @cached_property
     def evaluation(self) -> Evaluation:
         """Everything that is known about it."""
-        context, known = self.context, (self.verification, self.energy)
-        return measured(self.trajectory, context.scene, context.safety_distance, context.station, *known)
+        context = self.context
+        known = (self.verification, self.energy)
+        return measured(
+            self.trajectory, context.scene, context.safety_distance, context.station, *known
+        )
 
     @property
     def report(self) -> TrajectoryReport:
@@ -103,7 +110,9 @@ class Movement:
 
     @cached_property
     def coarse_energy_cost(self) -> float:
-        """J, or joules where the objective is not J, sampled coarsely: for comparisons on one path."""
+        """J, or joules where the objective is not J, sampled coarsely: for comparisons on one
+        path.
+        """
         return coarse_energy_cost(self.trajectory, self.context)
 
     def passing(self, path: FloatArray) -> "Movement":
@@ -113,10 +122,14 @@ class Movement:
         return other
 
     def asked_by(self, context: Context) -> "Movement":
-        """The same for a request with another objective in the same scene; proofs and report stay known."""
+        """The same for a request with another objective in the same scene; proofs and report stay
+        known.
+        """
         other = replace(self, context=context.at(self.context.station))
         known = ("clearance", "torque", "verification", "energy", "evaluation")
-        other.__dict__.update({name: self.__dict__[name] for name in known if name in self.__dict__})
+        other.__dict__.update(
+            {name: self.__dict__[name] for name in known if name in self.__dict__}
+        )
         return other
 
     def stretched_by(self, factor: float) -> "Movement":

@@ -1,8 +1,8 @@
 """What a movement is judged by, and the stretch of its duration that serves it best.
 
-movement_cost: W of eq. (9); time: T; energy: E_drive, what the drives take from the mains; time_and_energy:
-J = E_drive + time_value x T. What controller and tool always draw is in neither: it is part of what a second
-is worth.
+movement_cost: W of eq. (9); time: T; energy: E_drive, what the drives take from the mains;
+time_and_energy: J = E_drive + time_value x T. What controller and tool always draw is in neither:
+it is part of what a second is worth.
 """
 
 from dataclasses import dataclass, replace
@@ -23,11 +23,15 @@ _FACTORS = np.array([1.0, 1.04, 1.1, 1.18, 1.3, 1.5, 1.8, 2.2])
 _SLOWER = np.array(
     [*_FACTORS, 3.0, 4.0, 6.0, 9.0, 14.0]
 )  # where a second costs what holding costs, and no more
-_CLOSE, _USUAL = 1.05 ** np.arange(54.0), 18  # so near that the least cost is hardly missed; how many for J
+# so near that the least cost is hardly missed; how many for J
+_CLOSE = 1.05 ** np.arange(54.0)
+_USUAL = 18
 _REFINED = 5
 _COARSE_STEP = 4e-3  # s: energies are compared, not reported
 _BOUND_STEP = 10e-3  # s: of a bound that is about right
-_FEWEST_STEPS, _MOST_STEPS = 100, 5000  # of a movement that is short, or lasts long
+# of a movement that is short, or lasts long
+_FEWEST_STEPS = 100
+_MOST_STEPS = 5000
 _DRIVES_WATTS = 2000.0  # about what the drives of such an arm take while it moves
 _TIME_WATTS = 2000.0  # what a second is worth where time is all that counts
 _BESIDE = 5e-3  # weight of what breaks ties
@@ -54,7 +58,10 @@ def objective_value(report: Consumed, objective: str, time_value: float) -> floa
 def at_the_mains(context: Context) -> Context:
     """The same request, free in its duration, for E_mains: a second costs what is always drawn."""
     options = replace(
-        context.options, objective="time_and_energy", duration=0.0, time_value=context.scene.base_watts
+        context.options,
+        objective="time_and_energy",
+        duration=0.0,
+        time_value=context.scene.base_watts,
     )
     return replace(context, options=options)
 
@@ -68,8 +75,8 @@ def request_cost(report: Consumed, options: PlanOptions) -> float:
 
 @dataclass(frozen=True, eq=False)
 class ObjectiveWeights:
-    """Cost of a joule of the drives, of a second, and of a rad of each joint (n,); `power`: about what a
-    second of movement costs in all.
+    """Cost of a joule of the drives, of a second, and of a rad of each joint (n,); `power`: about
+    what a second of movement costs in all.
     """
 
     energy: float
@@ -79,10 +86,11 @@ class ObjectiveWeights:
 
 
 def objective_weights(context: Context, path: FloatArray) -> ObjectiveWeights:
-    """The objective as a sum that a descent can follow, for movements near `path` (M, n); with a requested
-    duration only joules are left to choose.
+    """The objective as a sum that a descent can follow, for movements near `path` (M, n); with a
+    requested duration only joules are left to choose.
     """
-    options, scene = context.options, context.scene
+    options = context.options
+    scene = context.scene
     still = np.zeros(len(scene.weights))
     if options.duration > 0.0 or options.objective == "energy":
         return ObjectiveWeights(1.0, 0.0, still, _DRIVES_WATTS)
@@ -126,8 +134,8 @@ def coarse_cost(trajectory: JointTrajectory, context: Context) -> float:
 
 
 def least_stretched_cost(fastest: JointTrajectory, context: Context) -> float:
-    """About what a trajectory costs at the stretch that serves the objective best, or at the requested
-    duration; no torque is asked for, so nobody who must keep it costs less.
+    """About what a trajectory costs at the stretch that serves the objective best, or at the
+    requested duration; no torque is asked for, so nobody who must keep it costs less.
     """
     options = context.options
     if options.duration > 0.0:
@@ -146,7 +154,9 @@ def best_stretch(fastest: JointTrajectory, context: Context) -> float:
     factors = _SLOWER if context.options.objective == "energy" else _FACTORS
     costs = stretched_costs(fastest, factors, context)
     k = int(np.argmin(costs))
-    around = np.linspace(factors[max(k - 1, 0)], factors[min(k + 1, len(factors) - 1)], _REFINED + 2)[1:-1]
+    around = np.linspace(
+        factors[max(k - 1, 0)], factors[min(k + 1, len(factors) - 1)], _REFINED + 2
+    )[1:-1]
     refined = stretched_costs(fastest, around, context)
     best = int(np.argmin(refined))
     return float(around[best]) if refined[best] < costs[k] else float(factors[k])
@@ -155,18 +165,23 @@ def best_stretch(fastest: JointTrajectory, context: Context) -> float:
 def stretched_costs(
     fastest: JointTrajectory, factors: FloatArray, context: Context, step: float = _COARSE_STEP
 ) -> FloatArray:
-    """J, or E_drive where the objective is not J (F,), of a trajectory stretched by `factors` (F,); all of
-    them from the same samples.
+    """J, or E_drive where the objective is not J (F,), of a trajectory stretched by `factors` (F,);
+    all of them from the same samples.
     """
-    scene, begin = context.scene, float(fastest.times[0])
+    scene = context.scene
+    begin = float(fastest.times[0])
     span = fastest.duration - begin
     count = int(np.clip(np.ceil(span / step), _FEWEST_STEPS, _MOST_STEPS))
     motion = motion_at(fastest, begin + (np.arange(count) + 0.5) * (span / count))
-    slower, still = factors[:, None, None], np.zeros_like(motion.q)
-    drives, speed = scene.dynamics.data, motion.qd / slower
-    # what holds the arm and dry friction stay, the viscous one falls with the speed, the rest with its square
+    slower = factors[:, None, None]
+    still = np.zeros_like(motion.q)
+    drives = scene.dynamics.data
+    speed = motion.qd / slower
+    # what holds the arm and dry friction stay, the viscous one falls with the speed, the rest with
+    # its square
     holding = scene.dynamics.inverse_dynamics(motion.q, still, still)
-    viscous, dry = drives.viscous * motion.qd, drives.coulomb * np.sign(motion.qd)
+    viscous = drives.viscous * motion.qd
+    dry = drives.coulomb * np.sign(motion.qd)
     whole = scene.dynamics.inverse_dynamics(motion.q, motion.qd, motion.qdd)
     torque = (whole - holding - viscous - dry) / slower**2 + viscous / slower + (holding + dry)
     shape = (len(factors) * count, -1)
@@ -179,7 +194,8 @@ def stretched_costs(
 
 
 def _drawn(axes: FloatArray, steps: FloatArray, scene: PlanningScene) -> FloatArray:
-    """Joules (F,) at the mains of F motions with the powers (F, N, n) W of their axes over steps (F,) s.
+    """Joules (F,) at the mains of F motions with the powers (F, N, n) W of their axes over steps
+    (F,) s.
 
     The bus takes them one after the other; a step between two of them empties its capacitor.
     """

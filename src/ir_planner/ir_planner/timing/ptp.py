@@ -1,9 +1,11 @@
-"""Time for a straight movement of all joints (PTP): as fast as speed, acceleration, jerk and torque allow.
+"""Time for a straight movement of all joints (PTP): as fast as speed, acceleration, jerk and torque
+allow.
 
-All joints follow one law s(t) (synchronous). The limits of the joints bound s'; the torque envelope is not
-a bound of s' alone: it depends on where the arm is and what it carries. So laws of several cruising speeds
-are tried, and for each the acceleration and the braking are raised, by halving, as far as the torque of
-every joint stays within its share of the envelope along the whole law; the shortest wins.
+All joints follow one law s(t) (synchronous). The limits of the joints bound s'; the torque envelope
+is not a bound of s' alone: it depends on where the arm is and what it carries. So laws of several
+cruising speeds are tried, and for each the acceleration and the braking are raised, by halving, as
+far as the torque of every joint stays within its share of the envelope along the whole law; the
+shortest wins.
 """
 
 import numpy as np
@@ -20,7 +22,9 @@ _HALVINGS = 7
 _PER_PHASE = 7
 
 
-def torque_per_segment(trajectory: JointTrajectory, dynamics: Dynamics, samples: int = 9) -> FloatArray:
+def torque_per_segment(
+    trajectory: JointTrajectory, dynamics: Dynamics, samples: int = 9
+) -> FloatArray:
     """Largest sampled use of the torque envelope in each segment, (S, n); no proof."""
     _, durations = trajectory.coefficients()
     t = (trajectory.times[:-1, None] + durations[:, None] * np.linspace(0.0, 1.0, samples)).ravel()
@@ -38,7 +42,9 @@ def _law_samples(steps: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     return s0 + t * (v0 + t * (a0 / 2 + j * t / 6)), v0 + t * (a0 + j * t / 2), a0 + j * t
 
 
-def _torque_of_laws(dynamics: Dynamics, start: FloatArray, delta: FloatArray, steps: IntArray) -> FloatArray:
+def _torque_of_laws(
+    dynamics: Dynamics, start: FloatArray, delta: FloatArray, steps: IntArray
+) -> FloatArray:
     """Largest use of torque (K, 2, n): while speeding up and cruising, and while braking."""
     s, sd, sdd = _law_samples(steps)
     shape = (*s.shape, len(start))
@@ -50,16 +56,22 @@ def _torque_of_laws(dynamics: Dynamics, start: FloatArray, delta: FloatArray, st
 def path_limits(delta: FloatArray, limits: MotionLimits) -> tuple[float, float, float]:
     """Bounds of s' [1/s], s'' and s''' for the movement by `delta` (n,)."""
     size = np.maximum(np.abs(delta), 1e-300)
-    return tuple(float(np.min(bound / size)) for bound in (limits.velocity, limits.acceleration, limits.jerk))  # type: ignore[return-value]
+    return tuple(
+        float(np.min(bound / size)) for bound in (limits.velocity, limits.acceleration, limits.jerk)
+    )  # type: ignore[return-value]
 
 
 def free_law(bounds: tuple[float, float, float]) -> TimeLaw:
-    """The fastest law within bounds of the speed of s and its derivatives alone, whatever the torque."""
+    """The fastest law within bounds of the speed of s and its derivatives alone, whatever the
+    torque.
+    """
     v, a, j = (np.array([bound]) for bound in bounds)
     return TimeLaw(tuple(int(k) for k in phase_steps(LawLimits(v, a, a, j))[0]))
 
 
-def fastest_law(start: FloatArray, goal: FloatArray, limits: MotionLimits, dynamics: Dynamics) -> TimeLaw:
+def fastest_law(
+    start: FloatArray, goal: FloatArray, limits: MotionLimits, dynamics: Dynamics
+) -> TimeLaw:
     """Law of the shortest synchronous movement from `start` to `goal` (n,).
 
     Raises TimingError when some joint's torque does not suffice however slowly.
@@ -80,8 +92,8 @@ def fastest_law(start: FloatArray, goal: FloatArray, limits: MotionLimits, dynam
     if best is None:
         joint = int(np.argmax(use[0].max(axis=0)))
         raise TimingError(
-            f"joint {joint + 1} needs {use[0, :, joint].max():.2f} times its torque at full speed and "
-            "too much at 1/256 of it as well: the load is too heavy for this movement",
+            f"joint {joint + 1} needs {use[0, :, joint].max():.2f} times its torque at full "
+            "speed and too much at 1/256 of it as well: the load is too heavy for this movement",
             joint,
         )
     return _refined(best, start, delta, (a, j), limits.torque_share, dynamics)
@@ -100,7 +112,9 @@ def _refined(
     return better if better is not None and better.total < best.total else best
 
 
-def _limits(speed: FloatArray, acceleration: FloatArray, braking: FloatArray, jerk: float) -> LawLimits:
+def _limits(
+    speed: FloatArray, acceleration: FloatArray, braking: FloatArray, jerk: float
+) -> LawLimits:
     return LawLimits(speed, acceleration, braking, np.full(len(speed), jerk))
 
 
@@ -112,15 +126,19 @@ def _best_law(
     share: float,
     dynamics: Dynamics,
 ) -> TimeLaw | None:
-    """Shortest law over cruising `speeds` (K,) whose torque stays within `share`; None when there is none."""
+    """Shortest law over cruising `speeds` (K,) whose torque stays within `share`; None when there
+    is none.
+    """
     a, jerk = aj
     count = len(speeds)
-    low, high = np.full((count, 2), 0.01 * a), np.full((count, 2), a)
+    low = np.full((count, 2), 0.01 * a)
+    high = np.full((count, 2), a)
     trial = high
     for k in range(_HALVINGS + 1):
         steps = phase_steps(_limits(speeds, trial[:, 0], trial[:, 1], jerk))
         fits = _torque_of_laws(dynamics, start, delta, steps).max(axis=2) <= share
-        low, high = np.where(fits, trial, low), np.where(fits & (k > 0), high, np.where(fits, a, trial))
+        low = np.where(fits, trial, low)
+        high = np.where(fits & (k > 0), high, np.where(fits, a, trial))
         trial = 0.5 * (low + high)
     steps = phase_steps(_limits(speeds, low[:, 0], low[:, 1], jerk))
     for _ in range(4):

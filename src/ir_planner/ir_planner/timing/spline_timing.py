@@ -1,9 +1,10 @@
-"""Time for the spline of eq. (10) through given points: interval by interval, until nothing exceeds its
-limit.
+"""Time for the spline of eq. (10) through given points: interval by interval, until nothing exceeds
+its limit.
 
 The first guess runs every interval at the speed limit of its fastest joint. Then each interval is
-lengthened or shortened by how much of the limits it uses, and at last all of them together until the
-largest use is 1. Durations are whole grid steps (even, the virtual knots halve the first and the last).
+lengthened or shortened by how much of the limits it uses, and at last all of them together until
+the largest use is 1. Durations are whole grid steps (even, the virtual knots halve the first and
+the last).
 """
 
 from typing import Any
@@ -36,8 +37,8 @@ def time_spline(
 ) -> JointTrajectory:
     """Trajectory through `points` (M, n), M >= 3, within the limits; neighbouring points differ.
 
-    `given` (M-1,) s: requested durations; their proportions are kept, and all are stretched where limits ask
-    for it. Raises TimingError when a joint's torque does not suffice however slowly.
+    `given` (M-1,) s: requested durations; their proportions are kept, and all are stretched where
+    limits ask for it. Raises TimingError when a joint's torque does not suffice however slowly.
     """
     if given is None:
         steps = _even(1.5 * natural_durations(points, limits.velocity))
@@ -53,11 +54,14 @@ def time_spline(
             worst = float(_interval_use(trajectory, len(points), limits, dynamics).max())
             if worst <= 1.0:
                 return trajectory
-        # gravity doesn't fall with speed: for torque the factor is too small, the more the nearer it comes
+        # gravity doesn't fall with speed: for torque the factor is too small, the more the nearer
+        # it comes
         steps = _even(steps * GRID_S * max(worst, 1.0 + _LEAST_STRETCH * 2**k))
     slowest = torque_per_segment(_spline(points, steps, joint_names), dynamics)
     joint = int(np.argmax(slowest.max(axis=0)))
-    raise TimingError(f"joint {joint + 1}: its torque does not carry the load along these points", joint)
+    raise TimingError(
+        f"joint {joint + 1}: its torque does not carry the load along these points", joint
+    )
 
 
 def _even(seconds: NDArray[np.floating[Any]]) -> IntArray:
@@ -77,7 +81,9 @@ def _spline(points: FloatArray, steps: IntArray, joint_names: tuple[str, ...]) -
 def _interval_use(
     trajectory: JointTrajectory, points: int, limits: MotionLimits, dynamics: Dynamics
 ) -> FloatArray:
-    """By what factor each of the M-1 intervals should be longer: above 1 where a limit is exceeded."""
+    """By what factor each of the M-1 intervals should be longer: above 1 where a limit is
+    exceeded.
+    """
     largest = extremes(*trajectory.coefficients())
     torque = torque_per_segment(trajectory, dynamics)
     use = lasting_longer(limits, largest.velocity, largest.acceleration, largest.jerk, torque)

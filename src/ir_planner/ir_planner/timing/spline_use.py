@@ -1,9 +1,10 @@
-"""How much of the limits the spline of eq. (10) through points uses, interval by interval: for rounds that
-change the times and ask again.
+"""How much of the limits the spline of eq. (10) through points uses, interval by interval: for
+rounds that change the times and ask again.
 
-It is the spline of `spline_through` from rest to rest, by its accelerations at the knots: a tridiagonal
-system. A virtual knot halves its interval, so next to it one coefficient of the system vanishes. Extremes of
-cubics are closed forms; torque is sampled. Nothing here is sent: the trajectory is made and judged by others.
+It is the spline of `spline_through` from rest to rest, by its accelerations at the knots: a
+tridiagonal system. A virtual knot halves its interval, so next to it one coefficient of the system
+vanishes. Extremes of cubics are closed forms; torque is sampled. Nothing here is sent: the
+trajectory is made and judged by others.
 """
 
 import numpy as np
@@ -19,7 +20,8 @@ _SHARES = np.linspace(0.0, 1.0, 9)[:, None]  # of a segment, where torque is sam
 def spline_use(
     points: FloatArray, seconds: FloatArray, limits: MotionLimits, dynamics: Dynamics
 ) -> FloatArray:
-    """By what factor each of the M-1 intervals should last longer, above 1 where a limit is exceeded.
+    """By what factor each of the M-1 intervals should last longer, above 1 where a limit is
+    exceeded.
 
     points (M, n), M >= 3, passed after `seconds` (M-1,) each.
     """
@@ -28,7 +30,8 @@ def spline_use(
     q, qd, qdd = _knots(points, span)
     h = span[:, None]
     jerk = np.diff(qdd, axis=0) / h
-    speed, change = np.abs(qd), np.abs(qdd)
+    speed = np.abs(qd)
+    change = np.abs(qdd)
     turning = np.zeros_like(jerk)  # speed where a joint's acceleration changes its sign
     np.divide(qdd[:-1] ** 2, 2.0 * jerk, out=turning, where=qdd[:-1] * qdd[1:] < 0.0)
     use = lasting_longer(
@@ -49,12 +52,16 @@ def _knots(points: FloatArray, span: FloatArray) -> tuple[FloatArray, FloatArray
     h = span[:, None]
     slope = np.diff(q, axis=0) / h
     slope[[0, -1]] = 0.0  # what is not known of the virtual knots stands in the matrix
-    slope[1], slope[-2] = (q[2] - q[0]) / h[1], (q[-1] - q[-3]) / h[-2]
+    slope[1] = (q[2] - q[0]) / h[1]
+    slope[-2] = (q[-1] - q[-3]) / h[-2]
     diagonal = 2.0 * (span[:-1] + span[1:])
-    diagonal[0], diagonal[-1] = 6.0 * span[0], 6.0 * span[-1]
+    diagonal[0] = 6.0 * span[0]
+    diagonal[-1] = 6.0 * span[-1]
     beside = span[1:-1]
-    lower, upper = beside.copy(), beside.copy()
-    lower[0], upper[-1] = 0.0, 0.0
+    lower = beside.copy()
+    upper = beside.copy()
+    lower[0] = 0.0
+    upper[-1] = 0.0
     qdd = np.zeros_like(q)
     qdd[1:-1] = dgtsv(lower, diagonal, upper, 6.0 * np.diff(slope, axis=0))[3]
     q[1] += h[0] ** 2 * qdd[1] / 6.0
@@ -65,7 +72,12 @@ def _knots(points: FloatArray, span: FloatArray) -> tuple[FloatArray, FloatArray
 
 
 def _torque(
-    q: FloatArray, qd: FloatArray, qdd: FloatArray, jerk: FloatArray, h: FloatArray, dynamics: Dynamics
+    q: FloatArray,
+    qd: FloatArray,
+    qdd: FloatArray,
+    jerk: FloatArray,
+    h: FloatArray,
+    dynamics: Dynamics,
 ) -> FloatArray:
     """Largest sampled share (S, n) of the torque envelope in each segment."""
     t = (h * _SHARES[:, 0])[:, :, None]

@@ -1,9 +1,9 @@
-"""A movement in straight steps between waypoints: laws in time, corners cut as far as allowed, the best
-duration.
+"""A movement in straight steps between waypoints: laws in time, corners cut as far as allowed, the
+best duration.
 
-Proved free are the straight steps between waypoints. Cutting corners leaves them, so the blended trajectory
-is certified itself, and a corner whose overlap violates something is cut less, down to a stop. Then the whole
-movement is stretched to the duration that the objective likes best.
+Proved free are the straight steps between waypoints. Cutting corners leaves them, so the blended
+trajectory is certified itself, and a corner whose overlap violates something is cut less, down to a
+stop. Then the whole movement is stretched to the duration that the objective likes best.
 """
 
 import itertools
@@ -30,18 +30,23 @@ from ir_planner.timing.time_law import GRID_S, Law, StepLaws
 from ir_planner.timing.torque_shares import within_torque
 
 MakeLaw = Callable[[FloatArray, FloatArray, MotionLimits, Dynamics], Law]
-# how steps are timed, and the share of the acceleration they may use; the fastest first. The fastest is not
-# always the one that costs the least joules once it is stretched.
-_SHAPES: tuple[tuple[MakeLaw, float], ...] = ((fastest, 1.0), (fastest_law, 1.0), (fastest_law, 0.6))
+# how steps are timed, and the share of the acceleration they may use; the fastest first. The
+# fastest is not always the one that costs the least joules once it is stretched.
+_SHAPES: tuple[tuple[MakeLaw, float], ...] = (
+    (fastest, 1.0),
+    (fastest_law, 1.0),
+    (fastest_law, 0.6),
+)
 NO_OWN_LAW = "neither torque nor clearance leaves a joint its own law: synchronous"
 _CUTS = (1.0, 0.7, 0.5, 0.35, 0.2, 0.1, 0.0)  # shares of the largest overlap, down to a stop
 
 
 def straight_steps(waypoints: FloatArray, context: Context) -> Movement:
-    """The movement over `waypoints` (M, n), whose straight steps are free, at the best duration for the
-    objective.
+    """The movement over `waypoints` (M, n), whose straight steps are free, at the best duration for
+    the objective.
 
-    Raises TimingError when a torque does not suffice, RequestError when the requested duration is too short.
+    Raises TimingError when a torque does not suffice, RequestError when the requested duration is
+    too short.
     """
     waypoints = distinct(waypoints)
     if len(waypoints) == 1:
@@ -51,7 +56,9 @@ def straight_steps(waypoints: FloatArray, context: Context) -> Movement:
     def timed(limits: MotionLimits) -> Movement:
         trajectory, note = _best_shape(waypoints, limits, context)
         own = context.options.timing == "asynchronous" and note != NO_OWN_LAW
-        return Movement(waypoints, trajectory, context, note, "asynchronous" if own else "synchronous")
+        return Movement(
+            waypoints, trajectory, context, note, "asynchronous" if own else "synchronous"
+        )
 
     movement = within_torque(timed, context)
     assert movement is not None  # timed always makes one
@@ -70,7 +77,9 @@ def distinct(waypoints: FloatArray) -> FloatArray:
     return result
 
 
-def _best_shape(waypoints: FloatArray, limits: MotionLimits, context: Context) -> tuple[JointTrajectory, str]:
+def _best_shape(
+    waypoints: FloatArray, limits: MotionLimits, context: Context
+) -> tuple[JointTrajectory, str]:
     """The trajectory in the shape and at the duration that the objective likes best, and a note."""
     options = context.options
     best: tuple[float, JointTrajectory, str] | None = None
@@ -96,7 +105,9 @@ def _joules_count(options: PlanOptions) -> bool:
 def _fastest(
     waypoints: FloatArray, limits: MotionLimits, law: MakeLaw, context: Context
 ) -> tuple[JointTrajectory, str]:
-    """The fastest trajectory in one shape, and a note where its timing is not the one that was asked for."""
+    """The fastest trajectory in one shape, and a note where its timing is not the one that was
+    asked for.
+    """
     common = [law(a, b, limits, context.scene.dynamics) for a, b in itertools.pairwise(waypoints)]
     synchronous = context.options.timing == "synchronous"
     found = None if synchronous else _each_joint_alone(waypoints, common, limits, context)
@@ -109,15 +120,17 @@ def _fastest(
 def _each_joint_alone(
     waypoints: FloatArray, common: list[Law], limits: MotionLimits, context: Context
 ) -> tuple[JointTrajectory, str] | None:
-    """Joints with a law each, and a note which of them keep to the `common` laws (one per step); None where
-    all have to.
+    """Joints with a law each, and a note which of them keep to the `common` laws (one per step);
+    None where all have to.
     """
-    deltas, names = np.diff(waypoints, axis=0), context.joint_names
+    deltas = np.diff(waypoints, axis=0)
+    names = context.joint_names
     found = [
         own_laws(start, delta, law, limits, context.scene.dynamics)
         for start, delta, law in zip(waypoints[:-1], deltas, common, strict=True)
     ]
-    laws, joined = [own for own, _ in found], [joints for _, joints in found]
+    laws = [own for own, _ in found]
+    joined = [joints for _, joints in found]
     while True:
         context.work.check()
         path = TimedPath(waypoints, tuple(laws), (0,) * (len(laws) - 1))
@@ -127,14 +140,20 @@ def _each_joint_alone(
             break
         at = int(blocked.time / GRID_S)
         k = int(np.searchsorted(path.starts, at, side="right")) - 1
-        joint = farthest_from_line(laws[k], common[k], deltas[k], at - int(path.starts[k]), joined[k])
+        joint = farthest_from_line(
+            laws[k], common[k], deltas[k], at - int(path.starts[k]), joined[k]
+        )
         if joint is None:
             return None
-        laws[k], joined[k] = joining(laws[k], common[k], joint), joined[k] | {joint}
+        laws[k] = joining(laws[k], common[k], joint)
+        joined[k] = joined[k] | {joint}
     if sum(len(joints) for joints in joined) == int((np.abs(deltas) >= STILL).sum()):
         return None
     kept = ", ".join(names[j] for j in sorted({j for joints in joined for j in joints}))
-    return trajectory, f"keep to the synchronous law for torque or clearance: {kept}" if kept else ""
+    return (
+        trajectory,
+        f"keep to the synchronous law for torque or clearance: {kept}" if kept else "",
+    )
 
 
 def _blocked(trajectory: JointTrajectory, context: Context) -> Violation | None:
@@ -183,4 +202,6 @@ def _corners_beyond_limits(
     middle = 0.5 * (trajectory.times[:-1] + trajectory.times[1:]) / GRID_S
     beyond = middle[use > 1.0 + SLACK]
     windows = [path.corner_window(corner) for corner in range(len(path.overlaps))]
-    return {k for k, (begin, end) in enumerate(windows) if ((begin <= beyond) & (beyond <= end)).any()}
+    return {
+        k for k, (begin, end) in enumerate(windows) if ((begin <= beyond) & (beyond <= end)).any()
+    }

@@ -1,11 +1,11 @@
-"""Time laws s(t) of piecewise constant jerk from 0 to 1, at rest at both ends: seven phases on a grid of 1
-ms.
+"""Time laws s(t) of piecewise constant jerk from 0 to 1, at rest at both ends: seven phases on a
+grid of 1 ms.
 
-Phases: jerk up, constant acceleration, jerk down, constant speed, and the same for braking; the two halves
-may differ. All durations are whole milliseconds: switches of several laws then never come closer than 1 ms,
-stretching by a factor of six decimals keeps whole nanoseconds, and the interpolant of the points is the law
-itself. Given the durations, speed, accelerations and jerks follow from the distance: rounding durations up
-never breaks a limit.
+Phases: jerk up, constant acceleration, jerk down, constant speed, and the same for braking; the two
+halves may differ. All durations are whole milliseconds: switches of several laws then never come
+closer than 1 ms, stretching by a factor of six decimals keeps whole nanoseconds, and the
+interpolant of the points is the law itself. Given the durations, speed, accelerations and jerks
+follow from the distance: rounding durations up never breaks a limit.
 """
 
 from dataclasses import dataclass
@@ -22,8 +22,8 @@ _NEWTON_STEPS = 40
 
 @dataclass(frozen=True)
 class LawLimits:
-    """Bounds of s, arrays (K,) of K candidate laws: speed 1/s, acceleration and braking 1/s^2, their jerks
-    1/s^3.
+    """Bounds of s, arrays (K,) of K candidate laws: speed 1/s, acceleration and braking 1/s^2,
+    their jerks 1/s^3.
     """
 
     speed: FloatArray
@@ -32,7 +32,9 @@ class LawLimits:
     jerk: FloatArray
 
 
-def _ramp(speed: FloatArray, acceleration: FloatArray, jerk: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _ramp(
+    speed: FloatArray, acceleration: FloatArray, jerk: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Durations (jerk phase, constant acceleration) (K,) s of a ramp from rest to `speed`."""
     full = speed * jerk >= acceleration**2
     phase = np.where(full, acceleration / jerk, np.sqrt(speed / jerk))
@@ -43,7 +45,8 @@ def _ramp(speed: FloatArray, acceleration: FloatArray, jerk: FloatArray) -> tupl
 def reached_speed(limits: LawLimits) -> FloatArray:
     """Largest speed (K,) 1/s that the distance 1 allows, at most the limit.
 
-    The distance of both ramps grows with the speed and is convex, so Newton's steps from above stay above.
+    The distance of both ramps grows with the speed and is convex, so Newton's steps from above stay
+    above.
     """
     speed = limits.speed.copy()
     for _ in range(_NEWTON_STEPS):
@@ -62,13 +65,17 @@ def _ramp_distance(
     """Distance (K,) of a ramp between rest and `speed`, and its derivative by the speed."""
     full = speed * jerk >= acceleration**2
     root = np.sqrt(speed / jerk)
-    distance = np.where(full, 0.5 * speed * (speed / acceleration + acceleration / jerk), speed * root)
+    distance = np.where(
+        full, 0.5 * speed * (speed / acceleration + acceleration / jerk), speed * root
+    )
     slope = np.where(full, speed / acceleration + 0.5 * acceleration / jerk, 1.5 * root)
     return distance, slope
 
 
 def phase_steps(limits: LawLimits) -> IntArray:
-    """Durations (K, 7) in grid steps of the fastest laws within `limits`; rounded up, so never faster."""
+    """Durations (K, 7) in grid steps of the fastest laws within `limits`; rounded up, so never
+    faster.
+    """
     speed = reached_speed(limits)
     up, steady = _ramp(speed, limits.acceleration, limits.jerk)
     down, slowing = _ramp(speed, limits.braking, limits.jerk)
@@ -82,7 +89,9 @@ def phase_steps(limits: LawLimits) -> IntArray:
 
 @dataclass(frozen=True)
 class LawStates:
-    """Laws at the 8 switches of their phases: times (K, 8) s, s, its derivatives (K, 8), and jerk (K, 7)."""
+    """Laws at the 8 switches of their phases: times (K, 8) s, s, its derivatives (K, 8), and jerk
+    (K, 7).
+    """
 
     times: FloatArray
     s: FloatArray
@@ -92,18 +101,21 @@ class LawStates:
 
 
 def law_states(steps: IntArray) -> LawStates:
-    """States of the laws with phases `steps` (K, 7): the first half is integrated from 0, the second back
-    from 1.
+    """States of the laws with phases `steps` (K, 7): the first half is integrated from 0, the
+    second back from 1.
     """
     t = steps * GRID_S
     rise = t[:, 0] * (t[:, 0] + t[:, 1])
     fall = t[:, 4] * (t[:, 4] + t[:, 5])
     speed = 1.0 / (0.5 * (2 * t[:, 0] + t[:, 1] + 2 * t[:, 4] + t[:, 5]) + t[:, 3])
     jerk = np.zeros(steps.shape)
-    jerk[:, 0], jerk[:, 2] = speed / rise, -speed / rise
-    jerk[:, 4], jerk[:, 6] = -speed / fall, speed / fall
+    jerk[:, 0] = speed / rise
+    jerk[:, 2] = -speed / rise
+    jerk[:, 4] = -speed / fall
+    jerk[:, 6] = speed / fall
     s, sd, sdd = np.zeros((3, len(steps), 8))
-    peak, brake = jerk[:, 0] * t[:, 0], jerk[:, 4] * t[:, 4]
+    peak = jerk[:, 0] * t[:, 0]
+    brake = jerk[:, 4] * t[:, 4]
     sdd[:, 1] = sdd[:, 2] = peak
     sdd[:, 5] = sdd[:, 6] = brake
     sd[:, 1] = 0.5 * peak * t[:, 0]
@@ -113,7 +125,9 @@ def law_states(steps: IntArray) -> LawStates:
     sd[:, 5] = sd[:, 6] - brake * t[:, 5]
     s[:, 7] = 1.0
     for k in (0, 1, 2):
-        s[:, k + 1] = s[:, k] + t[:, k] * (sd[:, k] + t[:, k] * (sdd[:, k] / 2 + jerk[:, k] * t[:, k] / 6))
+        s[:, k + 1] = s[:, k] + t[:, k] * (
+            sd[:, k] + t[:, k] * (sdd[:, k] / 2 + jerk[:, k] * t[:, k] / 6)
+        )
     for k in (6, 5, 4):
         s[:, k] = s[:, k + 1] - t[:, k] * (
             sd[:, k + 1] - t[:, k] * (sdd[:, k + 1] / 2 - jerk[:, k] * t[:, k] / 6)
@@ -157,7 +171,9 @@ class TimeLaw:
         anchor = np.where(phase < 4, phase, phase + 1)
         tau = (inside - ends[anchor]) * GRID_S
         j = states.jerk[0, phase]
-        s0, v0, a0 = states.s[0, anchor], states.sd[0, anchor], states.sdd[0, anchor]
+        s0 = states.s[0, anchor]
+        v0 = states.sd[0, anchor]
+        a0 = states.sdd[0, anchor]
         s = s0 + tau * (v0 + tau * (a0 / 2 + j * tau / 6))
         return s, v0 + tau * (a0 + j * tau / 2), a0 + j * tau
 
@@ -186,7 +202,9 @@ class Law(Protocol):
 
 @dataclass(frozen=True)
 class StepLaws:
-    """Laws of one straight step: one for all joints (synchronous), or one for each (asynchronous)."""
+    """Laws of one straight step: one for all joints (synchronous), or one for each
+    (asynchronous).
+    """
 
     laws: tuple[Law, ...]
 
@@ -197,18 +215,22 @@ class StepLaws:
 
     @property
     def ramp_up(self) -> int:
-        """Grid steps at the start in which the next-door movement may still brake; none where joints
-        differ.
+        """Grid steps at the start in which the next-door movement may still brake; none where
+        joints differ.
         """
         return self.laws[0].ramp_up if len(self.laws) == 1 else 0
 
     @property
     def ramp_down(self) -> int:
-        """Grid steps at the end in which the next movement may already start; none where joints differ."""
+        """Grid steps at the end in which the next movement may already start; none where joints
+        differ.
+        """
         return self.laws[0].ramp_down if len(self.laws) == 1 else 0
 
     def switches(self) -> IntArray:
-        """Grid steps (K,) at which a phase of any joint starts or ends, ascending without doubles."""
+        """Grid steps (K,) at which a phase of any joint starts or ends, ascending without
+        doubles.
+        """
         return np.unique(np.concatenate([law.switches() for law in self.laws]))
 
     def at(self, steps: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -1,9 +1,10 @@
 """A trajectory that came from anywhere becomes cheaper between the same end points, and is proved.
 
-Its path is fitted by uniform splines (with its own speed profile, with an even one, and with corners left
-out), which are optimised for the objective; the best that is certified is the answer, unless the original is
-and costs less. A path that hits something is pushed out of it by the same descent; where that fails, new
-paths are searched. The trade of time for energy comes with the answer.
+Its path is fitted by uniform splines (with its own speed profile, with an even one, and with
+corners left out), which are optimised for the objective; the best that is certified is the answer,
+unless the original is and costs less. A path that hits something is pushed out of it by the same
+descent; where that fails, new paths are searched. The trade of time for energy comes with the
+answer.
 """
 
 from dataclasses import dataclass
@@ -34,8 +35,8 @@ _SAME_DURATION = 1e-6  # s
 
 @dataclass(frozen=True, eq=False)
 class OptimizationPlan:
-    """The answer: reports before and after; trajectory None unless the status is SUCCESS; front: certified
-    movements from the fastest to the one of least energy.
+    """The answer: reports before and after; trajectory None unless the status is SUCCESS; front:
+    certified movements from the fastest to the one of least energy.
     """
 
     status: Status
@@ -47,7 +48,11 @@ class OptimizationPlan:
 
 
 def optimize_trajectory(
-    original: JointTrajectory, scene: PlanningScene, options: PlanOptions, work: Work, searches: Searches
+    original: JointTrajectory,
+    scene: PlanningScene,
+    options: PlanOptions,
+    work: Work,
+    searches: Searches,
 ) -> OptimizationPlan:
     """Improve a trajectory from rest to rest for the objective.
 
@@ -63,11 +68,16 @@ def _check(original: JointTrajectory, scene: PlanningScene) -> None:
     if not 2 <= count <= POINTS_MAX:
         raise RequestError(
             StatusCode.INVALID_MOTION_PLAN,
-            f"the trajectory has {count} point{'' if count == 1 else 's'}: 2 to {POINTS_MAX} are taken",
+            f"the trajectory has {count} point{'' if count == 1 else 's'}: 2 to {POINTS_MAX} are "
+            "taken",
         )
     bounded(original.duration, 0.0, DURATION_MAX, "time of the last point", "s")
-    within_limits(original.positions[0], scene.cell, "the first point", StatusCode.START_STATE_INVALID)
-    within_limits(original.positions[-1], scene.cell, "the last point", StatusCode.GOAL_STATE_INVALID)
+    within_limits(
+        original.positions[0], scene.cell, "the first point", StatusCode.START_STATE_INVALID
+    )
+    within_limits(
+        original.positions[-1], scene.cell, "the last point", StatusCode.GOAL_STATE_INVALID
+    )
     if original.velocities is None:  # straight between its points: a path with times
         return
     for speeds, verb in ((original.velocities[0], "starts"), (original.velocities[-1], "ends")):
@@ -75,7 +85,8 @@ def _check(original: JointTrajectory, scene: PlanningScene) -> None:
         if abs(speeds[j]) > AT_REST:
             raise RequestError(
                 StatusCode.INVALID_MOTION_PLAN,
-                f"the trajectory {verb} with velocity {speeds[j]:.4g} rad/s of {original.joint_names[j]}: "
+                f"the trajectory {verb} with velocity {speeds[j]:.4g} rad/s of "
+                f"{original.joint_names[j]}: "
                 f"it must lead from rest to rest (0 rad/s within {AT_REST:g})",
             )
 
@@ -91,7 +102,9 @@ class _Optimization:
         work: Work,
         searches: Searches,
     ) -> None:
-        self.scene, self.options, self.searches = scene, options, searches
+        self.scene = scene
+        self.options = options
+        self.searches = searches
         self.path = path_of(original, scene)
         self.journal = Journal(work, options.seed, planner_id="descent")
         self.context = Context(scene, options, self.journal, _station_at(self.path[[0, -1]], scene))
@@ -99,7 +112,9 @@ class _Optimization:
         self.descents = Descents(self.context)
         self.rerouting = False
         if self.context.station:
-            self.journal.note("station", f"allowed contacts of {self.context.station} hold in its zone")
+            self.journal.note(
+                "station", f"allowed contacts of {self.context.station} hold in its zone"
+            )
         with self.journal.stage("before") as notes:
             self.original = Movement(original.positions, original, self.context)
             violation = self.original.violation
@@ -108,7 +123,8 @@ class _Optimization:
 
     def run(self) -> OptimizationPlan:
         """Improve, trade time for energy, and compare with the original."""
-        start, goal = self.path[0], self.path[-1]
+        start = self.path[0]
+        goal = self.path[-1]
         blocked = end_in_collision(start, goal, self.space, self.options.safety_distance)
         if blocked is not None:
             return self._answer(blocked)
@@ -155,14 +171,16 @@ class _Optimization:
         if fastest.report.duration > requested:
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"duration is {requested:g} s: the shortest within the limits near the trajectory is "
-                f"{fastest.report.duration:.4g} s",
+                f"duration is {requested:g} s: the shortest within the limits near the "
+                f"trajectory is {fastest.report.duration:.4g} s",
             )
         movement = fastest.stretched_by(requested / fastest.report.duration)
         return movement if movement.certified else None
 
     def _shortcut(self) -> list[UniformSpline]:
-        """A start along the path with corners left out; none where its straight steps aren't free."""
+        """A start along the path with corners left out; none where its straight steps aren't
+        free.
+        """
         corners = evenly_spaced(self.path, _CORNERS)
         if not self.space.edges_free(corners[:-1], corners[1:]).all():
             return []
@@ -171,19 +189,27 @@ class _Optimization:
     def _rerouted(self) -> tuple[Status, Movement | None]:
         """A new movement between the same end points."""
         self.rerouting = True
-        self.journal.note("repair", "no descent from the original was certified: new paths are searched")
+        self.journal.note(
+            "repair", "no descent from the original was certified: new paths are searched"
+        )
         self.journal.planner_id = ""
-        start, goal = self.path[0], self.path[-1]
+        start = self.path[0]
+        goal = self.path[-1]
         status, found = search_regional(start, goal, self.context.at(""), self.searches)
         if found is None:
-            why = f"the original can't be repaired ({self.wrong})" if self.wrong else "nothing was certified"
+            why = (
+                f"the original can't be repaired ({self.wrong})"
+                if self.wrong
+                else "nothing was certified"
+            )
             return Status(status.code, f"{why}; {status.message}"), None
         self.journal.note("result", "not the original's path but a new one between its end points")
         return status, found
 
     def _within_options(self, movement: Movement) -> bool:
         """Whether a movement is certified and within the scalings."""
-        options, report = self.options, movement.report
+        options = self.options
+        report = movement.report
         return bool(
             report.certified
             and (report.velocity_ratio <= options.velocity_scaling + SLACK).all()
@@ -207,7 +233,9 @@ class _Optimization:
         moves = np.abs(np.diff(self.path, axis=0)).max() >= STILL
         if moves or not self.original.certified:
             why = "a loop would shrink to nothing: give its parts" if moves else self.wrong
-            raise RequestError(StatusCode.INVALID_MOTION_PLAN, f"the trajectory ends where it starts: {why}")
+            raise RequestError(
+                StatusCode.INVALID_MOTION_PLAN, f"the trajectory ends where it starts: {why}"
+            )
         self.journal.note("result", "the original is kept: it stands still")
         return self._answer(Status.success(), self.original)
 
@@ -217,7 +245,9 @@ class _Optimization:
         if best is not None and best is not self.original:  # nobody knows of a given one
             self.journal.timing = best.timing
         if self.options.planner_id and not self.rerouting:
-            sentence = f"planner_id {self.options.planner_id} is not used: no new path had to be searched"
+            sentence = (
+                f"planner_id {self.options.planner_id} is not used: no new path had to be searched"
+            )
             self.journal.note("options", sentence)
         info = self.journal.info(self.path[0], self.scene.cell.robot.joint_names)
         before = self.original.report
@@ -227,15 +257,21 @@ class _Optimization:
 
 
 def _station_at(ends: FloatArray, scene: PlanningScene) -> str:
-    """The station with allowed contacts at whose pose the tcp is at one of the ends (2, n); "" for none."""
+    """The station with allowed contacts at whose pose the tcp is at one of the ends (2, n); "" for
+    none.
+    """
     poses = scene.chain.tcp_poses(ends)
     for station in scene.cell.stations:
-        if station.allowed_contacts and np.abs(poses - station.pose).max(axis=(1, 2)).min() < _AT_STATION:
+        if (
+            station.allowed_contacts
+            and np.abs(poses - station.pose).max(axis=(1, 2)).min() < _AT_STATION
+        ):
             return station.name
     return ""
 
 
 def _point(movement: Movement) -> str:
     return (
-        f"{movement.report.duration:.3f} s {movement.report.energy:.0f} J {movement.trajectory.trajectory_id}"
+        f"{movement.report.duration:.3f} s {movement.report.energy:.0f} J "
+        f"{movement.trajectory.trajectory_id}"
     )

@@ -1,7 +1,8 @@
-"""Time against energy: certified movements between the fastest and the one of least energy at the mains.
+"""Time against energy: certified movements between the fastest and the one of least energy at the
+mains.
 
-Each is optimised at a duration of its own, from its neighbour among others. Energy is E_mains: beyond the
-duration at which it is least, slower costs more of both.
+Each is optimised at a duration of its own, from its neighbour among others. Energy is E_mains:
+beyond the duration at which it is least, slower costs more of both.
 """
 
 import numpy as np
@@ -12,11 +13,15 @@ from ir_planner.request import Context
 from ir_planner.timing import Movement, at_the_mains
 
 COUNT = 8  # durations from the fastest to the slowest end
-_APART = (1.005, 0.98)  # factors on duration or energy by which neighbours of a thinned front differ
+_APART = (
+    1.005,
+    0.98,
+)  # factors on duration or energy by which neighbours of a thinned front differ
 
 
 def pareto_front(known: list[Movement], context: Context) -> tuple[Movement, ...]:
-    """The non-dominated of the known certified movements and of those that are optimised from the first of
+    """The non-dominated of the known certified movements and of those that are optimised from the
+    first of
     them: durations increase, energies fall. The request's own objective and duration don't count.
 
     Ends early where the budget is exhausted. Raises CancelledError when asked to stop.
@@ -61,7 +66,8 @@ def thinned(front: tuple[Movement, ...]) -> tuple[Movement, ...]:
     kept = list(front[:1])
     for point in front[1:]:
         last = kept[-1].report
-        longer, cheaper = point.report.duration / last.duration, point.report.energy / last.energy
+        longer = point.report.duration / last.duration
+        cheaper = point.report.energy / last.energy
         if longer >= _APART[0] or cheaper <= _APART[1]:
             kept.append(point)
         elif point is front[-1]:

@@ -1,9 +1,10 @@
 """A trajectory through given points: the joint spline of eq. (10), timed within the limits.
 
-Between the points the spline is free to swing; where that is not free, the points are joined by straight
-movements that stop at each. Where no times are given, the spline's path stays and its time scaling becomes
-the best: fastest, or as the objective and the requested duration ask for. What violates a limit or a
-clearance is named with the first violation.
+Between the points the spline is free to swing; where that is not free, the points are joined by
+straight movements that stop at each. Where no times are given, the spline's path stays and its time
+scaling becomes
+the best: fastest, or as the objective and the requested duration ask for. What violates a limit or
+a clearance is named with the first violation.
 """
 
 import itertools
@@ -51,23 +52,30 @@ def plan_through(
 ) -> MovementPlan:
     """Trajectory through all points, at rest at the first and the last.
 
-    Given times keep their proportions and are stretched where limits ask for it. Raises RequestError.
+    Given times keep their proportions and are stretched where limits ask for it. Raises
+    RequestError.
     """
     _check_points(reference, scene)
     context = Context.of(scene, options, work)
     if options.planner_id:
-        sentence = f"planner_id {options.planner_id} is not used: nothing is searched between given points"
+        sentence = (
+            f"planner_id {options.planner_id} is not used: nothing is searched between given points"
+        )
         context.journal.note("options", sentence)
     start = reference.points[0]
     space = FreeSpace.of(scene, options.safety_distance, work)
     blocked = end_in_collision(start, reference.points[-1], space, options.safety_distance)
     if blocked is not None:
-        return MovementPlan(blocked, context.journal.info(start, context.joint_names), TrajectoryReport())
+        return MovementPlan(
+            blocked, context.journal.info(start, context.joint_names), TrajectoryReport()
+        )
     try:
         movement = _followed(reference, context)
     except TimingError as error:
         status = Status(StatusCode.INVALID_MOTION_PLAN, str(error))
-        return MovementPlan(status, context.journal.info(start, context.joint_names), TrajectoryReport())
+        return MovementPlan(
+            status, context.journal.info(start, context.joint_names), TrajectoryReport()
+        )
     context.journal.timing = movement.timing
     info = context.journal.info(start, context.joint_names)
     status = movement.verification.status
@@ -89,7 +97,8 @@ def _check_points(reference: Reference, scene: PlanningScene) -> None:
 
 
 def _followed(reference: Reference, context: Context) -> Movement:
-    points, journal = distinct(reference.points), context.journal
+    points = distinct(reference.points)
+    journal = context.journal
     if len(points) < 3:
         with journal.stage("ptp"):
             journal.planner_id = "ptp"
@@ -125,19 +134,23 @@ def _ptp(points: FloatArray, reference: Reference, context: Context) -> Movement
 def _stopping(points: FloatArray, context: Context) -> Movement:
     """Straight between the points, at rest at each."""
     dynamics = context.scene.dynamics
-    laws = tuple(StepLaws((fastest(a, b, context.limits, dynamics),)) for a, b in itertools.pairwise(points))
+    laws = tuple(
+        StepLaws((fastest(a, b, context.limits, dynamics),)) for a, b in itertools.pairwise(points)
+    )
     quickest = blended(TimedPath(points, laws, (0,) * (len(laws) - 1)), context.joint_names)
     return Movement(points, at_best_duration(quickest, context), context)
 
 
 def _in_proportion(points: FloatArray, durations: FloatArray | None, context: Context) -> Movement:
-    """The spline whose intervals last `durations` (M-1,) s or longer in the same proportions; None: as
-    limits ask for.
+    """The spline whose intervals last `durations` (M-1,) s or longer in the same proportions; None:
+    as limits ask for.
     """
     free = durations is not None and context.options.duration == 0.0
 
     def timed(limits: MotionLimits) -> Movement:
-        quickest = time_spline(points, context.joint_names, limits, context.scene.dynamics, durations)
+        quickest = time_spline(
+            points, context.joint_names, limits, context.scene.dynamics, durations
+        )
         trajectory = quickest if free else at_best_duration(quickest, context)
         return Movement(points, trajectory, context)
 
@@ -147,7 +160,9 @@ def _in_proportion(points: FloatArray, durations: FloatArray | None, context: Co
 
 
 def _best_along(points: FloatArray, context: Context, notes: list[str]) -> Movement:
-    """The path of the spline whose intervals are timed by rules, with the best time scaling along it."""
+    """The path of the spline whose intervals are timed by rules, with the best time scaling along
+    it.
+    """
     hurry = context.asking("time")
     by_rules = _in_proportion(points, None, hurry)
     if by_rules.violation is not None:
@@ -168,6 +183,6 @@ def _best_along(points: FloatArray, context: Context, notes: list[str]) -> Movem
 
 def _note(before: Movement, after: Movement) -> str:
     return (
-        f"time scaling: {after.trajectory.duration:.3f} s instead of {before.trajectory.duration:.3f} s, "
-        f"{after.note}"
+        f"time scaling: {after.trajectory.duration:.3f} s instead of "
+        f"{before.trajectory.duration:.3f} s, {after.note}"
     )

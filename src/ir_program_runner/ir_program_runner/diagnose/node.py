@@ -1,4 +1,6 @@
-"""Publishes what the runner does: a driver that is not heard, or a program that failed, is a warning."""
+"""Publishes what the runner does: a driver that is not heard, or a program that failed, is a
+warning.
+"""
 
 from __future__ import annotations
 
@@ -14,11 +16,15 @@ class RunnerDiagnostics:
     """One publisher of the node; `publish` once a second."""
 
     def __init__(self, node: Node) -> None:
-        self._name, self._diagnostics = node.get_name(), Diagnostics(node)
+        self._name = node.get_name()
+        self._diagnostics = Diagnostics(node)
 
-    def publish(self, progress: Progress | None, driver: Status, mode: Mode | None, last: Status) -> None:
+    def publish(
+        self, progress: Progress | None, driver: Status, mode: Mode | None, last: Status
+    ) -> None:
         """`progress`: of the running program, None for none; `last`: how the one before ended."""
-        level, sentence = OK, "ready"
+        level = OK
+        sentence = "ready"
         values: dict[str, object] = {
             "driver": str(driver),
             "mode": "not known" if mode is None else mode.name,
@@ -27,7 +33,9 @@ class RunnerDiagnostics:
             sentence = f"step {progress.index + 1} of {progress.total}: {progress.phase}"
             values["program"] = progress.program_id
         elif not last.ok:
-            level, sentence = WARN, f"the last program did not end well: {last}"
+            level = WARN
+            sentence = f"the last program did not end well: {last}"
         if not driver.ok:
-            level, sentence = WARN, f"{sentence}; {driver.message}"
+            level = WARN
+            sentence = f"{sentence}; {driver.message}"
         self._diagnostics.publish([Condition(self._name, level, sentence, values)])

@@ -15,8 +15,8 @@ NAN = math.nan
 
 @dataclass(frozen=True)
 class Measured:
-    """A movement of `seconds` [s] by each measurement [J]: the meter, positions, torques, and positions with
-    Pinocchio's torques; NaN where one is not available.
+    """A movement of `seconds` [s] by each measurement [J]: the meter, positions, torques, and
+    positions with Pinocchio's torques; NaN where one is not available.
     """
 
     label: str
@@ -53,12 +53,13 @@ class Agreement:
         if math.isnan(self.difference.low):
             of = "1 movement is" if count == 1 else f"each of {count} movements is"
             return f"the indirect measurement of {of} {shown} off the meter"
-        low, high = 100.0 * self.difference.low, 100.0 * self.difference.high
+        low = 100.0 * self.difference.low
+        high = 100.0 * self.difference.high
         agree = "no difference is shown" if low <= 0.0 <= high else "the two differ"
         return (
-            f"over {count} movements the indirect measurement is {shown} off the meter, between {low:+.1f} "
-            f"and {high:+.1f} % with 90 % confidence: {agree}; single movements spread by "
-            f"{100.0 * self.spread:.1f} %"
+            f"over {count} movements the indirect measurement is {shown} off the meter, between "
+            f"{low:+.1f} and {high:+.1f} % with 90 % confidence: {agree}; single movements "
+            f"spread by {100.0 * self.spread:.1f} %"
         )
 
 

@@ -1,5 +1,5 @@
-"""A recording explained: joules, seconds and clearance per step, totals of the program, shares of modes and
-stations, power at rest, the grid.
+"""A recording explained: joules, seconds and clearance per step, totals of the program, shares of
+modes and stations, power at rest, the grid.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ from ir_recorder.read.recording import Recording
 def analyse(recording: Recording, parameters: PowerParameters | None = None) -> Analysis:
     """All results that a recording allows; missing topics leave gaps and a sentence.
 
-    parameters: what joules of movements are predicted and rebuilt by; None: the plan's own, and the data's.
+    parameters: what joules of movements are predicted and rebuilt by; None: the plan's own, and the
+    data's.
     """
     return _Analyser(recording, parameters).analysis()
 
@@ -62,7 +63,11 @@ class _Analyser:
 
     def analysis(self) -> Analysis:
         recording = self.recording
-        power = recording.power if recording.power is not None and len(recording.power.time) > 1 else None
+        power = (
+            recording.power
+            if recording.power is not None and len(recording.power.time) > 1
+            else None
+        )
         meter = Meter(power) if power is not None else None
         cell = self._cell()
         if cell is not None and not recording.power_yaml:  # the controller of its robot
@@ -102,7 +107,9 @@ class _Analyser:
             return None
 
     def _safety_distance(self, results: tuple[StepResult, ...]) -> float:
-        """The least S_m that a movement was planned with; of plans that say none the one among the facts."""
+        """The least S_m that a movement was planned with; of plans that say none the one among the
+        facts.
+        """
         said = [result.step.movement.report.safety_distance for result in results]
         if planned := [distance for distance in said if distance > 0.0]:
             return min(planned)
@@ -133,7 +140,12 @@ class _Analyser:
     def _resting(self, mode: str, step: ExecutedStep, cell: Cell | None) -> float:
         """W at rest where a step begins, by the data; NaN where posture or cell are missing."""
         joints = self.recording.joints
-        if cell is None or joints is None or joints.position.shape[1] != cell.robot.n or not len(joints.time):
+        if (
+            cell is None
+            or joints is None
+            or joints.position.shape[1] != cell.robot.n
+            or not len(joints.time)
+        ):
             return NAN
         row = int(np.clip(np.searchsorted(joints.time, step.start), 0, len(joints.time) - 1))
         loads = carried(cell, step.movement.load)
@@ -158,7 +170,8 @@ class _Analyser:
         cell: Cell | None,
         indirect: IndirectMeter | None,
     ) -> StepResult:
-        start, end = step.start, step.end
+        start = step.start
+        end = step.end
         moved = indirect is not None and not step.movement.is_pause
         loads = carried(cell, step.movement.load)
         return StepResult(
@@ -171,7 +184,9 @@ class _Analyser:
             rectifier_energy=meter.rectifier(start, end) if meter else NAN,
             peak_power=meter.peak(start, end) if meter else NAN,
             indirect_energy=indirect.energy(start, end, loads) if indirect and moved else NAN,
-            second_opinion=indirect.second_opinion(start, end, loads) if indirect and moved else NAN,
+            second_opinion=indirect.second_opinion(start, end, loads)
+            if indirect and moved
+            else NAN,
             torque_energy=indirect.from_torques(start, end, loads) if indirect and moved else NAN,
             stored_energy=meter.stored(start, self.link) if meter else NAN,
             motors_power=self._resting(MOTORS, step, cell),
@@ -186,15 +201,17 @@ class _Analyser:
         link = self.data.dc_link
         return IndirectMeter(self.recording.joints, cell.robot, cell.base_pose, link, parameters)
 
-    def _predicted(self, steps: Sequence[ExecutedStep], cell: Cell | None) -> Sequence[ExecutedStep]:
+    def _predicted(
+        self, steps: Sequence[ExecutedStep], cell: Cell | None
+    ) -> Sequence[ExecutedStep]:
         """The steps with the energies that the given parameters predict for their movements."""
         parameters = self.parameters
         if parameters is None or cell is None:
             named = {step.movement.report.power_parameters for step in steps} - {"", DATA_SHEET}
             if named and parameters is None:
                 self.problems.append(
-                    f"planned by the power parameters {min(named)[:80]}; energies from positions follow the "
-                    f"data sheet: name their file with --power-parameters"
+                    f"planned by the power parameters {min(named)[:80]}; energies from positions "
+                    "follow the data sheet: name their file with --power-parameters"
                 )
             return steps
         predictor = Predictor(cell.robot, self.data.dc_link, cell.base_pose, parameters)

@@ -1,7 +1,9 @@
-"""Charge of the DC link's capacitors that a plan counted on, and that had gone when the robot moved.
+"""Charge of the DC link's capacitors that a plan counted on, and that had gone when the robot
+moved.
 
-A program's plan carries what braking leaves to the next movement, less what holding the arm takes in the
-planned time between. Nodes answer late where the machine is busy: by then more of it has gone.
+A program's plan carries what braking leaves to the next movement, less what holding the arm takes
+in the planned time between. Nodes answer late where the machine is busy: by then more of it has
+gone.
 """
 
 from __future__ import annotations
@@ -25,7 +27,11 @@ def lost_charges(steps: Sequence[ExecutedStep], meter: Meter | None, link: DcLin
         if not step.index:  # a program begins when it is asked to
             due = math.inf
         late = meter is not None and due < step.start
-        gone = meter.stored(due, link) - meter.stored(step.start, link) if meter is not None and late else 0.0
+        gone = (
+            meter.stored(due, link) - meter.stored(step.start, link)
+            if meter is not None and late
+            else 0.0
+        )
         lost.append(gone if gone > 0.0 else 0.0)
         due = due + step.movement.duration if step.movement.is_pause else step.end
     return lost

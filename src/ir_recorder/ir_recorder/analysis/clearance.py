@@ -1,7 +1,8 @@
-"""Executed clearance: exact distances along the recorded joint states, with the loads the program carried.
+"""Executed clearance: exact distances along the recorded joint states, with the loads the program
+carried.
 
-Pairs that a station allows to touch don't count against the safety distance on movements to and from it:
-they keep their own.
+Pairs that a station allows to touch don't count against the safety distance on movements to and
+from it: they keep their own.
 """
 
 from __future__ import annotations
@@ -20,15 +21,17 @@ from ir_recorder.analysis.loads import held_part, normal
 from ir_recorder.analysis.steps import ExecutedStep
 from ir_recorder.read.recording import JointSeries
 
-COARSE = 0.02  # s between samples of the profile: 4 cm of tool path. Near its minimum all joint states count
+# s between samples of the profile: 4 cm of tool path. Near its minimum all joint states count
+COARSE = 0.02
 _NONE = -1
 
 
 @dataclass(frozen=True, eq=False)
 class StepClearance:
-    """Along one step: time (N,) [s], distance (N,) [m] of the nearest pair that isn't allowed to touch,
-    point_a and point_b (N, 3) in the world; the least distance with its pair and time; contact_margin [m]:
-    least excess of an allowed pair over its own safety distance (inf: no such pair).
+    """Along one step: time (N,) [s], distance (N,) [m] of the nearest pair that isn't allowed to
+    touch, point_a and point_b (N, 3) in the world; the least distance with its pair and time;
+    contact_margin [m]: least excess of an allowed pair over its own safety distance (inf: no such
+    pair).
     """
 
     time: FloatArray
@@ -74,14 +77,18 @@ def collision_model(cell: Cell, load: str, places: PartPlaces) -> CollisionModel
     tool = cell.tool is not None and cell.tool.name in normal(load).split(LOAD_SEPARATOR)
     held = held_part(cell, load)
     if tool or held or not load:
-        capsules, pairs = cell.capsules(held), cell.self_pairs(held)
+        capsules = cell.capsules(held)
+        pairs = cell.self_pairs(held)
     else:
-        capsules, pairs = cell.robot.capsules, cell.robot.self_pairs
+        capsules = cell.robot.capsules
+        pairs = cell.robot.self_pairs
     bodies = cell.bodies(PartPlaces(held, {**places.lying, held: ""} if held else places.lying))
     return CollisionModel(chain, capsules, bodies, pairs, cell.ignored_pairs)
 
 
-def _along(cell: Cell, joints: JointSeries, step: ExecutedStep, places: PartPlaces) -> StepClearance | None:
+def _along(
+    cell: Cell, joints: JointSeries, step: ExecutedStep, places: PartPlaces
+) -> StepClearance | None:
     rows = np.flatnonzero((joints.time >= step.start - 1e-9) & (joints.time <= step.end + 1e-9))
     rows = rows[np.isfinite(joints.position[rows]).all(axis=1)]
     if not len(rows) or joints.position.shape[1] != cell.robot.n:
@@ -111,11 +118,15 @@ def _along(cell: Cell, joints: JointSeries, step: ExecutedStep, places: PartPlac
 
 def _stride(time: FloatArray) -> int:
     """How many joint states lie between two coarse samples."""
-    return max(1, round(COARSE / max(float(np.median(np.diff(time))), 1e-4))) if len(time) > 1 else 1
+    return (
+        max(1, round(COARSE / max(float(np.median(np.diff(time))), 1e-4))) if len(time) > 1 else 1
+    )
 
 
 def allowed_pairs(cell: Cell, movement: PlannedMovement, model: CollisionModel) -> FloatArray:
-    """Own safety distance (Z,) of pairs that the step's stations allow to touch, NaN for all others."""
+    """Own safety distance (Z,) of pairs that the step's stations allow to touch, NaN for all
+    others.
+    """
     own = np.full(len(model.pairs), np.nan)
     ends = (movement.from_station, movement.to_station)
     for station in cell.stations:

@@ -1,7 +1,8 @@
-"""A power meter beside a recording: its joules on the recording's time axis, in place of the recorded ones.
+"""A power meter beside a recording: its joules on the recording's time axis, in place of the
+recorded ones.
 
-The meter's file is read by the reader of traces. Its clock is laid onto the recording's by the offset that
-the mapping gives, or by comparing its power with the recorded one.
+The meter's file is read by the reader of traces. Its clock is laid onto the recording's by the
+offset that the mapping gives, or by comparing its power with the recorded one.
 """
 
 from __future__ import annotations
@@ -17,25 +18,30 @@ from ir_recorder.read.recording import PowerSeries, Recording
 from ir_recorder.traces import Trace, TraceMapping, clock_offset, mean_power, read_traces
 
 MEASURED = "measured"  # the name of the plant: its figures are not the model's
-METER, OFFSET, SHARE = "meter", "meter_clock_offset", "meter_against_recorded"  # facts of such a recording
+# facts of such a recording
+METER = "meter"
+OFFSET = "meter_clock_offset"
+SHARE = "meter_against_recorded"
 
 
 @dataclass(frozen=True)
 class MeterPlace:
-    """Seconds that were added to the meter's clock, and how well both powers then agree (1: exactly; NaN:
-    the offset was given).
+    """Seconds that were added to the meter's clock, and how well both powers then agree (1:
+    exactly; NaN: the offset was given).
     """
 
     offset: float
     correlation: float
 
 
-def with_meter(recording: Recording, path: str | Path, mapping: TraceMapping | None = None) -> Recording:
+def with_meter(
+    recording: Recording, path: str | Path, mapping: TraceMapping | None = None
+) -> Recording:
     """The recording with the joules and watts of a meter's file, at its own readings.
 
-    What the meter doesn't cover keeps the recorded figures. The facts name the file, the offset of its clock,
-    and its joules over the recorded ones. TraceError where the file has no power, the recording no meter, or
-    the clocks' offset can't be found.
+    What the meter doesn't cover keeps the recorded figures. The facts name the file, the offset of
+    its clock, and its joules over the recorded ones. TraceError where the file has no power, the
+    recording no meter, or the clocks' offset can't be found.
     """
     power = recording.power
     if power is None or len(power.time) < 2:
@@ -68,7 +74,9 @@ def with_meter(recording: Recording, path: str | Path, mapping: TraceMapping | N
     )
 
 
-def _place(power: PowerSeries, trace: Trace, joules: FloatArray, mapping: TraceMapping) -> MeterPlace:
+def _place(
+    power: PowerSeries, trace: Trace, joules: FloatArray, mapping: TraceMapping
+) -> MeterPlace:
     if np.isfinite(mapping.clock_offset):  # the reader has added it
         return MeterPlace(0.0, np.nan)
     watts = np.diff(joules) / np.diff(trace.time)
@@ -80,7 +88,9 @@ def _place(power: PowerSeries, trace: Trace, joules: FloatArray, mapping: TraceM
 
 def _facts(path: str | Path, place: MeterPlace, share: float) -> tuple[tuple[str, str], ...]:
     found = (
-        "as given" if np.isnan(place.correlation) else f"found, the powers agree by {place.correlation:.2f}"
+        "as given"
+        if np.isnan(place.correlation)
+        else f"found, the powers agree by {place.correlation:.2f}"
     )
     return (
         (METER, Path(path).name),

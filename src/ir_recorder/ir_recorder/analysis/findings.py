@@ -1,4 +1,6 @@
-"""All checks of a recording: of the requests, the program, its steps, the power at rest, the joint states."""
+"""All checks of a recording: of the requests, the program, its steps, the power at rest, the joint
+states.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,11 @@ def findings(analysis: Analysis, tolerances: Tolerances | None = None) -> tuple[
     return (
         *_requests(analysis),
         *_program(analysis),
-        *(check for result in steps for check in step_checks(result, analysis.safety_distance, bounds)),
+        *(
+            check
+            for result in steps
+            for check in step_checks(result, analysis.safety_distance, bounds)
+        ),
         *_at_rest(analysis, bounds),
         *_grid(analysis),
     )
@@ -47,10 +53,14 @@ def _program(analysis: Analysis) -> Iterator[Finding]:
     for steps in _runs(analysis):
         ended = sum(step.outcome == ENDED for step in steps)
         open_ = [
-            f"{s.index + 1} {s.label}: {s.outcome} {s.note}".strip() for s in steps if s.outcome != ENDED
+            f"{s.index + 1} {s.label}: {s.outcome} {s.note}".strip()
+            for s in steps
+            if s.outcome != ENDED
         ]
         why = "every step of the program has to end"
-        yield at_least("steps of the program that ended", ended, steps[0].total, "", why, "; ".join(open_))
+        yield at_least(
+            "steps of the program that ended", ended, steps[0].total, "", why, "; ".join(open_)
+        )
 
 
 def _runs(analysis: Analysis) -> Iterator[list[ExecutedStep]]:
@@ -73,24 +83,32 @@ def _at_rest(analysis: Analysis, bounds: Tolerances) -> Iterator[Finding]:
             yield unchecked(f"power at rest, {row_name(row)}", "the load is unknown to the cell")
             continue
         bound = bounds.resting_relative * row.expected
-        low, high = row.expected - bound, row.expected + bound
+        low = row.expected - bound
+        high = row.expected + bound
         if bounds.within_interval and row.high > row.low:
-            low, high = min(low, 2.0 * row.low - row.expected), max(high, 2.0 * row.high - row.expected)
+            low = min(low, 2.0 * row.low - row.expected)
+            high = max(high, 2.0 * row.high - row.expected)
             why += ", or twice the 90 % interval of what the drives draw"
         name = f"power at rest, {row_name(row)}"
         yield Finding(name, row.power, low, high, "W", why, row.expected, note)
         if not math.isnan(row.table_2):
-            bound, why = bounds.resting_relative * row.table_2, f"{share} of the paper's Table II"
+            bound = bounds.resting_relative * row.table_2
+            why = f"{share} of the paper's Table II"
             yield near(f"Table II, {row_name(row)}", row.power, row.table_2, bound, "W", why, note)
     if bounds.resting_rows:
         why = "the demonstration visits every mode with every load"
-        yield at_least("modes shown at machine home", len(analysis.plateaus), bounds.resting_rows, "", why)
+        yield at_least(
+            "modes shown at machine home", len(analysis.plateaus), bounds.resting_rows, "", why
+        )
 
 
 def row_name(row: Plateau) -> str:
     """A mode with its load in words: "bus power off, gripper (155 kg)"."""
     mass = "" if math.isnan(row.payload) or not row.payload else f" ({row.payload:g} kg)"
-    return f"{row.mode.lower().replace('_', ' ')}, {'no load' if row.load == 'none' else row.load}{mass}"
+    return (
+        f"{row.mode.lower().replace('_', ' ')}, "
+        f"{'no load' if row.load == 'none' else row.load}{mass}"
+    )
 
 
 def _grid(analysis: Analysis) -> Iterator[Finding]:
@@ -104,5 +122,10 @@ def _grid(analysis: Analysis) -> Iterator[Finding]:
     faults = len(grid.gaps) + grid.off_grid + grid.backward
     why = "500 Hz without a gap by contract"
     yield at_most(
-        "joint states off a gap-free 2 ms grid", faults if grid.count else math.nan, 0.0, "", why, note
+        "joint states off a gap-free 2 ms grid",
+        faults if grid.count else math.nan,
+        0.0,
+        "",
+        why,
+        note,
     )

@@ -1,8 +1,10 @@
-"""Where the joules of a run go: from the mains to controller, tool, axes, brake resistor; what comes back.
+"""Where the joules of a run go: from the mains to controller, tool, axes, brake resistor; what
+comes back.
 
-The meter gives mains, base, axes and brake resistor; recorded speed and torque split an axis into its motor's
-electrical losses and mechanical work; gravity's part of that work follows from posture and load by the data
-of the robot. A run begins and ends at rest, so the mechanical work that gravity doesn't keep is friction.
+The meter gives mains, base, axes and brake resistor; recorded speed and torque split an axis into
+its motor's electrical losses and mechanical work; gravity's part of that work follows from posture
+and load by the data of the robot. A run begins and ends at rest, so the mechanical work that
+gravity doesn't keep is friction.
 """
 
 from __future__ import annotations
@@ -23,12 +25,14 @@ _GAP = 0.02  # s: beyond it nothing was published, and the robot stood still
 
 @dataclass(frozen=True)
 class EnergyFlows:
-    """Joules of the program, of the whole recording where none was executed; NaN where it wasn't recorded.
+    """Joules of the program, of the whole recording where none was executed; NaN where it wasn't
+    recorded.
 
-    mains = controller + tool + rectifier + from_mains; from_mains + returned = taken + resistor + stored.
-    taken, returned: by accelerating and by braking axes, each counted for itself; stored: left in the
-    capacitors. motors: electrical losses of motors and inverters. lifted, lowered: work into and out of
-    gravity and counterbalance; friction: mechanical work that neither keeps.
+    mains = controller + tool + rectifier + from_mains; from_mains + returned = taken + resistor +
+    stored.
+    taken, returned: by accelerating and by braking axes, each counted for itself; stored: left in
+    the capacitors. motors: electrical losses of motors and inverters. lifted, lowered: work into
+    and out of gravity and counterbalance; friction: mechanical work that neither keeps.
     """
 
     mains: float
@@ -77,7 +81,9 @@ def energy_flows(analysis: Analysis) -> EnergyFlows | None:
     inside = (power.time > start + 1e-9) & (power.time <= end + 1e-9)
     step = np.diff(power.time, prepend=power.time[:1])[inside]
     axes = power.joint_power[inside]
-    axes = np.nan_to_num(axes) if np.isfinite(axes).any() else axes  # a meter of the mains alone knows none
+    axes = (
+        np.nan_to_num(axes) if np.isfinite(axes).any() else axes
+    )  # a meter of the mains alone knows none
     tool = float(np.nan_to_num(power.tool_power[inside]) @ step)
     work, lifted, lowered = _mechanical(analysis, start, end)
     taken = float(step @ np.maximum(axes, 0.0).sum(axis=1))
@@ -103,12 +109,22 @@ def _span(analysis: Analysis) -> tuple[float, float]:
 
 
 def _mechanical(analysis: Analysis, start: float, end: float) -> tuple[float, float, float]:
-    """Work of the motors [J], and what of it lifts and what lowering gives back; NaN where unknown."""
-    joints, cell = analysis.recording.joints, analysis.cell
-    if joints is None or cell is None or joints.position.shape[1] != cell.robot.n or not analysis.steps:
+    """Work of the motors [J], and what of it lifts and what lowering gives back; NaN where
+    unknown.
+    """
+    joints = analysis.recording.joints
+    cell = analysis.cell
+    if (
+        joints is None
+        or cell is None
+        or joints.position.shape[1] != cell.robot.n
+        or not analysis.steps
+    ):
         return NAN, NAN, NAN
     inside = (joints.time >= start) & (joints.time <= end)
-    time, speed, torque = joints.time[inside], joints.velocity[inside], joints.effort[inside]
+    time = joints.time[inside]
+    speed = joints.velocity[inside]
+    torque = joints.effort[inside]
     if len(time) < 2 or not np.isfinite([speed, torque]).all():
         return NAN, NAN, NAN
     watts = (speed * torque).sum(axis=1)
@@ -124,7 +140,8 @@ def _lifting(joints: JointSeries, cell: Cell, result: StepResult) -> tuple[float
     q = np.ascontiguousarray(joints.position[inside])
     model = DynamicsModel(cell.robot, carried(cell, result.step.movement.load))
     held = model.gravity(q) - model.counterbalance(q)
-    watts, time = (held * joints.velocity[inside]).sum(axis=1), joints.time[inside]
+    watts = (held * joints.velocity[inside]).sum(axis=1)
+    time = joints.time[inside]
     return _integral(time, np.maximum(watts, 0.0)), _integral(time, np.maximum(-watts, 0.0))
 
 

@@ -1,5 +1,5 @@
-"""Whether /joint_states lies on a grid without gaps. While the controller hibernates there are none to
-come.
+"""Whether /joint_states lies on a grid without gaps. While the controller hibernates there are none
+to come.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ _ASLEEP = (Mode.TO_HIBERNATION, Mode.HIBERNATION, Mode.FROM_HIBERNATION)
 
 @dataclass(frozen=True)
 class GridCheck:
-    """Stamps against a grid: how many there are, off the grid, going back; gaps as (time [s], length [s]).
+    """Stamps against a grid: how many there are, off the grid, going back; gaps as (time [s],
+    length [s]).
 
-    excused: gaps in which the controller hibernated. Each gap-free stretch has a grid of its own after such
-    a pause.
+    excused: gaps in which the controller hibernated. Each gap-free stretch has a grid of its own
+    after such a pause.
     """
 
     count: int
@@ -35,10 +36,14 @@ class GridCheck:
         return self.count > 0 and not (self.off_grid or self.backward or self.gaps)
 
 
-def check_grid(joints: JointSeries, power: PowerSeries | None, period_ns: int = PERIOD_NS) -> GridCheck:
+def check_grid(
+    joints: JointSeries, power: PowerSeries | None, period_ns: int = PERIOD_NS
+) -> GridCheck:
     """Checks the stamps of /joint_states."""
     steps = np.diff(joints.stamp_ns)
-    gaps, excused, origin = [], 0, int(joints.stamp_ns[0]) if len(joints.stamp_ns) else 0
+    gaps = []
+    excused = 0
+    origin = int(joints.stamp_ns[0]) if len(joints.stamp_ns) else 0
     off_grid = 0
     part_start = 0
     for k in [*np.flatnonzero(steps > period_ns).tolist(), len(steps)]:
@@ -52,7 +57,9 @@ def check_grid(joints: JointSeries, power: PowerSeries | None, period_ns: int = 
             origin = int(joints.stamp_ns[k + 1])
         else:
             gaps.append((float(joints.time[k]), float(steps[k] * 1e-9)))
-    return GridCheck(len(joints.stamp_ns), off_grid, int(np.count_nonzero(steps <= 0)), tuple(gaps), excused)
+    return GridCheck(
+        len(joints.stamp_ns), off_grid, int(np.count_nonzero(steps <= 0)), tuple(gaps), excused
+    )
 
 
 def _asleep(power: PowerSeries, start: float, end: float) -> bool:

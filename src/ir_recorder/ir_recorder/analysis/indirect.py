@@ -1,8 +1,9 @@
 """Indirect measurement (section VI of the paper): mains energy rebuilt from what the robot did.
 
-From recorded positions alone: differentiated, torques of the bodies, losses and DC link by code that planner
-and plant know nothing of (`ir_recorder.measure`). From recorded torques: their power instead of the bodies'.
-Both use the power parameters that they are given, by default the data sheet's.
+From recorded positions alone: differentiated, torques of the bodies, losses and DC link by code
+that planner and plant know nothing of (`ir_recorder.measure`). From recorded torques: their power
+instead of the bodies'. Both use the power parameters that they are given, by default the data
+sheet's.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ NAN = float("nan")
 
 
 class IndirectMeter:
-    """Mains energy of stretches in which the motors are on; base_pose (4, 4) of the robot in the cell."""
+    """Mains energy of stretches in which the motors are on; base_pose (4, 4) of the robot in the
+    cell.
+    """
 
     def __init__(
         self,
@@ -35,13 +38,17 @@ class IndirectMeter:
         link: DcLink,
         parameters: PowerParameters,
     ) -> None:
-        self._joints, self._robot, self._link = joints, robot, link
+        self._joints = joints
+        self._robot = robot
+        self._link = link
         self._parameters = parameters
         self._model = PowerModel(robot, link, base_pose, parameters)
         self._second = PowerModel(robot, link, base_pose, parameters, pinocchio_torques)
 
     def energy(self, start: float, end: float, loads: tuple[Load, ...]) -> float:
-        """J between two times [s] with these loads, from positions alone; NaN where they are missing."""
+        """J between two times [s] with these loads, from positions alone; NaN where they are
+        missing.
+        """
         return self._by(self._model, start, end, loads)
 
     def second_opinion(self, start: float, end: float, loads: tuple[Load, ...]) -> float:
@@ -74,10 +81,17 @@ class IndirectMeter:
 
     def from_torques(self, start: float, end: float, loads: tuple[Load, ...]) -> float:
         """The same from recorded speed and torque; NaN where they weren't recorded."""
-        joints, of = self._joints, self._parameters.axis
+        joints = self._joints
+        of = self._parameters.axis
         inside = (joints.time >= start - 1e-9) & (joints.time < end - 1e-9)
-        speed, torque, time = joints.velocity[inside], joints.effort[inside], joints.time[inside]
-        if len(time) < 2 or speed.shape[1] != self._robot.n or not np.isfinite([speed, torque]).all():
+        speed = joints.velocity[inside]
+        torque = joints.effort[inside]
+        time = joints.time[inside]
+        if (
+            len(time) < 2
+            or speed.shape[1] != self._robot.n
+            or not np.isfinite([speed, torque]).all()
+        ):
             return NAN
         step = float((end - start) / len(time))
         motor = torque / self._robot.gear_ratio

@@ -19,7 +19,9 @@ FASTER = 0.1  # share of the moving time that a shorter layout or a quicker prog
 
 @dataclass(frozen=True)
 class Lever:
-    """Up to so many joules of the run; means: what would save them; basis: how they are computed."""
+    """Up to so many joules of the run; means: what would save them; basis: how they are
+    computed.
+    """
 
     name: str
     joules: float
@@ -42,7 +44,8 @@ def _drive_levers(flows: EnergyFlows) -> list[Lever]:
         Lever(
             "heat in the brake resistor",
             flows.resistor,
-            "brake one axis while another accelerates, a larger capacitor, or a supply that feeds back",
+            "brake one axis while another accelerates, a larger capacitor, or a supply that "
+            "feeds back",
             "all of it",
         ),
         Lever(
@@ -86,5 +89,7 @@ def _time_levers(analysis: Analysis) -> list[Lever]:
             "deeper modes, earlier, woken later; a tool that can be switched off",
             "all of it",
         ),
-        Lever("waiting between steps", waiting, "machines and nodes that answer sooner", "all of it"),
+        Lever(
+            "waiting between steps", waiting, "machines and nodes that answer sooner", "all of it"
+        ),
     ]

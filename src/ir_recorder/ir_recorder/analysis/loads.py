@@ -39,8 +39,9 @@ class LoadTimeline:
 def load_timeline(recording: Recording) -> LoadTimeline:
     """The load over time.
 
-    While a program runs its steps give it exactly; before and after, the driver's diagnostics do once a
-    second, and a step of the base load in between marks when a tool was attached or detached.
+    While a program runs its steps give it exactly; before and after, the driver's diagnostics do
+    once a second, and a step of the base load in between marks when a tool was attached or
+    detached.
     """
     steps = []
     for event in recording.events:
@@ -51,7 +52,8 @@ def load_timeline(recording: Recording) -> LoadTimeline:
             steps.append((event.time, after(load, event.movement.attach, event.movement.detach)))
     reported = [(event.time, normal(event.text)) for event in recording.loads]
     if steps:
-        first, last = steps[0][0], steps[-1][0] + STALE
+        first = steps[0][0]
+        last = steps[-1][0] + STALE
         reported = [observation for observation in reported if not first <= observation[0] <= last]
     if recording.power is not None:
         reported = _sharpened(reported, recording.power)
@@ -59,15 +61,20 @@ def load_timeline(recording: Recording) -> LoadTimeline:
 
 
 def _sharpened(reported: list[tuple[float, str]], power: PowerSeries) -> list[tuple[float, str]]:
-    """Replaces the reports around a change by the readings before and after the step of the base load."""
-    jumps = np.flatnonzero((np.abs(np.diff(power.base_power)) > TOOL_STEP) & (np.diff(power.mode) == 0))
+    """Replaces the reports around a change by the readings before and after the step of the base
+    load.
+    """
+    jumps = np.flatnonzero(
+        (np.abs(np.diff(power.base_power)) > TOOL_STEP) & (np.diff(power.mode) == 0)
+    )
     result: list[tuple[float, str]] = []
     for time, load in reported:
         if result and result[-1][1] != load:
             start = result[-1][0] - STALE
             own = [k for k in jumps if start < power.time[k] and power.time[k + 1] <= time]
             if own:
-                before, behind = float(power.time[own[0]]), float(power.time[own[-1] + 1])
+                before = float(power.time[own[0]])
+                behind = float(power.time[own[-1] + 1])
                 old = result[-1][1]
                 while result and result[-1][0] > before and result[-1][1] == old:
                     result.pop()

@@ -1,7 +1,7 @@
 """Joules between two times, read off the mains meter.
 
-A reading's power is the mean since the reading before, so energies are exact at readings and linear between
-them.
+A reading's power is the mean since the reading before, so energies are exact at readings and linear
+between them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from ir_recorder.read.recording import PowerSeries
 
 
 class Meter:
-    """Cumulative energies over the readings; times [s] outside of them count as the nearest reading."""
+    """Cumulative energies over the readings; times [s] outside of them count as the nearest
+    reading.
+    """
 
     def __init__(self, power: PowerSeries) -> None:
         self.time = power.time
@@ -34,7 +36,8 @@ class Meter:
     def straddling(self, start: float, end: float) -> float:
         """J by which `energy` may be wrong, as the readings at both ends lie partly outside.
 
-        A reading doesn't say when its energy was drawn: of a step shorter than one, nothing is known.
+        A reading doesn't say when its energy was drawn: of a step shorter than one, nothing is
+        known.
         """
         after = np.searchsorted(self.time, [start, end], "left").clip(0, len(self.time) - 1)
         before = (np.searchsorted(self.time, [start, end], "right") - 1).clip(0)
@@ -65,10 +68,14 @@ class Meter:
         return float(self.power[inside].max()) if inside.any() else float("nan")
 
     def stored(self, time: float, link: DcLink) -> float:
-        """J in the capacitors of the DC link at a time, by the bus voltage; NaN where it wasn't recorded."""
+        """J in the capacitors of the DC link at a time, by the bus voltage; NaN where it wasn't
+        recorded.
+        """
         volts = float(np.interp(time, self.time, self._volts))
         return (
-            max(0.5 * link.capacitance * (volts**2 - link.voltage**2), 0.0) if volts > 0.0 else float("nan")
+            max(0.5 * link.capacitance * (volts**2 - link.voltage**2), 0.0)
+            if volts > 0.0
+            else float("nan")
         )
 
     def _between(self, cumulative: FloatArray, start: float, end: float) -> float:

@@ -1,4 +1,6 @@
-"""Checks of one step of the program: energy, duration, tool, clearance; each with the reason of its bound."""
+"""Checks of one step of the program: energy, duration, tool, clearance; each with the reason of its
+bound.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +16,12 @@ from ir_recorder.analysis.steps import UNSEEN
 from ir_recorder.analysis.tolerances import Tolerances
 
 
-def step_checks(result: StepResult, safety_distance: float, bounds: Tolerances) -> Iterator[Finding]:
-    """All checks of a movement or pause that ended; safety_distance [m]: S_m as recorded, NaN where not."""
+def step_checks(
+    result: StepResult, safety_distance: float, bounds: Tolerances
+) -> Iterator[Finding]:
+    """All checks of a movement or pause that ended; safety_distance [m]: S_m as recorded, NaN where
+    not.
+    """
     name = f"{result.step.index + 1} {result.step.label}"
     if result.step.movement.is_pause:
         yield from _pause(name, result, bounds)
@@ -25,10 +31,14 @@ def step_checks(result: StepResult, safety_distance: float, bounds: Tolerances) 
     if planned > 0.0:
         why = "ends are extrapolated from states at 50 Hz"
         yield near(f"duration of {name}", result.seconds, planned, bounds.duration, "s", why)
-    if planned >= UNSEEN:  # a shorter one has too few positions, and perhaps no state of the controller
+    if (
+        planned >= UNSEEN
+    ):  # a shorter one has too few positions, and perhaps no state of the controller
         yield _from_joint_states(name, result, bounds)
         why = "beyond it the planned clearance is no proof"
-        yield at_most(f"tool deviation on {name}", result.tool_deviation, bounds.tool_deviation, "m", why)
+        yield at_most(
+            f"tool deviation on {name}", result.tool_deviation, bounds.tool_deviation, "m", why
+        )
     yield from _clearance(name, result, safety_distance, bounds)
 
 
@@ -53,22 +63,26 @@ def _from_joint_states(name: str, result: StepResult, bounds: Tolerances) -> Fin
 
 
 def _energy(name: str, result: StepResult, bounds: Tolerances) -> Iterator[Finding]:
-    planned, stored = result.step.movement.report.energy, _stored(result)
+    planned = result.step.movement.report.energy
+    stored = _stored(result)
     if planned <= 0.0:
         yield unchecked(f"energy of {name}", "the movement carries no plan")
         return
     low, high, why = _expected(result, 1.0, bounds)
     why += _of_capacitors(result)
-    yield _between(f"energy of {name}", result.energy, low - stored, high + result.lost_charge, planned, why)
+    yield _between(
+        f"energy of {name}", result.energy, low - stored, high + result.lost_charge, planned, why
+    )
 
 
 def _expected(result: StepResult, share: float, bounds: Tolerances) -> tuple[float, float, str]:
     """Least and largest energy [J] of `share` of the planned time of a step, and the reason.
 
-    A plant that is not the model is held against the plan's interval: what drives draw that the data put at
-    zero is a large part of a small robot's power at rest, as of its movements.
+    A plant that is not the model is held against the plan's interval: what drives draw that the
+    data put at zero is a large part of a small robot's power at rest, as of its movements.
     """
-    report, least = result.step.movement.report, _least(result, bounds)
+    report = result.step.movement.report
+    least = _least(result, bounds)
     planned = share * report.energy
     if bounds.within_interval and report.energy_high > report.energy_low:
         low, high = (2.0 * share * end - planned for end in (report.energy_low, report.energy_high))
@@ -83,11 +97,14 @@ def _pause(name: str, result: StepResult, bounds: Tolerances) -> Iterator[Findin
     if movement.duration <= 0.0:
         return  # a stop without a dwell: nothing is planned
     why = "wake margin and answers of the nodes; time of the plant, which a busy machine delays"
-    yield near(f"duration of {name}", result.seconds, movement.duration, bounds.pause_duration, "s", why)
+    yield near(
+        f"duration of {name}", result.seconds, movement.duration, bounds.pause_duration, "s", why
+    )
     if movement.report.energy <= 0.0:
         yield unchecked(f"energy of {name}", "the pause carries no plan")
         return
-    planned, stored = movement.report.energy, _stored(result)
+    planned = movement.report.energy
+    stored = _stored(result)
     if _rests(movement):
         low, high, why = _resting(result, bounds)
     else:
@@ -96,14 +113,19 @@ def _pause(name: str, result: StepResult, bounds: Tolerances) -> Iterator[Findin
         low, high, why = _expected(result, share, bounds)
         why += " of the planned power"
     why += _of_capacitors(result)
-    yield _between(f"energy of {name}", result.energy, low - stored, high + result.lost_charge, planned, why)
+    yield _between(
+        f"energy of {name}", result.energy, low - stored, high + result.lost_charge, planned, why
+    )
 
 
 def _resting(result: StepResult, bounds: Tolerances) -> tuple[float, float, str]:
     """Least and largest energy [J] of a pause in a resting mode, and the reason."""
     later = bounds.pause_duration * result.motors_power
-    planned, least = result.step.movement.report.energy, _least(result, bounds)
-    low, high, why = planned - least, planned + least, ""
+    planned = result.step.movement.report.energy
+    least = _least(result, bounds)
+    low = planned - least
+    high = planned + least
+    why = ""
     if bounds.within_interval:
         low, high, why = _expected(result, 1.0, bounds)
         why += ", and "
@@ -111,7 +133,9 @@ def _resting(result: StepResult, bounds: Tolerances) -> tuple[float, float, str]
     return low - later, high + later, why
 
 
-def _clearance(name: str, result: StepResult, recorded: float, bounds: Tolerances) -> Iterator[Finding]:
+def _clearance(
+    name: str, result: StepResult, recorded: float, bounds: Tolerances
+) -> Iterator[Finding]:
     near_ = result.clearance
     if near_ is None:
         yield unchecked(f"clearance on {name}", "cell or joint states are missing")
@@ -130,8 +154,8 @@ def _clearance(name: str, result: StepResult, recorded: float, bounds: Tolerance
 def kept_distance(result: StepResult, recorded: float, bounds: Tolerances) -> tuple[float, str]:
     """The distance [m] that the executed clearance is held against, and its source.
 
-    S_m that the plan's report says, else the one among the facts; else the clearance of a certified plan that
-    comes nearer than the default S_m.
+    S_m that the plan's report says, else the one among the facts; else the clearance of a certified
+    plan that comes nearer than the default S_m.
     """
     planned = result.step.movement.report
     if planned.safety_distance > 0.0:
@@ -148,15 +172,20 @@ def _rests(movement: PlannedMovement) -> bool:
 
 
 def _least(result: StepResult, bounds: Tolerances) -> float:
-    """J that any step may differ by: more where a reading at an end holds more, as if the next one moves."""
+    """J that any step may differ by: more where a reading at an end holds more, as if the next one
+    moves.
+    """
     return max(bounds.energy_absolute, float(np.nan_to_num(result.straddling_energy)))
 
 
 def _of_capacitors(result: StepResult) -> str:
     """What they change in a bound, in words."""
-    stored, lost = _stored(result), result.lost_charge
+    stored = _stored(result)
+    lost = result.lost_charge
     less = f"; less {stored:.0f} J that the capacitors held at the start" if stored >= 1.0 else ""
-    return less + (f"; and {lost:.0f} J that had gone from them as it began late" if lost >= 1.0 else "")
+    return less + (
+        f"; and {lost:.0f} J that had gone from them as it began late" if lost >= 1.0 else ""
+    )
 
 
 def _stored(result: StepResult) -> float:
@@ -167,5 +196,7 @@ def _share(relative: float, absolute: float) -> str:
     return f"{relative * 100.0:g} % or {absolute:.3g} J"
 
 
-def _between(name: str, measured: float, low: float, high: float, expected: float, reason: str) -> Finding:
+def _between(
+    name: str, measured: float, low: float, high: float, expected: float, reason: str
+) -> Finding:
     return Finding(name, measured, low, high, "J", reason, expected)

@@ -1,7 +1,7 @@
 """Power at rest from a recording alone: its mean while mode and load stay, at machine home.
 
-Each is held against the data of controller and tool; Table II of the paper stands beside it only where the
-load is the paper's.
+Each is held against the data of controller and tool; Table II of the paper stands beside it only
+where the load is the paper's.
 """
 
 from __future__ import annotations
@@ -36,8 +36,9 @@ NAN = float("nan")
 class Plateau:
     """Power [W] in a mode with a load over `seconds` in total.
 
-    payload [kg]: mass of the load. expected [W]: by the data of controller, tool and robot. table_2 [W]:
-    the paper's value, NaN where the load is another one. low, high [W]: the 90 % interval of what is
+    payload [kg]: mass of the load. expected [W]: by the data of controller, tool and robot. table_2
+    [W]: the paper's value, NaN where the load is another one. low, high [W]: the 90 % interval of
+    what is
     expected, of a robot that holds itself: drives draw more than the data know. NaN: none.
     """
 
@@ -70,7 +71,8 @@ def plateaus(
     for start, end, load in timeline.certain(float(power.time[-1])):
         for first, last, mode in _stays(power, home, start, end):
             key = (Mode(mode).name, load)
-            first, last = first + SETTLING, last - SETTLING
+            first = first + SETTLING
+            last = last - SETTLING
             if last - first >= SHORTEST:
                 seconds[key] = seconds.get(key, 0.0) + last - first
                 joules[key] = joules.get(key, 0.0) + meter.energy(first, last)
@@ -81,18 +83,24 @@ def plateaus(
     return tuple(sorted(rows, key=lambda row: (-row.payload, REST_MODES.index(row.mode))))
 
 
-def _plateau(mode: str, load: str, power: float, seconds: float, cell: Cell, data: PowerData) -> Plateau:
+def _plateau(
+    mode: str, load: str, power: float, seconds: float, cell: Cell, data: PowerData
+) -> Plateau:
     loads = carried(cell, load)
     known = load == NO_LOAD or len(loads) == len(load.split(LOAD_SEPARATOR))
     payload = float(sum(item.mass for item in loads)) if known else NAN
     expected = resting_watts(mode, cell.robot.machine_home, cell, loads, data) if known else NAN
-    of_the_paper = known and cell.robot.name == data.table_2_robot and _of_the_paper(loads, payload, data)
+    of_the_paper = (
+        known and cell.robot.name == data.table_2_robot and _of_the_paper(loads, payload, data)
+    )
     table_2 = data.measured(round(payload), mode) if of_the_paper else NAN
     low, high = _interval(expected, cell, loads, data) if known and mode == MOTORS else (NAN, NAN)
     return Plateau(mode, load, payload, power, expected, table_2, seconds, low, high)
 
 
-def _interval(expected: float, cell: Cell, loads: tuple[Load, ...], data: PowerData) -> tuple[float, float]:
+def _interval(
+    expected: float, cell: Cell, loads: tuple[Load, ...], data: PowerData
+) -> tuple[float, float]:
     """The 90 % interval of a power [W] on motors at machine home, by the marks of the data."""
     predictor = Predictor(cell.robot, data.dc_link, cell.base_pose, data_sheet_of(cell.robot, data))
     watts, low, high = predictor.standing(cell.robot.machine_home, loads)
@@ -100,7 +108,9 @@ def _interval(expected: float, cell: Cell, loads: tuple[Load, ...], data: PowerD
 
 
 def _of_the_paper(loads: tuple[Load, ...], payload: float, data: PowerData) -> bool:
-    """Whether Table II was measured with this load: its mass, and the watts that its rows contain."""
+    """Whether Table II was measured with this load: its mass, and the watts that its rows
+    contain.
+    """
     listed = {row.payload for row in data.table_2}
     if not any(abs(payload - mass) < SAME_MASS for mass in listed):
         return False
@@ -126,13 +136,15 @@ def _stays(
 
 
 def _at_home(recording: Recording, cell: Cell, times: FloatArray) -> BoolArray:
-    """Whether the robot stood at machine home at `times` (N,); while nothing is published it stays where it
-    was.
+    """Whether the robot stood at machine home at `times` (N,); while nothing is published it stays
+    where it was.
     """
     joints = recording.joints
     if joints is None or joints.position.shape[1] != cell.robot.n:
         return np.zeros(len(times), dtype=bool)
-    nearest = np.clip(np.searchsorted(joints.time, times, side="right") - 1, 0, len(joints.time) - 1)
+    nearest = np.clip(
+        np.searchsorted(joints.time, times, side="right") - 1, 0, len(joints.time) - 1
+    )
     near = np.abs(joints.position[nearest] - cell.robot.machine_home).max(axis=1) < AT_HOME
     still = np.nan_to_num(np.abs(joints.velocity[nearest])).max(axis=1) < STILL
     return np.asarray(near & still)

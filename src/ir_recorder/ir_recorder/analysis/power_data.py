@@ -1,4 +1,6 @@
-"""The figures of controller and DC link that a recording was made with, not those of this installation."""
+"""The figures of controller and DC link that a recording was made with, not those of this
+installation.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ _PLANT = {  # of a plant file's dc_link
 
 
 def recorded_power_data(recording: Recording) -> tuple[PowerData, str]:
-    """The attached data of the controller, and a sentence where they can't be read; else the bundled ones."""
+    """The attached data of the controller, and a sentence where they can't be read; else the
+    bundled ones.
+    """
     if not recording.power_yaml:
         return load_power_data(), ""
     try:
@@ -32,8 +36,8 @@ def recorded_power_data(recording: Recording) -> tuple[PowerData, str]:
 
 
 def recorded_link(recording: Recording, data: PowerData) -> DcLink:
-    """The DC link of the simulated plant where one is recorded, whose mains may have another voltage; else
-    that of the data.
+    """The DC link of the simulated plant where one is recorded, whose mains may have another
+    voltage; else that of the data.
     """
     try:
         page = yaml.safe_load(recording.plant_yaml) if recording.plant_yaml else {}

@@ -24,7 +24,8 @@ class Predictor:
     def __init__(
         self, robot: RobotModel, link: DcLink, base_pose: FloatArray, parameters: PowerParameters
     ) -> None:
-        self._model, self._parameters = PowerModel(robot, link, base_pose, parameters), parameters
+        self._model = PowerModel(robot, link, base_pose, parameters)
+        self._parameters = parameters
         self._draws = parameters.draws(_DRAWS, 0)
 
     def report(
@@ -47,7 +48,8 @@ class Predictor:
 
     def _energies(self, samples: Samples) -> tuple[float, float, float]:
         """Energy [J] of samples, and the ends of its 90 % interval."""
-        prepared, expected = self._model.prepare(samples), self._draws.mean(axis=0)
+        prepared = self._model.prepare(samples)
+        expected = self._draws.mean(axis=0)
         energy = samples.step * float(self._model.watts(self._parameters.mean, prepared).sum())
         watts, slopes = self._model.watts_and_slopes(expected, prepared)
         drawn = samples.step * (watts.sum() + (self._draws - expected) @ slopes.sum(axis=0))

@@ -22,14 +22,14 @@ NAN = float("nan")
 class StepResult:
     """A step with what it took, measured at the mains meter.
 
-    energy, base_energy, dissipated_energy, rectifier_energy [J]; straddling_energy [J]: by which energy may
-    be wrong, as readings at its ends belong to other steps as well; joint_energy (n,) [J] at the DC bus;
-    peak_power [W];
-    indirect_energy [J]: from recorded positions alone; torque_energy [J]: from recorded speed and torque;
-    second_opinion [J]: from positions with torques by Pinocchio, where it is installed;
+    energy, base_energy, dissipated_energy, rectifier_energy [J]; straddling_energy [J]: by which
+    energy may be wrong, as readings at its ends belong to other steps as well; joint_energy (n,)
+    [J] at the DC bus; peak_power [W];
+    indirect_energy [J]: from recorded positions alone; torque_energy [J]: from recorded speed and
+    torque; second_opinion [J]: from positions with torques by Pinocchio, where it is installed;
     stored_energy [J]: in the capacitors at the
-    start; lost_charge [J]: that the plan counted on in them, and that had gone as the step began late;
-    motors_power [W]: at rest with motors on, by the data; tool_deviation [m]: largest between
+    start; lost_charge [J]: that the plan counted on in them, and that had gone as the step began
+    late; motors_power [W]: at rest with motors on, by the data; tool_deviation [m]: largest between
     commanded and simulated tcp. NaN where it wasn't recorded. clearance is None for pauses.
     """
 
@@ -94,7 +94,8 @@ class StationUse:
 
 @dataclass(frozen=True)
 class Unshortened:
-    """The cycle with its pauses in power modes at full length: seconds [s] and energy [J], computed.
+    """The cycle with its pauses in power modes at full length: seconds [s] and energy [J],
+    computed.
 
     NaN where the pauses of the run don't match. run_pauses, full_pauses [s]: their sums.
     """
@@ -107,7 +108,8 @@ class Unshortened:
 
 @dataclass(frozen=True)
 class ProgramTotals:
-    """Seconds and joules of the whole program, of its movements and of its pauses, measured and planned.
+    """Seconds and joules of the whole program, of its movements and of its pauses, measured and
+    planned.
 
     unshortened: the cycle as it is in production, None where the run's pauses are not shortened.
     """
@@ -135,7 +137,8 @@ class Analysis:
     """All results; parts whose topics are missing are empty or NaN, `problems` names which and why.
 
     seconds, energy [J], mean_power, peak_power [W]: of the whole recording, at the mains meter.
-    safety_distance [m]: S_m that the movements were planned with, NaN where the recording carries none.
+    safety_distance [m]: S_m that the movements were planned with, NaN where the recording carries
+    none.
     """
 
     recording: Recording
@@ -156,8 +159,8 @@ class Analysis:
 
     @property
     def savings(self) -> ProgramSavings | None:
-        """What the executed program saves by its plan: the last that was recorded before its first step; None
-        where there is none.
+        """What the executed program saves by its plan: the last that was recorded before its first
+        step; None where there is none.
         """
         begin = self.steps[0].step.start if self.steps else math.inf
         known = [event.savings for event in self.recording.savings if event.time <= begin]

@@ -27,31 +27,41 @@ def mode_shares(power: PowerSeries) -> tuple[Share, ...]:
     shares = []
     for number in np.unique(power.mode):
         own = power.mode == number
-        shares.append(Share(mode_name(int(number)), float(seconds[own].sum()), float(joules[own].sum())))
+        shares.append(
+            Share(mode_name(int(number)), float(seconds[own].sum()), float(joules[own].sum()))
+        )
     return tuple(shares)
 
 
 def station_uses(results: Sequence[StepResult]) -> tuple[StationUse, ...]:
-    """Every step belongs to one stop: service movements, paths and pauses to theirs, a regional movement to
-    the one where it ends.
+    """Every step belongs to one stop: service movements, paths and pauses to theirs, a regional
+    movement to the one where it ends.
     """
     kinds: dict[str, dict[str, list[StepResult]]] = {}
     for result in results:
         movement = result.step.movement
         if movement.is_pause:
-            kind, station = "rest", movement.to_station or movement.from_station
+            kind = "rest"
+            station = movement.to_station or movement.from_station
         elif movement.kind == MovementKind.SERVICE_EXIT:
-            kind, station = "service", movement.from_station
+            kind = "service"
+            station = movement.from_station
         elif movement.kind in (MovementKind.SERVICE_ENTRY, MovementKind.CARTESIAN):
-            kind, station = "service", movement.to_station
+            kind = "service"
+            station = movement.to_station
         else:
-            kind, station = "travel", movement.to_station
+            kind = "travel"
+            station = movement.to_station
         kinds.setdefault(station or "elsewhere", {}).setdefault(kind, []).append(result)
     return tuple(
-        StationUse(station, *(_share(kind, own.get(kind, [])) for kind in ("rest", "service", "travel")))
+        StationUse(
+            station, *(_share(kind, own.get(kind, [])) for kind in ("rest", "service", "travel"))
+        )
         for station, own in kinds.items()
     )
 
 
 def _share(kind: str, results: Sequence[StepResult]) -> Share:
-    return Share(kind, sum(result.seconds for result in results), sum(result.energy for result in results))
+    return Share(
+        kind, sum(result.seconds for result in results), sum(result.energy for result in results)
+    )

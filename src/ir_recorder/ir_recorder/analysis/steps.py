@@ -21,8 +21,8 @@ UNSEEN = 0.06
 class ExecutedStep:
     """Step `index` of the `total` of a program.
 
-    start, end [s]: from the executor's path time where it moved, else from the events; a movement that is too
-    short for its states lasts as long as planned.
+    start, end [s]: from the executor's path time where it moved, else from the events; a movement
+    that is too short for its states lasts as long as planned.
 
     outcome: "ended", "failed", "canceled", or "open" where the recording ends before.
     """
@@ -66,12 +66,13 @@ def step_label(movement: PlannedMovement) -> str:
 def executed_steps(recording: Recording) -> tuple[ExecutedStep, ...]:
     """All steps that started, in the order of time.
 
-    The runner's events come later than the robot's stamps where the machine is busy. A pause is moved back by
-    what the end of the movement before it came late, and ends at the latest when the robot moves again, as
-    does a movement that is too short to be seen.
+    The runner's events come later than the robot's stamps where the machine is busy. A pause is
+    moved back by what the end of the movement before it came late, and ends at the latest when the
+    robot moves again, as does a movement that is too short to be seen.
     """
     steps: list[ExecutedStep] = []
-    runs, late = _Runs(recording.controller), 0.0
+    runs = _Runs(recording.controller)
+    late = 0.0
     for position, event in enumerate(recording.events):
         if event.event != STARTED:
             continue
@@ -82,7 +83,9 @@ def executed_steps(recording: Recording) -> tuple[ExecutedStep, ...]:
             late = max(0.0, last - ran[1]) if end else 0.0
             steps[-1:] = [_ended_at(step, ran[0]) for step in steps[-1:]]
         start, stop = ran or (event.time - late, last - late)
-        if ran is None and _unseen(event.movement):  # its events are as far apart as the nodes' answers
+        if ran is None and _unseen(
+            event.movement
+        ):  # its events are as far apart as the nodes' answers
             stop = min(stop, start + event.movement.report.duration)
         steps.append(
             ExecutedStep(
@@ -103,7 +106,9 @@ def _unseen(movement: PlannedMovement) -> bool:
 
 
 def _ended_at(step: ExecutedStep, moves: float) -> ExecutedStep:
-    """The step before the robot moves at a time [s]: a pause ends by then, an unseen movement was before."""
+    """The step before the robot moves at a time [s]: a pause ends by then, an unseen movement was
+    before.
+    """
     late = max(0.0, step.end - moves)
     if step.movement.is_pause:
         return replace(step, end=max(step.start, step.end - late))
@@ -135,10 +140,11 @@ class _Runs:
                 self._runs.setdefault(ids[moving[0]], []).append(times)
 
     def next_of(self, movement: PlannedMovement) -> tuple[float, float] | None:
-        """Start and end [s] of the movement's trajectory in its next run; None where it wasn't recorded.
+        """Start and end [s] of the movement's trajectory in its next run; None where it wasn't
+        recorded.
 
-        Both are extrapolated at the speed seen at that end of the path to path time 0 and to the planned
-        duration; a run that stopped well before its end ends where it stopped.
+        Both are extrapolated at the speed seen at that end of the path to path time 0 and to the
+        planned duration; a run that stopped well before its end ends where it stopped.
         """
         runs = self._runs.get(movement.trajectory_id, [])
         if not runs:

@@ -12,12 +12,16 @@ MODEL_PLANTS = ("", "nominal", "ideal")
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Bounds of the checks. The energy a movement may differ by is the larger of the relative and the
-    absolute one; what the capacitors held at its start, as the bus voltage shows, may be missing besides.
+    """Bounds of the checks. The energy a movement may differ by is the larger of the relative and
+    the absolute one; what the capacitors held at its start, as the bus voltage shows, may be
+    missing besides.
     """
 
     energy_relative: float = setting(
-        0.01, "Energy against plan: the nominal plant agrees within this share.", minimum=0.0, maximum=1.0
+        0.01,
+        "Energy against plan: the nominal plant agrees within this share.",
+        minimum=0.0,
+        maximum=1.0,
     )
     energy_absolute: float = setting(
         10.0,
@@ -26,12 +30,15 @@ class Tolerances:
         minimum=0.0,
     )
     duration: float = setting(
-        0.05, "Duration of a movement: its ends are extrapolated from states at 50 Hz.", unit="s", minimum=0.0
+        0.05,
+        "Duration of a movement: its ends are extrapolated from states at 50 Hz.",
+        unit="s",
+        minimum=0.0,
     )
     pause_duration: float = setting(
         0.5,
-        "Duration of a pause, and how long it may rest less deep than planned: wake margin 0.2 s and three "
-        "answers of 0.1 s.",
+        "Duration of a pause, and how long it may rest less deep than planned: wake margin 0.2 s "
+        "and three answers of 0.1 s.",
         unit="s",
         minimum=0.0,
     )
@@ -44,7 +51,9 @@ class Tolerances:
     safety_distance: float = setting(
         0.02, "S_m where the recording carries none: the default of requests.", unit="m"
     )
-    slack: float = setting(1e-4, "Clearance: resolution of the exact distances and of the states.", unit="m")
+    slack: float = setting(
+        1e-4, "Clearance: resolution of the exact distances and of the states.", unit="m"
+    )
     resting_relative: float = setting(
         0.01, "Power at rest against the data of controller and tool.", minimum=0.0, maximum=1.0
     )
@@ -57,8 +66,8 @@ class Tolerances:
 
     plant_relative: float = setting(
         0.2,
-        "Energy and power of a plant that is not the model, where the plan has no interval: two standard "
-        "deviations of figures of medium confidence.",
+        "Energy and power of a plant that is not the model, where the plan has no interval: two "
+        "standard deviations of figures of medium confidence.",
         minimum=0.0,
         maximum=1.0,
     )
@@ -71,10 +80,16 @@ class Tolerances:
         check_settings(self)
 
     def of_plant(self, plant: str) -> Tolerances:
-        """The bounds for a plant of this name: only those of its own data agree closely with the model."""
+        """The bounds for a plant of this name: only those of its own data agree closely with the
+        model.
+        """
         if plant in MODEL_PLANTS:
             return self
         wide = self.plant_relative
         return replace(
-            self, energy_relative=wide, indirect_relative=wide, resting_relative=wide, within_interval=True
+            self,
+            energy_relative=wide,
+            indirect_relative=wide,
+            resting_relative=wide,
+            within_interval=True,
         )

@@ -11,8 +11,9 @@ from ir_msgs_py.ros.diagnostics import ERROR, OK, WARN, Condition, Diagnostics
 
 @dataclass(frozen=True)
 class State:
-    """failure: why the last recording ended on its own; path: of the running one, "" for none; lost: messages
-    that never arrived; dropped: for which the disk was too slow; waiting: bytes in the queue to it.
+    """failure: why the last recording ended on its own; path: of the running one, "" for none;
+    lost: messages that never arrived; dropped: for which the disk was too slow; waiting: bytes in
+    the queue to it.
     """
 
     failure: str
@@ -28,7 +29,8 @@ class RecorderDiagnostics:
     """One publisher of the node; `publish` once a second."""
 
     def __init__(self, node: Node) -> None:
-        self._name, self._diagnostics = node.get_name(), Diagnostics(node)
+        self._name = node.get_name()
+        self._diagnostics = Diagnostics(node)
 
     def publish(self, state: State) -> None:
         """One status."""

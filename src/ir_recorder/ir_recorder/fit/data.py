@@ -1,4 +1,6 @@
-"""What a fit is made from: a recording, or traces of joints and of a power meter with its own clock."""
+"""What a fit is made from: a recording, or traces of joints and of a power meter with its own
+clock.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ from ir_recorder.traces.trace import LOAD
 
 @dataclass(frozen=True, eq=False)
 class FitData:
-    """Samples with watts, the model of their robot, and sentences on how they were laid together."""
+    """Samples with watts, the model of their robot, and sentences on how they were laid
+    together.
+    """
 
     samples: Samples
     model: PowerModel
@@ -34,8 +38,9 @@ class FitData:
 
 @dataclass(frozen=True)
 class Source:
-    """A file of the robot's motion; a file of the meter (None: the same), with the mapping of each; a cell
-    for what no file says of it, and what is held all the time ("" where the recording knows).
+    """A file of the robot's motion; a file of the meter (None: the same), with the mapping of each;
+    a cell for what no file says of it, and what is held all the time ("" where the recording
+    knows).
     """
 
     motion: Path
@@ -47,7 +52,9 @@ class Source:
 
 
 def fit_data(source: Source, prior: PowerParameters) -> FitData:
-    """Read all of a source and lay it on one grid; ReadError, TraceError or FitError as a sentence."""
+    """Read all of a source and lay it on one grid; ReadError, TraceError or FitError as a
+    sentence.
+    """
     recording = read_recording(source.motion) if source.motion.suffix.lower() == ".mcap" else None
     cell = source.cell or attached_cell(recording)
     _check_load(cell, source.load)
@@ -76,15 +83,18 @@ def fit_data(source: Source, prior: PowerParameters) -> FitData:
             notes.append(note)
         meter = outer
     if meter is None:
-        raise FitError(f"{source.motion}: there is neither a column power nor energy; name the meter's file")
+        raise FitError(
+            f"{source.motion}: there is neither a column power nor energy; name the meter's file"
+        )
     check_readings(meter)
-    names, modes = cell.robot.joint_names, prior.modes
+    names = cell.robot.joint_names
+    modes = prior.modes
     return FitData(samples_of(joints, meter, names, modes, runs), model, tuple(notes))
 
 
 def _written_loads(cell: Cell, trace: Trace) -> list[tuple[float, float, tuple[Load, ...]]]:
-    """Runs of the words of a column `load`; none where there is no such column. FitError for what the cell
-    does not have.
+    """Runs of the words of a column `load`; none where there is no such column. FitError for what
+    the cell does not have.
     """
     words = trace.texts.get(LOAD, ())
     for word in dict.fromkeys(words):
@@ -97,7 +107,9 @@ def _check_load(cell: Cell, text: str, where: str = "") -> None:
     """Refuse a load text that names what is neither the cell's tool nor one of its parts."""
     known = {NO_LOAD, *(load.name for load in cell.loads("")), *(part.name for part in cell.parts)}
     if strange := set(normal(text).split(LOAD_SEPARATOR)) - known:
-        raise FitError(f"{where}load {min(strange)[:40]!r} is unknown, known are {', '.join(sorted(known))}")
+        raise FitError(
+            f"{where}load {min(strange)[:40]!r} is unknown, known are {', '.join(sorted(known))}"
+        )
 
 
 def _recorded_loads(
@@ -132,16 +144,22 @@ def _aligned(
     model: PowerModel,
     runs: LoadRuns,
 ) -> tuple[Trace, str]:
-    """The outer meter on the robot's clock: its power against the recorded one, else the predicted one."""
+    """The outer meter on the robot's clock: its power against the recorded one, else the predicted
+    one.
+    """
     if meter is not None:
-        time, watts, what = meter.time, _watts(meter), "the recorded power"
+        time = meter.time
+        watts = _watts(meter)
+        what = "the recorded power"
     else:
         samples = samples_of(joints, None, prior.joints, prior.modes, runs)
-        time, watts = samples.time, model.watts(prior.mean, model.prepare(samples))
+        time = samples.time
+        watts = model.watts(prior.mean, model.prepare(samples))
         what = "the power that the data sheet predicts"
     offset = clock_offset(time, watts, outer.time, _watts(outer))
     note = (
-        f"{outer.source}: {offset.seconds:+.3f} s on its clock agrees with {what} by {offset.correlation:.2f}"
+        f"{outer.source}: {offset.seconds:+.3f} s on its clock agrees with {what} by "
+        f"{offset.correlation:.2f}"
     )
     return outer.shifted(offset.seconds), note
 

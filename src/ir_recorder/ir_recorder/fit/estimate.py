@@ -1,8 +1,10 @@
-"""Power parameters from a power meter: regularised least squares with physical bounds, by Gauss and Newton.
+"""Power parameters from a power meter: regularised least squares with physical bounds, by Gauss and
+Newton.
 
-The prior pulls what the data say little about towards the data sheet. The forward model runs the DC link, so
-its switch and its capacitor are in every step. Residuals of neighbouring instants hang together; they count
-as the fewer independent ones that their autocorrelation leaves, standing and moving apart from each other.
+The prior pulls what the data say little about towards the data sheet. The forward model runs the DC
+link, so its switch and its capacitor are in every step. Residuals of neighbouring instants hang
+together; they count as the fewer independent ones that their autocorrelation leaves, standing and
+moving apart from each other.
 """
 
 from __future__ import annotations
@@ -30,7 +32,11 @@ from ir_recorder.measure import PowerModel, Samples, movements
 
 DETERMINED = 0.8  # of the deviation before: what is left of it after the fit, at most
 LEAST_WATTS = 0.5  # noise of a residual, at least: the resolution of meters
-SOFTNESS = (10.0, 2.0, 0.3)  # J: of the DC link, where the descent begins; its kinks make local minima
+SOFTNESS = (
+    10.0,
+    2.0,
+    0.3,
+)  # J: of the DC link, where the descent begins; its kinks make local minima
 _ROUNDS = 30
 _SHARES = (1.0, 0.5, 0.25, 0.1, 0.03, 0.01)  # of a step: the DC link makes kinks
 _DONE = 1e-4  # of a deviation: the largest change of a last step
@@ -40,8 +46,8 @@ _SHORTEST = 100  # residuals that a fit needs
 
 @dataclass(frozen=True)
 class FittedMovement:
-    """A movement from `start` on for `seconds` [s]: energy [J] at the mains measured, and predicted by the
-    parameters before and after the fit.
+    """A movement from `start` on for `seconds` [s]: energy [J] at the mains measured, and predicted
+    by the parameters before and after the fit.
     """
 
     start: float
@@ -53,9 +59,10 @@ class FittedMovement:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """What was found. parameters: with covariance; determined (P,): which of them the data determine; the
-    others are as before. movements: residuals. time (W,) s, measured, before, after (W,) W: of windows.
-    noise [W]: of a window at rest and in motion, with how many windows one independent residual takes.
+    """What was found. parameters: with covariance; determined (P,): which of them the data
+    determine; the others are as before. movements: residuals. time (W,) s, measured, before, after
+    (W,) W: of windows. noise [W]: of a window at rest and in motion, with how many windows one
+    independent residual takes.
     inflation: of the noise, so that the covariance explains the residuals of movements and rests.
     """
 
@@ -74,12 +81,16 @@ class Fit:
     def kept(self) -> tuple[str, ...]:
         """Names of what the data do not determine."""
         return tuple(
-            name for name, own in zip(self.parameters.names, self.determined, strict=True) if not own
+            name
+            for name, own in zip(self.parameters.names, self.determined, strict=True)
+            if not own
         )
 
 
 def fit(samples: Samples, model: PowerModel, prior: PowerParameters, name: str = "fit") -> Fit:
-    """Fit the parameters of `model` to the watts of the samples. FitError where they hold too little."""
+    """Fit the parameters of `model` to the watts of the samples. FitError where they hold too
+    little.
+    """
     return _Estimate(samples, model, prior).result(name)
 
 
@@ -89,10 +100,12 @@ class _Estimate:
         self._windows = np.flatnonzero(by_window(usable.astype(float)) > 1.0 - 1e-9)
         if len(self._windows) < _SHORTEST:
             raise FitError(
-                f"{len(self._windows) * WINDOW * samples.step:.1f} s have watts, motion, mode and load at "
-                f"once, at least {_SHORTEST * WINDOW * samples.step:.1f} s are needed"
+                f"{len(self._windows) * WINDOW * samples.step:.1f} s have watts, motion, mode "
+                f"and load at once, at least {_SHORTEST * WINDOW * samples.step:.1f} s are needed"
             )
-        self._samples, self._model, self._prior = samples, model, prior
+        self._samples = samples
+        self._model = model
+        self._prior = prior
         self._prepared = model.prepare(samples)
         self._watts = self._reduced(samples.watts)
         self._moving = self._reduced(samples.moving.astype(float)) > 0.0
@@ -100,14 +113,18 @@ class _Estimate:
         values, vectors = np.linalg.eigh(scaled(prior))
         if values.min() <= 1e-9:
             raise FitError("the covariance of the prior is singular")
-        self._pull = (vectors / np.sqrt(values)).T / safe(prior.deviation)  # (P, P): whitens the parameters
+        self._pull = (vectors / np.sqrt(values)).T / safe(
+            prior.deviation
+        )  # (P, P): whitens the parameters
         self._free = prior.deviation > 0.0
 
-    def result(self, name: str) -> Fit:  # long: one field per line
-        """Both noises and the parameters in turn, then with the noise that explains what was left out, and
-        once more with what is not determined as before.
+    def result(self, name: str) -> Fit:
+        """Both noises and the parameters in turn, then with the noise that explains what was left
+        out, and once more with what is not determined as before.
         """
-        noise, correlated, mean = (50.0, 50.0), (1.0, 1.0), self._prior.mean.copy()
+        noise = (50.0, 50.0)
+        correlated = (1.0, 1.0)
+        mean = self._prior.mean.copy()
         for softness in SOFTNESS:
             mean, _ = self._solve(mean, self._weight(noise, correlated), self._free, softness)
         for _ in range(_REWEIGHTED):
@@ -118,9 +135,13 @@ class _Estimate:
         inflation = self._widening(mean, weight)
         weight = weight / np.sqrt(inflation)
         mean, precision = self._solve(mean, weight, self._free)
-        left = np.sqrt(np.diag(inverse(precision, self._prior.deviation))) / safe(self._prior.deviation)
+        left = np.sqrt(np.diag(inverse(precision, self._prior.deviation))) / safe(
+            self._prior.deviation
+        )
         determined = np.asarray(self._free & (left < DETERMINED))
-        check_explained(self._watts, self._reduced(self._model.watts(mean, self._prepared)), self._moving)
+        check_explained(
+            self._watts, self._reduced(self._model.watts(mean, self._prepared)), self._moving
+        )
         check_determined(determined, self._moving, WINDOW * self._samples.step)
         mean, precision = self._solve(mean, weight, determined)
         covariance = inverse(precision, self._prior.deviation)
@@ -132,7 +153,9 @@ class _Estimate:
             covariance=0.5 * (covariance + covariance.T),
             sources=tuple(str(source) for source in sources),
         )
-        before, after = (self._model.watts(each, self._prepared) for each in (self._prior.mean, mean))
+        before, after = (
+            self._model.watts(each, self._prepared) for each in (self._prior.mean, mean)
+        )
         return Fit(
             found,
             determined,
@@ -157,8 +180,8 @@ class _Estimate:
     def _solve(
         self, start: FloatArray, weight: FloatArray, free: BoolArray, softness: float = 0.0
     ) -> tuple[FloatArray, FloatArray]:
-        """The parameters of least cost with those that are not free as in the prior; and the precision
-        (P, P).
+        """The parameters of least cost with those that are not free as in the prior; and the
+        precision (P, P).
         """
         mean = np.where(free, start, self._prior.mean)
         cost, residual, slopes = self._at(mean, weight, softness)
@@ -172,7 +195,8 @@ class _Estimate:
             else:
                 break
             moved = np.abs((trial - mean) / safe(self._prior.deviation)).max()
-            mean, (cost, residual, slopes) = trial, better
+            mean = trial
+            (cost, residual, slopes) = better
             if moved < _DONE:
                 break
         return mean, slopes.T @ slopes + self._pull.T @ self._pull
@@ -192,7 +216,9 @@ class _Estimate:
     ) -> FloatArray:
         """The step of Gauss and Newton within the bounds; zero for what is not free."""
         scale = safe(self._prior.deviation)[free]
-        reduced = np.asarray(np.linalg.qr(np.column_stack([slopes[:, free] * scale, residual]), mode="r"))
+        reduced = np.asarray(
+            np.linalg.qr(np.column_stack([slopes[:, free] * scale, residual]), mode="r")
+        )
         matrix = np.concatenate([reduced[:, :-1], self._pull[:, free] * scale])
         target = np.concatenate([reduced[:, -1], self._pull @ (self._prior.mean - mean)])
         low, high = ((bound - mean)[free] / scale for bound in (self._low, self._high))
@@ -204,15 +230,19 @@ class _Estimate:
     def _noise(self, mean: FloatArray) -> tuple[tuple[float, float], tuple[float, float]]:
         """Deviation of a residual [W], and residuals per independent one: at rest, and moving."""
         residual = self._watts - self._reduced(self._model.watts(mean, self._prepared))
-        noise, correlated = [], []
+        noise = []
+        correlated = []
         for rows in (~self._moving, self._moving):
             own = residual[rows]
-            noise.append(max(float(np.sqrt(np.mean(own**2))), LEAST_WATTS) if len(own) else LEAST_WATTS)
+            noise.append(
+                max(float(np.sqrt(np.mean(own**2))), LEAST_WATTS) if len(own) else LEAST_WATTS
+            )
             correlated.append(correlation_length(own))
         return (noise[0], noise[1]), (correlated[0], correlated[1])
 
     def _movements(self, before: FloatArray, after: FloatArray) -> tuple[FittedMovement, ...]:
-        step, watts = self._samples.step, self._samples.watts
+        step = self._samples.step
+        watts = self._samples.watts
         return tuple(
             FittedMovement(
                 float(self._samples.time[first]),
@@ -226,7 +256,8 @@ class _Estimate:
     def _widening(self, mean: FloatArray, weight: FloatArray) -> float:
         """The factor on the noise that the residual energies of movements and rests take."""
         watts, slopes = self._model.watts_and_slopes(mean, self._prepared)
-        missing, step = self._samples.watts - watts, WINDOW
+        missing = self._samples.watts - watts
+        step = WINDOW
         residual = self._watts - self._reduced(watts)
         moved = residual[self._moving]
         white = 0.5 * float(np.mean(np.diff(moved) ** 2)) if len(moved) > 1 else 0.0

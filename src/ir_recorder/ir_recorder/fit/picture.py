@@ -1,4 +1,6 @@
-"""A fit as one picture: powers over time, residuals by movement, and parameters against their prior."""
+"""A fit as one picture: powers over time, residuals by movement, and parameters against their
+prior.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +18,15 @@ from ir_recorder.report.files import write_output
 from ir_recorder.report.picture import PICTURE_START
 
 _MOST_SECONDS = 60.0  # of powers that are shown: a few movements, not an hour
-_MEASURED, _BEFORE, _AFTER = "#39434f", "#e8590c", "#5b8def"
+_MEASURED = "#39434f"
+_BEFORE = "#e8590c"
+_AFTER = "#5b8def"
 
 
 def write_fit_picture(found: Fit, prior: PowerParameters, path: Path) -> Path:
-    """Write the picture as PNG and return its absolute path; FitError where matplotlib isn't installed."""
+    """Write the picture as PNG and return its absolute path; FitError where matplotlib isn't
+    installed.
+    """
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
@@ -59,7 +65,9 @@ def _residuals(axes: Any, found: Fit) -> None:
         ([each.before for each in found.movements], _BEFORE, "before the fit"),
         ([each.after for each in found.movements], _AFTER, "after the fit"),
     ):
-        shares = [100.0 * (v / m.measured - 1.0) for v, m in zip(values, found.movements, strict=True)]
+        shares = [
+            100.0 * (v / m.measured - 1.0) for v, m in zip(values, found.movements, strict=True)
+        ]
         axes.plot(number, shares, "o", color=colour, markersize=4, label=label)
     axes.axhline(0.0, color=_MEASURED, linewidth=0.8)
     axes.set(xlabel="movement", ylabel="energy off the meter [%]")
@@ -69,14 +77,21 @@ def _residuals(axes: Any, found: Fit) -> None:
 def _parameters(axes: Any, found: Fit, prior: PowerParameters) -> None:
     """Each parameter in deviations of its prior: where it went, and what uncertainty is left."""
     scale = np.where(prior.deviation > 0.0, prior.deviation, 1.0)
-    moved, left = (found.parameters.mean - prior.mean) / scale, found.parameters.deviation / scale
+    moved = (found.parameters.mean - prior.mean) / scale
+    left = found.parameters.deviation / scale
     place = np.arange(len(moved))
     for rows, colour, label in (
         (found.determined, _AFTER, "determined by the data"),
         (~found.determined, "#adb5bd", "kept at the prior"),
     ):
         axes.errorbar(
-            place[rows], moved[rows], yerr=left[rows], fmt="o", markersize=3.5, color=colour, label=label
+            place[rows],
+            moved[rows],
+            yerr=left[rows],
+            fmt="o",
+            markersize=3.5,
+            color=colour,
+            label=label,
         )
     axes.axhspan(-1.0, 1.0, color="#f1f3f5", zorder=0)
     axes.set_xticks(place, found.parameters.names, rotation=90, fontsize=6.5)

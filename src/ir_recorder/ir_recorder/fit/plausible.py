@@ -1,4 +1,6 @@
-"""Data that no parameters explain are refused: units that are not what they are taken for, another robot."""
+"""Data that no parameters explain are refused: units that are not what they are taken for, another
+robot.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,8 @@ _SELDOM = 0.25  # s: within it an axis is accelerated and braked again
 
 
 def check_explained(measured: FloatArray, fitted: FloatArray, moving: BoolArray) -> None:
-    """FitError where the fitted power (W,) [W] stays so far from the measured that the data can't be those of
-    the model.
+    """FitError where the fitted power (W,) [W] stays so far from the measured that the data can't
+    be those of the model.
     """
     for rows, what in ((~moving, "at rest"), (moving, "in motion")):
         if np.count_nonzero(rows) < _FEWEST:
@@ -26,21 +28,25 @@ def check_explained(measured: FloatArray, fitted: FloatArray, moving: BoolArray)
         off = float(np.sqrt(np.mean((measured - fitted)[rows] ** 2)))
         if off > MOST_UNEXPLAINED * max(mean, 0.0):
             raise FitError(
-                f"no parameters explain the meter: {what} it shows {mean:.0f} W in the mean, the fit is off "
-                f"by {off:.0f} W (rms). Are the units of power and energy those of the headings, modes and "
-                "loads those that were driven, and is it this robot?"
+                f"no parameters explain the meter: {what} it shows {mean:.0f} W in the mean, the "
+                f"fit is off by {off:.0f} W (rms). Are the units of power and energy those of "
+                "the headings, modes and loads those that were driven, and is it this robot?"
             )
 
 
 def check_determined(determined: BoolArray, moving: BoolArray, window: float) -> None:
-    """FitError where the data determine no parameter (P,); moving (W,): in which windows of `window` s."""
+    """FitError where the data determine no parameter (P,); moving (W,): in which windows of
+    `window` s.
+    """
     if determined.any():
         return
-    seconds, moved = window * len(moving), window * np.count_nonzero(moving)
+    seconds = window * len(moving)
+    moved = window * np.count_nonzero(moving)
     raise FitError(
-        f"the data determine none of the {len(determined)} power parameters, so there is nothing to write: "
-        f"the robot moves in {moved:.1f} of {seconds:.1f} s with watts. Drive several axes at several speeds "
-        "and stay in the power modes; ir energy excite plans such movements"
+        f"the data determine none of the {len(determined)} power parameters, so there is nothing "
+        f"to write: the robot moves in {moved:.1f} of {seconds:.1f} s with watts. Drive several "
+        "axes at several speeds and stay in the power modes; ir energy excite plans such "
+        "movements"
     )
 
 
@@ -62,6 +68,6 @@ def check_range(source: str, robot: RobotModel, q: FloatArray) -> None:
         value = float(q[np.nanargmax(beyond[:, j]), j])
         raise FitError(
             f"{source}: {robot.joint_names[j]} is {value:.3g} rad, {robot.name} reaches "
-            f"{robot.position_min[j]:.3g} to {robot.position_max[j]:.3g} rad. Degrees need a heading that"
-            f" says so: {robot.joint_names[j]}_deg; or is it another robot?"
+            f"{robot.position_min[j]:.3g} to {robot.position_max[j]:.3g} rad. Degrees need a "
+            f"heading that says so: {robot.joint_names[j]}_deg; or is it another robot?"
         )

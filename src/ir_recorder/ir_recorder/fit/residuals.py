@@ -13,16 +13,22 @@ _SHORTEST_REST = 0.3  # s
 
 
 def rests(samples: Samples) -> list[tuple[int, int]]:
-    """Rows (first, behind the last) of rests of at least 0.3 s: a posture's error is no noise either."""
+    """Rows (first, behind the last) of rests of at least 0.3 s: a posture's error is no noise
+    either.
+    """
     still = samples.known & ~samples.moving
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
-    return [(a, b) for a, b in edges.reshape(-1, 2).tolist() if (b - a) * samples.step >= _SHORTEST_REST]
+    return [
+        (a, b) for a, b in edges.reshape(-1, 2).tolist() if (b - a) * samples.step >= _SHORTEST_REST
+    ]
 
 
 def by_window(values: FloatArray) -> FloatArray:
     """Means (M // WINDOW, ...) of consecutive samples (M, ...)."""
     count = len(values) // WINDOW
-    return np.asarray(values[: count * WINDOW].reshape(count, WINDOW, *values.shape[1:]).mean(axis=1))
+    return np.asarray(
+        values[: count * WINDOW].reshape(count, WINDOW, *values.shape[1:]).mean(axis=1)
+    )
 
 
 def safe(deviation: FloatArray) -> FloatArray:
@@ -39,7 +45,9 @@ def scaled(prior: PowerParameters) -> FloatArray:
 
 
 def inverse(precision: FloatArray, deviation: FloatArray) -> FloatArray:
-    """The covariance (P, P), inverted where parameters have deviations of one size; 0 for what is certain."""
+    """The covariance (P, P), inverted where parameters have deviations of one size; 0 for what is
+    certain.
+    """
     scale = safe(deviation)
     inverse = np.linalg.inv(precision * np.outer(scale, scale)) * np.outer(scale, scale)
     certain = deviation <= 0.0
@@ -49,7 +57,9 @@ def inverse(precision: FloatArray, deviation: FloatArray) -> FloatArray:
 
 
 def correlation_length(residual: FloatArray) -> float:
-    """Residuals (W,) per independent one: 1 + 2 times the autocorrelations up to the first negative."""
+    """Residuals (W,) per independent one: 1 + 2 times the autocorrelations up to the first
+    negative.
+    """
     own = residual - residual.mean() if len(residual) else residual
     power = float(own @ own)
     if len(own) < 3 or power <= 0.0:

@@ -15,20 +15,25 @@ def sentences(found: Fit) -> tuple[str, ...]:
     own = int(found.determined.sum())
     lines = [f"{own} of {len(found.determined)} parameters are determined by the data"]
     if found.kept:
-        lines.append(f"kept at the prior, because the data say little of them: {', '.join(found.kept)}")
+        lines.append(
+            f"kept at the prior, because the data say little of them: {', '.join(found.kept)}"
+        )
     if not found.movements:
         lines.append(
-            "nothing moves for 0.3 s or longer in these data: friction, masses and losses in motion were not "
+            "nothing moves for 0.3 s or longer in these data: friction, masses and losses in "
+            "motion were not "
             "determined, and movements are predicted as before; ir energy excite plans some"
         )
     else:
         lines.append(
             f"energy of {len(found.movements)} movements is off the meter by "
-            f"{_share(found.movements, 'before')} before, by {_share(found.movements, 'after')} after "
-            f"(median and largest, in the fitted data)"
+            f"{_share(found.movements, 'before')} before, by {_share(found.movements, 'after')} "
+            "after (median and largest, in the fitted data)"
         )
     rest, moving = found.noise
-    lines.append(f"power over 50 ms is off by {rest:.1f} W at rest and {moving:.1f} W in motion (rms)")
+    lines.append(
+        f"power over 50 ms is off by {rest:.1f} W at rest and {moving:.1f} W in motion (rms)"
+    )
     if found.inflation > 1.0:
         lines.append(
             f"noise counts {found.inflation:.1f} times: the model lacks something, and movements "

@@ -1,7 +1,15 @@
-"""What a recording file holds beside its messages: schemas, quality of service, names of attachments."""
+"""What a recording file holds beside its messages: schemas, quality of service, names of
+attachments.
+"""
 
 from ir_recorder.format.definition import Field, definitions_of
-from ir_recorder.format.qos import QosOffer, QosRequest, offers_from_yaml, offers_to_yaml, request_for
+from ir_recorder.format.qos import (
+    QosOffer,
+    QosRequest,
+    offers_from_yaml,
+    offers_to_yaml,
+    request_for,
+)
 from ir_recorder.format.schemas import MessageSchema, SchemaLibrary
 
 __all__ = [

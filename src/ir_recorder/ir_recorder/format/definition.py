@@ -1,7 +1,7 @@
 """Fields of a ROS 2 message definition, read from its text without ROS.
 
-A definition is the .msg text; in a recording the texts of all types it is built from follow, separated by a
-line of 80 "=" and a line "MSG: package/Type" (the `ros2msg` schema of MCAP).
+A definition is the .msg text; in a recording the texts of all types it is built from follow,
+separated by a line of 80 "=" and a line "MSG: package/Type" (the `ros2msg` schema of MCAP).
 """
 
 from __future__ import annotations
@@ -11,7 +11,18 @@ from dataclasses import dataclass
 
 from ir_recorder.errors import ReadError
 
-_NUMBERS = ("float32", "float64", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64")
+_NUMBERS = (
+    "float32",
+    "float64",
+    "int8",
+    "uint8",
+    "int16",
+    "uint16",
+    "int32",
+    "uint32",
+    "int64",
+    "uint64",
+)
 TEXTS = ("string", "wstring")
 PRIMITIVES = frozenset(("bool", "byte", "char", *TEXTS, *_NUMBERS))
 MOST_DEPTH = 32  # types inside types; those of ROS 2 reach 6
@@ -41,7 +52,9 @@ class Field:
 
 
 def fields_of(text: str, package: str) -> tuple[Field, ...]:
-    """Fields of one .msg text; constants and comments are left out, types get their package's name."""
+    """Fields of one .msg text; constants and comments are left out, types get their package's
+    name.
+    """
     fields = []
     for line in text.splitlines():
         match = _FIELD.match(line.split("#", 1)[0].strip())
@@ -71,26 +84,35 @@ def definitions_of(name: str, text: str) -> dict[str, tuple[Field, ...]]:
 
 
 def _check_size(
-    name: str, definitions: dict[str, tuple[Field, ...]], sizes: dict[str, int], above: tuple[str, ...]
+    name: str,
+    definitions: dict[str, tuple[Field, ...]],
+    sizes: dict[str, int],
+    above: tuple[str, ...],
 ) -> int:
     """Fields of one message of the type, arrays of fixed length counted out and at least one.
 
-    ReadError for a type that contains itself, is built too deep, or has too many fields: a reader that
-    walks it would not come to an end.
+    ReadError for a type that contains itself, is built too deep, or has too many fields: a reader
+    that walks it would not come to an end.
     """
     if name in sizes:
         return sizes[name]
     if name in above:
         raise ReadError(f"the definition of {name[:80]} contains itself")
     if len(above) >= MOST_DEPTH:
-        raise ReadError(f"the definition of {above[0][:80]} is built deeper than {MOST_DEPTH} types")
+        raise ReadError(
+            f"the definition of {above[0][:80]} is built deeper than {MOST_DEPTH} types"
+        )
     total = 1
     for field in definitions.get(name, ()):
         count = 1 if field.count is None or field.count < 0 else field.count
-        inner = 1 if field.primitive else _check_size(field.type, definitions, sizes, (*above, name))
+        inner = (
+            1 if field.primitive else _check_size(field.type, definitions, sizes, (*above, name))
+        )
         values = 1 if field.primitive and field.type not in TEXTS else count
         if count == 0:
-            raise ReadError(f"the definition of {name[:80]} has an array of no elements: {field.name[:80]}")
+            raise ReadError(
+                f"the definition of {name[:80]} has an array of no elements: {field.name[:80]}"
+            )
         total += inner * values
         if total > MOST_FIELDS:
             raise ReadError(f"the definition of {name[:80]} has more than {MOST_FIELDS} fields")

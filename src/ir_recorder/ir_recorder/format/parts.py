@@ -1,4 +1,6 @@
-"""A recording in several files: when the next begins, its name, and what shows that they belong together."""
+"""A recording in several files: when the next begins, its name, and what shows that they belong
+together.
+"""
 
 from __future__ import annotations
 
@@ -16,17 +18,22 @@ LEAST_DURATION = 1.0  # s: no file is shorter than what a kill may cost
 
 @dataclass(frozen=True)
 class Split:
-    """size [bytes] and duration [s] of a file from which on the next begins; 0: there is none by it."""
+    """size [bytes] and duration [s] of a file from which on the next begins; 0: there is none by
+    it.
+    """
 
     size: int = 0
     duration: float = 0.0
 
     def __post_init__(self) -> None:
         if self.size and self.size < LEAST_SIZE:
-            raise SplitError(f"split_size is {self.size} bytes: it must be 0 or at least {LEAST_SIZE:,}")
+            raise SplitError(
+                f"split_size is {self.size} bytes: it must be 0 or at least {LEAST_SIZE:,}"
+            )
         if not (self.duration == 0.0 or LEAST_DURATION <= self.duration < float("inf")):
             raise SplitError(
-                f"split_duration is {self.duration:g} s: it must be 0 or at least {LEAST_DURATION:g}"
+                f"split_duration is {self.duration:g} s: it must be 0 or at least "
+                f"{LEAST_DURATION:g}"
             )
 
     @property
@@ -36,7 +43,9 @@ class Split:
 
     def due(self, size: int, seconds: float) -> bool:
         """Whether a file of that size and duration is long enough."""
-        return bool((self.size and size >= self.size) or (self.duration and seconds >= self.duration))
+        return bool(
+            (self.size and size >= self.size) or (self.duration and seconds >= self.duration)
+        )
 
 
 def part_path(first: Path, part: int) -> Path:
@@ -51,7 +60,9 @@ def is_further_part(path: Path, part: str) -> bool:
 
 
 def part_facts(recording: str, part: int, repeated: Mapping[str, int]) -> dict[str, str]:
-    """The metadata record of a part; repeated: how many messages of a topic it has again at its begin."""
+    """The metadata record of a part; repeated: how many messages of a topic it has again at its
+    begin.
+    """
     return {
         contents.RECORDING: recording,
         contents.PART: str(part),

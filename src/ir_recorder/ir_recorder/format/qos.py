@@ -1,6 +1,7 @@
 """Quality of service as recordings carry it: the YAML that rosbag2 writes beside every channel.
 
-rosbag2 (metadata version 9, since Jazzy) names the policies; playback offers again what was offered.
+rosbag2 (metadata version 9, since Jazzy) names the policies; playback offers again what was
+offered.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ _INFINITE = {"sec": 9223372036, "nsec": 854775807}  # RMW_DURATION_INFINITE
 
 @dataclass(frozen=True)
 class QosOffer:
-    """What one publisher offered: reliable or best effort, latched (transient local) or not, and its
-    depth.
+    """What one publisher offered: reliable or best effort, latched (transient local) or not, and
+    its depth.
     """
 
     reliable: bool = True
@@ -34,8 +35,8 @@ class QosRequest:
 
 
 def request_for(offers: Sequence[QosOffer]) -> QosRequest:
-    """The strictest request that all offers meet (as rosbag2 does); without a publisher: reliable, not
-    latched.
+    """The strictest request that all offers meet (as rosbag2 does); without a publisher: reliable,
+    not latched.
     """
     if not offers:
         return QosRequest(reliable=True, transient_local=False)
@@ -62,7 +63,9 @@ def offers_to_yaml(offers: Sequence[QosOffer]) -> str:
 
 
 def offers_from_yaml(text: str) -> tuple[QosOffer, ...]:
-    """Offers of a channel; names (version 9) and numbers (before) are understood, nonsense is no offer."""
+    """Offers of a channel; names (version 9) and numbers (before) are understood, nonsense is no
+    offer.
+    """
     if len(text) > MOST_TEXT:
         return ()
     try:

@@ -1,8 +1,10 @@
 """Definitions of message types as a recording carries them, from the installed interface packages.
 
-MCAP's `ros2msg` encoding: the text of the type, then the texts of all types it is built from, read from
-`share/<package>/msg/*.msg`; the type's hash (RIHS01, REP-2016) from the .json beside it. Types that rosidl
-derives from actions and services have no such text, and readers refuse their names: they aren't recorded.
+MCAP's `ros2msg` encoding: the text of the type, then the texts of all types it is built from, read
+from `share/<package>/msg/*.msg`; the type's hash (RIHS01, REP-2016) from the .json beside it. Types
+that rosidl
+derives from actions and services have no such text, and readers refuse their names: they aren't
+recorded.
 """
 
 from __future__ import annotations
@@ -18,7 +20,8 @@ from pathlib import Path
 from ir_recorder.errors import SchemaError
 from ir_recorder.format.definition import SEPARATOR, fields_of
 
-# names of packages and types as ROS 2 has them: no path, no dot, nothing to import but an interface package
+# names of packages and types as ROS 2 has them: no path, no dot, nothing to import but an interface
+# package
 _PACKAGE = re.compile(r"[a-z][a-z0-9_]{0,250}")
 _TYPE = re.compile(r"[A-Z][A-Za-z0-9_]{0,250}")
 
@@ -35,7 +38,9 @@ class MessageSchema:
 
 
 class SchemaLibrary:
-    """Looks definitions up below the `share` folders of the given prefixes (default: the environment's)."""
+    """Looks definitions up below the `share` folders of the given prefixes (default: the
+    environment's).
+    """
 
     def __init__(self, prefixes: Sequence[Path] | None = None) -> None:
         self._prefixes = tuple(prefixes) if prefixes is not None else installed_prefixes()
@@ -68,7 +73,9 @@ class SchemaLibrary:
             described = json.loads(self._file(package, f"msg/{own}.json"))
         except (SchemaError, json.JSONDecodeError):
             return ""
-        hashes = {entry["type_name"]: entry["hash_string"] for entry in described.get("type_hashes", ())}
+        hashes = {
+            entry["type_name"]: entry["hash_string"] for entry in described.get("type_hashes", ())
+        }
         return str(hashes.get(name, ""))
 
     def _file(self, package: str, path: str) -> str:
@@ -77,14 +84,18 @@ class SchemaLibrary:
             if file.is_file():
                 return file.read_text(encoding="utf-8")
         places = ", ".join(str(prefix / "share") for prefix in self._prefixes)
-        raise SchemaError(f"no definition {package}/{path} below {places}: is the package installed?")
+        raise SchemaError(
+            f"no definition {package}/{path} below {places}: is the package installed?"
+        )
 
 
 def installed_prefixes() -> tuple[Path, ...]:
-    """Prefixes of the installed interface packages: AMENT_PREFIX_PATH first, then the Python environment's
-    own.
+    """Prefixes of the installed interface packages: AMENT_PREFIX_PATH first, then the Python
+    environment's own.
     """
-    named = [Path(entry) for entry in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if entry]
+    named = [
+        Path(entry) for entry in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if entry
+    ]
     return tuple(dict.fromkeys([*named, Path(sys.prefix)]))
 
 

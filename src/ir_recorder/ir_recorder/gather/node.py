@@ -1,4 +1,6 @@
-"""Asks nodes for what explains a recording, without waiting: answers are attached when they come."""
+"""Asks nodes for what explains a recording, without waiting: answers are attached when they
+come.
+"""
 
 from __future__ import annotations
 
@@ -26,14 +28,17 @@ ASKED = (names.PLANNER, names.SIM_DRIVER, names.PROGRAM_RUNNER)
 
 
 class Asked:
-    """One service call that is repeated until its answer was taken; `each` sends it while nobody answers.
+    """One service call that is repeated until its answer was taken; `each` sends it while nobody
+    answers.
 
-    An answer may be lost, as that of a node that had not discovered its client: who has not answered for
-    PATIENCE looks is asked again.
+    An answer may be lost, as that of a node that had not discovered its client: who has not
+    answered for PATIENCE looks is asked again.
     """
 
     def __init__(self, client: Client, request: Any, take: Callable[[Any], bool]) -> None:
-        self._client, self._request, self._take = client, request, take
+        self._client = client
+        self._request = request
+        self._take = take
         self._pending: Future | None = None
         self._looks = 0
         self.done = False

@@ -1,5 +1,5 @@
-"""Listens to topics as raw bytes, with the quality of service that is offered, and without waking for every
-message.
+"""Listens to topics as raw bytes, with the quality of service that is offered, and without waking
+for every message.
 """
 
 from __future__ import annotations
@@ -41,10 +41,15 @@ class Arrival:
 _OWNERS: dict[str, tuple[Any, Callable[[str, Any], bool]]] = {
     names.DIAGNOSTICS: (
         DiagnosticArray,
-        lambda namespace, message: any(owns_diagnostic(namespace, each.name) for each in message.status),
+        lambda namespace, message: any(
+            owns_diagnostic(namespace, each.name) for each in message.status
+        ),
     ),
     names.ROSOUT: (Log, lambda namespace, message: owns_logger(namespace, message.name)),
-    names.PARAMETER_EVENTS: (ParameterEvent, lambda namespace, message: owns_node(namespace, message.node)),
+    names.PARAMETER_EVENTS: (
+        ParameterEvent,
+        lambda namespace, message: owns_node(namespace, message.node),
+    ),
 }
 """Topics that all cells share: the type, and whether a message comes from a node of a namespace."""
 
@@ -61,14 +66,18 @@ def is_own(arrival: Arrival, namespace: str) -> bool:
 
 
 class Listener:
-    """Subscriptions of a node by topic; `lost` counts messages of single publishers that never arrived."""
+    """Subscriptions of a node by topic; `lost` counts messages of single publishers that never
+    arrived.
+    """
 
     def __init__(self, node: Node, depth: int) -> None:
         self._node = node
         self._depth = depth
         self._group = PolledGroup()
         self._subscriptions: dict[str, Subscription] = {}
-        self._numbers: dict[str, int | None] = {}  # of the last message; None where publishers mix theirs
+        self._numbers: dict[
+            str, int | None
+        ] = {}  # of the last message; None where publishers mix theirs
         self.lost = 0
 
     def __contains__(self, topic: str) -> bool:
@@ -82,14 +91,18 @@ class Listener:
 
     def offers(self, topic: str) -> tuple[QosOffer, ...]:
         """What the topic's publishers offer now."""
-        return tuple(_offer(publisher) for publisher in self._node.get_publishers_info_by_topic(topic))
+        return tuple(
+            _offer(publisher) for publisher in self._node.get_publishers_info_by_topic(topic)
+        )
 
     def open(self, topic: str, type_name: str, offers: Sequence[QosOffer]) -> None:
         """Subscribes to a topic; SchemaError when its type isn't installed."""
         request = request_for(offers)
         profile = QoSProfile(
             depth=self._depth,
-            reliability=ReliabilityPolicy.RELIABLE if request.reliable else ReliabilityPolicy.BEST_EFFORT,
+            reliability=ReliabilityPolicy.RELIABLE
+            if request.reliable
+            else ReliabilityPolicy.BEST_EFFORT,
             durability=_LATCHED if request.transient_local else DurabilityPolicy.VOLATILE,
         )
         subscription = self._node.create_subscription(
@@ -128,7 +141,9 @@ class Listener:
         self._group = PolledGroup()  # a group keeps a reference to whatever it ever had
 
     def _count(self, topic: str, number: int | None) -> None:
-        """A publisher numbers its messages: numbers that are left out are messages that didn't arrive."""
+        """A publisher numbers its messages: numbers that are left out are messages that didn't
+        arrive.
+        """
         last = self._numbers[topic]
         if last is not None and number is not None:
             if 0 < last < number:

@@ -1,8 +1,8 @@
 """Which topics belong to the cell.
 
-By default the shared ones and everything under the project's nodes, in the recorder's own namespace. Hidden
-topics (a name part that starts with "_") stay out, but for the status of actions: the feedback's types
-can't be read back without ROS.
+By default the shared ones and everything under the project's nodes, in the recorder's own
+namespace. Hidden topics (a name part that starts with "_") stay out, but for the status of actions:
+the feedback's types can't be read back without ROS.
 """
 
 from __future__ import annotations
@@ -15,7 +15,12 @@ from ir_msgs_py import names
 from ir_msgs_py.namespaces import NODES
 from ir_recorder.errors import TopicsError
 
-SHARED = (names.JOINT_STATES, names.ROBOT_DESCRIPTION, names.TF, names.TF_STATIC)  # in the cell's namespace
+SHARED = (
+    names.JOINT_STATES,
+    names.ROBOT_DESCRIPTION,
+    names.TF,
+    names.TF_STATIC,
+)  # in the cell's namespace
 GLOBAL = (names.DIAGNOSTICS, names.ROSOUT, names.PARAMETER_EVENTS)
 MOST_TOPICS = 1000
 LONGEST_TOPIC = 255  # characters, as DDS has it
@@ -24,14 +29,19 @@ _FEEDBACK = "_FeedbackMessage"
 
 
 def checked_topics(topics: Iterable[str]) -> tuple[str, ...]:
-    """Names and patterns of a request without the empty ones; TopicsError where they are no names."""
+    """Names and patterns of a request without the empty ones; TopicsError where they are no
+    names.
+    """
     wanted = tuple(topic for topic in topics if topic)
     if len(wanted) > MOST_TOPICS:
-        raise TopicsError(f"{len(wanted)} names or patterns of topics: at most {MOST_TOPICS} are taken")
+        raise TopicsError(
+            f"{len(wanted)} names or patterns of topics: at most {MOST_TOPICS} are taken"
+        )
     for topic in wanted:
         if len(topic) > LONGEST_TOPIC or not topic.isprintable():
             raise TopicsError(
-                f"topic {topic[:60]!a}: at most {LONGEST_TOPIC} characters, without control characters"
+                f"topic {topic[:60]!a}: at most {LONGEST_TOPIC} characters, without control "
+                "characters"
             )
     return wanted
 
@@ -40,8 +50,8 @@ def checked_topics(topics: Iterable[str]) -> tuple[str, ...]:
 class TopicSelection:
     """Decides for each topic of the graph whether it is recorded.
 
-    `wanted`: names or patterns ("/ir_planner/*"; "*" is every visible topic); empty: the topics of the cell
-    below `namespace` ("/" or "/cell_1").
+    `wanted`: names or patterns ("/ir_planner/*"; "*" is every visible topic); empty: the topics of
+    the cell below `namespace` ("/" or "/cell_1").
     """
 
     wanted: tuple[str, ...] = ()
@@ -73,8 +83,8 @@ class TopicSelection:
 
 
 def single_type(topic: str, types: Sequence[str]) -> str | None:
-    """The type of a topic, or None where recordings can't take it: several types, or one derived from an
-    action.
+    """The type of a topic, or None where recordings can't take it: several types, or one derived
+    from an action.
     """
     if len(types) != 1 or types[0].endswith(_FEEDBACK):
         return None

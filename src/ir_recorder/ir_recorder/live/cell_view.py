@@ -1,7 +1,8 @@
-"""The cell as the nodes describe it: what the page draws, the parts' places, the nearest pair, planned paths.
+"""The cell as the nodes describe it: what the page draws, the parts' places, the nearest pair,
+planned paths.
 
-It runs in a worker's thread, over whatever was heard last: a large cell or a slow machine delays the picture,
-and nothing else.
+It runs in a worker's thread, over whatever was heard last: a large cell or a slow machine delays
+the picture, and nothing else.
 """
 
 from __future__ import annotations
@@ -36,8 +37,8 @@ class Heard:
 
     cell: the text of its file; states: machine and state, "shut>open" while it
     changes; joints, q: names and values (n,) [rad], None while
-    none are heard; load: what is carried; movement: the step that runs; ended: steps since the last look,
-    None among them where a program begins; path: what is or will be driven.
+    none are heard; load: what is carried; movement: the step that runs; ended: steps since the last
+    look, None among them where a program begins; path: what is or will be driven.
     """
 
     cell: str = ""
@@ -67,11 +68,20 @@ class CellView:
         self._path: tuple[JointTrajectory | None, str] = (None, "")
 
     def look(self, heard: Heard) -> dict[str, Json]:
-        """What has to be shown: name, problem, number of the scene, places of parts, nearest pair, path."""
+        """What has to be shown: name, problem, number of the scene, places of parts, nearest pair,
+        path.
+        """
         if heard.cell != self._text:
             self._read(heard.cell)
         if self._cell is None:
-            return {"cell": "", "problem": self._problem, "scene": "", "near": None, "path": "", "lies": {}}
+            return {
+                "cell": "",
+                "problem": self._problem,
+                "scene": "",
+                "near": None,
+                "path": "",
+                "lies": {},
+            }
         if heard.states != self._states:
             self._stand(heard.states)
         for movement in heard.ended[:MOST_STEPS]:
@@ -89,8 +99,13 @@ class CellView:
         }
 
     def _read(self, text: str) -> None:
-        self._text, self._states, self._cell, self.scene, self._model = text, (), None, b"", None
-        self._read_cell, self._standing = None, {}
+        self._text = text
+        self._states = ()
+        self._cell = None
+        self.scene = b""
+        self._model = None
+        self._read_cell = None
+        self._standing = {}
         try:
             self._cell = self._read_cell = cell_from_yaml(text) if text else None
             self._problem = ""
@@ -102,25 +117,28 @@ class CellView:
             self._show()
 
     def _stand(self, states: tuple[tuple[str, str], ...]) -> None:
-        """Puts the machines into the states that the driver says they are in; what they sweep while they
-        change is there, too. States that the planner's cell doesn't have are not followed.
+        """Puts the machines into the states that the driver says they are in; what they sweep while
+        they change is there, too. States that the planner's cell doesn't have are not followed.
         """
         self._states = states
         if self._read_cell is None:
             return
-        heard, standing = {name: tuple(text.split(">")) for name, text in states}, {}
+        heard = {name: tuple(text.split(">")) for name, text in states}
+        standing = {}
         for machine in self._read_cell.equipment:
             now = heard.get(machine.name, ())
             known = {state.name for state in machine.states}
             if 1 <= len(now) <= 2 and known.issuperset(now) and now != (machine.state,):
                 standing[machine.name] = now
         if standing != self._standing:
-            self._standing, self._model = standing, None
+            self._standing = standing
+            self._model = None
             self._cell = cell_in(self._read_cell, standing)
             self._show()
 
     def _show(self) -> None:
-        cell, read = self._cell, self._read_cell
+        cell = self._cell
+        read = self._read_cell
         if cell is None or read is None:
             return
         self._version += 1
@@ -131,7 +149,8 @@ class CellView:
             "bodies": door_bodies(read, doors),
             **{"start": 0.0, "step": 1.0, "frames": 0, "angleStep": 1.0, "angles": "", "power": ""},
             "parts": [
-                {"name": part.name, "lies": [], "meshes": part_meshes(cell, part.name)} for part in cell.parts
+                {"name": part.name, "lies": [], "meshes": part_meshes(cell, part.name)}
+                for part in cell.parts
             ],
             **{"loads": [], "nearest": []},
         }
@@ -140,12 +159,20 @@ class CellView:
 
     def _lies(self) -> dict[str, Json]:
         """Where each part lies, for those that lie somewhere."""
-        cell, places = self._cell, self._places.lying
-        return {name: matrix(cell.station(at).pose) for name, at in places.items() if at and cell is not None}
+        cell = self._cell
+        places = self._places.lying
+        return {
+            name: matrix(cell.station(at).pose)
+            for name, at in places.items()
+            if at and cell is not None
+        }
 
     def _near(self, heard: Heard) -> Json:
-        """Distance [m], the two points and the names of the nearest pair that isn't allowed to touch."""
-        cell, q = self._cell, self.in_order(heard.joints, heard.q)
+        """Distance [m], the two points and the names of the nearest pair that isn't allowed to
+        touch.
+        """
+        cell = self._cell
+        q = self.in_order(heard.joints, heard.q)
         if cell is None or q is None:
             return None
         key = (self._version, heard.load, tuple(sorted(self._places.lying.items())))
@@ -173,7 +200,9 @@ class CellView:
         return self._path[1]
 
     def in_order(self, names: Sequence[str], values: FloatArray | None) -> FloatArray | None:
-        """Values (..., n) in the robot's order of joints; None for other joints, or without numbers."""
+        """Values (..., n) in the robot's order of joints; None for other joints, or without
+        numbers.
+        """
         robot = self._cell.robot if self._cell is not None else None
         if robot is None or values is None or sorted(names) != sorted(robot.joint_names):
             return None

@@ -1,8 +1,10 @@
-"""Who is answered: browsers on this machine that look at this page, and none that another page sent.
+"""Who is answered: browsers on this machine that look at this page, and none that another page
+sent.
 
-A page from elsewhere can make a browser ask a server on loopback, under a name that it lets point there (DNS
-rebinding) or under its own address. The header Host says which name was asked for, Origin which page asked.
-The token is in the address that the command prints, behind #: it is never sent to a server on its own.
+A page from elsewhere can make a browser ask a server on loopback, under a name that it lets point
+there (DNS rebinding) or under its own address. The header Host says which name was asked for,
+Origin which page asked. The token is in the address that the command prints, behind #: it is never
+sent to a server on its own.
 """
 
 from __future__ import annotations
@@ -15,7 +17,10 @@ from hmac import compare_digest
 ADDRESS = "127.0.0.1"
 TOKEN_HEADER = "X-Live-Token"
 NAMES = (ADDRESS, "localhost")
-_OWN_SITES = ("same-origin", "none")  # of Sec-Fetch-Site: this page, or a person who typed the address
+_OWN_SITES = (
+    "same-origin",
+    "none",
+)  # of Sec-Fetch-Site: this page, or a person who typed the address
 
 
 @dataclass(frozen=True)
@@ -34,7 +39,8 @@ class Guard:
         """Why a request is not answered, "" where it is."""
         if headers.get("Host", "") not in {f"{name}:{self.port}" for name in NAMES}:
             return f"this server answers to {ADDRESS}:{self.port} and localhost:{self.port} only"
-        origin, site = headers.get("Origin"), headers.get("Sec-Fetch-Site", "none")
+        origin = headers.get("Origin")
+        site = headers.get("Sec-Fetch-Site", "none")
         if (origin is not None and origin not in self.origins) or site not in _OWN_SITES:
             return "another page's requests are not answered"
         return ""

@@ -1,7 +1,8 @@
-"""The node `ir_live`: hears a cell's nodes; browsers on this machine watch it and set the PLC's bits.
+"""The node `ir_live`: hears a cell's nodes; browsers on this machine watch it and set the PLC's
+bits.
 
-It looks at the newest of every topic 20 times a second and is woken by none: the cell's nodes never wait for
-it, and of a flood the middleware keeps the end.
+It looks at the newest of every topic 20 times a second and is woken by none: the cell's nodes never
+wait for it, and of a flood the middleware keeps the end.
 """
 
 from __future__ import annotations
@@ -76,13 +77,19 @@ class LiveNode(Node):
 
     def __init__(self, port: int = 0, **options: Any) -> None:
         super().__init__(names.LIVE, **options)
-        self._topics = {name: PolledTopic(self, kind, name, qos) for name, (kind, qos) in _TOPICS.items()}
-        self._stream, self._commands, self._view = Stream(), Commands(), CellView()
+        self._topics = {
+            name: PolledTopic(self, kind, name, qos) for name, (kind, qos) in _TOPICS.items()
+        }
+        self._stream = Stream()
+        self._commands = Commands()
+        self._view = CellView()
         self._worker = ThreadPoolExecutor(1, "cell")
         self._looking: Future[dict[str, Json]] | None = None
         self._looked = self._powered = -math.inf
-        self._heard, self._ended = Heard(), list[PlannedMovement | None]()
-        self._driven, self._contacts = "", 0
+        self._heard = Heard()
+        self._ended = list[PlannedMovement | None]()
+        self._driven = ""
+        self._contacts = 0
         self._set_bit = self.create_client(SetPlcInput, names.SET_PLC_INPUT)
         self._get_trajectory = self.create_client(GetTrajectory, names.GET_TRAJECTORY)
         self.server = LiveServer(self._stream, self._commands.press, lambda: self._view.scene, port)
@@ -128,16 +135,20 @@ class LiveNode(Node):
         """What the worker found, if it is done; it looks again at what is heard by then."""
         found: dict[str, Json] = {}
         if self._looking is not None and self._looking.done():
-            looking, self._looking = self._looking, None
+            looking = self._looking
+            self._looking = None
             try:
                 found = looking.result()
-            except Exception as error:  # a cell that can be described, and not drawn, must not end the view
+            except (
+                Exception
+            ) as error:  # a cell that can be described, and not drawn, must not end the view
                 found = {"problem": text(f"the cell can't be drawn: {error!r}")}
             if self._heard.q is None:
                 found["near"] = None
         if self._looking is None and self._now() - self._looked >= LOOK_PERIOD:
             self._looked = self._now()
-            ended, self._ended = tuple(self._ended), []
+            ended = tuple(self._ended)
+            self._ended = []
             self._looking = self._worker.submit(self._view.look, replace(self._heard, ended=ended))
         return found
 
@@ -168,7 +179,8 @@ class LiveNode(Node):
         if state.trajectory_id and state.trajectory_id != self._driven:
             self._driven = state.trajectory_id
             self._fetch(state.trajectory_id)
-        scaling, off = number(state.speed_scaling, 2), number(state.tool_deviation, 5)
+        scaling = number(state.speed_scaling, 2)
+        off = number(state.tool_deviation, 5)
         return {"scaling": scaling, "off": off, "driving": bool(state.trajectory_id)}
 
     def _load(self, messages: Sequence[Any]) -> dict[str, Json]:
@@ -220,10 +232,14 @@ class LiveNode(Node):
 
     def _touched(self, messages: Sequence[Any]) -> dict[str, Json]:
         self._contacts += len(messages)
-        return {"contact": {"number": self._contacts, "words": text(contact_sentence(messages[-1]))}}
+        return {
+            "contact": {"number": self._contacts, "words": text(contact_sentence(messages[-1]))}
+        }
 
     def _fetch(self, trajectory_id: str) -> None:
-        """Asks the planner for the points behind an id that is driven; unanswered, the old path stays."""
+        """Asks the planner for the points behind an id that is driven; unanswered, the old path
+        stays.
+        """
         if not self._get_trajectory.service_is_ready():
             return
         future = self._get_trajectory.call_async(GetTrajectory.Request(trajectory_id=trajectory_id))

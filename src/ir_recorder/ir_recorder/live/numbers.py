@@ -28,8 +28,11 @@ def text(value: object) -> str:
 
 
 def power_values(messages: Sequence[Any]) -> dict[str, Json]:
-    """Readings of the mains meter since the last record: lowest and highest watts, the rest of the last."""
-    last, watts = messages[-1], [float(m.power) for m in messages if math.isfinite(m.power)]
+    """Readings of the mains meter since the last record: lowest and highest watts, the rest of the
+    last.
+    """
+    last = messages[-1]
+    watts = [float(m.power) for m in messages if math.isfinite(m.power)]
     return {
         "w": [number(min(watts), 1), number(max(watts), 1)] if watts else None,
         "energy": number(last.energy, 1),

@@ -8,7 +8,15 @@ from functools import cache
 
 from ir_recorder.report.page import asset
 
-SCRIPTS = ("charts.js", "renderer.js", "motion.js", "export.js", "live_motion.js", "live_panel.js", "live.js")
+SCRIPTS = (
+    "charts.js",
+    "renderer.js",
+    "motion.js",
+    "export.js",
+    "live_motion.js",
+    "live_panel.js",
+    "live.js",
+)
 NONCE = secrets.token_urlsafe(18)
 """Of this process: only the page's own script and style run."""
 

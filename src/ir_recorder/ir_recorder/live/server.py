@@ -1,12 +1,13 @@
-"""The server of the live view: one page, the cell's scene, a stream of events, and requests of its buttons.
+"""The server of the live view: one page, the cell's scene, a stream of events, and requests of its
+buttons.
 
     GET /        the page
     GET /scene   the cell as JSON (404 while it isn't known)
     GET /events  server-sent events: `start` with what is kept, then `records`
     POST /press  {"name": "ab", "value": true}: a bit of the PLC, with the token
 
-It listens on 127.0.0.1 alone. Every connection has a thread that only reads what is kept, so a browser that
-is slow or dead costs its own connection and nothing else.
+It listens on 127.0.0.1 alone. Every connection has a thread that only reads what is kept, so a
+browser that is slow or dead costs its own connection and nothing else.
 """
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ from ir_recorder.live.page import NONCE, live_page
 from ir_recorder.live.stream import Stream
 
 MOST_CONNECTIONS = 32
-"""Browsers and their requests at a time. Each that watches costs a thread that wakes 20 times a second."""
+"""Browsers and their requests at a time. Each that watches costs a thread that wakes 20 times a
+second.
+"""
 PATIENCE = 5.0  # s: for a request to be sent, and for a browser to take what it is sent
 SILENCE = 1.0  # s: then a comment is sent, and a browser that has gone is noticed
 MOST_BODY = 1_000  # bytes of a request
@@ -50,18 +53,22 @@ Press = Callable[[str, bool], Answer]
 class LiveServer:
     """Serves a stream to browsers from a thread of its own until it is closed.
 
-    press: does what a button asks for; scene: the cell as JSON, b"" while it isn't known. LiveError where the
-    port is taken. port 0: a free one.
+    press: does what a button asks for; scene: the cell as JSON, b"" while it isn't known. LiveError
+    where the port is taken. port 0: a free one.
     """
 
-    def __init__(self, stream: Stream, press: Press, scene: Callable[[], bytes], port: int = 0) -> None:
+    def __init__(
+        self, stream: Stream, press: Press, scene: Callable[[], bytes], port: int = 0
+    ) -> None:
         try:
             self._server = _Server((ADDRESS, port), _Handler)
         except (OSError, OverflowError) as error:
             raise LiveError(f"port {port} of {ADDRESS} can't be listened on: {error}") from error
         self.port = int(self._server.server_address[1])
         self._server.guard = self.guard = Guard(self.port)
-        self._server.stream, self._server.press, self._server.scene = stream, press, scene
+        self._server.stream = stream
+        self._server.press = press
+        self._server.scene = scene
         self._stream = stream
         self._thread = threading.Thread(
             target=self._server.serve_forever, args=(0.1,), name="live", daemon=True
@@ -136,8 +143,10 @@ class _Handler(BaseHTTPRequestHandler):
     server: _Server
     timeout = PATIENCE
     protocol_version = "HTTP/1.1"
-    server_version, sys_version = "ir_live", ""
-    error_message_format, error_content_type = "%(message)s\n", "text/plain; charset=utf-8"
+    server_version = "ir_live"
+    sys_version = ""
+    error_message_format = "%(message)s\n"
+    error_content_type = "text/plain; charset=utf-8"
 
     def do_GET(self) -> None:
         if refusal := self.server.guard.refusal(self.headers):  # type: ignore[arg-type]
@@ -154,7 +163,8 @@ class _Handler(BaseHTTPRequestHandler):
             self._say(HTTPStatus.NOT_FOUND, "there is /, /scene and /events")
 
     def do_POST(self) -> None:
-        guard, headers = self.server.guard, self.headers
+        guard = self.server.guard
+        headers = self.headers
         refusal = guard.refusal(headers) or guard.command_refusal(headers)  # type: ignore[arg-type]
         length = headers.get("Content-Length", "")
         if refusal:
@@ -162,7 +172,10 @@ class _Handler(BaseHTTPRequestHandler):
         elif self.path != "/press":
             self._say(HTTPStatus.NOT_FOUND, "there is /press")
         elif not (length.isascii() and length.isdigit() and int(length) <= MOST_BODY):
-            self._say(HTTPStatus.BAD_REQUEST, f"a request has a Content-Length of at most {MOST_BODY} bytes")
+            self._say(
+                HTTPStatus.BAD_REQUEST,
+                f"a request has a Content-Length of at most {MOST_BODY} bytes",
+            )
         elif (command := _command(self.rfile.read(int(length)))) is None:
             self._say(HTTPStatus.BAD_REQUEST, 'a request is {"name": TEXT, "value": true or false}')
         else:
@@ -206,7 +219,10 @@ class _Handler(BaseHTTPRequestHandler):
         self.wfile.write(content)
 
     def _headers(self, kind: str) -> None:
-        own = f"script-src 'nonce-{NONCE}'; style-src 'nonce-{NONCE}'; connect-src 'self'; img-src data:; "
+        own = (
+            f"script-src 'nonce-{NONCE}'; style-src 'nonce-{NONCE}'; connect-src 'self'; "
+            "img-src data:; "
+        )
         closed = "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
         for name, value in (
             ("Content-Type", kind),
@@ -231,5 +247,6 @@ def _command(body: bytes) -> tuple[str, bool] | None:
         return None
     if not isinstance(content, dict) or set(content) != {"name", "value"}:
         return None
-    name, value = content["name"], content["value"]
+    name = content["name"]
+    value = content["value"]
     return (name, value) if isinstance(name, str) and isinstance(value, bool) else None

@@ -1,7 +1,7 @@
 """What the nodes said lately, as records that many browsers read, each as fast as it can.
 
-A record holds the time and what has changed since the record before. Nothing waits for a reader: the newest
-records are kept, and who falls behind starts anew with them.
+A record holds the time and what has changed since the record before. Nothing waits for a reader:
+the newest records are kept, and who falls behind starts anew with them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ class Stream:
     """Records of changing values, kept as text; any thread may add and read."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock, self._start = clock, clock()
+        self._clock = clock
+        self._start = clock()
         self._epoch = time.time()
         self._news = threading.Condition()
         self._records: deque[tuple[dict[str, Any], bytes]] = deque()
@@ -40,7 +41,8 @@ class Stream:
     def add(self, values: Mapping[str, Any], always: tuple[str, ...] = ()) -> None:
         """Adds a record with what differs from before, and those named in `always`.
 
-        Values are JSON without NaN. A record that would be the same as before is one of the time alone.
+        Values are JSON without NaN. A record that would be the same as before is one of the time
+        alone.
         """
         changed = {k: v for k, v in values.items() if k in always or self._state.get(k) != v}
         record = {"t": round(self.now(), 3), **changed}
@@ -58,18 +60,26 @@ class Stream:
 
     def _is_too_much(self, now: float) -> bool:
         oldest = self._records[0][0]["t"]
-        return len(self._records) > MOST_KEPT or now - oldest > SECONDS_KEPT or self._bytes > MOST_BYTES
+        return (
+            len(self._records) > MOST_KEPT
+            or now - oldest > SECONDS_KEPT
+            or self._bytes > MOST_BYTES
+        )
 
     def begin(self) -> tuple[bytes, int]:
-        """What a reader needs to begin with, as JSON, and the number of the record that comes next."""
+        """What a reader needs to begin with, as JSON, and the number of the record that comes
+        next.
+        """
         with self._news:
             before = {"t": self._records[0][0]["t"] if self._records else 0.0, **self._before}
-            texts, following = [text for _, text in self._records], self._first + len(self._records)
+            texts = [text for _, text in self._records]
+            following = self._first + len(self._records)
         head = json.dumps({"epoch": self._epoch, "before": before}, allow_nan=False).encode()
         return head[:-1] + b',"records":[' + b",".join(texts) + b"]}", following
 
     def after(self, number: int, timeout: float) -> tuple[list[bytes], int] | None:
-        """Records from `number` on, and the number after them; none of them when nothing came in time.
+        """Records from `number` on, and the number after them; none of them when nothing came in
+        time.
 
         None where they are no longer kept: the reader begins anew.
         """

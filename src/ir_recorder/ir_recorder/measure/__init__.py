@@ -1,4 +1,6 @@
-"""Energy by measurement: motion differentiated, torques, DC link and losses by code of the analysis alone."""
+"""Energy by measurement: motion differentiated, torques, DC link and losses by code of the analysis
+alone.
+"""
 
 from ir_recorder.measure.on_one_grid import planned_samples, samples_of, standing_sample
 from ir_recorder.measure.power_model import PowerModel

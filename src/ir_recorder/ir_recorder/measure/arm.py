@@ -1,8 +1,9 @@
-"""Torques of a moving arm, one rigid body after another: what each of them asks of every joint before it.
+"""Torques of a moving arm, one rigid body after another: what each of them asks of every joint
+before it.
 
-Velocities and accelerations go outwards from the base; the force and moment that a body needs are projected
-onto the axes (Kane's method). Nothing here is shared with planner, driver or kernels: this is what their
-torques are compared with.
+Velocities and accelerations go outwards from the base; the force and moment that a body needs are
+projected onto the axes (Kane's method). Nothing here is shared with planner, driver or kernels:
+this is what their torques are compared with.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ GRAVITY = 9.80665  # m/s^2, standard
 
 @dataclass(frozen=True, eq=False)
 class ArmTorques:
-    """What moves the bodies, each (N, n) Nm at the joints: links, loads, rotors, and the counterbalance,
-    which helps.
+    """What moves the bodies, each (N, n) Nm at the joints: links, loads, rotors, and the
+    counterbalance, which helps.
     """
 
     links: FloatArray
@@ -32,8 +33,8 @@ class ArmTorques:
 
 @dataclass(frozen=True, eq=False)
 class _Frame:
-    """A link: turn (N, 3, 3), place (N, 3), angular speed and acceleration (N, 3), and the acceleration of
-    its origin (N, 3), gravity as an acceleration upwards included.
+    """A link: turn (N, 3, 3), place (N, 3), angular speed and acceleration (N, 3), and the
+    acceleration of its origin (N, 3), gravity as an acceleration upwards included.
     """
 
     turn: FloatArray
@@ -46,11 +47,15 @@ class _Frame:
 def arm_torques(
     robot: RobotModel, loads: Sequence[Load], base_pose: FloatArray, motion: FloatArray
 ) -> ArmTorques:
-    """Torques at motion (3, N, n), which is q, qd, qdd, of the robot with loads at base_pose (4, 4)."""
+    """Torques at motion (3, N, n), which is q, qd, qdd, of the robot with loads at base_pose (4,
+    4).
+    """
     q, qd, qdd = motion
     N, n = q.shape
-    axes, places = np.empty((n, N, 3)), np.empty((n, N, 3))
-    links, held = np.zeros((N, n)), np.zeros((N, n))
+    axes = np.empty((n, N, 3))
+    places = np.empty((n, N, 3))
+    links = np.zeros((N, n))
+    held = np.zeros((N, n))
     frame = _base(N, np.asarray(base_pose))
     for i in range(n):
         frame, axes[i] = _next(frame, robot, i, q[:, i], qd[:, i], qdd[:, i])
@@ -73,7 +78,8 @@ def _next(
     before: _Frame, robot: RobotModel, i: int, q: FloatArray, qd: FloatArray, qdd: FloatArray
 ) -> tuple[_Frame, FloatArray]:
     """The link after joint i, and the joint's axis (N, 3) in the world."""
-    origin, axis = robot.joint_origin[i], robot.joint_axis[i]
+    origin = robot.joint_origin[i]
+    axis = robot.joint_axis[i]
     arm = before.turn @ origin[:3, 3]
     still = before.turn @ origin[:3, :3]
     turn = still @ _turned(axis, q)
@@ -88,7 +94,8 @@ def _turned(axis: FloatArray, angle: FloatArray) -> FloatArray:
     """Turns (N, 3, 3) by angles (N,) about an axis (3,)."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sin, cos = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
+    sin = np.sin(angle)[:, None, None]
+    cos = np.cos(angle)[:, None, None]
     return np.asarray(np.eye(3) + sin * cross + (1.0 - cos) * (cross @ cross))
 
 
@@ -118,14 +125,17 @@ def _project(
 
 
 def spring_torque(robot: RobotModel, q: FloatArray) -> FloatArray:
-    """What the gas spring does about the joints' axes (N, n) Nm: the slope of its energy over the angle.
+    """What the gas spring does about the joints' axes (N, n) Nm: the slope of its energy over the
+    angle.
 
     By the principle of virtual work: force times the change of the rod's length per radian.
     """
-    torque, spring = np.zeros_like(q), robot.counterbalance
+    torque = np.zeros_like(q)
+    spring = robot.counterbalance
     if spring is None:
         return torque
-    eye, pivot = spring.rod_eye, spring.pivot
+    eye = spring.rod_eye
+    pivot = spring.pivot
     angle = q[:, spring.joint]
     x = eye[0] * np.cos(angle) + eye[1] * np.sin(angle)
     z = eye[1] * np.cos(angle) - eye[0] * np.sin(angle)

@@ -1,8 +1,10 @@
-"""The DC link as a tank of joules: a rectifier that only fills, a chopper that takes what is too much.
+"""The DC link as a tank of joules: a rectifier that only fills, a chopper that takes what is too
+much.
 
-The charge above the rectified mains is what the capacitors hold. The chopper switches at two voltages,
-between which a braking robot leaves the charge at random; here it is held in their middle, so that powers
-change steadily with the parameters. With the watts, their derivatives go through the same steps.
+The charge above the rectified mains is what the capacitors hold. The chopper switches at two
+voltages, between which a braking robot leaves the charge at random; here it is held in their
+middle, so that powers change steadily with the parameters. With the watts, their derivatives go
+through the same steps.
 """
 
 from __future__ import annotations
@@ -20,7 +22,9 @@ _SATURATED = 40.0  # beyond, a double is one of the two lines
 
 @dataclass(frozen=True, eq=False)
 class BusFlow:
-    """Watts (N,) that the rectifier gives, their derivatives (N, P), and joules (N,) held after each step."""
+    """Watts (N,) that the rectifier gives, their derivatives (N, P), and joules (N,) held after
+    each step.
+    """
 
     watts: FloatArray
     slopes: FloatArray
@@ -44,17 +48,21 @@ def bus_flow(
     tangents = np.zeros((len(wanted), 0)) if slopes is None else slopes
     if softness > 0.0:
         return _soft_flow(top, wanted, step, tangents, charge, softness)
-    given, given_slopes = np.zeros(len(wanted)), np.zeros_like(tangents)
-    held, held_slope = np.empty(len(wanted)), np.zeros(tangents.shape[1])
+    given = np.zeros(len(wanted))
+    given_slopes = np.zeros_like(tangents)
+    held = np.empty(len(wanted))
+    held_slope = np.zeros(tangents.shape[1])
     free = False  # whether held_slope is anything but zero
     for k, joules in enumerate((wanted * step).tolist()):
         rest = charge - joules
         if rest < 0.0:
-            given[k], charge = -rest / step, 0.0
+            given[k] = -rest / step
+            charge = 0.0
             given_slopes[k] = tangents[k] - held_slope / step if free else tangents[k]
             free = False
         elif rest > top:
-            charge, free = top, False
+            charge = top
+            free = False
         else:
             charge = rest
             held_slope = (held_slope if free else 0.0) - tangents[k] * step
@@ -64,9 +72,15 @@ def bus_flow(
 
 
 def _soft_flow(
-    top: float, wanted: FloatArray, step: float, tangents: FloatArray, charge: float, softness: float
+    top: float,
+    wanted: FloatArray,
+    step: float,
+    tangents: FloatArray,
+    charge: float,
+    softness: float,
 ) -> BusFlow:
-    """The same with switches that conduct more and more: given = S ln(1 + exp(-rest / S)), S the softness.
+    """The same with switches that conduct more and more: given = S ln(1 + exp(-rest / S)), S the
+    softness.
 
     No kink stops a descent, however many samples change from one state of the link to another.
     """
@@ -76,9 +90,12 @@ def _soft_flow(
         filled, filling = _soft(-rest / softness)
         lost, losing = _soft((rest - top) / softness)
         charge = rest + softness * (filled - lost)
-        given[k], held[k] = softness * filled / step, charge
-        conducts[k], passes[k] = filling, 1.0 - filling - losing
-    slope, given_slopes = np.zeros(tangents.shape[1]), np.empty_like(tangents)
+        given[k] = softness * filled / step
+        held[k] = charge
+        conducts[k] = filling
+        passes[k] = 1.0 - filling - losing
+    slope = np.zeros(tangents.shape[1])
+    given_slopes = np.empty_like(tangents)
     for k, passed in enumerate(passes.tolist()):
         given_slopes[k] = slope - tangents[k] * step
         slope = passed * given_slopes[k]

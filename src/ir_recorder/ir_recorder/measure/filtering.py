@@ -1,4 +1,5 @@
-"""Speed and acceleration from positions alone: local polynomials (Savitzky and Golay, 1964), zero phase.
+"""Speed and acceleration from positions alone: local polynomials (Savitzky and Golay, 1964), zero
+phase.
 
 On a uniform grid a polynomial of degree 4 is fitted to the neighbours of each sample; its value and
 derivatives in the middle are one convolution each. Half the signal passes at the stated bandwidth
@@ -18,12 +19,16 @@ _DEGREE = 4
 
 
 def half_width(rate: float, bandwidth: float = BANDWIDTH) -> int:
-    """Neighbours on each side for a cut-off of `bandwidth` [Hz] (3 dB) at `rate` [Hz]; at least 3."""
+    """Neighbours on each side for a cut-off of `bandwidth` [Hz] (3 dB) at `rate` [Hz]; at least
+    3.
+    """
     return max(3, math.ceil(((_DEGREE + 1) * rate / (2.0 * bandwidth) + 4.6) / 3.2))
 
 
 def kernels(width: int, step: float) -> FloatArray:
-    """Weights (3, 2 width + 1) of the neighbours for value, first and second derivative at step [s]."""
+    """Weights (3, 2 width + 1) of the neighbours for value, first and second derivative at step
+    [s].
+    """
     places = np.arange(-width, width + 1) * step
     scale = width * step  # keeps the powers within 1
     powers = np.vander(places / scale, _DEGREE + 1, increasing=True)

@@ -1,4 +1,6 @@
-"""Traces of joints and meter become samples on one grid, with speed and acceleration from positions alone."""
+"""Traces of joints and meter become samples on one grid, with speed and acceleration from positions
+alone.
+"""
 
 from __future__ import annotations
 
@@ -33,25 +35,31 @@ def samples_of(
     loads: LoadRuns,
     step: float = STEP,
 ) -> Samples:
-    """Samples over the time of both traces. `modes`: names in their order; without a column of modes the
-    motors count as on. FitError where there is nothing to sample.
+    """Samples over the time of both traces. `modes`: names in their order; without a column of
+    modes the motors count as on. FitError where there is nothing to sample.
     """
     positions = joints.joints(joint_names)
     if positions is None:
-        raise FitError(f"{joints.source}: there is no column {joint_names[0]}: positions are needed")
-    first, last = joints.time[0], joints.time[-1]
+        raise FitError(
+            f"{joints.source}: there is no column {joint_names[0]}: positions are needed"
+        )
+    first = joints.time[0]
+    last = joints.time[-1]
     if meter is not None:
-        first, last = max(first, meter.time[0]), min(last, meter.time[-1])
+        first = max(first, meter.time[0])
+        last = min(last, meter.time[-1])
     count = int((last - first) / step)
     if not 2 <= count <= MOST_SAMPLES:
         raise FitError(
-            f"{joints.source}: {max(last - first, 0.0):g} s of positions and power together, must be "
-            f"{2 * step:g} to {MOST_SAMPLES * step:g} s"
+            f"{joints.source}: {max(last - first, 0.0):g} s of positions and power together, "
+            f"must be {2 * step:g} to {MOST_SAMPLES * step:g} s"
         )
     edges = first + step * np.arange(count + 1)
     middles = 0.5 * (edges[1:] + edges[:-1])
     q, qd, qdd = _motion(joints, positions, middles)
-    mode, motors = _modes(meter if meter is not None and MODE in meter.texts else joints, modes, middles)
+    mode, motors = _modes(
+        meter if meter is not None and MODE in meter.texts else joints, modes, middles
+    )
     held, load = _loads(loads, middles)
     energy = None if meter is None else meter.joules()
     watts = np.full(count, np.nan)
@@ -65,22 +73,29 @@ def samples_of(
 def planned_samples(
     trajectory: JointTrajectory, loads: Sequence[Load], modes: Sequence[str], step: float = STEP
 ) -> Samples:
-    """What a trajectory asks for with motors on, without a meter; the last step may reach beyond its end."""
+    """What a trajectory asks for with motors on, without a meter; the last step may reach beyond
+    its end.
+    """
     count = max(int(np.ceil((trajectory.duration - trajectory.times[0]) / step - 1e-9)), 1)
     step = float((trajectory.duration - trajectory.times[0]) / count)
     middles = trajectory.times[0] + (np.arange(count) + 0.5) * step
     at = trajectory.sample(middles)
     held, load = one_load(loads, count)
     mode = np.full(count, list(modes).index(_MOTORS))
-    on, none = np.ones(count, bool), np.full(count, np.nan)
+    on = np.ones(count, bool)
+    none = np.full(count, np.nan)
     return Samples(step, middles, at.q, at.qd, at.qdd, mode, load, on, none, held)
 
 
 def standing_sample(q: FloatArray, loads: Sequence[Load], modes: Sequence[str]) -> Samples:
     """One second of standing at q (n,) on motors, without a meter."""
-    still, (held, load) = np.zeros((1, len(q))), one_load(loads, 1)
-    mode, on = np.full(1, list(modes).index(_MOTORS)), np.ones(1, bool)
-    return Samples(1.0, np.full(1, 0.5), q[None], still, still, mode, load, on, np.full(1, np.nan), held)
+    still = np.zeros((1, len(q)))
+    (held, load) = one_load(loads, 1)
+    mode = np.full(1, list(modes).index(_MOTORS))
+    on = np.ones(1, bool)
+    return Samples(
+        1.0, np.full(1, 0.5), q[None], still, still, mode, load, on, np.full(1, np.nan), held
+    )
 
 
 def _motion(joints: Trace, positions: FloatArray, middles: FloatArray) -> FloatArray:
@@ -88,13 +103,17 @@ def _motion(joints: Trace, positions: FloatArray, middles: FloatArray) -> FloatA
     step = max(joints.period, _FASTEST)
     grid = np.arange(joints.time[0], joints.time[-1], step)
     if len(grid) > 5 * MOST_SAMPLES:
-        raise FitError(f"{joints.source}: {len(grid)} positions, at most {5 * MOST_SAMPLES} are used")
+        raise FitError(
+            f"{joints.source}: {len(grid)} positions, at most {5 * MOST_SAMPLES} are used"
+        )
     found = resampled(joints.time, positions, grid, GAP_FACTOR * joints.period)
     lost = np.asarray(~np.isfinite(found).all(axis=1))
     held = _held(found, lost)
     moved = differentiated(held, step)
     unknown = _wide(lost & ~_at_rest(held, lost), half_width(1.0 / step))
-    at = np.stack([np.column_stack([np.interp(middles, grid, c) for c in each.T]) for each in moved])
+    at = np.stack(
+        [np.column_stack([np.interp(middles, grid, c) for c in each.T]) for each in moved]
+    )
     at[:, np.interp(middles, grid, unknown.astype(float)) > 0.0] = np.nan
     return np.asarray(at)
 
@@ -108,7 +127,9 @@ def _held(values: FloatArray, lost: BoolArray) -> FloatArray:
 
 
 def _at_rest(held: FloatArray, lost: BoolArray) -> BoolArray:
-    """Rows of gaps behind which the robot is where it was: it did not move (hibernation has no states)."""
+    """Rows of gaps behind which the robot is where it was: it did not move (hibernation has no
+    states).
+    """
     still = np.zeros(len(lost), bool)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], lost, [False]]).astype(int)))
     for first, behind in edges.reshape(-1, 2).tolist():
@@ -123,16 +144,24 @@ def _wide(rows: BoolArray, width: int) -> BoolArray:
 
 
 def _modes(trace: Trace, modes: Sequence[str], middles: FloatArray) -> tuple[IntArray, BoolArray]:
-    """Places of the modes (M,), and whether the motors are on; UNKNOWN between readings that differ."""
+    """Places of the modes (M,), and whether the motors are on; UNKNOWN between readings that
+    differ.
+    """
     words = trace.texts.get(MODE)
     if words is None:
         on = np.full(len(middles), list(modes).index(_MOTORS))
         return on, np.ones(len(middles), bool)
-    places = {name: k for k, name in enumerate(modes)} | {Mode.MOVING.name: list(modes).index(_MOTORS)}
+    places = {name: k for k, name in enumerate(modes)} | {
+        Mode.MOVING.name: list(modes).index(_MOTORS)
+    }
     known = {*places, *REST_MODES, *(mode.name for mode in Mode)}
-    strange = next((word for word in words if word not in known and not word.startswith("mode ")), "")
+    strange = next(
+        (word for word in words if word not in known and not word.startswith("mode ")), ""
+    )
     if strange:
-        raise FitError(f"{trace.source}: mode {strange[:40]!r} is unknown, known are {', '.join(modes)}")
+        raise FitError(
+            f"{trace.source}: mode {strange[:40]!r} is unknown, known are {', '.join(modes)}"
+        )
     number = np.array([places.get(word, UNKNOWN) for word in words])
     after = np.clip(np.searchsorted(trace.time, middles), 1, len(number) - 1)
     mode = np.where(number[after] == number[after - 1], number[after], UNKNOWN)

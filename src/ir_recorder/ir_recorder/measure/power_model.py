@@ -1,9 +1,9 @@
 """Watts at the mains that motion asks for, and how they change with every power parameter.
 
-Per axis: torque times speed, copper loss of the motor torque squared, inverter loss of its magnitude, iron
-loss of the speed squared; friction viscous, Coulomb, and a share of the torque through the gear. The axes
-share the DC link, which feeds idle inverters too; the rectifier's efficiency and the standing watts come on
-top.
+Per axis: torque times speed, copper loss of the motor torque squared, inverter loss of its
+magnitude, iron loss of the speed squared; friction viscous, Coulomb, and a share of the torque
+through the gear. The axes share the DC link, which feeds idle inverters too; the rectifier's
+efficiency and the standing watts come on top.
 """
 
 from __future__ import annotations
@@ -27,7 +27,9 @@ _BUS_UP = ("STAND_ON_MOTORS", "STAND_ON_BRAKES")  # modes in which the drive bus
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """Samples with the torques of their bodies; tool_watts (M,) W of the tool by its declaration."""
+    """Samples with the torques of their bodies; tool_watts (M,) W of the tool by its
+    declaration.
+    """
 
     samples: Samples
     torques: ArmTorques
@@ -35,8 +37,8 @@ class Prepared:
 
 
 class PowerModel:
-    """Watts of one robot; `layout` names the parameters, the vectors of which the methods take; `bodies`
-    computes torques at motion (3, N, n) as `arm_torques` does.
+    """Watts of one robot; `layout` names the parameters, the vectors of which the methods take;
+    `bodies` computes torques at motion (3, N, n) as `arm_torques` does.
     """
 
     def __init__(
@@ -49,22 +51,32 @@ class PowerModel:
     ) -> None:
         if layout.robot != robot.name or layout.joints != robot.joint_names:
             raise FitError(f"power parameters are of {layout.robot}, the robot is {robot.name}")
-        self._robot, self._link, self._pose, self.layout = robot, link, base_pose, layout
+        self._robot = robot
+        self._link = link
+        self._pose = base_pose
+        self.layout = layout
         self._bodies = bodies
         self._ratio = np.array(robot.gear_ratio)
 
     def prepare(self, samples: Samples) -> Prepared:
-        """Torques of the bodies at every sample; where the motion is unknown the robot counts as at rest."""
+        """Torques of the bodies at every sample; where the motion is unknown the robot counts as at
+        rest.
+        """
         known = samples.known[:, None]
         motion = np.where(known, [samples.q, samples.qd, samples.qdd], 0.0)
         motion[0] = np.where(known, samples.q, self._robot.machine_home)
         parts = [np.zeros((len(samples), self._robot.n)) for _ in range(4)]
         watts = np.zeros(len(samples))
-        bus_up = np.isin(samples.mode, [k for k, mode in enumerate(self.layout.modes) if mode in _BUS_UP])
+        bus_up = np.isin(
+            samples.mode, [k for k, mode in enumerate(self.layout.modes) if mode in _BUS_UP]
+        )
         for k in np.unique(samples.load):
-            rows, loads = samples.load == k, samples.loads[k] if k >= 0 else ()
+            rows = samples.load == k
+            loads = samples.loads[k] if k >= 0 else ()
             own = self._bodies(self._robot, loads, self._pose, motion[:, rows])
-            for part, each in zip(parts, (own.links, own.loads, own.rotors, own.counterbalance), strict=True):
+            for part, each in zip(
+                parts, (own.links, own.loads, own.rotors, own.counterbalance), strict=True
+            ):
                 part[rows] = each
             watts[rows] = sum(load.watts_always for load in loads)
             watts[rows & bus_up] += sum(load.watts_drive_bus for load in loads)
@@ -103,13 +115,16 @@ class PowerModel:
         watts += self._one(mean, "drives_watts") * samples.motors
         return np.asarray(watts + self._one(mean, "tool_watts") * prepared.tool_watts)
 
-    def _wanted(self, mean: FloatArray, prepared: Prepared, slopes: FloatArray | None) -> FloatArray:
+    def _wanted(
+        self, mean: FloatArray, prepared: Prepared, slopes: FloatArray | None
+    ) -> FloatArray:
         """W (M,) that the axes together take from the link; fills `slopes` (M, P) where given."""
         of = self.layout.places
         viscous, coulomb, copper, iron, inverter, gear = (
             mean[of(term)] for term in ("viscous", "coulomb", "copper", "iron", "inverter", "gear")
         )
-        arm, qd = prepared.torques, np.where(prepared.samples.known[:, None], prepared.samples.qd, 0.0)
+        arm = prepared.torques
+        qd = np.where(prepared.samples.known[:, None], prepared.samples.qd, 0.0)
         on = prepared.samples.motors[:, None]
         through = (
             self._one(mean, "link_mass") * arm.links

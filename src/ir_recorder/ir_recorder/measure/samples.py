@@ -1,4 +1,6 @@
-"""What a robot did, sample by sample on one grid: motion, mode, load and, where there is a meter, watts."""
+"""What a robot did, sample by sample on one grid: motion, mode, load and, where there is a meter,
+watts.
+"""
 
 from __future__ import annotations
 
@@ -18,9 +20,10 @@ MOVING = 0.002  # rad/s: less than the slowest planned motion, more than the noi
 class Samples:
     """M samples of `step` [s]; each value belongs to the whole step.
 
-    time (M,) s: middles of the steps. q, qd, qdd (M, n). mode (M,): place in the names of modes, UNKNOWN in
-    transitions and where nobody knows; load (M,): place in `loads`, UNKNOWN as well. watts (M,): mean at the
-    mains, NaN where it wasn't measured. motors (M,): whether the drives are on.
+    time (M,) s: middles of the steps. q, qd, qdd (M, n). mode (M,): place in the names of modes,
+    UNKNOWN in transitions and where nobody knows; load (M,): place in `loads`, UNKNOWN as well.
+    watts (M,): mean at the mains, NaN where it wasn't measured. motors (M,): whether the drives are
+    on.
     """
 
     step: float
@@ -37,7 +40,9 @@ class Samples:
     @property
     def known(self) -> BoolArray:
         """Samples (M,) in which motion, mode and load are known."""
-        return np.asarray(np.isfinite(self.q).all(axis=1) & (self.mode != UNKNOWN) & (self.load != UNKNOWN))
+        return np.asarray(
+            np.isfinite(self.q).all(axis=1) & (self.mode != UNKNOWN) & (self.load != UNKNOWN)
+        )
 
     @property
     def moving(self) -> BoolArray:
@@ -58,9 +63,11 @@ class Samples:
         return replace(self, **arrays)
 
 
-def movements(samples: Samples, shortest: float = 0.3, pause: float = 0.2) -> tuple[tuple[int, int], ...]:
-    """Rows (first, behind the last) of stretches in which the robot moves for at least `shortest` [s]; a stop
-    of less than `pause` [s] belongs to the movement.
+def movements(
+    samples: Samples, shortest: float = 0.3, pause: float = 0.2
+) -> tuple[tuple[int, int], ...]:
+    """Rows (first, behind the last) of stretches in which the robot moves for at least `shortest`
+    [s]; a stop of less than `pause` [s] belongs to the movement.
     """
     moving = samples.moving & samples.known
     edges = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]]).astype(int)))

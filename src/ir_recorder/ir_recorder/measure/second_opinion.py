@@ -20,11 +20,14 @@ def available() -> bool:
 def pinocchio_torques(
     robot: RobotModel, loads: Sequence[Load], base_pose: FloatArray, motion: FloatArray
 ) -> ArmTorques:
-    """The same as `arm_torques` at motion (3, N, n); what the loads ask for counts among the links."""
+    """The same as `arm_torques` at motion (3, N, n); what the loads ask for counts among the
+    links.
+    """
     import pinocchio
 
     q, _, qdd = motion
-    model, parent = pinocchio.Model(), 0
+    model = pinocchio.Model()
+    parent = 0
     model.gravity.linear = np.asarray(base_pose)[:3, :3].T @ [0.0, 0.0, -GRAVITY]
     for i, (origin, axis) in enumerate(zip(robot.joint_origin, robot.joint_axis, strict=True)):
         place = pinocchio.SE3(origin[:3, :3].copy(), origin[:3, 3].copy())
@@ -38,4 +41,6 @@ def pinocchio_torques(
     data = model.createData()
     rows = [pinocchio.rnea(model, data, *row).copy() for row in motion.transpose(1, 0, 2)]
     torque = np.array(rows).reshape(q.shape)
-    return ArmTorques(torque, np.zeros_like(q), qdd * robot.reflected_inertia, spring_torque(robot, q))
+    return ArmTorques(
+        torque, np.zeros_like(q), qdd * robot.reflected_inertia, spring_torque(robot, q)
+    )

@@ -1,4 +1,6 @@
-"""Topics that move a robot or a machine: playback leaves them out unless one is asked for by name."""
+"""Topics that move a robot or a machine: playback leaves them out unless one is asked for by
+name.
+"""
 
 from __future__ import annotations
 
@@ -15,11 +17,17 @@ TYPES = (  # commands of any controller, whatever their topic is called
     "ir_msgs/msg/PlcInputs",
     "ir_msgs/msg/Signal",
 )
-SHOWN = (names.PLANNED_TRAJECTORY, names.PLC_INPUTS_IN_FORCE, names.MACHINE_SIGNALS)  # nodes only report here
+SHOWN = (
+    names.PLANNED_TRAJECTORY,
+    names.PLC_INPUTS_IN_FORCE,
+    names.MACHINE_SIGNALS,
+)  # nodes only report here
 
 
 def is_command(topic: str, type_name: str = "") -> bool:
-    """Whether messages of this topic may move something, by its name in any namespace or by its type."""
+    """Whether messages of this topic may move something, by its name in any namespace or by its
+    type.
+    """
     if any(_ends(topic, name) for name in COMMANDS):
         return True
     return type_name in TYPES and not any(_ends(topic, name) for name in SHOWN)

@@ -13,10 +13,14 @@ from contextlib import contextmanager
 
 from ir_recorder.play.playhead import Playhead
 
-HELP = "space: pause; left, right: 5 s back and on; up, down: twice and half the rate; 0: from the start"
+HELP = (
+    "space: pause; left, right: 5 s back and on; up, down: twice and half the rate; 0: from "
+    "the start"
+)
 _STEP = 5.0  # s of the recording
 _PATIENCE = 0.1  # s between two looks whether playback has ended
-_SLOWEST, _FASTEST = 0.001, 1000.0
+_SLOWEST = 0.001
+_FASTEST = 1000.0
 
 
 def press(key: bytes, head: Playhead) -> None:
@@ -40,7 +44,8 @@ def keys_of_terminal(pressed: Callable[[bytes], None]) -> Iterator[bool]:
     if not sys.stdin.isatty():
         yield False
         return
-    terminal, ended = sys.stdin.fileno(), threading.Event()
+    terminal = sys.stdin.fileno()
+    ended = threading.Event()
     before = termios.tcgetattr(terminal)
 
     def read() -> None:

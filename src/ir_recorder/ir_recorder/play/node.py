@@ -1,7 +1,8 @@
 """`ir-play`: publishes a recording's messages again, byte by byte, with their timing.
 
-The qualities of service are those that were offered; what was latched is latched again. Topics that command
-a robot or a machine are left out unless asked for by their full name, and then not beside a driver.
+The qualities of service are those that were offered; what was latched is latched again. Topics that
+command a robot or a machine are left out unless asked for by their full name, and then not beside a
+driver.
 """
 
 from __future__ import annotations
@@ -56,7 +57,8 @@ class PlayNode(Node):
     ) -> None:
         super().__init__(names.PLAY, **options)
         self._settings = settings
-        self._stop, self._wake = threading.Event(), threading.Event()
+        self._stop = threading.Event()
+        self._wake = threading.Event()
         self._latched: set[str] = set()
         self._feeds: dict[str, Publisher] = {}
         self._ticks = self.create_publisher(Clock, "/clock", 10) if clock else None
@@ -106,8 +108,10 @@ class PlayNode(Node):
             self.head.control(request.pause, request.rate, request.seek)
             self._wake.set()
             state = self.head.state
-            response.paused, response.rate = state.paused, state.rate
-            response.position, response.duration = state.position, state.duration
+            response.paused = state.paused
+            response.rate = state.rate
+            response.position = state.position
+            response.duration = state.duration
             return Status.success()
 
         return answered(response, self.get_name(), control, _known, self.get_logger().error)
@@ -124,21 +128,29 @@ class PlayNode(Node):
             return
         if not self._settings.plays(channel.topic, channel.type):
             if is_command(channel.topic, channel.type):
-                self.get_logger().info(f"{channel.topic[:200]} is a command: it is played only by its name")
+                self.get_logger().info(
+                    f"{channel.topic[:200]} is a command: it is played only by its name"
+                )
             return
         self._open(channel.topic, channel.type, channel.qos)
         if channel.topic in self._feeds:
             times = channel.log_time.tolist()
-            self._messages += zip(times, [channel.topic] * len(times), channel.messages, strict=True)
+            self._messages += zip(
+                times, [channel.topic] * len(times), channel.messages, strict=True
+            )
 
     def _open(self, topic: str, type_name: str, qos: str) -> None:
         if topic in self._feeds:
             return
         try:
-            self._schemas.schema(type_name)  # an installed type: a name from a file imports nothing else
+            self._schemas.schema(
+                type_name
+            )  # an installed type: a name from a file imports nothing else
             message_type = interface_type(type_name, "msg")
         except (SchemaError, UnknownTypeError):
-            self.get_logger().warning(f"{topic[:200]} isn't played: type {type_name[:200]} isn't installed")
+            self.get_logger().warning(
+                f"{topic[:200]} isn't played: type {type_name[:200]} isn't installed"
+            )
             return
         offers = offers_from_yaml(qos)
         reliable = all(offer.reliable for offer in offers)
@@ -168,17 +180,22 @@ class PlayNode(Node):
         self.published = player.play(self._messages, self._settings)
 
     def _refused(self) -> bool:
-        """Whether playback ends because a driver would follow its commands; looks every LOOK_PERIOD."""
+        """Whether playback ends because a driver would follow its commands; looks every
+        LOOK_PERIOD.
+        """
         now = time.monotonic()
         if not self._commands or now < self._next_look:
             return bool(self.failure)
         self._next_look = now + LOOK_PERIOD
         followers = {
-            end.node_name for topic in self._commands for end in self.get_subscriptions_info_by_topic(topic)
+            end.node_name
+            for topic in self._commands
+            for end in self.get_subscriptions_info_by_topic(topic)
         }
         followers |= {name for name in self.get_node_names() if name == names.SIM_DRIVER}
         if followers:
-            who, what = ", ".join(sorted(followers)), ", ".join(self._commands)
+            who = ", ".join(sorted(followers))
+            what = ", ".join(self._commands)
             self.failure = f"{what} would command {who}: a recording is not played to a live robot"
             self._stop.set()
         return bool(self.failure)

@@ -17,9 +17,10 @@ _PAUSED = 1.0  # s between two looks while nothing is due
 class Player:
     """Hands messages to `publish` when they are due.
 
-    now() [s] is a clock that never jumps; wait(seconds) returns True when playback shall end, and may return
-    early. tick(recorded_ns) is called at least every `tick_period` seconds of waiting, for /clock. head: by
-    which others control it. latched: topics whose last message is published again after a seek.
+    now() [s] is a clock that never jumps; wait(seconds) returns True when playback shall end, and
+    may return early. tick(recorded_ns) is called at least every `tick_period` seconds of waiting,
+    for /clock. head: by which others control it. latched: topics whose last message is published
+    again after a seek.
     """
 
     def __init__(
@@ -32,9 +33,14 @@ class Player:
         head: Playhead | None = None,
         latched: Collection[str] = (),
     ) -> None:
-        self._now, self._wait, self._publish = now, wait, publish
-        self._tick, self._period, self._next_tick = tick, tick_period, -math.inf
-        self._head, self._latched = head, latched
+        self._now = now
+        self._wait = wait
+        self._publish = publish
+        self._tick = tick
+        self._period = tick_period
+        self._next_tick = -math.inf
+        self._head = head
+        self._latched = latched
 
     def play(self, messages: Sequence[tuple[int, str, bytes]], settings: PlaySettings) -> int:
         """Plays to the end, or for ever where `loop`; returns how many messages were published."""
@@ -43,7 +49,9 @@ class Player:
             return 0
         head = self._head or Playhead(self._now, ordered[-1].at, settings.rate)
         head.begin()
-        count, index, jumps = 0, 0, 0
+        count = 0
+        index = 0
+        jumps = 0
         while True:
             if jumps != head.jumps:
                 jumps = head.jumps
@@ -53,18 +61,23 @@ class Player:
                 if not settings.loop:
                     return count
                 head.control(pause=False, seek=0.0)
-                index, jumps = 0, head.jumps
+                index = 0
+                jumps = head.jumps
             due = self._until(ordered[index], ordered[0].recorded_ns, head, jumps)
             if due is None:
                 return count
             if due:
                 self._publish(ordered[index])
-                index, count = index + 1, count + 1
+                index = index + 1
+                count = count + 1
 
     def _until(self, message: DueMessage, start_ns: int, head: Playhead, jumps: int) -> bool | None:
-        """Waits until the message is due: True; False after a seek, None when playback shall end."""
+        """Waits until the message is due: True; False after a seek, None when playback shall
+        end.
+        """
         while jumps == head.jumps:
-            now, left = self._now(), head.left(message.at)
+            now = self._now()
+            left = head.left(message.at)
             if self._tick is not None and now >= self._next_tick:
                 self._tick(start_ns + round(min(head.state.position, message.at) * 1e9))
                 self._next_tick = now + self._period

@@ -12,7 +12,8 @@ from ir_recorder.play.commands import is_command
 
 @dataclass(frozen=True)
 class PlaySettings:
-    """How to play: rate (2 = twice as fast), loop, names or patterns of topics (empty: all visible ones).
+    """How to play: rate (2 = twice as fast), loop, names or patterns of topics (empty: all visible
+    ones).
 
     Topics that command a robot or a machine are played only by their full name.
     """
@@ -26,7 +27,9 @@ class PlaySettings:
         checked_rate(self.rate)
 
     def plays(self, topic: str, type_name: str = "") -> bool:
-        """Whether a topic is played; hidden ones and commands only by name, commands by the full one."""
+        """Whether a topic is played; hidden ones and commands only by name, commands by the full
+        one.
+        """
         if is_command(topic, type_name):
             return topic in self.topics
         if self.topics:
@@ -44,7 +47,9 @@ class DueMessage:
     data: bytes
 
 
-def schedule(messages: Sequence[tuple[int, str, bytes]], settings: PlaySettings) -> Iterator[DueMessage]:
+def schedule(
+    messages: Sequence[tuple[int, str, bytes]], settings: PlaySettings
+) -> Iterator[DueMessage]:
     """One pass over messages (log time [ns], topic, data) in the order of time."""
     ordered = sorted((m for m in messages if settings.plays(m[1])), key=lambda message: message[0])
     if not ordered:

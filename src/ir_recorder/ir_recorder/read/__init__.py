@@ -1,4 +1,6 @@
-"""Recordings read without ROS: raw channels, columns of CDR messages, typed series on one time axis."""
+"""Recordings read without ROS: raw channels, columns of CDR messages, typed series on one time
+axis.
+"""
 
 from ir_recorder.read.cdr import Columns
 from ir_recorder.read.raw import RawChannel, RawRecording, read_raw

@@ -12,7 +12,9 @@ from ir_recorder.read.recording import TextEvent
 def machine_states(messages: Iterable[tuple[float, Any]]) -> Iterator[TextEvent]:
     """The state of each machine; "closed>open" while it changes."""
     for time, message in messages:
-        for name, state, ahead in zip(message.equipment, message.states, message.next, strict=False):
+        for name, state, ahead in zip(
+            message.equipment, message.states, message.next, strict=False
+        ):
             yield TextEvent(time, str(name), f"{state}>{ahead}" if ahead else str(state))
 
 

@@ -1,9 +1,9 @@
 """Columns out of many CDR messages of one type at once, without ROS.
 
-A topic at 500 Hz has messages of one layout: the offsets are found by walking the first one, then every
-field of all messages is one strided view. Messages of another layout (a longer text, an empty array) form
-their own group. Source: OMG CDR (XCDR1, little endian), alignment counted after the four bytes of the
-encapsulation header.
+A topic at 500 Hz has messages of one layout: the offsets are found by walking the first one, then
+every field of all messages is one strided view. Messages of another layout (a longer text, an empty
+array) form their own group. Source: OMG CDR (XCDR1, little endian), alignment counted after the
+four bytes of the encapsulation header.
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ from ir_recorder.errors import ReadError
 from ir_recorder.format.definition import TEXTS, Field, definitions_of, short_name
 
 _DTYPES = {"bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1"} | {
-    f"{kind}{bits}": f"<{kind[0]}{bits // 8}" for kind in ("int", "uint", "float") for bits in (16, 32, 64)
+    f"{kind}{bits}": f"<{kind[0]}{bits // 8}"
+    for kind in ("int", "uint", "float")
+    for bits in (16, 32, 64)
 }
 _HEADER = 4  # bytes: encapsulation kind and options
 _LITTLE_ENDIAN = 1  # kind CDR_LE
@@ -54,9 +56,9 @@ class Columns:
         sizes = np.array([len(message) for message in messages], dtype=np.int64)
         for size in np.unique(sizes):
             open_rows = np.flatnonzero(sizes == size)
-            block = np.frombuffer(b"".join(messages[int(i)] for i in open_rows), dtype=np.uint8).reshape(
-                -1, size
-            )
+            block = np.frombuffer(
+                b"".join(messages[int(i)] for i in open_rows), dtype=np.uint8
+            ).reshape(-1, size)
             while len(open_rows):
                 if len(self._groups) == MOST_LAYOUTS:
                     raise ReadError(f"its messages have more than {MOST_LAYOUTS} different layouts")
@@ -64,7 +66,8 @@ class Columns:
                 words = [o + k for o in layout.lengths for k in range(4)]
                 same = (block[:, words] == block[0, words]).all(axis=1)
                 self._groups.append((open_rows[same], block[same], layout))
-                open_rows, block = open_rows[~same], block[~same]
+                open_rows = open_rows[~same]
+                block = block[~same]
 
     def numbers(self, path: str, width: int | None = None) -> FloatArray:
         """A numeric field as (N,), or (N, width) for an array; missing values are NaN."""
@@ -130,7 +133,8 @@ class _Walker:
     def __init__(self, data: bytes, definitions: dict[str, tuple[Field, ...]]) -> None:
         if len(data) < _HEADER or data[1] != _LITTLE_ENDIAN:
             raise ReadError("a message isn't little-endian CDR")
-        self._data, self._definitions = data, definitions
+        self._data = data
+        self._definitions = definitions
         self._at = _HEADER
         self.leaves: dict[str, _Leaf] = {}
         self.lengths: list[int] = []

@@ -11,7 +11,9 @@ _SHOWN = 8  # namespaces in a sentence
 
 
 def namespaces_of(raw: RawRecording) -> list[str]:
-    """Namespaces of the cells: what stands before the mains meter's topic, else before /joint_states."""
+    """Namespaces of the cells: what stands before the mains meter's topic, else before
+    /joint_states.
+    """
     for name in (names.POWER_STATE, names.JOINT_STATES):
         topics = [channel.topic for channel in raw.channels if channel.topic.endswith(f"/{name}")]
         if topics:
@@ -20,11 +22,15 @@ def namespaces_of(raw: RawRecording) -> list[str]:
 
 
 def chosen_namespace(raw: RawRecording, wanted: str | None) -> tuple[str, str]:
-    """The namespace to read, and a sentence where the file holds others too; ReadError for one it lacks."""
+    """The namespace to read, and a sentence where the file holds others too; ReadError for one it
+    lacks.
+    """
     found = namespaces_of(raw)
     shown = one_line(", ".join(found[:_SHOWN]) or "none", 400)
     if wanted is None:
-        sentence = f"the first of the recording's cells is read ({shown}); --namespace chooses another"
+        sentence = (
+            f"the first of the recording's cells is read ({shown}); --namespace chooses another"
+        )
         return (found[0] if found else "/"), (sentence if len(found) > 1 else "")
     absolute = f"/{wanted.strip('/')}"
     if absolute not in found:

@@ -23,9 +23,10 @@ _OVERHEAD = 120  # bytes of memory that a message takes beside its own
 class ReadLimits:
     """Most bytes of memory for one chunk and for a whole recording.
 
-    chunk: writers close chunks at 0.25 to 4 MB, a single large message may exceed that. total: five hours
-    of a cell. free, ratio: beyond `free` bytes a recording may be `ratio` times as large as in its file, as
-    time to decompress is spent on what a file holds; a robot that rests all day compresses to a fiftieth.
+    chunk: writers close chunks at 0.25 to 4 MB, a single large message may exceed that. total: five
+    hours of a cell. free, ratio: beyond `free` bytes a recording may be `ratio` times as large as
+    in its file, as time to decompress is spent on what a file holds; a robot that rests all day
+    compresses to a fiftieth.
     """
 
     chunk: int = 64 * 2**20
@@ -44,14 +45,17 @@ class ChunkReader:
     def records(self, chunk: Chunk) -> list[McapRecord]:
         """What is in the chunk; its check sum is compared."""
         if chunk.uncompressed_size > self._limits.chunk:
-            claimed, most = _mib(chunk.uncompressed_size), _mib(self._limits.chunk)
+            claimed = _mib(chunk.uncompressed_size)
+            most = _mib(self._limits.chunk)
             raise ReadError(f"it claims {claimed} uncompressed, at most {most} are read")
         self._given += len(chunk.data)
         self._claimed += chunk.uncompressed_size
-        free, times = self._limits.free, self._limits.ratio
+        free = self._limits.free
+        times = self._limits.ratio
         if self._claimed > free + times * self._given:
             raise TooLargeError(
-                f"{_mib(self._claimed)} uncompressed from {_mib(self._given)}: at most {_mib(free)} and "
+                f"{_mib(self._claimed)} uncompressed from {_mib(self._given)}: at most "
+                f"{_mib(free)} and "
                 f"{times} times as much as compressed are read, the rest is left out"
             )
         data = _decompressed(chunk)
@@ -65,7 +69,9 @@ class ChunkReader:
         """Adds to the memory in use."""
         self._used += size
         if self._used > self._limits.total:
-            raise TooLargeError(f"more than {_mib(self._limits.total)} uncompressed: the rest is left out")
+            raise TooLargeError(
+                f"more than {_mib(self._limits.total)} uncompressed: the rest is left out"
+            )
 
 
 class TooLargeError(ReadError):
@@ -86,7 +92,9 @@ def _decompressed(chunk: Chunk) -> bytes:
     """The chunk's bytes, never more than it claims and one."""
     wanted = chunk.uncompressed_size
     if chunk.compression == "zstd":
-        data = _read_at_most(zstandard.ZstdDecompressor().stream_reader(chunk.data).read, wanted + 1)
+        data = _read_at_most(
+            zstandard.ZstdDecompressor().stream_reader(chunk.data).read, wanted + 1
+        )
     elif chunk.compression == "lz4":
         with lz4.frame.open(BytesIO(chunk.data)) as stream:
             data = _read_at_most(stream.read, wanted + 1)
@@ -100,7 +108,8 @@ def _decompressed(chunk: Chunk) -> bytes:
 
 
 def _read_at_most(read: Callable[[int], bytes], most: int) -> bytes:
-    parts, size = [], 0
+    parts = []
+    size = 0
     while size < most and (part := read(min(_STEP, most - size))):
         parts.append(part)
         size += len(part)

@@ -19,19 +19,22 @@ from ir_recorder.read.raw_values import RawChannel
 
 
 def decoder_of(channel: RawChannel) -> Callable[[bytes], Any] | None:
-    """What decodes the channel's messages, None where nothing does; raises nearly anything for a damaged
-    schema. The library prints what it can't read, which may be anything: that stays out of the terminal.
+    """What decodes the channel's messages, None where nothing does; raises nearly anything for a
+    damaged schema. The library prints what it can't read, which may be anything: that stays out of
+    the terminal.
     """
     schema = Schema(1, channel.schema_text.encode(), channel.schema_encoding, channel.type)
     definitions_of(channel.type, channel.schema_text)
     with contextlib.redirect_stderr(io.StringIO()):
-        decode: Callable[[bytes], Any] | None = DecoderFactory().decoder_for(channel.message_encoding, schema)
+        decode: Callable[[bytes], Any] | None = DecoderFactory().decoder_for(
+            channel.message_encoding, schema
+        )
     return decode
 
 
 def movement_from(message: Any) -> PlannedMovement:
-    """A PlannedMovement of its decoded message, without the points; ValueError where a field makes no
-    sense.
+    """A PlannedMovement of its decoded message, without the points; ValueError where a field makes
+    no sense.
     """
     return PlannedMovement(
         kind=message.kind,
@@ -76,7 +79,9 @@ def _interval(message: Any) -> tuple[float, float]:
 
 
 def report_from(message: Any) -> TrajectoryReport:
-    """A TrajectoryReport of its decoded message; what recordings of before don't have keeps its default."""
+    """A TrajectoryReport of its decoded message; what recordings of before don't have keeps its
+    default.
+    """
     later = ("energy_low", "energy_high", "power_parameters", "torque_reserve", "safety_distance")
     return TrajectoryReport(
         **{name: getattr(message, name) for name in later if hasattr(message, name)},

@@ -1,4 +1,6 @@
-"""What the plans behind a recorded run save, and what their searches did, from the planner's answers."""
+"""What the plans behind a recorded run save, and what their searches did, from the planner's
+answers.
+"""
 
 from __future__ import annotations
 
@@ -20,27 +22,35 @@ MOST_STAGES = 2_000
 
 
 def with_plans(found: Recording, channel: RawChannel | None) -> Recording:
-    """The recording with searches and savings of its plans, by the planner's calls; all savings where no plan
-    is known.
+    """The recording with searches and savings of its plans, by the planner's calls; all savings
+    where no plan is known.
     """
     plans = _driven_plans(channel, found.events)
-    logs = tuple(log if plan.own else _not_driven(log) for plan in plans for log in _logs_of(plan.answer))
+    logs = tuple(
+        log if plan.own else _not_driven(log) for plan in plans for log in _logs_of(plan.answer)
+    )
     ids = {plan.answer.texts("savings.program_id")[0] for plan in plans}
-    savings = tuple(event for event in found.savings if not plans or event.savings.program_id in ids)
+    savings = tuple(
+        event for event in found.savings if not plans or event.savings.program_id in ids
+    )
     return replace(found, searches=logs, savings=savings)
 
 
 @dataclass(frozen=True, eq=False)
 class _Driven:
-    """A planner's answer; own: its program itself was driven, not one of its front or its savings."""
+    """A planner's answer; own: its program itself was driven, not one of its front or its
+    savings.
+    """
 
     answer: Columns
     own: bool
 
 
-def _driven_plans(channel: RawChannel | None, events: Sequence[ProgramEvent]) -> tuple[_Driven, ...]:
-    """Of the programs that were driven, in the order in which they were, each by the last answer on a
-    planner's calls that has it; of the last planned program where none was driven.
+def _driven_plans(
+    channel: RawChannel | None, events: Sequence[ProgramEvent]
+) -> tuple[_Driven, ...]:
+    """Of the programs that were driven, in the order in which they were, each by the last answer on
+    a planner's calls that has it; of the last planned program where none was driven.
 
     A program that was planned before the recording, or by nobody in it, has none.
     """
@@ -55,8 +65,12 @@ def _driven_plans(channel: RawChannel | None, events: Sequence[ProgramEvent]) ->
         return tuple(_Driven(plan, True) for plan in islice(_plans(recorded, definition), 1))
     found: list[_Driven] = []
     for program, trajectories in driven.items():
-        ids = {program} if program else trajectories - {""}  # steps that a client handed over have no name
-        named = [answer for answer in recorded if ids and all(each.encode() in answer for each in ids)]
+        ids = (
+            {program} if program else trajectories - {""}
+        )  # steps that a client handed over have no name
+        named = [
+            answer for answer in recorded if ids and all(each.encode() in answer for each in ids)
+        ]
         plans = [plan for plan in _plans(named, definition) if ids <= _ids(plan)]
         own = [plan for plan in plans if program in ("", plan.texts("program_id")[0])]
         found += [_Driven(plan, bool(own)) for plan in (own or plans)[:1]]

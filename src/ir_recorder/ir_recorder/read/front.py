@@ -1,7 +1,8 @@
-"""The Pareto front of a program, from the planner's answers that a recording holds; read without ROS.
+"""The Pareto front of a program, from the planner's answers that a recording holds; read without
+ROS.
 
-An answer is the result of the action ir_msgs/action/Plan as CDR. Its definition isn't in the file: it is
-that of the installed interfaces, without which no front is read.
+An answer is the result of the action ir_msgs/action/Plan as CDR. Its definition isn't in the file:
+it is that of the installed interfaces, without which no front is read.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ MOST_POINTS = 50  # of a front, by the request
 def recorded_front(
     path: str | Path, roots: FileRoots = ANYWHERE, namespace: str | None = None
 ) -> tuple[ProgramPoint, ...]:
-    """The last front that a planner answered with, by cycle time; empty where there is none. ReadError as
-    `read_recording`.
+    """The last front that a planner answered with, by cycle time; empty where there is none.
+    ReadError as `read_recording`.
     """
     raw = read_raw(path, roots)
     prefix = chosen_namespace(raw, namespace)[0].rstrip("/")
@@ -64,7 +65,9 @@ def answers(channel: RawChannel, kinds: tuple[str, ...] = (ACTION,)) -> Iterator
 
 
 def front_of(answer: bytes, definition: str) -> tuple[ProgramPoint, ...]:
-    """The front in one result, CDR with its definition; empty where it has none or makes no sense."""
+    """The front in one result, CDR with its definition; empty where it has none or makes no
+    sense.
+    """
     try:
         columns = Columns([answer], f"{ACTION.replace('/action/', '/msg/')}_Result", definition)
     except ReadError:
@@ -82,23 +85,32 @@ def front_of(answer: bytes, definition: str) -> tuple[ProgramPoint, ...]:
 
 @cache
 def result_definition() -> str:
-    """Text of the result's type and of all it is built from; "" where the interfaces aren't installed."""
+    """Text of the result's type and of all it is built from; "" where the interfaces aren't
+    installed.
+    """
     package, _, name = ACTION.split("/")
-    files = [prefix / "share" / package / "action" / f"{name}.action" for prefix in installed_prefixes()]
+    files = [
+        prefix / "share" / package / "action" / f"{name}.action" for prefix in installed_prefixes()
+    ]
     text = next((file.read_text(encoding="utf-8") for file in files if file.is_file()), "")
     parts = re.split(r"^---\s*$", text, flags=re.MULTILINE)
     if len(parts) != 3:
         return ""
-    library, sections = SchemaLibrary(), dict[str, str]()
+    library = SchemaLibrary()
+    sections = dict[str, str]()
     try:
         for field in fields_of(parts[1], package):
             if not field.primitive:
                 own, inner = field.type.split("/")
-                head, *others = library.schema(f"{own}/msg/{inner}").text.split(f"{SEPARATOR}\nMSG: ")
+                head, *others = library.schema(f"{own}/msg/{inner}").text.split(
+                    f"{SEPARATOR}\nMSG: "
+                )
                 sections[field.type] = head
                 for other in others:
                     title, _, body = other.partition("\n")
                     sections[title] = body
     except SchemaError:
         return ""
-    return parts[1] + "".join(f"{SEPARATOR}\nMSG: {title}\n{body}\n" for title, body in sections.items())
+    return parts[1] + "".join(
+        f"{SEPARATOR}\nMSG: {title}\n{body}\n" for title, body in sections.items()
+    )

@@ -23,7 +23,8 @@ def with_further_parts(first: RawRecording, read: Callable[[Path], RawRecording]
     """
     if first.fact(contents.PART) != "0":
         return first
-    parts, problems = [first], list(first.problems)
+    parts = [first]
+    problems = list(first.problems)
     for number in range(1, MOST_PARTS):
         path = part_path(first.path, number)
         if not path.exists():
@@ -63,7 +64,9 @@ def _joined(channels: list[RawChannel]) -> tuple[RawChannel, ...]:
     """One channel for those of a topic and a type, in the order of the files."""
     groups: dict[tuple[str, str, str], list[RawChannel]] = {}
     for channel in channels:
-        groups.setdefault((channel.topic, channel.type, channel.message_encoding), []).append(channel)
+        groups.setdefault((channel.topic, channel.type, channel.message_encoding), []).append(
+            channel
+        )
     return tuple(
         replace(
             group[0],

@@ -19,7 +19,9 @@ MOST_STEPS = 1_000
 
 
 def planned_steps(channel: RawChannel | None) -> tuple[PlannedMovement, ...]:
-    """Steps of the last answer on a planner's calls that has some, without points; empty where none has."""
+    """Steps of the last answer on a planner's calls that has some, without points; empty where none
+    has.
+    """
     definition = result_definition()
     if channel is None or channel.message_encoding != "cdr" or not definition:
         return ()

@@ -1,7 +1,7 @@
 """What an MCAP file holds, channel by channel, however much of it is left.
 
-A recording that ended with a power cut has no summary and half a chunk; one that was copied badly has a
-chunk whose check sum fails. All that can be read is given, with a sentence for what can't.
+A recording that ended with a power cut has no summary and half a chunk; one that was copied badly
+has a chunk whose check sum fails. All that can be read is given, with a sentence for what can't.
 """
 
 from __future__ import annotations
@@ -81,11 +81,13 @@ class _Collector:
             )
 
 
-def read_raw(path: str | Path, roots: FileRoots = ANYWHERE, limits: ReadLimits | None = None) -> RawRecording:
+def read_raw(
+    path: str | Path, roots: FileRoots = ANYWHERE, limits: ReadLimits | None = None
+) -> RawRecording:
     """Everything readable in an MCAP file; ReadError when there is nothing, or it isn't one.
 
-    Of a recording in several files the first gives all, any other only what it holds. They are regular ones
-    below `roots`; what they hold takes no more memory than `limits`.
+    Of a recording in several files the first gives all, any other only what it holds. They are
+    regular ones below `roots`; what they hold takes no more memory than `limits`.
     """
     chunks = ChunkReader(limits or ReadLimits())
     return with_further_parts(
@@ -111,7 +113,9 @@ def _read_file(path: Path, roots: FileRoots, chunks: ChunkReader) -> RawRecordin
     if not found.complete:
         found.problems.append(f"the file ends early; {messages} messages were read up to there")
     if not messages and not found.attachments and not found.facts:
-        raise ReadError(one_line(f"{path} holds no messages" + "".join(f"; {p}" for p in found.problems)))
+        raise ReadError(
+            one_line(f"{path} holds no messages" + "".join(f"; {p}" for p in found.problems))
+        )
     problems = tuple(map(one_line, found.problems))
     return RawRecording(
         path, tuple(found.raw_channels()), tuple(found.attachments), tuple(found.facts), problems
@@ -155,7 +159,9 @@ def _size(record: McapRecord) -> int:
 
 
 def _open_chunk(chunk: Chunk, offset: int, found: _Collector, chunks: ChunkReader) -> None:
-    lost = f"{(chunk.message_end_time - chunk.message_start_time) * 1e-9:.2f} s of messages are lost"
+    lost = (
+        f"{(chunk.message_end_time - chunk.message_start_time) * 1e-9:.2f} s of messages are lost"
+    )
     try:
         records = chunks.records(chunk)
     except TooLargeError:
@@ -163,7 +169,9 @@ def _open_chunk(chunk: Chunk, offset: int, found: _Collector, chunks: ChunkReade
     except ReadError as error:
         found.problems.append(f"chunk at byte {offset} is left out, {error}: {lost}")
         return
-    except Exception as error:  # the decompressors raise errors of their own; a lost chunk isn't the end
+    except (
+        Exception
+    ) as error:  # the decompressors raise errors of their own; a lost chunk isn't the end
         found.problems.append(f"chunk at byte {offset} is damaged ({type(error).__name__}): {lost}")
         return
     for record in records:

@@ -33,8 +33,8 @@ class RawAttachment:
 
 @dataclass(frozen=True)
 class RawRecording:
-    """Everything readable in a file; `problems` says what wasn't, `facts` are the metadata records' texts
-    by key.
+    """Everything readable in a file; `problems` says what wasn't, `facts` are the metadata records'
+    texts by key.
     """
 
     path: Path

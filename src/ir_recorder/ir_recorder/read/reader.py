@@ -1,5 +1,5 @@
-"""Reads a recording into typed series, without ROS: what is damaged or missing becomes a sentence, not a
-refusal.
+"""Reads a recording into typed series, without ROS: what is damaged or missing becomes a sentence,
+not a refusal.
 """
 
 from __future__ import annotations
@@ -46,7 +46,14 @@ _OF_A_RUN = (names.JOINT_STATES, names.POWER_STATE, names.CONTROLLER_STATE, name
 _CALLS = f"{names.PLANNER}/{names.CALLS}"
 _WARN = 30  # rcl_interfaces/Log
 # action_msgs/GoalStatus
-_OUTCOMES = {1: "accepted", 2: "executing", 3: "canceling", 4: "succeeded", 5: "canceled", 6: "aborted"}
+_OUTCOMES = {
+    1: "accepted",
+    2: "executing",
+    3: "canceling",
+    4: "succeeded",
+    5: "canceled",
+    6: "aborted",
+}
 _IN_BITS = tuple(bit.name for bit in fields(PlcInputs) if bit.type == "bool")
 _OUT_BITS = tuple(bit.name for bit in fields(PlcOutputs) if bit.type == "bool")
 
@@ -59,8 +66,8 @@ def read_recording(
 ) -> Recording:
     """The recording of one cell in a file below `roots`, read within `limits`.
 
-    namespace: of the cell ("/cell_1"); None: the first one, with a sentence where there are more. ReadError
-    when the file is no recording, or holds no cell of that namespace.
+    namespace: of the cell ("/cell_1"); None: the first one, with a sentence where there are more.
+    ReadError when the file is no recording, or holds no cell of that namespace.
     """
     return _Reader(read_raw(path, roots, limits), namespace).recording()
 
@@ -80,19 +87,24 @@ class _Reader:
         raw = self._raw
         for channel in raw.channels:
             if channel.message_encoding != "cdr" and channel.messages:
-                self._problems.append(f"{channel.topic} is {channel.message_encoding}, not cdr: left out")
+                self._problems.append(
+                    f"{channel.topic} is {channel.message_encoding}, not cdr: left out"
+                )
         found = Recording(
             path=raw.path,
             start_ns=self._start,
             duration=(self._end - self._start) * 1e-9,
             topics=tuple(
-                TopicSummary(c.topic, c.type, len(c.messages), c.message_encoding) for c in raw.channels
+                TopicSummary(c.topic, c.type, len(c.messages), c.message_encoding)
+                for c in raw.channels
             ),
             joints=self._series(names.JOINT_STATES, self._joints),
             power=self._series(names.POWER_STATE, self._power),
             controller=self._series(names.CONTROLLER_STATE, self._controller),
             plc_inputs=self._plc_inputs(),
-            plc_outputs=self._series(names.PLC_OUTPUTS, self._bits(_OUT_BITS, stamped=True), needed=False),
+            plc_outputs=self._series(
+                names.PLC_OUTPUTS, self._bits(_OUT_BITS, stamped=True), needed=False
+            ),
             events=tuple(self._events()),
             loads=tuple(self._loads()),
             signals=tuple(self._signals()),
@@ -100,7 +112,9 @@ class _Reader:
             contacts=tuple(contacts(self._messages(names.CONTACTS))),
             warnings=tuple(self._warnings()),
             goals=tuple(self._goals()),
-            savings=tuple(SavingsEvent(t, savings_from(m)) for t, m in self._messages(names.PROGRAM_SAVINGS)),
+            savings=tuple(
+                SavingsEvent(t, savings_from(m)) for t, m in self._messages(names.PROGRAM_SAVINGS)
+            ),
             hardware=self._hardware(),
             cell_yaml=self._attached(contents.CELL),
             urdf=self._attached(contents.URDF) or self._text(names.ROBOT_DESCRIPTION),
@@ -142,7 +156,8 @@ class _Reader:
         first = next(self._decoded(channel), None)
         if first is None:
             raise ReadError("no message can be decoded")
-        joint_names, stamps = tuple(first[1].name), columns.stamps()
+        joint_names = tuple(first[1].name)
+        stamps = columns.stamps()
         n = len(joint_names)
         return JointSeries(
             joint_names,
@@ -181,7 +196,9 @@ class _Reader:
             columns.numbers("error.positions", len(names.JOINT_NAMES)),
         )
 
-    def _bits(self, bits: tuple[str, ...], stamped: bool) -> Callable[[Columns, RawChannel], BitSeries]:
+    def _bits(
+        self, bits: tuple[str, ...], stamped: bool
+    ) -> Callable[[Columns, RawChannel], BitSeries]:
         def build(columns: Columns, channel: RawChannel) -> BitSeries:
             times = columns.stamps() if stamped else channel.log_time
             levels = np.stack([columns.integers(bit) for bit in bits], axis=1)
@@ -190,7 +207,9 @@ class _Reader:
         return build
 
     def _plc_inputs(self) -> BitSeries | None:
-        """The levels in force, whoever set them; in a recording without them those sent on the topic."""
+        """The levels in force, whoever set them; in a recording without them those sent on the
+        topic.
+        """
         bits = self._bits(_IN_BITS, stamped=False)
         in_force = self._series(names.PLC_INPUTS_IN_FORCE, bits, needed=False)
         return in_force or self._series(names.PLC_INPUTS, bits, needed=False)
@@ -203,7 +222,9 @@ class _Reader:
             except MsgsError as error:
                 broken += 1
                 if broken == 1:
-                    self._problems.append(f"a program event at {time:.2f} s makes no sense: {error}")
+                    self._problems.append(
+                        f"a program event at {time:.2f} s makes no sense: {error}"
+                    )
                 continue
             yield ProgramEvent(
                 self._stamp(message.header.stamp),
@@ -273,7 +294,9 @@ class _Reader:
         try:
             decode = decoder_of(channel)
         except Exception as error:  # a damaged schema makes the parser raise nearly anything
-            self._problems.append(f"{channel.topic}: definition of {channel.type} can't be read ({error})")
+            self._problems.append(
+                f"{channel.topic}: definition of {channel.type} can't be read ({error})"
+            )
             return
         failed = 0
         for stamp, data in zip(channel.log_time.tolist(), channel.messages, strict=True):

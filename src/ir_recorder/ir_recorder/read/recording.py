@@ -1,4 +1,6 @@
-"""What a recording holds, as typed values on one time axis. Times are seconds since the first message."""
+"""What a recording holds, as typed values on one time axis. Times are seconds since the first
+message.
+"""
 
 from __future__ import annotations
 
@@ -36,8 +38,8 @@ class TopicSummary:
 
 @dataclass(frozen=True, eq=False)
 class JointSeries(_ReadOnlyArrays):
-    """/joint_states: stamp_ns (N,), time (N,) s, position (N, n) rad, velocity (N, n) rad/s, effort (N, n)
-    Nm.
+    """/joint_states: stamp_ns (N,), time (N,) s, position (N, n) rad, velocity (N, n) rad/s, effort
+    (N, n) Nm.
     """
 
     names: tuple[str, ...]
@@ -51,11 +53,12 @@ class JointSeries(_ReadOnlyArrays):
 @dataclass(frozen=True, eq=False)
 class PowerSeries(_ReadOnlyArrays):
     """The mains meter, N readings: mode and target numbers of ir_msgs/PowerMode; power, base_power,
-    burnt_power (N,) W; energy (N,) J since the meter's start; bus_voltage (N,) V; joint_power (N, n) W at
-    the DC bus, joint_torque (N, n) Nm; tool_power (N,) W, part of base_power; rectifier_loss (N,) W;
-    joint_temperature (N, n) deg C. What the plant doesn't have is NaN.
+    burnt_power (N,) W; energy (N,) J since the meter's start; bus_voltage (N,) V; joint_power (N,
+    n) W at the DC bus, joint_torque (N, n) Nm; tool_power (N,) W, part of base_power;
+    rectifier_loss (N,) W; joint_temperature (N, n) deg C. What the plant doesn't have is NaN.
 
-    A power is the mean since the reading before. plant: what the meter measures, "" where it has no name.
+    A power is the mean since the reading before. plant: what the meter measures, "" where it has no
+    name.
     """
 
     time: FloatArray
@@ -76,9 +79,9 @@ class PowerSeries(_ReadOnlyArrays):
 
 @dataclass(frozen=True, eq=False)
 class ControllerSeries(_ReadOnlyArrays):
-    """The trajectory executor, N states: trajectory_id ("" while holding), path_time (N,) s along the
-    trajectory, speed_scaling (N,), tool_deviation (N,) m between commanded and simulated tcp, joint_error
-    (N, n) rad between commanded and simulated joints.
+    """The trajectory executor, N states: trajectory_id ("" while holding), path_time (N,) s along
+    the trajectory, speed_scaling (N,), tool_deviation (N,) m between commanded and simulated tcp,
+    joint_error (N, n) rad between commanded and simulated joints.
     """
 
     time: FloatArray
@@ -130,7 +133,9 @@ class TextEvent:
 
 @dataclass(frozen=True)
 class GoalEnd:
-    """The last state of a goal: its action ("plan"), the number of action_msgs/GoalStatus, and in words."""
+    """The last state of a goal: its action ("plan"), the number of action_msgs/GoalStatus, and in
+    words.
+    """
 
     action: str
     status: int
@@ -139,15 +144,16 @@ class GoalEnd:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """All that could be read; a series is None where its topic is missing, `problems` names what is wrong.
+    """All that could be read; a series is None where its topic is missing, `problems` names what is
+    wrong.
 
-    start_ns: node clock of time 0. hardware: the driver's name of its plant ("..., simulated"). cell_yaml and
-    urdf are "" where none is attached, so are power_yaml (data of the controller) and plant_yaml (the
-    simulated plant with its figures). facts: texts by key. planned: steps of the last planned program, where
-    nothing was driven. machines: their states by name, "closed>open" while they change; contacts: what the
-    robot touched, by body. savings: of the driven programs, or of the last planned one, where their plans are
-    in it. searches: what the searches of the driven programs did, or of the last planned one
-    where none was driven, where they keep a log.
+    start_ns: node clock of time 0. hardware: the driver's name of its plant ("..., simulated").
+    cell_yaml and urdf are "" where none is attached, so are power_yaml (data of the controller) and
+    plant_yaml (the simulated plant with its figures). facts: texts by key. planned: steps of the
+    last planned program, where nothing was driven. machines: their states by name, "closed>open"
+    while they change; contacts: what the robot touched, by body. savings: of the driven programs,
+    or of the last planned one, where their plans are in it. searches: what the searches of the
+    driven programs did, or of the last planned one where none was driven, where they keep a log.
     """
 
     path: Path
@@ -189,7 +195,9 @@ class Recording:
 
     @property
     def origin(self) -> str:
-        """The word for its watts: "simulated", "measured", "recorded" where the plant is not named."""
+        """The word for its watts: "simulated", "measured", "recorded" where the plant is not
+        named.
+        """
         if not self.hardware:
             return "recorded"
         return "simulated" if "simulated" in self.hardware else "measured"

@@ -1,4 +1,6 @@
-"""Curves of every axis for the engineer: position, speed, torque, power, tracking error, temperature."""
+"""Curves of every axis for the engineer: position, speed, torque, power, tracking error,
+temperature.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,9 @@ _STEPS = 32_000  # of int16
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """One quantity: time (N,) s, value (N, n) in `unit`, limit (n, 2); series: what the columns are."""
+    """One quantity: time (N,) s, value (N, n) in `unit`, limit (n, 2); series: what the columns
+    are.
+    """
 
     name: str
     unit: str
@@ -31,7 +35,11 @@ class Curves:
 
 def axis_curves(analysis: Analysis) -> list[dict[str, Json]]:
     """What axes.js draws."""
-    return [packed(curves) for curves in _curves(analysis) if len(curves.time) > 1 and _seen(curves.value)]
+    return [
+        packed(curves)
+        for curves in _curves(analysis)
+        if len(curves.time) > 1 and _seen(curves.value)
+    ]
 
 
 def _seen(value: FloatArray) -> bool:
@@ -40,7 +48,9 @@ def _seen(value: FloatArray) -> bool:
 
 def _curves(analysis: Analysis) -> Iterator[Curves]:
     recording = analysis.recording
-    joints, power, controller = recording.joints, recording.power, recording.controller
+    joints = recording.joints
+    power = recording.power
+    controller = recording.controller
     if joints is not None:
         position, speed, torque = _limits(analysis, joints.position.shape[1])
         yield Curves("position", "°", joints.time, np.degrees(joints.position), position)
@@ -54,10 +64,14 @@ def _curves(analysis: Analysis) -> Iterator[Curves]:
         tool = controller.tool_deviation[:, None] * 1e3
         yield Curves("tool off its path", "mm", controller.time, tool, shown=False, series="tool")
     if power is not None:
-        yield Curves("temperature of the gear", "°C", power.time, power.joint_temperature, shown=False)
+        yield Curves(
+            "temperature of the gear", "°C", power.time, power.joint_temperature, shown=False
+        )
 
 
-def _limits(analysis: Analysis, n: int) -> tuple[FloatArray | None, FloatArray | None, FloatArray | None]:
+def _limits(
+    analysis: Analysis, n: int
+) -> tuple[FloatArray | None, FloatArray | None, FloatArray | None]:
     """Limits (n, 2) of position [deg], speed [deg/s] and torque [Nm] by the data of the robot."""
     if analysis.cell is None or analysis.cell.robot.n != n:
         return None, None, None

@@ -1,7 +1,8 @@
-"""Bars of joules per movement: what consumers took right of zero, what braking axes gave left of it.
+"""Bars of joules per movement: what consumers took right of zero, what braking axes gave left of
+it.
 
-Every piece is the net energy of one consumer over the movement. The sum of both sides is what the mains gave,
-but for what stays in the capacitors; it stands beside the bar.
+Every piece is the net energy of one consumer over the movement. The sum of both sides is what the
+mains gave, but for what stays in the capacitors; it stands beside the bar.
 """
 
 from __future__ import annotations
@@ -48,7 +49,9 @@ def joule_bars(results: Sequence[StepResult]) -> str:
 
 def _pieces(result: StepResult) -> list[_Piece]:
     own = [_Piece("base", "controller, drives and tool", result.base_energy)]
-    own += [_Piece(f"a{j + 1}", f"axis A{j + 1}", float(v)) for j, v in enumerate(result.joint_energy)]
+    own += [
+        _Piece(f"a{j + 1}", f"axis A{j + 1}", float(v)) for j, v in enumerate(result.joint_energy)
+    ]
     own.append(_Piece("dissipated", "brake resistor", result.dissipated_energy))
     return [piece for piece in own if np.isfinite(piece.joules)]
 
@@ -73,13 +76,15 @@ def _row(result: StepResult, own: Sequence[_Piece], scale: _Scale) -> str:
     return (
         f'<div class="row"><span class="label">{text(label)}</span>'
         f'<div class="track">{"".join(track)}</div>'
-        f'<span class="value"><b>{text(joules(result.energy))}</b><small>{text(sides)}</small></span></div>'
+        f'<span class="value"><b>{text(joules(result.energy))}</b><small>{text(sides)}</small></span></div>'  # noqa: E501
     )
 
 
 def _stacked(own: Sequence[_Piece]) -> list[tuple[_Piece, float]]:
     """Each piece with the joules at its left end."""
-    placed, right, left = [], 0.0, 0.0
+    placed = []
+    right = 0.0
+    left = 0.0
     for piece in own:
         if piece.joules >= 0.0:
             placed.append((piece, right))
@@ -104,13 +109,16 @@ def _mark(style: str, value: float, words: str, scale: _Scale) -> str:
 
 def _axis(scale: _Scale) -> str:
     step = tick_step(scale.high - scale.low)
-    first, last = int(np.ceil(scale.low / step)), int(scale.high / step)
+    first = int(np.ceil(scale.low / step))
+    last = int(scale.high / step)
     ticks = [
         f'<span style="left:{scale.at(k * step):.2f}%">{text(joules(k * step))}</span>'
         for k in range(first, last + 1)
     ]
     track = f'<div class="track">{"".join(ticks)}</div>'
-    return f'<div class="row axis"><span class="label"></span>{track}<span class="value"></span></div>'
+    return (
+        f'<div class="row axis"><span class="label"></span>{track}<span class="value"></span></div>'
+    )
 
 
 def tick_step(span: float) -> float:

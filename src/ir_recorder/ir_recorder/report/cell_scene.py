@@ -1,4 +1,6 @@
-"""The cell as it stands, for the picture in 3D: triangles and poses of robot, loads, machines and parts."""
+"""The cell as it stands, for the picture in 3D: triangles and poses of robot, loads, machines and
+parts.
+"""
 
 from __future__ import annotations
 
@@ -53,7 +55,9 @@ def _load_shapes(cell: Cell) -> list[dict[str, Json]]:
     """Tool and parts as they are held; each is drawn while its name is in the load."""
     shapes = []
     loads = list(cell.loads())
-    loads += [load for part in cell.parts for load in cell.loads(part.name) if load.name == part.name]
+    loads += [
+        load for part in cell.parts for load in cell.loads(part.name) if load.name == part.name
+    ]
     for load in loads:
         for capsule in load.capsules:
             kind = "tool" if load.kind == "tool" else "part"

@@ -1,4 +1,6 @@
-"""Checks as tables: for each kind the one that is nearest to its bound, then the checks themselves."""
+"""Checks as tables: for each kind the one that is nearest to its bound, then the checks
+themselves.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,8 @@ from ir_recorder.report.tables import table
 from ir_recorder.report.words import interval, number, text
 
 _KIND = re.compile(
-    r"energy of .* from joint states$|energy of |duration of |.*? (?=on \d)|power at rest|Table II|goals of"
+    r"energy of .* from joint states$|energy of |duration of |.*? (?=on \d)|power at rest|Table "
+    r"II|goals of"
 )
 _ORDER = (Verdict.HOLDS, Verdict.FAILS, Verdict.NOT_CHECKED)
 _STYLES = {Verdict.HOLDS: "good", Verdict.FAILS: "bad", Verdict.NOT_CHECKED: "open"}
@@ -66,13 +69,17 @@ def _kinds(findings: Sequence[Finding]) -> str:
         ">allowed",
         "reason of the bound",
     )
-    return table(heads, [_kind_row(kind, own) for kind, own in kinds.items()], "Checks by kind", "kinds")
+    return table(
+        heads, [_kind_row(kind, own) for kind, own in kinds.items()], "Checks by kind", "kinds"
+    )
 
 
 def _kind(finding: Finding) -> str:
     found = _KIND.match(finding.name)
     name = found[0].strip() if found else finding.name
-    return "energy from joint states" if name.endswith("from joint states") else _NAMES.get(name, name)
+    return (
+        "energy from joint states" if name.endswith("from joint states") else _NAMES.get(name, name)
+    )
 
 
 def _kind_row(kind: str, own: Sequence[Finding]) -> tuple[str, ...]:
@@ -83,7 +90,13 @@ def _kind_row(kind: str, own: Sequence[Finding]) -> tuple[str, ...]:
         return (*row, "", "", "", text(own[0].note))
     near = min(made, key=_room)
     allowed = interval(near.low, near.high, near.unit)
-    return (*row, text(near.name), text(number(near.measured, near.unit)), text(allowed), text(near.reason))
+    return (
+        *row,
+        text(near.name),
+        text(number(near.measured, near.unit)),
+        text(allowed),
+        text(near.reason),
+    )
 
 
 def _count(number: int, verdict: Verdict) -> str:
@@ -94,4 +107,8 @@ def _room(finding: Finding) -> float:
     """How far within its bounds a check lies, as a share of them; negative where it fails."""
     to_bound = min(finding.high - finding.measured, finding.measured - finding.low)
     width = (finding.high - finding.low) / 2.0
-    return to_bound / (width if math.isfinite(width) else max(abs(finding.measured), 1e-9)) if width else 0.0
+    return (
+        to_bound / (width if math.isfinite(width) else max(abs(finding.measured), 1e-9))
+        if width
+        else 0.0
+    )

@@ -1,4 +1,6 @@
-"""Two or more recordings side by side: figures, steps, and powers over time, each against the first."""
+"""Two or more recordings side by side: figures, steps, and powers over time, each against the
+first.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,10 @@ Compared = tuple[Analysis, Sequence[Finding]]
 
 
 def write_comparison(
-    compared: Sequence[Compared], path: str | Path, roots: FileRoots = ANYWHERE, costs: Costs | None = None
+    compared: Sequence[Compared],
+    path: str | Path,
+    roots: FileRoots = ANYWHERE,
+    costs: Costs | None = None,
 ) -> Path:
     """Writes the page below `roots`; its absolute path. PathError when it can't be written."""
     return write_output(path, comparison_html(compared, costs).encode(), PAGE_START, roots)
@@ -43,8 +48,12 @@ def write_comparison(
 
 def comparison_html(compared: Sequence[Compared], costs: Costs | None = None) -> str:
     """The page as text: the first recording is what the others are held against."""
-    analyses, names = [each for each, _ in compared], _names([each for each, _ in compared])
-    data = {"end": _longest(analyses), "axes": [_powers(analyses, names)] if _longest(analyses) else []}
+    analyses = [each for each, _ in compared]
+    names = _names([each for each, _ in compared])
+    data = {
+        "end": _longest(analyses),
+        "axes": [_powers(analyses, names)] if _longest(analyses) else [],
+    }
     parts = {
         "title": text(f"{len(analyses)} recordings compared"),
         "subtitle": text(f"{names[0]} is what the others are held against"),
@@ -63,7 +72,9 @@ def _names(analyses: Sequence[Analysis]) -> list[str]:
     """File names; with their folders where two are alike."""
     short = [analysis.recording.path.stem for analysis in analyses]
     long = [f"{a.recording.path.parent.name}/{a.recording.path.stem}" for a in analyses]
-    return [name if short.count(name) == 1 else other for name, other in zip(short, long, strict=True)]
+    return [
+        name if short.count(name) == 1 else other for name, other in zip(short, long, strict=True)
+    ]
 
 
 def _problems(analyses: Sequence[Analysis], names: Sequence[str]) -> str:
@@ -75,7 +86,9 @@ def _problems(analyses: Sequence[Analysis], names: Sequence[str]) -> str:
     if len({a.cell.name for a in analyses if a.cell is not None}) > 1:
         items.append("<li>These recordings are of different cells.</li>")
     if len({(a.recording.origin, a.recording.plant) for a in analyses}) > 1:
-        items.append("<li>These recordings are of different plants: not only the programs differ.</li>")
+        items.append(
+            "<li>These recordings are of different plants: not only the programs differ.</li>"
+        )
     return f'<div class="problems"><b>Mind</b><ul>{"".join(items)}</ul></div>' if items else ""
 
 
@@ -88,7 +101,10 @@ def _figures(compared: Sequence[Compared], names: Sequence[str], costs: Costs) -
 
 
 def _measured_row(
-    name: str, unit: Callable[[float], str], value: Callable[[Analysis], float], compared: Sequence[Compared]
+    name: str,
+    unit: Callable[[float], str],
+    value: Callable[[Analysis], float],
+    compared: Sequence[Compared],
 ) -> tuple[str, ...]:
     values = [value(analysis) for analysis, _ in compared]
     return (name, *(_against(each, values[0], unit, k == 0) for k, each in enumerate(values)))
@@ -105,11 +121,15 @@ def _yearly(analysis: Analysis, costs: Costs) -> str:
     cycle = cycle_of(analysis)
     if cycle is None:
         return DASH
-    return text(money(costs.money(cycle.energy * costs.cycles_per_year(cycle.seconds)), costs.currency))
+    return text(
+        money(costs.money(cycle.energy * costs.cycles_per_year(cycle.seconds)), costs.currency)
+    )
 
 
 def _of_program(part: str, value: str) -> Callable[[Analysis], float]:
-    """Energy [J] or seconds of a part of the program that was executed, else of the one that was planned."""
+    """Energy [J] or seconds of a part of the program that was executed, else of the one that was
+    planned.
+    """
 
     def found(analysis: Analysis) -> float:
         program: ProgramTotals | None = analysis.program
@@ -213,7 +233,9 @@ def _longest(analyses: Sequence[Analysis]) -> float:
 
 
 def _powers(analyses: Sequence[Analysis], names: Sequence[str]) -> dict[str, Json]:
-    """Mains power from the start of each program on one grid: means, so that its joules are the meter's."""
+    """Mains power from the start of each program on one grid: means, so that its joules are the
+    meter's.
+    """
     edges = np.linspace(0.0, _longest(analyses), _POINTS + 1)
     value = np.zeros((_POINTS, len(analyses)))
     for k, analysis in enumerate(analyses):
@@ -222,5 +244,8 @@ def _powers(analyses: Sequence[Analysis], names: Sequence[str]) -> dict[str, Jso
             spent = np.interp(edges + analysis.steps[0].step.start, power.time, power.energy)
             value[:, k] = np.diff(spent) / np.diff(edges)
     curves = Curves("power at the mains", "W", (edges[1:] + edges[:-1]) / 2.0, value)
-    ends = [analysis.program.whole.seconds if analysis.program is not None else 0.0 for analysis in analyses]
+    ends = [
+        analysis.program.whole.seconds if analysis.program is not None else 0.0
+        for analysis in analyses
+    ]
     return {**packed(curves), "names": list(names), "ends": ends}

@@ -61,8 +61,8 @@ class Costs:
         check_settings(self)
         if self.shift_hours * self.shifts_per_day > _DAY:
             raise InvalidValueError(
-                f"shift_hours is {self.shift_hours:g} h and shifts_per_day {self.shifts_per_day:g}: "
-                f"together they must be at most {_DAY:g} h a day"
+                f"shift_hours is {self.shift_hours:g} h and shifts_per_day "
+                f"{self.shifts_per_day:g}: together they must be at most {_DAY:g} h a day"
             )
 
     def money(self, energy: float) -> float:
@@ -115,7 +115,9 @@ def _checked(where: str, key: str, value: object) -> float | str:
             or not 0 < len(value.strip()) <= _CURRENCY_MAX
             or not value.isprintable()
         ):
-            raise CostsError(f"{where} must be a text of at most {_CURRENCY_MAX} characters in one line")
+            raise CostsError(
+                f"{where} must be a text of at most {_CURRENCY_MAX} characters in one line"
+            )
         return value
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise CostsError(f"{where} is {str(value)[:40]!r}, it must be a number")

@@ -15,13 +15,25 @@ from ir_recorder.analysis.steps import ExecutedStep
 from ir_recorder.read.recording import BitSeries
 from ir_recorder.report.axes import axis_curves
 from ir_recorder.report.machine_lanes import machine_lanes
-from ir_recorder.report.planned_motion import blamed, failed_scene, lanes, planned_scene, planned_side
+from ir_recorder.report.planned_motion import (
+    blamed,
+    failed_scene,
+    lanes,
+    planned_scene,
+    planned_side,
+)
 from ir_recorder.report.scene import scene
 from ir_recorder.report.series import Json, envelope, floats
 from ir_recorder.report.words import mode_words
 
 MOST_POINTS = 24_000  # of the power curve: 4 minutes as they were read
-_BITS = {"ab": "AB", "hib": "HIB", "bbs": "BBS", "drives_ready": "drives", "emergency_stop": "e-stop"}
+_BITS = {
+    "ab": "AB",
+    "hib": "HIB",
+    "bbs": "BBS",
+    "drives_ready": "drives",
+    "emergency_stop": "e-stop",
+}
 MOST_CLEARANCES = 6_000  # per movement: 2 minutes at the 50 Hz of the profile
 
 
@@ -98,7 +110,12 @@ def _lanes(analysis: Analysis) -> Iterator[dict[str, Json]]:
 
 
 def _step_span(step: ExecutedStep) -> list[Json]:
-    return [step.start, step.end, step.label, "pause" if step.movement.is_pause else step.movement.kind]
+    return [
+        step.start,
+        step.end,
+        step.label,
+        "pause" if step.movement.is_pause else step.movement.kind,
+    ]
 
 
 def _mode_spans(analysis: Analysis) -> Iterator[list[Json]]:
@@ -118,7 +135,8 @@ def _load_spans(analysis: Analysis) -> Iterator[list[Json]]:
     for time, load in [*observations[1:], (analysis.recording.duration, "")]:
         if load != current:
             yield [max(start, 0.0), time, current, "load" if current != "none" else "none"]
-            start, current = time, load
+            start = time
+            current = load
 
 
 def _bit_spans(series: BitSeries, name: str, end: float) -> Iterator[list[Json]]:

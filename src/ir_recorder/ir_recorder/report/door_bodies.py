@@ -1,5 +1,5 @@
-"""Bodies of machines over a recording: doors are where their states have them, and while one changes what it
-sweeps is drawn as well.
+"""Bodies of machines over a recording: doors are where their states have them, and while one
+changes what it sweeps is drawn as well.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ ALWAYS = -1e9  # s: what is heard first was so before
 
 
 def door_bodies(cell: Cell, events: Sequence[TextEvent]) -> list[dict[str, Json]]:
-    """All bodies of the cell; those of machines whose states are in `events` ("shut>open" while they change)
-    with `shown`: from which time [s] on they are there or not; `sweep`: it is what a door sweeps.
+    """All bodies of the cell; those of machines whose states are in `events` ("shut>open" while
+    they change) with `shown`: from which time [s] on they are there or not; `sweep`: it is what a
+    door sweeps.
     """
     shapes = []
     for machine in cell.equipment:
@@ -31,7 +32,8 @@ def door_bodies(cell: Cell, events: Sequence[TextEvent]) -> list[dict[str, Json]
 
 def _standing(machine: Equipment, heard: Sequence[TextEvent]) -> Iterator[tuple[float, Equipment]]:
     """The machine from the beginning, and whenever another of its states was heard."""
-    known, last = {state.name for state in machine.states}, ""
+    known = {state.name for state in machine.states}
+    last = ""
     for event in heard:
         states = event.text.split(">")
         if event.text != last and known.issuperset(states) and len(states) <= 2:

@@ -12,7 +12,8 @@ from ir_recorder.errors import PathError
 def write_output(path: str | Path, content: bytes, replaces: bytes, roots: FileRoots) -> Path:
     """Writes a file below `roots` and makes its folder; returns its absolute path.
 
-    A file that is there is replaced only where it starts with `replaces`. PathError when it can't be written.
+    A file that is there is replaced only where it starts with `replaces`. PathError when it can't
+    be written.
     """
     target = Path(path).absolute()
     try:

@@ -1,4 +1,6 @@
-"""Energy over cycle time as a drawing: programs as points, those that no other one beats joined by a line."""
+"""Energy over cycle time as a drawing: programs as points, those that no other one beats joined by
+a line.
+"""
 
 from __future__ import annotations
 
@@ -12,19 +14,26 @@ from ir_recorder.report.bars import tick_step
 from ir_recorder.report.marks import mark
 from ir_recorder.report.words import joules, seconds, text
 
-WIDTH, HEIGHT = 720.0, 300.0
-_LEFT, _RIGHT, _TOP, _BOTTOM = 84.0, 190.0, 18.0, 44.0
-_NAME, _LINE, _HALF = (
-    90.0,
-    14.0,
-    4.0,
-)  # how wide and how high a name is, and how far it stands below its middle
-_LEAST_S, _LEAST_J = 0.05, 5.0  # span of an axis: what differs by less reads alike
+WIDTH = 720.0
+HEIGHT = 300.0
+_LEFT = 84.0
+_RIGHT = 190.0
+_TOP = 18.0
+_BOTTOM = 44.0
+# how wide and how high a name is, and how far it stands below its middle
+_NAME = 90.0
+_LINE = 14.0
+_HALF = 4.0
+# span of an axis: what differs by less reads alike
+_LEAST_S = 0.05
+_LEAST_J = 5.0
 
 
 @dataclass(frozen=True)
 class Point:
-    """A program: cycle time [s], energy [J] at the mains, and whether that is simulated or predicted."""
+    """A program: cycle time [s], energy [J] at the mains, and whether that is simulated or
+    predicted.
+    """
 
     name: str
     seconds: float
@@ -33,21 +42,31 @@ class Point:
 
 
 def front_section(analysis: Analysis, planned: Sequence[ProgramPoint] = ()) -> str:
-    """Section of the page: this run, the planned front, the common program, what was planned in its time."""
-    savings, program = analysis.savings, analysis.program
+    """Section of the page: this run, the planned front, the common program, what was planned in its
+    time.
+    """
+    savings = analysis.savings
+    program = analysis.program
     if savings is None and not planned:
         return ""
     total = savings.total if savings is not None else None
     run = program.whole if program is not None and math.isfinite(program.whole.energy) else None
     points = [
-        *([Point("this run", run.seconds, run.energy, analysis.recording.origin)] if run is not None else ()),
+        *(
+            [Point("this run", run.seconds, run.energy, analysis.recording.origin)]
+            if run is not None
+            else ()
+        ),
         *(Point("", point.cycle_time, point.energy, "predicted") for point in planned),
     ]
     if total is not None:
         points.append(Point("common program", total.seconds, total.common, "predicted"))
         points.append(Point("planned in its time", total.seconds, total.planned, "predicted"))
-    hint = "Left is faster, down is cheaper; the line joins programs that no other one beats in both."
-    head, drawn = f'<h2>Energy over cycle time</h2><p class="hint">{hint}</p>', front_chart(points)
+    hint = (
+        "Left is faster, down is cheaper; the line joins programs that no other one beats in both."
+    )
+    head = f'<h2>Energy over cycle time</h2><p class="hint">{hint}</p>'
+    drawn = front_chart(points)
     return f'<section id="front">{head}{drawn}</section>' if drawn else ""
 
 
@@ -64,13 +83,16 @@ def front_chart(points: Sequence[Point], along: str = "cycle time") -> str:
     """The drawing as SVG, its axis named `along`; "" for fewer than two points."""
     if len(points) < 2:
         return ""
-    times, energies = [p.seconds for p in points], [p.energy for p in points]
+    times = [p.seconds for p in points]
+    energies = [p.energy for p in points]
     x = _Axis(min(times), max(times), _LEAST_S, _LEFT, WIDTH - _RIGHT)
     y = _Axis(min(energies), max(energies), _LEAST_J, HEIGHT - _BOTTOM, _TOP)
     line = " ".join(f"{x.at(p.seconds):.1f},{y.at(p.energy):.1f}" for p in pareto(points))
     heights = _heights(points, x, y)
     marks = "".join(_mark(point, k, heights[k], x, y) for k, point in enumerate(points))
-    said = "; ".join(f"{p.name} {seconds(p.seconds)}, {joules(p.energy)}, {p.source}" for p in points)
+    said = "; ".join(
+        f"{p.name} {seconds(p.seconds)}, {joules(p.energy)}, {p.source}" for p in points
+    )
     return (
         '<div class="figure scroll"><svg class="front" id="energy_over_cycle_time" '
         f'viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{text(said)}">'
@@ -103,28 +125,37 @@ class _Axis:
 
     def ticks(self) -> list[float]:
         step = tick_step(1.2 * self.span)
-        first, last = math.ceil(self.first / step), math.floor((self.first + 1.2 * self.span) / step)
+        first = math.ceil(self.first / step)
+        last = math.floor((self.first + 1.2 * self.span) / step)
         return [k * step for k in range(first, last + 1)]
 
 
 def _grid(x: _Axis, y: _Axis, along: str) -> str:
-    right, bottom = WIDTH - _RIGHT, HEIGHT - _BOTTOM
+    right = WIDTH - _RIGHT
+    bottom = HEIGHT - _BOTTOM
     parts = []
     for value in y.ticks():
         at = y.at(value)
         parts.append(f'<path class="grid" d="M{_LEFT:g} {at:.1f}H{right:g}"/>')
-        parts.append(f'<text x="{_LEFT - 8:g}" y="{at + 4:.1f}" text-anchor="end">{joules(value)}</text>')
+        parts.append(
+            f'<text x="{_LEFT - 8:g}" y="{at + 4:.1f}" text-anchor="end">{joules(value)}</text>'
+        )
     for value in x.ticks():
         at = x.at(value)
         parts.append(f'<path class="grid" d="M{at:.1f} {_TOP:g}V{bottom:g}"/>')
-        parts.append(f'<text x="{at:.1f}" y="{bottom + 18:g}" text-anchor="middle">{seconds(value)}</text>')
+        parts.append(
+            f'<text x="{at:.1f}" y="{bottom + 18:g}" text-anchor="middle">{seconds(value)}</text>'
+        )
     middle = (_LEFT + right) / 2.0
-    return "".join(parts) + f'<text x="{middle:g}" y="{HEIGHT - 6:g}" text-anchor="middle">{along}</text>'
+    return (
+        "".join(parts)
+        + f'<text x="{middle:g}" y="{HEIGHT - 6:g}" text-anchor="middle">{along}</text>'
+    )
 
 
 def _heights(points: Sequence[Point], x: _Axis, y: _Axis) -> list[float]:
-    """Where the names of points go: beside them, or below another name that stands there, and all of them
-    higher where the last would stand below the drawing.
+    """Where the names of points go: beside them, or below another name that stands there, and all
+    of them higher where the last would stand below the drawing.
     """
     heights = [y.at(point.energy) for point in points]
     named = sorted((k for k, point in enumerate(points) if point.name), key=heights.__getitem__)
@@ -145,7 +176,8 @@ def _heights(points: Sequence[Point], x: _Axis, y: _Axis) -> list[float]:
 
 
 def _mark(point: Point, index: int, label: float, x: _Axis, y: _Axis) -> str:
-    at, high = x.at(point.seconds), y.at(point.energy)
+    at = x.at(point.seconds)
+    high = y.at(point.energy)
     name = point.name or "program of the front"
     words = f"{name}, {point.source}: {seconds(point.seconds)}, {joules(point.energy)}"
     title = f"<title>{text(words)}</title>"
@@ -154,8 +186,11 @@ def _mark(point: Point, index: int, label: float, x: _Axis, y: _Axis) -> str:
     else:
         drawn = mark(index, at, high, title)
     leader = (
-        f'<path class="grid" d="M{at:.1f} {high:.1f}L{at + 10:.1f} {label:.1f}"/>' if label != high else ""
+        f'<path class="grid" d="M{at:.1f} {high:.1f}L{at + 10:.1f} {label:.1f}"/>'
+        if label != high
+        else ""
     )
     return (
-        f'{leader}{drawn}<text x="{at + 12:.1f}" y="{label + 4:.1f}" class="name">{text(point.name)}</text>'
+        f'{leader}{drawn}<text x="{at + 12:.1f}" y="{label + 4:.1f}" '
+        f'class="name">{text(point.name)}</text>'
     )

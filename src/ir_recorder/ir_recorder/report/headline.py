@@ -40,7 +40,7 @@ class Tile:
     def html(self) -> str:
         """As an element of the page."""
         notes = "".join(f"<small>{text(note)}</small>" for note in self.notes if note)
-        return f'<div class="tile"><span>{text(self.name)}</span><b>{text(self.value)}</b>{notes}</div>'
+        return f'<div class="tile"><span>{text(self.name)}</span><b>{text(self.value)}</b>{notes}</div>'  # noqa: E501
 
 
 _PREDICTED = "predicted, not driven"
@@ -52,8 +52,9 @@ def subtitle(analysis: Analysis) -> str:
     start = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=recording.start_ns * 1e-9)
     version = recording.fact(VERSION)
     return text(
-        f"{recording.path.name}, {start:%Y-%m-%d %H:%M:%S} UTC, recorded {seconds(recording.duration)}, "
-        f"{joules(analysis.energy)} at the mains" + (f", recorder {version}" if version else "")
+        f"{recording.path.name}, {start:%Y-%m-%d %H:%M:%S} UTC, recorded "
+        f"{seconds(recording.duration)}, {joules(analysis.energy)} at the mains"
+        + (f", recorder {version}" if version else "")
     )
 
 
@@ -77,7 +78,8 @@ def source(analysis: Analysis) -> str:
         return '<p class="source open">plant not recorded</p>'
     style = analysis.recording.origin
     kind = "Simulated, not measured" if style == "simulated" else "Measured"
-    what, plant = hardware.removesuffix(", simulated"), analysis.recording.plant
+    what = hardware.removesuffix(", simulated")
+    plant = analysis.recording.plant
     what += f", plant {plant}" if plant else ""
     return f'<p class="source {style}"><b>{kind}</b> {text(what)}</p>'
 
@@ -94,7 +96,9 @@ def notes(analysis: Analysis) -> str:
     facts = [(key, value) for key, value in analysis.recording.facts if key not in OWN_FACTS]
     if not facts:
         return ""
-    items = "".join(f"<li>{text(key.replace('_', ' '))} <b>{text(value)}</b></li>" for key, value in facts)
+    items = "".join(
+        f"<li>{text(key.replace('_', ' '))} <b>{text(value)}</b></li>" for key, value in facts
+    )
     return f'<ul class="notes"><li class="head">Settings of this run</li>{items}</ul>'
 
 
@@ -122,15 +126,27 @@ def tiles(analysis: Analysis, costs: Costs | None = None) -> str:
 
 def _planned(analysis: Analysis) -> list[Tile]:
     """Figures of a plan that was not driven, all predicted."""
-    steps, tiles = analysis.recording.planned, []
-    for name, part in (("planned program", "whole"), ("movements", "movements"), ("pauses", "pauses")):
-        found, within = planned_share(steps, part), planned_interval(steps) if part == "whole" else None
+    steps = analysis.recording.planned
+    tiles = []
+    for name, part in (
+        ("planned program", "whole"),
+        ("movements", "movements"),
+        ("pauses", "pauses"),
+    ):
+        found = planned_share(steps, part)
+        within = planned_interval(steps) if part == "whole" else None
         if found is None:
             continue
-        spread = f"90 % interval {joules(within[0])} to {joules(within[1])}" if within is not None else ""
+        spread = (
+            f"90 % interval {joules(within[0])} to {joules(within[1])}"
+            if within is not None
+            else ""
+        )
         why = _says(one_sided(found.energy, *within)) if within is not None else ""
         tiles.append(
-            Tile(name, joules(found.energy), (f"in {seconds(found.seconds)}, predicted", spread, why))
+            Tile(
+                name, joules(found.energy), (f"in {seconds(found.seconds)}, predicted", spread, why)
+            )
         )
     near = millimetres(planned_clearance(steps))
     return [*tiles, Tile("least clearance", near, ("planned, without pairs that may touch",))]
@@ -142,7 +158,8 @@ def _recorded(analysis: Analysis) -> Tile:
 
 
 def _whole(analysis: Analysis, program: ProgramTotals) -> Tile:
-    whole, shortened = program.whole, program.unshortened is not None
+    whole = program.whole
+    shortened = program.unshortened is not None
     planned = program.planned_movements.energy + program.planned_pauses.energy
     return Tile(
         "this run, pauses shortened" if shortened else "program, one cycle",
@@ -157,7 +174,9 @@ def _whole(analysis: Analysis, program: ProgramTotals) -> Tile:
 
 
 def _within(analysis: Analysis) -> str:
-    """The interval of what was predicted: the sum of the steps', as what is unsure is so in all alike."""
+    """The interval of what was predicted: the sum of the steps', as what is unsure is so in all
+    alike.
+    """
     _, low, high = _sums(analysis)
     return f" (90 % interval {joules(low)} to {joules(high)})" if high > 0.0 else ""
 
@@ -186,10 +205,14 @@ def _unshortened(program: ProgramTotals) -> Tile | None:
         return None
     cut = f"pauses of {seconds(full.full_pauses)} instead of {seconds(full.run_pauses)}"
     if math.isnan(full.energy):
-        return Tile("cycle with full pauses", "not known", ("the pauses of the run don't match the cell's",))
+        return Tile(
+            "cycle with full pauses", "not known", ("the pauses of the run don't match the cell's",)
+        )
     energy = f"{number(full.energy / 3600.0, 'Wh')} in {seconds(full.seconds)}"
     return Tile(
-        "cycle with full pauses", joules(full.energy), (energy, cut, "computed from this run and the data")
+        "cycle with full pauses",
+        joules(full.energy),
+        (energy, cut, "computed from this run and the data"),
     )
 
 
@@ -213,7 +236,11 @@ def _yearly(analysis: Analysis, costs: Costs) -> Tile | None:
         return None
     energy = cycle.energy * costs.cycles_per_year(cycle.seconds)
     co2 = f"{kilowatt_hours(energy)}, {number(costs.co2(energy), 'kg')} CO2"
-    assumed = "prices and shifts assumed" if set(costs.given) != set(NAMES) else "prices and shifts as given"
+    assumed = (
+        "prices and shifts assumed"
+        if set(costs.given) != set(NAMES)
+        else "prices and shifts as given"
+    )
     return Tile("a year of such cycles", money(costs.money(energy), costs.currency), (co2, assumed))
 
 
@@ -230,8 +257,12 @@ def _parts(program: ProgramTotals, origin: str) -> list[Tile]:
 
 def _part(name: str, found: Share, planned: Share, whole: Share, origin: str) -> Tile:
     of_run = share(found.energy, whole.energy)
-    against = f"predicted {joules(planned.energy)}, {_against(found.energy, planned.energy, origin)}"
-    return Tile(name, joules(found.energy), (f"{seconds(found.seconds)}, {of_run} of the run", against))
+    against = (
+        f"predicted {joules(planned.energy)}, {_against(found.energy, planned.energy, origin)}"
+    )
+    return Tile(
+        name, joules(found.energy), (f"{seconds(found.seconds)}, {of_run} of the run", against)
+    )
 
 
 def _against(found: float, planned: float, origin: str) -> str:
@@ -239,7 +270,15 @@ def _against(found: float, planned: float, origin: str) -> str:
 
 
 def _clearance(analysis: Analysis) -> Tile:
-    least = min((r.clearance.least for r in analysis.movements if r.clearance is not None), default=math.nan)
+    least = min(
+        (r.clearance.least for r in analysis.movements if r.clearance is not None), default=math.nan
+    )
     kept = analysis.safety_distance
-    bound = "safety distance not recorded" if math.isnan(kept) else f"safety distance {millimetres(kept)}"
-    return Tile("least clearance", millimetres(least), (bound, "executed, without pairs that may touch"))
+    bound = (
+        "safety distance not recorded"
+        if math.isnan(kept)
+        else f"safety distance {millimetres(kept)}"
+    )
+    return Tile(
+        "least clearance", millimetres(least), (bound, "executed, without pairs that may touch")
+    )

@@ -12,7 +12,8 @@ from ir_recorder.report.words import joules, share, text
 
 def lever_section(analysis: Analysis, costs: Costs) -> str:
     """Section of the page; "" where no lever is known."""
-    found, program = levers(analysis), analysis.program
+    found = levers(analysis)
+    program = analysis.program
     cycle = cycle_of(analysis)
     if not found or program is None or cycle is None:
         return ""
@@ -29,7 +30,8 @@ def lever_section(analysis: Analysis, costs: Costs) -> str:
     )
     heads = ("lever", ">joules of this run", ">share", ">a year, at most", "what would save them")
     return (
-        '<section id="levers"><h2>The biggest levers</h2><p class="hint">Upper bounds from figures of this '
+        '<section id="levers"><h2>The biggest levers</h2><p class="hint">Upper bounds from '
+        "figures of this "
         "run, each by itself: together they count some joules twice.</p>"
         f"{table(heads, rows, 'The biggest levers')}</section>"
     )

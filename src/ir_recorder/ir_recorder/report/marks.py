@@ -1,6 +1,8 @@
-"""How named curves and points of one drawing differ: by a colour, a mark, and beyond seven by a dash too.
+"""How named curves and points of one drawing differ: by a colour, a mark, and beyond seven by a
+dash too.
 
-The colours are those of Okabe and Ito, which the colour-blind distinguish; axes.js draws curves with them.
+The colours are those of Okabe and Ito, which the colour-blind distinguish; axes.js draws curves
+with them.
 """
 
 from __future__ import annotations
@@ -16,11 +18,14 @@ MARKS = (
     "M-5 -2H5V2H-5Z",
     "M-2 -5H2V5H-2Z",
 )
-"""SVG paths about the origin; as many as share no factor with the colours, so that 56 pairs differ."""
+"""SVG paths about the origin; as many as share no factor with the colours, so that 56 pairs
+differ.
+"""
 
 
 def mark(index: int, x: float, y: float, inside: str) -> str:
     """The mark of a series at a place of a drawing, as SVG around what belongs to it."""
-    path, colour = MARKS[index % len(MARKS)], index % COLOURS + 1
+    path = MARKS[index % len(MARKS)]
+    colour = index % COLOURS + 1
     place = f"translate({x:.1f} {y:.1f})"
     return f'<path class="s{colour}" transform="{place}" d="{path}">{inside}</path>'

@@ -1,4 +1,6 @@
-"""What a cycle costs and what its plan saves: joules, money and CO2 per part, per shift and per year."""
+"""What a cycle costs and what its plan saves: joules, money and CO2 per part, per shift and per
+year.
+"""
 
 from __future__ import annotations
 
@@ -23,10 +25,11 @@ class Cycle:
 
 
 def cycle_of(analysis: Analysis) -> Cycle | None:
-    """The cycle as it is in production: with full pauses where the run's are shortened; of a plan that was
-    not driven the planned one; None without either.
+    """The cycle as it is in production: with full pauses where the run's are shortened; of a plan
+    that was not driven the planned one; None without either.
     """
-    program, savings = analysis.program, analysis.savings
+    program = analysis.program
+    savings = analysis.savings
     planned = planned_share(analysis.recording.planned)
     if program is None and planned is not None:
         return Cycle("planned program, predicted", planned.energy, planned.seconds)
@@ -37,7 +40,9 @@ def cycle_of(analysis: Analysis) -> Cycle | None:
         return None
     full = program.unshortened
     if full is not None and math.isfinite(full.energy):
-        return Cycle("cycle with full pauses, computed from this run and the data", full.energy, full.seconds)
+        return Cycle(
+            "cycle with full pauses, computed from this run and the data", full.energy, full.seconds
+        )
     name = "this run" if full is None else "this run, its pauses shortened"
     return Cycle(name, program.whole.energy, program.whole.seconds)
 
@@ -47,29 +52,37 @@ def costs_section(analysis: Analysis, costs: Costs) -> str:
     cycle = cycle_of(analysis)
     if cycle is None:
         return ""
-    shift, year = costs.cycles_per_shift(cycle.seconds), costs.cycles_per_year(cycle.seconds)
+    shift = costs.cycles_per_shift(cycle.seconds)
+    year = costs.cycles_per_year(cycle.seconds)
     counts = (1.0 / costs.parts_per_cycle, shift, year)
     rows = [_row(cycle.name, cycle.energy, cycle.seconds, counts, costs)]
     rows += _saved(analysis, counts, costs)
     heads = ("", ">a cycle", ">a part", ">a shift", ">a year")
-    origin = analysis.recording.origin if analysis.program is not None else "not there: nothing was driven"
+    origin = (
+        analysis.recording.origin
+        if analysis.program is not None
+        else "not there: nothing was driven"
+    )
     return (
         '<section id="costs"><h2>What a cycle costs</h2>'
-        f'<p class="hint">Energy of the run is {text(origin)}; savings are predicted, with their 90 % '
+        f'<p class="hint">Energy of the run is {text(origin)}; savings are predicted, with their '
+        "90 % "
         "interval, at the same number of cycles.</p>"
         f"{table(heads, rows, 'What a cycle costs')}{_assumptions(costs, counts)}</section>"
     )
 
 
-def _row(name: str, energy: float, length: float, counts: tuple[float, ...], costs: Costs) -> tuple[str, ...]:
+def _row(
+    name: str, energy: float, length: float, counts: tuple[float, ...], costs: Costs
+) -> tuple[str, ...]:
     cycle = f"<b>{joules(energy)}</b><small>{seconds(length)}</small>"
     return (text(name), cycle, *(_priced(energy * count, costs) for count in counts))
 
 
 def _priced(energy: float, costs: Costs) -> str:
     return (
-        f"<b>{text(money(costs.money(energy), costs.currency))}</b>"
-        f"<small>{kilowatt_hours(energy)}</small><small>{number(costs.co2(energy), 'kg')} CO2</small>"
+        f"<b>{text(money(costs.money(energy), costs.currency))}</b><small>{kilowatt_hours(energy)}</small><small>{number(costs.co2(energy), 'kg')} "  # noqa: E501
+        "CO2</small>"
     )
 
 
@@ -78,7 +91,11 @@ def money(value: float, currency: str) -> str:
     if not math.isfinite(value):
         return DASH
     shown = (
-        f"{value:,.0f}" if abs(value) >= 100.0 else f"{value:.2f}" if abs(value) >= 1.0 else f"{value:.4f}"
+        f"{value:,.0f}"
+        if abs(value) >= 100.0
+        else f"{value:.2f}"
+        if abs(value) >= 1.0
+        else f"{value:.4f}"
     )
     return f"{shown.replace(',', ' ')} {currency}"
 
@@ -88,10 +105,15 @@ def _saved(analysis: Analysis, counts: tuple[float, ...], costs: Costs) -> list[
     if savings is None:
         return []
     program = analysis.program
-    cut = " (pauses as shortened)" if program is not None and program.unshortened is not None else ""
+    cut = (
+        " (pauses as shortened)" if program is not None and program.unshortened is not None else ""
+    )
     parts = [("saved by its movements", savings.movements, "")]
     if savings.pauses.seconds > 0.0:
-        parts += [("saved in its pauses", savings.pauses, cut), ("saved together", savings.total, cut)]
+        parts += [
+            ("saved in its pauses", savings.pauses, cut),
+            ("saved together", savings.total, cut),
+        ]
     return [_saving(f"{name}{note}", saving, counts, costs) for name, saving, note in parts]
 
 
@@ -100,7 +122,9 @@ def _saving(name: str, saving: Saving, counts: tuple[float, ...], costs: Costs) 
     for count in counts:
         low, high = (costs.money(end * count) for end in (saving.saved_low, saving.saved_high))
         amount = text(money(costs.money(saving.saved * count), costs.currency))
-        between = f"<small>{text(money(low, ''))}to {text(money(high, ''))}</small>" if high > low else ""
+        between = (
+            f"<small>{text(money(low, ''))}to {text(money(high, ''))}</small>" if high > low else ""
+        )
         cells.append(f"<b>{amount}</b>{between}")
     return (text(name), *cells)
 

@@ -37,7 +37,8 @@ def write_report(
     costs: Costs | None = None,
     front: Sequence[ProgramPoint] = (),
 ) -> Path:
-    """Writes the page below `roots`, in place of another page but of no other file; its absolute path.
+    """Writes the page below `roots`, in place of another page but of no other file; its absolute
+    path.
 
     PathError when it can't be written.
     """
@@ -52,8 +53,8 @@ def report_html(
     costs: Costs | None = None,
     front: Sequence[ProgramPoint] = (),
 ) -> str:
-    """The page as text, with the checks to show; without `costs` with those that are assumed. front: of the
-    program, as it was planned.
+    """The page as text, with the checks to show; without `costs` with those that are assumed.
+    front: of the program, as it was planned.
 
     The chart of clearances shows the recorded safety distance, else that of the tolerances.
     """

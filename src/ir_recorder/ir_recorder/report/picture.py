@@ -1,4 +1,6 @@
-"""A picture of power and motion, for people who don't open a page. matplotlib is asked for only here."""
+"""A picture of power and motion, for people who don't open a page. matplotlib is asked for only
+here.
+"""
 
 from __future__ import annotations
 
@@ -37,10 +39,11 @@ MOST_POINTS = 4000  # more than twice the picture's pixels
 
 
 def write_picture(analysis: Analysis, path: str | Path, roots: FileRoots = ANYWHERE) -> Path:
-    """Power with the modes marked, joules per movement, and the tool's path from above, as PNG below `roots`.
+    """Power with the modes marked, joules per movement, and the tool's path from above, as PNG
+    below `roots`.
 
-    Returns the absolute path. RecorderError where matplotlib isn't installed, PathError where the file
-    can't be written.
+    Returns the absolute path. RecorderError where matplotlib isn't installed, PathError where the
+    file can't be written.
     """
     try:
         from matplotlib.figure import Figure
@@ -60,7 +63,11 @@ def write_picture(analysis: Analysis, path: str | Path, roots: FileRoots = ANYWH
 
 def _power(axes: Axes, analysis: Analysis) -> None:
     power = analysis.recording.power
-    axes.set(xlabel="time [s]", ylabel="power at the mains [W]", title=f"Power, {joules(analysis.energy)}")
+    axes.set(
+        xlabel="time [s]",
+        ylabel="power at the mains [W]",
+        title=f"Power, {joules(analysis.energy)}",
+    )
     _plain(axes)
     if power is None:
         return
@@ -83,7 +90,9 @@ def _mode_bands(axes: Axes, power: PowerSeries) -> None:
         label = mode_words(name) if name in MODE_COLOURS else "transition"
         end = float(power.time[min(last, len(power.time) - 1)])
         shown = None if label in named else label
-        axes.axvspan(float(power.time[first]), end, color=colour, alpha=0.22, linewidth=0, label=shown)
+        axes.axvspan(
+            float(power.time[first]), end, color=colour, alpha=0.22, linewidth=0, label=shown
+        )
         named.add(label)
 
 
@@ -103,7 +112,8 @@ def _joules(axes: Axes, analysis: Analysis) -> None:
 
 
 def _path(axes: Axes, analysis: Analysis) -> None:
-    cell, joints = analysis.cell, analysis.recording.joints
+    cell = analysis.cell
+    joints = analysis.recording.joints
     axes.set(xlabel="x [m]", ylabel="y [m]", title="Tool path from above, by power", aspect="equal")
     _plain(axes)
     if cell is None or joints is None or joints.position.shape[1] != cell.robot.n:
@@ -112,7 +122,8 @@ def _path(axes: Axes, analysis: Analysis) -> None:
         for body in machine.world_bodies():
             low, high = body.bounds()
             if np.isfinite(low).all():
-                xs, ys = [low[0], high[0], high[0], low[0]], [low[1], low[1], high[1], high[1]]
+                xs = [low[0], high[0], high[0], low[0]]
+                ys = [low[1], low[1], high[1], high[1]]
                 axes.fill(xs, ys, color="#b9c5d2", alpha=0.5, linewidth=0)
     stride = max(1, len(joints.time) // MOST_POINTS)
     q = np.ascontiguousarray(joints.position[::stride])

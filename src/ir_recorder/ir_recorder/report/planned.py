@@ -12,7 +12,9 @@ _PARTS = {"whole": (True, False), "movements": (False,), "pauses": (True,)}
 
 
 def planned_share(steps: Sequence[PlannedMovement], part: str = "whole") -> Share | None:
-    """Time and energy of the whole program, its movements or its pauses; None for no plan or another part."""
+    """Time and energy of the whole program, its movements or its pauses; None for no plan or
+    another part.
+    """
     if not steps or part not in _PARTS:
         return None
     own = [step for step in steps if step.is_pause in _PARTS[part]]
@@ -21,7 +23,9 @@ def planned_share(steps: Sequence[PlannedMovement], part: str = "whole") -> Shar
 
 def planned_interval(steps: Sequence[PlannedMovement]) -> tuple[float, float] | None:
     """90 % interval of the whole energy [J], None where the plan has none."""
-    low, high = (sum(getattr(step.report, name) for step in steps) for name in ("energy_low", "energy_high"))
+    low, high = (
+        sum(getattr(step.report, name) for step in steps) for name in ("energy_low", "energy_high")
+    )
     return (low, high) if high > low else None
 
 

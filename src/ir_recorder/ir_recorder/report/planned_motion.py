@@ -1,4 +1,6 @@
-"""The picture in 3D of a program that was planned and not driven, and of one for which no plan was found."""
+"""The picture in 3D of a program that was planned and not driven, and of one for which no plan was
+found.
+"""
 
 from __future__ import annotations
 
@@ -23,10 +25,11 @@ from ir_recorder.report.side_motion import motion_of
 
 
 def planned_side(analysis: Analysis) -> Side | None:
-    """The planned steps with the power [W] that they are predicted to take; None where their motion is not
-    known.
+    """The planned steps with the power [W] that they are predicted to take; None where their motion
+    is not known.
     """
-    cell, steps = analysis.cell, analysis.recording.planned
+    cell = analysis.cell
+    steps = analysis.recording.planned
     if cell is None or not any(step.trajectory is not None for step in steps):
         return None
     time, watts = _power(steps, cell)
@@ -36,7 +39,11 @@ def planned_side(analysis: Analysis) -> Side | None:
 
 def planned_scene(side: Side, cell: Cell) -> dict[str, Json]:
     """What motion.js draws of it; doors stand as the movements rely on them."""
-    return {**motion_of(side, cell), **cell_scene(cell), "bodies": door_bodies(cell, list(_states(side)))}
+    return {
+        **motion_of(side, cell),
+        **cell_scene(cell),
+        "bodies": door_bodies(cell, list(_states(side))),
+    }
 
 
 def failed_scene(cell: Cell) -> dict[str, Json]:
@@ -49,7 +56,9 @@ def blamed(cell: Cell, problems: Sequence[str]) -> list[Json]:
     """The bodies and capsules that the problems name: drawn in red."""
     words = set(re.findall(r"\w[\w.\-]*\w|\w", " ".join(problems)))
     capsules = {
-        capsule.name for part in ("", *(p.name for p in cell.parts)) for capsule in cell.capsules(part)
+        capsule.name
+        for part in ("", *(p.name for p in cell.parts))
+        for capsule in cell.capsules(part)
     }
     return [*sorted((capsules | {body.name for body in cell.bodies()}) & words)]
 
@@ -71,7 +80,9 @@ def _standing(cell: Cell) -> PlannedMovement:
 
 
 def _label(step: PlannedMovement) -> str:
-    return " → ".join(dict.fromkeys(filter(None, (step.from_station, step.to_station)))) or step.kind
+    return (
+        " → ".join(dict.fromkeys(filter(None, (step.from_station, step.to_station)))) or step.kind
+    )
 
 
 def _timed(steps: Sequence[PlannedMovement]) -> Iterator[tuple[float, PlannedMovement]]:
@@ -89,11 +100,14 @@ def _states(side: Side) -> Iterator[TextEvent]:
 
 
 def _power(steps: Sequence[PlannedMovement], cell: Cell) -> tuple[FloatArray, FloatArray]:
-    """Time [s] and power at the mains [W]: of movements by the data sheet, of pauses as they were planned."""
+    """Time [s] and power at the mains [W]: of movements by the data sheet, of pauses as they were
+    planned.
+    """
     data = cell.robot.controller
     parameters = data_sheet_of(cell.robot, data)
     model = PowerModel(cell.robot, data.dc_link, cell.base_pose, parameters)
-    times, watts = [], []
+    times = []
+    watts = []
     for begin, step in _timed(steps):
         if step.trajectory is None:
             times.append(begin + np.array([0.0, step.duration]))

@@ -1,8 +1,11 @@
-"""A robot's surface made from its data: housings about its axes, beams and tubes between them, a pedestal.
+"""A robot's surface made from its data: housings about its axes, beams and tubes between them, a
+pedestal.
 
-The collision capsules say how thick and how long a link is, the joints' axes which of them turn. A capsule
-along an axis of its link becomes a turned part, another one a beam with a waist; each joint gets a housing.
-All lies within the capsules but for rims of a few centimetres: it is a picture, clearance is of the capsules.
+The collision capsules say how thick and how long a link is, the joints' axes which of them turn. A
+capsule along an axis of its link becomes a turned part, another one a beam with a waist; each joint
+gets a housing.
+All lies within the capsules but for rims of a few centimetres: it is a picture, clearance is of the
+capsules.
 """
 
 from __future__ import annotations
@@ -54,7 +57,9 @@ def _of_capsule(robot: RobotModel, capsule: Capsule) -> Part:
 
 
 def _axes(robot: RobotModel, link: int) -> list[FloatArray]:
-    """Axes (3,) in the link's frame: of the joint that carries it, and of the one that it carries."""
+    """Axes (3,) in the link's frame: of the joint that carries it, and of the one that it
+    carries.
+    """
     axes = [robot.joint_axis[link - 1]]
     if link < len(robot.joint_axis):
         axes.append(robot.joint_origin[link][:3, :3] @ robot.joint_axis[link])
@@ -63,7 +68,8 @@ def _axes(robot: RobotModel, link: int) -> list[FloatArray]:
 
 def _pedestal(capsule: Capsule) -> Mesh:
     """A foot plate and a column that narrows, as high as the capsule."""
-    r, high = capsule.radius, float(max(capsule.p0[2], capsule.p1[2])) + 0.25 * capsule.radius
+    r = capsule.radius
+    high = float(max(capsule.p0[2], capsule.p1[2])) + 0.25 * capsule.radius
     profile = [
         (0.0, 0.0),
         (r, 0.0),
@@ -100,7 +106,8 @@ def _beam(capsule: Capsule, along: FloatArray, length: float, axis: FloatArray) 
     side = side / norm if norm > 1e-6 else to_axis(along)[:, 0]
     up = np.cross(along, side)
     angle = np.linspace(0.0, 2.0 * np.pi, SEGMENTS + 1)
-    c, s = np.cos(angle), np.sin(angle)
+    c = np.cos(angle)
+    s = np.sin(angle)
     ring = np.stack(
         [np.sign(c) * np.abs(c) ** (2 / _SQUARE), np.sign(s) * np.abs(s) ** (2 / _SQUARE)], axis=1
     )
@@ -118,15 +125,21 @@ def _beam(capsule: Capsule, along: FloatArray, length: float, axis: FloatArray) 
 
 
 def _lofted(sections: FloatArray) -> Mesh:
-    """Closed rings (K, S, 3), first point repeated at the end, joined to a surface with flat ends."""
+    """Closed rings (K, S, 3), first point repeated at the end, joined to a surface with flat
+    ends.
+    """
     count, row = sections.shape[:2]
     k, s = np.meshgrid(np.arange(count - 1), np.arange(row - 1), indexing="ij")
     a = (k * row + s).ravel()
-    sides = np.concatenate([np.stack([a, a + 1, a + row + 1], 1), np.stack([a, a + row + 1, a + row], 1)])
+    sides = np.concatenate(
+        [np.stack([a, a + 1, a + row + 1], 1), np.stack([a, a + row + 1, a + row], 1)]
+    )
     around = np.gradient(sections, axis=1)
     around[:, 0] = around[:, -1] = (sections[:, 1] - sections[:, -2]) / 2.0
     normals = np.cross(around, np.gradient(sections, axis=0)).reshape(-1, 3)
-    points, triangles, start = [sections.reshape(-1, 3)], [sides], count * row
+    points = [sections.reshape(-1, 3)]
+    triangles = [sides]
+    start = count * row
     shades = [normals]
     for ring, sign in ((sections[0], -1.0), (sections[-1], 1.0)):
         middle = ring[:-1].mean(axis=0)
@@ -146,7 +159,9 @@ def _lofted(sections: FloatArray) -> Mesh:
 
 
 def lathe(profile: FloatArray) -> Mesh:
-    """A profile (K, 2) of radii and heights, from the bottom up, turned about z; edges stay sharp."""
+    """A profile (K, 2) of radii and heights, from the bottom up, turned about z; edges stay
+    sharp.
+    """
     angle = np.linspace(0.0, 2.0 * np.pi, SEGMENTS + 1)
     turn = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     points: list[FloatArray] = []
@@ -166,11 +181,15 @@ def lathe(profile: FloatArray) -> Mesh:
 
 
 def _housings(robot: RobotModel) -> Iterator[Part]:
-    """A cylinder about each joint that swings, on the link that it carries and nearly as thick as it."""
+    """A cylinder about each joint that swings, on the link that it carries and nearly as thick as
+    it.
+    """
     for link in range(1, len(robot.joint_axis) + 1):
         axis = robot.joint_axis[link - 1]
         near = [c for c in robot.capsules if c.link == link and _distance(c) < c.radius]
-        swings = [c for c in near if np.linalg.norm(c.p1 - c.p0) > c.radius and not _parallel(c, axis)]
+        swings = [
+            c for c in near if np.linalg.norm(c.p1 - c.p0) > c.radius and not _parallel(c, axis)
+        ]
         if not swings:
             continue
         r = 0.8 * _SLIM * max(c.radius for c in swings)
@@ -187,7 +206,9 @@ def _housings(robot: RobotModel) -> Iterator[Part]:
 
 
 def _counterbalance(robot: RobotModel) -> Iterator[Part]:
-    """The cylinder of the spring, from its pivot towards the rod's eye as it points with the arm upright."""
+    """The cylinder of the spring, from its pivot towards the rod's eye as it points with the arm
+    upright.
+    """
     spring = robot.counterbalance
     if spring is None:
         return
@@ -198,7 +219,14 @@ def _counterbalance(robot: RobotModel) -> Iterator[Part]:
     reach = float(np.linalg.norm(along))
     r = float(np.sqrt(spring.piston_area / np.pi)) * 3.2
     profile = np.array(
-        [(0.0, -r), (r, -r), (r, 0.7 * reach), (0.4 * r, 0.72 * reach), (0.4 * r, reach), (0.0, reach)]
+        [
+            (0.0, -r),
+            (r, -r),
+            (r, 0.7 * reach),
+            (0.4 * r, 0.72 * reach),
+            (0.4 * r, reach),
+            (0.0, reach),
+        ]
     )
     yield Part(spring.joint, "joint", _moved(lathe(profile), to_axis(along / reach), pivot))
 

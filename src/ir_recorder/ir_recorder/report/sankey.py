@@ -14,7 +14,10 @@ from ir_recorder.analysis.flows import EnergyFlows, energy_flows
 from ir_recorder.report.tables import table
 from ir_recorder.report.words import joules, share, text
 
-WIDTH, TALL, GAP, BAR = 860.0, 250.0, 16.0, 14.0
+WIDTH = 860.0
+TALL = 250.0
+GAP = 16.0
+BAR = 14.0
 _TOP = 26.0
 _COLUMNS = (8.0, 240.0, 450.0, 690.0)
 _LEAST = 0.002  # share of the mains that is drawn; less is in the table alone
@@ -22,7 +25,9 @@ _LEAST = 0.002  # share of the mains that is drawn; less is in the table alone
 
 @dataclass
 class _Node:
-    """A bar with its joules; `used_in`, `used_out`: how much of its two sides is taken by flows already."""
+    """A bar with its joules; `used_in`, `used_out`: how much of its two sides is taken by flows
+    already.
+    """
 
     name: str
     style: str
@@ -40,11 +45,15 @@ def sankey_section(analysis: Analysis) -> str:
         return ""
     over = "of the program" if analysis.steps else "of the recording"
     hint = (
-        f"Energy {over}, {joules(flows.mains)} at the mains. Gross flows: axes that brake return energy to "
+        f"Energy {over}, {joules(flows.mains)} at the mains. Gross flows: axes that brake return "
+        "energy to "
         "the DC bus, masses that are lowered return it to the axes; both flow back to the left."
     )
     if flows.split:
-        hint += " Lifting follows from posture and load by the data of the robot; friction is what remains."
+        hint += (
+            " Lifting follows from posture and load by the data of the robot; friction is "
+            "what remains."
+        )
     return (
         '<section id="flows"><h2>Where the joules go</h2>'
         f'<p class="hint">{text(hint)}</p>'
@@ -89,8 +98,11 @@ def sankey(flows: EnergyFlows) -> str:
     least = _LEAST * flows.mains
     shown = [node for node in nodes.values() if node.joules > least]
     above = flows.mains - flows.from_mains
-    scale = TALL / max(flows.mains, nodes["bus"].joules + above, nodes["axes"].joules + flows.resistor)
-    bottom, paths = _place(shown, scale), []
+    scale = TALL / max(
+        flows.mains, nodes["bus"].joules + above, nodes["axes"].joules + flows.resistor
+    )
+    bottom = _place(shown, scale)
+    paths = []
     for source, to, value in links:
         if value <= least:
             continue
@@ -119,7 +131,9 @@ def _graph(flows: EnergyFlows) -> tuple[dict[str, _Node], list[tuple[str, str, f
         "bus": _Node("DC bus", "bus", 1, flows.from_mains + flows.returned),
         "resistor": _Node("brake resistor", "dissipated", 2, flows.resistor),
         "axes": _Node("axes", "axes", 2, flows.taken + lowered),
-        "friction": _Node("friction" if flows.split else "losses and friction", "friction", 3, work),
+        "friction": _Node(
+            "friction" if flows.split else "losses and friction", "friction", 3, work
+        ),
         "motors": _Node("motors, inverters", "loss", 3, flows.motors if flows.split else 0.0),
         "lifting": _Node("lifting", "lift", 3, flows.lifted if flows.split else 0.0),
     }
@@ -150,33 +164,44 @@ def _place(nodes: Sequence[_Node], scale: float) -> float:
 def _forward(source: _Node, to: _Node, value: float, scale: float) -> str:
     """A ribbon from the right side of a node to the left side of one further right."""
     high = value * scale
-    x0, x1 = _COLUMNS[source.column] + BAR, _COLUMNS[to.column]
-    y0, y1 = source.y + source.used_out, to.y + to.used_in
+    x0 = _COLUMNS[source.column] + BAR
+    x1 = _COLUMNS[to.column]
+    y0 = source.y + source.used_out
+    y1 = to.y + to.used_in
     source.used_out += high
     to.used_in += high
     middle = (x0 + x1) / 2.0
     path = (
-        f"M{x0:.1f} {y0:.1f}C{middle:.1f} {y0:.1f} {middle:.1f} {y1:.1f} {x1:.1f} {y1:.1f}V{y1 + high:.1f}"
+        f"M{x0:.1f} {y0:.1f}C{middle:.1f} {y0:.1f} {middle:.1f} {y1:.1f} {x1:.1f} "
+        f"{y1:.1f}V{y1 + high:.1f}"
         f"C{middle:.1f} {y1 + high:.1f} {middle:.1f} {y0 + high:.1f} {x0:.1f} {y0 + high:.1f}Z"
     )
     return f'<path class="flow {to.style}" d="{path}">{_title(source.name, to.name, value)}</path>'
 
 
 def _back(source: _Node, to: _Node, value: float, scale: float, bottom: float) -> tuple[str, float]:
-    """A ribbon from the right side of a node below everything to one further left, and the new bottom."""
+    """A ribbon from the right side of a node below everything to one further left, and the new
+    bottom.
+    """
     high = value * scale
-    x0, x1 = _COLUMNS[source.column] + BAR, _COLUMNS[to.column]
-    y0, y1 = source.y + source.used_out + high / 2.0, to.y + to.used_in + high / 2.0
+    x0 = _COLUMNS[source.column] + BAR
+    x1 = _COLUMNS[to.column]
+    y0 = source.y + source.used_out + high / 2.0
+    y1 = to.y + to.used_in + high / 2.0
     source.used_out += high
     to.used_in += high
     under = bottom + GAP + high / 2.0
-    r0, r1 = min((under - y0) / 2.0, 46.0), min((under - y1) / 2.0, 46.0)
+    r0 = min((under - y0) / 2.0, 46.0)
+    r1 = min((under - y1) / 2.0, 46.0)
     path = (
         f"M{x0:.1f} {y0:.1f}{_arc(r0, 1, 1)}V{under - r0:.1f}{_arc(r0, -1, 1)}H{x1:.1f}"
         f"{_arc(r1, -1, -1)}V{y1 + r1:.1f}{_arc(r1, 1, -1)}"
     )
-    middle, words = (x0 + x1) / 2.0, f"back {joules(value)}"
-    label = f'<text x="{middle:.1f}" y="{under + 4.0:.1f}" text-anchor="middle">{text(words)}</text>'
+    middle = (x0 + x1) / 2.0
+    words = f"back {joules(value)}"
+    label = (
+        f'<text x="{middle:.1f}" y="{under + 4.0:.1f}" text-anchor="middle">{text(words)}</text>'
+    )
     title = _title(source.name, to.name, value)
     drawn = f'<path class="back" stroke-width="{max(high, 1.0):.1f}" d="{path}">{title}</path>'
     return drawn + label, under + max(high / 2.0, 8.0)
@@ -188,9 +213,15 @@ def _arc(radius: float, right: int, down: int) -> str:
 
 
 def _bar(node: _Node, scale: float, mains: float) -> str:
-    x, high = _COLUMNS[node.column], max(node.joules * scale, 2.0)
-    words = f"{joules(node.joules)}, {share(node.joules, mains)}" if math.isfinite(node.joules) else ""
-    rect = f'<rect class="{node.style}" x="{x:g}" y="{node.y:.1f}" width="{BAR:g}" height="{high:.1f}"/>'
+    x = _COLUMNS[node.column]
+    high = max(node.joules * scale, 2.0)
+    words = (
+        f"{joules(node.joules)}, {share(node.joules, mains)}" if math.isfinite(node.joules) else ""
+    )
+    rect = (
+        f'<rect class="{node.style}" x="{x:g}" y="{node.y:.1f}" width="{BAR:g}" '
+        f'height="{high:.1f}"/>'
+    )
     at = x + BAR + 6.0
     if node.column < len(_COLUMNS) - 1 and high < 2.4 * GAP and node.column:
         one = f"{text(node.name)} {text(words)}"

@@ -30,9 +30,12 @@ def savings_section(analysis: Analysis) -> str:
     heads = ("", ">baseline", ">planned", ">saved", ">time", "held against")
     return (
         '<section id="savings"><h2>What the program saves</h2>'
-        '<p class="hint">Predicted energies at the mains, over the same seconds, with the 90 % interval of '
-        "what is saved; nothing here is simulated or measured. Losses that the data sheet puts at zero can "
-        "only add; where the common program has more of them, the interval lies mostly above the value.</p>"
+        '<p class="hint">Predicted energies at the mains, over the same seconds, with the 90 % '
+        "interval of "
+        "what is saved; nothing here is simulated or measured. Losses that the data sheet puts "
+        "at zero can "
+        "only add; where the common program has more of them, the interval lies mostly above the "
+        "value.</p>"
         f"{table(heads, cells, 'What the program saves')}"
         f"<details><summary>In words</summary><p>{text(savings.sentence)}; program "
         f"{text(savings.program_id)}.</p></details></section>"
@@ -54,10 +57,12 @@ def savings_lines(analysis: Analysis) -> list[str]:
 def _rows(analysis: Analysis, savings: ProgramSavings) -> list[Row]:
     """Name, figures and baseline; the row of pauses only where there are any."""
     common = (
-        f"synchronous S-curve PTP at 100 % through the same stations ({savings.around} of {savings.across} "
-        "around bodies)"
+        f"synchronous S-curve PTP at 100 % through the same stations ({savings.around} of "
+        f"{savings.across} around bodies)"
     )
-    shortened = " (pauses shortened)" if analysis.recording.fact(contents.UNSHORTENED_PAUSES) else ""
+    shortened = (
+        " (pauses shortened)" if analysis.recording.fact(contents.UNSHORTENED_PAUSES) else ""
+    )
     rows = [("movements", savings.movements, common)]
     if savings.pauses.seconds > 0.0:
         rows.append(("pauses", savings.pauses, f"the controller's own timers{shortened}"))
@@ -74,7 +79,11 @@ def _sure(saving: Saving) -> str:
     if saving.saved_low == saving.saved_high:
         return ""
     within = f", 90 % interval {joules(saving.saved_low)} to {joules(saving.saved_high)}"
-    return within if saving.certain else f"{within}: zero lies in it, so it is open whether anything is saved"
+    return (
+        within
+        if saving.certain
+        else f"{within}: zero lies in it, so it is open whether anything is saved"
+    )
 
 
 def _share(saving: Saving) -> str:

@@ -1,4 +1,6 @@
-"""The cell and its motion for the picture in 3D: the joint values 50 times a second, parts, loads, pairs."""
+"""The cell and its motion for the picture in 3D: the joint values 50 times a second, parts, loads,
+pairs.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +22,14 @@ POWER_STEP = 1.0  # W: colours show no less, and int16 holds 32 kW
 
 def scene(analysis: Analysis) -> dict[str, Json] | None:
     """What motion.js draws; None where cell or joint states are missing."""
-    cell, joints = analysis.cell, analysis.recording.joints
-    if cell is None or joints is None or joints.position.shape[1] != cell.robot.n or len(joints.time) < 2:
+    cell = analysis.cell
+    joints = analysis.recording.joints
+    if (
+        cell is None
+        or joints is None
+        or joints.position.shape[1] != cell.robot.n
+        or len(joints.time) < 2
+    ):
         return None
     time = _frames(joints.time)
     nearest = np.clip(np.searchsorted(joints.time, time, side="right") - 1, 0, len(joints.time) - 1)

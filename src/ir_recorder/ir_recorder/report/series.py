@@ -25,12 +25,16 @@ class Envelope:
 
 
 def envelope(time: FloatArray, value: FloatArray, most: int) -> Envelope:
-    """A series (N,) as at most `most` stretches of equal count, every peak kept; a short one unchanged."""
+    """A series (N,) as at most `most` stretches of equal count, every peak kept; a short one
+    unchanged.
+    """
     if len(time) <= most:
         return Envelope(time, value, value)
     edges = np.linspace(0, len(time), most + 1).astype(int)[:-1]
-    low, high = np.minimum.reduceat(value, edges), np.maximum.reduceat(value, edges)
-    first, last = time[edges], time[np.append(edges[1:], len(time)) - 1]
+    low = np.minimum.reduceat(value, edges)
+    high = np.maximum.reduceat(value, edges)
+    first = time[edges]
+    last = time[np.append(edges[1:], len(time)) - 1]
     return Envelope((first + last) / 2.0, low, high)
 
 
@@ -40,7 +44,9 @@ def floats(values: ArrayLike) -> str:
 
 
 def quantised(values: ArrayLike, step: float) -> str:
-    """An array (...) as int16 multiples of `step`, little endian, in base64; clipped to its range."""
+    """An array (...) as int16 multiples of `step`, little endian, in base64; clipped to its
+    range.
+    """
     kept = np.clip(np.nan_to_num(np.asarray(values, dtype=float)), -32768 * step, 32767 * step)
     return _base64(np.rint(kept / step).astype("<i2"))
 

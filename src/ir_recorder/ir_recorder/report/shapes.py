@@ -16,7 +16,9 @@ RINGS = 7  # from the rim of a half sphere to its pole, as wide as the segments
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """points (V, 3) [m], normals (V, 3), triangles (T, 3) of indices, seen from outside counter-clockwise."""
+    """points (V, 3) [m], normals (V, 3), triangles (T, 3) of indices, seen from outside
+    counter-clockwise.
+    """
 
     points: FloatArray
     normals: FloatArray
@@ -54,25 +56,36 @@ def _box(size: FloatArray) -> Mesh:
     triangles: list[list[int]] = []
     for axis in range(3):
         for sign in (-1.0, 1.0):
-            u, v = (axis + 1) % 3, (axis + 2) % 3
+            u = (axis + 1) % 3
+            v = (axis + 2) % 3
             start = len(points)
             for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
                 point = np.zeros(3)
-                point[axis], point[u], point[v] = sign, a, b
+                point[axis] = sign
+                point[u] = a
+                point[v] = b
                 points.append(point * size / 2.0)
                 normals.append(np.eye(3)[axis] * sign)
             quad = [0, 1, 2, 0, 2, 3] if sign > 0 else [0, 2, 1, 0, 3, 2]
-            triangles += [[start + quad[k], start + quad[k + 1], start + quad[k + 2]] for k in (0, 3)]
+            triangles += [
+                [start + quad[k], start + quad[k + 1], start + quad[k + 2]] for k in (0, 3)
+            ]
     return Mesh(np.array(points), np.array(normals), np.array(triangles))
 
 
 def _revolved(radii: FloatArray, heights: FloatArray, normals: FloatArray) -> Mesh:
-    """A profile (K,) of radii and heights turned about z; its normals (K, 2) are radial and axial."""
+    """A profile (K,) of radii and heights turned about z; its normals (K, 2) are radial and
+    axial.
+    """
     angle = np.linspace(0.0, 2.0 * np.pi, SEGMENTS + 1)
     round_ = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     count = len(radii)
     points = np.concatenate(
-        [radii[:, None, None] * round_, np.broadcast_to(heights[:, None, None], (count, SEGMENTS + 1, 1))], 2
+        [
+            radii[:, None, None] * round_,
+            np.broadcast_to(heights[:, None, None], (count, SEGMENTS + 1, 1)),
+        ],
+        2,
     )
     outward = np.concatenate(
         [
@@ -84,7 +97,9 @@ def _revolved(radii: FloatArray, heights: FloatArray, normals: FloatArray) -> Me
     row = SEGMENTS + 1
     k, s = np.meshgrid(np.arange(count - 1), np.arange(SEGMENTS), indexing="ij")
     a = (k * row + s).ravel()
-    triangles = np.concatenate([np.stack([a, a + 1, a + row + 1], 1), np.stack([a, a + row + 1, a + row], 1)])
+    triangles = np.concatenate(
+        [np.stack([a, a + 1, a + row + 1], 1), np.stack([a, a + row + 1, a + row], 1)]
+    )
     return Mesh(points.reshape(-1, 3), outward.reshape(-1, 3), triangles)
 
 
@@ -114,7 +129,9 @@ def _hull(vertices: FloatArray) -> Mesh:
     )
     corners[turned < 0] = corners[turned < 0][:, [0, 2, 1]]
     count = len(corners)
-    return Mesh(corners.reshape(-1, 3), np.repeat(outward, 3, axis=0), np.arange(3 * count).reshape(-1, 3))
+    return Mesh(
+        corners.reshape(-1, 3), np.repeat(outward, 3, axis=0), np.arange(3 * count).reshape(-1, 3)
+    )
 
 
 def to_axis(axis: FloatArray) -> FloatArray:

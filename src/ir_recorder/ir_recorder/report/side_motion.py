@@ -70,14 +70,19 @@ def _joints(side: Side, time: FloatArray) -> FloatArray:
 def _parts(side: Side, cell: Cell) -> list[dict[str, Json]]:
     """For each part its meshes, and from when on it lies where."""
     lying = {part.name: part.station for part in cell.parts}
-    changes: dict[str, list[Json]] = {name: [_lies(cell, -1e9, station)] for name, station in lying.items()}
+    changes: dict[str, list[Json]] = {
+        name: [_lies(cell, -1e9, station)] for name, station in lying.items()
+    }
     for begin, step in _timed(side):
         end = begin + step.duration
         if step.attach in changes:
             changes[step.attach].append(_lies(cell, end, ""))
         if step.detach in changes:
             changes[step.detach].append(_lies(cell, end, step.to_station))
-    return [{"name": name, "lies": lies, "meshes": part_meshes(cell, name)} for name, lies in changes.items()]
+    return [
+        {"name": name, "lies": lies, "meshes": part_meshes(cell, name)}
+        for name, lies in changes.items()
+    ]
 
 
 def _lies(cell: Cell, time: float, station: str) -> Json:

@@ -1,4 +1,5 @@
-"""Steps of recordings as columns of numbers, for CSV, Parquet and pandas: SI units, the unit in each name.
+"""Steps of recordings as columns of numbers, for CSV, Parquet and pandas: SI units, the unit in
+each name.
 
 ``pandas.DataFrame(step_columns([analysis]))`` is the table of a program.
 """
@@ -26,12 +27,16 @@ def step_columns(analyses: Sequence[Analysis]) -> dict[str, list[Cell]]:
     """All steps of all recordings, a column for each figure; NaN where it wasn't recorded."""
     rows = [_row(analysis, result) for analysis in analyses for result in analysis.steps]
     names = list(dict.fromkeys(name for row in rows for name in row)) or ["recording"]
-    return {name: [row.get(name, "" if name in _TEXTS else math.nan) for row in rows] for name in names}
+    return {
+        name: [row.get(name, "" if name in _TEXTS else math.nan) for row in rows] for name in names
+    }
 
 
 def _row(analysis: Analysis, result: StepResult) -> dict[str, Cell]:
-    step, near = result.step, result.clearance
-    movement, report = step.movement, step.movement.report
+    step = result.step
+    near = result.clearance
+    movement = step.movement
+    report = step.movement.report
     recording = analysis.recording
     return {
         **{"recording": recording.path.name, "origin": recording.origin, "plant": recording.plant},
@@ -49,16 +54,21 @@ def _row(analysis: Analysis, result: StepResult) -> dict[str, Cell]:
     }
 
 
-def write_table(analyses: Sequence[Analysis], path: str | Path, roots: FileRoots = ANYWHERE) -> Path:
+def write_table(
+    analyses: Sequence[Analysis], path: str | Path, roots: FileRoots = ANYWHERE
+) -> Path:
     """Writes the steps as .csv or .parquet below `roots`; RecorderError for another ending."""
     return write_columns(step_columns(analyses), path, CSV_START, roots)
 
 
 def write_columns(
-    columns: Mapping[str, Sequence[Cell]], path: str | Path, start: bytes, roots: FileRoots = ANYWHERE
+    columns: Mapping[str, Sequence[Cell]],
+    path: str | Path,
+    start: bytes,
+    roots: FileRoots = ANYWHERE,
 ) -> Path:
-    """Writes columns as .csv or .parquet below `roots`, in place of a table that begins alike; RecorderError
-    for another ending.
+    """Writes columns as .csv or .parquet below `roots`, in place of a table that begins alike;
+    RecorderError for another ending.
     """
     if str(path).endswith(".csv"):
         return write_output(path, _csv(columns), start, roots)

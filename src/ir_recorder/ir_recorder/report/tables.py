@@ -30,25 +30,41 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str, kin
 
     caption: for screen readers, and the name of the CSV file that the page writes of it.
     """
-    columns = "".join(f'<th scope="col"{_number(head)}>{text(head.lstrip(">"))}</th>' for head in heads)
+    columns = "".join(
+        f'<th scope="col"{_number(head)}>{text(head.lstrip(">"))}</th>' for head in heads
+    )
     body = "".join(f"<tr>{_cells(heads, row)}</tr>" for row in rows)
     if not body:
         return '<p class="empty">Nothing was recorded.</p>'
     head = f"<thead><tr>{columns}</tr></thead>"
     named = f'<caption class="unseen">{text(caption)}</caption>'
-    return f'<div class="scroll"><table class="{kind}">{named}{head}<tbody>{body}</tbody></table></div>'
+    return (
+        '<div class="scroll"><table '
+        f'class="{kind}">{named}{head}<tbody>{body}</tbody></table></div>'
+    )
 
 
 def step_table(analysis: Analysis) -> str:
     """Every step: predicted, with its 90 % interval, against simulated or measured."""
     found = f">{analysis.recording.origin}"
-    heads = ("#", "step", "load", ">time", ">predicted", found, ">deviation", ">mean power", ">clearance")
+    heads = (
+        "#",
+        "step",
+        "load",
+        ">time",
+        ">predicted",
+        found,
+        ">deviation",
+        ">mean power",
+        ">clearance",
+    )
     rows = (_step(result) for result in analysis.steps)
     return table((*heads, ">tool deviation"), rows, "Steps of the program")
 
 
 def _step(result: StepResult) -> tuple[str, ...]:
-    step, near = result.step, result.clearance
+    step = result.step
+    near = result.clearance
     plan = step.movement.report.energy
     label = f'<button class="go" data-time="{step.start:.3f}">{text(step.label)}</button>'
     if step.outcome != "ended":
@@ -111,7 +127,9 @@ def station_table(analysis: Analysis) -> str:
     ]
     other = analysis.elsewhere
     if math.isfinite(other.energy):
-        rows.append((text(other.name), DASH, DASH, DASH, f"{other.seconds:.1f} s", joules(other.energy)))
+        rows.append(
+            (text(other.name), DASH, DASH, DASH, f"{other.seconds:.1f} s", joules(other.energy))
+        )
     heads = ("station", ">travel to it", ">service movements", ">pauses", ">time", ">energy")
     return table(heads, rows, "Stations")
 
@@ -146,13 +164,22 @@ def resting_table(analysis: Analysis) -> str:
         for row in analysis.plateaus
     ]
     found = f">{analysis.recording.origin}"
-    heads = ("mode and load at machine home", ">by the data", found, ">deviation", ">Table II", ">over")
+    heads = (
+        "mode and load at machine home",
+        ">by the data",
+        found,
+        ">deviation",
+        ">Table II",
+        ">over",
+    )
     return table(heads, rows, "Power at rest")
 
 
 def fact_table(analysis: Analysis) -> str:
     """Facts and topics of the file."""
-    facts = table(("fact", "value"), ((text(k), text(v)) for k, v in analysis.recording.facts), "Facts")
+    facts = table(
+        ("fact", "value"), ((text(k), text(v)) for k, v in analysis.recording.facts), "Facts"
+    )
     topics = table(
         ("topic", "type", ">messages", ">per second"),
         (
@@ -174,7 +201,10 @@ def warning_table(analysis: Analysis) -> str:
     warnings = analysis.recording.warnings
     if not warnings:
         return '<p class="empty">None.</p>'
-    rows = [(f"{w.time:.2f} s", text(w.name), text(w.text[:LONGEST_TEXT])) for w in warnings[:MOST_WARNINGS]]
+    rows = [
+        (f"{w.time:.2f} s", text(w.name), text(w.text[:LONGEST_TEXT]))
+        for w in warnings[:MOST_WARNINGS]
+    ]
     more = len(warnings) - MOST_WARNINGS
     left = f'<p class="empty">{more} more in the recording.</p>' if more > 0 else ""
     return table((">time", "node", "text"), rows, "Warnings in the log") + left
@@ -197,7 +227,9 @@ def _small(name: str, value: str) -> str:
 
 
 def _share(share: Share) -> str:
-    return f"{joules(share.energy)}<small>{seconds(share.seconds)}</small>" if share.seconds else DASH
+    return (
+        f"{joules(share.energy)}<small>{seconds(share.seconds)}</small>" if share.seconds else DASH
+    )
 
 
 def _bar(value: float, most: float, kind: str) -> str:

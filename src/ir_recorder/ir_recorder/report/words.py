@@ -67,7 +67,11 @@ def number(value: float, unit: str) -> str:
         return DASH
     if unit == "m":
         return millimetres(value)
-    return f"{value:.4g} {unit}".strip() if abs(value) < 1e4 else f"{value:,.0f} {unit}".replace(",", " ")
+    return (
+        f"{value:.4g} {unit}".strip()
+        if abs(value) < 1e4
+        else f"{value:,.0f} {unit}".replace(",", " ")
+    )
 
 
 def interval(low: float, high: float, unit: str) -> str:
@@ -87,6 +91,10 @@ def mode_words(name: str) -> str:
 
 
 def text(value: object) -> str:
-    """Anything as HTML text; characters that steer a terminal or the direction of writing are replaced."""
-    seen = "".join("\ufffd" if category(c) in _UNSEEN and c not in "\n\t" else c for c in str(value))
+    """Anything as HTML text; characters that steer a terminal or the direction of writing are
+    replaced.
+    """
+    seen = "".join(
+        "\ufffd" if category(c) in _UNSEEN and c not in "\n\t" else c for c in str(value)
+    )
     return escape(seen, quote=True)

@@ -39,7 +39,8 @@ class Services:
     """Offers start and stop on `node` for `recorder`."""
 
     def __init__(self, node: Node, recorder: Recorder) -> None:
-        self._recorder, self._source = recorder, node.get_name()
+        self._recorder = recorder
+        self._source = node.get_name()
         self._log = node.get_logger().error
         BoundedService(node, StartRecording, "~/start", self._on_start)
         BoundedService(node, StopRecording, "~/stop", self._on_stop)
@@ -49,7 +50,10 @@ class Services:
             split = Split(request.split_size, request.split_duration)
             start = self._recorder.start
             response.path = start(request.path, request.overwrite, request.topics, split=split)
-            return f"recording into {response.path}{without_publisher(self._recorder.unmet, 'is seen yet')}"
+            return (
+                "recording into "
+                f"{response.path}{without_publisher(self._recorder.unmet, 'is seen yet')}"
+            )
 
         return self._answer(response, start)
 
@@ -61,7 +65,8 @@ class Services:
                 raise NothingRecordedError(self._recorder.failure or "nothing is being recorded")
             response.path = str(summary.path)
             response.paths = [str(path) for path in summary.paths]
-            response.messages, response.seconds = summary.messages, summary.seconds
+            response.messages = summary.messages
+            response.seconds = summary.seconds
             response.dropped = summary.dropped
             seconds = f"{summary.messages} messages over {summary.seconds:.1f} s"
             if summary.dropped:

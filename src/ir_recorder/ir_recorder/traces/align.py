@@ -1,4 +1,6 @@
-"""Traces of several clocks on one time axis: resampling, and the offset of a clock by cross-correlation."""
+"""Traces of several clocks on one time axis: resampling, and the offset of a clock by
+cross-correlation.
+"""
 
 from __future__ import annotations
 
@@ -24,13 +26,19 @@ class ClockOffset:
 
 
 def mean_power(time: FloatArray, joules: FloatArray, edges: FloatArray) -> FloatArray:
-    """Mean watts (M,) between edges (M + 1,) s of an energy count (N,) J at `time` (N,) s; NaN outside."""
+    """Mean watts (M,) between edges (M + 1,) s of an energy count (N,) J at `time` (N,) s; NaN
+    outside.
+    """
     count = np.interp(edges, time, joules, left=np.nan, right=np.nan)
     return np.asarray(np.diff(count) / np.diff(edges))
 
 
-def resampled(time: FloatArray, values: FloatArray, at: FloatArray, longest_gap: float) -> FloatArray:
-    """Values (N, ...) linear at the instants `at` (M,); NaN outside, and inside gaps longer than that [s]."""
+def resampled(
+    time: FloatArray, values: FloatArray, at: FloatArray, longest_gap: float
+) -> FloatArray:
+    """Values (N, ...) linear at the instants `at` (M,); NaN outside, and inside gaps longer than
+    that [s].
+    """
     columns = values.reshape(len(time), -1)
     found = np.column_stack([_linear(time, column, at, longest_gap) for column in columns.T])
     return np.asarray(found.reshape(len(at), *values.shape[1:]))
@@ -40,7 +48,8 @@ def _linear(time: FloatArray, values: FloatArray, at: FloatArray, longest_gap: f
     known = np.isfinite(values)
     if np.count_nonzero(known) < 2:
         return np.full(len(at), np.nan)
-    time, values = time[known], values[known]
+    time = time[known]
+    values = values[known]
     found = np.interp(at, time, values, left=np.nan, right=np.nan)
     after = np.clip(np.searchsorted(time, at), 1, len(time) - 1)
     exact = time[after] == at
@@ -55,18 +64,24 @@ def clock_offset(
     other_watts: FloatArray,
     longest: float = 3600.0,
 ) -> ClockOffset:
-    """What to add to `other_time` so that two powers agree best; at most `longest` [s] is looked for.
+    """What to add to `other_time` so that two powers agree best; at most `longest` [s] is looked
+    for.
 
     watts (N,) at time (N,) s, other_watts (M,) at other_time (M,) s.
 
-    By the normalised cross-correlation of both at 100 Hz, between samples by a parabola through its peak.
-    TraceError where no offset stands out: the signals are too short, too flat, or not of the same run.
+    By the normalised cross-correlation of both at 100 Hz, between samples by a parabola through its
+    peak.
+    TraceError where no offset stands out: the signals are too short, too flat, or not of the same
+    run.
     """
-    first, second = _regular(time, watts), _regular(other_time, other_watts)
+    first = _regular(time, watts)
+    second = _regular(other_time, other_watts)
     products = correlate(first - first.mean(), second - second.mean(), method="fft")
     lags = np.arange(len(products)) - (len(second) - 1)
     overlap = _norms(first - first.mean(), second - second.mean())
-    score = np.where(np.abs(lags / RATE + time[0] - other_time[0]) <= longest, products / overlap, -np.inf)
+    score = np.where(
+        np.abs(lags / RATE + time[0] - other_time[0]) <= longest, products / overlap, -np.inf
+    )
     peak = int(np.argmax(score))
     best = float(score[peak])
     if not best >= LEAST_CORRELATION:
@@ -91,7 +106,8 @@ def _norms(first: FloatArray, second: FloatArray) -> FloatArray:
 
     The floor, a fifth of the smaller signal's norm, keeps short overlaps from agreeing by chance.
     """
-    ones_first, ones_second = np.ones(len(first)), np.ones(len(second))
+    ones_first = np.ones(len(first))
+    ones_second = np.ones(len(second))
     own = correlate(first**2, ones_second, method="fft").clip(0.0)
     other = correlate(ones_first, second**2, method="fft").clip(0.0)
     floor = 0.2 * min(float(first @ first), float(second @ second)) + 1e-12

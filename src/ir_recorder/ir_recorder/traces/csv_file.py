@@ -1,9 +1,10 @@
 """Traces as CSV: a line of headings, then numbers; commas, semicolons, tabs or spaces between them.
 
-Read in blocks, so that memory holds the wanted columns only. An empty cell and NaN are missing values. Where
-no commas separate, they may be decimal. Time may be written as date and time of ISO 8601. A row that says the
-same as the one before, and a last line that was cut, are left out; the trace's problems say so. The text is
-UTF-8, or UTF-16 with its byte order mark ("Unicode text" of a spreadsheet).
+Read in blocks, so that memory holds the wanted columns only. An empty cell and NaN are missing
+values. Where no commas separate, they may be decimal. Time may be written as date and time of ISO
+8601. A row that says the same as the one before, and a last line that was cut, are left out; the
+trace's problems say so. The text is UTF-8, or UTF-16 with its byte order mark ("Unicode text" of a
+spreadsheet).
 """
 
 from __future__ import annotations
@@ -46,7 +47,9 @@ def _lines(path: Path) -> TextIO:
     """The lines of a file in UTF-8 or, where it begins so, UTF-16."""
     descriptor = opened(path)
     utf_16 = os.pread(descriptor, 2, 0) in (BOM_UTF16_LE, BOM_UTF16_BE)
-    return os.fdopen(descriptor, encoding="utf-16" if utf_16 else "utf-8-sig", errors="replace", newline="")
+    return os.fdopen(
+        descriptor, encoding="utf-16" if utf_16 else "utf-8-sig", errors="replace", newline=""
+    )
 
 
 def _cut(file: TextIO) -> bool:
@@ -62,8 +65,11 @@ class _Reader:
     def __init__(
         self, path: Path, file: Iterator[str], wanted: Wanted, mapping: TraceMapping, cut: bool
     ) -> None:
-        self._path, self._mapping, self._cut = path, mapping, cut
-        self._file, self._begin = file, 0
+        self._path = path
+        self._mapping = mapping
+        self._cut = cut
+        self._file = file
+        self._begin = 0
         self._problems: list[str] = []
         header = self._header()
         self._delimiter = max(
@@ -90,7 +96,10 @@ class _Reader:
         """All rows."""
         numbers = [name for name in self._places if name not in WORDS]
         texts: dict[str, list[str]] = {name: [] for name in self._places if name in WORDS}
-        blocks, lines, size, line = [], [], 0, self._begin
+        blocks = []
+        lines = []
+        size = 0
+        line = self._begin
         following = list(islice(self._file, _BLOCK))
         while block := following:
             following = list(islice(self._file, _BLOCK))
@@ -104,7 +113,8 @@ class _Reader:
                 lines.append(np.array([number for number, _ in own], np.int64))
                 for name, words in texts.items():
                     words.extend(intern(row[self._places[name][0]].strip()) for _, row in own)
-            line, size = line + len(block), size + blocks[-1].size
+            line = line + len(block)
+            size = size + blocks[-1].size
             if size > VALUES_MAX:
                 raise TraceError(f"{self._path}:{line}: more than {VALUES_MAX} values, the limit")
         values = np.concatenate(blocks) if blocks else np.empty((0, len(numbers)))
@@ -119,7 +129,8 @@ class _Reader:
         time = columns.pop(TIME)
         self._check_time(time, lines)
         texts_of = MappingProxyType(spoken)
-        problems, sampled = tuple(self._problems), self._mapping.sampled
+        problems = tuple(self._problems)
+        sampled = self._mapping.sampled
         return Trace(str(self._path), time, MappingProxyType(columns), texts_of, problems, sampled)
 
     def _rows(self, block: Sequence[str], before: int, last: bool) -> list[tuple[int, list[str]]]:
@@ -130,15 +141,17 @@ class _Reader:
         return own
 
     def _plain(self, block: Sequence[str], names: Sequence[str]) -> FloatArray | None:
-        """Values of these columns (rows, names) in SI where the lines hold finite numbers alone, by NumPy's
-        parser; None where anything else is in them.
+        """Values of these columns (rows, names) in SI where the lines hold finite numbers alone, by
+        NumPy's parser; None where anything else is in them.
         """
         between = len(self._headings) - 1
         if any(line.count(self._delimiter) != between for line in block):
             return None
         places = [self._places[name][0] for name in names]
         try:
-            values = np.loadtxt(block, delimiter=self._delimiter, usecols=places, comments=None, ndmin=2)
+            values = np.loadtxt(
+                block, delimiter=self._delimiter, usecols=places, comments=None, ndmin=2
+            )
         except ValueError:
             return None
         if values.shape != (len(block), len(names)) or not np.isfinite(values).all():
@@ -165,7 +178,9 @@ class _Reader:
         except ValueError:
             value = self._unusual(text.strip(), name, line)
         else:
-            if value - value != 0.0 and (value == value or name == TIME):  # inf; nan is a missing value
+            if value - value != 0.0 and (
+                value == value or name == TIME
+            ):  # inf; nan is a missing value
                 raise TraceError(f"{self._path}:{line}: {name} is {text[:40]!a}, it must be finite")
         return value
 
@@ -187,14 +202,15 @@ class _Reader:
             k = int(back[0]) + 1
             line = np.concatenate(lines)[k]
             raise TraceError(
-                f"{self._path}:{line}: time is {time[k]:.12g} s, it must increase: the row before has "
-                f"{time[k - 1]:.12g} s"
+                f"{self._path}:{line}: time is {time[k]:.12g} s, it must increase: the row "
+                f"before has {time[k - 1]:.12g} s"
             )
 
 
 def _once(values: FloatArray, spoken: Mapping[str, Sequence[str]]) -> BoolArray:
     """Which rows (N,) say something else than the one before, in values (N, columns) or words."""
-    before, after = values[:-1], values[1:]
+    before = values[:-1]
+    after = values[1:]
     kept = np.ones(len(values), bool)
     kept[1:] = ((before != after) & ~(np.isnan(before) & np.isnan(after))).any(axis=1)
     for words in spoken.values():

@@ -16,11 +16,15 @@ Wanted = Callable[[str], bool]
 def chosen(
     headings: Sequence[str], where: str, wanted: Wanted, mapping: TraceMapping
 ) -> dict[str, tuple[int, float]]:
-    """Place and factor to SI of each column by its name; TraceError without a time, or with two of a name."""
+    """Place and factor to SI of each column by its name; TraceError without a time, or with two of
+    a name.
+    """
     places: dict[str, tuple[int, float]] = {}
     for name, column in mapping.columns.items():
         if column.heading not in headings:
-            raise TraceError(f"{where}: there is no column {column.heading[:80]!r}, {_known(headings)}")
+            raise TraceError(
+                f"{where}: there is no column {column.heading[:80]!r}, {_known(headings)}"
+            )
         if headings.count(column.heading) > 1:
             raise TraceError(f"{where}: column {column.heading[:80]} is there twice")
         places[name] = headings.index(column.heading), column.factor
@@ -37,7 +41,9 @@ def chosen(
 
 
 def _named(heading: str, where: str, wanted: Wanted) -> tuple[str, float]:
-    """Name and factor of a heading; a unit in brackets has to be known only where the name is wanted."""
+    """Name and factor of a heading; a unit in brackets has to be known only where the name is
+    wanted.
+    """
     bare = heading.split("[")[0].split("(")[0].strip()
     if wanted(heading) or (bare != heading and not wanted(bare)):
         return heading, 1.0

@@ -41,8 +41,8 @@ class Column:
 class TraceMapping:
     """Columns of a file by the names that they mean; empty: the headings say it themselves.
 
-    clock_offset [s] is added to the file's time, NaN where it is to be found by comparing. sampled: power is
-    the value of an instant, else the mean since the row before.
+    clock_offset [s] is added to the file's time, NaN where it is to be found by comparing. sampled:
+    power is the value of an instant, else the mean since the row before.
     """
 
     columns: Mapping[str, Column] = field(default_factory=lambda: MappingProxyType({}))
@@ -66,13 +66,17 @@ def read_mapping(path: Path) -> TraceMapping:
     meaning = tree.get("power_is", "mean")
     if meaning not in ("mean", "sample"):
         raise TraceError(f"{path}: power_is is {str(meaning)[:40]!r}, it must be mean or sample")
-    return TraceMapping(_columns(path, tree.get("columns")), _offset(path, tree), meaning == "sample")
+    return TraceMapping(
+        _columns(path, tree.get("columns")), _offset(path, tree), meaning == "sample"
+    )
 
 
 def _columns(path: Path, tree: Any) -> Mapping[str, Column]:
     if not isinstance(tree, dict) or "time" not in tree:
         raise TraceError(f"{path}: columns must name at least time")
-    return MappingProxyType({str(name): _column(f"{path}: {name}", each) for name, each in tree.items()})
+    return MappingProxyType(
+        {str(name): _column(f"{path}: {name}", each) for name, each in tree.items()}
+    )
 
 
 def _column(where: str, tree: Any) -> Column:
@@ -86,5 +90,7 @@ def _column(where: str, tree: Any) -> Column:
 def _offset(path: Path, tree: Mapping[str, Any]) -> float:
     offset = tree.get("clock_offset", math.nan)
     if isinstance(offset, bool) or not isinstance(offset, int | float) or math.isinf(offset):
-        raise TraceError(f"{path}: clock_offset is {str(offset)[:40]!r}, it must be a number of seconds")
+        raise TraceError(
+            f"{path}: clock_offset is {str(offset)[:40]!r}, it must be a number of seconds"
+        )
     return float(offset)

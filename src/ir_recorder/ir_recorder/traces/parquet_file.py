@@ -20,7 +20,9 @@ from ir_recorder.traces.trace import TIME, Trace
 
 
 def read_parquet(path: Path, wanted: Wanted, mapping: TraceMapping) -> Trace:
-    """The trace of a Parquet file; TraceError where pyarrow isn't installed or a column makes no sense."""
+    """The trace of a Parquet file; TraceError where pyarrow isn't installed or a column makes no
+    sense.
+    """
     try:
         from pyarrow import ArrowException, parquet
     except ImportError as error:
@@ -28,20 +30,27 @@ def read_parquet(path: Path, wanted: Wanted, mapping: TraceMapping) -> Trace:
     try:
         with os.fdopen(opened(path), "rb") as stream:
             file = parquet.ParquetFile(stream)
-            places = chosen([str(name) for name in file.schema_arrow.names], str(path), wanted, mapping)
+            places = chosen(
+                [str(name) for name in file.schema_arrow.names], str(path), wanted, mapping
+            )
             if file.metadata.num_rows * len(places) > VALUES_MAX:
                 raise TraceError(f"{path}: more than {VALUES_MAX} values, the limit")
             table = _read(file, [place for place, _ in places.values()])
     except (ArrowException, OSError) as error:
         raise TraceError(f"{path}: {error}") from error
-    columns, texts = dict[str, FloatArray](), dict[str, tuple[str, ...]]()
+    columns = dict[str, FloatArray]()
+    texts = dict[str, tuple[str, ...]]()
     for (name, (_, scale)), column in zip(places.items(), table, strict=True):
         if name in WORDS:
-            texts[name] = tuple("" if each is None else str(each).strip() for each in column.to_pylist())
+            texts[name] = tuple(
+                "" if each is None else str(each).strip() for each in column.to_pylist()
+            )
         else:
             columns[name] = scale * _numbers(path, column, name)
     time = columns.pop(TIME)
-    return Trace(str(path), time, MappingProxyType(columns), MappingProxyType(texts), sampled=mapping.sampled)
+    return Trace(
+        str(path), time, MappingProxyType(columns), MappingProxyType(texts), sampled=mapping.sampled
+    )
 
 
 def _read(file: Any, places: list[int]) -> list[Any]:
@@ -57,7 +66,9 @@ def _numeric(types: Any) -> tuple[Callable[[Any], bool], ...]:
 
 
 def _numbers(path: Path, column: Any, name: str) -> FloatArray:
-    """Values (N,), NaN where a cell is empty; times may be dates. TraceError for what is no number."""
+    """Values (N,), NaN where a cell is empty; times may be dates. TraceError for what is no
+    number.
+    """
     from pyarrow import ArrowException, types
 
     if name == TIME and types.is_timestamp(column.type):

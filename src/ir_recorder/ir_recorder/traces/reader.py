@@ -1,4 +1,6 @@
-"""One reader of measured data: recordings (MCAP), CSV and Parquet; everything that needs a trace uses it."""
+"""One reader of measured data: recordings (MCAP), CSV and Parquet; everything that needs a trace
+uses it.
+"""
 
 from __future__ import annotations
 
@@ -24,12 +26,15 @@ def read_traces(
     mapping: TraceMapping | None = None,
     joint_names: Sequence[str] = JOINT_NAMES,
 ) -> tuple[Trace, ...]:
-    """The traces of a file by its ending (.csv, .txt, .parquet, .mcap): one, or those of a recording.
+    """The traces of a file by its ending (.csv, .txt, .parquet, .mcap): one, or those of a
+    recording.
 
-    Without a mapping the columns that are read are `time`, `power`, `energy`, `mode`, `load`, and for each
-    joint its name and `_velocity`, `_acceleration`, `_effort`. TraceError or ReadError as a sentence.
+    Without a mapping the columns that are read are `time`, `power`, `energy`, `mode`, `load`, and
+    for each joint its name and `_velocity`, `_acceleration`, `_effort`. TraceError or ReadError as
+    a sentence.
     """
-    path, mapping = Path(path), mapping or TraceMapping()
+    path = Path(path)
+    mapping = mapping or TraceMapping()
     ending = path.suffix.lower()
     wanted = _wanted(path, joint_names)
     if ending in (".csv", ".txt"):
@@ -47,7 +52,9 @@ def column_names(joint_names: Sequence[str]) -> frozenset[str]:
 
 
 def _wanted(path: Path, joint_names: Sequence[str]) -> Wanted:
-    """Whether a column is read. TraceError for a joint that the robot doesn't have, by its number."""
+    """Whether a column is read. TraceError for a joint that the robot doesn't have, by its
+    number.
+    """
     known = column_names(joint_names)
     stems = {name.rstrip(_DIGITS) for name in joint_names if name[-1:].isdecimal()}
 
@@ -64,4 +71,8 @@ def _wanted(path: Path, joint_names: Sequence[str]) -> Wanted:
 
 def _shifted(trace: Trace, mapping: TraceMapping) -> Trace:
     """On the clock that the mapping gives; as it is where it gives none."""
-    return trace if mapping.clock_offset != mapping.clock_offset else trace.shifted(mapping.clock_offset)
+    return (
+        trace
+        if mapping.clock_offset != mapping.clock_offset
+        else trace.shifted(mapping.clock_offset)
+    )

@@ -17,7 +17,9 @@ _NUMBERS = frozenset(int(mode) for mode in Mode)
 
 
 def recorded_traces(recording: Recording) -> tuple[Trace, ...]:
-    """The joints' trace and the meter's, as far as they were recorded; TraceError where neither was."""
+    """The joints' trace and the meter's, as far as they were recorded; TraceError where neither
+    was.
+    """
     found = []
     if recording.joints is not None and len(recording.joints.time) > 1:
         found.append(joint_trace(recording.joints, f"{recording.path} joint states"))

@@ -12,7 +12,9 @@ BYTES_MAX = 500_000_000
 
 
 def opened(path: Path) -> int:
-    """A descriptor of a file of at most BYTES_MAX; never waits on a FIFO or a device. Raises TraceError."""
+    """A descriptor of a file of at most BYTES_MAX; never waits on a FIFO or a device. Raises
+    TraceError.
+    """
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except (OSError, ValueError) as error:

@@ -1,4 +1,6 @@
-"""Measured data on one clock: columns of numbers and of words over strictly increasing seconds, in SI."""
+"""Measured data on one clock: columns of numbers and of words over strictly increasing seconds, in
+SI.
+"""
 
 from __future__ import annotations
 
@@ -25,10 +27,11 @@ GAP_FACTOR = 4.0  # a step so many times longer than the usual one is a gap
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """N instants of one source: time (N,) s; columns by name, each (N,), NaN where a value is missing; texts
-    by name, each of N words; problems that did not prevent reading.
+    """N instants of one source: time (N,) s; columns by name, each (N,), NaN where a value is
+    missing; texts by name, each of N words; problems that did not prevent reading.
 
-    sampled: `power` holds values of the instants; else means since the row before, as meters report them.
+    sampled: `power` holds values of the instants; else means since the row before, as meters report
+    them.
     """
 
     source: str
@@ -44,7 +47,9 @@ class Trace:
         back = np.flatnonzero(np.diff(self.time) <= 0.0)
         if len(back):
             k = int(back[0])
-            raise TraceError(f"{self.source}: time {self.time[k + 1]:g} s follows {self.time[k]:g} s")
+            raise TraceError(
+                f"{self.source}: time {self.time[k + 1]:g} s follows {self.time[k]:g} s"
+            )
         self.time.setflags(write=False)
         for values in self.columns.values():
             values.setflags(write=False)
@@ -55,7 +60,8 @@ class Trace:
         return float(np.median(np.diff(self.time)))
 
     def joints(self, names: Sequence[str], ending: str = "") -> FloatArray | None:
-        """Columns (N, n) of all joints with an ending ("", "_velocity", ...); None where none has it.
+        """Columns (N, n) of all joints with an ending ("", "_velocity", ...); None where none has
+        it.
 
         TraceError where some have it and others have not.
         """
@@ -69,18 +75,24 @@ class Trace:
         return np.column_stack([self.columns[name] for name in wanted])
 
     def gaps(self) -> tuple[tuple[float, float], ...]:
-        """Where rows are missing: (time [s], length [s]) of steps much longer than the usual one."""
+        """Where rows are missing: (time [s], length [s]) of steps much longer than the usual
+        one.
+        """
         steps = np.diff(self.time)
         return tuple(
-            (float(self.time[k]), float(steps[k])) for k in np.flatnonzero(steps > GAP_FACTOR * self.period)
+            (float(self.time[k]), float(steps[k]))
+            for k in np.flatnonzero(steps > GAP_FACTOR * self.period)
         )
 
     def shifted(self, offset: float) -> Trace:
         """The same on another clock: `offset` [s] is added to the time."""
-        return Trace(self.source, self.time + offset, self.columns, self.texts, self.problems, self.sampled)
+        return Trace(
+            self.source, self.time + offset, self.columns, self.texts, self.problems, self.sampled
+        )
 
     def joules(self) -> FloatArray | None:
-        """Energy at the mains (N,) J since the first row, by the meter's count or its power; None without.
+        """Energy at the mains (N,) J since the first row, by the meter's count or its power; None
+        without.
 
         A reading of power that is missing counts as the one before.
         """
@@ -89,7 +101,8 @@ class Trace:
             return np.asarray(count - count[0])
         if POWER not in self.columns:
             return None
-        watts, steps = _filled(self.columns[POWER]), np.diff(self.time)
+        watts = _filled(self.columns[POWER])
+        steps = np.diff(self.time)
         mean = 0.5 * (watts[1:] + watts[:-1]) if self.sampled else watts[1:]
         return np.concatenate([[0.0], np.cumsum(mean * steps)])
 

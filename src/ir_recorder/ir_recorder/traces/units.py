@@ -1,4 +1,6 @@
-"""Headings of columns as people write them: "power [kW]", "time_ms", "joint_a1 (deg)"; all become SI."""
+"""Headings of columns as people write them: "power [kW]", "time_ms", "joint_a1 (deg)"; all become
+SI.
+"""
 
 from __future__ import annotations
 

@@ -13,4 +13,6 @@ def files_of_cell(name_or_path: str) -> CellFiles:
         cell = load_cell(name_or_path)
     except DescriptionError as error:
         raise PathError(f"cell {name_or_path[:200]!r} can't be attached: {error}") from error
-    return CellFiles(cell_to_yaml(cell), robot_urdf(cell.robot, cell.tool, cell.tcp, cell.base_pose))
+    return CellFiles(
+        cell_to_yaml(cell), robot_urdf(cell.robot, cell.tool, cell.tcp, cell.base_pose)
+    )

@@ -1,4 +1,6 @@
-"""Data that a cell refers to by name, as a recording carries them: the robot's and its controller's files."""
+"""Data that a cell refers to by name, as a recording carries them: the robot's and its controller's
+files.
+"""
 
 from __future__ import annotations
 
@@ -20,4 +22,6 @@ def data_of_cell(cell_yaml: str) -> dict[str, str]:
         return {contents.ROBOT: robot.document}
     found = {contents.ROBOT: data / "robots" / f"{robot.name}.yaml"}
     found[contents.POWER] = data / "power" / f"{robot.controller.name}.yaml"
-    return {name: path.read_text(encoding="utf-8") for name, path in found.items() if path.is_file()}
+    return {
+        name: path.read_text(encoding="utf-8") for name, path in found.items() if path.is_file()
+    }

@@ -1,4 +1,6 @@
-"""One recording in progress: channels by topic, what is attached, and what became of it. No ROS here."""
+"""One recording in progress: channels by topic, what is attached, and what became of it. No ROS
+here.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,14 @@ from ir_recorder.write.writer import RecordingSummary, RecordingWriter
 
 # those whose numbers a recording holds, and whose versions decide them
 PACKAGES = (
-    *("ir_planner", "ir_sim_driver", "ir_program_runner", "ir_kernels", "ir_description", "ir_msgs_py"),
+    *(
+        "ir_planner",
+        "ir_sim_driver",
+        "ir_program_runner",
+        "ir_kernels",
+        "ir_description",
+        "ir_msgs_py",
+    ),
     *("ir_msgs", "numpy", "scipy", "pybullet", "rclpy"),
 )
 
@@ -43,14 +52,19 @@ class RecordingSession:
         split: Split | None = None,
         open_next: Callable[[Path], RecordingWriter] = RecordingWriter,
     ) -> None:
-        self._writer, self._open_next = writer, open_next
-        self._split, self._latched = split or Split(), LatchedMessages()
-        self._first, self._part, self._begun = writer.path, 0, time
+        self._writer = writer
+        self._open_next = open_next
+        self._split = split or Split()
+        self._latched = LatchedMessages()
+        self._first = writer.path
+        self._part = 0
+        self._begun = time
         self._name = f"{writer.path.stem} {time}"
         self._topics: dict[str, tuple[str, Sequence[QosOffer]]] = {}
         self._channels: dict[str, int] = {}
         self._attached: dict[str, tuple[str, bytes]] = {}
-        self._messages, self._span = 0, (0, 0)
+        self._messages = 0
+        self._span = (0, 0)
         own = {
             contents.VERSION: installed_version("ir_recorder"),
             contents.STARTED: str(time),
@@ -128,7 +142,8 @@ class RecordingSession:
     def _next_file(self, time: int) -> None:
         """Ends the file and begins another that can be read alone."""
         self._writer.finish()
-        self._part, self._begun = self._part + 1, time
+        self._part = self._part + 1
+        self._begun = time
         self._writer = self._open_next(part_path(self._first, self._part))
         self._head()
         for name, (media, data) in self._attached.items():

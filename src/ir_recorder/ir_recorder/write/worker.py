@@ -1,7 +1,8 @@
 """A thread of its own for a recording: a disk that is slow or compresses holds up nobody.
 
-What waits is bounded in bytes; messages beyond are dropped and counted. What waited reaches the operating
-system within FLUSH_PERIOD, so that a recorder that is killed leaves a file that can be read up to there.
+What waits is bounded in bytes; messages beyond are dropped and counted. What waited reaches the
+operating system within FLUSH_PERIOD, so that a recorder that is killed leaves a file that can be
+read up to there.
 """
 
 from __future__ import annotations
@@ -34,11 +35,13 @@ class Message(NamedTuple):
 class RecordingWorker:
     """Feeds a session from a queue of at most `most` bytes.
 
-    All methods but `finish` return at once and raise the WriteError that ended the recording, if one did.
+    All methods but `finish` return at once and raise the WriteError that ended the recording, if
+    one did.
     """
 
     def __init__(self, session: RecordingSession, most: int) -> None:
-        self._session, self._most = session, most
+        self._session = session
+        self._most = most
         self._queue: SimpleQueue[Act | list[Message] | None] = SimpleQueue()
         self._put = self._taken = 0  # bytes; each is written by one thread only
         self._failure: WriteError | None = None

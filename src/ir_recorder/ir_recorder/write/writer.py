@@ -1,8 +1,9 @@
 """Writes recordings that rosbag2, Foxglove and plain MCAP readers accept.
 
-Profile `ros2`, one `ros2msg` schema per type, CDR bytes as they came from the middleware, chunks with
-indexes and a statistics record. Nothing but CDR channels: `ros2 bag play` refuses a file with a JSON
-channel, so everything else (cell file, URDF, facts) goes into attachments and metadata records.
+Profile `ros2`, one `ros2msg` schema per type, CDR bytes as they came from the middleware, chunks
+with indexes and a statistics record. Nothing but CDR channels: `ros2 bag play` refuses a file with
+a JSON channel, so everything else (cell file, URDF, facts) goes into attachments and metadata
+records.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ _NAME_MAX = 200  # bytes of a file's name; file systems end at 255
 
 @dataclass(frozen=True)
 class RecordingSummary:
-    """What a finished recording holds: its file (the first, where `paths` has several), the number of
-    messages, the time they span [s], and how many messages the disk was too slow for.
+    """What a finished recording holds: its file (the first, where `paths` has several), the number
+    of messages, the time they span [s], and how many messages the disk was too slow for.
     """
 
     path: Path
@@ -45,8 +46,8 @@ class RecordingSummary:
 class RecordingWriter:
     """One MCAP file being written; times are nanoseconds of the node's clock.
 
-    Raises PathError when the file can't be opened and WriteError as soon as the storage refuses; after a
-    WriteError the writer is closed and further calls raise the same error again.
+    Raises PathError when the file can't be opened and WriteError as soon as the storage refuses;
+    after a WriteError the writer is closed and further calls raise the same error again.
     """
 
     def __init__(
@@ -94,16 +95,21 @@ class RecordingWriter:
                 topic,
                 "cdr",
                 self._schema_ids[type_name],
-                {"offered_qos_profiles": offers_to_yaml(offers), "topic_type_hash": schema.type_hash},
+                {
+                    "offered_qos_profiles": offers_to_yaml(offers),
+                    "topic_type_hash": schema.type_hash,
+                },
             )
         self._sequence[channel] = 0
         return channel
 
-    def write(self, channel: int, log_time: int, data: bytes, publish_time: int | None = None) -> None:
+    def write(
+        self, channel: int, log_time: int, data: bytes, publish_time: int | None = None
+    ) -> None:
         """Appends one message's CDR bytes.
 
-        Players read in file order, so a time that runs back by less than REORDERED is set to the newest;
-        more is a clock that was set back, and kept.
+        Players read in file order, so a time that runs back by less than REORDERED is set to the
+        newest; more is a clock that was set back, and kept.
         """
         if 0 < self._newest - log_time < REORDERED:
             log_time = self._newest
@@ -167,7 +173,8 @@ class RecordingWriter:
     def fail(self, error: OSError) -> WriteError:
         """Closes the writer for good after the storage refused; gives the error to raise."""
         self._failure = WriteError(
-            f"{self.path}: {error.strerror or error} after {self._messages} messages; recording has ended"
+            f"{self.path}: {error.strerror or error} after {self._messages} messages; recording "
+            "has ended"
         )
         with suppress(OSError):  # closing flushes, and the storage refuses still
             self._file.close()
@@ -183,7 +190,9 @@ class _Storage:
     def __enter__(self) -> None:
         return None
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: object
+    ) -> None:
         if isinstance(error, OSError):
             raise self._owner.fail(error) from error
 
@@ -195,7 +204,9 @@ def checked_path(path: str | Path) -> Path:
         raise PathError(f"path {text[:80]!r}: empty, or with control characters")
     name = Path(text).name
     if len(name.encode()) > _NAME_MAX:
-        raise PathError(f"the file's name has {len(name.encode())} bytes, at most {_NAME_MAX} are taken")
+        raise PathError(
+            f"the file's name has {len(name.encode())} bytes, at most {_NAME_MAX} are taken"
+        )
     if Path(text).suffix != ".mcap":
         raise PathError(f"path {text[:200]!r} must end in .mcap")
     if len(text.encode(errors="replace")) > _PATH_MAX:
@@ -213,7 +224,9 @@ def _open(path: Path, overwrite: bool, roots: FileRoots) -> BinaryIO:
     except FileRefusedError as error:
         raise PathError(str(error)) from error
     if not path.parent.is_dir():
-        raise PathError(f"{path} can't be written: there is no directory {path.parent}; make it first")
+        raise PathError(
+            f"{path} can't be written: there is no directory {path.parent}; make it first"
+        )
     try:
         return roots.open_to_write(path, MCAP0_MAGIC if overwrite else None)
     except FileRefusedError as error:

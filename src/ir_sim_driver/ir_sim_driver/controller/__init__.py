@@ -1,4 +1,6 @@
-"""The controller around the plant: the stepped simulation, its settings, and the driver that runs it."""
+"""The controller around the plant: the stepped simulation, its settings, and the driver that runs
+it.
+"""
 
 from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.controller.diagnostics import Entry, report

@@ -1,4 +1,6 @@
-"""The one way to a simulation that another thread steps: under its lock, and only while it is stepped."""
+"""The one way to a simulation that another thread steps: under its lock, and only while it is
+stepped.
+"""
 
 from __future__ import annotations
 
@@ -15,12 +17,13 @@ from ir_sim_driver.notices import Level
 class Access:
     """Hands out `simulation`; wake_hint: what wakes the controller, for sentences.
 
-    failure: why the simulation is not stepped any more, "" while it is. simulation: for single values that
-    are read without the lock.
+    failure: why the simulation is not stepped any more, "" while it is. simulation: for single
+    values that are read without the lock.
     """
 
     def __init__(self, simulation: Simulation, wake_hint: str) -> None:
-        self.simulation, self._wake_hint = simulation, wake_hint
+        self.simulation = simulation
+        self._wake_hint = wake_hint
         self.lock = threading.Lock()
         self.failure = ""
 
@@ -32,7 +35,9 @@ class Access:
 
     @contextmanager
     def alive(self) -> Iterator[Simulation]:
-        """To ask for something. Raises RequestRefusedError when nobody steps the simulation any more."""
+        """To ask for something. Raises RequestRefusedError when nobody steps the simulation any
+        more.
+        """
         with self.lock:
             if self.failure:
                 raise RequestRefusedError(StatusCode.FAILURE, self.failure)
@@ -52,7 +57,9 @@ class Access:
 
     @contextmanager
     def writing(self) -> Iterator[Simulation]:
-        """To write PLC inputs: what is refused becomes a notice, a pressed emergency stop acts at once."""
+        """To write PLC inputs: what is refused becomes a notice, a pressed emergency stop acts at
+        once.
+        """
         with self.alive() as simulation:
             try:
                 yield simulation

@@ -30,17 +30,19 @@ def make_simulation(
     data: PowerData | None = None,
     plant: str | Plant = NOMINAL,
 ) -> Simulation:
-    """Simulation of a cell (a Cell, the name of a bundled one or a path) with a load text of its loads.
+    """Simulation of a cell (a Cell, the name of a bundled one or a path) with a load text of its
+    loads.
 
-    plant: a Plant or a text that names one, see `plant_named`; the ideal backend has none but its own.
-    Raises what ir_description raises for a cell, RequestRefusedError for a load, SettingsError for a plant,
-    BackendError.
+    plant: a Plant or a text that names one, see `plant_named`; the ideal backend has none but its
+    own. Raises what ir_description raises for a cell, RequestRefusedError for a load, SettingsError
+    for a plant, BackendError.
     """
     settings = settings or SimulationSettings()
     cell = load_cell(cell) if isinstance(cell, str) else cell
     if load == CELL_TOOL:
         load = "none" if cell.tool is None else cell.tool.name
-    what, data = carried(cell, load), data or cell.robot.controller
+    what = carried(cell, load)
+    data = data or cell.robot.controller
     plant = plant_named(plant, cell.robot, data) if isinstance(plant, str) else plant
     if backend == IDEAL:
         plant = ideal_plant(cell.robot, data)

@@ -1,4 +1,6 @@
-"""The cell around the robot as it is now: states of machines, parts that lie, and what the robot touches."""
+"""The cell around the robot as it is now: states of machines, parts that lie, and what the robot
+touches.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ from ir_sim_driver.motion import Executor, ToolPoint, TrajectoryGoal
 from ir_sim_driver.notices import Level, Notices
 from ir_sim_driver.plant import Backend, Carried
 
-_PATIENCE = 2.0 * SOON  # s of the clock that a movement waits for a door that will be open within SOON
+_PATIENCE = (
+    2.0 * SOON
+)  # s of the clock that a movement waits for a door that will be open within SOON
 
 
 class CellWatch:
@@ -38,11 +42,17 @@ class CellWatch:
         dt: float,
         now: Callable[[], float],
     ) -> None:
-        self._tool, self._backend, self._notices = tool, backend, notices
-        self._dt, self._now = dt, now
-        self._machines, self._parts = Machines(cell), Parts(cell, load)
+        self._tool = tool
+        self._backend = backend
+        self._notices = notices
+        self._dt = dt
+        self._now = now
+        self._machines = Machines(cell)
+        self._parts = Parts(cell, load)
         self._contacts = ContactWatch(cell.robot.acceleration_max, dt)
-        self._cell, self._load, self._station = cell, load, ""
+        self._cell = cell
+        self._load = load
+        self._station = ""
         self._touch: Touch | None = None
         self._where = ("", 0.0)  # id of the trajectory and time along it, at the first touch
         self._done: list[Contact] = []
@@ -77,11 +87,14 @@ class CellWatch:
         """Grows with every change of a machine's state and every contact."""
         return self._versions
 
-    # -- what changes ---------------------------------------------------------------------------------------
+    # -- what changes
+    # ---------------------------------------------------------------------------------------
 
     def stand_in(self, cell: Cell, load: Carried) -> None:
         """The robot stands in another cell from now on, with this load."""
-        self._cell, self._load, self._station = cell, load, ""
+        self._cell = cell
+        self._load = load
+        self._station = ""
         self._machines.stand_in(cell)
         self._parts.stand_in(cell, load)
         self._changed_state()
@@ -113,19 +126,22 @@ class CellWatch:
         self._touch = None
         self._arrange()
 
-    # -- what is asked --------------------------------------------------------------------------------------
+    # -- what is asked
+    # --------------------------------------------------------------------------------------
 
     def states(self) -> tuple[MachineState, ...]:
         """What every machine is in, and changes to."""
         return self._machines.states(self._now())
 
     def refusal(self, goal: TrajectoryGoal, checked: ContactScene) -> str:
-        """Why a movement that was checked in this scene can't start with the machines as they are, "" when it
-        can.
+        """Why a movement that was checked in this scene can't start with the machines as they are,
+        "" when it can.
         """
         refusal = self._machines.refusal(goal.states, self._now())
         if not refusal and checked is not self._scene:
-            refusal = "a machine or a part has moved while the trajectory was checked: send it again"
+            refusal = (
+                "a machine or a part has moved while the trajectory was checked: send it again"
+            )
         return refusal
 
     def wait_for(self, states: Sequence[str]) -> None:
@@ -137,10 +153,13 @@ class CellWatch:
         """What a trajectory of this station must keep clear of now."""
         return self._contacts.asked(self._scene, station)
 
-    # -- stepped --------------------------------------------------------------------------------------------
+    # -- stepped
+    # --------------------------------------------------------------------------------------------
 
     def look(self, step: int, executor: Executor, dynamics: DynamicsModel, safety: Safety) -> None:
-        """Look after this step, which is due; a robot that touches what it may not is stopped by `safety`."""
+        """Look after this step, which is due; a robot that touches what it may not is stopped by
+        `safety`.
+        """
         if self._machines.next_change <= self._now() and self._machines.step(self._now()):
             self._changed_state()
             self._arrange(standing=False)
@@ -168,7 +187,8 @@ class CellWatch:
         if touch is None:
             self.due = self._until_change(step, self._contacts.due)
             return ""
-        self._touch, self._where = touch, (executor.label, executor.path_time)
+        self._touch = touch
+        self._where = (executor.label, executor.path_time)
         self.due = step + 1
         _, body_a, body_b = touch.scene.model.pairs[touch.z]
         at = f" at {executor.path_time:.3f} s of {executor.label}" if executor.active else ""
@@ -176,7 +196,8 @@ class CellWatch:
 
     def take_contacts(self) -> tuple[Contact, ...]:
         """Contacts since the last call, each when the robot stands again."""
-        done, self._done = tuple(self._done), []
+        done = tuple(self._done)
+        self._done = []
         return done
 
     def _until_change(self, step: int, due: int) -> int:
@@ -192,7 +213,9 @@ class CellWatch:
             self._changed.notify_all()
 
     def _arrange(self, standing: bool = True) -> None:
-        """Build the scene anew. standing: what touches now was there before, or was put there by hand."""
+        """Build the scene anew. standing: what touches now was there before, or was put there by
+        hand.
+        """
         self._scene = scene = ContactScene.of(
             self._cell, self._tool.chain, self._load, self._machines, self._parts
         )
@@ -200,5 +223,6 @@ class CellWatch:
         self.due = 0
         if touching:
             self._notices.add(
-                Level.WARN, f"the robot stands in contact, and may only leave it: {', '.join(touching)}"
+                Level.WARN,
+                f"the robot stands in contact, and may only leave it: {', '.join(touching)}",
             )

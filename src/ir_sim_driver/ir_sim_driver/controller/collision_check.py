@@ -1,4 +1,6 @@
-"""Would this movement touch anything? Proved for every instant before it starts, not looked at in samples."""
+"""Would this movement touch anything? Proved for every instant before it starts, not looked at in
+samples.
+"""
 
 from __future__ import annotations
 
@@ -19,8 +21,8 @@ _PIECES = 200  # segments that are proved together
 
 
 def check_collision(path: Path, segments: slice, offset: float, keep: Keep) -> None:
-    """Prove that every pair keeps its distance along some segments of a path; offset [s]: of its trajectory's
-    time 0. Raises TrajectoryRefusedError.
+    """Prove that every pair keeps its distance along some segments of a path; offset [s]: of its
+    trajectory's time 0. Raises TrajectoryRefusedError.
     """
     begin = float(np.sum(path.durations[: segments.start or 0]))
     if len(path.durations[segments]) == 0:
@@ -36,8 +38,8 @@ def check_collision(path: Path, segments: slice, offset: float, keep: Keep) -> N
         if time.thread_time() - started > CHECK_TIME:
             raise TrajectoryRefusedError(
                 ErrorCode.INVALID_GOAL,
-                f"the trajectory could not be proved free of collisions within {CHECK_TIME:g} s of processor "
-                f"time: it was up to {begin - offset:.3f} s",
+                f"the trajectory could not be proved free of collisions within {CHECK_TIME:g} s "
+                f"of processor time: it was up to {begin - offset:.3f} s",
             )
 
 
@@ -57,12 +59,14 @@ def _check_point(q: FloatArray, keep: Keep) -> None:
         raise _refused(q, 0.0, COLLIDES, z, keep.scene)
 
 
-def _refused(q: FloatArray, at: float, verdict: int, z: int, scene: ContactScene) -> TrajectoryRefusedError:
+def _refused(
+    q: FloatArray, at: float, verdict: int, z: int, scene: ContactScene
+) -> TrajectoryRefusedError:
     kind, body_a, body_b = scene.model.pairs[z]
     distance = float(scene.model.witnesses(q[None], [z]).distance[0])
     does = "collides" if verdict == COLLIDES else "can't be proved free of collisions"
     return TrajectoryRefusedError(
         ErrorCode.INVALID_GOAL,
-        f"the trajectory {does}: {body_a} and {body_b} ({kind.lower()}) come to {distance * 1e3:.1f} mm at "
-        f"{at:.3f} s; plan it again, or allow_collision",
+        f"the trajectory {does}: {body_a} and {body_b} ({kind.lower()}) come to "
+        f"{distance * 1e3:.1f} mm at {at:.3f} s; plan it again, or allow_collision",
     )

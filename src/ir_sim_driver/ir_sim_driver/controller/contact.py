@@ -1,11 +1,11 @@
 """Does the robot touch what it may not? Looked at as often as its speed and the clearance ask for.
 
-After a look that found the clearance d the next one is due before any surface can have moved by d: with v the
-speed bound of all surfaces now and A that of their acceleration, v T + A T^2 / 2 = d. A is what motors and
-gravity can do at most, whoever supervises them. Near things that is every step.
+After a look that found the clearance d the next one is due before any surface can have moved by d:
+with v the speed bound of all surfaces now and A that of their acceleration, v T + A T^2 / 2 = d. A
+is what motors and gravity can do at most, whoever supervises them. Near things that is every step.
 
-A pair that touches when the scene changes, or when the robot recovers, may go on touching, but no deeper:
-whoever is in contact may only leave it.
+A pair that touches when the scene changes, or when the robot recovers, may go on touching, but no
+deeper: whoever is in contact may only leave it.
 """
 
 from __future__ import annotations
@@ -26,11 +26,13 @@ from ir_sim_driver.plant import Backend
 
 LONGEST = 100  # steps between two looks, however far everything is
 _FAR = 10.0  # m: as far as nothing gets within LONGEST
-STIFFNESS = 1e6  # N/m of the arm at its tool: 1 N per micrometre, what robots of this size are measured at
+STIFFNESS = (
+    1e6  # N/m of the arm at its tool: 1 N per micrometre, what robots of this size are measured at
+)
 _RELEASE = 5e-4  # m that a pair in contact may go deeper: opening brakes let the arm settle
 HARDEST = 6.0
-"""Times the acceleration limits: the torque envelope and gravity give a surface 4.1 times (the largest over
-random states, loads and plants), in every mode: driven, falling, braking.
+"""Times the acceleration limits: the torque envelope and gravity give a surface 4.1 times (the
+largest over random states, loads and plants), in every mode: driven, falling, braking.
 """
 _FRESH = 0.5  # share of the clearance that a bound may use up before distances are computed again
 
@@ -74,13 +76,17 @@ class _Group:
     """Pairs (Z,) that joints with these reaches (n,) [m] move; due: step of their next look."""
 
     def __init__(self, pairs: BoolArray, reach: FloatArray, hardest: FloatArray, dt: float) -> None:
-        self._pairs, self._reach, self._dt = pairs, reach, dt
+        self._pairs = pairs
+        self._reach = reach
+        self._dt = dt
         self._acceleration = float(reach @ hardest)
 
     def start(self, thresholds: FloatArray) -> None:
         """Keep these distances (Z,) from now on."""
         self._offset: FloatArray = np.where(self._pairs, thresholds, -np.inf)
-        self._clearance, self._from, self.due = 0.0, self._reach, 0
+        self._clearance = 0.0
+        self._from = self._reach
+        self.due = 0
 
     def look(self, model: CollisionModel, step: int, q: FloatArray, qd: FloatArray) -> int:
         """The pair that is too near, -1: none, and not before `due`."""
@@ -92,7 +98,8 @@ class _Group:
             left = math.inf if z < 0 else distance - float(self._offset[z])
             if left <= 0.0:
                 return z
-            self._clearance, self._from = min(left, _FAR), q
+            self._clearance = min(left, _FAR)
+            self._from = q
         self.due = step + self._steps(min(left, _FAR), float(self._reach.dot(np.abs(qd))))
         return -1
 
@@ -106,7 +113,9 @@ class _Group:
 
 
 class ContactWatch:
-    """Watches a robot with these acceleration limits (n,), stepped by dt [s]. due: step of the next look."""
+    """Watches a robot with these acceleration limits (n,), stepped by dt [s]. due: step of the next
+    look.
+    """
 
     def __init__(self, acceleration_max: FloatArray, dt: float) -> None:
         self._hardest: FloatArray = HARDEST * np.asarray(acceleration_max)
@@ -116,19 +125,26 @@ class ContactWatch:
         self._in_contact = False
         self.thresholds: FloatArray = np.empty(0)
 
-    def watch(self, scene: ContactScene, q: FloatArray, station: str, standing: bool) -> tuple[str, ...]:
-        """Watch this scene from q (n,) on, with what the station allows; the pairs that touch already.
+    def watch(
+        self, scene: ContactScene, q: FloatArray, station: str, standing: bool
+    ) -> tuple[str, ...]:
+        """Watch this scene from q (n,) on, with what the station allows; the pairs that touch
+        already.
 
         standing: what touches now may be left; otherwise only what could be left before.
         """
         left = self._in_contact_names()
-        self._scene, self._station = scene, station
+        self._scene = scene
+        self._station = station
         self._groups = tuple(
-            _Group(pairs, reach, self._hardest, self._dt) for pairs, reach in scene.groups if pairs.any()
+            _Group(pairs, reach, self._hardest, self._dt)
+            for pairs, reach in scene.groups
+            if pairs.any()
         )
         self._allowed: BoolArray = scene.allowed(station)
         self._inside = self._any = bool(self._allowed.any())
-        plain, pairs = self._plain(), scene.model.pairs
+        plain = self._plain()
+        pairs = scene.model.pairs
         self.thresholds = self._relaxed(q, plain)
         if not standing:
             known = np.array([(a, b) in left for _, a, b in pairs], dtype=bool)
@@ -156,25 +172,32 @@ class ContactWatch:
         assert self._scene is not None
         if station == self._station:
             return
-        before, plain = self.thresholds, self._plain()
-        self._station, self._allowed = station, self._scene.allowed(station)
+        before = self.thresholds
+        plain = self._plain()
+        self._station = station
+        self._allowed = self._scene.allowed(station)
         self._inside = self._any = bool(self._allowed.any())
         self.thresholds = np.where(before < plain, np.minimum(before, self._plain()), self._plain())
         self._start()
 
     def asked(self, scene: ContactScene, station: str) -> Keep:
         """What a trajectory of this station must keep in this scene as it is watched now."""
-        outside, allowed = scene.touching, scene.allowed(station)
+        outside = scene.touching
+        allowed = scene.allowed(station)
         if scene is self._scene and len(outside):
             held = self.thresholds < self._plain()
             outside = np.where(held, np.minimum(outside, self.thresholds), outside)
         if not allowed.any():
             return Keep(scene, outside)
-        return Keep(scene, outside, station, np.where(allowed, np.minimum(outside, -ALLOWED_DEPTH), outside))
+        return Keep(
+            scene, outside, station, np.where(allowed, np.minimum(outside, -ALLOWED_DEPTH), outside)
+        )
 
     def look(self, step: int, backend: Backend, dynamics: DynamicsModel) -> Touch | None:
         """Look at what is due; a touch that is not allowed."""
-        scene, q, qd = self._scene, backend.q, backend.qd
+        scene = self._scene
+        q = backend.q
+        qd = backend.qd
         assert scene is not None
         if self._any or self._in_contact:
             self._follow(q)
@@ -189,15 +212,20 @@ class ContactWatch:
     def _touched(
         self, scene: ContactScene, z: int, step: int, backend: Backend, dynamics: DynamicsModel
     ) -> Touch:
-        """The first touch: speed along the normal, with a door's own, and the robot's mass behind it."""
-        q, pair = backend.q[None], np.array([z])
+        """The first touch: speed along the normal, with a door's own, and the robot's mass behind
+        it.
+        """
+        q = backend.q[None]
+        pair = np.array([z])
         gradient = scene.model.gradients(q, pair)[0]
         own = scene.speeds.get(scene.model.pairs[z].body_b, 0.0)
         speed = max(0.0, own - float(gradient @ backend.qd))
         weight = float(gradient @ np.linalg.solve(dynamics.mass_matrix(q)[0], gradient))
         impact = speed * math.sqrt(STIFFNESS / weight) if weight > 0.0 else math.inf
         self.due = step + 1
-        return Touch(scene, z, step, speed, impact, -float(scene.model.witnesses(q, pair).distance[0]))
+        return Touch(
+            scene, z, step, speed, impact, -float(scene.model.witnesses(q, pair).distance[0])
+        )
 
     def _follow(self, q: FloatArray) -> None:
         """Take back what is allowed where the tool has left the zone, or a pair its contact."""
@@ -205,13 +233,18 @@ class ContactWatch:
         if self._any:
             inside = self._scene.inside(q, self._station)
             if inside != self._inside:
-                before, plain = self.thresholds, self._plain()
+                before = self.thresholds
+                plain = self._plain()
                 self._inside = inside
-                self.thresholds = np.where(before < plain, np.minimum(before, self._plain()), self._plain())
+                self.thresholds = np.where(
+                    before < plain, np.minimum(before, self._plain()), self._plain()
+                )
                 self._start()
         if self._in_contact:
             plain = self._plain()
-            self.thresholds = np.maximum(self.thresholds, np.minimum(plain, self._relaxed(q, plain)))
+            self.thresholds = np.maximum(
+                self.thresholds, np.minimum(plain, self._relaxed(q, plain))
+            )
             self._in_contact = bool((self.thresholds < plain).any())
             self._start()
 

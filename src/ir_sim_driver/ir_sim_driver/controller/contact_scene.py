@@ -1,4 +1,6 @@
-"""What the robot can touch at one moment: itself, tool and part against machines, floor and lying parts."""
+"""What the robot can touch at one moment: itself, tool and part against machines, floor and lying
+parts.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,9 @@ from ir_sim_driver.plant import Carried
 
 TOUCH = 1e-5  # m of overlap that counts as touching: ten times what distances are off by
 ALLOWED_DEPTH = 5e-3  # m that an allowed pair may overlap: as far as the tool may be off its path
-_UPPER_ARM, _FOREARM = 2, 3  # links
+# links
+_UPPER_ARM = 2
+_FOREARM = 3
 ZONE_MARGIN = 0.05  # m around a zone where its contacts are still allowed: beyond usual S_m
 
 
@@ -36,7 +40,9 @@ class ContactScene:
         bodies: Iterable[Body],
         speeds: Mapping[str, float] | None = None,
     ) -> None:
-        self.cell, self.chain, bodies = cell, chain, tuple(bodies)
+        self.cell = cell
+        self.chain = chain
+        bodies = tuple(bodies)
         self.speeds = speeds or {}
         self.capsules: tuple[Capsule, ...] = (
             *cell.robot.capsules,
@@ -57,15 +63,21 @@ class ContactScene:
         self.touching: FloatArray = np.full(len(self.model.pairs), -TOUCH)
 
     @classmethod
-    def of(cls, cell: Cell, chain: Chain, load: Carried, machines: Machines, parts: Parts) -> ContactScene:
+    def of(
+        cls, cell: Cell, chain: Chain, load: Carried, machines: Machines, parts: Parts
+    ) -> ContactScene:
         """The scene of the cell as its machines and parts are now."""
         floor = tuple(body for body in cell.bodies() if body.name == "floor") if cell.floor else ()
         states = machines.present_states()
         elsewhere = {
-            each.name: states[each.name] for each in cell.equipment if states[each.name] != (each.state,)
+            each.name: states[each.name]
+            for each in cell.equipment
+            if states[each.name] != (each.state,)
         }
         # machines as the file has them keep their placed bodies, which take long to make
-        around = (body for each in cell_in(cell, elsewhere).equipment for body in each.world_bodies())
+        around = (
+            body for each in cell_in(cell, elsewhere).equipment for body in each.world_bodies()
+        )
         speeds = {
             name: speed
             for machine in cell.equipment
@@ -76,10 +88,11 @@ class ContactScene:
 
     @cached_property
     def groups(self) -> tuple[tuple[BoolArray, FloatArray], ...]:
-        """Pairs (Z,) with the reaches (n,) [m] of the joints that move them: those of links 1 and 2 with what
-        stands around, those of the wrist among themselves, and all others.
+        """Pairs (Z,) with the reaches (n,) [m] of the joints that move them: those of links 1 and 2
+        with what stands around, those of the wrist among themselves, and all others.
         """
-        n, link = len(self.reach), {capsule.name: capsule.link for capsule in self.capsules}
+        n = len(self.reach)
+        link = {capsule.name: capsule.link for capsule in self.capsules}
         outer = np.array([max(link[a], link.get(b, 0)) for _, a, b in self.model.pairs], dtype=int)
         inner = np.array([min(link[a], link.get(b, 0)) for _, a, b in self.model.pairs], dtype=int)
         wrist = inner >= _FOREARM
@@ -122,11 +135,15 @@ class ContactScene:
         return np.array([frozenset((a, b)) in contacts for _, a, b in self.model.pairs], dtype=bool)
 
     def inside(self, q: FloatArray, station: str) -> bool:
-        """Whether the tcp at q (n,) is in the zone of a station's machine, or within ZONE_MARGIN of it."""
+        """Whether the tcp at q (n,) is in the zone of a station's machine, or within ZONE_MARGIN of
+        it.
+        """
         return bool(self.depth(q[None], station)[0] >= 0.0)
 
     def depth(self, q: FloatArray, station: str) -> FloatArray:
-        """(N,): how far [m] the tcp at q (N, n) is from leaving that; negative: from getting there."""
+        """(N,): how far [m] the tcp at q (N, n) is from leaving that; negative: from getting
+        there.
+        """
         zone = self.cell.zone_at(station)
         if zone is None:
             return np.full(len(q), -np.inf)
@@ -144,6 +161,11 @@ class ContactScene:
 
 
 def _ends(capsules: Iterable[Capsule]) -> Iterator[tuple[int, float]]:
-    """Link and distance [m] from its frame of what moves farthest of each: the end of its segment."""
+    """Link and distance [m] from its frame of what moves farthest of each: the end of its
+    segment.
+    """
     for capsule in capsules:
-        yield capsule.link, max(float(np.linalg.norm(capsule.p0)), float(np.linalg.norm(capsule.p1)))
+        yield (
+            capsule.link,
+            max(float(np.linalg.norm(capsule.p0)), float(np.linalg.norm(capsule.p1))),
+        )

@@ -21,17 +21,24 @@ class Entry(NamedTuple):
 _LAG_SHOWN = 0.5  # s; people and timeouts notice no shorter one
 
 
-def report(simulation: Simulation, worst_lag: float, failure: str = "", lag: float = 0.0) -> list[Entry]:
-    """Controller, executor and plant; the controller's entries are STALE while it is off the network.
+def report(
+    simulation: Simulation, worst_lag: float, failure: str = "", lag: float = 0.0
+) -> list[Entry]:
+    """Controller, executor and plant; the controller's entries are STALE while it is off the
+    network.
 
-    worst_lag, lag [s]: delay of the plant's thread, the longest so far and now; failure: why it has ended.
+    worst_lag, lag [s]: delay of the plant's thread, the longest so far and now; failure: why it has
+    ended.
     """
     reading = simulation.mains.meter.reading()
-    level, sentence = Level.OK, "running"
+    level = Level.OK
+    sentence = "running"
     if failure or simulation.fault:
-        level, sentence = Level.ERROR, failure or simulation.fault
+        level = Level.ERROR
+        sentence = failure or simulation.fault
     elif lag > _LAG_SHOWN:
-        level, sentence = Level.WARN, f"{lag:.1f} s behind the clock: this machine is too slow, or loaded"
+        level = Level.WARN
+        sentence = f"{lag:.1f} s behind the clock: this machine is too slow, or loaded"
     plant = Entry(
         "ir_sim_driver: plant",
         level,
@@ -58,9 +65,11 @@ def report(simulation: Simulation, worst_lag: float, failure: str = "", lag: flo
 def _controller(simulation: Simulation) -> Entry:
     mode = simulation.modes.mode
     last = simulation.notices.last
-    level, sentence = Level.OK, mode.name
+    level = Level.OK
+    sentence = mode.name
     if mode is Mode.EMERGENCY_STOP or simulation.stopped:
-        level, sentence = Level.ERROR, simulation.fault or "emergency stop: release it, then recover"
+        level = Level.ERROR
+        sentence = simulation.fault or "emergency stop: release it, then recover"
     elif last is not None and last.level is not Level.OK:
         level, sentence = last
     return Entry(
@@ -71,19 +80,24 @@ def _controller(simulation: Simulation) -> Entry:
             "mode": mode.name,
             "operating mode": simulation.plc.operating_mode.name,
             "time to target [s]": f"{simulation.modes.time_to_target:.3f}",
-            "emergency stop left the path by [mm]": f"{simulation.safety.emergency.excursion * 1e3:.2f}",
+            "emergency stop left the path by "
+            "[mm]": f"{simulation.safety.emergency.excursion * 1e3:.2f}",
         },
     )
 
 
 def _executor(simulation: Simulation) -> Entry:
-    executor, load = simulation.executor, simulation.load_checks.last
-    level, sentence = Level.OK, f"executing {executor.label}" if executor.active else "holding"
+    executor = simulation.executor
+    load = simulation.load_checks.last
+    level = Level.OK
+    sentence = f"executing {executor.label}" if executor.active else "holding"
     held = simulation.speed_scaling.holds()
     if executor.active and held:
-        level, sentence = Level.WARN, f"{sentence}, which stands: {held}"
+        level = Level.WARN
+        sentence = f"{sentence}, which stands: {held}"
     if load is not None and load.noticed:
-        level, sentence = Level.WARN, load.sentence
+        level = Level.WARN
+        sentence = load.sentence
     return Entry(
         "ir_sim_driver: executor",
         level,

@@ -1,7 +1,8 @@
-"""The driver: a simulation that one thread steps and others ask. Nobody else touches the simulation. No ROS.
+"""The driver: a simulation that one thread steps and others ask. Nobody else touches the
+simulation. No ROS.
 
-Everything that touches the simulation holds one lock for a short time; trajectories are checked beside it in
-a thread of their own, so that a long one does not keep anybody waiting.
+Everything that touches the simulation holds one lock for a short time; trajectories are checked
+beside it in a thread of their own, so that a long one does not keep anybody waiting.
 """
 
 from __future__ import annotations
@@ -43,7 +44,9 @@ class Snapshot:
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """Poses (n+1, 4, 4) of the links in the world, and capsules of the robot and of its load on them."""
+    """Poses (n+1, 4, 4) of the links in the world, and capsules of the robot and of its load on
+    them.
+    """
 
     link_poses: FloatArray
     robot: tuple[Capsule, ...]
@@ -53,19 +56,22 @@ class Bodies:
 class Driver:
     """Runs `simulation`, `steps` of its steps per tick.
 
-    plc: what links and the PLC's topic talk to. wake_hint: what wakes the controller, for sentences.
+    plc: what links and the PLC's topic talk to. wake_hint: what wakes the controller, for
+    sentences.
     """
 
     def __init__(
         self, simulation: Simulation, steps: int = 2, wake_hint: str = "a Wake-on-LAN packet"
     ) -> None:
-        self._simulation, self._steps = simulation, steps
+        self._simulation = simulation
+        self._steps = steps
         self._access = Access(simulation, wake_hint)
         self._lock = self._access.lock
         self._stamp = 0
         self._goals = Goals(simulation, self._lock, lambda: self._stamp)
         self._frames = Frames(simulation, steps)
-        self.plc, self.cell_side = PlcSide(self._access), CellSide(self._access)
+        self.plc = PlcSide(self._access)
+        self.cell_side = CellSide(self._access)
         self.joint_names = tuple(simulation.robot.joint_names)
 
     def close(self) -> None:
@@ -75,7 +81,8 @@ class Driver:
     def tick(self, stamp_ns: int, moved: Callable[[Joints], None] = lambda joints: None) -> Frame:
         """Let the steps of a tick pass, which ends at the stamp [ns].
 
-        moved: gets the joints before the rest of the frame is made; it must be quick, everybody waits for it.
+        moved: gets the joints before the rest of the frame is made; it must be quick, everybody
+        waits for it.
         """
         with self._lock:
             self._stamp = stamp_ns
@@ -83,7 +90,8 @@ class Driver:
                 take_offered_cell(self._simulation)
                 for _ in range(self._steps):
                     self._simulation.step()
-                moved(joints := self._frames.joints(stamp_ns))
+                joints = self._frames.joints(stamp_ns)
+                moved(joints)
                 calls = self._goals.take_calls(self._simulation.take_outcomes())
                 frame = self._frames.take(joints)
             except Exception as error:
@@ -102,12 +110,15 @@ class Driver:
         for ended, outcome in calls:
             ended(outcome)
 
-    # -- movements ------------------------------------------------------------------------------------------
+    # -- movements
+    # ------------------------------------------------------------------------------------------
 
     def submit(
         self, points: int, read: Callable[[], TrajectoryGoal], ended: Callable[[Outcome], None]
     ) -> int:
-        """Check a goal beside everything else and start it; returns its ticket. See `Goals.submit`."""
+        """Check a goal beside everything else and start it; returns its ticket. See
+        `Goals.submit`.
+        """
 
         def here() -> TrajectoryGoal:
             goal = read()
@@ -179,13 +190,14 @@ class Driver:
         with self._lock:
             return self._simulation.executor.active
 
-    # -- requests; each raises RequestRefusedError, also while the controller is off the network -------------
+    # -- requests; each raises RequestRefusedError, also while the controller is off the network
+    # -------------
 
     def press(self, writer: str, name: str, level: bool) -> tuple[PlcInputs, str]:
         """Set one bit, or the mode switch by the name of its position.
 
-        Returns the levels and a remark: why the bit will not count. A pressed emergency stop is latched in
-        every mode, asleep too, and has been acted upon when this returns.
+        Returns the levels and a remark: why the bit will not count. A pressed emergency stop is
+        latched in every mode, asleep too, and has been acted upon when this returns.
         """
         with self._access.online(asleep_too=name == STOP_BIT and level) as simulation:
             plc = simulation.plc
@@ -228,7 +240,9 @@ class Driver:
             return carried
 
     def offer_cell(self, planned: PlannedCell) -> None:
-        """Stand in this cell as soon as the robot stands; a cell that can't be its own becomes a warning."""
+        """Stand in this cell as soon as the robot stands; a cell that can't be its own becomes a
+        warning.
+        """
         with self._lock:
             reason = self._simulation.surroundings.offer(planned)
             if reason:
@@ -236,7 +250,8 @@ class Driver:
                     Level.WARN, f"cell {planned.cell.name!r} of the planner is not taken: {reason}"
                 )
 
-    # -- what people see ------------------------------------------------------------------------------------
+    # -- what people see
+    # ------------------------------------------------------------------------------------
 
     def warn(self, sentence: str) -> None:
         """Add a warning to the notices."""
@@ -244,7 +259,9 @@ class Driver:
             self._simulation.notices.add(Level.WARN, sentence)
 
     def snapshot(self, worst_lag: float, lag: float = 0.0) -> Snapshot:
-        """Notices since the last snapshot, and the state; delays [s] of whoever ticks: worst and now."""
+        """Notices since the last snapshot, and the state; delays [s] of whoever ticks: worst and
+        now.
+        """
         with self._lock:
             return Snapshot(
                 self._simulation.notices.take(),
@@ -271,13 +288,15 @@ class Driver:
     def description(self) -> str:
         """URDF of the robot with what it carries."""
         with self._lock:
-            cell, load = self._simulation.cell, self._simulation.load
+            cell = self._simulation.cell
+            load = self._simulation.load
         return robot_urdf(cell.robot, load.loads, cell.tcp, cell.base_pose)
 
     def fixed_frames(self) -> tuple[FramePose, ...]:
         """Frames that no joint moves, with those of what is carried."""
         with self._lock:
-            cell, load = self._simulation.cell, self._simulation.load
+            cell = self._simulation.cell
+            load = self._simulation.load
         return fixed_frames(cell.robot, load.loads, cell.tcp, cell.base_pose)
 
     def moving_frames(self, q: FloatArray) -> tuple[FramePose, ...]:

@@ -1,7 +1,7 @@
 """The emergency stop (STOP 0): motors off, then brakes with all they have, off the path if need be.
 
-Between the two lies the brakes' reaction time, in which the arm rolls on and sags. Nobody follows the command
-any more; afterwards it is where the robot stands, so nothing can jump or resume.
+Between the two lies the brakes' reaction time, in which the arm rolls on and sags. Nobody follows
+the command any more; afterwards it is where the robot stands, so nothing can jump or resume.
 """
 
 from __future__ import annotations
@@ -25,8 +25,13 @@ class EmergencyStop:
     def __init__(
         self, backend: Backend, executor: Executor, tool: ToolPoint, notices: Notices, reaction: int
     ) -> None:
-        self._backend, self._executor, self._tool, self._notices = backend, executor, tool, notices
-        self._reaction, self._open, self._powered = reaction, 0, False
+        self._backend = backend
+        self._executor = executor
+        self._tool = tool
+        self._notices = notices
+        self._reaction = reaction
+        self._open = 0
+        self._powered = False
         self._running: Excursion | None = None
         self.excursion = 0.0
 
@@ -36,12 +41,16 @@ class EmergencyStop:
         return self._running is not None
 
     def start(self, sentence: str, braked: bool, powered: bool = False) -> None:
-        """Stop; the goal ends with this sentence. braked: the brakes are closed; powered: the motors stop the
-        robot until the brakes act, else they are off.
+        """Stop; the goal ends with this sentence. braked: the brakes are closed; powered: the
+        motors stop the robot until the brakes act, else they are off.
         """
-        executor, q = self._executor, self._backend.q
-        self._running = None if braked else Excursion(self._tool, executor.path, executor.path_parameter, q)
-        self._open, self._powered = 0 if braked else self._reaction, powered
+        executor = self._executor
+        q = self._backend.q
+        self._running = (
+            None if braked else Excursion(self._tool, executor.path, executor.path_parameter, q)
+        )
+        self._open = 0 if braked else self._reaction
+        self._powered = powered
         executor.drop(sentence)
         executor.hold(q)
 

@@ -1,7 +1,7 @@
 """What is published at a stamp: joints every tick; power, controller state and PLC levels when due.
 
-Joints are taken first and without the rest: reading the mains meter takes a fifth of a tick, every fifth
-tick, and would make the period of joint states that irregular.
+Joints are taken first and without the rest: reading the mains meter takes a fifth of a tick, every
+fifth tick, and would make the period of joint states that irregular.
 """
 
 from __future__ import annotations
@@ -56,7 +56,8 @@ class Frames:
     """Makes frames of `simulation`, which is stepped `steps` times between two of them."""
 
     def __init__(self, simulation: Simulation, steps: int) -> None:
-        self._simulation, self._steps = simulation, steps
+        self._simulation = simulation
+        self._steps = steps
         self._outputs: PlcOutputs | None = None
         self._inputs: PlcInputs | None = None
         self._energy = self._dissipated = self._rectified = self._metered = 0.0
@@ -85,19 +86,23 @@ class Frames:
         levels = simulation.plc.levels
         inputs = None if levels is self._inputs or levels == self._inputs else levels
         self._inputs = inputs or self._inputs
-        finding, load = simulation.load_checks.take(), simulation.load
+        finding = simulation.load_checks.take()
+        load = simulation.load
         return Frame(joints, load, power, following, outputs, inputs, finding)
 
     def _power(self, stamp_ns: int) -> PowerState:
         simulation = self._simulation
         simulation.mains.settle()
-        reading, modes = simulation.mains.meter.reading(), simulation.modes
+        reading = simulation.mains.meter.reading()
+        modes = simulation.modes
         elapsed = reading.time - self._metered
         per_second = 1.0 / elapsed if elapsed > 0.0 else 0.0
         mean = (reading.energy - self._energy) * per_second
         dissipated = (reading.burnt_energy - self._dissipated) * per_second
         rectifier = (reading.rectifier_energy - self._rectified) * per_second
-        self._energy, self._dissipated, self._metered = reading.energy, reading.burnt_energy, reading.time
+        self._energy = reading.energy
+        self._dissipated = reading.burnt_energy
+        self._metered = reading.time
         self._rectified = reading.rectifier_energy
         temperature = simulation.backend.temperature
         return PowerState(

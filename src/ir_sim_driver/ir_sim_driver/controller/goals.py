@@ -1,4 +1,6 @@
-"""Goals from their sender to their outcome: checked in a thread of their own, started, stopped, reported."""
+"""Goals from their sender to their outcome: checked in a thread of their own, started, stopped,
+reported.
+"""
 
 from __future__ import annotations
 
@@ -20,10 +22,16 @@ Ended = Callable[[Outcome], None]
 
 
 class Goals:
-    """Goals of `simulation`, which is only touched under `lock`; now: present time of the clock [ns]."""
+    """Goals of `simulation`, which is only touched under `lock`; now: present time of the clock
+    [ns].
+    """
 
-    def __init__(self, simulation: Simulation, lock: threading.Lock, now: Callable[[], int]) -> None:
-        self._simulation, self._lock, self._now = simulation, lock, now
+    def __init__(
+        self, simulation: Simulation, lock: threading.Lock, now: Callable[[], int]
+    ) -> None:
+        self._simulation = simulation
+        self._lock = lock
+        self._now = now
         self._checker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="trajectory_checks")
         self._tickets = 0
         self._dead = ""
@@ -39,8 +47,8 @@ class Goals:
     def submit(self, points: int, read: Read, ended: Ended) -> int:
         """Check a goal of so many points beside everything else and start it; returns its ticket.
 
-        read: makes the goal, may raise TrajectoryRefusedError. ended: gets the outcome, whether the goal was
-        refused (id NO_GOAL) or executed; it is called from other threads.
+        read: makes the goal, may raise TrajectoryRefusedError. ended: gets the outcome, whether the
+        goal was refused (id NO_GOAL) or executed; it is called from other threads.
         """
         with self._lock:
             self._tickets += 1
@@ -68,7 +76,9 @@ class Goals:
 
     def runs(self, ticket: int) -> bool:
         """Whether this goal is executed now. The lock is held."""
-        return ticket in self._running and self._running[ticket] == self._simulation.executor.goal_id
+        return (
+            ticket in self._running and self._running[ticket] == self._simulation.executor.goal_id
+        )
 
     def take_calls(self, outcomes: Sequence[Outcome]) -> list[tuple[Ended, Outcome]]:
         """Senders of these outcomes, to be called when the lock is free again. The lock is held."""
@@ -116,7 +126,9 @@ class Goals:
             ended(refusal)
 
     def _vetted(self, goal: TrajectoryGoal) -> VettedGoal:
-        """The goal, checked in the cell as it is at the end of the check; a door may move meanwhile."""
+        """The goal, checked in the cell as it is at the end of the check; a door may move
+        meanwhile.
+        """
         vetted = self._simulation.vet(goal, self._now())
         for _ in range(_AGAIN):
             if vetted.keep.scene is self._simulation.cell_watch.scene:

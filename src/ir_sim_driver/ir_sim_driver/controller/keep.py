@@ -1,7 +1,7 @@
 """What a trajectory must keep clear of, and where along it the contacts of its station are allowed.
 
-An allowed contact belongs to a station: it counts where the tcp is surely in the zone of the station's
-machine or within a margin of it, as for who watches the robot.
+An allowed contact belongs to a station: it counts where the tcp is surely in the zone of the
+station's machine or within a margin of it, as for who watches the robot.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ _SHIFT = np.array([[math.comb(k, j) for k in range(6)] for j in range(6)], dtype
 
 
 class Piece(NamedTuple):
-    """A part of a path with coefficients (S, n, 6) and durations (S,) [s] along which the distances (Z,) [m]
-    must be kept.
+    """A part of a path with coefficients (S, n, 6) and durations (S,) [s] along which the distances
+    (Z,) [m] must be kept.
     """
 
     coefficients: FloatArray
@@ -34,7 +34,8 @@ class Piece(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Keep:
-    """Distances (Z,) [m] that the pairs of a scene must keep outside the zone of a station, and inside; ""
+    """Distances (Z,) [m] that the pairs of a scene must keep outside the zone of a station, and
+    inside; ""
     and None: there is no such station.
     """
 
@@ -62,8 +63,11 @@ class Keep:
     def _divided(
         self, coefficients: FloatArray, durations: FloatArray
     ) -> tuple[FloatArray, FloatArray, BoolArray]:
-        """The same path in halves of its segments until each is inside or not: whether it is, (S,)."""
-        parts, spans = coefficients, durations
+        """The same path in halves of its segments until each is inside or not: whether it is,
+        (S,).
+        """
+        parts = coefficients
+        spans = durations
         order: FloatArray = np.arange(len(spans), dtype=float)  # places along the path
         width = np.ones(len(spans))
         done: list[tuple[FloatArray, FloatArray, FloatArray, BoolArray]] = []
@@ -72,9 +76,13 @@ class Keep:
             travel = self._travel(parts, spans)
             known = (np.abs(depth) > travel) | (travel < _FINEST)
             done.append((order[known], parts[known], spans[known], depth[known] > travel[known]))
-            first, half, there, wide = parts[~known], 0.5 * spans[~known], order[~known], 0.5 * width[~known]
+            first = parts[~known]
+            half = 0.5 * spans[~known]
+            there = order[~known]
+            wide = 0.5 * width[~known]
             parts = np.concatenate((first, _later(first, half)))
-            spans, width = np.concatenate((half, half)), np.concatenate((wide, wide))
+            spans = np.concatenate((half, half))
+            width = np.concatenate((wide, wide))
             order = np.concatenate((there, there + wide))
         columns = [np.concatenate(column) for column in zip(*done, strict=True)]
         along = np.argsort(columns[0])

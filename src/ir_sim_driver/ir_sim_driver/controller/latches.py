@@ -1,4 +1,6 @@
-"""What was asked for once and stays so until it is done: drives off, recovery, cold start, waking."""
+"""What was asked for once and stays so until it is done: drives off, recovery, cold start,
+waking.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,9 @@ from ir_sim_driver.plc import Plc
 
 
 class Latches:
-    """drives_off: it came and no drives_on since. recover, restart, wake: waiting to be acted upon."""
+    """drives_off: it came and no drives_on since. recover, restart, wake: waiting to be acted
+    upon.
+    """
 
     def __init__(self) -> None:
         self.drives_off = self.recover = self.restart = self.wake = False

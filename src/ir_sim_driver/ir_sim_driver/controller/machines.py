@@ -1,6 +1,7 @@
 """The states of the cell's machines, as signals switch them; a change takes its time.
 
-A machine with a switch is in the state that its cell says until its signal is heard for the first time. While
+A machine with a switch is in the state that its cell says until its signal is heard for the first
+time. While
 it changes it is in both states: their bodies are all there, with what they sweep.
 """
 
@@ -11,7 +12,8 @@ from collections.abc import Iterable
 from ir_description import Cell, Equipment
 from ir_msgs_py.contact import MachineState
 
-SOON = 0.5  # s: a change that ends within this is waited for, as the clocks of PLC and plant differ a little
+# s: a change that ends within this is waited for, as the clocks of PLC and plant differ a little
+SOON = 0.5
 
 
 class Machines:
@@ -32,11 +34,15 @@ class Machines:
             if machine.switch is not None and before.get(machine.name) in known:
                 self._states[machine.name] = before[machine.name]
         self._moving = {
-            name: change for name, change in self._moving.items() if name in before and self._switched(name)
+            name: change
+            for name, change in self._moving.items()
+            if name in before and self._switched(name)
         }
 
     def _switched(self, name: str) -> bool:
-        return any(machine.name == name and machine.switch is not None for machine in self.cell.equipment)
+        return any(
+            machine.name == name and machine.switch is not None for machine in self.cell.equipment
+        )
 
     @property
     def next_change(self) -> float:
@@ -48,17 +54,22 @@ class Machines:
         begun = False
         for machine in self.cell.equipment:
             if machine.switch is not None and machine.switch.signal == signal:
-                begun |= self._turn(machine, machine.switch.on if level else machine.switch.off, now)
+                begun |= self._turn(
+                    machine, machine.switch.on if level else machine.switch.off, now
+                )
         return begun
 
     def _turn(self, machine: Equipment, target: str, now: float) -> bool:
         assert machine.switch is not None
-        name, time = machine.name, machine.switch.time
-        state, (ahead, when) = self._states[name], self._moving.get(name, ("", now))
+        name = machine.name
+        time = machine.switch.time
+        state = self._states[name]
+        (ahead, when) = self._moving.get(name, ("", now))
         if target == (ahead or state):
             return False
         if ahead and target == state:  # turned round in between
-            self._states[name], time = ahead, max(0.0, time - (when - now))
+            self._states[name] = ahead
+            time = max(0.0, time - (when - now))
         self._moving[name] = target, now + time
         return True
 
@@ -87,7 +98,9 @@ class Machines:
         return tuple(result)
 
     def soon(self, wanted: Iterable[str], now: float) -> bool:
-        """Whether a machine will be in a wanted state ("lathe=door_open") within SOON, but isn't yet."""
+        """Whether a machine will be in a wanted state ("lathe=door_open") within SOON, but isn't
+        yet.
+        """
         for text in wanted:
             name, _, state = text.partition("=")
             ahead, when = self._moving.get(name, ("", now))
@@ -105,16 +118,26 @@ class Machines:
         machine = next((each for each in self.cell.equipment if each.name == name), None)
         if machine is None:
             known = ", ".join(self._states)
-            return f"the trajectory relies on {text[:80]!a}: no machine has that name; known are {known}"
+            return (
+                f"the trajectory relies on {text[:80]!a}: no machine has that name; known are "
+                f"{known}"
+            )
         states = [state.name for state in machine.states]
         if wanted not in states:
             known = ", ".join(states) or "none"
-            return f"the trajectory relies on {text[:80]!a}: {name} has no such state; known are {known}"
-        state, (ahead, when) = self._states[name], self._moving.get(name, ("", now))
+            return (
+                f"the trajectory relies on {text[:80]!a}: {name} has no such state; known are "
+                f"{known}"
+            )
+        state = self._states[name]
+        (ahead, when) = self._moving.get(name, ("", now))
         if state == wanted and not ahead:
             return ""
         going = f", changing to {ahead} for another {when - now:.2f} s" if ahead else ""
-        return f"{name} is {state}{going}: the trajectory relies on {wanted}; {self._advice(machine, wanted)}"
+        return (
+            f"{name} is {state}{going}: the trajectory relies on {wanted}; "
+            f"{self._advice(machine, wanted)}"
+        )
 
     def _advice(self, machine: Equipment, wanted: str) -> str:
         switch = machine.switch

@@ -23,13 +23,13 @@ class Mains:
         self, plant: Plant, data: PowerData, backend: Backend, dt: float, regeneration: Regeneration
     ) -> None:
         self._backend = backend
-        self.base, self._known = BasePower(plant.watts), BasePower(standing_watts(data))
+        self.base = BasePower(plant.watts)
+        self._known = BasePower(standing_watts(data))
         self.meter = PowerMeter(plant, dt, regeneration)
         self._unsettled = 0
-        self._level, self._steps = (
-            Mode.STAND_ON_MOTORS,
-            0,
-        )  # steps at this level that the meter has not counted
+        # steps at this level that the meter has not counted
+        self._level = Mode.STAND_ON_MOTORS
+        self._steps = 0
 
     def set_load(self, load: Carried) -> None:
         """Count a load's own consumption from now on."""
@@ -58,7 +58,10 @@ class Mains:
         if self._steps:
             level = self._level
             self.meter.add(
-                self.base.of(level), self.base.tool(level), level is Mode.STAND_ON_MOTORS, self._steps
+                self.base.of(level),
+                self.base.tool(level),
+                level is Mode.STAND_ON_MOTORS,
+                self._steps,
             )
             self._steps = 0
 

@@ -1,4 +1,6 @@
-"""Which power mode is asked for: PLC bits, pauses and latches put together, and why no movement may start."""
+"""Which power mode is asked for: PLC bits, pauses and latches put together, and why no movement may
+start.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,8 @@ _STOPS = "was requested during the movement; stopped on the path"
 class ModeControl:
     """Decides about the power modes of one controller.
 
-    power: watts at the mains in a mode with the present load and posture; pe_ids: PROFIenergy's numbers.
+    power: watts at the mains in a mode with the present load and posture; pe_ids: PROFIenergy's
+    numbers.
     """
 
     def __init__(
@@ -29,8 +32,11 @@ class ModeControl:
         power: Callable[[Mode], float],
         pe_ids: Mapping[Mode, int],
     ) -> None:
-        self._enabling_switch, self._plc = settings.controller.enabling_switch, plc
-        self.modes = PowerModes(settings.transitions, settings.idle, settings.controller.rest_at_start)
+        self._enabling_switch = settings.controller.enabling_switch
+        self._plc = plc
+        self.modes = PowerModes(
+            settings.transitions, settings.idle, settings.controller.rest_at_start
+        )
         self.pauses = Pauses(self.modes, plc, power, pe_ids)
         self.latches = Latches()
         self._operating_mode = plc.operating_mode
@@ -55,14 +61,18 @@ class ModeControl:
         rest = self._rest()
         return "" if rest in (None, Mode.STAND_ON_MOTORS) else f"{ROW[rest].name} {_STOPS}"
 
-    def step(self, dt: float, *, motion: bool, standing: bool, emergency: bool) -> tuple[Mode, Mode] | None:
+    def step(
+        self, dt: float, *, motion: bool, standing: bool, emergency: bool
+    ) -> tuple[Mode, Mode] | None:
         """Let dt [s] pass; the modes before and after when the mode has changed.
 
-        motion: a movement waits or runs. standing: the robot does not move. emergency: stop at once.
+        motion: a movement waits or runs. standing: the robot does not move. emergency: stop at
+        once.
         """
         if self.modes.motors_on:
             self.pauses.wants_motors = False
-        latches, before = self.latches, self.modes.mode
+        latches = self.latches
+        before = self.modes.mode
         if emergency:
             latches.recover = False
         demand = (
@@ -75,7 +85,9 @@ class ModeControl:
             latches.restart,
             self._plc.operating_mode in MANUAL,
         )
-        if demand != self._demand:  # the same one as long as nothing changes: this runs every millisecond
+        if (
+            demand != self._demand
+        ):  # the same one as long as nothing changes: this runs every millisecond
             self._demand = Demand(*demand)
         self.modes.step(dt, self._demand)
         latches.wake = False
@@ -87,7 +99,8 @@ class ModeControl:
 
     def refusal(self) -> str:
         """Why no movement may start now, "" when it may."""
-        mode, plc = self.modes.mode, self._plc
+        mode = self.modes.mode
+        plc = self._plc
         if mode is Mode.EMERGENCY_STOP or plc.stopped:
             return "emergency stop: release it and recover first"
         if mode not in DRIVES_ON:
@@ -104,7 +117,8 @@ class ModeControl:
 
     def outputs(self, *, in_home: bool) -> PlcOutputs:
         """Levels to the PLC; all off while the controller is off the network."""
-        mode, plc = self.modes.mode, self._plc
+        mode = self.modes.mode
+        plc = self._plc
         if mode in OFF_THE_NETWORK:
             return PlcOutputs(operating_mode=plc.operating_mode)
         return PlcOutputs(

@@ -8,8 +8,8 @@ from ir_sim_driver.notices import Level
 
 
 def take_offered_cell(simulation: Simulation) -> None:
-    """Take the cell that is offered, if any and if the robot stands: tcp, postures, and the load as the cell
-    describes it.
+    """Take the cell that is offered, if any and if the robot stands: tcp, postures, and the load as
+    the cell describes it.
     """
     surroundings = simulation.surroundings
     if surroundings.offered is None or not simulation.stands:
@@ -26,7 +26,9 @@ def take_offered_cell(simulation: Simulation) -> None:
     try:
         simulation.set_load(load)
     except BackendError as error:
-        notices.add(Level.ERROR, f"load {load.text!r} of cell {cell.name!r} can't be carried: {error}")
+        notices.add(
+            Level.ERROR, f"load {load.text!r} of cell {cell.name!r} can't be carried: {error}"
+        )
     simulation.cell_watch.stand_in(cell, simulation.load)
     surroundings.settle(planned)
     notices.add(Level.OK, f"the robot stands in cell {cell.name!r} now, hash {surroundings.hash}")

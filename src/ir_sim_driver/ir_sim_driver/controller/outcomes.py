@@ -1,4 +1,6 @@
-"""How goals ended: numbered when they start, with their energy, what their load was, and their contact."""
+"""How goals ended: numbered when they start, with their energy, what their load was, and their
+contact.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ class Outcomes:
     def __init__(
         self, executor: Executor, mains: Mains, cell_watch: CellWatch, load_checks: LoadChecks
     ) -> None:
-        self._executor, self._mains, self._cell_watch = executor, mains, cell_watch
+        self._executor = executor
+        self._mains = mains
+        self._cell_watch = cell_watch
         self._load_checks = load_checks
         self._goals = 0
         self._energy = 0.0
@@ -42,12 +46,15 @@ class Outcomes:
 
     def _completed(self, outcome: Outcome) -> Outcome:
         contact = self._cell_watch.last
-        if outcome.code is ErrorCode.CONTACT and contact is not None:  # its torques are not the load's
+        if (
+            outcome.code is ErrorCode.CONTACT and contact is not None
+        ):  # its torques are not the load's
             self._load_checks.begin()
             return replace(outcome, contact=contact, sentence=contact.sentence)
         return outcome.weighed(self._load_checks.ended(outcome.label))
 
     def take(self) -> list[Outcome]:
         """Goals that ended since the last call."""
-        ended, self._ended = self._ended, []
+        ended = self._ended
+        self._ended = []
         return ended

@@ -1,4 +1,6 @@
-"""Where the parts of the cell are: held by the robot, lying where they were put down, or not there."""
+"""Where the parts of the cell are: held by the robot, lying where they were put down, or not
+there.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +38,9 @@ class Parts:
 
     def bodies(self) -> tuple[Body, ...]:
         """What lies there, in the world."""
-        return tuple(body for name, pose in self._places.items() for body in self.cell.part(name).lying(pose))
+        return tuple(
+            body for name, pose in self._places.items() for body in self.cell.part(name).lying(pose)
+        )
 
 
 def _parts_of(load: Carried) -> set[str]:

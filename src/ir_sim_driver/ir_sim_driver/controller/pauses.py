@@ -19,14 +19,21 @@ _DEPTH = {mode: row.depth for row in RESTS for mode in (row.entering, row.mode)}
 class Pauses:
     """PROFIenergy's commands on the power modes.
 
-    wants_motors: a pause was ended, motors are asked for. power: watts at the mains in a mode with the
-    present load and posture; pe_ids: PROFIenergy's numbers.
+    wants_motors: a pause was ended, motors are asked for. power: watts at the mains in a mode with
+    the present load and posture; pe_ids: PROFIenergy's numbers.
     """
 
     def __init__(
-        self, modes: PowerModes, plc: Plc, power: Callable[[Mode], float], pe_ids: Mapping[Mode, int]
+        self,
+        modes: PowerModes,
+        plc: Plc,
+        power: Callable[[Mode], float],
+        pe_ids: Mapping[Mode, int],
     ) -> None:
-        self._modes, self._plc, self._power, self._pe_ids = modes, plc, power, pe_ids
+        self._modes = modes
+        self._plc = plc
+        self._power = power
+        self._pe_ids = pe_ids
         self._route: tuple[Mode, ...] = ()
         self.wants_motors = False
 
@@ -37,11 +44,15 @@ class Pauses:
 
     @property
     def rest(self) -> Mode | None:
-        """The mode that the pause asks for now, maybe not the deepest yet; None while no pause is on."""
+        """The mode that the pause asks for now, maybe not the deepest yet; None while no pause is
+        on.
+        """
         if not self._route:
             return None
         depth = _DEPTH.get(self._modes.mode, 0)
-        settled = self._modes.mode in ROW  # a mode that is being entered is asked for until it is reached
+        settled = (
+            self._modes.mode in ROW
+        )  # a mode that is being entered is asked for until it is reached
         return next(
             (
                 mode
@@ -56,7 +67,9 @@ class Pauses:
         self._route = ()
 
     def query_modes(self) -> tuple[PowerMode, ...]:
-        """All modes that can be left again, with the present load, entered from where the robot is."""
+        """All modes that can be left again, with the present load, entered from where the robot
+        is.
+        """
         source = self._modes.level
         if source not in (Mode.STAND_ON_MOTORS, Mode.STAND_ON_BRAKES):
             source = Mode.STAND_ON_MOTORS
@@ -69,9 +82,11 @@ class Pauses:
         return mode_table(times, self._power, self._pe_ids, source)
 
     def start(self, pause: float, executing: bool) -> PowerMode:
-        """Start_Pause of `pause` [s] from now: go through the modes that take least energy; the deepest.
+        """Start_Pause of `pause` [s] from now: go through the modes that take least energy; the
+        deepest.
 
-        Called again while the pause is on, it may go deeper, never back. Raises RequestRefusedError.
+        Called again while the pause is on, it may go deeper, never back. Raises
+        RequestRefusedError.
         """
         if not 0.0 < pause <= PAUSE_MAX:
             raise RequestRefusedError(
@@ -90,13 +105,16 @@ class Pauses:
         return next(mode for mode in table if mode.mode is deepest)
 
     def end(self) -> float:
-        """End_Pause: back to motors; returns the seconds it takes, the rest of the minimum stay included."""
+        """End_Pause: back to motors; returns the seconds it takes, the rest of the minimum stay
+        included.
+        """
         self.forget()
         self.wants_motors = True
         return self._modes.time_to_ready()
 
     def _refusal(self, executing: bool) -> str:
-        plc, mode = self._plc, self._modes.mode
+        plc = self._plc
+        mode = self._modes.mode
         if plc.operating_mode is not OperatingMode.EXT:
             return f"operating mode is {plc.operating_mode.name}, must be EXT"
         if plc.levels.ab or plc.levels.hib or plc.levels.ks:

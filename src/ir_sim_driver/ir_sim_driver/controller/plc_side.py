@@ -1,4 +1,6 @@
-"""What the PLC may do: `plc.Controller` on a running simulation, and all levels at once for the topic."""
+"""What the PLC may do: `plc.Controller` on a running simulation, and all levels at once for the
+topic.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,9 @@ from ir_sim_driver.controller.access import Access
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.plc import Readout
 
-_POWER_WINDOW = 0.01  # s; the mean power that a PLC reads is over at least one period of power_state
+_POWER_WINDOW = (
+    0.01  # s; the mean power that a PLC reads is over at least one period of power_state
+)
 _ALIVE_STEPS = 100  # a PLC that polls at 10 Hz or slower sees every change of the alive counter
 
 
@@ -26,7 +30,8 @@ class PlcSide:
             if not simulation.on_the_network:
                 return None
             simulation.mains.settle()
-            reading, modes = simulation.mains.meter.reading(), simulation.modes
+            reading = simulation.mains.meter.reading()
+            modes = simulation.modes
             power, energy, time = self._power
             if reading.time - time >= _POWER_WINDOW:
                 power = (reading.energy - energy) / (reading.time - time)
@@ -53,7 +58,9 @@ class PlcSide:
             simulation.plc.write(writer, levels)
 
     def write_all_inputs(self, writer: str, *inputs: PlcInputs) -> None:
-        """Set all levels at once, several times in a row. Raises RequestRefusedError when all are written."""
+        """Set all levels at once, several times in a row. Raises RequestRefusedError when all are
+        written.
+        """
         refusal: RequestRefusedError | None = None
         with self._access.writing() as simulation:
             for levels in inputs:
@@ -64,10 +71,15 @@ class PlcSide:
             if refusal is not None:
                 raise refusal
 
-    def write_mode_and_pause(self, writer: str, mode: OperatingMode | None, pause: float | None) -> None:
-        """Turn the mode switch and start or end a pause, both or neither. Raises RequestRefusedError."""
+    def write_mode_and_pause(
+        self, writer: str, mode: OperatingMode | None, pause: float | None
+    ) -> None:
+        """Turn the mode switch and start or end a pause, both or neither. Raises
+        RequestRefusedError.
+        """
         with self._access.writing() as simulation:
-            plc, before = simulation.plc, simulation.plc.operating_mode
+            plc = simulation.plc
+            before = simulation.plc.operating_mode
             if mode is not None:
                 plc.turn_switch(writer, mode)
             try:

@@ -1,4 +1,5 @@
-"""What stops the robot at once, whatever it does: emergency stop, faults of the supervision, failed physics.
+"""What stops the robot at once, whatever it does: emergency stop, faults of the supervision, failed
+physics.
 
 A stop is latched: it lasts until somebody recovers, who moves and resumes nothing.
 """
@@ -18,7 +19,9 @@ from ir_sim_driver.plc import Plc
 
 
 class Safety:
-    """Stops `backend` and drops what `executor` does. fault: why the robot is stopped, "" without a fault."""
+    """Stops `backend` and drops what `executor` does. fault: why the robot is stopped, "" without a
+    fault.
+    """
 
     def __init__(
         self,
@@ -30,7 +33,10 @@ class Safety:
         notices: Notices,
         settings: SimulationSettings,
     ) -> None:
-        self._backend, self._executor, self._plc, self._notices = backend, executor, plc, notices
+        self._backend = backend
+        self._executor = executor
+        self._plc = plc
+        self._notices = notices
         self._tool = tool
         self._supervision = Supervision(robot, settings.dt, settings.supervision)
         reaction = round(settings.supervision.brake_reaction / settings.dt)
@@ -41,7 +47,9 @@ class Safety:
 
     @property
     def stopped(self) -> bool:
-        """Whether an emergency stop or a fault is latched: nothing moves until somebody recovers."""
+        """Whether an emergency stop or a fault is latched: nothing moves until somebody
+        recovers.
+        """
         return self._plc.stopped or bool(self.fault)
 
     @property
@@ -57,7 +65,9 @@ class Safety:
             self.emergency.step()
 
     def entered(self, braked: bool) -> None:
-        """The controller is in EMERGENCY_STOP from now on; braked: the brakes are closed already."""
+        """The controller is in EMERGENCY_STOP from now on; braked: the brakes are closed
+        already.
+        """
         self.emergency.start(self.fault or "emergency stop", braked, self._powered)
 
     def supervise(self, motors_on: bool, tube: float) -> None:
@@ -74,29 +84,39 @@ class Safety:
         self._stop_for(Fault(str(error), ErrorCode.INVALID_GOAL))
 
     def touched(self, sentence: str) -> None:
-        """The robot touches what it may not: the motors stop it off its path, then the brakes hold it."""
+        """The robot touches what it may not: the motors stop it off its path, then the brakes hold
+        it.
+        """
         self._powered = not self.stopped
         if not self.fault:
             self._stop_for(Fault(sentence, ErrorCode.CONTACT))
 
     def recover(self) -> None:
-        """Unlatch all where the robot is now. Raises RequestRefusedError while the button is pressed."""
+        """Unlatch all where the robot is now. Raises RequestRefusedError while the button is
+        pressed.
+        """
         if self._plc.pressed:
             raise RequestRefusedError(
-                StatusCode.INVALID_ROBOT_STATE, "the emergency stop is still pressed: release it first"
+                StatusCode.INVALID_ROBOT_STATE,
+                "the emergency stop is still pressed: release it first",
             )
         q = self._backend.q
         if self._broken:
             self._backend.reset(q)
         if not self.emergency.stopping:
             self._executor.hold(q)
-        self.fault, self._broken, self._powered = "", False, False
+        self.fault = ""
+        self._broken = False
+        self._powered = False
         self._supervision.recovered(q)
         self._plc.reset_stop()
 
     def _deviation(self, motors_on: bool) -> float:
-        """How far the tool is from its command [m]; behind closed brakes, from where they closed."""
-        executor, q = self._executor, self._backend.q
+        """How far the tool is from its command [m]; behind closed brakes, from where they
+        closed.
+        """
+        executor = self._executor
+        q = self._backend.q
         if motors_on:
             return executor.deviation
         if self.emergency.stopping or self._broken or q is executor.command:

@@ -29,7 +29,10 @@ class ControllerSettings:
         "STAND_ON_MOTORS", "Power mode at the start.", choices=REST_MODES, read_only=True
     )
     operating_mode: str = setting(
-        "EXT", "Position of the mode switch at the start.", choices=("T1", "T2", "AUT", "EXT"), read_only=True
+        "EXT",
+        "Position of the mode switch at the start.",
+        choices=("T1", "T2", "AUT", "EXT"),
+        read_only=True,
     )
     enabling_switch: bool = setting(
         False,
@@ -37,7 +40,10 @@ class ControllerSettings:
         read_only=True,
     )
     regeneration: str = setting(
-        "shared", "What becomes of braking energy at the DC bus.", choices=REGENERATIONS, read_only=True
+        "shared",
+        "What becomes of braking energy at the DC bus.",
+        choices=REGENERATIONS,
+        read_only=True,
     )
 
     def __post_init__(self) -> None:

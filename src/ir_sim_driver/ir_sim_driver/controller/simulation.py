@@ -1,4 +1,5 @@
-"""The robot and its controller as one stepped thing: PLC, power modes, executor, physics, mains meter.
+"""The robot and its controller as one stepped thing: PLC, power modes, executor, physics, mains
+meter.
 
 One `step` is dt of plant time. Whoever steps it decides how fast time passes. No ROS.
 """
@@ -43,9 +44,11 @@ _HOME = 0.01  # rad off machine home that still count as there
 
 
 class Simulation:
-    """A cell's robot and controller; backend: a robot of `plant` (default: the nominal one), same dt.
+    """A cell's robot and controller; backend: a robot of `plant` (default: the nominal one), same
+    dt.
 
-    Raises nothing in `step`: a backend that fails is stopped, named in `notices`, and restarted by `recover`.
+    Raises nothing in `step`: a backend that fails is stopped, named in `notices`, and restarted by
+    `recover`.
     """
 
     def __init__(
@@ -58,21 +61,31 @@ class Simulation:
         plant: Plant | None = None,
     ) -> None:
         self.settings = settings = settings or SimulationSettings()
-        self.cell, self.robot, self.backend = cell, cell.robot, backend
+        self.cell = cell
+        self.robot = cell.robot
+        self.backend = backend
         self.surroundings = Surroundings(cell)
-        self.notices, self.watch = Notices(), Watchdog()
+        self.notices = Notices()
+        self.watch = Watchdog()
         home = np.array(cell.machine_home)
         backend.reset(home)
         self.dynamics = DynamicsModel(self.robot, (), cell.base_pose)
         self.plant = plant or nominal_plant(cell.robot, data)
-        self.mains = Mains(self.plant, data, backend, settings.dt, settings.controller.regeneration_mode)
+        self.mains = Mains(
+            self.plant, data, backend, settings.dt, settings.controller.regeneration_mode
+        )
         self.plc = Plc(settings.plc, self.notices, settings.controller.mode_switch)
         pe_ids = {Mode[mode.name]: mode.pe_mode_id for mode in data.modes}
         self.control = ModeControl(settings, self.plc, self.standing_power, pe_ids)
-        self.modes, self.pauses = self.control.modes, self.control.pauses
+        self.modes = self.control.modes
+        self.pauses = self.control.pauses
         self.tool = ToolPoint(cell.robot, cell.base_pose, cell.tcp)
-        self.executor = Executor(self.robot, self.dynamics, self.tool, settings.execution, settings.dt, home)
-        self.safety = Safety(self.robot, backend, self.executor, self.tool, self.plc, self.notices, settings)
+        self.executor = Executor(
+            self.robot, self.dynamics, self.tool, settings.execution, settings.dt, home
+        )
+        self.safety = Safety(
+            self.robot, backend, self.executor, self.tool, self.plc, self.notices, settings
+        )
         self.load_checks = LoadChecks(cell, settings.load_check, self.notices, PERIOD * settings.dt)
         self._carry(load)
         self.speed_scaling = SpeedScaling(self.executor, self.tool, self.plc, self.notices)
@@ -99,7 +112,9 @@ class Simulation:
 
     @property
     def stopped(self) -> bool:
-        """Whether an emergency stop or a fault is latched: nothing moves until somebody recovers."""
+        """Whether an emergency stop or a fault is latched: nothing moves until somebody
+        recovers.
+        """
         return self.safety.stopped
 
     @property
@@ -107,25 +122,32 @@ class Simulation:
         """Why the robot is stopped, "" when it is not or by the emergency stop."""
         return self.safety.fault
 
-    # -- what may be asked ----------------------------------------------------------------------------------
+    # -- what may be asked
+    # ----------------------------------------------------------------------------------
 
     def vet(self, goal: TrajectoryGoal, now_ns: int) -> VettedGoal:
         """Check all of a goal that does not depend on the robot's state; may run beside `step`.
 
         Raises TrajectoryRefusedError.
         """
-        return vet(goal, self.robot, self.dynamics, self.settings.execution, now_ns, self.cell_watch.asked)
+        return vet(
+            goal, self.robot, self.dynamics, self.settings.execution, now_ns, self.cell_watch.asked
+        )
 
     def execute(self, vetted: VettedGoal, now_ns: int) -> int:
-        """Start a vetted goal, return its id; preempts the one that runs. Raises TrajectoryRefusedError."""
+        """Start a vetted goal, return its id; preempts the one that runs. Raises
+        TrajectoryRefusedError.
+        """
         goal = vetted.goal
         refusal = self._refusal() or self.surroundings.refusal(goal, self.load)
         if refusal := refusal or self.cell_watch.refusal(goal, vetted.keep.scene):
             raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, refusal)
-        now, delay = self.executor.motion(), vetted.delay(now_ns)
+        now = self.executor.motion()
+        delay = vetted.delay(now_ns)
         route = vetted.route(now, self.robot, self.dynamics, self.settings.execution, delay)
         wait = 0.0 if now.qd.any() else max(0.0, delay - route.offset)
-        self.executor.start(goal_id := self._outcomes.next_id(), goal, route, wait)
+        goal_id = self._outcomes.next_id()
+        self.executor.start(goal_id, goal, route, wait)
         self.cell_watch.begin(goal.station)
         self._outcomes.started()
         self.load_checks.begin()
@@ -158,7 +180,8 @@ class Simulation:
         """Carry this from now on. Raises RequestRefusedError while the robot moves."""
         if not self.stands:
             raise RequestRefusedError(
-                StatusCode.INVALID_ROBOT_STATE, "the robot moves: a load changes only while it stands"
+                StatusCode.INVALID_ROBOT_STATE,
+                "the robot moves: a load changes only while it stands",
             )
         self.mains.settle()
         before = self.load
@@ -180,7 +203,8 @@ class Simulation:
             self.control.latches.wake = True
 
     def recover(self) -> str:
-        """Leave the emergency stop: release the brakes where the robot stands, move and resume nothing.
+        """Leave the emergency stop: release the brakes where the robot stands, move and resume
+        nothing.
 
         Returns a remark. Raises RequestRefusedError.
         """
@@ -239,7 +263,8 @@ class Simulation:
             self._change_mode(0.0)
 
     def _change_mode(self, dt: float) -> None:
-        executor, control = self.executor, self.control
+        executor = self.executor
+        control = self.control
         active = executor.active
         if active:
             sentence = control.interruption()
@@ -256,8 +281,10 @@ class Simulation:
             self._mode_changed(*changed)
 
     def _move(self) -> None:
-        backend, executor = self.backend, self.executor
-        modes, safety = self.modes, self.safety
+        backend = self.backend
+        executor = self.executor
+        modes = self.modes
+        safety = self.safety
         braked = modes.mode is Mode.EMERGENCY_STOP or (not modes.motors_on and safety.stopped)
         if braked or safety.broken:
             safety.brake()

@@ -1,4 +1,6 @@
-"""How fast path time may pass now: what somebody has asked for, move_enable, and the tool's speed in T1."""
+"""How fast path time may pass now: what somebody has asked for, move_enable, and the tool's speed
+in T1.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +14,16 @@ class SpeedScaling:
     """Of what `executor` follows. factor: what was asked for, in [0, 1]."""
 
     def __init__(self, executor: Executor, tool: ToolPoint, plc: Plc, notices: Notices) -> None:
-        self._executor, self._tool, self._plc, self._notices = executor, tool, plc, notices
+        self._executor = executor
+        self._tool = tool
+        self._plc = plc
+        self._notices = notices
         self.factor = 1.0
 
     def ask(self, factor: float) -> float:
-        """Take the factor into [0, 1] and return it; NaN and negative ones are ignored with a warning."""
+        """Take the factor into [0, 1] and return it; NaN and negative ones are ignored with a
+        warning.
+        """
         if not factor >= 0.0:
             self._notices.add(Level.WARN, f"speed scaling {factor:g} ignored: it must be in [0, 1]")
         else:
@@ -36,5 +43,6 @@ class SpeedScaling:
         path = self._executor.path
         if path is None or self._plc.operating_mode is not OperatingMode.T1:
             return self.factor
-        s, stop_time = self._executor.path_parameter, self._executor.stop_time
+        s = self._executor.path_parameter
+        stop_time = self._executor.stop_time
         return min(self.factor, manual_scaling(self._tool, path, s, stop_time))

@@ -1,7 +1,9 @@
-"""Is the robot where it should be, and no faster? Looked at in every mode, braking and standing too.
+"""Is the robot where it should be, and no faster? Looked at in every mode, braking and standing
+too.
 
-Whoever leaves its range, the tube around its command, its speed or its acceleration is stopped by the brakes
-at once (STOP 0), and so is a motor that gives all it has for long. The fault lasts until somebody recovers.
+Whoever leaves its range, the tube around its command, its speed or its acceleration is stopped by
+the brakes at once (STOP 0), and so is a motor that gives all it has for long. The fault lasts until
+somebody recovers.
 """
 
 from __future__ import annotations
@@ -78,7 +80,9 @@ class Fault(NamedTuple):
 
 
 class Command(NamedTuple):
-    """Commanded position q (n,) [rad], deviation [m] of the tool from it, and the largest that is allowed."""
+    """Commanded position q (n,) [rad], deviation [m] of the tool from it, and the largest that is
+    allowed.
+    """
 
     q: FloatArray
     deviation: float
@@ -89,11 +93,14 @@ class Supervision:
     """Looks at `robot` every PERIOD steps of dt [s]."""
 
     def __init__(self, robot: RobotModel, dt: float, settings: SupervisionSettings) -> None:
-        self._robot, self._settings = robot, settings
+        self._robot = robot
+        self._settings = settings
         self._low = robot.position_min - settings.range_margin
         self._high = robot.position_max + settings.range_margin
         self._speed = robot.velocity_max * (1.0 + settings.speed_margin)
-        self._change = robot.acceleration_max * (1.0 + settings.acceleration_margin) * (PERIOD * _WINDOW * dt)
+        self._change = (
+            robot.acceleration_max * (1.0 + settings.acceleration_margin) * (PERIOD * _WINDOW * dt)
+        )
         self._saturation_looks = max(1, round(settings.saturation_time / (PERIOD * dt)))
         self._allow(self._low, self._high)
         self._speeds: deque[FloatArray] = deque(maxlen=_WINDOW + 1)
@@ -101,7 +108,9 @@ class Supervision:
         self._seen: FloatArray | None = None
 
     def recovered(self, q: FloatArray) -> None:
-        """Begin anew at q (n,): who is outside may stay there and come back, but go no farther out."""
+        """Begin anew at q (n,): who is outside may stay there and come back, but go no farther
+        out.
+        """
         margin = self._settings.range_margin
         self._allow(np.minimum(self._low, q - margin), np.maximum(self._high, q + margin))
         self._speeds.clear()
@@ -109,13 +118,17 @@ class Supervision:
 
     def _allow(self, low: FloatArray, high: FloatArray) -> None:
         """Positions (n,) from now on."""
-        self._allowed_low, self._allowed_high = low, high
+        self._allowed_low = low
+        self._allowed_high = high
         rows = np.stack((low, high, self._speed, self._change), axis=1)
         self._bounds: list[list[float]] = rows.tolist()
 
     def look(self, backend: Backend, command: Command, braking: bool) -> Fault | None:
-        """What is wrong now. command: of the last step; braking: motors are off, the brakes close or hold."""
-        q, saturated = backend.q, backend.saturated
+        """What is wrong now. command: of the last step; braking: motors are off, the brakes close
+        or hold.
+        """
+        q = backend.q
+        saturated = backend.saturated
         if q is self._seen and not saturated:  # nothing has moved since
             self._speeds.clear()
             self._saturated = 0
@@ -156,7 +169,8 @@ class Supervision:
         j = int(beyond.argmax())
         return Fault(
             f"{robot.joint_names[j]} is at {q[j]:.4f} rad: its range is "
-            f"[{robot.position_min[j]:.4f}, {robot.position_max[j]:.4f}] rad, exceeded by {beyond[j]:.3g} rad"
+            f"[{robot.position_min[j]:.4f}, {robot.position_max[j]:.4f}] rad, exceeded by "
+            f"{beyond[j]:.3g} rad"
         )
 
     def _left_tube(self, q: FloatArray, command: Command) -> Fault | None:
@@ -164,7 +178,8 @@ class Supervision:
             return None
         error = command.q - q
         j = int(np.abs(error).argmax())
-        off, tube = command.deviation * 1e3, command.tube * 1e3
+        off = command.deviation * 1e3
+        tube = command.tube * 1e3
         return Fault(
             f"the tool is {off:.2f} mm from its command: at most {tube:g} mm; "
             f"worst is {self._robot.joint_names[j]} with {error[j]:+.6f} rad",

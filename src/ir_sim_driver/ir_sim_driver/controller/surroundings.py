@@ -1,5 +1,5 @@
-"""The cell that the driver takes itself to stand in: its own at the start, then the one that the planner
-publishes.
+"""The cell that the driver takes itself to stand in: its own at the start, then the one that the
+planner publishes.
 
 What was planned in another cell, or with another load, is refused with both named.
 """
@@ -32,7 +32,8 @@ class Surroundings:
     """cell: the one that counts. `offered`: one that counts as soon as the robot stands."""
 
     def __init__(self, cell: Cell) -> None:
-        self.cell, self._hash = cell, ""
+        self.cell = cell
+        self._hash = ""
         self.offered: PlannedCell | None = None
         self._changed = threading.Condition()
 
@@ -51,7 +52,8 @@ class Surroundings:
 
     def take(self) -> PlannedCell | None:
         """What is offered where it is another cell; it counts from `settle` on."""
-        planned, self.offered = self.offered, None
+        planned = self.offered
+        self.offered = None
         return None if planned is None or planned.hash == self.hash else planned
 
     def settle(self, planned: PlannedCell) -> None:
@@ -61,7 +63,9 @@ class Surroundings:
             self._changed.notify_all()
 
     def wait_for(self, expected: str) -> None:
-        """Give the cell of this hash the time to come; must not be called by who steps the simulation."""
+        """Give the cell of this hash the time to come; must not be called by who steps the
+        simulation.
+        """
         if expected and expected != self.hash:
             with self._changed:
                 self._changed.wait_for(lambda: expected == self.hash, PATIENCE)
@@ -70,21 +74,26 @@ class Surroundings:
         """Why a trajectory that was planned elsewhere is not executed here, "" when it may be."""
         if goal.cell_hash and goal.cell_hash != self.hash:
             return (
-                f"the trajectory was planned in a cell with hash {goal.cell_hash[:32]!a}, the robot stands "
-                f"in cell {self.cell.name!r} with hash {self.hash!r}: plan it again"
+                f"the trajectory was planned in a cell with hash {goal.cell_hash[:32]!a}, the "
+                f"robot stands in cell {self.cell.name!r} with hash {self.hash!r}: plan it again"
             )
         if goal.load and _names(goal.load) != _names(load.text):
-            return f"the trajectory was planned with load {goal.load[:80]!a}, the robot carries {load.text!r}"
+            return (
+                f"the trajectory was planned with load {goal.load[:80]!a}, the robot carries "
+                f"{load.text!r}"
+            )
         return ""
 
     def load_in(self, cell: Cell, load: Carried) -> tuple[Carried, str]:
-        """What is carried as another cell describes it, and a warning: unknown there, it stays as it is.
+        """What is carried as another cell describes it, and a warning: unknown there, it stays as
+        it is.
 
         The tool of this cell becomes the tool of that one.
         """
         if load.text == CUSTOM:
             return load, ""
-        tool, old = cell.tool, self.cell.tool
+        tool = cell.tool
+        old = self.cell.tool
         names = load.text.split(LOAD_SEPARATOR)
         if tool is not None and old is not None:
             names = [tool.name if name == old.name else name for name in names]

@@ -1,4 +1,6 @@
-"""Goals before they start: what is checked beside the running robot, and what only when they start."""
+"""Goals before they start: what is checked beside the running robot, and what only when they
+start.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ _NS = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class VettedGoal:
-    """A goal whose trajectory was found executable with the dynamics of one load, and free in one scene."""
+    """A goal whose trajectory was found executable with the dynamics of one load, and free in one
+    scene.
+    """
 
     goal: TrajectoryGoal
     dynamics: DynamicsModel
@@ -42,7 +46,9 @@ class VettedGoal:
         settings: ExecutionSettings,
         delay: float,
     ) -> Route:
-        """Path from the commanded motion `now` onto the trajectory. Raises TrajectoryRefusedError."""
+        """Path from the commanded motion `now` onto the trajectory. Raises
+        TrajectoryRefusedError.
+        """
         if self.dynamics is not dynamics:
             raise TrajectoryRefusedError(
                 ErrorCode.INVALID_GOAL, "the load changed while the trajectory was checked"

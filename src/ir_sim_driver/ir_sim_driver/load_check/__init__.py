@@ -1,4 +1,6 @@
-"""Does the robot carry what was declared? Expected against found torque of a movement, by least squares."""
+"""Does the robot carry what was declared? Expected against found torque of a movement, by least
+squares.
+"""
 
 from ir_sim_driver.load_check.checks import LoadChecks
 from ir_sim_driver.load_check.estimate import Declared, LoadFinding, Motion, weighed

@@ -1,4 +1,6 @@
-"""The load check of a running robot: every movement is watched, and weighs the declared load at its end."""
+"""The load check of a running robot: every movement is watched, and weighs the declared load at its
+end.
+"""
 
 from __future__ import annotations
 
@@ -14,16 +16,20 @@ from ir_sim_driver.plant import Backend, Carried
 
 
 class LoadChecks:
-    """Of the robot of `cell`; period [s] between two looks; notices: what is noticed is a warning there.
+    """Of the robot of `cell`; period [s] between two looks; notices: what is noticed is a warning
+    there.
 
     last: what the last movement said, None where it said nothing or is still driven.
     """
 
-    def __init__(self, cell: Cell, settings: LoadCheckSettings, notices: Notices, period: float) -> None:
+    def __init__(
+        self, cell: Cell, settings: LoadCheckSettings, notices: Notices, period: float
+    ) -> None:
         own = settings.parameters not in ("", DATA_SHEET)
         sheet = data_sheet_of(cell.robot, cell.robot.controller)
         parameters = load_power_parameters(settings.parameters) if own else sheet
-        self._settings, self._notices = settings, notices
+        self._settings = settings
+        self._notices = notices
         self._robot = Uncertainty(cell.robot, parameters, cell.robot.marks, cell.base_pose)
         self._watch = LoadWatch(period)
         self._declared: Declared | None = None
@@ -36,7 +42,8 @@ class LoadChecks:
         self._watch.begin()
         factor = 1.0 + self._settings.mass_error
         return tuple(
-            replace(each, mass=each.mass * factor, inertia=each.inertia * factor) for each in load.loads
+            replace(each, mass=each.mass * factor, inertia=each.inertia * factor)
+            for each in load.loads
         )
 
     def begin(self) -> None:
@@ -46,7 +53,8 @@ class LoadChecks:
 
     def take(self) -> LoadFinding | None:
         """What the last movement said, once."""
-        finding, self._new = self._new, None
+        finding = self._new
+        self._new = None
         return finding
 
     def look(self, robot: Backend) -> None:
@@ -55,7 +63,8 @@ class LoadChecks:
 
     def ended(self, trajectory_id: str) -> LoadFinding | None:
         """What the movement says of the load; None where no load is declared or it says nothing."""
-        motion, declared = self._watch.motion(), self._declared
+        motion = self._watch.motion()
+        declared = self._declared
         self.begin()
         if motion is None or declared is None:
             return None

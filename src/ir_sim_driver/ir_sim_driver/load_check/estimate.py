@@ -1,8 +1,8 @@
 """The mass that explains the torques of a movement best: generalised least squares.
 
-found = expected + d m + J p + e: d is the torque per kg at the declared load's centre, p the robot's
-parameters, one standard deviation each, e what no parameter explains. With V = J J' + S, S diagonal,
-m = d' V^-1 (found - expected) / (d' V^-1 d), and its variance is 1 / (d' V^-1 d).
+found = expected + d m + J p + e: d is the torque per kg at the declared load's centre, p the
+robot's parameters, one standard deviation each, e what no parameter explains. With V = J J' + S, S
+diagonal, m = d' V^-1 (found - expected) / (d' V^-1 d), and its variance is 1 / (d' V^-1 d).
 """
 
 from __future__ import annotations
@@ -19,17 +19,22 @@ from ir_sim_driver.load_check.uncertainty import Uncertainty
 from ir_sim_driver.plant import Carried
 
 UNEXPLAINED = 0.005
-"""Standard deviation of what no parameter explains, at one instant, as a share of the peak torque: twice what
-the stepped plants show.
+"""Standard deviation of what no parameter explains, at one instant, as a share of the peak torque:
+twice what the stepped plants show.
 """
-LOAD_MASS, LOAD_CENTRE = 0.01, 0.01
+LOAD_MASS = 0.01
+LOAD_CENTRE = 0.01
 """Standard deviations of a declared load: share of its mass, m of its centre in each direction."""
-_CHANGES, _STARTS = 0.1, 2.0  # of the Coulomb friction
+# of the Coulomb friction
+_CHANGES = 0.1
+_STARTS = 2.0
 _KG = 1.0
 
 
 class Motion(NamedTuple):
-    """What was found at N instants of a movement, each (N, n): q, qd, qdd [rad, s] and torque [Nm]."""
+    """What was found at N instants of a movement, each (N, n): q, qd, qdd [rad, s] and torque
+    [Nm].
+    """
 
     q: FloatArray
     qd: FloatArray
@@ -41,10 +46,11 @@ class Motion(NamedTuple):
 class LoadFinding:
     """What a movement's torques say of the load.
 
-    trajectory_id: what was driven; load: what was declared, as its text names it. noticed: the mass is beyond
-    the threshold. joint: where the difference is largest for its deviation; expected, found, deviation [Nm]:
-    mean torque there in the direction in which more load shows, and a standard deviation of the difference.
-    mass, mass_deviation [kg]: more than declared, and its standard deviation.
+    trajectory_id: what was driven; load: what was declared, as its text names it. noticed: the mass
+    is beyond the threshold. joint: where the difference is largest for its deviation; expected,
+    found, deviation [Nm]: mean torque there in the direction in which more load shows, and a
+    standard deviation of the difference. mass, mass_deviation [kg]: more than declared, and its
+    standard deviation.
     """
 
     trajectory_id: str
@@ -65,23 +71,28 @@ class LoadFinding:
         more = "heavier" if self.mass > 0.0 else "lighter"
         return (
             f"the load is about {abs(self.mass):.0f} kg {more} than {self.load[:80]!a} declares: "
-            f"{self.joint} expects {self.expected:.0f} Nm in the mean, found are {self.found:.0f} Nm, "
-            f"a standard deviation is {self.deviation:.0f} Nm"
+            f"{self.joint} expects {self.expected:.0f} Nm in the mean, found are "
+            f"{self.found:.0f} Nm, a standard deviation is {self.deviation:.0f} Nm"
         )
 
 
 class Declared:
-    """A declared load carried by a robot that is known as `robot`, and the loads near it that it is compared
-    with.
+    """A declared load carried by a robot that is known as `robot`, and the loads near it that it is
+    compared with.
     """
 
     def __init__(self, load: Carried, robot: Uncertainty) -> None:
-        self.load, self.robot = load, robot
+        self.load = load
+        self.robot = robot
         self._model = robot.carrying(load.loads)
-        self._others = [robot.carrying(loads) for loads in (_heavier(load.loads), *_shifted(load.loads))]
+        self._others = [
+            robot.carrying(loads) for loads in (_heavier(load.loads), *_shifted(load.loads))
+        ]
 
     def torques(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Expected (N, n) [Nm], more for one kg (N, n), and more for a shift of the centre (N, n, 3)."""
+        """Expected (N, n) [Nm], more for one kg (N, n), and more for a shift of the centre (N, n,
+        3).
+        """
         q, qd, qdd, _ = motion
         expected = self._model.inverse_dynamics(q, qd, qdd)
         more, *shifted = (other.inverse_dynamics(q, qd, qdd) - expected for other in self._others)
@@ -92,7 +103,8 @@ class Declared:
 def weighed(motion: Motion, declared: Declared, threshold: float) -> LoadFinding | None:
     """Weigh what was carried along a movement; None where no torque depends on the load."""
     q, qd, qdd, torque = motion
-    load, robot = declared.load, declared.robot
+    load = declared.load
+    robot = declared.robot
     expected, more, shifted = declared.torques(motion)
     columns = np.concatenate((robot.columns(q, qd, qdd, expected), shifted), axis=2)
     noise = _noise(robot, qd)
@@ -103,7 +115,8 @@ def weighed(motion: Motion, declared: Declared, threshold: float) -> LoadFinding
     mass = float((more * inverse.times(torque - expected)).sum()) / information
     deviation = float(np.hypot(information**-0.5, LOAD_MASS * load.mass))
     j, seen, found, spread = _clearest(more, expected, torque, columns, noise)
-    joint, noticed = robot.model.joint_names[j], abs(mass) > threshold * deviation
+    joint = robot.model.joint_names[j]
+    noticed = abs(mass) > threshold * deviation
     return LoadFinding("", load.text, noticed, joint, seen, found, spread, mass, deviation)
 
 
@@ -111,7 +124,8 @@ class _Covariance:
     """V = J J' + S for columns J (N, n, P) and deviations (N, n) of S, never formed."""
 
     def __init__(self, columns: FloatArray, noise: FloatArray) -> None:
-        self._shape, self._noise = noise.shape, noise.ravel()
+        self._shape = noise.shape
+        self._noise = noise.ravel()
         self._white = columns.reshape(len(self._noise), -1) / self._noise[:, None]
         self._inner = np.eye(self._white.shape[1]) + self._white.T @ self._white
 
@@ -126,7 +140,9 @@ class _Covariance:
 def _heavier(loads: Sequence[Load]) -> tuple[Load, ...]:
     """The loads, one kilogram heavier in proportion."""
     factor = 1.0 + _KG / sum(load.mass for load in loads)
-    return tuple(replace(load, mass=load.mass * factor, inertia=load.inertia * factor) for load in loads)
+    return tuple(
+        replace(load, mass=load.mass * factor, inertia=load.inertia * factor) for load in loads
+    )
 
 
 def _shifted(loads: Sequence[Load]) -> list[tuple[Load, ...]]:
@@ -138,18 +154,25 @@ def _shifted(loads: Sequence[Load]) -> list[tuple[Load, ...]]:
 
 
 def _noise(robot: Uncertainty, qd: FloatArray) -> FloatArray:
-    """Deviation (N, n) [Nm] of what no parameter explains; of axes that stand, and more so of those that
-    start or stop, the friction that may change from one instant to the next.
+    """Deviation (N, n) [Nm] of what no parameter explains; of axes that stand, and more so of those
+    that start or stop, the friction that may change from one instant to the next.
     """
-    unexplained, standing = UNEXPLAINED * robot.model.envelope_torque[:, 0], robot.standing(qd)
+    unexplained = UNEXPLAINED * robot.model.envelope_torque[:, 0]
+    standing = robot.standing(qd)
     changing = _CHANGES * standing + _STARTS * standing * (1.0 - standing)
     return np.asarray(np.hypot(unexplained, changing * robot.model.friction_coulomb))
 
 
 def _clearest(
-    more: FloatArray, expected: FloatArray, found: FloatArray, columns: FloatArray, noise: FloatArray
+    more: FloatArray,
+    expected: FloatArray,
+    found: FloatArray,
+    columns: FloatArray,
+    noise: FloatArray,
 ) -> tuple[int, float, float, float]:
-    """The joint that shows the difference best: its index, mean torques expected and found, deviation."""
+    """The joint that shows the difference best: its index, mean torques expected and found,
+    deviation.
+    """
     weight = more / np.maximum(np.abs(more).sum(axis=0), 1e-12)
     means = (weight * expected).sum(axis=0), (weight * found).sum(axis=0)
     of_parameters = np.einsum("kj,kjp->jp", weight, columns)

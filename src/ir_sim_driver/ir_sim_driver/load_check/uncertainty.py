@@ -1,10 +1,11 @@
 """How far the torques of a robot may be from its model's: parameter by parameter, along a movement.
 
 Friction, gears, rotors, counterbalance and the scale of all masses have the covariance of the power
-parameters (the data's marks of confidence, or a fit). Each link's own mass, centre and inertia, and the
-friction at low speed, have the deviations of the table below, whatever was fitted: an energy fit does not
-separate them. An axis that stands has whatever friction holds it: its motor's torque says how the gravity on
-it changes, hardly how large that is.
+parameters (the data's marks of confidence, or a fit). Each link's own mass, centre and inertia, and
+the
+friction at low speed, have the deviations of the table below, whatever was fitted: an energy fit
+does not separate them. An axis that stands has whatever friction holds it: its motor's torque says
+how the gravity on it changes, hardly how large that is.
 """
 
 from __future__ import annotations
@@ -20,10 +21,15 @@ from ir_msgs_py.arrays import FloatArray
 
 LINK_SIZE = 0.2
 """m: a link's centre of mass is off by its mark's share of this, in each direction."""
-STRIBECK_SHARE, STRIBECK_SPEED = 0.15, 0.05
-"""Friction more at rest as a share of the Coulomb friction, gone over so many rad/s: an assumption."""
+STRIBECK_SHARE = 0.15
+STRIBECK_SPEED = 0.05
+"""Friction more at rest as a share of the Coulomb friction, gone over so many rad/s: an
+assumption.
+"""
 STANDING_SHARE = 0.75
-"""Friction of an axis that stands, as a share of the Coulomb friction: either way, all along the movement."""
+"""Friction of an axis that stands, as a share of the Coulomb friction: either way, all along the
+movement.
+"""
 _SIGN = 0.01  # rad/s over which the sign of a friction turns
 _STANDS = 0.003  # rad/s below which friction is whatever holds the axis
 _AXIS_TERMS = ("viscous", "coulomb", "gear")
@@ -45,7 +51,11 @@ class Uncertainty:
     ) -> None:
         self.model = model = parameters.robot_with(robot)
         self._base_pose = base_pose
-        places = [parameters.index(f"{term}.{joint}") for term in _AXIS_TERMS for joint in robot.joint_names]
+        places = [
+            parameters.index(f"{term}.{joint}")
+            for term in _AXIS_TERMS
+            for joint in robot.joint_names
+        ]
         places += [parameters.index(name) for name in _SCALES]
         covariance = parameters.covariance[np.ix_(places, places)]
         values, vectors = np.linalg.eigh(covariance)
@@ -60,14 +70,22 @@ class Uncertainty:
         """The dynamics that are expected with these loads."""
         return DynamicsModel(self.model, tuple(loads), self._base_pose)
 
-    def columns(self, q: FloatArray, qd: FloatArray, qdd: FloatArray, torque: FloatArray) -> FloatArray:
-        """Torques (N, n, P) [Nm] more for one standard deviation of each of P independent parameters, where
-        `torque` is expected; all (N, n).
+    def columns(
+        self, q: FloatArray, qd: FloatArray, qdd: FloatArray, torque: FloatArray
+    ) -> FloatArray:
+        """Torques (N, n, P) [Nm] more for one standard deviation of each of P independent
+        parameters, where `torque` is expected; all (N, n).
         """
         plain = self._plain.inverse_dynamics(q, qd, qdd)
         links = [link.inverse_dynamics(q, qd, qdd) - plain for link in self._links]
-        sign, n = np.tanh(qd / _SIGN), self._plain.n
-        rest = self.model.friction_coulomb * STRIBECK_SHARE * np.exp(-np.abs(qd) / STRIBECK_SPEED) * sign
+        sign = np.tanh(qd / _SIGN)
+        n = self._plain.n
+        rest = (
+            self.model.friction_coulomb
+            * STRIBECK_SHARE
+            * np.exp(-np.abs(qd) / STRIBECK_SPEED)
+            * sign
+        )
         axes = (qd, sign, np.abs(torque) * sign)
         known = [_on_axis(values, j) for values in axes for j in range(n)]
         standing = STANDING_SHARE * self.model.friction_coulomb * self.standing(qd)
@@ -78,13 +96,17 @@ class Uncertainty:
             (
                 np.stack(known, axis=2) @ self._root,
                 np.stack(links, axis=2),
-                np.stack([_on_axis(values, j) for values in (rest, standing) for j in range(n)], axis=2),
+                np.stack(
+                    [_on_axis(values, j) for values in (rest, standing) for j in range(n)], axis=2
+                ),
             ),
             axis=2,
         )
 
     def standing(self, qd: FloatArray) -> FloatArray:
-        """Share (N, n) of the Coulomb friction that may act either way, because the axis hardly moves."""
+        """Share (N, n) of the Coulomb friction that may act either way, because the axis hardly
+        moves.
+        """
         return np.asarray(1.0 / (1.0 + (qd / _STANDS) ** 2))
 
     def _dynamics(self, robot: RobotModel) -> DynamicsModel:
@@ -108,7 +130,8 @@ def _other_links(robot: RobotModel, marks: Mapping[str, str]) -> list[RobotModel
         def share(figure: str, link: str = name) -> float:
             return RELATIVE_DEVIATION[marks.get(f"links.{link}.{figure}", "L")]
 
-        mass, inertia = robot.link_mass.copy(), robot.link_inertia.copy()
+        mass = robot.link_mass.copy()
+        inertia = robot.link_inertia.copy()
         mass[i] *= 1.0 + share("mass_kg")
         inertia[i] *= 1.0 + share("inertia_kgm2")
         others += [replace(robot, link_mass=mass), replace(robot, link_inertia=inertia)]

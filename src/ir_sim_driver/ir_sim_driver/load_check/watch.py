@@ -11,13 +11,17 @@ from ir_sim_driver.load_check.estimate import Motion
 from ir_sim_driver.plant import Backend
 
 _REACH = 3  # looks before and after an instant that its speed and acceleration are taken from
-_EVERY, _MOST = 16, 96  # looks between two instants at first, and instants kept
+# looks between two instants at first, and instants kept
+_EVERY = 16
+_MOST = 96
 LEAST = 6
 """Instants that a check needs."""
 
 
 class LoadWatch:
-    """Is given the robot every `period` [s] while a movement is driven; keeps few instants of any length."""
+    """Is given the robot every `period` [s] while a movement is driven; keeps few instants of any
+    length.
+    """
 
     def __init__(self, period: float) -> None:
         self._period = period
@@ -27,7 +31,8 @@ class LoadWatch:
         """A movement starts."""
         self._seen: deque[FloatArray] = deque(maxlen=2 * _REACH + 1)
         self._torque: FloatArray | None = None
-        self._looks, self._every = 0, _EVERY
+        self._looks = 0
+        self._every = _EVERY
         self._rows: list[tuple[FloatArray, FloatArray, FloatArray, FloatArray]] = []
 
     def look(self, robot: Backend) -> None:
@@ -37,7 +42,9 @@ class LoadWatch:
         if phase == _REACH:
             self._torque = robot.torque
         elif phase == 2 * _REACH and self._torque is not None:
-            first, middle, last = self._seen[0], self._seen[_REACH], self._seen[-1]
+            first = self._seen[0]
+            middle = self._seen[_REACH]
+            last = self._seen[-1]
             self._rows.append((first, middle, last, self._torque))
             if len(self._rows) > _MOST:
                 del self._rows[::2]
@@ -45,7 +52,9 @@ class LoadWatch:
         self._looks += 1
 
     def motion(self) -> Motion | None:
-        """The instants so far; None while they are too few, or not finite, as where the physics failed."""
+        """The instants so far; None while they are too few, or not finite, as where the physics
+        failed.
+        """
         if len(self._rows) < LEAST:
             return None
         first, middle, last, torque = np.ascontiguousarray(np.array(self._rows).swapaxes(0, 1))

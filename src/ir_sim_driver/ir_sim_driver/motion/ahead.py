@@ -10,13 +10,16 @@ from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.motion.path import Path
 
 _STEPS = 64
-"""At once: the array functions' own time is spread over them, and few are dropped when the speed changes."""
+"""At once: the array functions' own time is spread over them, and few are dropped when the speed
+changes.
+"""
 
 
 def ahead(path: Path, s: float, step: float) -> Iterator[tuple[float, FloatArray]]:
     """Path times [s] and commands (n,) after one, two, ... steps of path time from s < duration on.
 
-    Path times are summed as one step after another would; the last pair, if it is reached, is the end.
+    Path times are summed as one step after another would; the last pair, if it is reached, is the
+    end.
     """
     times = np.add.accumulate(np.concatenate(([s], np.full(_STEPS, step))))[1:]
     within = times[times < path.duration]

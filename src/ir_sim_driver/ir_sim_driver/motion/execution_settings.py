@@ -13,7 +13,8 @@ class ExecutionSettings:
 
     start_tolerance: float = setting(
         0.01,
-        "How far the first point of a trajectory that starts at 0 may lie from the command, per joint.",
+        "How far the first point of a trajectory that starts at 0 may lie from the command, per "
+        "joint.",
         unit="rad",
         minimum=1e-6,
         maximum=0.1,
@@ -32,7 +33,11 @@ class ExecutionSettings:
         maximum=60.0,
     )
     tube: float = setting(
-        0.005, "Largest distance of the tool from its commanded place.", unit="m", minimum=1e-4, maximum=0.1
+        0.005,
+        "Largest distance of the tool from its commanded place.",
+        unit="m",
+        minimum=1e-4,
+        maximum=0.1,
     )
     stop_time: float = setting(
         0.3,
@@ -55,7 +60,9 @@ class ExecutionSettings:
         minimum=0.05,
         maximum=5.0,
     )
-    max_points: int = setting(20_000, "Longest trajectory, in points.", minimum=1, maximum=1_000_000)
+    max_points: int = setting(
+        20_000, "Longest trajectory, in points.", minimum=1, maximum=1_000_000
+    )
     max_duration: float = setting(3600.0, "Longest trajectory.", unit="s", minimum=1.0, maximum=1e5)
     max_delay: float = setting(
         10.0, "How far in the future a header stamp may lie.", unit="s", minimum=0.0, maximum=3600.0

@@ -1,5 +1,5 @@
-"""Trajectory execution, stepped: path time with speed scaling, hold, stop along the path, tolerances and the
-tube.
+"""Trajectory execution, stepped: path time with speed scaling, hold, stop along the path,
+tolerances and the tube.
 
 The semantics are those of ros2_controllers' joint_trajectory_controller; what it leaves open is in
 docs/driver.md.
@@ -40,7 +40,9 @@ class _Run:
     quiet: float  # bound of the tool's deviation [m] below which nothing can be broken
     error: FloatArray  # largest of each joint so far (n,) [rad]
     s: float = 0.0
-    ahead: Iterator[tuple[float, FloatArray]] = field(default_factory=lambda: iter(()))  # at an even speed
+    ahead: Iterator[tuple[float, FloatArray]] = field(
+        default_factory=lambda: iter(())
+    )  # at an even speed
     settling: int = 0
     stopping: bool = False
     deviation: float = 0.0
@@ -48,7 +50,9 @@ class _Run:
 
 @dataclass(frozen=True, eq=False)
 class Following:
-    """Command and robot side by side: positions (n,), velocities (n,), the command's accelerations (n,)."""
+    """Command and robot side by side: positions (n,), velocities (n,), the command's accelerations
+    (n,).
+    """
 
     command: Motion
     q: FloatArray
@@ -75,7 +79,9 @@ class Executor:
         q: FloatArray,
     ) -> None:
         self._names: tuple[str, ...] = tuple(robot.joint_names)
-        self._settings, self._dt, self._tool = settings, dt, tool
+        self._settings = settings
+        self._dt = dt
+        self._tool = tool
         self.stop_time = settings.stop_time  # s
         self._speed = PathSpeed(dynamics, np.array(robot.acceleration_max), settings.stop_time, dt)
         self._still: FloatArray = np.zeros(len(q))
@@ -136,12 +142,14 @@ class Executor:
 
     def set_settings(self, settings: ExecutionSettings) -> None:
         """Use other bounds from the next goal on."""
-        self._settings, self.stop_time = settings, settings.stop_time
+        self._settings = settings
+        self.stop_time = settings.stop_time
         self._speed.set_stop_time(settings.stop_time)
 
     def motion(self) -> Motion:
         """The commanded motion now."""
-        run, v = self._run, self.path_speed
+        run = self._run
+        v = self.path_speed
         if run is None or v == 0.0:
             return Motion(self.command, self._still, self._still)
         path = run.route.path.motion(run.s)
@@ -149,14 +157,20 @@ class Executor:
 
     def following(self, q: FloatArray, qd: FloatArray) -> Following:
         """How the robot at q, qd (n,) follows."""
-        return Following(self.motion(), q, qd, self.label, self.path_time, self.path_speed, self.deviation)
+        return Following(
+            self.motion(), q, qd, self.label, self.path_time, self.path_speed, self.deviation
+        )
 
     def start(self, goal_id: int, goal: TrajectoryGoal, route: Route, delay: float = 0.0) -> None:
-        """Follow the route, which starts at the commanded motion; a running goal ends as preempted."""
+        """Follow the route, which starts at the commanded motion; a running goal ends as
+        preempted.
+        """
         moving = self.motion().qd.any()
         if self._run is not None:
             if not self._run.stopping:
-                self._will_end(ErrorCode.INVALID_GOAL, "preempted by another trajectory", canceled=False)
+                self._will_end(
+                    ErrorCode.INVALID_GOAL, "preempted by another trajectory", canceled=False
+                )
             self._finish()
         s = self._settings
         path_tolerance = Tolerances.of(self._names, goal.path_tolerance, s.path_tolerance)
@@ -173,7 +187,8 @@ class Executor:
             -1.0 if path_tolerance.has_velocity else quiet,
             np.zeros(len(self._still)),
         )
-        # a route from rest starts with speed zero, so path time may start at once; one in motion carries on
+        # a route from rest starts with speed zero, so path time may start at once; one in motion
+        # carries on
         self._speed.value = 1.0 if moving else 0.0
         self._fresh = not moving
 
@@ -199,11 +214,14 @@ class Executor:
 
     def take_outcomes(self) -> list[Outcome]:
         """Goals that have ended since the last call."""
-        outcomes, self._outcomes = self._outcomes, []
+        outcomes = self._outcomes
+        self._outcomes = []
         return outcomes
 
-    def advance(self, scaling: float, ready: bool = True) -> FloatArray:
-        """Command (n,) for the end of this step. scaling in [0, 1]; not ready: the robot cannot move yet."""
+    def advance(self, scaling: float, ready: bool = True) -> FloatArray:  # noqa: C901
+        """Command (n,) for the end of this step. scaling in [0, 1]; not ready: the robot cannot
+        move yet.
+        """
         run = self._run
         if run is None:
             return self.command
@@ -218,8 +236,10 @@ class Executor:
                 self._finish()
             return self.command
         if self._fresh:
-            self._speed.value, self._fresh = target, False
-        speed, path = self._speed, run.route.path
+            self._speed.value = target
+            self._fresh = False
+        speed = self._speed
+        path = run.route.path
         if run.s < path.duration:
             if speed.value != target:
                 run.ahead = iter(())
@@ -241,8 +261,11 @@ class Executor:
 
     def supervise(self, robot: Backend) -> None:
         """Compare the robot with the command after the step: tube, tolerances, end."""
-        q, run = robot.q, self._run
-        error, size, bound = self._still, self._still, 0.0
+        q = robot.q
+        run = self._run
+        error = self._still
+        size = self._still
+        bound = 0.0
         if q is not self.command:
             error = self.command - q
             size = np.abs(error)
@@ -277,13 +300,17 @@ class Executor:
         run.settling += 1
         if run.settling * self._dt > run.goal_time:
             self._will_end(
-                ErrorCode.GOAL_TOLERANCE_VIOLATED, f"{sentence} {run.goal_time:g} s after the end", False
+                ErrorCode.GOAL_TOLERANCE_VIOLATED,
+                f"{sentence} {run.goal_time:g} s after the end",
+                False,
             )
             self._finish()
 
     def _will_end(self, code: ErrorCode, sentence: str, canceled: bool) -> None:
         assert self._run is not None
-        self._run.outcome = replace(self._run.outcome, code=code, sentence=sentence, canceled=canceled)
+        self._run.outcome = replace(
+            self._run.outcome, code=code, sentence=sentence, canceled=canceled
+        )
 
     def _finish(self) -> None:
         run = self._run

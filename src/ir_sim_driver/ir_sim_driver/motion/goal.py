@@ -36,10 +36,11 @@ class JointTolerance:
 class TrajectoryGoal:
     """A trajectory with what the sender allows.
 
-    stamp_ns: node clock at which the trajectory starts, 0 = now. goal_time [s]: longest wait for the goal
-    tolerance after the end, 0 = the default. has_effort: points carry effort. multi_dof: number of multi-dof
-    points. cell_hash, load: the cell and the load that it was planned with, "": not compared. station: whose
-    contacts are allowed, "": none. states: of machines that it relies on ("lathe=door_open").
+    stamp_ns: node clock at which the trajectory starts, 0 = now. goal_time [s]: longest wait for
+    the goal tolerance after the end, 0 = the default. has_effort: points carry effort. multi_dof:
+    number of multi-dof points. cell_hash, load: the cell and the load that it was planned with, "":
+    not compared. station: whose contacts are allowed, "": none. states: of machines that it relies
+    on ("lathe=door_open").
     allow_collision: start it although it is known to collide.
     """
 
@@ -62,11 +63,11 @@ class TrajectoryGoal:
 class Outcome:
     """How goal `goal_id` ended.
 
-    canceled: on request of its sender. max_tool_deviation [m] between commanded and simulated tcp; energy
-    [J] at the mains while it ran; max_tracking_error: largest error of each joint [rad]; settling_time [s]
-    from the end of the command until the robot was within the goal tolerance. label: of the goal. load_check:
-    what its torques say of the load, None where nothing; contact: the one that ended
-    it.
+    canceled: on request of its sender. max_tool_deviation [m] between commanded and simulated tcp;
+    energy [J] at the mains while it ran; max_tracking_error: largest error of each joint [rad];
+    settling_time [s] from the end of the command until the robot was within the goal tolerance.
+    label: of the goal. load_check: what its torques say of the load, None where nothing; contact:
+    the one that ended it.
     """
 
     goal_id: int

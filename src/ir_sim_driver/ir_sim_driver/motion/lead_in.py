@@ -1,9 +1,10 @@
 """From where the command is onto a trajectory, without a jump.
 
-First time > 0: a polynomial leads in until then. First time 0 at rest: the last difference (within the start
-tolerance) is closed before path time starts, as slowly as is asked. First time 0 in motion, or with a first
-velocity: a polynomial bridges to the next point far enough away. A movement that is replaced by one with a
-later start leads in until that start.
+First time > 0: a polynomial leads in until then. First time 0 at rest: the last difference (within
+the start tolerance) is closed before path time starts, as slowly as is asked. First time 0 in
+motion, or with a first
+velocity: a polynomial bridges to the next point far enough away. A movement that is replaced by one
+with a later start leads in until that start.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ AT_REST = 1e-6  # rad/s that still count as standing
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """A path and the path time [s] at which its trajectory starts; the first `lead` segments are not the
-    trajectory's.
+    """A path and the path time [s] at which its trajectory starts; the first `lead` segments are
+    not the trajectory's.
     """
 
     path: Path
@@ -47,9 +48,10 @@ def route_onto(
 ) -> Route:
     """Path from the commanded motion `now` onto and along what is executed of the trajectory.
 
-    acceleration_max (n,) [rad/s^2]. delay [s]: until time 0 of the trajectory; a robot at rest waits for it.
-    share: of acceleration_max, that closing the last difference may use; anything else has its time given.
-    Raises TrajectoryRefusedError.
+    acceleration_max (n,) [rad/s^2]. delay [s]: until time 0 of the trajectory; a robot at rest
+    waits for it.
+    share: of acceleration_max, that closing the last difference may use; anything else has its time
+    given. Raises TrajectoryRefusedError.
     """
     moving = bool(now.qd.any())
     first = float(trajectory.times[0]) + (delay if moving else 0.0)
@@ -95,15 +97,16 @@ def _motion_at_point(trajectory: JointTrajectory, k: int) -> Motion:
     v = samples.qd[0] if trajectory.velocities is None else trajectory.velocities[k]
     a = samples.qdd[0] if trajectory.accelerations is None else trajectory.accelerations[k]
     if last:  # the robot rests there
-        v, a = (
-            (still if trajectory.velocities is None else v),
-            (still if trajectory.accelerations is None else a),
-        )
+        v = still if trajectory.velocities is None else v
+        a = still if trajectory.accelerations is None else a
     return Motion(trajectory.positions[k], v, a)
 
 
 def _check_start(
-    trajectory: JointTrajectory, now: Motion, acceleration_max: FloatArray, settings: ExecutionSettings
+    trajectory: JointTrajectory,
+    now: Motion,
+    acceleration_max: FloatArray,
+    settings: ExecutionSettings,
 ) -> None:
     delta = trajectory.positions[0] - now.q
     j = int(np.abs(delta).argmax())
@@ -111,9 +114,8 @@ def _check_start(
         raise TrajectoryRefusedError(
             ErrorCode.INVALID_GOAL,
             f"{trajectory.joint_names[j]} starts at {trajectory.positions[0, j]:.6f} rad, "
-            f"{delta[j]:+.6f} rad from the "
-            f"commanded {now.q[j]:.6f} rad: at most {settings.start_tolerance:g} rad (or a first time "
-            "above 0 s)",
+            f"{delta[j]:+.6f} rad from the commanded {now.q[j]:.6f} rad: at most "
+            f"{settings.start_tolerance:g} rad (or a first time above 0 s)",
         )
     jump = _motion_at_point(trajectory, 0).qd - now.qd
     over = np.abs(jump) - settings.blend_time * acceleration_max
@@ -121,6 +123,7 @@ def _check_start(
     if over[j] > 0.0:
         raise TrajectoryRefusedError(
             ErrorCode.INVALID_GOAL,
-            f"{trajectory.joint_names[j]} starts with {jump[j]:+.4f} rad/s against the command: at most "
+            f"{trajectory.joint_names[j]} starts with {jump[j]:+.4f} rad/s against the command: "
+            "at most "
             f"{settings.blend_time * acceleration_max[j]:.4f} rad/s (or a first time above 0 s)",
         )

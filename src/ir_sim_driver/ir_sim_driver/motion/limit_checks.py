@@ -1,7 +1,9 @@
-"""Does a path keep the limits of position, velocity, acceleration and torque? Proved for every instant.
+"""Does a path keep the limits of position, velocity, acceleration and torque? Proved for every
+instant.
 
-Positions, velocities and accelerations are compared by the exact extremes of the polynomials, torques by
-guaranteed bounds (ir_kernels): segments of a nanosecond and paths of an hour alike, nothing is sampled.
+Positions, velocities and accelerations are compared by the exact extremes of the polynomials,
+torques by guaranteed bounds (ir_kernels): segments of a nanosecond and paths of an hour alike,
+nothing is sampled.
 """
 
 from __future__ import annotations
@@ -56,8 +58,8 @@ def check_limits(
     """Raise TrajectoryRefusedError naming joint, time, value, limit and excess where a limit is
     exceeded first: of position, velocity, acceleration or torque, in this order.
 
-    Segments (S, n, 6) with durations (S,) [s], the first at time `start` [s] of the trajectory. dynamics:
-    with the present load. allowed: positions, the robot's own range unless given.
+    Segments (S, n, 6) with durations (S,) [s], the first at time `start` [s] of the trajectory.
+    dynamics: with the present load. allowed: positions, the robot's own range unless given.
     """
     if len(durations) == 0:
         return
@@ -69,7 +71,8 @@ def check_limits(
             )
         position, speed, change = (polynomial_extrema(coefficients, durations, k) for k in range(3))
     starts = start + np.concatenate(([0.0], np.cumsum(durations)[:-1]))
-    names, slack = robot.joint_names, 1.0 + settings.limit_slack
+    names = robot.joint_names
+    slack = 1.0 + settings.limit_slack
     allowed = allowed or Range.of(robot)
     found = [
         _position_excess(position, starts, names, allowed, settings.position_slack),
@@ -89,7 +92,10 @@ def _position_excess(
     low = _first(~(found.minimum >= allowed.low - slack), found.time_of_minimum, starts)
     high = _first(~(found.maximum <= allowed.high + slack), found.time_of_maximum, starts)
     candidates = []
-    for at, values, bounds in ((low, found.minimum, allowed.low), (high, found.maximum, allowed.high)):
+    for at, values, bounds in (
+        (low, found.minimum, allowed.low),
+        (high, found.maximum, allowed.high),
+    ):
         if at is not None:
             time, k, j = at
             sentence = _sentence(names[j], "is at", values[k, j], float(bounds[j]), time, "rad")
@@ -98,7 +104,12 @@ def _position_excess(
 
 
 def _excess(
-    found: Extrema, starts: FloatArray, names: Sequence[str], limit: FloatArray, slack: float, unit: str
+    found: Extrema,
+    starts: FloatArray,
+    names: Sequence[str],
+    limit: FloatArray,
+    slack: float,
+    unit: str,
 ) -> _Excess | None:
     down = -found.minimum > found.maximum
     value = np.where(down, found.minimum, found.maximum)
@@ -125,7 +136,8 @@ def _torque_excess(
     j = int(np.where(beyond, bounds.sampled, -np.inf).argmax())
     q, qd, qdd = Path(coefficients, durations, coefficients[0, :, 0]).motion(float(bounds.time[j]))
     limit = float(dynamics.torque_limit(qd[None])[0, j])
-    # by the bound: it counts friction of either sign where a joint turns, and what could not be decided
+    # by the bound: it counts friction of either sign where a joint turns, and what could not be
+    # decided
     needed = dynamics.inverse_dynamics(q[None], qd[None], qdd[None])[0, j]
     torque = float(np.copysign(bounds.upper[j] * limit, needed))
     time = start + float(bounds.time[j])
@@ -133,7 +145,9 @@ def _torque_excess(
 
 
 def _first(bad: BoolArray, when: FloatArray, starts: FloatArray) -> tuple[float, int, int] | None:
-    """Time [s], segment and joint of the earliest instant `when` (S, n) [s from starts (S,)] that is bad."""
+    """Time [s], segment and joint of the earliest instant `when` (S, n) [s from starts (S,)] that
+    is bad.
+    """
     if not bad.any():
         return None
     k = int(bad.any(axis=1).argmax())

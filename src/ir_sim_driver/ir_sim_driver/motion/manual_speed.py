@@ -1,7 +1,7 @@
 """Operating mode T1: the tool keeps 250 mm/s, by looking ahead along the path.
 
-From path speed v a stop at rate r covers v^2 / 2r of path time, so the speed that may be had now is bounded
-by what is allowed at every later place s': v^2 <= allowed(s')^2 + 2 r (s' - s).
+From path speed v a stop at rate r covers v^2 / 2r of path time, so the speed that may be had now is
+bounded by what is allowed at every later place s': v^2 <= allowed(s')^2 + 2 r (s' - s).
 """
 
 from __future__ import annotations

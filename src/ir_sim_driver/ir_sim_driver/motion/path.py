@@ -28,10 +28,13 @@ class Path:
 
     def __init__(self, coefficients: FloatArray, durations: FloatArray, rest: FloatArray) -> None:
         self._c = np.ascontiguousarray(np.swapaxes(coefficients, 1, 2))  # (S, 6, n)
-        self._starts = np.concatenate(([0.0], np.cumsum(durations)[:-1])).tolist() if len(durations) else []
+        self._starts = (
+            np.concatenate(([0.0], np.cumsum(durations)[:-1])).tolist() if len(durations) else []
+        )
         self._lengths = durations.tolist()
         self.duration = float(np.sum(durations))
-        self.coefficients, self.durations = coefficients, durations
+        self.coefficients = coefficients
+        self.durations = durations
         self.start: FloatArray = rest.copy() if not self._starts else coefficients[0, :, 0].copy()
         self.end: FloatArray = (
             rest.copy() if not self._starts else self._at(len(durations) - 1, self._lengths[-1])
@@ -40,7 +43,9 @@ class Path:
     def _at(self, segment: int, t: float) -> FloatArray:
         t2 = t * t
         powers = np.array((1.0, t, t2, t2 * t, t2 * t2, t2 * t2 * t))
-        value: FloatArray = np.dot(powers, self._c[segment])  # half the time of @ on arrays this small
+        value: FloatArray = np.dot(
+            powers, self._c[segment]
+        )  # half the time of @ on arrays this small
         return value
 
     def position(self, s: float) -> FloatArray:
@@ -63,8 +68,8 @@ class Path:
         return positions
 
     def motion(self, s: float) -> Motion:
-        """Position and derivatives at path time s; derivatives are zero before the start and after the
-        end.
+        """Position and derivatives at path time s; derivatives are zero before the start and after
+        the end.
         """
         if s < 0.0 or s > self.duration or not self._starts:
             rest = np.zeros(len(self.start))
@@ -81,17 +86,22 @@ class Path:
 
 
 def quintic(before: Motion, after: Motion, duration: float) -> FloatArray:
-    """Coefficients (1, n, 6) of the polynomial that leads from one motion to another in `duration` [s]."""
+    """Coefficients (1, n, 6) of the polynomial that leads from one motion to another in `duration`
+    [s].
+    """
     T = duration
     q0, v0, a0 = before
-    delta, v1, a1 = after.q - q0, after.qd, after.qdd
+    delta = after.q - q0
+    v1 = after.qd
+    a1 = after.qdd
     return np.stack(
         [
             q0,
             v0,
             0.5 * a0,
             (20.0 * delta - (8.0 * v1 + 12.0 * v0) * T - (3.0 * a0 - a1) * T**2) / (2.0 * T**3),
-            (-30.0 * delta + (14.0 * v1 + 16.0 * v0) * T + (3.0 * a0 - 2.0 * a1) * T**2) / (2.0 * T**4),
+            (-30.0 * delta + (14.0 * v1 + 16.0 * v0) * T + (3.0 * a0 - 2.0 * a1) * T**2)
+            / (2.0 * T**4),
             (12.0 * delta - 6.0 * (v0 + v1) * T - (a0 - a1) * T**2) / (2.0 * T**5),
         ],
         axis=1,

@@ -1,8 +1,9 @@
 """Trajectories of positions alone: their corners are rounded, so that velocity never jumps.
 
-The linear interpolant has corners, which no drive can follow. What is executed is its mean over the last
-w = blend_time: q~(t) = 1/w int_{t-w}^{t} q(u) du, a piecewise parabola with q~' continuous and
-q~'' = (q'(t) - q'(t - w)) / w. A cubic Hermite spline through its knots t_i and t_i + w is exactly it.
+The linear interpolant has corners, which no drive can follow. What is executed is its mean over the
+last w = blend_time: q~(t) = 1/w int_{t-w}^{t} q(u) du, a piecewise parabola with q~' continuous and
+q~'' = (q'(t) - q'(t - w)) / w. A cubic Hermite spline through its knots t_i and t_i + w is exactly
+it.
 """
 
 from __future__ import annotations
@@ -16,10 +17,11 @@ _APART = 100_000  # ns; between nearer knots the rounding of positions would cou
 
 
 def rounded(trajectory: JointTrajectory, blend_time: float) -> JointTrajectory:
-    """The trajectory that is executed: itself when it carries velocities, else its mean over blend_time [s].
+    """The trajectory that is executed: itself when it carries velocities, else its mean over
+    blend_time [s].
 
-    It ends blend_time later. Before a first time 0 the robot rests; before a later one the mean continues
-    the first line, so that what leads in meets it in motion.
+    It ends blend_time later. Before a first time 0 the robot rests; before a later one the mean
+    continues the first line, so that what leads in meets it in motion.
     """
     if trajectory.velocities is not None or len(trajectory.times_ns) < 2:
         return trajectory
@@ -27,7 +29,8 @@ def rounded(trajectory: JointTrajectory, blend_time: float) -> JointTrajectory:
     given = trajectory.times_ns
     knots = np.unique(np.concatenate((given, given + window_ns)))
     first = int(given[0])
-    t, q = (given - first) / NS_PER_S, trajectory.positions
+    t = (given - first) / NS_PER_S
+    q = trajectory.positions
     start = q[0] if first == 0 else q[0] - (q[1] - q[0]) / t[1] * blend_time
     t = np.concatenate(([-blend_time], t, [t[-1] + blend_time]))
     at = (knots - first) / NS_PER_S
@@ -43,7 +46,9 @@ def rounded(trajectory: JointTrajectory, blend_time: float) -> JointTrajectory:
 
 
 def _apart(knots: IntArray) -> IntArray:
-    """Indices of knots (N,) [ns], ascending, that are at least _APART apart; the first and the last stay."""
+    """Indices of knots (N,) [ns], ascending, that are at least _APART apart; the first and the last
+    stay.
+    """
     kept = [0]
     for k in range(1, len(knots) - 1):
         if knots[k] - knots[kept[-1]] >= _APART and knots[-1] - knots[k] >= _APART:

@@ -20,8 +20,12 @@ class Tolerances:
     has_velocity: bool
 
     @classmethod
-    def of(cls, joint_names: Sequence[str], given: Sequence[JointTolerance], default: float) -> Tolerances:
-        """Arrays in the robot's joint order; 0 means the default [rad] (speed: unbounded), -1 unbounded."""
+    def of(
+        cls, joint_names: Sequence[str], given: Sequence[JointTolerance], default: float
+    ) -> Tolerances:
+        """Arrays in the robot's joint order; 0 means the default [rad] (speed: unbounded), -1
+        unbounded.
+        """
         position = np.full(len(joint_names), default)
         velocity = np.full(len(joint_names), np.inf)
         for tolerance in given:
@@ -38,7 +42,11 @@ class Tolerances:
 
     def broken_velocity(self, joint_names: Sequence[str], error: FloatArray) -> str:
         """Sentence about the worst speed error (n,) [rad/s]; "" when all are within."""
-        return _worst(joint_names, error, self.velocity, "velocity", "rad/s") if self.has_velocity else ""
+        return (
+            _worst(joint_names, error, self.velocity, "velocity", "rad/s")
+            if self.has_velocity
+            else ""
+        )
 
 
 def _worst(names: Sequence[str], error: FloatArray, bound: FloatArray, what: str, unit: str) -> str:
@@ -46,4 +54,6 @@ def _worst(names: Sequence[str], error: FloatArray, bound: FloatArray, what: str
     if (size <= bound).all():
         return ""
     j = int((size - bound).argmax())
-    return f"{names[j]} {what} error is {error[j]:+.6f} {unit}: the tolerance is {bound[j]:g} {unit}"
+    return (
+        f"{names[j]} {what} error is {error[j]:+.6f} {unit}: the tolerance is {bound[j]:g} {unit}"
+    )

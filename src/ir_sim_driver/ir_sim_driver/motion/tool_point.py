@@ -42,7 +42,9 @@ class ToolPoint:
         return positions
 
     def bound(self, size: FloatArray) -> float:
-        """Upper bound [m] of the tool's deviation when the joints are off by as much as size (n,) >= 0."""
+        """Upper bound [m] of the tool's deviation when the joints are off by as much as size (n,)
+        >= 0.
+        """
         return float(self._reach.dot(size))
 
     def quiet_bound(self, tolerance: FloatArray) -> float:

@@ -21,12 +21,12 @@ from ir_sim_driver.motion.rounding import rounded
 
 _NS = 1e-9
 _GENTLENESS = (0.25, 0.1, 0.03, 0.01, 1e-3, 1e-4)
-"""Shares of the acceleration limits with which the last difference to a trajectory may be closed, tried in
-turn. With the last one the torques are those of standing there and of friction.
+"""Shares of the acceleration limits with which the last difference to a trajectory may be closed,
+tried in turn. With the last one the torques are those of standing there and of friction.
 """
 _HARMLESS = 1e-5
-"""A difference [rad] that is closed whatever friction asks for: encoders leave less, and a drive that holds
-the robot where the trajectory starts creeps so far (30 um at 3 m) with what it has left.
+"""A difference [rad] that is closed whatever friction asks for: encoders leave less, and a drive
+that holds the robot where the trajectory starts creeps so far (30 um at 3 m) with what it has left.
 """
 _SHORT = 0.01  # share for it: over before a motor that gives all it has counts as overloaded
 
@@ -34,8 +34,8 @@ _SHORT = 0.01  # share for it: over before a motor that gives all it has counts 
 def check_goal(
     goal: TrajectoryGoal, joint_names: tuple[str, ...], settings: ExecutionSettings, now_ns: int
 ) -> TrajectoryGoal:
-    """Return the goal in the robot's joint order. Raises TrajectoryRefusedError; knows nothing of the
-    robot's state.
+    """Return the goal in the robot's joint order. Raises TrajectoryRefusedError; knows nothing of
+    the robot's state.
     """
     if goal.multi_dof:
         raise _invalid(f"{goal.multi_dof} multi-dof points: the robot has joints only")
@@ -49,7 +49,9 @@ def check_goal(
     except JointNamesError as error:
         raise TrajectoryRefusedError(ErrorCode.INVALID_JOINTS, str(error)) from error
     if trajectory.duration > settings.max_duration:
-        raise _invalid(f"the trajectory takes {trajectory.duration:g} s: at most {settings.max_duration:g} s")
+        raise _invalid(
+            f"the trajectory takes {trajectory.duration:g} s: at most {settings.max_duration:g} s"
+        )
     _check_stamp(goal, trajectory, settings, now_ns)
     _check_end(trajectory)
     for tolerance in (*goal.path_tolerance, *goal.goal_tolerance):
@@ -60,10 +62,13 @@ def check_goal(
 
 
 def check_trajectory(
-    trajectory: JointTrajectory, robot: RobotModel, dynamics: DynamicsModel, settings: ExecutionSettings
+    trajectory: JointTrajectory,
+    robot: RobotModel,
+    dynamics: DynamicsModel,
+    settings: ExecutionSettings,
 ) -> JointTrajectory:
-    """Check every instant of a trajectory against the limits, whatever state the robot is in; what is
-    executed of it.
+    """Check every instant of a trajectory against the limits, whatever state the robot is in; what
+    is executed of it.
 
     May take a while for long ones. Raises TrajectoryRefusedError.
     """
@@ -91,9 +96,10 @@ def checked_route(
 ) -> Route:
     """Path from the commanded motion `now` along a trajectory that passed check_trajectory.
 
-    Only what leads in is checked here; from outside its range a joint may come back, and go no farther out.
-    The last difference of a robot at rest is closed as fast as its torques allow: nobody gave that a time.
-    One that is _HARMLESS is never refused.
+    Only what leads in is checked here; from outside its range a joint may come back, and go no
+    farther out.
+    The last difference of a robot at rest is closed as fast as its torques allow: nobody gave that
+    a time. One that is _HARMLESS is never refused.
     delay [s]: until time 0 of the trajectory. Raises TrajectoryRefusedError.
     """
     allowed = Range.of(robot).including(now.q)
@@ -104,7 +110,8 @@ def checked_route(
     for share in _GENTLENESS:
         found = route(share)
         lead = slice(0, found.lead)
-        coefficients, durations = found.path.coefficients[lead], found.path.durations[lead]
+        coefficients = found.path.coefficients[lead]
+        durations = found.path.durations[lead]
         try:
             check_limits(coefficients, durations, -found.offset, robot, dynamics, settings, allowed)
         except TrajectoryRefusedError as error:
@@ -116,22 +123,25 @@ def checked_route(
     if np.abs(trajectory.positions[0] - now.q).max() <= _HARMLESS:
         return route(_SHORT)
     raise _invalid(
-        f"{refusal}; until 0 s it goes from where it stands to the first point, however slowly: plan it "
-        "again from where it stands"
+        f"{refusal}; until 0 s it goes from where it stands to the first point, however slowly: "
+        "plan it again from where it stands"
     ) from refusal
 
 
-def _check_points(trajectory: JointTrajectory, robot: RobotModel, settings: ExecutionSettings) -> None:
+def _check_points(
+    trajectory: JointTrajectory, robot: RobotModel, settings: ExecutionSettings
+) -> None:
     """Name the point that is outside: more use to its sender than the instant between points."""
     q = trajectory.positions
     over = np.maximum(q - robot.position_max, robot.position_min - q) > settings.position_slack
     if over.any():
         k, j = (int(i) for i in np.argwhere(over)[0])
-        low, high = robot.position_min[j], robot.position_max[j]
+        low = robot.position_min[j]
+        high = robot.position_max[j]
         excess = max(q[k, j] - high, low - q[k, j])
         raise _invalid(
-            f"point {k} joint {j} ({trajectory.joint_names[j]}) is at {q[k, j]:.6f} rad: the limits are "
-            f"[{low:.6f}, {high:.6f}] rad, exceeded by {excess:.3g} rad"
+            f"point {k} joint {j} ({trajectory.joint_names[j]}) is at {q[k, j]:.6f} rad: the "
+            f"limits are [{low:.6f}, {high:.6f}] rad, exceeded by {excess:.3g} rad"
         )
 
 
@@ -144,12 +154,13 @@ def _check_stamp(
     if delay + trajectory.duration < 0.0:
         raise TrajectoryRefusedError(
             ErrorCode.OLD_HEADER_TIMESTAMP,
-            f"the trajectory ended {-delay - trajectory.duration:.3f} s ago by its header stamp: it "
-            "must end in the future",
+            f"the trajectory ended {-delay - trajectory.duration:.3f} s ago by its header stamp: "
+            "it must end in the future",
         )
     if delay > settings.max_delay:
         raise _invalid(
-            f"the trajectory starts in {delay:.3f} s by its header stamp: at most {settings.max_delay:g} s"
+            f"the trajectory starts in {delay:.3f} s by its header stamp: at most "
+            f"{settings.max_delay:g} s"
         )
 
 
@@ -160,16 +171,16 @@ def _check_end(trajectory: JointTrajectory) -> None:
     j = int(np.abs(last).argmax())
     if abs(last[j]) > AT_REST:
         raise _invalid(
-            f"point {len(trajectory.times_ns) - 1} joint {j} ({trajectory.joint_names[j]}) ends with "
-            f"{last[j]:g} rad/s: "
-            "the last velocity must be 0 rad/s"
+            f"point {len(trajectory.times_ns) - 1} joint {j} ({trajectory.joint_names[j]}) ends "
+            f"with {last[j]:g} rad/s: the last velocity must be 0 rad/s"
         )
 
 
 def _check_tolerance(tolerance: JointTolerance, joint_names: tuple[str, ...]) -> None:
     if tolerance.name not in joint_names:
         raise _invalid(
-            f"tolerance for unknown joint {tolerance.name[:80]!r}: expected are {', '.join(joint_names)}"
+            f"tolerance for unknown joint {tolerance.name[:80]!r}: expected are "
+            f"{', '.join(joint_names)}"
         )
     for what in ("position", "velocity", "acceleration"):
         value = getattr(tolerance, what)
@@ -180,8 +191,8 @@ def _check_tolerance(tolerance: JointTolerance, joint_names: tuple[str, ...]) ->
             )
     if tolerance.acceleration > 0.0:
         raise _invalid(
-            f"acceleration tolerance of {tolerance.name} is {tolerance.acceleration:g} rad/s^2: nothing "
-            "measures accelerations, it must be 0 (default) or -1 (unbounded)"
+            f"acceleration tolerance of {tolerance.name} is {tolerance.acceleration:g} rad/s^2: "
+            "nothing measures accelerations, it must be 0 (default) or -1 (unbounded)"
         )
 
 

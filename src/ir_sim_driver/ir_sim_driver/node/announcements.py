@@ -1,4 +1,5 @@
-"""What the driver announces to whoever comes later, and hears: the planner's cell, the machines' signals.
+"""What the driver announces to whoever comes later, and hears: the planner's cell, the machines'
+signals.
 
 Load, robot, timers and states of machines are latched; contacts are not.
 """
@@ -41,13 +42,16 @@ _CONTACTS = QoSProfile(depth=100)
 
 
 class Announcements:
-    """Of `driver`, by `node`; load_changed: called when the robot carries another load, and at the start.
+    """Of `driver`, by `node`; load_changed: called when the robot carries another load, and at the
+    start.
 
     A cell is read beside everything else.
     """
 
     def __init__(self, node: Node, driver: Driver, load_changed: Callable[[], None]) -> None:
-        self._node, self._driver, self._load_changed = node, driver, load_changed
+        self._node = node
+        self._driver = driver
+        self._load_changed = load_changed
         self._load: Carried | None = None
         self._cells = ThreadPoolExecutor(max_workers=1, thread_name_prefix="cells")
         self._offered: deque[CellState] = deque(maxlen=1)  # a flood of large cells waits nowhere
@@ -73,14 +77,16 @@ class Announcements:
         self._cells.shutdown(wait=True, cancel_futures=True)
 
     def watch(self, load: Carried) -> None:
-        """Let the node look soon when this load, which is carried now, or a change around the robot has not
-        been announced; any thread may call it.
+        """Let the node look soon when this load, which is carried now, or a change around the robot
+        has not been announced; any thread may call it.
         """
         if load is not self._load or self._driver.cell_side.version != self._version:
             self._changed.trigger()
 
     def look(self) -> None:
-        """Announce what has changed: the load, and the robot with it, states of machines; and contacts."""
+        """Announce what has changed: the load, and the robot with it, states of machines; and
+        contacts.
+        """
         self._look_around()
         load = self._driver.carried
         if load is self._load:
@@ -93,7 +99,8 @@ class Announcements:
         self._load_changed()
 
     def _look_around(self) -> None:
-        cell, version = self._driver.cell_side, self._driver.cell_side.version
+        cell = self._driver.cell_side
+        version = self._driver.cell_side.version
         if version != self._version:
             self._version = version
             machines = machine_states_to_msg(cell.machine_states())

@@ -1,9 +1,9 @@
 """Action goals that are counted before Python objects are made of them.
 
-rclpy converts a request while it holds the interpreter, some 10 us for each point: the plant's thread would
-wait a second for a goal of 100,000 points that is refused anyway. rclpy asks the message's class for the
-function that converts it; here it gets one that looks at the C message first, and leaves out the points where
-they are more than may be.
+rclpy converts a request while it holds the interpreter, some 10 us for each point: the plant's
+thread would wait a second for a goal of 100,000 points that is refused anyway. rclpy asks the
+message's class for the function that converts it; here it gets one that looks at the C message
+first, and leaves out the points where they are more than may be.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from ir_sim_driver.node.goal_clients import participant_of
 _CLIENTS_KEPT = 1000
 _Convert = ctypes.PYFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p)
 _api = ctypes.pythonapi
-_api.PyCapsule_GetName.restype, _api.PyCapsule_GetName.argtypes = ctypes.c_char_p, [ctypes.py_object]
+_api.PyCapsule_GetName.restype = ctypes.c_char_p
+_api.PyCapsule_GetName.argtypes = [ctypes.py_object]
 _api.PyCapsule_GetPointer.restype = ctypes.c_void_p
 _api.PyCapsule_GetPointer.argtypes = [ctypes.py_object, ctypes.c_char_p]
 _api.PyCapsule_New.restype = ctypes.py_object
@@ -53,7 +54,8 @@ class _GoalRequest(ctypes.Structure):
 
 
 class _CountedRequest:
-    """Looks like the class `request` to rclpy, and leaves points out where there are more than most().
+    """Looks like the class `request` to rclpy, and leaves points out where there are more than
+    most().
 
     left_out: points of the request that was converted last, 0 where it is whole.
     """
@@ -87,11 +89,15 @@ class _CountedRequest:
 
 
 class BoundedActionServer(RecordedActionServer):
-    """An action server of goals that begin with a trajectory; most: points that are converted at most."""
+    """An action server of goals that begin with a trajectory; most: points that are converted at
+    most.
+    """
 
     _is_goal_request_ready: bool
 
-    def __init__(self, node: Any, action_type: Any, *arguments: Any, most: Callable[[], int], **options: Any):
+    def __init__(
+        self, node: Any, action_type: Any, *arguments: Any, most: Callable[[], int], **options: Any
+    ):
         self._counted = _CountedRequest(action_type.Impl.SendGoalService.Request, most)
         self._points: dict[bytes, int] = {}
         self._clients: dict[bytes, bytes] = {}

@@ -38,7 +38,8 @@ FEEDBACK_PERIOD = 0.05  # s: 20 Hz, enough for a person or a progress bar
 
 
 class Executions:
-    """Goals of one kind of action, ExecuteTrajectory or FollowJointTrajectory, called `name`, on `driver`.
+    """Goals of one kind of action, ExecuteTrajectory or FollowJointTrajectory, called `name`, on
+    `driver`.
 
     client_timeout [s]: how long a movement goes on when its client is gone; 0: to its end.
     """
@@ -46,7 +47,9 @@ class Executions:
     def __init__(
         self, driver: Driver, node: Executing, action_type: Any, name: str, client_timeout: float
     ) -> None:
-        self._driver, self._node, self._type = driver, node, action_type
+        self._driver = driver
+        self._node = node
+        self._type = action_type
         self._feedback_topic = f"{name}/_action/feedback"  # every client subscribes to it
         self._client_timeout = client_timeout
         self._tickets: dict[bytes, int] = {}
@@ -56,7 +59,9 @@ class Executions:
 
     async def execute(self, handle: Any) -> Any:
         """Carry a goal out; the action's result."""
-        key, request, limit = bytes(handle.goal_id.uuid), handle.request, self._driver.max_points
+        key = bytes(handle.goal_id.uuid)
+        request = handle.request
+        limit = self._driver.max_points
         done = self._node.future()
 
         def ended(outcome: Outcome) -> None:
@@ -94,14 +99,19 @@ class Executions:
 
     def _result(self, handle: Any, outcome: Outcome) -> Any:
         result = self._type.Result()
-        result.error_code, result.error_string = int(outcome.code), one_line(outcome.sentence)
+        result.error_code = int(outcome.code)
+        result.error_string = one_line(outcome.sentence)
         if hasattr(result, "max_tool_deviation"):  # ours; FollowJointTrajectory knows neither
-            result.max_tool_deviation, result.energy = outcome.max_tool_deviation, outcome.energy
+            result.max_tool_deviation = outcome.max_tool_deviation
+            result.energy = outcome.energy
             result.max_tracking_error = list(outcome.max_tracking_error)
-            result.settling_time, result.plant = outcome.settling_time, self._driver.plant.name
+            result.settling_time = outcome.settling_time
+            result.plant = self._driver.plant.name
             result.load_check = _load_checks(outcome.load_check, self._driver.stamp_ns)
             result.contacts = [] if outcome.contact is None else [contact_to_msg(outcome.contact)]
-        if outcome.canceled or (handle.is_cancel_requested and outcome.code is ErrorCode.SUCCESSFUL):
+        if outcome.canceled or (
+            handle.is_cancel_requested and outcome.code is ErrorCode.SUCCESSFUL
+        ):
             handle.canceled()
         elif outcome.code is ErrorCode.SUCCESSFUL:
             handle.succeed()

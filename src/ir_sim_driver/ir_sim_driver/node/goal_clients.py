@@ -1,8 +1,8 @@
 """Who has sent a goal, and whether that process is still there.
 
-A goal names no client. Its request carries the identity of the endpoint that wrote it, which rclpy keeps for
-itself; its first bytes are those of the process's participant, as in the identity of the subscription that
-every action client has to the feedback.
+A goal names no client. Its request carries the identity of the endpoint that wrote it, which rclpy
+keeps for itself; its first bytes are those of the process's participant, as in the identity of the
+subscription that every action client has to the feedback.
 """
 
 from __future__ import annotations
@@ -35,18 +35,22 @@ def participant_of(request_id: Any) -> bytes:
 class ClientWatch:
     """Whether the client of a goal has been gone for `timeout` [s]; 0: never.
 
-    participant: of who sent it, b"" where nobody knows: any subscriber to the feedback counts then, and also
-    before the participant's own has been discovered.
+    participant: of who sent it, b"" where nobody knows: any subscriber to the feedback counts then,
+    and also before the participant's own has been discovered.
     """
 
     def __init__(self, timeout: float, participant: bytes = b"") -> None:
-        self._timeout, self._participant = timeout, participant
-        self._known, self._seen = False, time.monotonic()
+        self._timeout = timeout
+        self._participant = participant
+        self._known = False
+        self._seen = time.monotonic()
 
     def gone(self, subscribers: Sequence[bytes]) -> bool:
         """Look at the identities of those who subscribe to the feedback now."""
         now = time.monotonic()
-        own = bool(self._participant) and any(each.startswith(self._participant) for each in subscribers)
+        own = bool(self._participant) and any(
+            each.startswith(self._participant) for each in subscribers
+        )
         self._known = self._known or own
         if own or (subscribers and not self._known):
             self._seen = now

@@ -1,9 +1,10 @@
 """Which stamp of a gap-free grid is due, on a clock that may lag, stop and jump.
 
-A thread that gets too little of the processor lags: what it has missed is made up for stamp by stamp, no
-faster than `catch_up` times the clock. A process that got none of it for long was suspended, which looks as
-if the clock had jumped: the grid has a gap then, with the reason. The two differ only in how often the grid
-could look at the clock.
+A thread that gets too little of the processor lags: what it has missed is made up for stamp by
+stamp, no faster than `catch_up` times the clock. A process that got none of it for long was
+suspended, which looks as
+if the clock had jumped: the grid has a gap then, with the reason. The two differ only in how often
+the grid could look at the clock.
 """
 
 from __future__ import annotations
@@ -13,15 +14,20 @@ from math import inf
 
 _NS = 1_000_000_000
 _BACK = _NS // 2  # a clock that is this far behind the next stamp has jumped
-_AT_ONCE = _NS // 10  # a delay of up to this is made up for at once: no gap in what others see is shorter
-_WALL_SHARE = 0.5  # of an advance of the clock in which the process can't have looked: it was suspended
+_AT_ONCE = (
+    _NS // 10
+)  # a delay of up to this is made up for at once: no gap in what others see is shorter
+_WALL_SHARE = (
+    0.5  # of an advance of the clock in which the process can't have looked: it was suspended
+)
 
 
 @dataclass(frozen=True)
 class ClockPolicy:
     """How a clock is followed.
 
-    gap [s]: an advance between two looks that is a gap. lag [s]: a delay that is one, however it came about.
+    gap [s]: an advance between two looks that is a gap. lag [s]: a delay that is one, however it
+    came about.
     catch_up: speed in times the clock's, at which delays are made up for.
     """
 
@@ -31,8 +37,10 @@ class ClockPolicy:
 
 
 SYSTEM = ClockPolicy(gap=2.0, lag=inf, catch_up=2.0)
-"""The host's clock: a loaded machine lags as long as it is loaded. Two seconds without a look at the clock
-are no load: its threads wait for tenths of one, and for a whole one while a huge message is read."""
+"""The host's clock: a loaded machine lags as long as it is loaded. Two seconds without a look at
+the clock
+are no load: its threads wait for tenths of one, and for a whole one while a huge message is read.
+"""
 FOREIGN = ClockPolicy(gap=5.0, lag=5.0, catch_up=inf)
 """Somebody's /clock, which comes in steps and at any speed."""
 OWN = ClockPolicy(gap=inf, lag=inf, catch_up=inf)
@@ -42,7 +50,8 @@ OWN = ClockPolicy(gap=inf, lag=inf, catch_up=inf)
 class Grid:
     """Stamps on multiples of period_ns.
 
-    gap: why the grid began anew in the last look, "" where it did not. lag [s]: of the next stamp, then.
+    gap: why the grid began anew in the last look, "" where it did not. lag [s]: of the next stamp,
+    then.
     """
 
     def __init__(self, period_ns: int) -> None:
@@ -56,10 +65,13 @@ class Grid:
     def look(self, now: int, wall: int, policy: ClockPolicy) -> int:
         """Nanoseconds until a stamp is due, 0 or less: `take` it.
 
-        now: the clock, 0 where it has not started. wall: a clock of the process that nobody sets, both [ns].
+        now: the clock, 0 where it has not started. wall: a clock of the process that nobody sets,
+        both [ns].
         """
-        advance, passed = now - self._seen, wall - self._wall
-        self._seen, self._wall = now, wall
+        advance = now - self._seen
+        passed = wall - self._wall
+        self._seen = now
+        self._wall = wall
         self.gap = ""
         if now <= 0:
             self._restart("the clock has stopped" if self._stamp else "")
@@ -80,7 +92,9 @@ class Grid:
         return self._stamp - self._period
 
     def _restart(self, reason: str) -> None:
-        self.gap, self._stamp, self.lag = reason, 0, 0.0
+        self.gap = reason
+        self._stamp = 0
+        self.lag = 0.0
 
     def _allowed(self, advance: int, policy: ClockPolicy) -> float:
         """Up to where stamps may be taken after the clock has advanced so far."""

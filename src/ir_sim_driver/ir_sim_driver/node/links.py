@@ -1,4 +1,6 @@
-"""Opens the links that the settings ask for; a controller that nothing can wake does not hibernate."""
+"""Opens the links that the settings ask for; a controller that nothing can wake does not
+hibernate.
+"""
 
 from __future__ import annotations
 

@@ -77,7 +77,9 @@ def condition_of(entry: Entry, hardware: str) -> Condition:
     return Condition(entry.name, entry.level, entry.sentence, entry.values, hardware)
 
 
-def fill_joint_state(msg: Any, stamp_ns: int, q: FloatArray, qd: FloatArray, torque: FloatArray) -> None:
+def fill_joint_state(
+    msg: Any, stamp_ns: int, q: FloatArray, qd: FloatArray, torque: FloatArray
+) -> None:
     """Write a state, each (n,), into a message that is used again and again."""
     msg.header.stamp.sec, msg.header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
     msg.position = float_array(q)
@@ -85,22 +87,31 @@ def fill_joint_state(msg: Any, stamp_ns: int, q: FloatArray, qd: FloatArray, tor
     msg.effort = float_array(torque)
 
 
-def fill_controller_state(msg: Any, names: Sequence[str], stamp_ns: int, following: Following) -> None:
+def fill_controller_state(
+    msg: Any, names: Sequence[str], stamp_ns: int, following: Following
+) -> None:
     """Command, robot and their difference, into a ControllerState."""
     msg.header.stamp = time_to_msg(stamp_ns)
     msg.joint_names = list(names)
     fill_points(msg.reference, msg.feedback, msg.error, following)
     msg.trajectory_id = following.label
-    msg.path_time, msg.speed_scaling = following.path_time, following.path_speed
+    msg.path_time = following.path_time
+    msg.speed_scaling = following.path_speed
     msg.tool_deviation = following.deviation
 
 
 def fill_load_check(msg: Any, stamp_ns: int, finding: LoadFinding) -> None:
     """What a movement's torques say of the load, into a LoadCheck."""
     msg.header.stamp = time_to_msg(stamp_ns)
-    msg.trajectory_id, msg.load, msg.noticed = finding.trajectory_id, finding.load, finding.noticed
-    msg.joint, msg.expected, msg.found = finding.joint, finding.expected, finding.found
-    msg.deviation, msg.mass, msg.sentence = finding.deviation, finding.mass, finding.sentence
+    msg.trajectory_id = finding.trajectory_id
+    msg.load = finding.load
+    msg.noticed = finding.noticed
+    msg.joint = finding.joint
+    msg.expected = finding.expected
+    msg.found = finding.found
+    msg.deviation = finding.deviation
+    msg.mass = finding.mass
+    msg.sentence = finding.sentence
 
 
 def fill_points(desired: Any, actual: Any, error: Any, following: Following) -> None:
@@ -108,9 +119,11 @@ def fill_points(desired: Any, actual: Any, error: Any, following: Following) -> 
     command = following.command
     at = duration_to_msg(max(0, round(following.path_time / _NS)))
     desired.time_from_start = actual.time_from_start = error.time_from_start = at
-    desired.positions, desired.velocities = float_array(command.q), float_array(command.qd)
+    desired.positions = float_array(command.q)
+    desired.velocities = float_array(command.qd)
     desired.accelerations = float_array(command.qdd)
-    actual.positions, actual.velocities = float_array(following.q), float_array(following.qd)
+    actual.positions = float_array(following.q)
+    actual.velocities = float_array(following.qd)
     error.positions = float_array(command.q - following.q)
     error.velocities = float_array(command.qd - following.qd)
 

@@ -51,7 +51,10 @@ except ImportError:
     FollowJointTrajectory = None
 
 _NS = 1_000_000_000
-_MARKERS_PERIOD, _DIAGNOSTICS_PERIOD, _TRANSFORMS_PERIOD = 0.05, 1.0, 0.02  # s
+# s
+_MARKERS_PERIOD = 0.05
+_DIAGNOSTICS_PERIOD = 1.0
+_TRANSFORMS_PERIOD = 0.02
 _LINES_MAX = 20  # of the log per second: who toggles a bit all day must not fill a disk
 _RESULT_KEPT = 60  # s that the result of a goal can be asked for; each takes memory
 _LAST_WORDS = 1.0  # s for the answers to goals when the plant has stopped
@@ -74,7 +77,11 @@ class SimDriver(Node):
         self.add_on_set_parameters_callback(self._keep_time)
         options = configuration.node
         simulation = simulation or make_simulation(
-            options.cell, options.load, options.backend, configuration.simulation, plant=options.plant
+            options.cell,
+            options.load,
+            options.backend,
+            configuration.simulation,
+            plant=options.plant,
         )
         steps = round(1.0 / (options.joint_state_rate * simulation.settings.dt))
         self._driver = Driver(simulation, steps, configuration.wake_hint)
@@ -91,7 +98,9 @@ class SimDriver(Node):
         return self._links[link].port if link in self._links else 0
 
     def destroy_node(self) -> None:
-        """Stop the plant, then the rest. Raises PlantStoppedError when the plant had ended before."""
+        """Stop the plant, then the rest. Raises PlantStoppedError when the plant had ended
+        before.
+        """
         self._plant.close()
         for link in self._links.values():
             link.close()
@@ -110,7 +119,10 @@ class SimDriver(Node):
         self._trajectory_topic = TrajectoryTopic(self, self._driver)
         self._plc_topic = PlcTopic(self, self._driver)
         self.create_subscription(
-            Float64, names.SPEED_SCALING, lambda msg: self._driver.set_speed_scaling(float(msg.data)), 10
+            Float64,
+            names.SPEED_SCALING,
+            lambda msg: self._driver.set_speed_scaling(float(msg.data)),
+            10,
         )
         self._markers_timer = self.create_timer(_MARKERS_PERIOD, self._publish_markers)
         self.create_timer(_DIAGNOSTICS_PERIOD, self._publish_diagnostics)
@@ -122,7 +134,9 @@ class SimDriver(Node):
     def _open_requests(self) -> None:
         self._actions = [self._serve_action(ExecuteTrajectory, names.EXECUTE_TRAJECTORY)]
         if FollowJointTrajectory is not None:
-            self._actions.append(self._serve_action(FollowJointTrajectory, names.FOLLOW_JOINT_TRAJECTORY))
+            self._actions.append(
+                self._serve_action(FollowJointTrajectory, names.FOLLOW_JOINT_TRAJECTORY)
+            )
         answers = Services(self._driver, self.get_name(), self._announcements.look)
         BoundedService(self, SetPlcInput, names.SET_PLC_INPUT, answers.set_plc_input)
         BoundedService(self, StartPause, names.START_PAUSE, answers.start_pause)
@@ -150,7 +164,8 @@ class SimDriver(Node):
             result_timeout=_RESULT_KEPT,
             **ACTION_SERVICES,
         )
-        executions.points_of, executions.client_of = server.points_of, server.client_of
+        executions.points_of = server.points_of
+        executions.client_of = server.client_of
         return server
 
     # what executions borrow
@@ -171,7 +186,9 @@ class SimDriver(Node):
     def every(self, seconds: float, callback: Callable[[], None]) -> Callable[[], None]:
         """Call back again and again until the returned function is called."""
         # rclpy's group of the node would keep a reference to every timer that it ever had
-        timer = self.create_timer(seconds, callback, callback_group=MutuallyExclusiveCallbackGroup())
+        timer = self.create_timer(
+            seconds, callback, callback_group=MutuallyExclusiveCallbackGroup()
+        )
         return lambda: self.destroy_timer(timer)
 
     def now_msg(self) -> Any:
@@ -214,7 +231,9 @@ class SimDriver(Node):
             self._publish_diagnostics()
 
     def goes_on(self) -> bool:
-        """Whether the plant runs, or has stopped so recently that goals are still being answered."""
+        """Whether the plant runs, or has stopped so recently that goals are still being
+        answered.
+        """
         return not self._driver.failure or time.monotonic() < self._last_words
 
     # slow topics out
@@ -231,7 +250,8 @@ class SimDriver(Node):
     def _publish_markers(self) -> None:
         joints = self._joints
         if not self._markers.get_subscription_count():
-            self._markers_timer.cancel()  # until somebody listens: every wake delays the plant's thread
+            # until somebody listens: every wake delays the plant's thread
+            self._markers_timer.cancel()
             return
         if joints is None or joints.q is None:
             return
@@ -272,10 +292,19 @@ def main() -> int:
     def make() -> SimDriver:
         node = SimDriver()
         gc.collect()
-        gc.freeze()  # what is there now stays: a full collection of it would hold the plant up for 40 ms
+        # what is there now stays: a full collection of it would hold the plant up for 40 ms
+        gc.freeze()
         return node
 
-    about = "Simulates a KR210 with its drives, power modes, PLC bits and mains meter; executes trajectories."
+    about = (
+        "Simulates a KR210 with its drives, power modes, PLC bits and mains meter; executes "
+        "trajectories."
+    )
     return run_node(
-        names.SIM_DRIVER, make, goes_on=SimDriver.goes_on, look=_LOOK, refusals=REFUSALS, about=about
+        names.SIM_DRIVER,
+        make,
+        goes_on=SimDriver.goes_on,
+        look=_LOOK,
+        refusals=REFUSALS,
+        about=about,
     )

@@ -23,16 +23,21 @@ from ir_sim_driver.power import IdleTimes
 class NodeSettings:
     """What the node simulates and how it meets the world."""
 
-    cell: str = setting("demo", "Name of a bundled cell, or the path of a cell file.", read_only=True)
+    cell: str = setting(
+        "demo", "Name of a bundled cell, or the path of a cell file.", read_only=True
+    )
     load: str = setting(
         "cell",
         "Loads at the start: 'cell' (the cell's tool), 'none', or names joined by '+'.",
         read_only=True,
     )
-    backend: str = setting("pybullet", "What simulates the robot.", choices=tuple(BACKENDS), read_only=True)
+    backend: str = setting(
+        "pybullet", "What simulates the robot.", choices=tuple(BACKENDS), read_only=True
+    )
     plant: str = setting(
         TYPICAL,
-        "Which plant is simulated: nominal, typical, typical:SEED, or the path of a plant file (.yaml).",
+        "Which plant is simulated: nominal, typical, typical:SEED, or the path of a plant file "
+        "(.yaml).",
         read_only=True,
     )
     joint_state_rate: int = setting(
@@ -45,7 +50,8 @@ class NodeSettings:
     )
     client_timeout: float = setting(
         2.0,
-        "How long a movement goes on when the client that asked for it has left the graph; 0: to its end.",
+        "How long a movement goes on when the client that asked for it has left the graph; 0: to "
+        "its end.",
         unit="s",
         minimum=0.0,
         maximum=3600.0,
@@ -67,11 +73,15 @@ class NodeSettings:
     def __post_init__(self) -> None:
         check_settings(self)
         if 1000 % self.joint_state_rate:
-            raise SettingsError(f"joint_state_rate is {self.joint_state_rate} Hz: it must divide 1000 Hz")
+            raise SettingsError(
+                f"joint_state_rate is {self.joint_state_rate} Hz: it must divide 1000 Hz"
+            )
 
 
 class DriverParameters:
-    """All parameters; `execution` ones can be changed while the robot stands, then `changed` is called."""
+    """All parameters; `execution` ones can be changed while the robot stands, then `changed` is
+    called.
+    """
 
     def __init__(
         self, node: Node, refuse: Callable[[], str], changed: Callable[[ExecutionSettings], None]
@@ -79,7 +89,11 @@ class DriverParameters:
         self.node: NodeSettings = Parameters(node, NodeSettings).value
         self.links: tuple[Link, ...] = tuple(Parameters(node, link).value for link in LINKS)
         execution = Parameters(
-            node, ExecutionSettings, prefix="execution.", refuse=lambda names: refuse(), on_change=changed
+            node,
+            ExecutionSettings,
+            prefix="execution.",
+            refuse=lambda names: refuse(),
+            on_change=changed,
         )
         self.simulation = SimulationSettings(
             controller=Parameters(node, ControllerSettings).value,
@@ -96,5 +110,9 @@ class DriverParameters:
     @property
     def wake_hint(self) -> str:
         """What wakes the controller, for sentences."""
-        hints = [f"a Wake-on-LAN packet for {link.mac}" for link in self.links if isinstance(link, WakeOnLan)]
+        hints = [
+            f"a Wake-on-LAN packet for {link.mac}"
+            for link in self.links
+            if isinstance(link, WakeOnLan)
+        ]
         return " or ".join(hints)

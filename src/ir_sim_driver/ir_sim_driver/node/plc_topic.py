@@ -29,7 +29,9 @@ class PlcTopic:
         self._write(lambda: self._driver.plc.write_all_inputs(TOPIC, *levels))
 
     def _read(self, msg: PlcInputs) -> Levels | None:
-        """The levels; None for a message that makes no sense, of which only a pressed stop counts."""
+        """The levels; None for a message that makes no sense, of which only a pressed stop
+        counts.
+        """
         try:
             return plc_inputs_from_msg(msg)
         except (MsgsError, ValueError) as error:

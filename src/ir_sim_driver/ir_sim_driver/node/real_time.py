@@ -10,14 +10,16 @@ from ir_sim_driver.node.grid import ClockPolicy, Grid
 
 _NS = 1_000_000_000
 _POLL = 0.002  # s, while a clock stands still or has not started
-_STEP_MAX = _NS // 10  # ns of real time that a scaled clock counts between two looks; more is a suspension
+_STEP_MAX = (
+    _NS // 10
+)  # ns of real time that a scaled clock counts between two looks; more is a suspension
 
 
 class GridThread:
     """Calls `tick(stamp_ns)` for every multiple of period_ns of `clock` until it is closed.
 
-    on_gap: called with a sentence when the grid begins anew. on_failure: called with what `tick` raised;
-    the thread ends then. lag [s]: the present delay; worst_lag [s]: the longest so far.
+    on_gap: called with a sentence when the grid begins anew. on_failure: called with what `tick`
+    raised; the thread ends then. lag [s]: the present delay; worst_lag [s]: the longest so far.
     """
 
     def __init__(
@@ -31,8 +33,12 @@ class GridThread:
         wall: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self._grid = Grid(period_ns)
-        self._clock, self._policy, self._wall, self._tick = clock, policy, wall, tick
-        self._on_gap, self._on_failure = on_gap, on_failure
+        self._clock = clock
+        self._policy = policy
+        self._wall = wall
+        self._tick = tick
+        self._on_gap = on_gap
+        self._on_failure = on_failure
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name="plant", daemon=True)
         self.worst_lag = 0.0
@@ -78,12 +84,17 @@ class ScaledClock:
     While nobody looks at it, as in a process that is suspended, it stands.
     """
 
-    def __init__(self, factor: float, start_ns: int, wall: Callable[[], int] = time.monotonic_ns) -> None:
-        self._factor, self._now, self._wall = factor, start_ns, wall
+    def __init__(
+        self, factor: float, start_ns: int, wall: Callable[[], int] = time.monotonic_ns
+    ) -> None:
+        self._factor = factor
+        self._now = start_ns
+        self._wall = wall
         self._seen = wall()
 
     def __call__(self) -> int:
         """Present time [ns]."""
-        seen, self._seen = self._seen, self._wall()
+        seen = self._seen
+        self._seen = self._wall()
         self._now += int(self._factor * min(self._seen - seen, _STEP_MAX))
         return self._now

@@ -22,13 +22,19 @@ from ir_sim_driver.plc import SERVICE
 
 
 class Services:
-    """Answers for `driver` in the name of `source`; load_changed is called when the robot carries another."""
+    """Answers for `driver` in the name of `source`; load_changed is called when the robot carries
+    another.
+    """
 
     def __init__(self, driver: Driver, source: str, load_changed: Callable[[], None]) -> None:
-        self._driver, self._source, self._load_changed = driver, source, load_changed
+        self._driver = driver
+        self._source = source
+        self._load_changed = load_changed
 
     def set_plc_input(self, request: Any, response: Any) -> Any:
-        """Set one bit, or the mode switch by the name of its position; the remark: why it won't count."""
+        """Set one bit, or the mode switch by the name of its position; the remark: why it won't
+        count.
+        """
 
         def work() -> str:
             levels, remark = self._driver.press(SERVICE, request.name, bool(request.value))
@@ -101,7 +107,9 @@ class Services:
 
     def _answer(self, response: Any, work: Callable[[], str]) -> Any:
         """Run `work`; what it returns is the remark, what it raises the refusal."""
-        return answered(response, self._source, lambda: Status.success(work()), _known, self._driver.warn)
+        return answered(
+            response, self._source, lambda: Status.success(work()), _known, self._driver.warn
+        )
 
 
 def _known(error: Exception) -> Status | None:

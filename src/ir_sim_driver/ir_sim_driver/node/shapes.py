@@ -14,8 +14,8 @@ _SHORTEST = 1e-6  # m; a cylinder of no length is no marker
 
 
 class Shape(NamedTuple):
-    """A capsule in the world: ends (2, 3) [m], radius and length [m], centre (3,), quaternion xyzw (4,) of
-    its axis z.
+    """A capsule in the world: ends (2, 3) [m], radius and length [m], centre (3,), quaternion xyzw
+    (4,) of its axis z.
     """
 
     ends: FloatArray

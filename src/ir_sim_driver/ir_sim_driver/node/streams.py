@@ -1,4 +1,6 @@
-"""What the plant's thread publishes: joint states at every stamp and first, the rest when it is due."""
+"""What the plant's thread publishes: joint states at every stamp and first, the rest when it is
+due.
+"""
 
 from __future__ import annotations
 
@@ -23,22 +25,24 @@ from ir_sim_driver.controller import Frame, Joints
 from ir_sim_driver.node.messages import fill_controller_state, fill_joint_state, fill_load_check
 
 _NS = 1_000_000_000
-# Deep: a subscriber that gets no processor for seconds must not lose what it has not acknowledged yet. What
-# is acknowledged leaves the history, so depth costs nothing while everybody keeps up.
+# Deep: a subscriber that gets no processor for seconds must not lose what it has not acknowledged
+# yet. What is acknowledged leaves the history, so depth costs nothing while everybody keeps up.
 _STREAM = QoSProfile(depth=2000)
-_CLOCK_RATE = (
-    125  # messages of /clock per second of real time at most, and at least 100: each wakes every node
-)
+# messages of /clock per second of real time at most, and at least 100: each wakes every node
+_CLOCK_RATE = 125
 
 
 class Streams:
     """Publishers of `node` for frames of the joints of these names."""
 
     def __init__(self, node: Node, joint_names: Sequence[str]) -> None:
-        self._node, self._names = node, joint_names
+        self._node = node
+        self._names = joint_names
         self._joint_states = node.create_publisher(JointState, names.JOINT_STATES, _STREAM)
         self._power_states = node.create_publisher(PowerState, names.POWER_STATE, _STREAM)
-        self._controller_states = node.create_publisher(ControllerState, names.CONTROLLER_STATE, _STREAM)
+        self._controller_states = node.create_publisher(
+            ControllerState, names.CONTROLLER_STATE, _STREAM
+        )
         self._load_checks = node.create_publisher(LoadCheck, names.LOAD_CHECK, LATCHED)
         self._outputs = node.create_publisher(PlcOutputs, names.PLC_OUTPUTS, LATCHED)
         self._in_force = node.create_publisher(PlcInputs, names.PLC_INPUTS_IN_FORCE, LATCHED)
@@ -48,7 +52,9 @@ class Streams:
         self._clock_period = 1
 
     def give_time(self, rate: int, factor: float) -> None:
-        """Publish /clock from now on, for `rate` stamps per second that passes `factor` times as fast."""
+        """Publish /clock from now on, for `rate` stamps per second that passes `factor` times as
+        fast.
+        """
         self._clock = self._node.create_publisher(Clock, "/clock", 10)
         self._clock_period = math.ceil(rate * factor / _CLOCK_RATE) * (_NS // rate)
 

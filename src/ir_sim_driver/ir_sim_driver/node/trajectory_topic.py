@@ -1,5 +1,5 @@
-"""Trajectories by topic: taken as bytes, so that a huge one is refused before Python objects are made of it,
-and parsed beside the control loop.
+"""Trajectories by topic: taken as bytes, so that a huge one is refused before Python objects are
+made of it, and parsed beside the control loop.
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ from ir_sim_driver.controller import Driver
 from ir_sim_driver.motion import ErrorCode, Outcome, TrajectoryGoal
 from ir_sim_driver.node.messages import goal_from_trajectory
 
-_POINT = 256  # bytes; one with positions, velocities, accelerations and efforts of six joints has 232
+_POINT = (
+    256  # bytes; one with positions, velocities, accelerations and efforts of six joints has 232
+)
 _HEAD = 65_536  # bytes for header and names: some twenty times what they need
 
 

@@ -1,7 +1,7 @@
 """The frames of cell, robot and load on tf and tf_static, where tf2_msgs is installed.
 
-The names are relative: in a namespace the transforms of a cell stay with it, because frames of two cells are
-called the same.
+The names are relative: in a namespace the transforms of a cell stay with it, because frames of two
+cells are called the same.
 """
 
 from __future__ import annotations
@@ -30,14 +30,17 @@ class Transforms:
     """Publishes the frames of `driver`; message_type: tf2_msgs/TFMessage."""
 
     def __init__(self, node: Node, driver: Driver, message_type: Any = TFMessage) -> None:
-        self._driver, self._type = driver, message_type
+        self._driver = driver
+        self._type = message_type
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._moving = node.create_publisher(message_type, names.TF, 100)
         self._fixed = node.create_publisher(message_type, names.TF_STATIC, latched)
 
     def publish_fixed(self, now: Time) -> None:
         """Publish what no joint moves, also after the load has changed."""
-        self._fixed.publish(self._type(transforms=transforms_to_msg(self._driver.fixed_frames(), now)))
+        self._fixed.publish(
+            self._type(transforms=transforms_to_msg(self._driver.fixed_frames(), now))
+        )
 
     def publish_moving(self, q: FloatArray, stamp_ns: int) -> None:
         """Publish where the joints hold the links at q (n,) [rad]."""
@@ -61,5 +64,6 @@ def _transform(frame: FramePose, stamp: Time) -> TransformStamped:
     message = TransformStamped(
         child_frame_id=frame.name, transform=Transform(translation=place, rotation=pose.orientation)
     )
-    message.header.frame_id, message.header.stamp = frame.parent, stamp
+    message.header.frame_id = frame.parent
+    message.header.stamp = stamp
     return message

@@ -1,4 +1,6 @@
-"""The robot that is controlled: a port with its backends, plants, drives, the load, and the mains meter."""
+"""The robot that is controlled: a port with its backends, plants, drives, the load, and the mains
+meter.
+"""
 
 from ir_sim_driver.plant.backend import STANDING, Backend, Work
 from ir_sim_driver.plant.backends import BACKENDS, make_backend

@@ -1,8 +1,8 @@
 """The port between the controller and a robot, and what a robot did with its motors.
 
-Five kinds of steps of length dt: the motors follow a command (`track`) or stop the robot (`halt`), nothing
-but gravity and friction acts (`coast`), the mechanical brakes act (`brake`), or the brakes are closed and
-nothing moves (`rest`).
+Five kinds of steps of length dt: the motors follow a command (`track`) or stop the robot (`halt`),
+nothing but gravity and friction acts (`coast`), the mechanical brakes act (`brake`), or the brakes
+are closed and nothing moves (`rest`).
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ STANDING = 1e-3
 
 
 class Work(NamedTuple):
-    """What the motors did in K steps: speed (K, n) [rad/s] in the middle of the step, torque (K, n) [Nm] at
-    the joint.
+    """What the motors did in K steps: speed (K, n) [rad/s] in the middle of the step, torque (K, n)
+    [Nm] at the joint.
     """
 
     speed: FloatArray
@@ -63,12 +63,14 @@ class Backend(Protocol):
         """Of the gears (n,) [deg C]; None where there are none."""
 
     def set_load(self, loads: Sequence[Load], declared: Sequence[Load] | None = None) -> None:
-        """Carry these loads (ir_description Load, in the last link's frame) from now on; the controller takes
-        them for the declared ones, where these are given.
+        """Carry these loads (ir_description Load, in the last link's frame) from now on; the
+        controller takes them for the declared ones, where these are given.
         """
 
     def track(self, q_next: FloatArray) -> None:
-        """Make a step of dt: the motors follow the command, which is q_next (n,) at the end of the step."""
+        """Make a step of dt: the motors follow the command, which is q_next (n,) at the end of the
+        step.
+        """
 
     def coast(self) -> None:
         """Make a step of dt without motor torque, the mechanical brakes still open."""

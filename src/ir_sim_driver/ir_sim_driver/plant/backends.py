@@ -36,4 +36,6 @@ def make_backend(
     """
     if name not in BACKENDS:
         raise SettingsError(f"backend is {name[:80]!r}: known are {', '.join(BACKENDS)}")
-    return BACKENDS[name](cell, dt, control, plant or nominal_plant(cell.robot, cell.robot.controller))
+    return BACKENDS[name](
+        cell, dt, control, plant or nominal_plant(cell.robot, cell.robot.controller)
+    )

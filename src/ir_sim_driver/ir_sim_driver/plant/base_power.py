@@ -1,4 +1,6 @@
-"""Watts that a robot draws whatever its drives do: controller by mode, drives that are switched on, tool."""
+"""Watts that a robot draws whatever its drives do: controller by mode, drives that are switched on,
+tool.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ class BasePower:
         self._tool = dict.fromkeys(self._controller, factor * always)
         for level in (Mode.STAND_ON_MOTORS, Mode.STAND_ON_BRAKES):
             self._tool[level] += factor * drive_bus
-        self._watts = {level: watts + self._tool[level] for level, watts in self._controller.items()}
+        self._watts = {
+            level: watts + self._tool[level] for level, watts in self._controller.items()
+        }
 
     def of(self, level: Mode) -> float:
         """Watts in STAND_ON_MOTORS or a rest, without holding torque."""

@@ -26,12 +26,20 @@ class BulletArm:
     """
 
     def __init__(self, robot: RobotModel, dt: float, base_pose: FloatArray) -> None:
-        # the base stays at the origin and gravity turns instead: Bullet's inverse dynamics know no base pose
+        # the base stays at the origin and gravity turns instead: Bullet's inverse dynamics know no
+        # base pose
         self._base = base_pose
         self._gravity = (base_pose[:3, :3].T @ np.array([0.0, 0.0, -GRAVITY])).tolist()
-        self._bullet, self._client = _pybullet(), -1
-        self._errors = (self._bullet.error, SystemError, ValueError, TypeError)  # it raises what C leaves
-        self._robot, self._dt = robot, dt
+        self._bullet = _pybullet()
+        self._client = -1
+        self._errors = (
+            self._bullet.error,
+            SystemError,
+            ValueError,
+            TypeError,
+        )  # it raises what C leaves
+        self._robot = robot
+        self._dt = dt
         self._loads: tuple[Load, ...] = ()
         self._still = [0.0] * robot.n
         self._joints = list(range(robot.n))
@@ -46,7 +54,9 @@ class BulletArm:
             self.carry(self._loads, self._still)
 
     def carry(self, loads: Sequence[Load], q: Sequence[float]) -> None:
-        """Rebuild the robot with these loads. Raises BackendError where Bullet can't compute with it."""
+        """Rebuild the robot with these loads. Raises BackendError where Bullet can't compute with
+        it.
+        """
         self._loads = tuple(loads)
         self._build(urdf_of(self._robot, bodies_of(self._robot, self._loads)))
         self.inverse_dynamics(q, self._still, self._still)
@@ -79,7 +89,10 @@ class BulletArm:
         Bullet keeps this frame in double precision, the link frame itself only in single.
         """
         state = self._bullet.getLinkState(
-            self._body, self._joints[link - 1], computeForwardKinematics=True, physicsClientId=self._client
+            self._body,
+            self._joints[link - 1],
+            computeForwardKinematics=True,
+            physicsClientId=self._client,
         )
         position: FloatArray = self._base[:3, :3] @ np.array(state[0]) + self._base[:3, 3]
         return position
@@ -90,8 +103,13 @@ class BulletArm:
             self._call(self._bullet.resetJointState, self._body, joint, position, speed)
 
     def advance(self, torque: Sequence[float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Make a step with these torques on the links: position (n,), and speed (n,) over the step."""
-        bullet, body, joints, client = self._bullet, self._body, self._joints, self._client
+        """Make a step with these torques on the links: position (n,), and speed (n,) over the
+        step.
+        """
+        bullet = self._bullet
+        body = self._body
+        joints = self._joints
+        client = self._client
         try:
             bullet.setJointMotorControlArray(
                 body, joints, bullet.TORQUE_CONTROL, forces=torque, physicsClientId=client
@@ -102,12 +120,14 @@ class BulletArm:
             raise _failed(error) from error
         positions, speeds, _, _ = zip(*states, strict=True)
         if not math.hypot(*speeds) < SPEED_GUARD:  # NaN does not pass either
-            raise BackendError(f"the physics has diverged: joints move faster than {SPEED_GUARD:g} rad/s")
+            raise BackendError(
+                f"the physics has diverged: joints move faster than {SPEED_GUARD:g} rad/s"
+            )
         return positions, speeds
 
     def _build(self, text: str) -> None:
-        """Make a new server: the inverse dynamics of a removed body live on in the old one. Where that is not
-        possible the old one stays.
+        """Make a new server: the inverse dynamics of a removed body live on in the old one. Where
+        that is not possible the old one stays.
         """
         old = self._client
         self._client = _connect(self._bullet, self._dt, self._gravity)
@@ -123,17 +143,21 @@ class BulletArm:
 
     def _load(self, text: str) -> int:
         """The body of a URDF."""
-        file = os.memfd_create("robot.urdf")  # a full or read-only disk is no reason to have no robot
+        file = os.memfd_create(
+            "robot.urdf"
+        )  # a full or read-only disk is no reason to have no robot
         try:
             os.write(file, text.encode())
-            path, flags = f"/proc/self/fd/{file}", self._bullet.URDF_USE_INERTIA_FROM_FILE
+            path = f"/proc/self/fd/{file}"
+            flags = self._bullet.URDF_USE_INERTIA_FROM_FILE
             return int(self._call(self._bullet.loadURDF, path, useFixedBase=True, flags=flags))
         finally:
             os.close(file)
 
     def _prepare(self) -> None:
         """Take from the body what Bullet adds: damping, collisions, motors."""
-        bullet, client = self._bullet, self._client
+        bullet = self._bullet
+        client = self._client
         undamped = dict.fromkeys(("linearDamping", "angularDamping", "jointDamping"), 0.0)
         for link in range(-1, bullet.getNumJoints(self._body, physicsClientId=client)):
             bullet.changeDynamics(self._body, link, **undamped, physicsClientId=client)

@@ -1,8 +1,9 @@
-"""The robot as Bullet computes with it exactly: a body per link, in its principal axes, its loads merged.
+"""The robot as Bullet computes with it exactly: a body per link, in its principal axes, its loads
+merged.
 
-Bullet turns an inertia into its principal axes, moves it to the joint by -m x y and -m y x, and refuses what
-rounding leaves unsymmetrical by 1e-15 kg m^2. Given in principal axes nothing is turned; and some mass within
-parts in a trillion gives the same products in either order.
+Bullet turns an inertia into its principal axes, moves it to the joint by -m x y and -m y x, and
+refuses what rounding leaves unsymmetrical by 1e-15 kg m^2. Given in principal axes nothing is
+turned; and some mass within parts in a trillion gives the same products in either order.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ _THICKNESS = 1e-6  # share of the largest principal moment; a thousand times fin
 
 
 class Body(NamedTuple):
-    """A link: mass [kg], centre (3,) [m] and principal moments (3,) [kg m^2] about it in its frame, whose
-    pose in that of the link before is pose (4, 4); it turns about axis (3,).
+    """A link: mass [kg], centre (3,) [m] and principal moments (3,) [kg m^2] about it in its frame,
+    whose pose in that of the link before is pose (4, 4); it turns about axis (3,).
     """
 
     mass: float
@@ -34,11 +35,14 @@ class Body(NamedTuple):
 
 def bodies_of(robot: RobotModel, loads: Sequence[Load]) -> list[Body]:
     """The n bodies that move; the loads (in the last link's frame) are parts of the last one."""
-    bodies, before = [], np.eye(3)
+    bodies = []
+    before = np.eye(3)
     for i in range(robot.n):
         own = robot.link_mass[i + 1], robot.link_com[i + 1], robot.link_inertia[i + 1]
         carried = loads if i == robot.n - 1 else ()
-        mass, com, inertia = _merged([own, *((load.mass, load.com, load.inertia) for load in carried)])
+        mass, com, inertia = _merged(
+            [own, *((load.mass, load.com, load.inertia) for load in carried)]
+        )
         moments, turn = np.linalg.eigh(inertia)
         turn[:, 0] *= np.linalg.det(turn)
         pose = np.array(robot.joint_origin[i])
@@ -53,12 +57,14 @@ def bodies_of(robot: RobotModel, loads: Sequence[Load]) -> list[Body]:
 
 def urdf_of(robot: RobotModel, bodies: Sequence[Body]) -> str:
     """The URDF text of the bodies on a base that is fixed."""
-    low, high = np.array(robot.position_min).tolist(), np.array(robot.position_max).tolist()
+    low = np.array(robot.position_min).tolist()
+    high = np.array(robot.position_max).tolist()
     parts = [_link(0, 1.0, np.zeros(3), np.ones(3))]
     for i, body in enumerate(bodies):
         parts.append(_link(i + 1, body.mass, body.com, body.moments))
         parts.append(
-            f'<joint name="{i + 1}" type="revolute">{_origin(body.pose[:3, 3], _rpy(body.pose[:3, :3]))}'
+            f'<joint name="{i + 1}" '
+            f'type="revolute">{_origin(body.pose[:3, 3], _rpy(body.pose[:3, :3]))}'
             f'<parent link="{i}"/><child link="{i + 1}"/><axis xyz="{_row(body.axis)}"/>'
             f'<limit lower="{low[i]!r}" upper="{high[i]!r}" velocity="0" effort="0"/></joint>'
         )
@@ -79,7 +85,8 @@ def _merged(
 
 
 def _thick(moments: FloatArray) -> FloatArray:
-    """Principal moments (3,), rising, that Bullet does not take for impossible by rounding, and for zero
+    """Principal moments (3,), rising, that Bullet does not take for impossible by rounding, and for
+    zero
     then: a flat disc fulfils their triangle inequality with equality.
     """
     if moments[0] + moments[1] - moments[2] > _THICKNESS * moments[2]:
@@ -101,7 +108,9 @@ def _unit(axis: FloatArray) -> FloatArray:
 
 
 def _symmetrical(mass: float, com: FloatArray) -> float:
-    """The nearest mass above whose products with the coordinates of the centre commute in floating point."""
+    """The nearest mass above whose products with the coordinates of the centre commute in floating
+    point.
+    """
     x, y, z = com.tolist()
     for _ in range(_ULPS):
         if all((mass * a) * b == (mass * b) * a for a, b in ((x, y), (x, z), (y, z))):
@@ -113,8 +122,8 @@ def _symmetrical(mass: float, com: FloatArray) -> float:
 def _link(i: int, mass: float, com: FloatArray, moments: FloatArray) -> str:
     ixx, iyy, izz = moments.tolist()
     return (
-        f'<link name="{i}"><inertial>{_origin(com, np.zeros(3))}<mass value="{mass!r}"/>'
-        f'<inertia ixx="{ixx!r}" ixy="0" ixz="0" iyy="{iyy!r}" iyz="0" izz="{izz!r}"/></inertial></link>'
+        f'<link name="{i}"><inertial>{_origin(com, np.zeros(3))}<mass value="{mass!r}"/><inertia '
+        f'ixx="{ixx!r}" ixy="0" ixz="0" iyy="{iyy!r}" iyz="0" izz="{izz!r}"/></inertial></link>'
     )
 
 
@@ -127,11 +136,12 @@ def _row(values: FloatArray) -> str:
 
 
 def _rpy(R: FloatArray) -> FloatArray:
-    """Roll, pitch, yaw [rad] of a rotation (3, 3). Roll is taken behind yaw, so that next to a pitch of 90
-    degrees, where yaw is hardly known, their sum still is.
+    """Roll, pitch, yaw [rad] of a rotation (3, 3). Roll is taken behind yaw, so that next to a
+    pitch of 90 degrees, where yaw is hardly known, their sum still is.
     """
     yaw = np.arctan2(R[1, 0], R[0, 0])
-    sin, cos = np.sin(yaw), np.cos(yaw)
+    sin = np.sin(yaw)
+    cos = np.cos(yaw)
     pitch = np.arctan2(-R[2, 0], cos * R[0, 0] + sin * R[1, 0])
     roll = np.arctan2(sin * R[0, 2] - cos * R[1, 2], cos * R[1, 1] - sin * R[0, 1])
     return np.array((roll, pitch, yaw))

@@ -1,13 +1,15 @@
-"""The drives' control: feed-forward from the model of the robot, and feedback; it knows nothing of the plant.
+"""The drives' control: feed-forward from the model of the robot, and feedback; it knows nothing of
+the plant.
 
 Position loop around a speed loop with an integral part, as in drives with a feed-forward of speed:
 
-    u = K_v (e' + K_p e + (1 / T_i) integral of (e' + K_p e)),    torque = model(q_c, q_c', q_c'' + u)
+    u = K_v (e' + K_p e + (1 / T_i) integral of (e' + K_p e)),    torque = model(q_c, q_c', q_c'' +
+    u)
 
-e is the command less what the encoder says, on the same grid of steps: speed is the difference of two
-positions, acceleration the difference of two speeds, so the command feeds forward exactly, whatever its path
-time does; e' is filtered. The model is that of the data with the declared load; its inertia turns u into
-torques.
+e is the command less what the encoder says, on the same grid of steps: speed is the difference of
+two positions, acceleration the difference of two speeds, so the command feeds forward exactly,
+whatever its path time does; e' is filtered. The model is that of the data with the declared load;
+its inertia turns u into torques.
 """
 
 from __future__ import annotations
@@ -67,18 +69,25 @@ class ControlSettings:
         check_settings(self)
 
 
-_SEEN, _GOAL, _KEPT = 0, 1, slice(2, 7)
-"""Rows (n,) that the law acts on: encoders now, command at the end of the step, what the step before left."""
-_INTEGRAL, _NOW, _CHANGE, _MEASURED = 4, 5, 6, 7
+_SEEN = 0
+_GOAL = 1
+_KEPT = slice(2, 7)
+"""Rows (n,) that the law acts on: encoders now, command at the end of the step, what the step
+before left.
+"""
+_INTEGRAL = 4
+_NOW = 5
+_CHANGE = 6
+_MEASURED = 7
 """Rows that it gives, behind the new values of what is kept."""
 
 
 def control_law(settings: ControlSettings, dt: float) -> FloatArray:
     """(8, 7): what is linear in the law, over one step of dt [s], the same for every joint.
 
-    It acts on: encoders, next command; of the step before: encoders, command, commanded speed, filtered error
-    of speed, integral. It gives: these five for the next step; commanded speed now, acceleration with
-    feedback, measured speed.
+    It acts on: encoders, next command; of the step before: encoders, command, commanded speed,
+    filtered error of speed, integral. It gives: these five for the next step; commanded speed now,
+    acceleration with feedback, measured speed.
     """
     s = settings
     seen, goal, seen_before, command, speed_before, slow_before, integral = np.eye(7)
@@ -99,7 +108,11 @@ class ServoControl:
     """
 
     def __init__(
-        self, robot: RobotModel, dt: float, base_pose: FloatArray, settings: ControlSettings | None = None
+        self,
+        robot: RobotModel,
+        dt: float,
+        base_pose: FloatArray,
+        settings: ControlSettings | None = None,
     ) -> None:
         s = settings or ControlSettings()
         self._law = control_law(s, dt)
@@ -109,7 +122,8 @@ class ServoControl:
         self._bare = replace(robot, friction_viscous=none, friction_coulomb=none)
         self._viscous: list[float] = np.array(robot.friction_viscous).tolist()
         self._coulomb: list[float] = np.array(robot.friction_coulomb).tolist()
-        self._base_pose, self._drives = base_pose, Drivetrain(robot)
+        self._base_pose = base_pose
+        self._drives = Drivetrain(robot)
         self.declare(())
 
     def declare(self, loads: Sequence[Load]) -> None:
@@ -123,11 +137,12 @@ class ServoControl:
         self._rows[_KEPT][:2] = self._encoders(q), q
 
     def torque(self, q_next: FloatArray, q: FloatArray) -> tuple[FloatArray, bool]:
-        """Torque (n,) for the step that ends with the command q_next, the robot being at q now, and whether
-        the envelope has cut it.
+        """Torque (n,) for the step that ends with the command q_next, the robot being at q now, and
+        whether the envelope has cut it.
         """
         rows = self._rows
-        rows[_SEEN], rows[_GOAL] = self._encoders(q), q_next
+        rows[_SEEN] = self._encoders(q)
+        rows[_GOAL] = q_next
         new = self._law.dot(rows)
         speed = new[_NOW]
         model = self._model.inverse_dynamics_at(self.command, speed, new[_CHANGE])

@@ -1,10 +1,10 @@
 """The DC link as a circuit that is stepped: capacitor, rectifier, brake chopper and resistor.
 
-Within a step the drives take constant power, so the capacitor's energy E = C U^2 / 2 is known in closed form:
-it falls straight with the chopper open, and with e^(-2t/RC) with it closed. A step goes from event to event:
-the rectifier begins to conduct where U falls to the mains' voltage, the chopper closes at its upper and opens
-at its lower voltage. Nothing is lost: what the mains gave is what the drives, the resistor and the capacitor
-took.
+Within a step the drives take constant power, so the capacitor's energy E = C U^2 / 2 is known in
+closed form: it falls straight with the chopper open, and with e^(-2t/RC) with it closed. A step
+goes from event to event: the rectifier begins to conduct where U falls to the mains' voltage, the
+chopper closes at its upper and opens at its lower voltage. Nothing is lost: what the mains gave is
+what the drives, the resistor and the capacitor took.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ _EVENTS = 1000  # in one step: far more than any chopper switches
 
 
 class Flows(NamedTuple):
-    """Energies [J] of a step: through the rectifier into the link (negative: fed back), into the brake
-    resistor, and lost in the rectifier, which the mains give on top.
+    """Energies [J] of a step: through the rectifier into the link (negative: fed back), into the
+    brake resistor, and lost in the rectifier, which the mains give on top.
     """
 
     supplied: float
@@ -36,8 +36,12 @@ class Flows(NamedTuple):
 class DcCircuit:
     """Steps of dt [s]; stored [J]: in the capacitor, above what the mains charge it to."""
 
-    def __init__(self, figures: LinkFigures, dt: float, regeneration: Regeneration = "shared") -> None:
-        self._figures, self._dt, self._regeneration = figures, dt, regeneration
+    def __init__(
+        self, figures: LinkFigures, dt: float, regeneration: Regeneration = "shared"
+    ) -> None:
+        self._figures = figures
+        self._dt = dt
+        self._regeneration = regeneration
         half = 0.5 * figures.capacitance
         self._rest = half * figures.mains**2
         self._on = half * (figures.chopper_on**2 - figures.mains**2)
@@ -67,10 +71,12 @@ class DcCircuit:
     def steps(self, powers: FloatArray) -> Flows:
         """Let the axes take powers (K, n) [W] for a step each: the sums of the flows of `step`.
 
-        While the capacitor is empty and the axes take power, as nearly always, steps are summed at once.
+        While the capacitor is empty and the axes take power, as nearly always, steps are summed at
+        once.
         """
         total = powers.sum(axis=1)
-        flows, k = [0.0, 0.0, 0.0], 0
+        flows = [0.0, 0.0, 0.0]
+        k = 0
         shared = self._regeneration == "shared"
         braking = [*np.flatnonzero(total < 0.0).tolist(), len(total)] if shared else []
         while k < len(total):
@@ -98,12 +104,18 @@ class DcCircuit:
         for _ in range(_EVENTS):
             if left <= 0.0:
                 break
-            used, given, lost = self._braking(power, left) if self._closed else self._free(power, left)
-            left, supplied, dissipated = left - used, supplied + given, dissipated + lost
+            used, given, lost = (
+                self._braking(power, left) if self._closed else self._free(power, left)
+            )
+            left = left - used
+            supplied = supplied + given
+            dissipated = dissipated + lost
         return supplied, dissipated
 
     def _ideal(self, demand: float) -> tuple[float, float]:
-        """Energy from the mains, and over what the capacitor takes, where the chopper has no hysteresis."""
+        """Energy from the mains, and over what the capacitor takes, where the chopper has no
+        hysteresis.
+        """
         stored = self.stored - demand
         self.stored = min(max(stored, 0.0), self._on)
         return max(-stored, 0.0), max(stored - self._on, 0.0)
@@ -118,21 +130,24 @@ class DcCircuit:
         elif power < 0.0:
             room = self._on - self.stored
             if room <= -power * left:
-                self.stored, self._closed = self._on, True
+                self.stored = self._on
+                self._closed = True
                 return room / -power, 0.0, 0.0
         self.stored -= power * left
         return left, 0.0, 0.0
 
     def _braking(self, power: float, left: float) -> tuple[float, float, float]:
         """Until something switches, with the chopper closed."""
-        energy, target = self._rest + self.stored, self._rest + self._off
+        energy = self._rest + self.stored
+        target = self._rest + self._off
         settled = -power * self._tau  # where resistor and drives are in balance
         used = left
         if settled < target:
             used = min(left, self._tau * math.log((energy - settled) / (target - settled)))
         after = settled + (energy - settled) * math.exp(-used / self._tau)
         if used < left:
-            after, self._closed = target, False
+            after = target
+            self._closed = False
         dissipated = energy - after - power * used
         self.stored = after - self._rest
         return used, 0.0, dissipated
@@ -145,6 +160,12 @@ class DcCircuit:
         return self._losses(power, power * power)
 
     def _losses(self, power: float, square: float) -> float:
-        """Energy lost in the rectifier in steps whose powers [W] and squares of powers have these sums."""
+        """Energy lost in the rectifier in steps whose powers [W] and squares of powers have these
+        sums.
+        """
         f = self._figures
-        return self._dt / f.mains * (f.rectifier_drop * power + f.rectifier_resistance / f.mains * square)
+        return (
+            self._dt
+            / f.mains
+            * (f.rectifier_drop * power + f.rectifier_resistance / f.mains * square)
+        )

@@ -31,7 +31,8 @@ class DriveLosses:
     """Servo drives with these figures behind gears of `ratio` (n,)."""
 
     def __init__(self, figures: DriveFigures, ratio: FloatArray) -> None:
-        self._figures, self._ratio = figures, np.array(ratio)
+        self._figures = figures
+        self._ratio = np.array(ratio)
 
     def power(self, work: Work, powered: FloatArray) -> AxisPower:
         """Power in K steps; powered (K,): 1 in steps with motors on, else 0."""

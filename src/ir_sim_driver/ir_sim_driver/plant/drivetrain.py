@@ -1,5 +1,5 @@
-"""What stands between motor and link beside friction: rotor inertia, counterbalance, the torque envelope (eq.
-8).
+"""What stands between motor and link beside friction: rotor inertia, counterbalance, the torque
+envelope (eq. 8).
 
 One robot at a time and in plain floats where that is faster: this runs every millisecond.
 """
@@ -56,12 +56,16 @@ class Drivetrain:
         return torque
 
     def counterbalance_torque(self, angle: float) -> float:
-        """Torque [Nm] about the positive axis at the joint angle [rad]; formula of ir_description's data."""
+        """Torque [Nm] about the positive axis at the joint angle [rad]; formula of ir_description's
+        data.
+        """
         if self._gas_spring is None:
             return 0.0
         bx, bz, ex, ez, area, gas_volume, pressure, length_at_charge, exponent = self._gas_spring
-        sin, cos = math.sin(angle), math.cos(angle)
-        px, pz = cos * ex + sin * ez, cos * ez - sin * ex
+        sin = math.sin(angle)
+        cos = math.cos(angle)
+        px = cos * ex + sin * ez
+        pz = cos * ez - sin * ex
         length = math.hypot(px - bx, pz - bz)
         volume = gas_volume - area * (length - length_at_charge)
         force: float = area * pressure * (gas_volume / volume) ** exponent
@@ -69,14 +73,16 @@ class Drivetrain:
 
     def limited(self, torque: Sequence[float], qd: Sequence[float]) -> tuple[FloatArray, bool]:
         """Torque (n,) within the envelope at the speeds qd, and whether anything was cut off."""
-        result, cut = np.array(torque), False
+        result = np.array(torque)
+        cut = False
         if not any(map(gt, map(abs, torque), self._least)):
             return result, cut
         for j, (t, least) in enumerate(zip(torque, self._least, strict=True)):
             if abs(t) > least:
                 limit = self._limit_of(j, abs(qd[j]))
                 if abs(t) > limit:
-                    result[j], cut = math.copysign(limit, t), True
+                    result[j] = math.copysign(limit, t)
+                    cut = True
         return result, cut
 
     def limit(self, qd: FloatArray) -> FloatArray:
@@ -84,7 +90,8 @@ class Drivetrain:
         return np.array([self._limit_of(j, speed) for j, speed in enumerate(np.abs(qd).tolist())])
 
     def _limit_of(self, j: int, speed: float) -> float:
-        speeds, torques = self._speeds[j], self._torques[j]
+        speeds = self._speeds[j]
+        torques = self._torques[j]
         k = bisect_right(speeds, speed)
         if k == 0 or k == len(speeds):
             return torques[k]

@@ -1,6 +1,8 @@
-"""A robot that tracks exactly; speeds and torques are computed for many steps at once, from where it was.
+"""A robot that tracks exactly; speeds and torques are computed for many steps at once, from where
+it was.
 
-For tests of everything around the physics, and for long simulated shifts. A disturbance has no effect on it.
+For tests of everything around the physics, and for long simulated shifts. A disturbance has no
+effect on it.
 """
 
 from __future__ import annotations
@@ -22,7 +24,8 @@ class IdealBackend:
     """Implements Backend without physics, for `robot` standing at `base_pose` (4, 4)."""
 
     def __init__(self, robot: RobotModel, dt: float, base_pose: FloatArray | None = None) -> None:
-        self._robot, self._dt = robot, dt
+        self._robot = robot
+        self._dt = dt
         self._base_pose = np.eye(4) if base_pose is None else base_pose
         self._brake_step: FloatArray = BRAKE_FACTOR * dt * np.array(robot.acceleration_max)
         self.disturbance: FloatArray | None = None
@@ -58,7 +61,8 @@ class IdealBackend:
     @property
     def qd(self) -> FloatArray:
         """Speed now: the last difference and half of its change."""
-        last, before = self.q - self._before, self._before - self._earlier
+        last = self.q - self._before
+        before = self._before - self._earlier
         return (1.5 / self._dt) * last - (0.5 / self._dt) * before
 
     @property
@@ -80,7 +84,9 @@ class IdealBackend:
     def coast(self) -> None:
         """Fall and roll on as gravity, friction and counterbalance will have it."""
         speed = (self.q - self._before) / self._dt
-        free = self._dynamics.forward_dynamics(self.q[None], speed[None], np.zeros((1, len(speed))))[0]
+        free = self._dynamics.forward_dynamics(
+            self.q[None], speed[None], np.zeros((1, len(speed)))
+        )[0]
         self._go(self.q + self._dt * (speed + self._dt * free), False)
 
     def halt(self) -> None:
@@ -106,12 +112,15 @@ class IdealBackend:
     def work(self) -> Work:
         """Torques of the steps since the last call."""
         self._settle()
-        done, empty = self._done, np.empty((0, len(self.q)))
+        done = self._done
+        empty = np.empty((0, len(self.q)))
         self._done = Work(empty, empty)
         return done
 
     def _go(self, q_next: FloatArray, driven: bool) -> None:
-        self._earlier, self._before, self.q = self._before, self.q, q_next
+        self._earlier = self._before
+        self._before = self.q
+        self.q = q_next
         self._path.append(q_next)
         self._driven.append(driven)
 
@@ -125,9 +134,11 @@ class IdealBackend:
         middle = 0.5 * (steps[1:] + steps[:-1])
         driven = np.array(self._driven)[:, None]
         torque = np.where(driven, self._dynamics.inverse_dynamics(q[1:-1], middle, qdd), 0.0)
-        self._path, self._driven = self._path[-2:], []
+        self._path = self._path[-2:]
+        self._driven = []
         self._last = torque[-1]
         speed = np.where(driven, middle, 0.0)
         if len(self._done.speed):
-            speed, torque = np.vstack((self._done.speed, speed)), np.vstack((self._done.torque, torque))
+            speed = np.vstack((self._done.speed, speed))
+            torque = np.vstack((self._done.torque, torque))
         self._done = Work(speed, torque)

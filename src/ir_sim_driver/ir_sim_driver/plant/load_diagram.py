@@ -1,9 +1,10 @@
 """What the wrist can carry: moment and inertia of a load, bounded by the robot's own drives.
 
-The static moment of the load about the wrist's axes may not exceed the torque that their motors have at full
-speed, in any posture: for the KR210 that allows 210 kg at 0.27 m from A6 and 0.24 m in front of the flange,
-which is an estimate until it is held against a data sheet. The inertia may be such that the motors still
-reach a share of the acceleration limit.
+The static moment of the load about the wrist's axes may not exceed the torque that their motors
+have at full
+speed, in any posture: for the KR210 that allows 210 kg at 0.27 m from A6 and 0.24 m in front of the
+flange, which is an estimate until it is held against a data sheet. The inertia may be such that the
+motors still reach a share of the acceleration limit.
 """
 
 from __future__ import annotations
@@ -17,16 +18,23 @@ from ir_msgs_py.arrays import FloatArray
 
 _GRAVITY = 9.80665
 _ACCELERATION = 1.0 / 3.0
-"""Share of the acceleration limit that must be left: at that load point, with 105 kg m^2, it just is."""
+"""Share of the acceleration limit that must be left: at that load point, with 105 kg m^2, it just
+is.
+"""
 
 
 class LoadDiagram:
-    """Bounds of moment [Nm] and inertia [kg m^2] about the wrist's centre and about the last axis."""
+    """Bounds of moment [Nm] and inertia [kg m^2] about the wrist's centre and about the last
+    axis.
+    """
 
     def __init__(self, robot: RobotModel) -> None:
-        origin, axis = np.array(robot.joint_origin[-1]), np.array(robot.joint_axis[-1])
+        origin = np.array(robot.joint_origin[-1])
+        axis = np.array(robot.joint_axis[-1])
         self._mass = float(robot.rated_payload)
-        self._centre: FloatArray = -origin[:3, :3].T @ origin[:3, 3]  # of the wrist, in the last link's frame
+        self._centre: FloatArray = (
+            -origin[:3, :3].T @ origin[:3, 3]
+        )  # of the wrist, in the last link's frame
         self._axis: FloatArray = axis
         torque = np.array(robot.envelope_torque)[-2:]
         self._moments = torque[:, -1]

@@ -1,4 +1,6 @@
-"""What the flange carries: named loads of the cell joined by "+", or one that is described by numbers."""
+"""What the flange carries: named loads of the cell joined by "+", or one that is described by
+numbers.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,9 @@ from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.plant.load_diagram import LoadDiagram
 
 CUSTOM = "custom"
-_FAR, _BIG = 100.0, 1e6  # m, kg m^2: beyond what any robot carries; the load diagram is what bounds a load
+# m, kg m^2: beyond what any robot carries; the load diagram is what bounds a load
+_FAR = 100.0
+_BIG = 1e6
 _PAYLOAD_CODE = StatusCode.PLANNING_FAILED  # -1, as controllers answer an impossible payload
 
 
@@ -54,7 +58,8 @@ def carried(cell: Cell, text: str) -> Carried:
         if name not in known:
             raise RequestRefusedError(
                 StatusCode.INVALID_OBJECT_NAME,
-                f"load {name[:80]!r} is unknown: known are {', '.join((*sorted(known), NO_LOAD, CUSTOM))}",
+                f"load {name[:80]!r} is unknown: known are "
+                f"{', '.join((*sorted(known), NO_LOAD, CUSTOM))}",
             )
         if names.count(name) > 1:
             raise RequestRefusedError(
@@ -66,12 +71,14 @@ def carried(cell: Cell, text: str) -> Carried:
 def custom_load(
     cell: Cell, mass: float, com: FloatArray, inertia: FloatArray, always: float, drive_bus: float
 ) -> Carried:
-    """A load from numbers [kg, m, kg m^2, W], com (3,), inertia (6,) (ixx ixy ixz iyy iyz izz) or none.
-    Raises RequestRefusedError.
+    """A load from numbers [kg, m, kg m^2, W], com (3,), inertia (6,) (ixx ixy ixz iyy iyz izz) or
+    none. Raises RequestRefusedError.
     """
     limit = cell.robot.rated_payload
     if not (math.isfinite(mass) and 0.0 <= mass <= limit):
-        raise RequestRefusedError(_PAYLOAD_CODE, f"mass is {mass:g} kg: it must be in [0, {limit:g}] kg")
+        raise RequestRefusedError(
+            _PAYLOAD_CODE, f"mass is {mass:g} kg: it must be in [0, {limit:g}] kg"
+        )
     if inertia.size not in (0, 6):
         raise RequestRefusedError(
             _PAYLOAD_CODE, f"inertia has {inertia.size} values: it must have 6, or none"
@@ -81,7 +88,9 @@ def custom_load(
         ("inertia", inertia, _BIG, "kg m^2"),
     ):
         if not (np.abs(values) <= bound).all():  # NaN is refused too, and nothing overflows below
-            raise RequestRefusedError(_PAYLOAD_CODE, f"{name} is {values}: at most {bound:g} {unit} each")
+            raise RequestRefusedError(
+                _PAYLOAD_CODE, f"{name} is {values}: at most {bound:g} {unit} each"
+            )
     if mass == 0.0:
         return Carried(CUSTOM, ())
     matrix = np.zeros((3, 3))

@@ -31,8 +31,8 @@ BYTES_MAX = 1_000_000
 Figures = TypeVar("Figures", DriveFigures, GearFigures, LinkFigures)
 _Keys = dict[str, tuple[str, float, float, str]]
 
-# key in the file: field, smallest and largest value, unit. What the simulation divides by has a smallest
-# value, below that of any servo drive.
+# key in the file: field, smallest and largest value, unit. What the simulation divides by has a
+# smallest value, below that of any servo drive.
 _DRIVES: _Keys = {
     "torque_constant_nm_per_a": ("torque_constant", 1e-3, 1e3, "Nm/A"),
     "copper_loss_w_per_nm2": ("copper", 0.0, 1e4, "W/Nm^2"),
@@ -73,7 +73,9 @@ class PlantFileError(DescriptionFileError):
 
 
 def read_plant(path: str, robot: RobotModel, data: PowerData) -> Plant:
-    """The plant of a file for this robot. Raises PlantFileError, which quotes nothing of other files."""
+    """The plant of a file for this robot. Raises PlantFileError, which quotes nothing of other
+    files.
+    """
     try:
         text = read_regular_file(Path(path), BYTES_MAX).decode("utf-8")
     except InvalidValueError as error:
@@ -86,8 +88,11 @@ def read_plant(path: str, robot: RobotModel, data: PowerData) -> Plant:
 
 
 def plant_from_yaml(text: str, robot: RobotModel, data: PowerData, source: str = "<text>") -> Plant:
-    """The plant of a text; what it leaves out is that of the nominal plant. Raises PlantFileError."""
-    nominal, root = nominal_plant(robot, data), read_items(text, source, PlantFileError)
+    """The plant of a text; what it leaves out is that of the nominal plant. Raises
+    PlantFileError.
+    """
+    nominal = nominal_plant(robot, data)
+    root = read_items(text, source, PlantFileError)
     top = root.table(("format", "name", "robot"), (*_ROBOT, "drives", "gears", "dc_link", "watts"))
     top["format"].choice((FORMAT,))
     top["robot"].choice((robot.name,))
@@ -96,7 +101,8 @@ def plant_from_yaml(text: str, robot: RobotModel, data: PowerData, source: str =
         if "reflected_inertia_kgm2" in top:
             rotors = top["reflected_inertia_kgm2"].numbers(robot.n, 0.0, 1e6, "kg m^2")
             changed = replace(changed, reflected_inertia=rotors)
-        spring, pressure = robot.counterbalance, top.get("charge_pressure_pa")
+        spring = robot.counterbalance
+        pressure = top.get("charge_pressure_pa")
         if spring is not None and pressure is not None:
             value = pressure.number(0.0, 1e9, "Pa", above=True)
             changed = replace(changed, counterbalance=replace(spring, charge_pressure=value))
@@ -145,7 +151,9 @@ def plant_hash(plant: Plant) -> str:
 
 def _robot(links: Item | None, robot: RobotModel) -> RobotModel:
     """The robot with the masses, centres and inertias of the file."""
-    mass, com, inertia = (np.array(x) for x in (robot.link_mass, robot.link_com, robot.link_inertia))
+    mass, com, inertia = (
+        np.array(x) for x in (robot.link_mass, robot.link_com, robot.link_inertia)
+    )
     for item in [] if links is None else links.list(0, robot.n + 1):
         table = item.table(_LINK_KEYS[:1], _LINK_KEYS[1:])
         i = robot.link_names.index(table["name"].choice(robot.link_names))
@@ -176,13 +184,15 @@ def _figures(item: Item | None, nominal: Figures, keys: _Keys, n: int) -> Figure
 def _watts(item: Item | None, nominal: StandingWatts) -> StandingWatts:
     if item is None:
         return nominal
-    table, controller = item.table((), _WATTS), dict(nominal.controller)
+    table = item.table((), _WATTS)
+    controller = dict(nominal.controller)
     if "controller_w" in table:
         modes = table["controller_w"].table((), [mode.name for mode in controller])
         for mode in controller:
             watts = modes.get(mode.name)
             controller[mode] = controller[mode] if watts is None else watts.number(0.0, 1e5, "W")
-    drives, tool = table.get("drives_w"), table.get("tool_factor")
+    drives = table.get("drives_w")
+    tool = table.get("tool_factor")
     return StandingWatts(
         controller,
         nominal.drives if drives is None else drives.number(0.0, 1e5, "W"),

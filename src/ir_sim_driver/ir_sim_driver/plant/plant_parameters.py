@@ -1,7 +1,8 @@
-"""What a plant is made of: its robot, drives, gears, DC link and standing watts, as figures of its own.
+"""What a plant is made of: its robot, drives, gears, DC link and standing watts, as figures of its
+own.
 
-`nominal` has the figures of the data and none of the terms that the data do not know. Formulas and sources:
-docs/plant.md.
+`nominal` has the figures of the data and none of the terms that the data do not know. Formulas and
+sources: docs/plant.md.
 """
 
 from __future__ import annotations
@@ -18,14 +19,19 @@ from ir_msgs_py.modes import MODES, Mode
 
 NOMINAL = "nominal"
 VOLTAGE_SHARE = 0.9
-"""Share of the largest sine voltage that the back-EMF takes at full speed (an estimate): the rest drives the
-current."""
+"""Share of the largest sine voltage that the back-EMF takes at full speed (an estimate): the rest
+drives the current.
+"""
 HEAT_CAPACITY = 4.0
-"""J/K of gear, oil and housing per Nm of peak torque (an estimate): 26 kJ/K at A1, about 55 kg of steel."""
+"""J/K of gear, oil and housing per Nm of peak torque (an estimate): 26 kJ/K at A1, about 55 kg of
+steel.
+"""
 TIME_CONSTANT = 3600.0
 """s in which a gear warms up (an estimate; robots are warm after one to two hours)."""
 TIME_CONSTANT_MIN = 10.0
-"""s: no gear cools faster, and the steps in which its temperature is followed, 0.1 s, are short beside it."""
+"""s: no gear cools faster, and the steps in which its temperature is followed, 0.1 s, are short
+beside it.
+"""
 REFERENCE_TEMPERATURE = 40.0
 """deg C of the gears to which the friction of the data belongs (an estimate: half warm)."""
 AMBIENT = 20.0
@@ -48,9 +54,9 @@ def _checked(owner: object, n: int | None = None) -> None:
 class DriveFigures:
     """Servo drives of n axes, each (n,), at the motor.
 
-    torque_constant [Nm/A rms]; copper [W/Nm^2]; inverter [W/A]: conduction and switching in proportion to the
-    current; switching [W]: whatever the current, while motors are on; iron_linear [W s/rad], iron_square [W
-    s^2/rad^2]: hysteresis and eddy currents.
+    torque_constant [Nm/A rms]; copper [W/Nm^2]; inverter [W/A]: conduction and switching in
+    proportion to the current; switching [W]: whatever the current, while motors are on; iron_linear
+    [W s/rad], iron_square [W s^2/rad^2]: hysteresis and eddy currents.
     """
 
     torque_constant: FloatArray
@@ -68,10 +74,11 @@ class DriveFigures:
 class GearFigures:
     """Friction and temperature of n gears, each (n,), at the joint.
 
-    viscous [Nm s/rad] at the reference temperature, coulomb [Nm]; load_driven, load_back: friction as a share
-    of the torque that goes through the gear, where the motor drives and where it is driven; stribeck [Nm]:
-    more at rest, and gone over stribeck_speed [rad/s]; viscous_per_kelvin [1/K]: how fast the viscous part
-    falls; capacity [J/K], conductance [W/K]; ambient, start [deg C].
+    viscous [Nm s/rad] at the reference temperature, coulomb [Nm]; load_driven, load_back: friction
+    as a share of the torque that goes through the gear, where the motor drives and where it is
+    driven; stribeck [Nm]: more at rest, and gone over stribeck_speed [rad/s]; viscous_per_kelvin
+    [1/K]: how fast the viscous part falls; capacity [J/K], conductance [W/K]; ambient, start [deg
+    C].
     """
 
     viscous: FloatArray
@@ -91,17 +98,19 @@ class GearFigures:
         fast = np.flatnonzero(self.conductance * TIME_CONSTANT_MIN > self.capacity)
         if fast.size:
             k = int(fast[0])
-            C, G = self.capacity[k], self.conductance[k]
+            C = self.capacity[k]
+            G = self.conductance[k]
             raise InvalidValueError(
-                f"gear {k + 1} of {C:g} J/K and {G:g} W/K cools with a time constant of {C / G:.3g} s, must "
-                f"be at least {TIME_CONSTANT_MIN:g} s"
+                f"gear {k + 1} of {C:g} J/K and {G:g} W/K cools with a time constant of "
+                f"{C / G:.3g} s, must be at least {TIME_CONSTANT_MIN:g} s"
             )
 
 
 @dataclass(frozen=True)
 class LinkFigures:
     """DC link and its supply: capacitance [F], mains [V] rectified, chopper_on and chopper_off [V],
-    resistor [ohm], rectifier_drop [V] and rectifier_resistance [ohm] in series with what the mains give.
+    resistor [ohm], rectifier_drop [V] and rectifier_resistance [ohm] in series with what the mains
+    give.
     """
 
     capacitance: float
@@ -116,15 +125,16 @@ class LinkFigures:
         _checked(self)
         if not self.mains < self.chopper_off <= self.chopper_on:
             raise InvalidValueError(
-                f"the chopper switches on at {self.chopper_on:g} V and off at {self.chopper_off:g} V: they "
+                f"the chopper switches on at {self.chopper_on:g} V and off at "
+                f"{self.chopper_off:g} V: they "
                 f"must be above the mains, {self.mains:g} V, and in this order"
             )
 
 
 @dataclass(frozen=True)
 class StandingWatts:
-    """Watts [W] of the controller by mode and of the drives while motors are on; tool: factor on the data's
-    watts of the tool.
+    """Watts [W] of the controller by mode and of the drives while motors are on; tool: factor on
+    the data's watts of the tool.
     """
 
     controller: Mapping[Mode, float]
@@ -134,8 +144,9 @@ class StandingWatts:
 
 @dataclass(frozen=True, eq=False)
 class Plant:
-    """All figures of a plant. robot: its masses, inertias and counterbalance count; its friction and copper
-    losses do not, those of `gears` and `drives` do. name: what answers and recordings say.
+    """All figures of a plant. robot: its masses, inertias and counterbalance count; its friction
+    and copper losses do not, those of `gears` and `drives` do. name: what answers and recordings
+    say.
     """
 
     name: str
@@ -147,8 +158,9 @@ class Plant:
 
 
 def torque_constants(robot: RobotModel, voltage: float) -> FloatArray:
-    """Torque constants (n,) [Nm/A rms] for which the back-EMF at full speed needs VOLTAGE_SHARE of what an
-    inverter makes of the DC voltage [V]: k_t = 3 E / w, E = share U / sqrt(6), both rms per phase.
+    """Torque constants (n,) [Nm/A rms] for which the back-EMF at full speed needs VOLTAGE_SHARE of
+    what an inverter makes of the DC voltage [V]: k_t = 3 E / w, E = share U / sqrt(6), both rms per
+    phase.
     """
     speed = np.array(robot.velocity_max) * np.array(robot.gear_ratio)
     return 3.0 * VOLTAGE_SHARE * voltage / (math.sqrt(6.0) * speed)
@@ -162,10 +174,16 @@ def standing_watts(data: PowerData) -> StandingWatts:
 
 def nominal_plant(robot: RobotModel, data: PowerData) -> Plant:
     """The plant that is the model: every term that the data do not know is zero."""
-    n, none = len(robot.joint_names), np.zeros(len(robot.joint_names))
+    n = len(robot.joint_names)
+    none = np.zeros(len(robot.joint_names))
     capacity = HEAT_CAPACITY * np.array(robot.envelope_torque)[:, 0]
     drives = DriveFigures(
-        torque_constants(robot, data.dc_link.voltage), np.array(robot.copper_loss), none, none, none, none
+        torque_constants(robot, data.dc_link.voltage),
+        np.array(robot.copper_loss),
+        none,
+        none,
+        none,
+        none,
     )
     gears = GearFigures(
         np.array(robot.friction_viscous),
@@ -182,6 +200,12 @@ def nominal_plant(robot: RobotModel, data: PowerData) -> Plant:
     )
     link = data.dc_link
     circuit = LinkFigures(
-        link.capacitance, link.voltage, link.chopper_on, link.chopper_on, link.brake_resistor, 0.0, 0.0
+        link.capacitance,
+        link.voltage,
+        link.chopper_on,
+        link.chopper_on,
+        link.brake_resistor,
+        0.0,
+        0.0,
     )
     return Plant(NOMINAL, robot, drives, gears, circuit, standing_watts(data))

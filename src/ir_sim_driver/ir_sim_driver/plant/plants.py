@@ -1,4 +1,6 @@
-"""Which plant is simulated, by a text: `nominal`, `typical`, `typical:SEED`, or the path of a plant file."""
+"""Which plant is simulated, by a text: `nominal`, `typical`, `typical:SEED`, or the path of a plant
+file.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ _TYPICAL = re.compile(rf"{TYPICAL}(?::([0-9]{{1,18}}))?")
 
 
 def plant_named(text: str, robot: RobotModel, data: PowerData) -> Plant:
-    """The plant that a text names; `typical` is `typical:0`. Raises SettingsError, PlantFileError."""
+    """The plant that a text names; `typical` is `typical:0`. Raises SettingsError,
+    PlantFileError.
+    """
     if text == NOMINAL:
         return nominal_plant(robot, data)
     drawn = _TYPICAL.fullmatch(text)
@@ -25,7 +29,8 @@ def plant_named(text: str, robot: RobotModel, data: PowerData) -> Plant:
     if is_path(text):
         return read_plant(text, robot, data)
     raise SettingsError(
-        f"plant is {text[:80]!r}: known are {NOMINAL}, {TYPICAL}, {TYPICAL}:SEED and the path of a .yaml file"
+        f"plant is {text[:80]!r}: known are {NOMINAL}, {TYPICAL}, {TYPICAL}:SEED and the path of "
+        "a .yaml file"
     )
 
 

@@ -1,7 +1,9 @@
-"""The mains meter: base load by mode, axes through the DC link, energy that is the integral of the power.
+"""The mains meter: base load by mode, axes through the DC link, energy that is the integral of the
+power.
 
-mains = base + supplied + rectifier loss, and supplied = axes + brake resistor + change of the capacitor; what
-an axis takes is mechanical work, copper, inverter and iron losses. All of it is the plant's own.
+mains = base + supplied + rectifier loss, and supplied = axes + brake resistor + change of the
+capacitor; what an axis takes is mechanical work, copper, inverter and iron losses. All of it is the
+plant's own.
 """
 
 from __future__ import annotations
@@ -22,10 +24,11 @@ from ir_sim_driver.plant.plant_parameters import Plant
 class MeterReading:
     """Since the meter started, and in the last step.
 
-    time [s], energy [J] at the mains: of base_energy (tool_energy is a part of it), axis_energy (n,),
-    burnt_energy, capacitor_energy and rectifier_energy. axis_energy is made of mechanical_energy,
-    copper_energy, inverter_energy and iron_energy, each (n,). base_power, tool_power [W], bus_voltage [V],
-    joint_power (n,) [W], joint_torque (n,) [Nm], joint_current (n,) [A rms] of the last step.
+    time [s], energy [J] at the mains: of base_energy (tool_energy is a part of it), axis_energy
+    (n,), burnt_energy, capacitor_energy and rectifier_energy. axis_energy is made of
+    mechanical_energy, copper_energy, inverter_energy and iron_energy, each (n,). base_power,
+    tool_power [W], bus_voltage [V], joint_power (n,) [W], joint_torque (n,) [Nm], joint_current
+    (n,) [A rms] of the last step.
     """
 
     time: float
@@ -58,19 +61,27 @@ class PowerMeter:
         self._loads: list[tuple[int, float, float, bool]] = []  # steps that have the same
         self._pending = 0
         self._steps = 0
-        self._supplied = self._dissipated = self._rectifier = self._base_energy = self._tool_energy = 0.0
+        self._supplied = self._dissipated = self._rectifier = self._base_energy = (
+            self._tool_energy
+        ) = 0.0
         n = len(plant.robot.joint_names)
         self._parts: FloatArray = np.zeros((4, n))  # mechanical, copper, inverter, iron [J]
         self._power = self._torque = self._current = np.zeros(n)
         self._last_base = self._last_tool = 0.0
 
-    def add(self, base_power: float, tool_power: float = 0.0, powered: bool = True, steps: int = 1) -> None:
-        """Count steps with this base load [W], the tool's share of it, and whether motors are on."""
+    def add(
+        self, base_power: float, tool_power: float = 0.0, powered: bool = True, steps: int = 1
+    ) -> None:
+        """Count steps with this base load [W], the tool's share of it, and whether motors are
+        on.
+        """
         self._loads.append((steps, base_power, tool_power, powered))
         self._pending += steps
 
     def settle(self, work: Work) -> None:
-        """Take what the motors did in the steps that were added since the last call, one row per step."""
+        """Take what the motors did in the steps that were added since the last call, one row per
+        step.
+        """
         if not self._pending:
             return
         dt = self._dt
@@ -85,8 +96,11 @@ class PowerMeter:
         self._base_energy += dt * float(np.dot(counts, base))
         self._tool_energy += dt * float(np.dot(counts, tool))
         self._parts = self._parts + dt * np.array([part.sum(axis=0) for part in axes[:4]])
-        self._power, self._torque, self._current = total[-1], work.torque[-1], axes.current[-1]
-        self._last_base, self._last_tool = base[-1], tool[-1]
+        self._power = total[-1]
+        self._torque = work.torque[-1]
+        self._current = axes.current[-1]
+        self._last_base = base[-1]
+        self._last_tool = tool[-1]
         self._loads.clear()
         self._pending = 0
 

@@ -1,9 +1,10 @@
-"""The robot of a plant in PyBullet, driven by motor torques that a controller makes which does not know it.
+"""The robot of a plant in PyBullet, driven by motor torques that a controller makes which does not
+know it.
 
-Rotor inertia is up to 4000 times a link's own and can neither be fed back as a torque (it diverges in six
-steps) nor be added to the links. So every step solves (H + J_r) qdd + h + friction - counterbalance = tau for
-qdd, friction at the speed in the middle of the change (else it chatters at rest), and applies H qdd + h to
-the links.
+Rotor inertia is up to 4000 times a link's own and can neither be fed back as a torque (it diverges
+in six steps) nor be added to the links. So every step solves (H + J_r) qdd + h + friction -
+counterbalance = tau for qdd, friction at the speed in the middle of the change (else it chatters at
+rest), and applies H qdd + h to the links.
 """
 
 from __future__ import annotations
@@ -24,14 +25,19 @@ from ir_sim_driver.plant.gears import Gears
 from ir_sim_driver.plant.plant_parameters import Plant
 
 BRAKE_FACTOR = 1.5
-"""Torque of a mechanical brake over the joint's largest motor torque (an estimate; no public figure)."""
+"""Torque of a mechanical brake over the joint's largest motor torque (an estimate; no public
+figure).
+"""
 _CHUNK = 4096  # steps whose work is kept when nobody asks for it
 _FRICTION = 1e-6  # Nm to which the friction of a step is found
-_NEWTON, _ITERATIONS = 4, 16  # steps of Newton's method for it, and with those that surely come nearer
+# steps of Newton's method for it, and with those that surely come nearer
+_NEWTON = 4
+_ITERATIONS = 16
 
 
 class PyBulletBackend:
-    """Implements Backend for the plant of `model`, the robot as its controller knows it, at base_pose (4, 4).
+    """Implements Backend for the plant of `model`, the robot as its controller knows it, at
+    base_pose (4, 4).
 
     Raises BackendError when PyBullet is missing or has diverged.
     """
@@ -46,8 +52,10 @@ class PyBulletBackend:
     ) -> None:
         base = np.eye(4) if base_pose is None else np.array(base_pose)
         self._arm = BulletArm(plant.robot, dt, base)
-        self._dt, self._n = dt, len(plant.robot.joint_names)
-        self._drives, self._gears = Drivetrain(plant.robot), Gears(plant.gears, dt)
+        self._dt = dt
+        self._n = len(plant.robot.joint_names)
+        self._drives = Drivetrain(plant.robot)
+        self._gears = Gears(plant.gears, dt)
         self._axes = range(self._n)
         self._inertia: FloatArray = np.zeros((self._n, self._n))  # H + J_r, and what friction adds
         self._diagonal = self._inertia.ravel()[:: self._n + 1]
@@ -57,7 +65,8 @@ class PyBulletBackend:
         self._brake_torque: FloatArray = BRAKE_FACTOR * self._motor_torque
         self._still: FloatArray = np.zeros(self._n)
         self.disturbance: FloatArray | None = None
-        self.torque, self.saturated = self._still, False
+        self.torque = self._still
+        self.saturated = False
         self._rest = [0.0] * self._n
         self._be(np.array(plant.robot.machine_home, dtype=np.float64))
         self._load = self._rest  # through the gears to the links in the last step
@@ -94,8 +103,8 @@ class PyBulletBackend:
         self._write()
 
     def set_load(self, loads: Sequence[Load], declared: Sequence[Load] | None = None) -> None:
-        """Carry these loads, in the same motion. Raises BackendError where Bullet takes none of their
-        inertia.
+        """Carry these loads, in the same motion. Raises BackendError where Bullet takes none of
+        their inertia.
         """
         self._arm.carry(loads, self._at)
         self._servo.declare(loads if declared is None else declared)
@@ -112,7 +121,8 @@ class PyBulletBackend:
         """Fall and roll on as gravity, friction and counterbalance will have it."""
         if self._stale:
             self._write()
-        self.torque, self.saturated = self._still, False
+        self.torque = self._still
+        self.saturated = False
         self._drive(self._still)
         self._servo.reset(self.q)
 
@@ -125,14 +135,18 @@ class PyBulletBackend:
         self._stop(self._brake_torque, motors=False)
 
     def _stop(self, most: FloatArray, motors: bool) -> None:
-        """Take at most this torque (n,), of motors or brakes, to stop each joint within this step."""
-        H, h = self.mass_matrix(), self._bias(self._lagging)
+        """Take at most this torque (n,), of motors or brakes, to stop each joint within this
+        step.
+        """
+        H = self.mass_matrix()
+        h = self._bias(self._lagging)
         stopping = np.array(self._lagging) * (-1.0 / self._dt)
         links = H @ stopping + h
         balance = np.array(self._drives.counterbalance(self._at))
         wanted = links + self._drives.rotor_inertia * stopping - balance
         torque: FloatArray = np.clip(wanted, -most, most)
-        self.torque, self.saturated = torque if motors else self._still, False
+        self.torque = torque if motors else self._still
+        self.saturated = False
         if (torque != wanted).any() or self.disturbance is not None:
             self._drive(torque)
         else:
@@ -145,7 +159,8 @@ class PyBulletBackend:
             self._be(self.q)
             self._servo.reset(self.q)
             self._stale = True
-        self.torque, self.saturated = self._still, False
+        self.torque = self._still
+        self.saturated = False
         self._gears.cool()
         self._speeds.append(self._rest)
         self._torques.append(self._still)
@@ -171,7 +186,9 @@ class PyBulletBackend:
         return self._arm.link_com_position(link)
 
     def required_torque(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
-        """Motor torque (n,) [Nm] at the joint for this motion, by the equations that are stepped."""
+        """Motor torque (n,) [Nm] at the joint for this motion, by the equations that are
+        stepped.
+        """
         links = self._arm.inverse_dynamics(q.tolist(), qd.tolist(), qdd.tolist())
         through = np.array(links) - self._drives.counterbalance(q.tolist())
         speed = qd.tolist()
@@ -191,10 +208,15 @@ class PyBulletBackend:
 
     def _drive(self, torque: FloatArray) -> None:
         """Make a step under this motor torque and the disturbance."""
-        arm, q = self._arm, self._at
+        arm = self._arm
+        q = self._at
         balance = self._drives.counterbalance(q)
         outer = list(
-            map(sub, map(add, torque.tolist(), balance), arm.inverse_dynamics(q, self._now, self._rest))
+            map(
+                sub,
+                map(add, torque.tolist(), balance),
+                arm.inverse_dynamics(q, self._now, self._rest),
+            )
         )
         if self.disturbance is not None:
             outer = list(map(add, outer, self.disturbance.tolist()))
@@ -203,19 +225,27 @@ class PyBulletBackend:
         self._advance(links)
 
     def _accelerations(self, outer: Sequence[float]) -> list[float]:
-        """qdd (n,) of a step in which this torque (n,) acts, and friction at the speed in its middle."""
-        gears, lagging, speed, half = self._gears, self._lagging, self._now, 0.5 * self._dt
+        """qdd (n,) of a step in which this torque (n,) acts, and friction at the speed in its
+        middle.
+        """
+        gears = self._gears
+        lagging = self._lagging
+        speed = self._now
+        half = 0.5 * self._dt
         rows = self._arm.mass_matrix(self._at)
         self._inertia[:] = rows
         own = [row[j] + rotor for j, row, rotor in zip(self._axes, rows, self._rotor, strict=True)]
         dry = gears.dry(speed, self._load)
         friction, slope = gears.friction(speed, dry)
-        for k in range(_ITERATIONS):  # the state's speed lags half a step: qd is the speed at its position
+        for k in range(
+            _ITERATIONS
+        ):  # the state's speed lags half a step: qd is the speed at its position
             self._diagonal[:] = [m + half * s for m, s in zip(own, slope, strict=True)]
             rest = zip(outer, friction, slope, speed, lagging, strict=True)
             left = [t - f + s * (v - w) for t, f, s, v, w in rest]
             qdd: list[float] = dposv(self._inertia, left)[1].tolist()
-            before, speed = speed, [w + half * a for w, a in zip(lagging, qdd, strict=True)]
+            before = speed
+            speed = [w + half * a for w, a in zip(lagging, qdd, strict=True)]
             linear = zip(friction, slope, speed, before, strict=True)
             expected = [f + s * (v - u) for f, s, v, u in linear]
             friction, slope = gears.friction(speed, dry, chord=k >= _NEWTON)

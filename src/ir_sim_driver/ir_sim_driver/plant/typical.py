@@ -1,7 +1,8 @@
-"""Plants as they come: figures drawn by seed, spread around the data as far as their confidence marks say.
+"""Plants as they come: figures drawn by seed, spread around the data as far as their confidence
+marks say.
 
-Each figure of the data is scaled by a factor of its own. Terms that the data do not know have the values and
-the spread below. docs/plant.md has the sources and what is assumed.
+Each figure of the data is scaled by a factor of its own. Terms that the data do not know have the
+values and the spread below. docs/plant.md has the sources and what is assumed.
 """
 
 from __future__ import annotations
@@ -36,7 +37,9 @@ THRESHOLDS = 0.01
 """Standard deviation of the chopper's voltages, as a share: they are set by resistors of 1 %."""
 
 INVERTER_SHARE = 0.35
-"""Of the holding losses that the data, calibrated at the mains, call copper: the part of the inverter."""
+"""Of the holding losses that the data, calibrated at the mains, call copper: the part of the
+inverter.
+"""
 SWITCHING = 10.0
 """W per axis: a part of the watts that the data give for drives that are switched on."""
 IRON = (0.04, 1.2e-4)
@@ -79,7 +82,8 @@ class _Draw:
 def typical_plant(robot: RobotModel, data: PowerData, seed: int) -> Plant:
     """The plant of this seed."""
     draw = _Draw(np.random.default_rng(seed))
-    marks, power = robot.marks, data.marks
+    marks = robot.marks
+    power = data.marks
     nominal = nominal_plant(robot, data)
     return Plant(
         f"{TYPICAL}:{seed}",
@@ -93,7 +97,9 @@ def typical_plant(robot: RobotModel, data: PowerData, seed: int) -> Plant:
 
 def _robot(robot: RobotModel, marks: Mapping[str, str], draw: _Draw) -> RobotModel:
     """Masses, centres, inertias, rotors and the counterbalance's pressure."""
-    mass, com, inertia = (np.array(x) for x in (robot.link_mass, robot.link_com, robot.link_inertia))
+    mass, com, inertia = (
+        np.array(x) for x in (robot.link_mass, robot.link_com, robot.link_inertia)
+    )
     for i, name in enumerate(robot.link_names):
         place = f"links.{name}"
         mass[i] *= draw.one(marks[f"{place}.mass_kg"])
@@ -119,8 +125,11 @@ def _switching(nominal: Plant, n: int) -> float:
     return min(SWITCHING, nominal.watts.drives / n)
 
 
-def _drives(nominal: Plant, robot: RobotModel, marks: Mapping[str, str], draw: _Draw) -> DriveFigures:
-    n, known = robot.n, nominal.drives
+def _drives(
+    nominal: Plant, robot: RobotModel, marks: Mapping[str, str], draw: _Draw
+) -> DriveFigures:
+    n = robot.n
+    known = nominal.drives
     copper = known.copper * draw.mark(marks["drives.copper_loss_w_per_nm2"], n)
     size = robot.envelope_torque[:, 0] / robot.gear_ratio / 55.0
     # at the torque that lets the data's copper loss be 50 W, what a motor takes while it holds
@@ -136,7 +145,8 @@ def _drives(nominal: Plant, robot: RobotModel, marks: Mapping[str, str], draw: _
 
 
 def _gears(nominal: Plant, robot: RobotModel, marks: Mapping[str, str], draw: _Draw) -> GearFigures:
-    n, known = robot.n, nominal.gears
+    n = robot.n
+    known = nominal.gears
     ambient = known.ambient * draw.one("L")
     coulomb = known.coulomb * draw.mark(marks["drives.friction_coulomb_nm"], n)
     return GearFigures(
@@ -157,18 +167,21 @@ def _gears(nominal: Plant, robot: RobotModel, marks: Mapping[str, str], draw: _D
 def _link(nominal: Plant, data: PowerData, marks: Mapping[str, str], draw: _Draw) -> LinkFigures:
     threshold = float(draw.by(THRESHOLDS)[0])
     return LinkFigures(
-        capacitance=nominal.link.capacitance * draw.one(marks.get("dc_link.capacitance_f", UNMARKED)),
+        capacitance=nominal.link.capacitance
+        * draw.one(marks.get("dc_link.capacitance_f", UNMARKED)),
         mains=nominal.link.mains * float(draw.by(SUPPLY)[0]),
         chopper_on=data.dc_link.chopper_on * threshold,
         chopper_off=data.dc_link.chopper_off * threshold,
-        resistor=nominal.link.resistor * draw.one(marks.get("dc_link.brake_resistor_ohm", UNMARKED)),
+        resistor=nominal.link.resistor
+        * draw.one(marks.get("dc_link.brake_resistor_ohm", UNMARKED)),
         rectifier_drop=RECTIFIER[0] * draw.one("L"),
         rectifier_resistance=RECTIFIER[1] * draw.one("L"),
     )
 
 
 def _watts(nominal: Plant, marks: Mapping[str, str], n: int, draw: _Draw) -> StandingWatts:
-    known, switching = nominal.watts, n * _switching(nominal, n)
+    known = nominal.watts
+    switching = n * _switching(nominal, n)
     return StandingWatts(
         {
             mode: watts * draw.one(marks.get(f"modes.{mode.name}.controller_w", UNMARKED))

@@ -1,4 +1,6 @@
-"""The PLC's side: its inputs with their rules, the watchdog, and the links that it can connect by."""
+"""The PLC's side: its inputs with their rules, the watchdog, and the links that it can connect
+by.
+"""
 
 from ir_sim_driver.plc.inputs import BITS, POWER_BITS, Plc, PlcSettings
 from ir_sim_driver.plc.links import LINKS, SERVICE, TOPIC, WRITERS

@@ -1,8 +1,9 @@
-"""The PLC's side of the controller: debounced levels, interlocks of AB, HIB and KS, and the mode switch.
+"""The PLC's side of the controller: debounced levels, interlocks of AB, HIB and KS, and the mode
+switch.
 
-Rules of the KR C4 power management: the three bits count only in operating mode EXT, only one at a time, and
-never together with a PROFIenergy pause; a contradiction is ignored with a warning. A bit that is already 1
-when the controller starts or wakes is ignored until it has been 0 once.
+Rules of the KR C4 power management: the three bits count only in operating mode EXT, only one at a
+time, and never together with a PROFIenergy pause; a contradiction is ignored with a warning. A bit
+that is already 1 when the controller starts or wakes is ignored until it has been 0 once.
 """
 
 from __future__ import annotations
@@ -43,7 +44,8 @@ class PlcSettings:
     )
     startup_window: float = setting(
         0.5,
-        "Levels of the first full set count as already there at the start when it comes within this time.",
+        "Levels of the first full set count as already there at the start when it comes within "
+        "this time.",
         unit="s",
         minimum=0.0,
         maximum=60.0,
@@ -52,7 +54,8 @@ class PlcSettings:
 
     owner: str = setting(
         "any",
-        "Who may set PLC inputs; 'any': the last writer of a bit. A pressed emergency stop counts from all.",
+        "Who may set PLC inputs; 'any': the last writer of a bit. A pressed emergency stop "
+        "counts from all.",
         choices=OWNERS,
         read_only=True,
     )
@@ -64,16 +67,18 @@ class PlcSettings:
 class Plc:
     """Levels in, requests out; `step` lets time pass.
 
-    levels: what counts now (debounced, without stuck bits). rest: BUS_POWER_OFF, HIBERNATION or None.
+    levels: what counts now (debounced, without stuck bits). rest: BUS_POWER_OFF, HIBERNATION or
+    None.
     stopped: the emergency stop was pressed, however shortly, and nobody has reset it since.
-    drives_on, confirm, restart: rising edges seen in this step. no_hibernation: why HIB is ignored, "" where
-    it counts.
+    drives_on, confirm, restart: rising edges seen in this step. no_hibernation: why HIB is ignored,
+    "" where it counts.
     """
 
     def __init__(
         self, settings: PlcSettings, notices: Notices, mode: OperatingMode = OperatingMode.EXT
     ) -> None:
-        self._settings, self._notices = settings, notices
+        self._settings = settings
+        self._notices = notices
         self.raw = PlcInputs(operating_mode=mode)
         self.levels = PlcInputs(operating_mode=mode)
         self.operating_mode = mode
@@ -84,7 +89,8 @@ class Plc:
         self._ages: dict[str, float] = {}
         self._stuck: frozenset[str] = frozenset()
         self._uptime = 0.0
-        self._warning, self._warn_at = "", inf
+        self._warning = ""
+        self._warn_at = inf
         self._greeted = False
         self._judged: tuple[object, bool] = (None, False)
 
@@ -117,7 +123,8 @@ class Plc:
             self.set_bit(STOP_BIT, True)
         raise RequestRefusedError(
             StatusCode.INVALID_ROBOT_STATE,
-            f"PLC inputs belong to {owner!r} (parameter plc.owner): {writer} may only press {STOP_BIT}",
+            f"PLC inputs belong to {owner!r} (parameter plc.owner): {writer} may only press "
+            f"{STOP_BIT}",
         )
 
     def set_all(self, inputs: PlcInputs) -> None:
@@ -145,10 +152,15 @@ class Plc:
             return ""
         level = bool(getattr(self.raw, bit))
         if level and bit in self._stuck:
-            return f"PLC bit {bit.upper()} is 1 since the controller started: ignored until it has been 0"
+            return (
+                f"PLC bit {bit.upper()} is 1 since the controller started: ignored until it "
+                "has been 0"
+            )
         on = [name for name in POWER_BITS if getattr(self.raw, name) and name not in self._stuck]
         refusal = self._refusal(on, pause_active)
-        if refusal and (level or (self.rest is not None and self.operating_mode is not OperatingMode.EXT)):
+        if refusal and (
+            level or (self.rest is not None and self.operating_mode is not OperatingMode.EXT)
+        ):
             return f"PLC bit {bit.upper()} is {int(level)} but ignored: {refusal}"
         return ""
 
@@ -159,7 +171,9 @@ class Plc:
         self.levels = replace(self.levels, operating_mode=mode)
 
     def wake(self) -> None:
-        """The controller starts again: power bits that are 1 now are ignored until they have been 0."""
+        """The controller starts again: power bits that are 1 now are ignored until they have been
+        0.
+        """
         still = frozenset(bit for bit in POWER_BITS if getattr(self.raw, bit))
         self._stick(still, Level.OK, "when the controller wakes")
         self._ages.clear()
@@ -167,7 +181,9 @@ class Plc:
         self.rest = None
 
     def step(self, dt: float, pause_active: bool = False) -> bool:
-        """Let dt [s] pass; pause_active: a PROFIenergy pause is on. Returns whether anything is new."""
+        """Let dt [s] pass; pause_active: a PROFIenergy pause is on. Returns whether anything is
+        new.
+        """
         self._uptime += dt
         if self._uptime >= self._warn_at:
             self._warn_at = inf
@@ -205,7 +221,9 @@ class Plc:
         self._stuck |= bits
         if bits:
             names = ", ".join(sorted(bit.upper() for bit in bits))
-            self._notices.add(level, f"PLC bit {names} is already 1 {when}: ignored until it has been 0")
+            self._notices.add(
+                level, f"PLC bit {names} is already 1 {when}: ignored until it has been 0"
+            )
 
     def _debounce(self, dt: float) -> None:
         for bit in list(self._ages):
@@ -235,8 +253,13 @@ class Plc:
         self.restart = False
         if on:
             warning = f"PLC bit {names} ignored: {refusal}"
-            if refusal == _ONLY_ONE and self.rest is not None and on == [ROW[self.rest].bit, HIBERNATION_BIT]:
-                self._warning, self._warn_at = warning, self._uptime + _HANDOVER
+            if (
+                refusal == _ONLY_ONE
+                and self.rest is not None
+                and on == [ROW[self.rest].bit, HIBERNATION_BIT]
+            ):
+                self._warning = warning
+                self._warn_at = self._uptime + _HANDOVER
             else:
                 self._notices.add(Level.WARN, warning)
         if (

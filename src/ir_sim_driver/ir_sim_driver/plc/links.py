@@ -7,6 +7,7 @@ from ir_sim_driver.plc.port import Link
 from ir_sim_driver.plc.wake_on_lan import WakeOnLan
 
 LINKS: tuple[type[Link], ...] = (WakeOnLan, ModbusTcp)
-TOPIC, SERVICE = "topic", "service"
+TOPIC = "topic"
+SERVICE = "service"
 WRITERS = (TOPIC, *(link.name for link in LINKS if link.sets_inputs), SERVICE)
 """Who may set PLC inputs: the node's topic and service, and links."""

@@ -1,7 +1,8 @@
 """Modbus TCP server of the controller: a PLC sets its bits and reads the outputs.
 
-The server has a thread and an event loop of its own. Exception 03 also says what the controller refuses, 04
-that it is off the network. What clients do is not logged: a million of them leave no line.
+The server has a thread and an event loop of its own. Exception 03 also says what the controller
+refuses, 04 that it is off the network. What clients do is not logged: a million of them leave no
+line.
 """
 
 from __future__ import annotations
@@ -36,19 +37,26 @@ class Limits:
 class ModbusServer:
     """Serves `tables` on host:port until it is closed. Raises OSError when the port can't be had.
 
-    When all connections are taken, a new one takes the place of the one that has been silent for longest, or
-    is closed where none has been silent for a second. A frame that is not Modbus ends its connection.
+    When all connections are taken, a new one takes the place of the one that has been silent for
+    longest, or is closed where none has been silent for a second. A frame that is not Modbus ends
+    its connection.
     """
 
     def __init__(self, host: str, port: int, tables: Tables, limits: Limits | None = None) -> None:
-        self._tables, self._limits = tables, limits or Limits()
-        self._heard: dict[asyncio.StreamWriter, float] = {}  # last request, or begin, of each client [s]
+        self._tables = tables
+        self._limits = limits or Limits()
+        self._heard: dict[
+            asyncio.StreamWriter, float
+        ] = {}  # last request, or begin, of each client [s]
         self._reported: set[type[Exception]] = set()
         self._loop = asyncio.new_event_loop()
-        # without descriptors no client can be accepted: asyncio tries again every second, and need not say so
+        # without descriptors no client can be accepted: asyncio tries again every second, and need
+        # not say so
         self._loop.set_exception_handler(lambda loop, context: None)
         try:
-            self._server = self._loop.run_until_complete(asyncio.start_server(self._serve, host, port))
+            self._server = self._loop.run_until_complete(
+                asyncio.start_server(self._serve, host, port)
+            )
         except (OSError, ValueError, TypeError) as error:  # the last two: a host that is no name
             self._loop.close()
             raise OSError(f"TCP {host}:{port} can't be opened ({error})") from error
@@ -82,7 +90,9 @@ class ModbusServer:
                 self._heard[writer] = self._loop.time()
                 writer.write(self._answer(*request))
                 await self._within(writer.drain())
-                await asyncio.sleep(0)  # others' turn: requests that are here already need no waiting
+                await asyncio.sleep(
+                    0
+                )  # others' turn: requests that are here already need no waiting
         except _DROPPED:
             pass
         finally:
@@ -107,13 +117,17 @@ class ModbusServer:
     def _answer(self, transaction: int, unit: int, request: bytes) -> bytes:
         try:
             answer = answered(request, self._tables)
-        except Exception as error:  # a bug in one answer must end neither the connection nor the server
+        except (
+            Exception
+        ) as error:  # a bug in one answer must end neither the connection nor the server
             self._report(error)
             answer = bytes((request[0] | 0x80, ExceptionCode.DEVICE_FAILURE))
         return _HEADER.pack(transaction, 0, len(answer) + 1, unit) + answer
 
     def _report(self, error: Exception) -> None:
-        """Log an error of the driver's own, each kind once: clients must not be able to fill a disk."""
+        """Log an error of the driver's own, each kind once: clients must not be able to fill a
+        disk.
+        """
         if type(error) not in self._reported:
             self._reported.add(type(error))
             _LOG.error("a Modbus request could not be answered", exc_info=error)

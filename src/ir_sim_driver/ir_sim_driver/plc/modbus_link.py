@@ -31,7 +31,8 @@ class ModbusTcp:
     )
     modbus_watchdog: float = setting(
         2.0,
-        "Without a heartbeat for this long the link to the PLC counts as lost, if it has ever sent one.",
+        "Without a heartbeat for this long the link to the PLC counts as lost, if it has ever "
+        "sent one.",
         unit="s",
         minimum=0.1,
         maximum=3600.0,
@@ -40,7 +41,8 @@ class ModbusTcp:
 
     modbus_connections: int = setting(
         16,
-        "Modbus clients at once; one more takes the place of the one that has been silent for longest.",
+        "Modbus clients at once; one more takes the place of the one that has been silent for "
+        "longest.",
         minimum=1,
         maximum=1000,
         read_only=True,

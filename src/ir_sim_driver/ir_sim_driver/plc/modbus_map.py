@@ -1,5 +1,5 @@
-"""What a PLC finds at which Modbus address: coils and holding registers in, discrete inputs and input
-registers out.
+"""What a PLC finds at which Modbus address: coils and holding registers in, discrete inputs and
+input registers out.
 
 Addresses are zero-based (PDU addresses). 32-bit values take two registers, the high word first.
 """
@@ -25,12 +25,16 @@ COILS = (
 HEARTBEAT = COILS.index("heartbeat")
 DISCRETE_INPUTS = ("ab", "bbs", "drives_ready", "alarm_stop", "in_home", "moving")
 """Discrete inputs 0..5: the fields of ir_msgs/PlcOutputs."""
-OPERATING_MODE, PAUSE = 0, 1
-"""Holding registers: mode switch (1 T1, 2 T2, 3 AUT, 4 EXT); pause [s] (writing starts one, 0 ends it)."""
+OPERATING_MODE = 0
+PAUSE = 1
+"""Holding registers: mode switch (1 T1, 2 T2, 3 AUT, 4 EXT); pause [s] (writing starts one, 0 ends
+it).
+"""
 HOLDING_REGISTERS = 2
 INPUT_REGISTERS = 9
-"""Input registers: 0 mode, 1 target mode, 2 time to target [0.1 s], 3 and 4 power [W], 5 and 6 energy [J /
-100], 7 time to operate [s], 8 alive counter."""
+"""Input registers: 0 mode, 1 target mode, 2 time to target [0.1 s], 3 and 4 power [W], 5 and 6
+energy [J / 100], 7 time to operate [s], 8 alive counter.
+"""
 _WORD = 0xFFFF
 
 

@@ -1,7 +1,9 @@
-"""Requests of Modbus in bytes, answered from tables: the part of the protocol that knows no network.
+"""Requests of Modbus in bytes, answered from tables: the part of the protocol that knows no
+network.
 
 The eight functions that read and write bits and registers, as in the MODBUS Application Protocol
-Specification V1.1b3. What is wrong with a request is answered in its order: function, count, address, value.
+Specification V1.1b3. What is wrong with a request is answered in its order: function, count,
+address, value.
 """
 
 from __future__ import annotations
@@ -13,12 +15,22 @@ from typing import Protocol
 
 from ir_sim_driver.errors import ModbusRefusedError
 
-READ_COILS, READ_DISCRETE_INPUTS, READ_HOLDING, READ_INPUT = 1, 2, 3, 4
-WRITE_COIL, WRITE_REGISTER, WRITE_COILS, WRITE_REGISTERS = 5, 6, 15, 16
+READ_COILS = 1
+READ_DISCRETE_INPUTS = 2
+READ_HOLDING = 3
+READ_INPUT = 4
+WRITE_COIL = 5
+WRITE_REGISTER = 6
+WRITE_COILS = 15
+WRITE_REGISTERS = 16
 _REFUSED = 0x80  # mark of a function that was refused
-_MOST_BITS_READ, _MOST_BITS_WRITTEN = 2000, 1968
-_MOST_REGISTERS_READ, _MOST_REGISTERS_WRITTEN = 125, 123
-_ON, _OFF = 0xFF00, 0x0000  # a single coil
+_MOST_BITS_READ = 2000
+_MOST_BITS_WRITTEN = 1968
+_MOST_REGISTERS_READ = 125
+_MOST_REGISTERS_WRITTEN = 123
+# a single coil
+_ON = 0xFF00
+_OFF = 0x0000
 
 
 class ExceptionCode(IntEnum):
@@ -54,7 +66,8 @@ class Tables(Protocol):
 
 def answered(request: bytes, tables: Tables) -> bytes:
     """The PDU that answers a PDU of at least one byte."""
-    function, body = request[0], request[1:]
+    function = request[0]
+    body = request[1:]
     try:
         return request[:1] + _answer_of(function)(body, tables)
     except ModbusRefusedError as refusal:

@@ -25,10 +25,13 @@ T = TypeVar("T")
 
 
 class ControllerTables:
-    """Implements modbus_pdu.Tables on `controller`; watchdog [s]: longest time between heartbeats."""
+    """Implements modbus_pdu.Tables on `controller`; watchdog [s]: longest time between
+    heartbeats.
+    """
 
     def __init__(self, controller: Controller, watchdog: float) -> None:
-        self._controller, self._watchdog = controller, watchdog
+        self._controller = controller
+        self._watchdog = watchdog
         self._pause = 0
 
     def coils(self) -> list[bool]:
@@ -73,7 +76,8 @@ class ControllerTables:
             raise ModbusRefusedError(ExceptionCode.ADDRESS)
         self._readout()
         wanted = dict(enumerate(values, start=start))
-        position, pause = wanted.get(OPERATING_MODE), wanted.get(PAUSE)
+        position = wanted.get(OPERATING_MODE)
+        pause = wanted.get(PAUSE)
         if position is not None and not OperatingMode.T1 <= position <= OperatingMode.EXT:
             raise ModbusRefusedError(ExceptionCode.VALUE)
         mode = None if position is None else OperatingMode(position)
@@ -101,6 +105,8 @@ def _asked(work: Callable[[], T]) -> T:
         return work()
     except RequestRefusedError as error:
         dead = error.code is StatusCode.FAILURE
-        raise ModbusRefusedError(ExceptionCode.DEVICE_FAILURE if dead else ExceptionCode.VALUE) from error
+        raise ModbusRefusedError(
+            ExceptionCode.DEVICE_FAILURE if dead else ExceptionCode.VALUE
+        ) from error
     except DriverError as error:
         raise ModbusRefusedError(ExceptionCode.VALUE) from error

@@ -1,6 +1,7 @@
 """The port between PLC and controller: what a link may ask of the controller, and what a link is.
 
-A link knows its own wire (registers, packets) and nothing of the simulation; the controller knows no link.
+A link knows its own wire (registers, packets) and nothing of the simulation; the controller knows
+no link.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ STOP_BIT = "emergency_stop"
 
 @dataclass(frozen=True)
 class Readout:
-    """What a PLC may read. power [W], energy [J], times [s]; alive counts on while the plant runs."""
+    """What a PLC may read. power [W], energy [J], times [s]; alive counts on while the plant
+    runs.
+    """
 
     outputs: PlcOutputs
     mode: Mode
@@ -33,7 +36,8 @@ class Readout:
 class Controller(Protocol):
     """What a link may do; whatever is refused raises DriverError. writer: the name of the link.
 
-    A pressed emergency stop is never refused and latched in every mode, also while `readout` is None.
+    A pressed emergency stop is never refused and latched in every mode, also while `readout` is
+    None.
     """
 
     def readout(self) -> Readout | None:
@@ -45,14 +49,18 @@ class Controller(Protocol):
     def write_inputs(self, writer: str, levels: Mapping[str, bool]) -> None:
         """Set these levels, the others stay."""
 
-    def write_mode_and_pause(self, writer: str, mode: OperatingMode | None, pause: float | None) -> None:
+    def write_mode_and_pause(
+        self, writer: str, mode: OperatingMode | None, pause: float | None
+    ) -> None:
         """Turn the mode switch, and start a PROFIenergy pause [s] or end it with 0; None: leave it.
 
         Both or, where one of them is refused, neither.
         """
 
     def heartbeat(self, timeout: float) -> None:
-        """The PLC is alive; without another heartbeat within `timeout` [s] its link counts as lost."""
+        """The PLC is alive; without another heartbeat within `timeout` [s] its link counts as
+        lost.
+        """
 
     def wake(self) -> None:
         """Wake the controller from hibernation; does nothing otherwise."""

@@ -24,8 +24,12 @@ class WakeOnLan:
     name: ClassVar[str] = "wake_on_lan"
     sets_inputs: ClassVar[bool] = False
 
-    mac: str = setting(CONTROLLER_MAC, "MAC address that a Wake-on-LAN packet has to carry.", read_only=True)
-    wake_host: str = setting("127.0.0.1", "Address the Wake-on-LAN listener is bound to.", read_only=True)
+    mac: str = setting(
+        CONTROLLER_MAC, "MAC address that a Wake-on-LAN packet has to carry.", read_only=True
+    )
+    wake_host: str = setting(
+        "127.0.0.1", "Address the Wake-on-LAN listener is bound to.", read_only=True
+    )
     wake_port: int = setting(
         WAKE_PORT,
         "UDP port of the Wake-on-LAN listener; 0 takes a free one. The real one is 9.",
@@ -55,12 +59,14 @@ class WakeOnLan:
 class WakeListener:
     """Listens on a UDP port and calls `wake` for every packet that is for us; `close` ends it.
 
-    port 0 takes a free one; `port` says which. Raises OSError when the port is taken or the host is no name.
+    port 0 takes a free one; `port` says which. Raises OSError when the port is taken or the host is
+    no name.
     """
 
     def __init__(self, host: str, port: int, mac: str, wake: Callable[[], None]) -> None:
         mac_bytes(mac)
-        self._mac, self._wake = mac, wake
+        self._mac = mac
+        self._wake = wake
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind((host, port))
@@ -85,7 +91,9 @@ class WakeListener:
                 packet = self._socket.recv(_PACKET_MAX)
             except TimeoutError:
                 continue
-            except OSError:  # for example an ICMP error of an earlier answer: the socket stays usable
+            except (
+                OSError
+            ):  # for example an ICMP error of an earlier answer: the socket stays usable
                 continue
             if wakes(packet, self._mac):
                 self._wake()

@@ -13,12 +13,14 @@ class Watchdog:
 
     def beat(self, now: float, timeout: float) -> None:
         """Heartbeat at plant time `now` [s]; the next is due within `timeout` [s]."""
-        self._deadline, self._timeout = now + timeout, timeout
+        self._deadline = now + timeout
+        self._timeout = timeout
         self.lost = ""
 
     def forget(self) -> None:
         """Nobody can be heard now; watching begins again with the next heartbeat."""
-        self._deadline, self.lost = float("inf"), ""
+        self._deadline = float("inf")
+        self.lost = ""
 
     def step(self, now: float) -> bool:
         """Look at the time; True in the step in which the link is lost."""

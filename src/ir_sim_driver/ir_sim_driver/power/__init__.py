@@ -1,4 +1,6 @@
-"""Power modes at work: their state machine, how long each lasts, and PROFIenergy's choice for a pause."""
+"""Power modes at work: their state machine, how long each lasts, and PROFIenergy's choice for a
+pause.
+"""
 
 from ir_sim_driver.power.power_modes import NO_DEMAND, Demand, PowerModes
 from ir_sim_driver.power.profienergy import PAUSE_MAX, best_mode, best_route, energy_of, mode_table

@@ -12,14 +12,18 @@ from ir_sim_driver.power.transitions import IdleTimes, Times, times_of
 _INSTANT = 1e-6  # s; sums of steps are not exact
 _TRANSITIONS = {mode: row for row in RESTS for mode in (row.entering, row.leaving)}
 _STOPPABLE = DRIVES_ON | {Mode.EMERGENCY_STOP}
-"""Modes in which a pressed emergency stop counts at once; in the others when the transition has ended."""
+"""Modes in which a pressed emergency stop counts at once; in the others when the transition has
+ended.
+"""
 
 
 class Demand(NamedTuple):
     """What the rest of the controller asks of the power modes, level by level.
 
-    rest: the mode to rest in (STAND_ON_MOTORS: be ready, None: no opinion). motion: a movement waits or runs.
-    standing: the robot does not move. wake: a Wake-on-LAN packet came. emergency: emergency stop is pressed.
+    rest: the mode to rest in (STAND_ON_MOTORS: be ready, None: no opinion). motion: a movement
+    waits or runs.
+    standing: the robot does not move. wake: a Wake-on-LAN packet came. emergency: emergency stop is
+    pressed.
     recover: leave the emergency stop. restart: cold start. manual: operating mode T1 or T2.
     """
 
@@ -39,8 +43,9 @@ NO_DEMAND = Demand()
 class PowerModes:
     """The state machine; `step` advances it by dt [s].
 
-    mode: present mode. source: the rest (or STAND_ON_MOTORS) that a transition left. level: the rest, or
-    STAND_ON_MOTORS, whose power the controller draws now; while entering a rest that of the source.
+    mode: present mode. source: the rest (or STAND_ON_MOTORS) that a transition left. level: the
+    rest, or STAND_ON_MOTORS, whose power the controller draws now; while entering a rest that of
+    the source.
     motors_on: whether the motors follow commands. times: of every rest.
     """
 
@@ -49,9 +54,13 @@ class PowerModes:
     ) -> None:
         if start not in ROW:
             raise SettingsError(
-                f"the controller cannot start in {start.name}: known are {', '.join(m.name for m in ROW)}"
+                f"the controller cannot start in {start.name}: known are "
+                f"{', '.join(m.name for m in ROW)}"
             )
-        self._idle = {False: idle.motors_to_brakes_in_program, True: idle.motors_to_brakes_in_command}
+        self._idle = {
+            False: idle.motors_to_brakes_in_program,
+            True: idle.motors_to_brakes_in_command,
+        }
         self.times: dict[Mode, Times] = times_of(transitions)
         self.mode: Mode = start
         self.source: Mode = start
@@ -81,7 +90,8 @@ class PowerModes:
         """Seconds until motors are on when everything else agrees and the rest is left at once."""
         row = _TRANSITIONS.get(self.mode)
         if row is not None:
-            left, times = self.time_to_target, self.times[row.mode]
+            left = self.time_to_target
+            times = self.times[row.mode]
             return left + times.minimum_stay + times.leave if self.mode is row.entering else left
         if self.mode in self.times:
             times = self.times[self.mode]

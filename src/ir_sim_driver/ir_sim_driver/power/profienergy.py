@@ -21,14 +21,19 @@ PAUSE_MAX = 604_800.0  # s: a week
 
 
 def mode_table(
-    times: Mapping[Mode, Times], power: Callable[[Mode], float], pe_ids: Mapping[Mode, int], source: Mode
+    times: Mapping[Mode, Times],
+    power: Callable[[Mode], float],
+    pe_ids: Mapping[Mode, int],
+    source: Mode,
 ) -> tuple[PowerMode, ...]:
     """Modes from shallow to deep as they are when entered from `source` (motors or a rest).
 
     power: watts at the mains in a mode with the present load and posture.
     """
     motors = power(Mode.STAND_ON_MOTORS)
-    table = [PowerMode(mode=Mode.STAND_ON_MOTORS, pe_mode_id=pe_ids[Mode.STAND_ON_MOTORS], power=motors)]
+    table = [
+        PowerMode(mode=Mode.STAND_ON_MOTORS, pe_mode_id=pe_ids[Mode.STAND_ON_MOTORS], power=motors)
+    ]
     table += [
         PowerMode(
             mode=mode,
@@ -62,21 +67,26 @@ def best_mode(table: tuple[PowerMode, ...], pause: float) -> PowerMode:
 def best_route(
     table: tuple[PowerMode, ...], pause: float, source: Mode, source_watts: float
 ) -> tuple[PowerMode, ...]:
-    """The modes that a pause [s] takes least energy in, one after the other, each no longer than it must be
-    but for the last; empty: stay in `source`, which draws source_watts, on motors or in a rest.
+    """The modes that a pause [s] takes least energy in, one after the other, each no longer than it
+    must be but for the last; empty: stay in `source`, which draws source_watts, on motors or in a
+    rest.
 
     A mode is entered at the power of the one before.
     """
     motors = table[0].power
     deeper = [
-        mode for mode in table[1:] if ROW[mode.mode].depth >= ROW[source].depth and mode.mode is not source
+        mode
+        for mode in table[1:]
+        if ROW[mode.mode].depth >= ROW[source].depth and mode.mode is not source
     ]
     leave = next(mode.regular_time_to_operate for mode in table if mode.mode is source)
     route: tuple[PowerMode, ...] = ()
     best = motors * leave + source_watts * (pause - leave)
     for count in range(1, len(deeper) + 1):
         for modes in itertools.combinations(deeper, count):
-            energy, left, watts = 0.0, pause, source_watts
+            energy = 0.0
+            left = pause
+            watts = source_watts
             for mode in modes:
                 energy += watts * mode.time_to_pause + mode.power * mode.time_min_length_of_stay
                 left -= mode.time_to_pause + mode.time_min_length_of_stay
@@ -84,12 +94,15 @@ def best_route(
             left -= modes[-1].regular_time_to_operate
             energy += motors * modes[-1].regular_time_to_operate + watts * left
             if left >= -_ROUNDING and energy < best:
-                best, route = energy, modes
+                best = energy
+                route = modes
     return route
 
 
 def _with_break_even(table: list[PowerMode]) -> list[PowerMode]:
-    """Pause from which each mode saves against the next shallower one; never shorter than its least pause."""
+    """Pause from which each mode saves against the next shallower one; never shorter than its least
+    pause.
+    """
     result = table[:1]
     for shallower, mode in pairwise(table):
         slope = shallower.power - mode.power

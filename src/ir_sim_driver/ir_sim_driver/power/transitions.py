@@ -1,4 +1,6 @@
-"""How long the power modes last: times of every rest by its mode, and the controller's own timers."""
+"""How long the power modes last: times of every rest by its mode, and the controller's own
+timers.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,9 @@ class IdleTimes:
 
 @dataclass(frozen=True)
 class Times:
-    """Seconds into a rest (enter), out of it to motors on (leave), and at least in it (minimum_stay)."""
+    """Seconds into a rest (enter), out of it to motors on (leave), and at least in it
+    (minimum_stay).
+    """
 
     enter: float
     leave: float
@@ -49,6 +53,8 @@ def times_of(transitions: TransitionTimes) -> dict[Mode, Times]:
     """Times of every rest of the table."""
     names = {row.mode: row.mode.name for row in RESTS}
     return {
-        mode: Times(transitions.enter(name), transitions.leave(name), transitions.minimum_stay(name))
+        mode: Times(
+            transitions.enter(name), transitions.leave(name), transitions.minimum_stay(name)
+        )
         for mode, name in names.items()
     }

@@ -2,7 +2,13 @@
 
 from ir_studies.arena.entries import Entry
 from ir_studies.arena.runs import Finished, run_arena
-from ir_studies.arena.settings import EXAMPLE, PORTFOLIO, ArenaSettings, arena_settings, read_settings
+from ir_studies.arena.settings import (
+    EXAMPLE,
+    PORTFOLIO,
+    ArenaSettings,
+    arena_settings,
+    read_settings,
+)
 
 __all__ = [
     "EXAMPLE",

@@ -14,12 +14,15 @@ from ir_recorder.report.shapes import body_mesh, capsule_mesh
 from ir_recorder.report.words import text
 
 WIDTH = 220.0  # of the drawing; its height follows
-_AZIMUTH, _ELEVATION = math.radians(35.0), math.radians(28.0)
+_AZIMUTH = math.radians(35.0)
+_ELEVATION = math.radians(28.0)
 _MARGIN = 6.0
 
 
 def cell_picture(cell: Cell, q: FloatArray) -> str:
-    """SVG of the cell with its robot at q (n,); each convex body is the hull of what is seen of it."""
+    """SVG of the cell with its robot at q (n,); each convex body is the hull of what is seen of
+    it.
+    """
     chain = Chain(cell.robot, cell.base_pose, cell.tcp)
     links = chain.link_poses(q[None])[0]
     solids: list[tuple[str, FloatArray]] = []
@@ -38,10 +41,14 @@ def cell_picture(cell: Cell, q: FloatArray) -> str:
 def _drawn(name: str, solids: list[tuple[str, FloatArray]]) -> str:
     """Solids (V, 3) m from far to near, as polygons."""
     right, up, near = _view()
-    flat = [(kind, np.stack([points @ right, -(points @ up)], 1), points @ near) for kind, points in solids]
+    flat = [
+        (kind, np.stack([points @ right, -(points @ up)], 1), points @ near)
+        for kind, points in solids
+    ]
     flat.sort(key=lambda one: float(one[2].mean()))
     every = np.concatenate([points for _, points, _ in flat])
-    low, high = every.min(axis=0), every.max(axis=0)
+    low = every.min(axis=0)
+    high = every.max(axis=0)
     scale = (WIDTH - 2 * _MARGIN) / max(float(high[0] - low[0]), 1e-6)
     height = scale * float(high[1] - low[1]) + 2 * _MARGIN
     shapes = []
@@ -50,14 +57,18 @@ def _drawn(name: str, solids: list[tuple[str, FloatArray]]) -> str:
         corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in scale * (outline - low) + _MARGIN)
         shapes.append(f'<polygon style="fill:var(--{kind})" points="{corners}"/>')
     return (
-        f'<svg class="cell" viewBox="0 0 {WIDTH:g} {height:.0f}" role="img" aria-label="{text(name)}">'
+        f'<svg class="cell" viewBox="0 0 {WIDTH:g} {height:.0f}" role="img" '
+        f'aria-label="{text(name)}">'
         f"{''.join(shapes)}</svg>"
     )
 
 
 def _view() -> tuple[FloatArray, FloatArray, FloatArray]:
     """Unit vectors to the right, up, and towards who looks."""
-    ca, sa, ce, se = math.cos(_AZIMUTH), math.sin(_AZIMUTH), math.cos(_ELEVATION), math.sin(_ELEVATION)
+    ca = math.cos(_AZIMUTH)
+    sa = math.sin(_AZIMUTH)
+    ce = math.cos(_ELEVATION)
+    se = math.sin(_ELEVATION)
     near = np.array([ce * ca, -ce * sa, se])
     right = np.array([sa, ca, 0.0])
     return right, np.cross(near, right), near

@@ -1,4 +1,6 @@
-"""The runs of an arena: every planner on every task with every seed, in an order that treats all alike."""
+"""The runs of an arena: every planner on every task with every seed, in an order that treats all
+alike.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ from ir_studies.work import Job
 
 @dataclass(frozen=True)
 class Entry:
-    """One run: a planner, a task of a cell as start->goal, a seed, what is attached, and the timing."""
+    """One run: a planner, a task of a cell as start->goal, a seed, what is attached, and the
+    timing.
+    """
 
     planner: str
     cell: str
@@ -40,7 +44,9 @@ class Entry:
 
 
 def entries(settings: ArenaSettings) -> list[Entry]:
-    """All runs; planners change fastest and seeds slowest, so that what is there early is a fair part."""
+    """All runs; planners change fastest and seeds slowest, so that what is there early is a fair
+    part.
+    """
     tasks = {cell: _chosen(cell, settings.tasks) for cell in settings.cells}
     count = settings.seeds * sum(map(len, tasks.values()))
     count *= len(settings.loads) * len(settings.timings) * len(settings.planners)

@@ -17,8 +17,8 @@ Question = tuple[str, str, str, str]
 
 @dataclass(frozen=True)
 class Figures:
-    """Runs of one planner: how many were solved of how many, medians of seconds, and of J over the best that
-    anybody found for the same question; cut and dead ones.
+    """Runs of one planner: how many were solved of how many, medians of seconds, and of J over the
+    best that anybody found for the same question; cut and dead ones.
     """
 
     planner: str
@@ -51,7 +51,8 @@ def best_costs(runs: Iterable[Run], name: str = "cost_j") -> dict[Question, floa
 
 def figures(planner: str, runs: Sequence[Run]) -> Figures:
     """The figures of a planner among runs of all of them."""
-    J, W = best_costs(runs), best_costs(runs, "movement_cost")
+    J = best_costs(runs)
+    W = best_costs(runs, "movement_cost")
     own = [run for run in runs if run.entry.planner == planner]
     solved = [run for run in own if run.solved]
     return Figures(
@@ -71,8 +72,8 @@ def figures(planner: str, runs: Sequence[Run]) -> Figures:
 
 @dataclass(frozen=True)
 class Compared:
-    """Runs (a question and a seed each) that both planners solved, the median of the other's J over its own
-    there, and in how many the other's is lower.
+    """Runs (a question and a seed each) that both planners solved, the median of the other's J over
+    its own there, and in how many the other's is lower.
     """
 
     both: int
@@ -81,7 +82,9 @@ class Compared:
 
 
 def compared(planner: str, other: str, runs: Sequence[Run], tie: float = 0.0) -> Compared:
-    """A planner against another one; what differs by less than the share `tie` of J is not lower."""
+    """A planner against another one; what differs by less than the share `tie` of J is not
+    lower.
+    """
     a, b = (
         {(run.entry.question, run.entry.seed): run.number("cost_j") for run in runs
          if run.solved and run.entry.planner == name}
@@ -93,12 +96,14 @@ def compared(planner: str, other: str, runs: Sequence[Run], tie: float = 0.0) ->
 
 def success_over_time(planners: Sequence[str], runs: Sequence[Run], time: FloatArray) -> FloatArray:
     """Percent of the runs (N, planners) that were solved until each time (N,)."""
-    return np.stack([_solved_until([r for r in runs if r.entry.planner == p], time) for p in planners], 1)
+    return np.stack(
+        [_solved_until([r for r in runs if r.entry.planner == p], time) for p in planners], 1
+    )
 
 
 def cost_over_time(planners: Sequence[str], runs: Sequence[Run], time: FloatArray) -> FloatArray:
-    """Median (N, planners) over the runs of J until each time (N,), in percent above the best known; NaN
-    while fewer than half of them are solved.
+    """Median (N, planners) over the runs of J until each time (N,), in percent above the best
+    known; NaN while fewer than half of them are solved.
     """
     best = best_costs(runs)
     found = []
@@ -110,7 +115,9 @@ def cost_over_time(planners: Sequence[str], runs: Sequence[Run], time: FloatArra
 
 
 def energy_and_time(planners: Sequence[str], runs: Sequence[Run]) -> dict[str, tuple[float, float]]:
-    """Mean seconds and joules at the mains of each planner over the questions that all of them solved."""
+    """Mean seconds and joules at the mains of each planner over the questions that all of them
+    solved.
+    """
     by_planner: dict[str, dict[Question, list[Run]]] = {planner: {} for planner in planners}
     for run in runs:
         if run.solved and run.entry.planner in by_planner:
@@ -126,7 +133,9 @@ def energy_and_time(planners: Sequence[str], runs: Sequence[Run]) -> dict[str, t
 
 def _mean(own: Mapping[Question, Sequence[Run]], common: Iterable[Question], name: str) -> float:
     return float(
-        np.mean([np.mean([run.number(name) for run in own[question]]) for question in sorted(common)])
+        np.mean(
+            [np.mean([run.number(name) for run in own[question]]) for question in sorted(common)]
+        )
     )
 
 
@@ -145,7 +154,9 @@ def _ratio_until(run: Run, best: Mapping[Question, float], time: FloatArray) -> 
 
 
 def _over(value: float, least: float) -> float:
-    """A figure as a multiple of the least one; where that is 0, as of a task that stays, 1 or inf."""
+    """A figure as a multiple of the least one; where that is 0, as of a task that stays, 1 or
+    inf.
+    """
     if least == 0.0:
         return 1.0 if value == 0.0 else math.inf
     return value / least

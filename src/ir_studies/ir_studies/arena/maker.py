@@ -1,4 +1,6 @@
-"""What makes the runs of an arena: cells, models and OMPL are loaded before the first of them is timed."""
+"""What makes the runs of an arena: cells, models and OMPL are loaded before the first of them is
+timed.
+"""
 
 from __future__ import annotations
 
@@ -24,8 +26,8 @@ _STARTS = 2  # looks at what it takes to start a process of OMPL, after the firs
 
 
 def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
-    """Rows of entries, with everything loaded that is loaded once; `read` of the settings: what must be the
-    same here. WorkerError where it is not.
+    """Rows of entries, with everything loaded that is loaded once; `read` of the settings: what
+    must be the same here. WorkerError where it is not.
     """
     read: dict[str, Any] = {  # JSON knows no tuples
         key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()
@@ -48,8 +50,9 @@ def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
 
 
 def warm_up(settings: ArenaSettings) -> float:
-    """What is loaded once is loaded before anything is timed: cells, models with every load, OMPL. The least
-    that a process of OMPL ran [s] for a question with next to nothing to check: what it takes to start one.
+    """What is loaded once is loaded before anything is timed: cells, models with every load, OMPL.
+    The least that a process of OMPL ran [s] for a question with next to nothing to check: what it
+    takes to start one.
     """
     least = math.inf
     for cell in settings.cells:

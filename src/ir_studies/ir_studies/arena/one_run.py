@@ -1,8 +1,9 @@
-"""One run: a planner is asked for one task, with other seeds until its seconds are over; the best counts.
+"""One run: a planner is asked for one task, with other seeds until its seconds are over; the best
+counts.
 
-All are treated alike: what a planner finds is simplified, optimised, timed and proved by the same code. Who
-answers quickly is asked more often, who can use more work for a better answer gets it. Seconds are those of
-processors, also where another process answers.
+All are treated alike: what a planner finds is simplified, optimised, timed and proved by the same
+code. Who answers quickly is asked more often, who can use more work for a better answer gets it.
+Seconds are those of processors, also where another process answers.
 """
 
 from __future__ import annotations
@@ -23,19 +24,30 @@ from ir_studies.arena.tasks import tasks_of
 from ir_studies.work import Row
 
 SEEDS = 100_000  # between the first requests of two seeds
-_SHARE_OF_ENDS = 0.8  # of the clearance at start and goal, where that is smaller than the safety distance
-_LAST_STEP = 0.05  # s that a request is left to end its last step: a descent and its proof take up to these
+_SHARE_OF_ENDS = (
+    0.8  # of the clearance at start and goal, where that is smaller than the safety distance
+)
+_LAST_STEP = (
+    0.05  # s that a request is left to end its last step: a descent and its proof take up to these
+)
 _FIRST = "first feasible"  # how the note of the stage begins that knew the first free path
 
 
-def one_run(entry: Entry, settings: ArenaSettings, planner: Planner, clock: Callable[[], float]) -> Row:
+def one_run(
+    entry: Entry, settings: ArenaSettings, planner: Planner, clock: Callable[[], float]
+) -> Row:
     """Figures of the run: seconds, joules, metres; NaN where nothing was certified."""
     start, goal = tasks_of(planner.cell)[entry.task]
-    scene, ends = planner.scene(entry.load), np.stack([start, goal])
+    scene = planner.scene(entry.load)
+    ends = np.stack([start, goal])
     margin = _margin(scene, ends, settings.safety_distance)
-    best, first_path, said = None, math.nan, ""
+    best = None
+    first_path = math.nan
+    said = ""
     progress: list[list[float]] = []
-    begin, requests, truncated = clock(), 0, False
+    begin = clock()
+    requests = 0
+    truncated = False
     while True:
         passed = clock() - begin
         left = settings.seconds - passed
@@ -54,18 +66,25 @@ def one_run(entry: Entry, settings: ArenaSettings, planner: Planner, clock: Call
         if not (plan.status.ok and plan.report.certified):
             said = plan.status.message
             continue
-        J, at = cost_of(plan.report, settings.time_value), clock() - begin
+        J = cost_of(plan.report, settings.time_value)
+        at = clock() - begin
         if at > settings.seconds:
             said = f"the answer came after {at:.3g} s, over seconds {settings.seconds:g}"
         elif best is None or cost_of(best.report, settings.time_value) > J:
             best = plan
             progress.append([round(at, 6), J])
-    row: Row = {"requests": requests, "truncated": truncated, "free_ptp": free_ptp(scene, ends, margin)}
+    row: Row = {
+        "requests": requests,
+        "truncated": truncated,
+        "free_ptp": free_ptp(scene, ends, margin),
+    }
     row |= {"safety_distance_m": margin, "first_path_s": first_path, "total_s": clock() - begin}
     return row | _figures(best, progress, settings.time_value) | {"message": "" if best else said}
 
 
-def _options(entry: Entry, settings: ArenaSettings, request: int, left: float, margin: float) -> PlanOptions:
+def _options(
+    entry: Entry, settings: ArenaSettings, request: int, left: float, margin: float
+) -> PlanOptions:
     """What a request of the run asks for, counted from 0, when so many seconds are left."""
     return PlanOptions(
         planner_id="" if entry.planner == PORTFOLIO else entry.planner,
@@ -80,7 +99,9 @@ def _options(entry: Entry, settings: ArenaSettings, request: int, left: float, m
 
 
 def planned_in(left: float) -> float:
-    """How long a request may plan [s] so that it has answered when so many seconds more are over."""
+    """How long a request may plan [s] so that it has answered when so many seconds more are
+    over.
+    """
     return max(left - min(_LAST_STEP, 0.5 * left), 0.001)
 
 
@@ -102,7 +123,9 @@ def _figures(best: MovementPlan | None, progress: list[list[float]], time_value:
         "cost_j": cost_of(report, time_value) if solved else math.nan,
         "movement_cost": report.movement_cost if solved else math.nan,
         "clearance_m": report.min_clearance if solved else math.nan,
-        "trajectory_id": best.trajectory.trajectory_id if best is not None and best.trajectory else "",
+        "trajectory_id": best.trajectory.trajectory_id
+        if best is not None and best.trajectory
+        else "",
         "progress": progress,
     }
 
@@ -113,13 +136,17 @@ def cost_of(report: TrajectoryReport, time_value: float) -> float:
 
 
 def free_ptp(scene: PlanningScene, ends: np.ndarray, margin: float) -> bool:
-    """Whether the straight movement between the ends (2, n) is certified free: then nothing is searched."""
+    """Whether the straight movement between the ends (2, n) is certified free: then nothing is
+    searched.
+    """
     threshold = scene.thresholds(margin) - PROOF_TOLERANCE / 2
     return bool(scene.collision.certify_edges(ends[:1], ends[1:], threshold).verdict[0] == FREE)
 
 
 def first_feasible(info: PlanningInfo) -> float:
-    """Seconds of a request until the first free path was known, as its stages say; NaN where none was."""
+    """Seconds of a request until the first free path was known, as its stages say; NaN where none
+    was.
+    """
     passed = 0.0
     for stage in info.stages:
         passed += stage.seconds

@@ -21,8 +21,8 @@ _CSV_START = b"planner,"
 def write_outputs(
     runs: Sequence[Run], settings: ArenaSettings, folder: Path, missing: int = 0, *, parquet: bool
 ) -> tuple[Path, ...]:
-    """Write table.csv, table.parquet where that is asked for, arena.db and index.html. missing: runs that
-    were not made yet.
+    """Write table.csv, table.parquet where that is asked for, arena.db and index.html. missing:
+    runs that were not made yet.
 
     Raises RecorderError for files that can't be written, or replaced.
     """
@@ -36,8 +36,8 @@ def write_outputs(
 
 
 def write_settings(settings: ArenaSettings, folder: Path) -> Path:
-    """Write settings.yaml, with which the same arena is run again; one that says the same stays as it is.
-    RecorderError for a file that can't be written, or is something else.
+    """Write settings.yaml, with which the same arena is run again; one that says the same stays as
+    it is. RecorderError for a file that can't be written, or is something else.
     """
     path = folder / "settings.yaml"
     with suppress(SettingsError):

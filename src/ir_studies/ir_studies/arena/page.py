@@ -1,4 +1,6 @@
-"""The page of an arena: one HTML file with figures, distributions and pictures, styled as the report."""
+"""The page of an arena: one HTML file with figures, distributions and pictures, styled as the
+report.
+"""
 
 from __future__ import annotations
 
@@ -40,16 +42,20 @@ from ir_studies.page import BUTTON, page
 
 SCRIPTS = ("charts.js", "axes.js", "export.js", "compare.js")
 _HEADS = (
-    "planner", ">solved", ">first answer", ">best answer", ">J above the best", ">W above the least",
+    "planner", ">solved", ">first answer", ">best answer", ">J above the best", ">W above the least",  # noqa: E501
     ">duration", ">energy", ">clearance", ">lost",
 )  # fmt: skip
 _TIE = 5e-5  # of J: less is not shown
-_ABOVE = 25.0  # percent: what a curve of costs shows where nothing, or something more expensive, is known
-_BLOCKED, _FREE = "The straight movement is blocked", "The straight movement is free"
+# percent: what a curve of costs shows where nothing, or something more expensive, is known
+_ABOVE = 25.0
+_BLOCKED = "The straight movement is blocked"
+_FREE = "The straight movement is free"
 
 
 def write_page(runs: Sequence[Run], settings: ArenaSettings, path: Path, missing: int = 0) -> Path:
-    """Write the page in place of another page; its absolute path. PathError when it can't be written."""
+    """Write the page in place of another page; its absolute path. PathError when it can't be
+    written.
+    """
     return write_output(path, page_html(runs, settings, missing).encode(), PAGE_START, ANYWHERE)
 
 
@@ -63,12 +69,15 @@ def page_html(runs: Sequence[Run], settings: ArenaSettings, missing: int = 0) ->
         "title": "Arena",
         "subtitle": text(_subtitle(runs, settings, missing)),
         "verdict": verdict(runs, settings),
-        "shown": "Questions whose straight movement is free are left out: there nothing is searched."
+        "shown": "Questions whose straight movement is free are left out: there nothing is "
+        "searched."
         if blocked
         else "The straight movement is free in every question: nothing was searched.",
         "above": f"{_ABOVE:g}",
         "longest": seconds(longest(runs)),
-        "cells": "".join(_cell_section(runs, cell, titles, settings.planners) for cell in settings.cells),
+        "cells": "".join(
+            _cell_section(runs, cell, titles, settings.planners) for cell in settings.cells
+        ),
         "bindings": text(_bindings(runs, settings.planners)),
         "settings": text(settings_text(settings)),
         "data": json.dumps(
@@ -82,7 +91,9 @@ def page_html(runs: Sequence[Run], settings: ArenaSettings, missing: int = 0) ->
 
 def _subtitle(runs: Sequence[Run], settings: ArenaSettings, missing: int) -> str:
     questions = len({run.entry.question for run in runs})
-    made = f"{len(runs)} runs" if not missing else f"so far {len(runs)} of {len(runs) + missing} runs"
+    made = (
+        f"{len(runs)} runs" if not missing else f"so far {len(runs)} of {len(runs) + missing} runs"
+    )
     counts = {"planner": len(settings.planners), "cell": len(settings.cells)}
     counts |= {"question": questions, "seed": settings.seeds}
     asked = ", ".join(f"{count} {word}{'s' if count > 1 else ''}" for word, count in counts.items())
@@ -96,14 +107,18 @@ def _bindings(runs: Sequence[Run], planners: Sequence[str]) -> str:
         return ""
     own = [run for run in runs if run.entry.planner in names]
     paid = sum("start_s" not in run.row for run in own)
-    starts = f"Loading OMPL counts for nobody, nor does starting a process for each request{_least(own)}. "
+    starts = (
+        "Loading OMPL counts for nobody, nor does starting a process for each "
+        f"request{_least(own)}. "
+    )
     if paid:
         starts += f"In {paid} of these runs, of an earlier version, starting them counted. "
     return (
-        f"{starts}Not alike: OMPL's planners ({', '.join(names)}) ask for each check on its own, through "
-        "Python; the project's searches ask for many in one call, so they make more of them in the same "
-        "seconds. Each request starts anew: a roadmap (prm) is not kept for the next one, and aorrtc, which "
-        "goes on improving its path, answers when its checks or its time are spent, not with its first path."
+        f"{starts}Not alike: OMPL's planners ({', '.join(names)}) ask for each check on its own, "
+        "through Python; the project's searches ask for many in one call, so they make more of "
+        "them in the same seconds. Each request starts anew: a roadmap (prm) is not kept for "
+        "the next one, and aorrtc, which goes on improving its path, answers when its checks or "
+        "its time are spent, not with its first path."
     )
 
 
@@ -113,7 +128,9 @@ def _least(runs: Sequence[Run]) -> str:
 
 
 def _titles(cells: Sequence[str]) -> dict[str, str]:
-    """What the page calls the cells: files by their names, by their paths where two have the same."""
+    """What the page calls the cells: files by their names, by their paths where two have the
+    same.
+    """
     short = {cell: Path(cell).name if is_path(cell) else cell for cell in cells}
     names = list(short.values())
     return {cell: name if names.count(name) == 1 else cell for cell, name in short.items()}
@@ -128,9 +145,14 @@ def verdict(runs: Sequence[Run], settings: ArenaSettings) -> str:
         blocked, free = blocked_and_free(of_cell(runs, cell))
         said += _against(blocked, title, settings)
         said += _against(free, f"{title}, straight movement free", settings)
-    held = "In no cell did anybody solve more than the portfolio, or have a lower median J where both solved."
+    held = (
+        "In no cell did anybody solve more than the portfolio, or have a lower median J where "
+        "both solved."
+    )
     items = "".join(f"<li>{text(words)}</li>" for words in said or [held])
-    return f'<section id="verdict"><h2>The portfolio against the others</h2><ul>{items}</ul></section>'
+    return (
+        f'<section id="verdict"><h2>The portfolio against the others</h2><ul>{items}</ul></section>'
+    )
 
 
 def _against(own: Sequence[Run], place: str, settings: ArenaSettings) -> Iterator[str]:
@@ -138,19 +160,25 @@ def _against(own: Sequence[Run], place: str, settings: ArenaSettings) -> Iterato
     mine = found[PORTFOLIO]
     for planner, other in found.items():
         if other.success > mine.success:
-            yield f"{place}: {planner} solved {other.solved} of {other.count}, the portfolio {mine.solved}."
+            yield (
+                f"{place}: {planner} solved {other.solved} of {other.count}, the portfolio "
+                f"{mine.solved}."
+            )
         against = compared(PORTFOLIO, planner, own, _TIE)
         if against.ratio < 1.0 - _TIE:
             less = f"{100.0 * (1.0 - against.ratio):.2f} % below the portfolio's"
             yield (
-                f"{place}: J of {planner} is {less} in the median of the {against.both} runs that both "
-                f"solved; it is lower in {against.lower} of them."
+                f"{place}: J of {planner} is {less} in the median of the {against.both} runs "
+                f"that both solved; it is lower in {against.lower} of them."
             )
 
 
-def _cell_section(runs: Sequence[Run], name: str, titles: Mapping[str, str], planners: Sequence[str]) -> str:
+def _cell_section(
+    runs: Sequence[Run], name: str, titles: Mapping[str, str], planners: Sequence[str]
+) -> str:
     """Picture, figures of blocked and of free pairs apart, and time against energy."""
-    cell, title = load_cell(name), titles[name]
+    cell = load_cell(name)
+    title = titles[name]
     blocked, free = blocked_and_free(of_cell(runs, name))
     picture = cell_picture(cell, np.array(cell.tasks[0].start))
     parts = [f"<h2>{text(title)}</h2>{picture}"]
@@ -159,16 +187,20 @@ def _cell_section(runs: Sequence[Run], name: str, titles: Mapping[str, str], pla
             rows = [_row(figures(planner, part)) for planner in planners]
             parts.append(f"<h3>{head}</h3>{table(_HEADS, rows, f'{title}: {head.lower()}')}")
     means = energy_and_time(planners, blocked or free)
-    drawn = front_chart([Point(planner, *means[planner], "measured") for planner in means], "duration")
+    drawn = front_chart(
+        [Point(planner, *means[planner], "measured") for planner in means], "duration"
+    )
     if drawn:
         parts.append(f'<h3>Time against energy</h3><p class="hint">{_FRONT_HINT}</p>{drawn}')
     key = f"{list(titles).index(name) + 1}_{re.sub(r'[^a-z0-9]+', '_', title.lower())}"
-    return f"<section>{''.join(parts)}</section>".replace('id="energy_over_cycle_time"', f'id="energy_{key}"')
+    return f"<section>{''.join(parts)}</section>".replace(
+        'id="energy_over_cycle_time"', f'id="energy_{key}"'
+    )
 
 
 _FRONT_HINT = (
-    "Means over the questions (blocked ones where there are any) that all planners solved which solved any; "
-    "the line joins those that no other one beats in both."
+    "Means over the questions (blocked ones where there are any) that all planners solved which "
+    "solved any; the line joins those that no other one beats in both."
 )
 
 
@@ -197,7 +229,10 @@ def _curves(
 ) -> Iterator[dict[str, Json]]:
     """Success and cost over time until `end` s, for all cells together and for each."""
     time = np.linspace(0.0, end, GRID)
-    places = [("all cells", list(runs)), *((title, of_cell(runs, cell)) for cell, title in titles.items())]
+    places = [
+        ("all cells", list(runs)),
+        *((title, of_cell(runs, cell)) for cell, title in titles.items()),
+    ]
     kinds: tuple[tuple[str, Callable[..., FloatArray], float, float], ...] = (
         ("solved", success_over_time, 100.0, 0.0),
         ("J above the best known, median", cost_over_time, _ABOVE, _ABOVE),
@@ -206,4 +241,8 @@ def _curves(
         for place, own in places if len(titles) > 1 else places[:1]:
             value = np.nan_to_num(np.minimum(compute(planners, own, time), most), nan=missing)
             curves = Curves(f"{name}, {place}", "%", time, value, shown=place == "all cells")
-            yield {**packed(curves), "names": list(planners), "ends": [float(time[-1])] * len(planners)}
+            yield {
+                **packed(curves),
+                "names": list(planners),
+                "ends": [float(time[-1])] * len(planners),
+            }

@@ -1,4 +1,6 @@
-"""Runs as a database of Planner Arena: tables and views as OMPL's ompl_benchmark_statistics.py has them."""
+"""Runs as a database of Planner Arena: tables and views as OMPL's ompl_benchmark_statistics.py has
+them.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,7 @@ CREATE VIEW bestPlannerConfigsPerExperiment AS
 CREATE VIEW bestPlannerConfigs AS
   SELECT plannerid, AVG(solved) AS avg_solved, AVG(time) AS avg_total_time
   FROM runs GROUP BY plannerid ORDER BY avg_solved DESC, avg_total_time;
-"""
+"""  # noqa: E501
 _STATUS = ("answered", "died", "cut")
 
 
@@ -46,7 +48,9 @@ def write_database(runs: Sequence[Run], settings: ArenaSettings, path: Path) -> 
         part.unlink(missing_ok=True)
         with closing(sqlite3.connect(part)) as database, database:
             database.executescript(_TABLES)
-            database.executemany("INSERT INTO enums VALUES ('status', ?, ?)", list(enumerate(_STATUS)))
+            database.executemany(
+                "INSERT INTO enums VALUES ('status', ?, ?)", list(enumerate(_STATUS))
+            )
             _fill(database, runs, settings)
         os.replace(part, path)
     except (OSError, sqlite3.Error) as error:
@@ -71,7 +75,10 @@ def _fill(database: sqlite3.Connection, runs: Sequence[Run], settings: ArenaSett
 
 
 def _experiment(
-    database: sqlite3.Connection, question: Iterable[str], runs: Sequence[Run], settings: ArenaSettings
+    database: sqlite3.Connection,
+    question: Iterable[str],
+    runs: Sequence[Run],
+    settings: ArenaSettings,
 ) -> int:
     total = sum(run.number("total_s") for run in runs if run.number("total_s") > 0.0)
     values = (
@@ -80,8 +87,8 @@ def _experiment(
         datetime.now(UTC).isoformat(" ", "seconds"), "0", json.dumps(settings.budget),
     )  # fmt: skip
     words = (
-        "INSERT INTO experiments (name, totaltime, timelimit, memorylimit, runcount, version, hostname, "
-        "cpuinfo, date, seed, setup) VALUES (?,?,?,?,?,?,?,?,?,?,?)"
+        "INSERT INTO experiments (name, totaltime, timelimit, memorylimit, runcount, version, "
+        "hostname, cpuinfo, date, seed, setup) VALUES (?,?,?,?,?,?,?,?,?,?,?)"
     )
     return int(database.execute(words, values).lastrowid or 0)
 
@@ -97,11 +104,13 @@ def _insert(database: sqlite3.Connection, run: Run, experiment: int, planner: in
         int(run.number("requests")) if "requests" in run.row else 0, _STATUS.index(outcome),
     )  # fmt: skip
     words = (
-        "INSERT INTO runs (experimentid, plannerid, time, solved, correct_solution, time_to_first_solution, "
-        "solution_cost, solution_duration, solution_energy, movement_cost, solution_clearance, free_ptp, "
-        f"iterations, status) VALUES ({','.join('?' * 14)})"
+        "INSERT INTO runs (experimentid, plannerid, time, solved, correct_solution, "
+        "time_to_first_solution, solution_cost, solution_duration, solution_energy, "
+        "movement_cost, solution_clearance, free_ptp, iterations, status) VALUES "
+        f"({','.join('?' * 14)})"
     )
     key = database.execute(words, values).lastrowid
     database.executemany(
-        "INSERT OR REPLACE INTO progress VALUES (?, ?, ?)", [(key, at, cost) for at, cost in run.progress]
+        "INSERT OR REPLACE INTO progress VALUES (?, ?, ?)",
+        [(key, at, cost) for at, cost in run.progress],
     )

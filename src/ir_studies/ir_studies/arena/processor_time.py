@@ -1,7 +1,9 @@
-"""Processor time of this process and of those in which OMPL answers it, without what it takes to start them.
+"""Processor time of this process and of those in which OMPL answers it, without what it takes to
+start them.
 
-A clock for comparisons: on a machine that others use too, seconds of the wall say who had to wait. A process
-that is forked for each request is how OMPL is made repeatable here, not what its planners need.
+A clock for comparisons: on a machine that others use too, seconds of the wall say who had to wait.
+A process that is forked for each request is how OMPL is made repeatable here, not what its planners
+need.
 """
 
 from __future__ import annotations
@@ -17,8 +19,8 @@ _start = 0.0  # s of each process that count for nobody
 
 
 def processor_time() -> float:
-    """Seconds that this process has run, and those in which OMPL has answered it or does so now; for who asks
-    from one thread.
+    """Seconds that this process has run, and those in which OMPL has answered it or does so now;
+    for who asks from one thread.
     """
     return time.process_time() + others_time()
 
@@ -47,7 +49,9 @@ def charged(process: int) -> Iterator[None]:
 
 
 def _used(process: int) -> float:
-    """Seconds that a process has run since it was started up; where it is gone, when it was last seen."""
+    """Seconds that a process has run since it was started up; where it is gone, when it was last
+    seen.
+    """
     with suppress(OSError):
         _running[process] = max(time.clock_gettime((~process << 3) | _SCHEDULED) - _start, 0.0)
     return _running[process]

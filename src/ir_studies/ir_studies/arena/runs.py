@@ -1,5 +1,5 @@
-"""The whole arena: what is not yet in the folder is run, then table, database and page are written; also when
-it is stopped, of what is there.
+"""The whole arena: what is not yet in the folder is run, then table, database and page are written;
+also when it is stopped, of what is there.
 """
 
 from __future__ import annotations
@@ -20,7 +20,17 @@ from ir_studies.arena.tasks import read_by
 from ir_studies.errors import StoppedError, StudyError, WorkerError
 from ir_studies.work import Means, Results, Task
 
-_COLUMNS = ("planner", "solved", "count", "first", "final", "cost_ratio", "duration", "energy", "lost")
+_COLUMNS = (
+    "planner",
+    "solved",
+    "count",
+    "first",
+    "final",
+    "cost_ratio",
+    "duration",
+    "energy",
+    "lost",
+)
 
 
 @dataclass(frozen=True)
@@ -37,12 +47,16 @@ class Finished:
 
     @property
     def summed_up(self) -> str:
-        """A row of CSV per planner: of the questions whose straight movement is blocked, then of the free."""
+        """A row of CSV per planner: of the questions whose straight movement is blocked, then of
+        the free.
+        """
         lines = [",".join(("free_ptp", *_COLUMNS))]
         for free, own in enumerate(blocked_and_free(self.runs)):
             for planner in dict.fromkeys(run.entry.planner for run in own):
                 found = figures(planner, own)
-                lines.append(",".join(str(value) for value in (free, *(getattr(found, n) for n in _COLUMNS))))
+                lines.append(
+                    ",".join(str(value) for value in (free, *(getattr(found, n) for n in _COLUMNS)))
+                )
         return "\n".join(lines) + "\n"
 
 
@@ -53,8 +67,8 @@ def run_arena(
     *,
     parquet: bool = False,
 ) -> Finished:
-    """Run what the folder has no result of; interrupted, it writes what is known so far, and goes on from
-    there the next time. Raises StudyError.
+    """Run what the folder has no result of; interrupted, it writes what is known so far, and goes
+    on from there the next time. Raises StudyError.
     """
     if parquet and find_spec("pyarrow") is None:
         raise StudyError("a Parquet file needs pyarrow: pip install pyarrow")
@@ -65,14 +79,19 @@ def run_arena(
     with Results(Path(folder), "arena", settings.budget, read) as results:
         kept = write_settings(settings, Path(folder))
         missing = [entry.job for entry in wanted.values() if entry.key not in results.rows]
-        begin, before = time.monotonic(), len(wanted) - len(missing)
+        begin = time.monotonic()
+        before = len(wanted) - len(missing)
 
         def write() -> Finished:
-            known = [Run(entry, results.rows[k]) for k, entry in wanted.items() if k in results.rows]
+            known = [
+                Run(entry, results.rows[k]) for k, entry in wanted.items() if k in results.rows
+            ]
             runs = asked_alike(known)
             if not runs:
                 return Finished((), (kept,))
-            written = write_outputs(runs, settings, Path(folder), len(wanted) - len(runs), parquet=parquet)
+            written = write_outputs(
+                runs, settings, Path(folder), len(wanted) - len(runs), parquet=parquet
+            )
             return Finished(runs, (*written, kept))
 
         with _written_when_stopped(write), means.makers(task) as makers:

@@ -1,4 +1,6 @@
-"""What an arena compares, from a YAML file; whatever makes no sense is refused before anything is planned."""
+"""What an arena compares, from a YAML file; whatever makes no sense is refused before anything is
+planned.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,14 @@ from ir_planner.search import SEARCHES
 from ir_planner.search.with_ompl import missing, needs_ompl
 from ir_studies.arena.tasks import tasks_of
 from ir_studies.errors import SettingsError
-from ir_studies.work import Placed, beside, checked_known, checked_numbers, read_text, settings_values
+from ir_studies.work import (
+    Placed,
+    beside,
+    checked_known,
+    checked_numbers,
+    read_text,
+    settings_values,
+)
 
 FORMAT = "ir_arena/1"
 PORTFOLIO = "portfolio"
@@ -39,7 +48,7 @@ further_iterations: 100000000   # of its other requests, for who can make better
 safety_distance: 0.02        # m; less where an end of the task is nearer
 time_value: 500.0            # W in J = energy of the drives + time_value x T
 hang_after: 60.0             # s of the wall beyond `seconds` after which a run is cut
-"""
+"""  # noqa: E501
 
 
 @dataclass(frozen=True)
@@ -114,7 +123,9 @@ _REAL = (
 
 
 def read_settings(path: str | Path) -> ArenaSettings:
-    """The settings of a YAML file; cell files count from its folder. SettingsError names the key."""
+    """The settings of a YAML file; cell files count from its folder. SettingsError names the
+    key.
+    """
     content = read_text(path)
     try:
         return arena_settings(content, beside(path))
@@ -123,23 +134,29 @@ def read_settings(path: str | Path) -> ArenaSettings:
 
 
 def settings_text(settings: ArenaSettings, folder: Path | None = None) -> str:
-    """A settings file with all keys; cell files as seen from a folder, None: by their whole paths."""
+    """A settings file with all keys; cell files as seen from a folder, None: by their whole
+    paths.
+    """
     values = {key: list(v) if isinstance(v, tuple) else v for key, v in asdict(settings).items()}
     if folder is not None:
         values["cells"] = [os.path.relpath(c, folder) if is_path(c) else c for c in settings.cells]
     lines = {"format": FORMAT, **values}
-    return yaml.safe_dump(lines, sort_keys=False, default_flow_style=None, allow_unicode=True, width=100)
+    return yaml.safe_dump(
+        lines, sort_keys=False, default_flow_style=None, allow_unicode=True, width=100
+    )
 
 
 def arena_settings(content: str, placed: Placed) -> ArenaSettings:
-    """The settings of a text. placed: where cells are; files are known by their whole paths, however and from
-    wherever they are named.
+    """The settings of a text. placed: where cells are; files are known by their whole paths,
+    however and from wherever they are named.
     """
     values = settings_values(content, FORMAT, [field.name for field in fields(ArenaSettings)])
     if "cells" not in values:
         raise SettingsError("cells are missing: names of bundled cells, or files")
     if isinstance(values["cells"], tuple):
-        values["cells"] = tuple(_whole_path(placed(n)) if isinstance(n, str) else n for n in values["cells"])
+        values["cells"] = tuple(
+            _whole_path(placed(n)) if isinstance(n, str) else n for n in values["cells"]
+        )
     return ArenaSettings(**values)
 
 

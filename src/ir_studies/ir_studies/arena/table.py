@@ -10,7 +10,7 @@ from ir_studies.arena.entries import Entry
 from ir_studies.work import Row
 
 NUMBERS = (
-    "first_path_s", "first_s", "final_s", "duration_s", "energy_j", "drives_j", "cost_j", "movement_cost",
+    "first_path_s", "first_s", "final_s", "duration_s", "energy_j", "drives_j", "cost_j", "movement_cost",  # noqa: E501
     "clearance_m", "safety_distance_m", "total_s",
 )  # fmt: skip
 TIMES = ("first_path_s", "first_s", "final_s", "total_s")
@@ -49,12 +49,13 @@ class Run:
 
 
 def asked_alike(runs: Sequence[Run]) -> tuple[Run, ...]:
-    """The runs, where one that was cut or died knows from others of its question whether the straight
-    movement is free.
+    """The runs, where one that was cut or died knows from others of its question whether the
+    straight movement is free.
     """
     free = {run.entry.question for run in runs if run.free_ptp}
     return tuple(
-        replace(run, row={**run.row, "free_ptp": True}) if run.entry.question in free else run for run in runs
+        replace(run, row={**run.row, "free_ptp": True}) if run.entry.question in free else run
+        for run in runs
     )
 
 

@@ -12,13 +12,14 @@ from ir_studies.work.read_files import task_digests
 
 
 def tasks_of(cell: Cell) -> Mapping[str, tuple[FloatArray, FloatArray]]:
-    """Ends (n,) of every task, there and back: home->p1 and p1->home, or where the cell has another task of
-    that name, home->p1 back.
+    """Ends (n,) of every task, there and back: home->p1 and p1->home, or where the cell has another
+    task of that name, home->p1 back.
     """
     found: dict[str, tuple[FloatArray, FloatArray]] = {}
     named = {task.name for task in cell.tasks}
     for task in cell.tasks:
-        start, goal = np.array(task.start), np.array(task.goal)
+        start = np.array(task.start)
+        goal = np.array(task.goal)
         first, _, last = task.name.partition("->")
         back = f"{last}->{first}"
         found[task.name] = start, goal

@@ -33,4 +33,4 @@ time_value: 500.0            # W in J = energy of the drives + time_value x T, w
 safety_distance: 0.02        # m
 max_iterations: 0            # work of a plan; 0: the planner's default
 hang_after: 600.0            # s after which a job is cut
-"""
+"""  # noqa: E501

@@ -1,4 +1,5 @@
-"""The best placements and the given one, with error bars: seeds, and what is not known of the robot.
+"""The best placements and the given one, with error bars: seeds, and what is not known of the
+robot.
 
 The interval of a saving is that of the difference over the same drawn robots, as for all savings.
 """
@@ -20,7 +21,9 @@ from ir_studies.work import Job, Row
 
 @dataclass(frozen=True)
 class Final:
-    """A placement under a condition. rows: by seed; robots (ROBOTS,): what the drawn robots add, J."""
+    """A placement under a condition. rows: by seed; robots (ROBOTS,): what the drawn robots add,
+    J.
+    """
 
     placement: Placement
     condition: Condition
@@ -61,8 +64,12 @@ class Final:
 
 
 def final_jobs(known: Sequence[Known], settings: LayoutSettings) -> list[Job]:
-    """Plans of the best and of the given placement with all seeds; the first seed with the drawn robots."""
-    return [job for placement in finalists(known, settings) for _, job in _jobs(placement, settings)]
+    """Plans of the best and of the given placement with all seeds; the first seed with the drawn
+    robots.
+    """
+    return [
+        job for placement in finalists(known, settings) for _, job in _jobs(placement, settings)
+    ]
 
 
 def finalists(known: Sequence[Known], settings: LayoutSettings) -> list[Placement]:
@@ -70,7 +77,9 @@ def finalists(known: Sequence[Known], settings: LayoutSettings) -> list[Placemen
     others = [one for one in known if one.placement.key != GIVEN.key]
     best = [one.placement for one in best_of(others, settings.keep)]
     feasible = [
-        one.placement for one in known if one.placement.key == GIVEN.key and math.isfinite(one.coarse)
+        one.placement
+        for one in known
+        if one.placement.key == GIVEN.key and math.isfinite(one.coarse)
     ]
     return [*feasible, *best]
 
@@ -84,8 +93,12 @@ def finals(
         by: dict[Condition, list[Row]] = {}
         for condition, job in _jobs(placement, settings):
             by.setdefault(condition, []).append(rows[job.key])
-        found.append(tuple(Final(placement, condition, tuple(own)) for condition, own in by.items()))
-    return sorted(found, key=lambda own: (not own[0].is_given, mean_cost(own), own[0].placement.key))
+        found.append(
+            tuple(Final(placement, condition, tuple(own)) for condition, own in by.items())
+        )
+    return sorted(
+        found, key=lambda own: (not own[0].is_given, mean_cost(own), own[0].placement.key)
+    )
 
 
 def mean_cost(own: Sequence[Final]) -> float:

@@ -23,7 +23,9 @@ TURNS = {
     "tool": ("x", "y", "z", "a_deg", "b_deg", "c_deg"),
 }
 JOINTS = tuple(f"a{k}_deg" for k in range(1, 13))
-_METRES, _DEGREES = 3, 1  # decimals: what people can set up
+# decimals: what people can set up
+_METRES = 3
+_DEGREES = 1
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,10 @@ def variables(groups: Mapping[str, Mapping[str, Range]]) -> tuple[Variable, ...]
 
 def text_of(values: Values) -> str:
     """Values as the key of a placement; what does not move is left out."""
-    return " ".join(f"{name}={value!r}" for name, value in sorted(values.items()) if value) or "as given"
+    return (
+        " ".join(f"{name}={value!r}" for name, value in sorted(values.items()) if value)
+        or "as given"
+    )
 
 
 @dataclass(frozen=True)
@@ -79,7 +84,8 @@ class Placing:
     def cell(self, given: Cell, values: Values, payload: Mapping[str, float] | None = None) -> Cell:
         """The cell with everything moved by the values, and parts of other masses.
 
-        Raises InvalidValueError for a cell without sense: a posture beyond the joints' limits, too much load.
+        Raises InvalidValueError for a cell without sense: a posture beyond the joints' limits, too
+        much load.
         """
         groups: dict[str, dict[str, float]] = {}
         for name, value in values.items():
@@ -91,7 +97,9 @@ class Placing:
         for machine in given.equipment:
             moved = groups.get(f"equipment.{machine.name}")
             if moved:
-                cell = cell.with_equipment(machine.name, standing(cell.machine(machine.name).pose, moved))
+                cell = cell.with_equipment(
+                    machine.name, standing(cell.machine(machine.name).pose, moved)
+                )
         if "park" in groups:
             park = np.array(cell.park)
             for name, value in groups["park"].items():

@@ -1,6 +1,7 @@
 """What makes the jobs of a layout study: a look at a placement, and its program planned in full.
 
-A look says what is impossible and why, and what coarse movements would cost that meet nothing. Both are pure
+A look says what is impossible and why, and what coarse movements would cost that meet nothing. Both
+are pure
 functions of the job: they give the same bytes in every process.
 """
 
@@ -67,7 +68,9 @@ class Maker:
             cell = self._placing.cell(self._given, values, payload)
             new = sorted(deeper(overlaps(cell), self._overlapping).items())
             if new:
-                pairs = [f"{one} and {other} by {1e3 * depth:.1f} mm" for (one, other), depth in new[:3]]
+                pairs = [
+                    f"{one} and {other} by {1e3 * depth:.1f} mm" for (one, other), depth in new[:3]
+                ]
                 said = f"machines overlap more than as given: {', '.join(pairs)}"
                 return {"solved": False, "kind": "overlap", "message": said}
             request = self._request(cell, PlanOptions())
@@ -75,7 +78,11 @@ class Maker:
             if not found.status.ok:
                 return refused(found.status)
             if not math.isfinite(found.cost):
-                return {"solved": False, "kind": "no path", "message": "no chain connects the stations"}
+                return {
+                    "solved": False,
+                    "kind": "no path",
+                    "message": "no chain connects the stations",
+                }
             costs.append(found.cost)
         return {"solved": True, "coarse": costs}
 
@@ -90,11 +97,14 @@ class Maker:
         spreads = Spreads(request)
         row = figures(with_intervals(plan, spreads), self._budget["time_value"], cycle)
         if words.get("robots"):
-            row["robots"] = [round(float(one), 3) for one in np.sum(spreads.of(plan.movements), axis=0)]
+            row["robots"] = [
+                round(float(one), 3) for one in np.sum(spreads.of(plan.movements), axis=0)
+            ]
         return row
 
     def _request(self, cell: Cell, options: PlanOptions, cycle_time: float = 0.0) -> ProgramRequest:
-        budget, settings = self._budget, PlannerSettings()
+        budget = self._budget
+        settings = PlannerSettings()
         options = replace(
             options,
             planning_time=NEVER,
@@ -108,8 +118,11 @@ class Maker:
 
 
 def work_of(request: ProgramRequest) -> Work:
-    """As much as the planner gives a program of so many stops, in one thread: processes share the cores."""
-    stops, settings = max(len(request.stations or request.cell.program), 1), request.settings
+    """As much as the planner gives a program of so many stops, in one thread: processes share the
+    cores.
+    """
+    stops = max(len(request.stations or request.cell.program), 1)
+    settings = request.settings
     most = (request.options.max_iterations or settings.max_iterations) * stops
     better = request.options.max_iterations or settings.improvement_iterations
     return Work(most, time.monotonic() + NEVER, time.monotonic, improvement=better, threads=1)
@@ -122,7 +135,9 @@ def refused(status: Status) -> Row:
 
 
 def figures(plan: ProgramPlan, time_value: float, cycle_time: float) -> Row:
-    """What a certified program costs: J of its movements, within a cycle time its joules at the mains."""
+    """What a certified program costs: J of its movements, within a cycle time its joules at the
+    mains.
+    """
     report = plan.report
     moves = [step.report for step in plan.movements if not step.is_pause]
     seconds = sum(move.duration for move in moves)

@@ -21,7 +21,7 @@ from ir_studies.layout.summary import ends, of_condition
 _TABLE_START = b"placement,"
 _CELL_START = b"format: ir_cell/1"
 NUMBERS = (
-    "cost_j", "energy_j", "energy_low_j", "energy_high_j", "duration_s", "moving_j", "moving_s", "drives_j",
+    "cost_j", "energy_j", "energy_low_j", "energy_high_j", "duration_s", "moving_j", "moving_s", "drives_j",  # noqa: E501
     "clearance_m",
 )  # fmt: skip
 _BEST_HEADS = (
@@ -38,8 +38,8 @@ def write_outputs(
     given: Cell,
     folder: Path,
 ) -> tuple[tuple[Path, ...], str]:
-    """Write table.csv, best_1.yaml and so on, index.html; the files, and the best as CSV. given: the cell as
-    it was when the study began.
+    """Write table.csv, best_1.yaml and so on, index.html; the files, and the best as CSV. given:
+    the cell as it was when the study began.
 
     Raises RecorderError for files that can't be written, or replaced.
     """
@@ -78,7 +78,10 @@ def _row(k: int, known: Known, condition: Condition, settings: LayoutSettings) -
     state = "impossible" if known.cost == math.inf else "planned" if known.planned else "looked at"
     return {
         "placement": k,
-        **{variable.name: known.placement.values.get(variable.name, 0.0) for variable in settings.variables},
+        **{
+            variable.name: known.placement.values.get(variable.name, 0.0)
+            for variable in settings.variables
+        },
         "condition": condition.text,
         "state": state,
         "reason": kind,
@@ -92,7 +95,8 @@ def _row(k: int, known: Known, condition: Condition, settings: LayoutSettings) -
 def best_table(finals: Sequence[Sequence[Final]]) -> str:
     """CSV: the given placement and the best by condition, with their error bars."""
     given, _ = ends(finals)
-    lines, rank = [_BEST_HEADS], 0
+    lines = [_BEST_HEADS]
+    rank = 0
     for own in finals:
         rank += not own[0].is_given
         for one in own:

@@ -1,7 +1,8 @@
 """Whether machines stand in each other, and how deep: is there a plane between two convex bodies?
 
-Curved bodies are taken by points on their surface, and all bodies a millimetre smaller than they are. The
-robot's base counts against what it stands on; the planner keeps it clear of everything else.
+Curved bodies are taken by points on their surface, and all bodies a millimetre smaller than they
+are. The robot's base counts against what it stands on; the planner keeps it clear of everything
+else.
 """
 
 from __future__ import annotations
@@ -19,8 +20,11 @@ from ir_description import Body, Cell, Equipment
 from ir_msgs_py.arrays import FloatArray
 from ir_recorder.report.shapes import body_mesh, capsule_mesh
 
-TOUCHING = 1e-3  # m that a body is smaller on each side: machines stand side by side, and data are rounded
-DEEPER = 5e-3  # m that an overlap as drawn may grow: points of a curved body that turns lie so far inside it
+TOUCHING = (
+    1e-3  # m that a body is smaller on each side: machines stand side by side, and data are rounded
+)
+# m that an overlap as drawn may grow: points of a curved body that turns lie so far inside it
+DEEPER = 5e-3
 _APART = 1e-9  # m between a plane and the bodies that it separates
 Overlaps: TypeAlias = "dict[tuple[str, str], float]"
 """Depths [m] by the names of two bodies."""
@@ -44,12 +48,13 @@ class _Plane:
 
 
 def overlaps(cell: Cell) -> Overlaps:
-    """What reaches into each other: bodies of different machines in any of their states (a door that opens
-    needs its place too), bodies and the floor, the robot's base and what it stands on.
+    """What reaches into each other: bodies of different machines in any of their states (a door
+    that opens needs its place too), bodies and the floor, the robot's base and what it stands on.
     """
     machines = [[_shape(body) for body in _bodies(each)] for each in cell.equipment]
     bodies = [body for own in machines for body in own]
-    floor, base = [_Plane("floor", np.eye(4))] if cell.floor else [], list(_base(cell))
+    floor = [_Plane("floor", np.eye(4))] if cell.floor else []
+    base = list(_base(cell))
     pairs = [(a, b) for own, other in combinations(machines, 2) for a in own for b in other]
     pairs += [(body, plane) for body in bodies for plane in floor]
     stands = set(cell.ignored_pairs)
@@ -58,7 +63,9 @@ def overlaps(cell: Cell) -> Overlaps:
     return {pair: depth for pair, depth in depths.items() if depth > 0.0}
 
 
-def deeper(found: Mapping[tuple[str, str], float], given: Mapping[tuple[str, str], float]) -> Overlaps:
+def deeper(
+    found: Mapping[tuple[str, str], float], given: Mapping[tuple[str, str], float]
+) -> Overlaps:
     """How much deeper [m] than in the given cell, where that is more than DEEPER or new."""
     more = {pair: depth - given.get(pair, 0.0) for pair, depth in found.items()}
     return {pair: by for pair, by in more.items() if pair not in given or by > DEEPER}
@@ -70,7 +77,9 @@ def _bodies(machine: Equipment) -> tuple[Body, ...]:
 
 def _shape(body: Body) -> _Solid | _Plane:
     mesh = body_mesh(body)
-    return _Plane(body.name, body.pose) if mesh is None else _solid(body.name, mesh.points, body.pose)
+    return (
+        _Plane(body.name, body.pose) if mesh is None else _solid(body.name, mesh.points, body.pose)
+    )
 
 
 def _base(cell: Cell) -> Iterator[_Solid]:
@@ -89,13 +98,17 @@ def _solid(name: str, points: FloatArray, pose: FloatArray) -> _Solid:
 
 
 def _depth(first: _Solid | _Plane, second: _Solid | _Plane) -> float:
-    """How far [m] one must move to come out of the other, 0 where they are apart; of two planes too."""
+    """How far [m] one must move to come out of the other, 0 where they are apart; of two planes
+    too.
+    """
     if isinstance(first, _Plane):
         first, second = second, first
     if isinstance(first, _Plane):
         return 0.0
     if isinstance(second, _Plane):
-        below, smaller = (-_least_height(each, second.pose) for each in (first.points, first.smaller))
+        below, smaller = (
+            -_least_height(each, second.pose) for each in (first.points, first.smaller)
+        )
         return below if smaller > 0.0 else 0.0
     if not _near(first.smaller, second.smaller) or separable(first.smaller, second.smaller):
         return 0.0
@@ -125,8 +138,8 @@ def _near(first: FloatArray, second: FloatArray) -> bool:
 
 
 def separable(first: FloatArray, second: FloatArray) -> bool:
-    """Whether a plane lies between points (V, 3) and (W, 3): a linear programme for its normal n, offset t
-    and the distance m from both, with all components of n within 1.
+    """Whether a plane lies between points (V, 3) and (W, 3): a linear programme for its normal n,
+    offset t and the distance m from both, with all components of n within 1.
     """
     rows = np.vstack(
         [

@@ -1,4 +1,6 @@
-"""The page of a layout study: one HTML file with what follows, a map of energy over placement, reasons."""
+"""The page of a layout study: one HTML file with what follows, a map of energy over placement,
+reasons.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,11 @@ from ir_studies.layout.settings import LayoutSettings
 from ir_studies.layout.summary import cost_words, ends, of_condition, sentences
 from ir_studies.page import page
 
-_CHART, _HIGH, _LEFT, _BELOW = 340.0, 190.0, 52.0, 30.0  # width, height and room for numbers
+# width, height and room for numbers
+_CHART = 340.0
+_HIGH = 190.0
+_LEFT = 52.0
+_BELOW = 30.0
 _MACHINE = "equipment."  # before the name of an owner that is one
 _SENTENCE = 300  # characters of a reason
 _HEADS = (
@@ -45,8 +51,12 @@ def write_page(
     cell: Cell,
     path: Path,
 ) -> Path:
-    """Write the page in place of another page; its absolute path. PathError when it can't be written."""
-    return write_output(path, page_html(known, finals, settings, cell).encode(), PAGE_START, ANYWHERE)
+    """Write the page in place of another page; its absolute path. PathError when it can't be
+    written.
+    """
+    return write_output(
+        path, page_html(known, finals, settings, cell).encode(), PAGE_START, ANYWHERE
+    )
 
 
 def page_html(
@@ -83,11 +93,12 @@ def _rows(finals: Sequence[Sequence[Final]]) -> Iterator[tuple[str, ...]]:
                 continue
             less = DASH
             if given is not None and not one.is_given:
-                saved, between = one.saving(like := of_condition(given, one))
+                like = of_condition(given, one)
+                saved, between = one.saving(like)
                 share = percent(saved / like.mean()).lstrip("+")
                 less = _with_interval(f"{joules(saved)} ({share})", between)
             yield (
-                text(name), text(one.condition.text), _with_interval(joules(one.mean()), one.interval),
+                text(name), text(one.condition.text), _with_interval(joules(one.mean()), one.interval),  # noqa: E501
                 joules(one.spread()), less, joules(one.mean("moving_j")),
                 f"{one.mean('duration_s'):.2f} s", millimetres(one.mean("clearance_m")),
             )  # fmt: skip
@@ -104,7 +115,8 @@ def _maps(
     """One view from above for everything that moves along the floor."""
     _, best = ends(finals)
     star = settings.placing.cell(cell, best[0].placement.values) if best else None
-    limits, costs = shown_range(known), dict(zip(map(id, known), estimates(known), strict=True))
+    limits = shown_range(known)
+    costs = dict(zip(map(id, known), estimates(known), strict=True))
     owners = [v.owner for v in settings.variables if v.part in ("x", "y") and v.owner != "tool"]
     drawings: list[tuple[str, list[Mark]]] = []
     for owner in dict.fromkeys(owners):
@@ -166,7 +178,8 @@ def _chart(variable: Variable, known: Sequence[Known], low: float, high: float) 
         marks.append(mark(x, y, "given" if given else "dot", colour(one.cost, low, high), words))
     ends_of = ((_LEFT, "start", variable.low), (_CHART - 10.0, "end", variable.high))
     numbers = [
-        f'<text x="{x:g}" y="{_HIGH - 10:g}" text-anchor="{anchor}">{value:g} {variable.unit}</text>'
+        f'<text x="{x:g}" y="{_HIGH - 10:g}" text-anchor="{anchor}">{value:g} '
+        f"{variable.unit}</text>"
         for x, anchor, value in ends_of
     ]
     numbers += [
@@ -177,7 +190,8 @@ def _chart(variable: Variable, known: Sequence[Known], low: float, high: float) 
     return (
         f"<figure><figcaption>{text(variable.name)} (kJ)</figcaption>"
         f'<svg class="over" viewBox="0 0 {_CHART:g} {_HIGH:g}" role="img" '
-        f'aria-label="Cost over {text(variable.name)}">{line}{"".join((*numbers, *marks))}</svg></figure>'
+        'aria-label="Cost over '
+        f'{text(variable.name)}">{line}{"".join((*numbers, *marks))}</svg></figure>'
     )
 
 
@@ -194,7 +208,9 @@ def _impossible(known: Sequence[Known]) -> str:
             rows.append((text(kind), str(len(said)), f"{count} ×", text(sentence)))
     if not rows:
         return '<p class="empty">Nothing was impossible.</p>'
-    return table(("reason", ">placements", ">of these", "what it says"), rows, "Impossible placements")
+    return table(
+        ("reason", ">placements", ">of these", "what it says"), rows, "Impossible placements"
+    )
 
 
 def _without_numbers(sentence: str) -> str:

@@ -18,7 +18,9 @@ FIRST_SEED = 0
 
 @dataclass(frozen=True)
 class Placement:
-    """Where things stand, by variable. What stands as given is left out: its jobs are those of the cell."""
+    """Where things stand, by variable. What stands as given is left out: its jobs are those of the
+    cell.
+    """
 
     values: Values
 
@@ -35,12 +37,18 @@ class Placement:
         """The job of a look at it."""
         payloads = [dict(one) for one in payloads_of(conditions)]
         return Job(
-            f"look|{self.key}|{payloads}", {"stage": "look", "values": self.values, "payloads": payloads}
+            f"look|{self.key}|{payloads}",
+            {"stage": "look", "values": self.values, "payloads": payloads},
         )
 
     def plan(self, condition: Condition, seed: int = FIRST_SEED, *, robots: bool = False) -> Job:
         """The job of its program in full; robots: with what the drawn robots add."""
-        asked = {"values": self.values, "payload": dict(condition.payload), "seed": seed, "robots": robots}
+        asked = {
+            "values": self.values,
+            "payload": dict(condition.payload),
+            "seed": seed,
+            "robots": robots,
+        }
         words = {"stage": "plan", "cycle_time": condition.cycle_time, **asked}
         stage = "plan and robots" if robots else "plan"
         return Job(f"{stage}|{self.key}|{condition.text}|{seed}", words)
@@ -84,7 +92,9 @@ class Known:
         if not self.planned:
             return math.nan
         return float(
-            np.mean([row["cost_j"] if row.get("solved") else math.inf for row in self.plans.values()])
+            np.mean(
+                [row["cost_j"] if row.get("solved") else math.inf for row in self.plans.values()]
+            )
         )
 
     @property

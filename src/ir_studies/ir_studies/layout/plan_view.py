@@ -1,4 +1,6 @@
-"""The cell seen from above, with a dot at every place that was looked at, coloured by what it costs."""
+"""The cell seen from above, with a dot at every place that was looked at, coloured by what it
+costs.
+"""
 
 from __future__ import annotations
 
@@ -34,8 +36,9 @@ def colour(cost: float, low: float, high: float) -> str:
 
 
 def estimates(known: Sequence[Known]) -> list[float]:
-    """Costs of placements; of those that were looked at only, what coarse movements cost, with the median of
-    what plans cost above them. Inf where a placement is impossible, NaN where nothing was planned.
+    """Costs of placements; of those that were looked at only, what coarse movements cost, with the
+    median of what plans cost above them. Inf where a placement is impossible, NaN where nothing was
+    planned.
     """
     above = [one.cost - one.coarse for one in known if math.isfinite(one.cost)]
     more = float(np.median(above)) if above else math.nan
@@ -43,7 +46,9 @@ def estimates(known: Sequence[Known]) -> list[float]:
 
 
 def shown_range(known: Sequence[Known]) -> tuple[float, float]:
-    """Least cost, and the one that nine of ten placements stay below; NaN where none was planned."""
+    """Least cost, and the one that nine of ten placements stay below; NaN where none was
+    planned.
+    """
     costs = [cost for cost in estimates(known) if math.isfinite(cost)]
     return (min(costs), float(np.quantile(costs, 0.9))) if costs else (math.nan, math.nan)
 
@@ -52,7 +57,8 @@ def legend(low: float, high: float) -> str:
     """What the colours mean."""
     steps = np.linspace(low, high, len(_COLOURS) + 1)
     keys = (
-        f'<span><span class="key" style="background:{one}"></span>{text(joules(float(at)))} …</span>'
+        f'<span><span class="key" style="background:{one}"></span>{text(joules(float(at)))} '
+        "…</span>"
         for one, at in zip(_COLOURS, steps, strict=False)
         if math.isfinite(low)
     )
@@ -61,15 +67,16 @@ def legend(low: float, high: float) -> str:
 
 
 class PlanView:
-    """Draws places (2,) m of the world; given and best: the cell as it is and as it should be, as far as it
-    lies around places (N, 2), which all are in sight. across: m from edge to edge.
+    """Draws places (2,) m of the world; given and best: the cell as it is and as it should be, as
+    far as it lies around places (N, 2), which all are in sight. across: m from edge to edge.
     """
 
     def __init__(self, given: Cell, best: Cell | None, places: FloatArray) -> None:
         self._outlines = [("was", one) for one in outlines(given)]
         self._outlines += [("best", one) for one in (outlines(best) if best is not None else ())]
         around = max(_AROUND * float(np.ptp(places, axis=0).max()), _LEAST_M)
-        self._low, high = places.min(axis=0) - around, places.max(axis=0) + around
+        self._low = places.min(axis=0) - around
+        high = places.max(axis=0) + around
         self.across, up = (float(one) for one in high - self._low)
         self._scale = (WIDTH - 2 * _MARGIN) / max(self.across, up / _TALLEST)
         self._height = self._scale * up + 2 * _MARGIN
@@ -77,7 +84,8 @@ class PlanView:
     def drawn(self, name: str, marks: Sequence[Mark]) -> str:
         """SVG with marks: place (2,), kind (dot, open, cross, given, best), colour, words."""
         shapes = [
-            f'<polygon class="{kind}" points="{" ".join(f"{x:.1f},{y:.1f}" for x, y in self._at(points))}"/>'
+            f'<polygon class="{kind}" '
+            f'points="{" ".join(f"{x:.1f},{y:.1f}" for x, y in self._at(points))}"/>'
             for kind, points in self._outlines
         ]
         shapes += [mark(*self._at(place[None])[0], *rest) for place, *rest in marks]
@@ -107,7 +115,11 @@ def mark(x: float, y: float, kind: str, fill: str, words: str) -> str:
 def outlines(cell: Cell) -> Iterator[FloatArray]:
     """Outlines (V, 2) of machines' bodies and of the robot's base from above."""
     base = [capsule for capsule in cell.robot.capsules if capsule.link == 0]
-    solids = [(body_mesh(body), body.pose) for machine in cell.equipment for body in machine.world_bodies()]
+    solids = [
+        (body_mesh(body), body.pose)
+        for machine in cell.equipment
+        for body in machine.world_bodies()
+    ]
     solids += [(capsule_mesh(capsule), cell.base_pose) for capsule in base]
     for mesh, pose in solids:
         if mesh is None:

@@ -1,11 +1,13 @@
 """The search for the best placements: a look at many, full plans where they could be the best.
 
-A look costs a sixth of a plan and estimates its cost but for what stands in between. The least difference of
-cost and estimate that was seen, less a margin, makes it a bound: what can't be the best by it is not planned.
-That bound follows from what was seen; it is no proof. In a cycle time joules count, which are not what J at a
+A look costs a sixth of a plan and estimates its cost but for what stands in between. The least
+difference of
+cost and estimate that was seen, less a margin, makes it a bound: what can't be the best by it is
+not planned. That bound follows from what was seen; it is no proof. In a cycle time joules count,
+which are not what J at a
 fixed price of time says: there the line through what was planned takes the place of the difference.
-Everything goes on in rounds and batches of fixed size, so that the same settings give the same placements,
-however many processes make the jobs.
+Everything goes on in rounds and batches of fixed size, so that the same settings give the same
+placements, however many processes make the jobs.
 """
 
 from __future__ import annotations
@@ -34,17 +36,23 @@ class Search:
     """rows: by the keys of jobs; made: makes those that are missing."""
 
     def __init__(self, settings: LayoutSettings, rows: dict[str, Row], made: Made) -> None:
-        self._settings, self._rows, self._made = settings, rows, made
+        self._settings = settings
+        self._rows = rows
+        self._made = made
         self._conditions = settings.conditions
         self._placements: dict[str, Placement] = {}
         self._wanted: set[str] = set()  # keys of placements whose plans were made for this search
 
     def run(self) -> list[Known]:
-        """All placements that were looked at, the given one first, then in the order of the search."""
+        """All placements that were looked at, the given one first, then in the order of the
+        search.
+        """
         rounds = 1 if self._settings.method == "grid" else self._settings.rounds
         for k in range(rounds):
             new = {each.key: each for each in self._candidates(k, rounds)}
-            self._placements |= {key: each for key, each in new.items() if key not in self._placements}
+            self._placements |= {
+                key: each for key, each in new.items() if key not in self._placements
+            }
             looks = [each.look(self._conditions) for each in self._placements.values()]
             self._made(looks, f"round {k + 1} of {rounds}: looks", self._best_words())
             self._plan_what_matters(f"round {k + 1} of {rounds}: plans")
@@ -65,10 +73,13 @@ class Search:
         if k == 0:
             yield GIVEN
             first = self._first(rounds) - 1
-            yield from grid(self._settings) if self._settings.method == "grid" else self._spread(first, 0)
+            yield from (
+                grid(self._settings) if self._settings.method == "grid" else self._spread(first, 0)
+            )
             return
         found = best_of(self._known(), self._settings.keep)
-        left, later = self._settings.placements - self._first(rounds), rounds - 1
+        left = self._settings.placements - self._first(rounds)
+        later = rounds - 1
         count = left // later + (k <= left % later)
         if not found:  # near what?
             yield from self._spread(count, k)
@@ -105,7 +116,8 @@ class Search:
             self._wanted |= {known.placement.key for known in batch}
 
     def _batch(self) -> list[Known]:
-        settings, known = self._settings, self._known()
+        settings = self._settings
+        known = self._known()
         left = sorted(
             (one for one in known if not one.planned and math.isfinite(one.coarse)),
             key=lambda one: (one.coarse, one.placement.key),
@@ -129,7 +141,9 @@ class Search:
         return f"best {min(costs) / 1e3:.2f} kJ" if costs else ""
 
     def _looked_at(self) -> Iterable[Known]:
-        looked = (p for p in self._placements.values() if p.look(self._conditions).key in self._rows)
+        looked = (
+            p for p in self._placements.values() if p.look(self._conditions).key in self._rows
+        )
         return [self._of(placement) for placement in looked]
 
 
@@ -148,8 +162,12 @@ def points(dimensions: int, count: int, *seeds: int) -> np.ndarray:
 
 
 def slope_of(planned: Sequence[Known]) -> float:
-    """Least-squares slope of cost over coarse cost, within 0 .. 1; 1 where they say nothing of it."""
-    coarse, cost = (np.array([getattr(one, name) for one in planned]) for name in ("coarse", "cost"))
+    """Least-squares slope of cost over coarse cost, within 0 .. 1; 1 where they say nothing of
+    it.
+    """
+    coarse, cost = (
+        np.array([getattr(one, name) for one in planned]) for name in ("coarse", "cost")
+    )
     around = coarse - np.mean(coarse)
     if len(planned) < _LINE or not around.any():
         return 1.0

@@ -112,11 +112,15 @@ class LayoutSettings:
         """All cycle times with all masses."""
         masses = product(*self.payloads.values())  # few: _check_conditions counts them first
         payloads = [tuple(zip(self.payloads, one, strict=True)) for one in masses]
-        return tuple(Condition(cycle, payload) for payload in payloads for cycle in self.cycle_times)
+        return tuple(
+            Condition(cycle, payload) for payload in payloads for cycle in self.cycle_times
+        )
 
     @property
     def in_cycles(self) -> bool:
-        """Whether joules in a cycle time count, which are not in the unit of coarse movements, J."""
+        """Whether joules in a cycle time count, which are not in the unit of coarse movements,
+        J.
+        """
         return any(self.cycle_times)
 
     @property
@@ -129,7 +133,8 @@ class LayoutSettings:
         machines = [machine.name for machine in cell.equipment]
         checked_known("equipment", self.equipment, machines)
         checked_known("carried", self.carried, machines)
-        stations, paths = ([one.name for one in cell.stations], [one.name for one in cell.paths])
+        stations = [one.name for one in cell.stations]
+        paths = [one.name for one in cell.paths]
         checked_known("stations", self.stations, [*stations, *paths, *POSTURES])
         checked_known("payloads", self.payloads, [part.name for part in cell.parts])
         checked_known("park", self.park, JOINTS[: cell.robot.n])
@@ -155,12 +160,15 @@ class LayoutSettings:
 
 
 def _in_order(settings: LayoutSettings, cell: Cell) -> dict[str, Any]:
-    """The names of settings in the order of the cell: in which order a file has them says nothing."""
+    """The names of settings in the order of the cell: in which order a file has them says
+    nothing.
+    """
 
     def ordered(values: Mapping[str, _Value], names: Iterable[str]) -> dict[str, _Value]:
         return {name: values[name] for name in dict.fromkeys(names) if name in values}
 
-    machines, turns = [one.name for one in cell.equipment], TURNS["equipment"]
+    machines = [one.name for one in cell.equipment]
+    turns = TURNS["equipment"]
     equipment = ordered(settings.equipment, machines)
     return {
         "base": ordered(settings.base, TURNS["base"]),
@@ -191,7 +199,9 @@ _REAL = (
 
 
 def read_layout(path: str | Path) -> LayoutSettings:
-    """The settings of a YAML file; a cell file counts from its folder. SettingsError names the key."""
+    """The settings of a YAML file; a cell file counts from its folder. SettingsError names the
+    key.
+    """
     content = read_text(path)
     try:
         return layout_settings(content, beside(path))
@@ -210,10 +220,14 @@ def layout_settings(content: str, placed: Placed) -> LayoutSettings:
             values[name] = _ranges(name, values[name])
     if "equipment" in values:
         machines = _mapping("equipment", values["equipment"])
-        values["equipment"] = {name: _ranges(f"equipment: {name}", one) for name, one in machines.items()}
+        values["equipment"] = {
+            name: _ranges(f"equipment: {name}", one) for name, one in machines.items()
+        }
     if "payloads" in values:
         payloads = _mapping("payloads", values["payloads"])
-        values["payloads"] = {name: _list(f"payloads: {name}", one) for name, one in payloads.items()}
+        values["payloads"] = {
+            name: _list(f"payloads: {name}", one) for name, one in payloads.items()
+        }
     for name in ("carried", "stations", "cycle_times"):
         if name in values:
             values[name] = _list(name, values[name])

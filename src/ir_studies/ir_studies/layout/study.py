@@ -19,7 +19,9 @@ from ir_studies.work import Job, Means, Results, Task
 
 @dataclass(frozen=True)
 class Layouts:
-    """known: all placements that were looked at; finals: the given one and the best, by condition; files."""
+    """known: all placements that were looked at; finals: the given one and the best, by condition;
+    files.
+    """
 
     settings: LayoutSettings
     known: tuple[Known, ...]
@@ -34,8 +36,11 @@ class Layouts:
 
 
 def run_layout(settings: LayoutSettings, folder: str | Path, means: Means | None = None) -> Layouts:
-    """Make what the folder doesn't have yet; interrupted, it goes on where it ended. Raises StudyError."""
-    means, into = means or Means(), Path(folder)
+    """Make what the folder doesn't have yet; interrupted, it goes on where it ended. Raises
+    StudyError.
+    """
+    means = means or Means()
+    into = Path(folder)
     cell = load_cell(settings.cell)
     content = cell_to_yaml(cell)
     task = Task("layout", {"cell_yaml": content, **settings.budget}, settings.hang_after)

@@ -37,7 +37,10 @@ def sentences(
     if given is None:
         yield "The given placement is impossible itself: " + given_reason(known)
     if given is not None and best is not None and mean_cost(given) <= mean_cost(best):
-        yield "The given placement is the best of those that were planned: none of the others costs less."
+        yield (
+            "The given placement is the best of those that were planned: none of the others "
+            "costs less."
+        )
     for one in best or ():
         yield words(one, None if given is None else of_condition(given, one))
     if given is not None and best is None:
@@ -68,12 +71,12 @@ def bound_words(planned: int, settings: LayoutSettings) -> str:
     by = f", by more than {100 * settings.margin:g} % of these" if settings.margin > 0.0 else ""
     if settings.in_cycles:
         return (
-            "One of the others can be the best only if it lies further below the line of joules over what "
-            f"coarse movements cost than each of the {planned} that were planned{by}."
+            "One of the others can be the best only if it lies further below the line of joules "
+            f"over what coarse movements cost than each of the {planned} that were planned{by}."
         )
     return (
-        "One of the others can be the best only if its plan costs less above its coarse movements than each "
-        f"of the {planned} that were planned{by}."
+        "One of the others can be the best only if its plan costs less above its coarse "
+        f"movements than each of the {planned} that were planned{by}."
     )
 
 
@@ -98,8 +101,8 @@ def words(best: Final, given: Final | None) -> str:
     worse = given is not None and best.mean("cost_j") > given.mean("cost_j")
     name = "Best of the others" if worse else "Best"
     said = (
-        f"{name} ({best.placement.key}; {best.condition.text}): {joules(best.mean())} at the mains per "
-        f"cycle, predicted, 90 % interval {joules(within.low)} to {joules(within.high)}"
+        f"{name} ({best.placement.key}; {best.condition.text}): {joules(best.mean())} at the "
+        f"mains per cycle, predicted, 90 % interval {joules(within.low)} to {joules(within.high)}"
     )
     if len(best.rows) > 1:
         said += f", {joules(best.spread())} between {len(best.rows)} seeds"
@@ -115,10 +118,9 @@ def against(best: Final, given: Final) -> str:
     moving = best.mean("moving_j") / given.mean("moving_j") - 1.0
     return (
         f"the given one {joules(given.mean())}. It {does} {joules(sign * less)}, "
-        f"{percent(sign * less / given.mean()).lstrip('+')} "
-        f"(90 % interval {joules(low)} to {joules(high)}{sure}); of the movements alone "
-        f"{percent(moving)}. A cycle takes {best.mean('duration_s'):.2f} s instead of "
-        f"{given.mean('duration_s'):.2f} s."
+        f"{percent(sign * less / given.mean()).lstrip('+')} (90 % interval {joules(low)} to "
+        f"{joules(high)}{sure}); of the movements alone {percent(moving)}. A cycle takes "
+        f"{best.mean('duration_s'):.2f} s instead of {given.mean('duration_s'):.2f} s."
     )
 
 

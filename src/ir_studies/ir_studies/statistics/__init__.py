@@ -1,5 +1,6 @@
-"""Statistics of section VI of the paper: time and energy of movements between random places of a cell, with
-synchronous and asynchronous joints, predicted, measured directly and measured indirectly.
+"""Statistics of section VI of the paper: time and energy of movements between random places of a
+cell, with synchronous and asynchronous joints, predicted, measured directly and measured
+indirectly.
 """
 
 from ir_studies.statistics.runs import Finished, run_statistics

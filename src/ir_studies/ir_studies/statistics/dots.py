@@ -11,8 +11,12 @@ from ir_recorder.report.bars import tick_step
 from ir_recorder.report.words import text
 from ir_studies.statistics.figures import Comparison
 
-WIDTH, LINE = 720.0, 34.0
-_LEFT, _RIGHT, _TOP, _BOTTOM = 170.0, 20.0, 8.0, 48.0
+WIDTH = 720.0
+LINE = 34.0
+_LEFT = 170.0
+_RIGHT = 20.0
+_TOP = 8.0
+_BOTTOM = 48.0
 _INSIDE = (2.0, 98.0)  # percentiles that the axis holds; dots outside are drawn at its edge
 _SPREAD = 9.0  # up and down that dots are moved apart
 
@@ -23,7 +27,8 @@ def dots(comparisons: Sequence[Comparison], title: str) -> str:
     if not kept:
         return ""
     first, last, step = _ticks(kept)
-    low, high = first * step, last * step
+    low = first * step
+    high = last * step
     height = _TOP + LINE * len(kept) + _BOTTOM
 
     def at(value: float) -> float:
@@ -33,20 +38,23 @@ def dots(comparisons: Sequence[Comparison], title: str) -> str:
     lines = "".join(_line(each, _TOP + LINE * (k + 0.5), at) for k, each in enumerate(kept))
     said = "; ".join(f"{each.name}: mean {each.mean.value:+.1f} %" for each in kept)
     return (
-        f'<div class="figure scroll"><svg class="dots" viewBox="0 0 {WIDTH:g} {height:g}" role="img" '
-        f'aria-label="{text(title)}: {text(said)}">{_axis(range(first, last + 1), step, height, at)}{lines}'
+        f'<div class="figure scroll"><svg class="dots" viewBox="0 0 {WIDTH:g} {height:g}" '
+        'role="img" '
+        f'aria-label="{text(title)}: '
+        f'{text(said)}">{_axis(range(first, last + 1), step, height, at)}{lines}'
         f'<text x="{(_LEFT + WIDTH - _RIGHT) / 2:g}" y="{height - 12:g}" text-anchor="middle">'
         f"{text(title)}</text></svg></div>"
     )
 
 
 def _ticks(kept: Sequence[Comparison]) -> tuple[int, int, float]:
-    """First and last tick of the axis in steps, and the step [%]: intervals lie between them whole, and dots
-    but for the outermost ones.
+    """First and last tick of the axis in steps, and the step [%]: intervals lie between them whole,
+    and dots but for the outermost ones.
     """
     low, high = np.percentile(np.concatenate([each.values for each in kept]), _INSIDE)
     bars = [end for each in kept for end in (each.mean.low, each.mean.high) if math.isfinite(end)]
-    low, high = min(float(low), -1.0, *bars), max(float(high), 1.0, *bars)
+    low = min(float(low), -1.0, *bars)
+    high = max(float(high), 1.0, *bars)
     step = tick_step(high - low)
     return math.floor(low / step), math.ceil(high / step), step
 
@@ -57,8 +65,12 @@ def _axis(ticks: range, step: float, height: float, at: Callable[[float], float]
         x = at(k * step)
         kind = "zero" if k == 0 else "grid"
         bottom = height - _BOTTOM
-        found.append(f'<line class="{kind}" x1="{x:.1f}" x2="{x:.1f}" y1="{_TOP:g}" y2="{bottom:g}"/>')
-        found.append(f'<text x="{x:.1f}" y="{height - 30:g}" text-anchor="middle">{_tick(k * step)} %</text>')
+        found.append(
+            f'<line class="{kind}" x1="{x:.1f}" x2="{x:.1f}" y1="{_TOP:g}" y2="{bottom:g}"/>'
+        )
+        found.append(
+            f'<text x="{x:.1f}" y="{height - 30:g}" text-anchor="middle">{_tick(k * step)} %</text>'
+        )
     return "".join(found)
 
 
@@ -68,12 +80,14 @@ def _tick(percent: float) -> str:
 
 def _line(each: Comparison, y: float, at: Callable[[float], float]) -> str:
     marks = "".join(
-        f'<circle cx="{at(value):.1f}" cy="{y + _SPREAD * (2.0 * (0.618034 * k % 1.0) - 1.0):.1f}" r="2"/>'
+        f'<circle cx="{at(value):.1f}" '
+        f'cy="{y + _SPREAD * (2.0 * (0.618034 * k % 1.0) - 1.0):.1f}" r="2"/>'
         for k, value in enumerate(each.values.tolist())
     )
     label = f'<text x="{_LEFT - 10:g}" y="{y + 4:.1f}" text-anchor="end">{text(each.name)}</text>'
     if math.isnan(each.mean.low):
         return label + marks
-    x, wide = at(each.mean.low), max(at(each.mean.high) - at(each.mean.low), 2.0)
+    x = at(each.mean.low)
+    wide = max(at(each.mean.high) - at(each.mean.low), 2.0)
     bar = f'<rect x="{x:.1f}" y="{y - 12:.1f}" width="{wide:.1f}" height="24"/>'
     return label + bar + marks

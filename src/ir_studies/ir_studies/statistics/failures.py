@@ -1,4 +1,6 @@
-"""Why pairs have no movement and movements no measurement: counted by reason, with one of each in words."""
+"""Why pairs have no movement and movements no measurement: counted by reason, with one of each in
+words.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +12,11 @@ from dataclasses import dataclass
 from ir_studies.statistics.sides import ASYNCHRONOUS, SYNCHRONOUS, distinct, number, solved
 from ir_studies.work import Row
 
-NO_PAIR, NOT_DRIVEN = "pairs without both movements", "movements without a measurement"
-_FIGURES = re.compile(r"[-+]?\d[\d.,]*(?:e[-+]?\d+)?\b|\([^()]*\)")  # what differs where the reason is one
+NO_PAIR = "pairs without both movements"
+NOT_DRIVEN = "movements without a measurement"
+_FIGURES = re.compile(
+    r"[-+]?\d[\d.,]*(?:e[-+]?\d+)?\b|\([^()]*\)"
+)  # what differs where the reason is one
 
 
 @dataclass(frozen=True)

@@ -34,15 +34,18 @@ NATURAL = (
     ("W of eq. (9)", "movement_cost", ""),
     ("largest torque share", "torque_share", ""),
 )
-"""Natural values of section VI: what can be read off a movement, the column that holds it, and its unit."""
+"""Natural values of section VI: what can be read off a movement, the column that holds it, and its
+unit.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Relative differences in percent: values of each pair, or of each movement where pairs have several;
-    what follows is taken over `pairs`, which are independent: the mean with its 90 % interval,
-    the median with that by order statistics, effect (mean over standard deviation: Cohen's d of paired
-    samples), chance of such a mean. spread: standard deviation of the values. skewed: few carry the mean.
+    """Relative differences in percent: values of each pair, or of each movement where pairs have
+    several; what follows is taken over `pairs`, which are independent: the mean with its 90 %
+    interval, the median with that by order statistics, effect (mean over standard deviation:
+    Cohen's d of paired samples), chance of such a mean. spread: standard deviation of the values.
+    skewed: few carry the mean.
     levels: means of the first and of the second, in `unit`.
     shown: a difference is shown, all comparisons of the table taken together.
     """
@@ -83,13 +86,13 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Findings:
-    """pairs: that were asked; solved: with both timings; same: of these, those whose asynchronous answer is
-    the synchronous one; different: of the others, those that are not the same movements drawn again; slower:
-    of the others, those whose asynchronous movement takes longer.
-    comparisons: asynchronous against synchronous of the others, by natural value. agreements: predicted and
-    indirect against direct, over all movements; covered: share of the movements whose directly measured
-    energy lies in the predicted interval. driven: movements that were measured. failures: why pairs have no
-    comparison and movements no measurement, each with how many.
+    """pairs: that were asked; solved: with both timings; same: of these, those whose asynchronous
+    answer is the synchronous one; different: of the others, those that are not the same movements
+    drawn again; slower: of the others, those whose asynchronous movement takes longer.
+    comparisons: asynchronous against synchronous of the others, by natural value. agreements:
+    predicted and indirect against direct, over all movements; covered: share of the movements whose
+    directly measured energy lies in the predicted interval. driven: movements that were measured.
+    failures: why pairs have no comparison and movements no measurement, each with how many.
     """
 
     pairs: int
@@ -110,7 +113,8 @@ def findings_of(rows: Sequence[Row]) -> Findings:
     own = [row for row in both if row[ASYNCHRONOUS].get("timing") == ASYNCHRONOUS]
     every = [(k, row[timing]) for k, row in enumerate(rows) for timing in distinct(row)]
     measured = [(k, one) for k, one in every if math.isfinite(number(one, "direct_j"))]
-    own_pair, driven = [k for k, _ in measured], [one for _, one in measured]
+    own_pair = [k for k, _ in measured]
+    driven = [one for _, one in measured]
     direct = _field("direct_j")
     return Findings(
         len(rows),
@@ -127,7 +131,9 @@ def findings_of(rows: Sequence[Row]) -> Findings:
         together(
             [
                 replace(
-                    compared(f"{name} against direct", driven, _field(f"{name}_j"), direct, own_pair),
+                    compared(
+                        f"{name} against direct", driven, _field(f"{name}_j"), direct, own_pair
+                    ),
                     unit="J",
                 )
                 for name in ("predicted", "indirect")
@@ -154,8 +160,9 @@ def compared(
 ) -> Comparison:
     """first / second - 1 in percent over the rows that have both.
 
-    own_pair: the pair of each row where a pair has several; its movements go between the same places, so that
-    what is said of the mean and the median is taken over pairs. Where all are alike there is no interval.
+    own_pair: the pair of each row where a pair has several; its movements go between the same
+    places, so that what is said of the mean and the median is taken over pairs. Where all are alike
+    there is no interval.
     """
     figures = np.array([(first(row), second(row)) for row in rows]).reshape(-1, 2)
     kept = np.isfinite(figures).all(axis=1) & (figures[:, 1] != 0.0)

@@ -1,4 +1,6 @@
-"""What makes the rows of pairs: both timings planned, then driven by the simulated robot and measured."""
+"""What makes the rows of pairs: both timings planned, then driven by the simulated robot and
+measured.
+"""
 
 from __future__ import annotations
 
@@ -29,8 +31,8 @@ AROUND = 0.5  # s after a movement that the filter of the indirect measurement m
 
 
 def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
-    """Rows of pairs by their numbers, with the cell and its places loaded once; `read` of the settings: what
-    must be the same here. WorkerError where it is not.
+    """Rows of pairs by their numbers, with the cell and its places loaded once; `read` of the
+    settings: what must be the same here. WorkerError where it is not.
     """
     given = settings.get("read", {})
     asked = StatisticsSettings(**{key: value for key, value in settings.items() if key != "read"})
@@ -38,9 +40,14 @@ def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
     planner = Planner(time.monotonic)
     planner.set_cell("", asked.cell)
     try:
-        places, why = places_of(planner, asked.load), ""
-    except (StudyError, PlannerError) as error:  # a row says so in words, a process that can't start does not
-        places, why = (), str(error)
+        places = places_of(planner, asked.load)
+        why = ""
+    except (
+        StudyError,
+        PlannerError,
+    ) as error:  # a row says so in words, a process that can't start does not
+        places = ()
+        why = str(error)
 
     def row_of(words: Mapping[str, Any]) -> Row:
         if why:
@@ -55,7 +62,9 @@ def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
 
 
 def one_timing(pair: Pair, timing: str, asked: StatisticsSettings, planner: Planner) -> Row:
-    """Figures of the movement with one timing; `solved` false, with a sentence, where there is none."""
+    """Figures of the movement with one timing; `solved` false, with a sentence, where there is
+    none.
+    """
     options = PlanOptions(
         planner_id=asked.planner,
         seed=asked.seed,
@@ -76,7 +85,8 @@ def one_timing(pair: Pair, timing: str, asked: StatisticsSettings, planner: Plan
 
 
 def _planned(plan: MovementPlan) -> Row:
-    report, trajectory = plan.report, plan.trajectory
+    report = plan.report
+    trajectory = plan.trajectory
     return {
         "solved": True,
         "message": "",
@@ -94,7 +104,8 @@ def _planned(plan: MovementPlan) -> Row:
 
 
 def _driven(trajectory: JointTrajectory, load: str, plant: str, cell: Cell) -> Row:
-    """Joules by meter and by positions, peak power [W]; NaN, with a sentence, where it was not driven.
+    """Joules by meter and by positions, peak power [W]; NaN, with a sentence, where it was not
+    driven.
 
     Each movement has a robot of its own, whose gears are as warm as before the other.
     """
@@ -108,15 +119,24 @@ def _driven(trajectory: JointTrajectory, load: str, plant: str, cell: Cell) -> R
         finally:
             run.close()
     except (DriverError, DrivingError) as error:
-        return {"direct_j": math.nan, "indirect_j": math.nan, "peak_w": math.nan, "message": str(error)}
+        return {
+            "direct_j": math.nan,
+            "indirect_j": math.nan,
+            "peak_w": math.nan,
+            "message": str(error),
+        }
 
 
 def _measured(run: SimulatedRun, began: float, ended: float) -> Row:
-    trace, cell = run.trace(), run.cell
-    energy, time_s = trace.columns["energy"], trace.time
+    trace = run.trace()
+    cell = run.cell
+    energy = trace.columns["energy"]
+    time_s = trace.time
     inside = (time_s >= began - 0.5 * READING) & (time_s <= ended + 0.5 * READING)
     direct = float(np.diff(np.interp([began, ended], time_s, energy))[0])
-    indirect = _meter(trace, cell).energy(began, ended, carried(cell, run.simulation.load.text).loads)
+    indirect = _meter(trace, cell).energy(
+        began, ended, carried(cell, run.simulation.load.text).loads
+    )
     peak = float((np.diff(energy[inside]) / READING).max(initial=0.0))
     return {"direct_j": direct, "indirect_j": indirect, "peak_w": peak}
 

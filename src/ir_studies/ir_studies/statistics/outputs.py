@@ -23,13 +23,13 @@ from ir_studies.work import Row
 
 _CSV_START = b"pair,"
 _NUMBERS = (
-    "duration_s", "predicted_j", "predicted_low_j", "predicted_high_j", "direct_j", "indirect_j", "drives_j",
+    "duration_s", "predicted_j", "predicted_low_j", "predicted_high_j", "direct_j", "indirect_j", "drives_j",  # noqa: E501
     "peak_w", "path_m", "movement_cost", "torque_share",
 )  # fmt: skip
 _TEXTS = ("timing", "trajectory_id", "message")
 _HEADS = ("", ">pairs", ">mean difference, 90 %", ">median, 90 %", ">less / equal / more", ">d")
 _SUMMED_UP = (
-    "comparison", "pairs", "values", "mean_percent", "low_percent", "high_percent", "median_percent",
+    "comparison", "pairs", "values", "mean_percent", "low_percent", "high_percent", "median_percent",  # noqa: E501
     "median_low_percent", "median_high_percent", "effect", "less", "more", "chance", "shown",
 )  # fmt: skip
 
@@ -37,7 +37,9 @@ _SUMMED_UP = (
 def write_outputs(
     rows: Sequence[Row], found: Findings, settings: StatisticsSettings, folder: Path
 ) -> tuple[Path, ...]:
-    """Write table.csv and index.html. Raises RecorderError for files that can't be written, or replaced."""
+    """Write table.csv and index.html. Raises RecorderError for files that can't be written, or
+    replaced.
+    """
     html = page_html(found, settings).encode()
     return (
         write_columns(columns(rows), folder / "table.csv", _CSV_START, ANYWHERE),
@@ -71,7 +73,8 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
     parts = {
         "title": "Statistics",
         "subtitle": text(
-            f"{settings.cell}: {found.pairs} random pairs, planner {settings.planner or 'portfolio'}, "
+            f"{settings.cell}: {found.pairs} random pairs, planner "
+            f"{settings.planner or 'portfolio'}, "
             f"objective {settings.objective}, plant {settings.plant}"
         ),
         "said": "".join(f"<li>{text(sentence)}</li>" for sentence in sentences(found, settings)),
@@ -83,7 +86,9 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
             found.comparisons, "asynchronous less synchronous, in percent of synchronous"
         ),
         "agreements": _table(found.agreements, "Energies of a movement", (">energy", ">direct")),
-        "agreement_dots": dots(found.agreements, "predicted or indirect less direct, in percent of direct"),
+        "agreement_dots": dots(
+            found.agreements, "predicted or indirect less direct, in percent of direct"
+        ),
         "settings": text(settings.budget),
     }
     return page("statistics", parts)
@@ -95,8 +100,8 @@ def summed_up(found: Findings) -> str:
         ",".join(
             str(value)
             for value in (
-                f'"{each.name}"', each.pairs, each.count, each.mean.value, each.mean.low, each.mean.high,
-                each.median.value, each.median.low, each.median.high, each.effect, each.less, each.more,
+                f'"{each.name}"', each.pairs, each.count, each.mean.value, each.mean.low, each.mean.high,  # noqa: E501
+                each.median.value, each.median.low, each.median.high, each.effect, each.less, each.more,  # noqa: E501
                 each.chance, int(each.shown),
             )
         )
@@ -106,11 +111,16 @@ def summed_up(found: Findings) -> str:
 
 
 def _table(comparisons: Sequence[Comparison], caption: str, sides: tuple[str, str]) -> str:
-    """sides: of what the means are. With a column of movements where these are more than the pairs."""
-    rows, heads = [_row(each) for each in comparisons], [*_HEADS[:2], *sides, *_HEADS[2:]]
+    """sides: of what the means are. With a column of movements where these are more than the
+    pairs.
+    """
+    rows = [_row(each) for each in comparisons]
+    heads = [*_HEADS[:2], *sides, *_HEADS[2:]]
     if any(each.count != each.pairs for each in comparisons):
         heads.insert(1, ">movements")
-        rows = [(row[0], str(each.count), *row[1:]) for row, each in zip(rows, comparisons, strict=True)]
+        rows = [
+            (row[0], str(each.count), *row[1:]) for row, each in zip(rows, comparisons, strict=True)
+        ]
     return table(heads, rows, caption)
 
 
@@ -131,7 +141,10 @@ def _with_interval(found: Mean, tag: str) -> str:
     value = f"<{tag}>{signed(found.value)}</{tag}>"
     if not math.isfinite(found.low):
         return value
-    return f"{value} ({signed(found.low).removesuffix(' %')} to {signed(found.high).removesuffix(' %')})"
+    return (
+        f"{value} ({signed(found.low).removesuffix(' %')} to "
+        f"{signed(found.high).removesuffix(' %')})"
+    )
 
 
 def _left_out(found: Findings) -> str:

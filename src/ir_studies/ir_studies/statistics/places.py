@@ -1,5 +1,5 @@
-"""Random pairs of places of a cell: where regional movements begin and end. These are the ends of the
-withdrawals from its stations, the ends of its tasks, and home.
+"""Random pairs of places of a cell: where regional movements begin and end. These are the ends of
+the withdrawals from its stations, the ends of its tasks, and home.
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ from ir_studies.work.read_files import PLANT, digest_of_tasks
 NEAREST = 0.002  # m that a place keeps
 CANDIDATES = 8  # withdrawals of a station, in different configurations
 LONGEST = 600.0  # s: work ends a request, not the clock
-SHARE_OF_ENDS = 0.8  # of the clearance at the ends of a movement, where that is less than the safety distance
+SHARE_OF_ENDS = (
+    0.8  # of the clearance at the ends of a movement, where that is less than the safety distance
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +36,9 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """From start to goal (n,), with their names; margin [m]: the safety distance that both ends allow."""
+    """From start to goal (n,), with their names; margin [m]: the safety distance that both ends
+    allow.
+    """
 
     names: tuple[str, str]
     start: FloatArray
@@ -48,10 +52,15 @@ def places_of(planner: Planner, load: str) -> tuple[Place, ...]:
     named = {"home": np.array(cell.machine_home)[None]}
     for task in cell.tasks:
         first, _, last = task.name.partition("->")
-        named |= {first: np.array(task.start)[None], last or f"{first} goal": np.array(task.goal)[None]}
+        named |= {
+            first: np.array(task.start)[None],
+            last or f"{first} goal": np.array(task.goal)[None],
+        }
     options = PlanOptions(load=load, planning_time=LONGEST)
     for station in cell.stations:
-        found = planner.plan_service(station.name, "exit", None, cell.machine_home, CANDIDATES, options)
+        found = planner.plan_service(
+            station.name, "exit", None, cell.machine_home, CANDIDATES, options
+        )
         outside = [candidate.outside for candidate in found.candidates]
         named[station.name] = np.array(outside).reshape(-1, cell.robot.n)
     places = [_free(planner, name, q, load) for name, q in named.items()]
@@ -80,7 +89,8 @@ def pair_of(places: tuple[Place, ...], seed: int, number: int, safety_distance: 
     """Pair `number` of a seed: two different places, each in a configuration drawn for it."""
     rng = np.random.default_rng([seed, number])
     first, last = (places[k] for k in rng.choice(len(places), 2, replace=False))
-    i, j = int(rng.integers(len(first.q))), int(rng.integers(len(last.q)))
+    i = int(rng.integers(len(first.q)))
+    j = int(rng.integers(len(last.q)))
     least = float(min(first.clearance[i], last.clearance[j]))
     margin = min(safety_distance, SHARE_OF_ENDS * least)
     return Pair((first.name, last.name), first.q[i], last.q[j], margin)

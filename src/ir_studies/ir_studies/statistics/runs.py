@@ -35,8 +35,12 @@ class Finished:
         return summed_up(self.findings)
 
 
-def run_statistics(settings: StatisticsSettings, folder: str | Path, means: Means | None = None) -> Finished:
-    """Make the pairs that the folder has no row of; interrupted, it goes on where it ended. StudyError."""
+def run_statistics(
+    settings: StatisticsSettings, folder: str | Path, means: Means | None = None
+) -> Finished:
+    """Make the pairs that the folder has no row of; interrupted, it goes on where it ended.
+    StudyError.
+    """
     means = means or Means()
     jobs = {str(number): Job(str(number), {"number": number}) for number in range(settings.pairs)}
     read = read_by(settings)

@@ -32,7 +32,7 @@ plant: typical:0             # the robot that drives: nominal, typical:SEED, a f
 safety_distance: 0.02        # m; less where an end is nearer
 max_iterations: 0            # work of a request; 0: the planner's default
 hang_after: 300.0            # s after which a pair is cut
-"""
+"""  # noqa: E501
 
 
 @dataclass(frozen=True)
@@ -59,10 +59,14 @@ class StatisticsSettings:
             if not isinstance(getattr(self, name), str):
                 raise SettingsError(f"{name} is {getattr(self, name)!r:.60}: it must be a text")
         if self.objective not in OBJECTIVES:
-            raise SettingsError(f"objective is {self.objective!r:.60}: known are {', '.join(OBJECTIVES)}")
+            raise SettingsError(
+                f"objective is {self.objective!r:.60}: known are {', '.join(OBJECTIVES)}"
+            )
         if self.planner and self.planner not in SEARCHES:
             known = ", ".join(SEARCHES)
-            raise SettingsError(f'planner is {self.planner!r:.60}: known are "" (the portfolio), {known}')
+            raise SettingsError(
+                f'planner is {self.planner!r:.60}: known are "" (the portfolio), {known}'
+            )
         self._check_cell()
 
     @property

@@ -6,7 +6,8 @@ import math
 
 from ir_studies.work import Row
 
-SYNCHRONOUS, ASYNCHRONOUS = "synchronous", "asynchronous"
+SYNCHRONOUS = "synchronous"
+ASYNCHRONOUS = "asynchronous"
 
 
 def solved(row: Row, timing: str) -> bool:
@@ -15,7 +16,9 @@ def solved(row: Row, timing: str) -> bool:
 
 
 def distinct(row: Row) -> list[str]:
-    """Timings of a row with a movement of their own: the asynchronous answer may be the synchronous one."""
+    """Timings of a row with a movement of their own: the asynchronous answer may be the synchronous
+    one.
+    """
     found = [timing for timing in (SYNCHRONOUS, ASYNCHRONOUS) if solved(row, timing)]
     alike = len(found) == 2 and row[ASYNCHRONOUS].get("timing") != ASYNCHRONOUS
     return found[:1] if alike else found

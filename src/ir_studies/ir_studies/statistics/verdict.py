@@ -12,8 +12,9 @@ from ir_studies.statistics.figures import Comparison, Findings
 from ir_studies.statistics.settings import DRAWN, StatisticsSettings
 
 FEW = 30
-"""Pairs below which a mean may miss the few that carry it: drawn from the differences of `demo`, the interval
-holds their mean in 90 % of samples of 30, in 62 % of samples of 10 (benchmarks/studies.py --only statistics).
+"""Pairs below which a mean may miss the few that carry it: drawn from the differences of `demo`,
+the interval holds their mean in 90 % of samples of 30, in 62 % of samples of 10
+(benchmarks/studies.py --only statistics).
 """
 _SAID = ("duration", "energy, direct", "energy, predicted")
 
@@ -32,11 +33,12 @@ def sentences(found: Findings, settings: StatisticsSettings) -> list[str]:
 def _counts(found: Findings) -> Iterator[str]:
     own = found.solved - found.same
     again = f", {found.different} of them different" if found.different < own else ""
-    have, are = ("has" if found.solved == 1 else "have"), ("is" if own == 1 else "are")
+    have = "has" if found.solved == 1 else "have"
+    are = "is" if own == 1 else "are"
     yield (
-        f"{found.solved} of {_some(found.pairs, 'pair')} {have} a certified movement with both timings; "
-        f"in {found.same} of them the asynchronous answer is the synchronous one, so {own} {are} "
-        f"compared{again}."
+        f"{found.solved} of {_some(found.pairs, 'pair')} {have} a certified movement with both "
+        f"timings; in {found.same} of them the asynchronous answer is the synchronous one, so "
+        f"{own} {are} compared{again}."
     )
     for what, of in ((NO_PAIR, "of timings"), (NOT_DRIVEN, "of what is measured")):
         failures = [each for each in found.failures if each.what == what]
@@ -51,7 +53,10 @@ def _counts(found: Findings) -> Iterator[str]:
 def _timings(found: Findings) -> Iterator[str]:
     for each in found.comparisons:
         if each.name in _SAID and each.count:
-            yield f"Asynchronous against synchronous, {each.name}: {difference(each)}{_of_all(each, found)}."
+            yield (
+                f"Asynchronous against synchronous, {each.name}: "
+                f"{difference(each)}{_of_all(each, found)}."
+            )
 
 
 def _of_all(each: Comparison, found: Findings) -> str:
@@ -68,14 +73,15 @@ def _rule(found: Findings, settings: StatisticsSettings) -> Iterator[str]:
         return
     if settings.objective == "time":
         yield (
-            "With the objective time the synchronous answer is a candidate of the asynchronous request, so "
+            "With the objective time the synchronous answer is a candidate of the asynchronous "
+            "request, so "
             f"that none may be slower: a rule, no finding. Slower are {found.slower} of {own}."
         )
     elif settings.planner:
         yield (
-            f"The planner {settings.planner} gives joints laws of their own wherever it can, also where "
-            f"these serve the objective less; {found.slower} of {own} take longer. With the objective time, "
-            "or the portfolio, the synchronous answer is a candidate."
+            f"The planner {settings.planner} gives joints laws of their own wherever it can, "
+            f"also where these serve the objective less; {found.slower} of {own} take longer. "
+            "With the objective time, or the portfolio, the synchronous answer is a candidate."
         )
     else:
         yield (
@@ -87,14 +93,18 @@ def _rule(found: Findings, settings: StatisticsSettings) -> Iterator[str]:
 def _measurements(found: Findings, settings: StatisticsSettings) -> Iterator[str]:
     for each in found.agreements:
         if each.count:
-            spread = f"; single movements spread by {each.spread:.1f} %" if math.isfinite(each.spread) else ""
+            spread = (
+                f"; single movements spread by {each.spread:.1f} %"
+                if math.isfinite(each.spread)
+                else ""
+            )
             yield f"Energy, {each.name}: {difference(each)}{spread}."
     if found.driven and math.isfinite(found.covered):
         robots = (
             "each pair's by a robot drawn for it"
             if settings.plant == DRAWN
-            else f"all of one robot, which says little of the interval: with `plant: {DRAWN}` each pair has "
-            "a robot of its own"
+            else f"all of one robot, which says little of the interval: with `plant: {DRAWN}` "
+            "each pair has a robot of its own"
         )
         yield (
             "The predicted 90 % interval holds the directly measured energy of "
@@ -106,25 +116,28 @@ def _limits(found: Findings, settings: StatisticsSettings) -> Iterator[str]:
     said = [each for each in found.comparisons if each.name in _SAID and each.count]
     if any(0 < each.pairs < FEW for each in (*said, *found.agreements)):
         yield (
-            f"Fewer than {FEW} pairs may miss the few that carry a mean, and its interval then holds less "
-            "often than 90 %: ask for more pairs."
+            f"Fewer than {FEW} pairs may miss the few that carry a mean, and its interval then "
+            "holds less often than 90 %: ask for more pairs."
         )
     elif any(each.skewed for each in said):
-        yield "Where few pairs carry a mean its interval may hold less often than 90 %: look at the dots."
+        yield (
+            "Where few pairs carry a mean its interval may hold less often than 90 %: look at "
+            "the dots."
+        )
     tested = sum(math.isfinite(each.chance) for each in found.comparisons)
     if tested > 1:
         yield (
-            f"What is shown of the timings counts {tested} comparisons together (Holm): by chance alone any "
-            "of them would be shown in at most one study of ten."
+            f"What is shown of the timings counts {tested} comparisons together (Holm): by "
+            "chance alone any of them would be shown in at most one study of ten."
         )
     if not found.solved and not found.driven:
         yield "Nothing follows from that."
         return
     robots = "these simulated robots" if settings.plant == DRAWN else "this simulated robot"
     yield (
-        "Energies are those at the mains, controller and tool included. It holds for movements between these "
-        f"places, drawn alike, of {robots}; nothing follows for other cells, nor for a real robot, whose "
-        "power no meter has read here."
+        "Energies are those at the mains, controller and tool included. It holds for movements "
+        f"between these places, drawn alike, of {robots}; nothing follows for other cells, nor "
+        "for a real robot, whose power no meter has read here."
     )
 
 

@@ -1,4 +1,6 @@
-"""What all studies share: jobs made by worker processes, results in a growing file, settings files."""
+"""What all studies share: jobs made by worker processes, results in a growing file, settings
+files.
+"""
 
 from ir_studies.work.job import Job, Row, Task
 from ir_studies.work.means import MOST_WORKERS, Means

@@ -1,7 +1,7 @@
 """Jobs made by a Dask cluster: each of its threads has a worker process of this project.
 
-So what hangs there is cut and what dies is tried once more by the same code as on one machine; a worker of
-the cluster that dies is Dask's own business, which gives its job to another.
+So what hangs there is cut and what dies is tried once more by the same code as on one machine; a
+worker of the cluster that dies is Dask's own business, which gives its job to another.
 """
 
 from __future__ import annotations
@@ -29,14 +29,20 @@ from ir_studies.work.pool import Pool
 
 _CONNECT_S = 20.0
 _LOOK_S = 0.2  # between two looks whether somebody asks to stop
-_COUNT_S = (
-    1.0  # between two looks how many threads there are, and until a scheduler that is busy is left alone
+# between two looks how many threads there are, and until a scheduler that is busy is left alone
+_COUNT_S = 1.0
+# for the end of what a study leaves behind: who does not answer ends it without being asked
+_LEAVE_S = 10.0
+_AHEAD = (
+    4  # jobs that each thread has waiting: none waits for the next one to come over the network
 )
-_LEAVE_S = 10.0  # for the end of what a study leaves behind: who does not answer ends it without being asked
-_AHEAD = 4  # jobs that each thread has waiting: none waits for the next one to come over the network
-_MOST_TIMES = 3  # that Dask may give a job up because four workers died that had it, or had it waiting
+_MOST_TIMES = (
+    3  # that Dask may give a job up because four workers died that had it, or had it waiting
+)
 _GONE = "the scheduler is gone: the same command goes on when it is back"
-_MISSING = 'a Dask cluster needs Dask: pip install "ir_studies[cluster]", or pip install dask distributed'
+_MISSING = (
+    'a Dask cluster needs Dask: pip install "ir_studies[cluster]", or pip install dask distributed'
+)
 
 
 def _distributed() -> ModuleType:
@@ -57,9 +63,13 @@ class Cluster:
 
     def __init__(self, task: Task, address: str, stopped: Stopped | None = None) -> None:
         """Connect. WorkerError where Dask is missing, nobody answers, or no worker is there."""
-        self._dask, self._stopped = _distributed(), stopped
-        self._task, self._build, self._study = json.dumps(asdict(task)), computed_with(task.kind), uuid4().hex
-        self._threads, self._counted = 1, -_COUNT_S
+        self._dask = _distributed()
+        self._stopped = stopped
+        self._task = json.dumps(asdict(task))
+        self._build = computed_with(task.kind)
+        self._study = uuid4().hex
+        self._threads = 1
+        self._counted = -_COUNT_S
         self._running: dict[Any, _Turn] = {}
         try:
             with ThreadPoolExecutor(1) as apart:  # here a loop may run, as in a notebook
@@ -67,7 +77,9 @@ class Cluster:
             self._client = self._dask.Client(address, timeout=_CONNECT_S, set_as_default=False)
         except Exception as error:  # who knows what answers there, and how Dask reads it
             said = str(error) or f"nothing within {_CONNECT_S:g} s"
-            raise WorkerError(f"no Dask scheduler answers at {address!r:.80}: {said:.200}") from error
+            raise WorkerError(
+                f"no Dask scheduler answers at {address!r:.80}: {said:.200}"
+            ) from error
         try:
             self._client.wait_for_workers(1, timeout=_CONNECT_S)
         except TimeoutError as error:
@@ -77,13 +89,16 @@ class Cluster:
             ) from error
 
     async def _identity(self, address: str) -> None:
-        """Ask who is there. A client that could not connect is no use: its end waits, and is printed."""
+        """Ask who is there. A client that could not connect is no use: its end waits, and is
+        printed.
+        """
         async with self._dask.rpc(address) as scheduler:
             await asyncio.wait_for(scheduler.identity(), _CONNECT_S)
 
     def rows(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Row]]:
         """Each job with its row, as they are made."""
-        left, done = iter(jobs), Queue[Any]()
+        left = iter(jobs)
+        done = Queue[Any]()
         try:
             while True:
                 for job in islice(left, self._free()):
@@ -123,7 +138,10 @@ class Cluster:
             threads = self._client.sync(self._client.scheduler.ncores, callback_timeout=_COUNT_S)
         except TimeoutError:
             raise
-        except (AttributeError, OSError) as error:  # AttributeError: the client has given the scheduler up
+        except (
+            AttributeError,
+            OSError,
+        ) as error:  # AttributeError: the client has given the scheduler up
             raise WorkerError(_GONE) from error
         return sum(int(count) for count in threads.values())
 
@@ -137,14 +155,20 @@ class Cluster:
             return None
 
     def _row(self, future: Any, turn: _Turn) -> Row | None:
-        """What a job gave; None where it is to be made again, since its workers died: it need not be why."""
+        """What a job gave; None where it is to be made again, since its workers died: it need not
+        be why.
+        """
         try:
             row: Row = future.result()
         except self._dask.KilledWorker as error:
             turn.given_up += 1
             if turn.given_up < _MOST_TIMES:
                 return None
-            return {"outcome": "died", "solved": False, "message": f"workers died with it: {error!s:.200}"}
+            return {
+                "outcome": "died",
+                "solved": False,
+                "message": f"workers died with it: {error!s:.200}",
+            }
         except StudyError:
             raise
         except (self._dask.CancelledError, OSError) as error:
@@ -158,7 +182,10 @@ class Cluster:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         if self._client.status == "running":
             _within(_LEAVE_S, lambda: self._client.run(end_study, self._study, on_error="ignore"))
@@ -174,10 +201,14 @@ class Cluster:
 
 
 def _within(seconds: float, act: Callable[[], object]) -> None:
-    """Wait for an act so long at most: what has stopped at the other end must not hold who leaves."""
+    """Wait for an act so long at most: what has stopped at the other end must not hold who
+    leaves.
+    """
 
     def acted() -> None:
-        with suppress(Exception):  # who leaves has no use for it: a worker without a study ends its processes
+        with suppress(
+            Exception
+        ):  # who leaves has no use for it: a worker without a study ends its processes
             act()
 
     thread = threading.Thread(target=acted, daemon=True)
@@ -189,7 +220,9 @@ _kept = Kept()
 
 
 def made(study: str, task: str, words: Mapping[str, Any], build: str) -> Row:
-    """In a worker of the cluster: the row of a job. WorkerError where it would compute other bits."""
+    """In a worker of the cluster: the row of a job. WorkerError where it would compute other
+    bits.
+    """
     read: Task = Task(**json.loads(task))
     if computed_with(read.kind) != build:
         raise WorkerError(

@@ -16,8 +16,8 @@ REFUSED = "refused"
 class Task:
     """What every job of a study has in common.
 
-    kind: which module of MAKERS (worker.py) makes the jobs; settings: what it is given before the first, as
-    JSON; limit: seconds after which a job is cut.
+    kind: which module of MAKERS (worker.py) makes the jobs; settings: what it is given before the
+    first, as JSON; limit: seconds after which a job is cut.
     """
 
     kind: str

@@ -1,6 +1,7 @@
 """In a worker of a Dask cluster: the processes that make its jobs, one for each thread and study.
 
-A pool is touched by the thread that uses it only; others ask it to stop. A process ends with its study, and
+A pool is touched by the thread that uses it only; others ask it to stop. A process ends with its
+study, and
 where no job came for a while: a study that was killed says no goodbye.
 """
 
@@ -40,8 +41,9 @@ class Kept:
         return len(self._used)
 
     def row(self, study: str, make: Callable[[Stopped], Pool], job: Job) -> Row:
-        """The row of a job, made by the process that this thread has for a study. StoppedError where that
-        ended, also meanwhile; make: a new pool of one process, which asks whether it is to stop.
+        """The row of a job, made by the process that this thread has for a study. StoppedError
+        where that ended, also meanwhile; make: a new pool of one process, which asks whether it is
+        to stop.
         """
         own = threading.get_ident(), study
         used = self._taken(own, make)
@@ -79,7 +81,8 @@ class Kept:
                 used = self._used[own] = _Used(make(stop.is_set), stop)
             if used.waiting is not None:
                 used.waiting.cancel()
-            used.busy, used.waiting = True, None
+            used.busy = True
+            used.waiting = None
             return used
 
     def _put_back(self, own: _Key, used: _Used) -> None:

@@ -14,7 +14,9 @@ from ir_studies.work.job import Job, Row, Task
 from ir_studies.work.pool import COMMAND, Pool
 
 MOST_WORKERS = 64
-_ADDRESS = re.compile(r"(?:(?:tcp|tls|ws|wss)://)?(?:[\w.-]+|\[[0-9A-Fa-f:.]+\]):(?P<port>\d{1,5})", re.ASCII)
+_ADDRESS = re.compile(
+    r"(?:(?:tcp|tls|ws|wss)://)?(?:[\w.-]+|\[[0-9A-Fa-f:.]+\]):(?P<port>\d{1,5})", re.ASCII
+)
 _MOST_PORTS = 65_535
 Progress = Callable[[str, int, int, str], None]
 
@@ -32,10 +34,10 @@ class Makers(Protocol):
 
 @dataclass(frozen=True)
 class Means:
-    """workers: processes of this machine, 0: one per core. scheduler: address of a Dask scheduler instead, as
-    tcp://127.0.0.1:8786; WorkerError where it can't be one. progress: called with a phase, jobs made, that of
-    all, and the best so far in words. stopped: asked several times a second; True ends the study with
-    StoppedError. command: what a worker process is.
+    """workers: processes of this machine, 0: one per core. scheduler: address of a Dask scheduler
+    instead, as tcp://127.0.0.1:8786; WorkerError where it can't be one. progress: called with a
+    phase, jobs made, that of all, and the best so far in words. stopped: asked several times a
+    second; True ends the study with StoppedError. command: what a worker process is.
     """
 
     workers: int = 0
@@ -46,7 +48,9 @@ class Means:
 
     def __post_init__(self) -> None:
         if not 0 <= self.workers <= MOST_WORKERS:
-            raise StudyError(f"workers is {self.workers}: it must be in 1 .. {MOST_WORKERS}, or 0: as cores")
+            raise StudyError(
+                f"workers is {self.workers}: it must be in 1 .. {MOST_WORKERS}, or 0: as cores"
+            )
         if self.scheduler:
             _check_address(self.scheduler)
 
@@ -65,6 +69,6 @@ def _check_address(scheduler: str) -> None:
     found = _ADDRESS.fullmatch(scheduler)
     if found is None or not 1 <= int(found["port"]) <= _MOST_PORTS:
         raise WorkerError(
-            f"scheduler is {scheduler!r:.80}: it must be an address with a port in 1 .. {_MOST_PORTS}, as "
-            "tcp://127.0.0.1:8786"
+            f"scheduler is {scheduler!r:.80}: it must be an address with a port in 1 .. "
+            f"{_MOST_PORTS}, as tcp://127.0.0.1:8786"
         )

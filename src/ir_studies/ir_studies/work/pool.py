@@ -1,4 +1,6 @@
-"""Worker processes for jobs: what hangs is cut, what dies is tried once more, Ctrl-C ends them all."""
+"""Worker processes for jobs: what hangs is cut, what dies is tried once more, Ctrl-C ends them
+all.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ _CHUNK = 1 << 16
 _MOST_STARTS = 3  # workers in a row that don't start, until the study gives up
 _LOOK_S = 0.1  # between two looks whether somebody asks to stop
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-"""Each core has a worker already; and how many threads add up a sum must not depend on the machine."""
+"""Each core has a worker already; and how many threads add up a sum must not depend on the
+machine.
+"""
 
 
 @dataclass
@@ -37,7 +41,9 @@ class _Worker:
     """One process, and the job that it makes. It ends with this process, whatever it does then."""
 
     def __init__(self, command: Sequence[str], task: Task) -> None:
-        pipe = subprocess.PIPE  # a group of its own: Ctrl-C is for the study, which ends its workers
+        pipe = (
+            subprocess.PIPE
+        )  # a group of its own: Ctrl-C is for the study, which ends its workers
         held, self._lifeline = os.pipe()
         try:
             self.process = subprocess.Popen(
@@ -55,18 +61,21 @@ class _Worker:
         finally:
             os.close(held)
         self.turn: _Turn | None = None
-        self.ready, self._text = False, b""
+        self.ready = False
+        self._text = b""
         self.late = time.monotonic() + _START_S
         self._say({"kind": task.kind, "settings": dict(task.settings)})
 
     def take(self, turn: _Turn, limit: float) -> None:
         """Begin a job that may take `limit` s."""
-        self.turn, self.late = turn, time.monotonic() + limit
+        self.turn = turn
+        self.late = time.monotonic() + limit
         self._say(dict(turn.job.words))
 
     def rest(self) -> None:
         """Wait for the next job, as long as it takes."""
-        self.turn, self.late = None, float("inf")
+        self.turn = None
+        self.late = float("inf")
 
     def _say(self, words: object) -> None:
         assert self.process.stdin is not None
@@ -105,7 +114,10 @@ class Pool:
         command: Sequence[str] = COMMAND,
         stopped: Callable[[], bool] | None = None,
     ) -> None:
-        self._task, self._count, self._command, self._stopped = task, count, command, stopped
+        self._task = task
+        self._count = count
+        self._command = command
+        self._stopped = stopped
         self._selector = selectors.DefaultSelector()
         self._turns: deque[_Turn] = deque()
         self._workers: list[_Worker] = []
@@ -137,7 +149,10 @@ class Pool:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self.close()
 
@@ -157,7 +172,9 @@ class Pool:
             for row in rows:
                 if not worker.ready and REFUSED in row:
                     raise WorkerError(f"a worker can't begin: {row[REFUSED]}")
-                turn, worker.ready, self._failed_starts = worker.turn, True, 0
+                turn = worker.turn
+                worker.ready = True
+                self._failed_starts = 0
                 self._give(worker)  # before the row is handed on: who takes it may not come back
                 if turn is not None:
                     yield turn.job, {"outcome": "answered", **row}
@@ -187,13 +204,17 @@ class Pool:
         worker.end()
 
     def _replaced(self, worker: _Worker, outcome: str) -> Iterator[tuple[Job, Row]]:
-        """End a worker that died or is late; its job is made once more where it died for the first time."""
+        """End a worker that died or is late; its job is made once more where it died for the first
+        time.
+        """
         self._remove(worker)
         turn = worker.turn
         if turn is None and not worker.ready:
             self._failed_starts += 1
             if self._failed_starts == _MOST_STARTS:
-                raise WorkerError(f"a worker {outcome} before it could start: its last words are above")
+                raise WorkerError(
+                    f"a worker {outcome} before it could start: its last words are above"
+                )
         elif turn is not None and outcome == "died" and not turn.again:
             self._turns.appendleft(_Turn(turn.job, again=True))
         elif turn is not None:

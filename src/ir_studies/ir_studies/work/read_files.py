@@ -1,4 +1,6 @@
-"""What rows depend on beside their settings: files that every worker reads, known by their digests."""
+"""What rows depend on beside their settings: files that every worker reads, known by their
+digests.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,9 @@ from hashlib import sha256
 from ir_description import Cell, Task
 from ir_studies.errors import WorkerError
 
-PLANT, TASK, TASKS = "plant ", "task ", "tasks of "
+PLANT = "plant "
+TASK = "task "
+TASKS = "tasks of "
 """Before the name of what is no cell."""
 _CHARACTERS = 16  # of a digest
 
@@ -29,7 +33,9 @@ def title(name: str) -> str:
 
 
 def refuse_others(given: Mapping[str, str], found: Mapping[str, str]) -> None:
-    """WorkerError where this process reads something else than the study: an older file, or an edited one."""
+    """WorkerError where this process reads something else than the study: an older file, or an
+    edited one.
+    """
     for name, digest in given.items():
         if found.get(name) != digest:
             raise WorkerError(f"{title(name)} is not here what the study has read")

@@ -1,4 +1,5 @@
-"""The results of a study in a file that only grows: whatever ends the program, what was found is there.
+"""The results of a study in a file that only grows: whatever ends the program, what was found is
+there.
 
 One line of JSON per job. A line that was not finished is taken off when the file is opened again.
 """
@@ -25,15 +26,20 @@ _TITLES = {"arena": "an arena", "layout": "a layout study", "statistics": "stati
 class Results:
     """The file of a folder, for one program at a time; rows by the keys of their jobs.
 
-    kind: of the study. budget: settings that all rows depend on. cells: content hash by name, of plants and
-    tasks too; others may be added later, none may change.
+    kind: of the study. budget: settings that all rows depend on. cells: content hash by name, of
+    plants and tasks too; others may be added later, none may change.
     """
 
-    def __init__(self, folder: Path, kind: str, budget: Mapping[str, Any], cells: Mapping[str, str]) -> None:
-        """Open or begin. FolderError where the folder is in use or holds results of other settings."""
+    def __init__(
+        self, folder: Path, kind: str, budget: Mapping[str, Any], cells: Mapping[str, str]
+    ) -> None:
+        """Open or begin. FolderError where the folder is in use or holds results of other
+        settings.
+        """
         self.rows: dict[str, Row] = {}
         self.path = folder / NAME
-        self._kind, self._budget = kind, json.loads(json.dumps(dict(budget)))
+        self._kind = kind
+        self._budget = json.loads(json.dumps(dict(budget)))
         try:
             folder.mkdir(parents=True, exist_ok=True)
             flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
@@ -45,7 +51,9 @@ class Results:
             self._read(cells)
         except BlockingIOError as error:
             self._drop()
-            raise FolderError(f"{folder} is in use by another study: wait, or name another folder") from error
+            raise FolderError(
+                f"{folder} is in use by another study: wait, or name another folder"
+            ) from error
         except OSError as error:  # a file system without locks, a disk that can't be read
             self._drop()
             raise FolderError(f"{self.path} can't be used: {error.strerror}") from error
@@ -61,7 +69,9 @@ class Results:
         found = _mapping(lines[0]) if lines else head
         begun = lines or json.dumps(head).encode().startswith(content)
         if not (begun and found is not None and found.get("format") == head["format"]):
-            raise FolderError(f"{self.path} holds no results of {_TITLES[self._kind]}: name another folder")
+            raise FolderError(
+                f"{self.path} holds no results of {_TITLES[self._kind]}: name another folder"
+            )
         rows = [self._row(number, line) for number, line in enumerate(lines[1:], start=2)]
         self.rows = {row["key"]: row for row in rows if "key" in row}
         known = dict(pair for row in rows for pair in row.get("cells", {}).items())
@@ -86,17 +96,21 @@ class Results:
             raise FolderError(f"{self.path}: line {number} is damaged: {said}")
         return row
 
-    def _check(self, head: dict[str, Any], known: Mapping[str, str], cells: Mapping[str, str]) -> None:
+    def _check(
+        self, head: dict[str, Any], known: Mapping[str, str], cells: Mapping[str, str]
+    ) -> None:
         begun = head.get("budget", {})
         for key in {**begun, **self._budget}:
             if begun.get(key) != self._budget.get(key):
                 raise FolderError(
-                    f"{self.path} holds results with {key} {begun.get(key)!s:.80}, the settings have "
-                    f"{self._budget.get(key)!s:.80}: name another folder"
+                    f"{self.path} holds results with {key} {begun.get(key)!s:.80}, the settings "
+                    f"have {self._budget.get(key)!s:.80}: name another folder"
                 )
         for name, digest in cells.items():
             if known.get(name, digest) != digest:
-                raise FolderError(f"{self.path} holds results of another {title(name)}: name another folder")
+                raise FolderError(
+                    f"{self.path} holds results of another {title(name)}: name another folder"
+                )
 
     def add(self, job: Job, row: Row) -> None:
         """Keep a row: it is on the disk when this returns."""
@@ -121,7 +135,10 @@ class Results:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         try:
             self._file.close()

@@ -1,4 +1,6 @@
-"""Settings of a study from YAML: known keys, values in their ranges, or a sentence that says which not."""
+"""Settings of a study from YAML: known keys, values in their ranges, or a sentence that says which
+not.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ _MOST_DIGITS = 1_000  # of a number: few enough for a message, more than any flo
 Bounds: TypeAlias = "tuple[str, float, float]"
 """A key, its least and its largest value."""
 Placed = Callable[[str], str]
-"""From the name of a cell or a plant as the settings have it to what reads it: a bundled name, or a path."""
+"""From the name of a cell or a plant as the settings have it to what reads it: a bundled name, or a
+path.
+"""
 
 
 def read_text(path: str | Path) -> str:
@@ -26,7 +30,9 @@ def read_text(path: str | Path) -> str:
         if file.exists() and not file.is_file():
             raise SettingsError(f"{path} is no file with settings")
         if file.stat().st_size > MOST_CHARACTERS:
-            raise SettingsError(f"{path} is larger than {MOST_CHARACTERS} bytes: it is no settings file")
+            raise SettingsError(
+                f"{path} is larger than {MOST_CHARACTERS} bytes: it is no settings file"
+            )
         return file.read_text(encoding="utf-8")
     except OSError as error:
         raise SettingsError(f"{path} can't be read: {error.strerror}") from error
@@ -41,7 +47,9 @@ def beside(path: str | Path) -> Placed:
 
 
 def settings_values(content: str, format_name: str, known: Collection[str]) -> dict[str, Any]:
-    """Keys and values of a text, without its format; lists as tuples. SettingsError for unknown keys."""
+    """Keys and values of a text, without its format; lists as tuples. SettingsError for unknown
+    keys.
+    """
     read = _mapping(content)
     if read is None or read.get("format") != format_name:
         raise SettingsError(f"expected keys and values with format: {format_name}")
@@ -100,16 +108,24 @@ def checked_known(key: str, names: Iterable[object], known: Collection[str]) -> 
 
 
 def _within(value: float, low: float, high: float) -> bool:
-    return low <= value <= high if isinstance(value, int) else math.isfinite(value) and low <= value <= high
+    return (
+        low <= value <= high
+        if isinstance(value, int)
+        else math.isfinite(value) and low <= value <= high
+    )
 
 
 class _PlainLoader(yaml.SafeLoader):
-    """Without aliases, a few lines of which could stand for gigabytes, and without keys that stand twice."""
+    """Without aliases, a few lines of which could stand for gigabytes, and without keys that stand
+    twice.
+    """
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         if self.check_event(yaml.AliasEvent):
             event = self.peek_event()  # type: ignore[no-untyped-call]
-            raise yaml.MarkedYAMLError(problem="aliases are not read", problem_mark=event.start_mark)
+            raise yaml.MarkedYAMLError(
+                problem="aliases are not read", problem_mark=event.start_mark
+            )
         return super().compose_node(parent, index)
 
     def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:

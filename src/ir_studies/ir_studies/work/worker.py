@@ -1,4 +1,6 @@
-"""The process that makes jobs: what they have in common in, then a line of JSON for each, one row out."""
+"""The process that makes jobs: what they have in common in, then a line of JSON for each, one row
+out.
+"""
 
 from __future__ import annotations
 
@@ -21,8 +23,9 @@ MAKERS = {
     "layout": "ir_studies.layout.maker",
     "statistics": "ir_studies.statistics.maker",
 }
-"""Modules by kind of study; each has `maker(settings)`, which loads what is loaded once and returns what
-makes a row from the words of a job."""
+"""Modules by kind of study; each has `maker(settings)`, which loads what is loaded once and returns
+what makes a row from the words of a job.
+"""
 Maker = Callable[[Mapping[str, Any]], Row]
 
 
@@ -34,7 +37,9 @@ def maker_of(kind: str, settings: Mapping[str, Any]) -> Maker:
 
 def main() -> None:
     """Serve until the input ends. What libraries print goes to stderr."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who started it, who closes the input
+    signal.signal(
+        signal.SIGINT, signal.SIG_IGN
+    )  # Ctrl-C is for who started it, who closes the input
     tie()
     answers = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)
@@ -42,7 +47,9 @@ def main() -> None:
         task = json.loads(sys.stdin.readline())
         try:
             make = maker_of(task["kind"], task["settings"])
-        except Exception as error:  # whatever it is: who started this has a sentence for people, not a death
+        except (
+            Exception
+        ) as error:  # whatever it is: who started this has a sentence for people, not a death
             traceback.print_exc()
             answers.write(json.dumps({REFUSED: str(error) or repr(error)}) + "\n")
             return

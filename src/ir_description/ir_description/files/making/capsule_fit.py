@@ -1,4 +1,6 @@
-"""Capsules around points: as small as one axis allows, and how far they stand out from the points' hull."""
+"""Capsules around points: as small as one axis allows, and how far they stand out from the points'
+hull.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,8 @@ _DIRECTIONS = 500  # in which the surface is compared with the hull
 
 
 class CapsuleFit(NamedTuple):
-    """A capsule around points; overhang [m]: how far it stands out from the planes of their convex hull, at
-    most.
+    """A capsule around points; overhang [m]: how far it stands out from the planes of their convex
+    hull, at most.
     """
 
     p0: FloatArray
@@ -27,7 +29,8 @@ class CapsuleFit(NamedTuple):
 
 
 def fitted(triangles: FloatArray, axis: FloatArray | None = None) -> tuple[CapsuleFit, ...]:
-    """One capsule that encloses triangles (T, 3, 3), or two where these are smaller together by a sixth.
+    """One capsule that encloses triangles (T, 3, 3), or two where these are smaller together by a
+    sixth.
 
     axis (3,): a direction that is tried beside the principal ones, as from one joint to the next.
     """
@@ -73,8 +76,8 @@ def _corners(points: FloatArray) -> FloatArray:
 
 
 def _along(points: FloatArray, direction: FloatArray) -> CapsuleFit:
-    """The capsule with this direction, but for its overhang: a line through the middle of the projected
-    points, caps pulled in.
+    """The capsule with this direction, but for its overhang: a line through the middle of the
+    projected points, caps pulled in.
     """
     along = points @ direction
     flat = points - along[:, None] * direction
@@ -85,7 +88,8 @@ def _along(points: FloatArray, direction: FloatArray) -> CapsuleFit:
     beside = ((flat - centre) ** 2).sum(axis=1)
     radius = float(np.sqrt(beside.max()))
     cap = np.sqrt(np.maximum(radius**2 - beside, 0.0))
-    low, high = float((along + cap).min()), float((along - cap).max())
+    low = float((along + cap).min())
+    high = float((along - cap).max())
     if low > high:  # shorter than its caps: a sphere around the middle
         middle = centre + 0.5 * (low + high) * direction
         return CapsuleFit(middle, middle, float(np.linalg.norm(points - middle, axis=1).max()), 0.0)
@@ -104,7 +108,8 @@ def _overhang(points: FloatArray, fit: CapsuleFit) -> float:
     except (QhullError, ValueError):
         return radius
     k = np.arange(_DIRECTIONS) + 0.5  # a spiral over the sphere
-    height, turn = 1.0 - 2.0 * k / _DIRECTIONS, np.pi * (1.0 + np.sqrt(5.0)) * k
+    height = 1.0 - 2.0 * k / _DIRECTIONS
+    turn = np.pi * (1.0 + np.sqrt(5.0)) * k
     flat = np.sqrt(1.0 - height**2)
     sphere = np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1)
     out = np.where((sphere @ (p1 - p0))[:, None] >= 0.0, p1, p0) + radius * sphere

@@ -1,7 +1,8 @@
-"""The sheet of drive figures beside a URDF: what a URDF does not say, each known, or estimated and marked so.
+"""The sheet of drive figures beside a URDF: what a URDF does not say, each known, or estimated and
+marked so.
 
-The estimates are the proportions of the KR 210 R2700 extra, whose drives are known: see `TEMPLATE`, which
-says for each figure what it is and what happens where it is unknown.
+The estimates are the proportions of the KR 210 R2700 extra, whose drives are known: see `TEMPLATE`,
+which says for each figure what it is and what happens where it is unknown.
 """
 
 from __future__ import annotations
@@ -29,7 +30,10 @@ RATIO = 100.0
 ROTOR_SHARE = 1.0 / 3.0  # of the peak torque that the rotor alone takes at the acceleration limit
 FRICTION_SHARE = 0.08  # of the peak torque, each: Coulomb, and viscous at full speed
 COPPER_SHARE = 0.03  # of the peak power, lost in the windings at peak torque
-BEND, AT_BEND, AT_FULL = 0.62, 0.9, 0.5  # of full speed; torque there and at full speed, of the peak
+# of full speed; torque there and at full speed, of the peak
+BEND = 0.62
+AT_BEND = 0.9
+AT_FULL = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,9 +48,9 @@ class Value:
 
 @dataclass(frozen=True, eq=False)
 class DriveSheet:
-    """name, title, joint_names, link_names ((): those of the URDF); values: figures by their key in a robot
-    file; controller, counterbalance: as they were written, None where not; radii (7,) [m] of capsules
-    for links without a mesh.
+    """name, title, joint_names, link_names ((): those of the URDF); values: figures by their key in
+    a robot file; controller, counterbalance: as they were written, None where not; radii (7,) [m]
+    of capsules for links without a mesh.
     """
 
     name: str
@@ -90,7 +94,9 @@ def drive_sheet(text: str, source: str, arm: UrdfArm) -> DriveSheet:
     """Read a sheet for an arm, and estimate what it does not know. Raises RobotFileError."""
     top = read_items(text, source, RobotFileError).table(_KEYS, _OPTIONAL)
     top["format"].choice((FORMAT,))
-    known = {key: value for key, (unit, low) in _ROWS.items() if (value := _row(top, key, unit, low))}
+    known = {
+        key: value for key, (unit, low) in _ROWS.items() if (value := _row(top, key, unit, low))
+    }
     known["rated_payload_kg"] = _value(
         top["rated_payload_kg"], lambda item: item.number(0, 1e4, "kg", above=True)
     )
@@ -144,7 +150,7 @@ def _names(top: Table, key: str, count: int) -> tuple[str, ...]:
     return tuple(item.name() for item in top[key].list(count, count)) if key in top else ()
 
 
-def _complete(known: dict[str, Value], arm: UrdfArm, source: str) -> None:  # long: one line per figure
+def _complete(known: dict[str, Value], arm: UrdfArm, source: str) -> None:
     """Take from the URDF what it has, and estimate the rest."""
 
     def taken(key: str, numbers: list[float], what: str) -> None:
@@ -152,7 +158,9 @@ def _complete(known: dict[str, Value], arm: UrdfArm, source: str) -> None:  # lo
             return
         if not all(numbers):
             joint = arm.joints[[bool(n) for n in numbers].index(False)].name
-            raise RobotFileError(source, 0, f"{key} is unknown and the URDF has no {what} for {joint}")
+            raise RobotFileError(
+                source, 0, f"{key} is unknown and the URDF has no {what} for {joint}"
+            )
         known[key] = Value(np.array(numbers), "URDF", "M")
 
     def estimated(key: str, numbers: FloatArray, note: str) -> None:
@@ -165,14 +173,23 @@ def _complete(known: dict[str, Value], arm: UrdfArm, source: str) -> None:  # lo
     ]
     known.setdefault("position_min_deg", Value(np.array([low for low, _ in ends]), "URDF", "M"))
     known.setdefault("position_max_deg", Value(np.array([high for _, high in ends]), "URDF", "M"))
-    taken("velocity_deg_s", [float(np.degrees(joint.velocity)) for joint in arm.joints], "velocity limit")
+    taken(
+        "velocity_deg_s",
+        [float(np.degrees(joint.velocity)) for joint in arm.joints],
+        "velocity limit",
+    )
     taken("gear_peak_torque_nm", [joint.effort for joint in arm.joints], "effort limit")
-    speed, peak = np.radians(known["velocity_deg_s"].numbers), known["gear_peak_torque_nm"].numbers
+    speed = np.radians(known["velocity_deg_s"].numbers)
+    peak = known["gear_peak_torque_nm"].numbers
     estimated("acceleration_rad_s2", speed / RAMP, f"full speed in {RAMP:g} s")
     reached = known["acceleration_rad_s2"].numbers
-    estimated("jerk_deg_s3", np.degrees(reached) / JERK_TIME, f"full acceleration in {JERK_TIME:g} s")
     estimated(
-        "gear_ratio", np.full(AXES, RATIO), "usual; only the split between motor and gear follows from it"
+        "jerk_deg_s3", np.degrees(reached) / JERK_TIME, f"full acceleration in {JERK_TIME:g} s"
+    )
+    estimated(
+        "gear_ratio",
+        np.full(AXES, RATIO),
+        "usual; only the split between motor and gear follows from it",
     )
     ratio = known["gear_ratio"].numbers
     estimated("motor_peak_torque_nm", peak / ratio, "as much as the gear takes")
@@ -182,7 +199,9 @@ def _complete(known: dict[str, Value], arm: UrdfArm, source: str) -> None:  # lo
         "a third of the peak torque at the acceleration limit",
     )
     estimated(
-        "friction_viscous_nms_rad", FRICTION_SHARE * peak / speed, "8 % of the peak torque at full speed"
+        "friction_viscous_nms_rad",
+        FRICTION_SHARE * peak / speed,
+        "8 % of the peak torque at full speed",
     )
     estimated("friction_coulomb_nm", FRICTION_SHARE * peak, "8 % of the peak torque")
     motor = known["motor_peak_torque_nm"].numbers
@@ -194,5 +213,7 @@ def _complete(known: dict[str, Value], arm: UrdfArm, source: str) -> None:  # lo
     least = np.minimum(peak, motor * ratio)
     pairs = [[[BEND * v, AT_BEND * t], [v, AT_FULL * t]] for v, t in zip(speed, least, strict=True)]
     estimated(
-        "envelope_rad_s_nm", np.array(pairs), "peak torque to 62 % of full speed, half of it at full speed"
+        "envelope_rad_s_nm",
+        np.array(pairs),
+        "peak torque to 62 % of full speed, half of it at full speed",
     )

@@ -1,4 +1,6 @@
-"""A robot file as text: an arm of a URDF, its drive sheet, its capsules and the pairs that can touch."""
+"""A robot file as text: an arm of a URDF, its drive sheet, its capsules and the pairs that can
+touch.
+"""
 
 from __future__ import annotations
 
@@ -53,7 +55,7 @@ def _lines(
     capsules: Sequence[Capsule],
     self_pairs: Iterable[tuple[str, str]],
     comments: Iterable[str],
-) -> Iterator[str]:  # long: the file from top to bottom
+) -> Iterator[str]:
     links = link_names(arm, sheet)
     yield from (f"# {comment}" for comment in comments)
     yield f"format: {FORMAT}"
@@ -61,7 +63,9 @@ def _lines(
     if sheet.title:
         yield f"title: {json.dumps(sheet.title)}"
     yield from _written("controller", sheet.controller)
-    yield from (f"{key}: {_figure(sheet.values[key])}" for key in ("rated_payload_kg", "machine_home_deg"))
+    yield from (
+        f"{key}: {_figure(sheet.values[key])}" for key in ("rated_payload_kg", "machine_home_deg")
+    )
     yield "joints:"
     names = sheet.joint_names or tuple(joint.name for joint in arm.joints)
     yield f"  names: [{', '.join(names)}]"
@@ -69,7 +73,10 @@ def _lines(
     if not np.array_equal(arm.flange, np.eye(3)):
         angles = np.zeros((len(names), 3))
         angles[-1] = abc_from_rotation(arm.flange)
-        yield f"  rotation_abc_deg: {_figure(Value(angles, 'URDF', 'H', 'x of the flange points out'))}"
+        yield (
+            "  rotation_abc_deg: "
+            f"{_figure(Value(angles, 'URDF', 'H', 'x of the flange points out'))}"
+        )
     yield f"  axis: {_figure(Value(arm.axis, 'URDF', 'H'))}"
     yield from (f"  {key}: {_figure(sheet.values[key])}" for key in _JOINT_ROWS)
     yield "drives:"
@@ -114,7 +121,10 @@ def _written(key: str, node: Node | None) -> Iterator[str]:
 def _figure(value: Value) -> str:
     note = f", note: {json.dumps(value.note)}" if value.note else ""
     own = _row(value.numbers)
-    return f"{{value: {own}, source: {json.dumps(value.source)}, confidence: {value.confidence}{note}}}"
+    return (
+        f"{{value: {own}, source: {json.dumps(value.source)}, confidence: "
+        f"{value.confidence}{note}}}"
+    )
 
 
 def _row(values: FloatArray | float) -> str:

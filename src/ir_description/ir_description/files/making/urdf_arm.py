@@ -1,7 +1,7 @@
 """The six axes of a URDF, in frames parallel to the base at q = 0 and a flange whose x points out.
 
-Fixed joints disappear: what they carry belongs to the link that carries them. A tool frame (tool0, flange)
-says where the flange is and how it is turned.
+Fixed joints disappear: what they carry belongs to the link that carries them. A tool frame (tool0,
+flange) says where the flange is and how it is turned.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ _ON_AXIS = 1e-6  # m: by which a flange may lie beside axis 6
 
 @dataclass(frozen=True, eq=False)
 class UrdfArm:
-    """joints: the moving ones; origin (6, 3) [m] of each in the frame of the link before, axis (6, 3) in its
-    own; flange (3, 3): the last frame in the base at q = 0. links: 7, in these frames.
+    """joints: the moving ones; origin (6, 3) [m] of each in the frame of the link before, axis (6,
+    3) in its own; flange (3, 3): the last frame in the base at q = 0. links: 7, in these frames.
     """
 
     name: str
@@ -44,7 +44,8 @@ class UrdfArm:
 
 
 def urdf_arm(text: str, source: str, tip: str = "") -> UrdfArm:
-    """The arm from the base to a link `tip` ("": flange, tool0 or the link that ends the longest chain).
+    """The arm from the base to a link `tip` ("": flange, tool0 or the link that ends the longest
+    chain).
 
     Raises RobotFileError where it has not six turning axes.
     """
@@ -59,7 +60,9 @@ def urdf_arm(text: str, source: str, tip: str = "") -> UrdfArm:
     if len(moving) != AXES:
         names = listed(joint.name for joint in moving)
         raise RobotFileError(
-            source, 0, f"the arm has {len(moving)} axes ({names}): arms of six axes are planned; see --tip"
+            source,
+            0,
+            f"the arm has {len(moving)} axes ({names}): arms of six axes are planned; see --tip",
         )
     placed = _placed(path)
     frames = _frames(path, moving, placed)
@@ -74,12 +77,16 @@ def urdf_arm(text: str, source: str, tip: str = "") -> UrdfArm:
             for joint, frame in zip(moving, frames[1:], strict=True)
         ]
     )
-    return UrdfArm(tree.name, tuple(moving), origin, _snapped(axis), frames[-1][:3, :3], tuple(links))
+    return UrdfArm(
+        tree.name, tuple(moving), origin, _snapped(axis), frames[-1][:3, :3], tuple(links)
+    )
 
 
 def _tip(tree: UrdfTree, tip: str, source: str) -> str:
     if tip and tip not in tree.links:
-        raise RobotFileError(source, 0, f"link {shown(tip)} is unknown; known are {listed(tree.links)}")
+        raise RobotFileError(
+            source, 0, f"link {shown(tip)} is unknown; known are {listed(tree.links)}"
+        )
     known = [name for suffix in TIPS for name in tree.links if name.endswith(suffix)]
     return tip or (known[0] if known else max(tree.links, key=lambda name: len(_path(tree, name))))
 
@@ -106,13 +113,16 @@ def _placed(path: list[UrdfJoint]) -> dict[str, FloatArray]:
 def _frames(
     path: list[UrdfJoint], moving: list[UrdfJoint], placed: dict[str, FloatArray]
 ) -> list[FloatArray]:
-    """Poses (4, 4) of the 7 frames in the base: where the joints are, the last where the flange is."""
+    """Poses (4, 4) of the 7 frames in the base: where the joints are, the last where the flange
+    is.
+    """
     frames = [np.eye(4)]
     for joint in moving:
         frame = np.eye(4)
         frame[:3, 3] = placed[joint.child][:3, 3]
         frames.append(frame)
-    tip, last = placed[path[-1].child], placed[moving[-1].child]
+    tip = placed[path[-1].child]
+    last = placed[moving[-1].child]
     z = last[:3, :3] @ moving[-1].axis
     frames[-1][:3, 3] = last[:3, 3] + ((tip[:3, 3] - last[:3, 3]) @ z) * z
     R = _snapped(tip[:3, :3] @ TOOL0[:3, :3].T if path[-1].child.endswith("tool0") else tip[:3, :3])
@@ -145,7 +155,9 @@ def _gathered(
     for part in parts:
         d = part.com - com
         inertia += part.inertia + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
-    return UrdfLink(name, mass, com, inertia, tuple(shape for part in parts for shape in part.shapes))
+    return UrdfLink(
+        name, mass, com, inertia, tuple(shape for part in parts for shape in part.shapes)
+    )
 
 
 def _fixed(tree: UrdfTree, name: str, pose: FloatArray) -> list[UrdfLink]:
@@ -153,9 +165,16 @@ def _fixed(tree: UrdfTree, name: str, pose: FloatArray) -> list[UrdfLink]:
     link = tree.links[name]
     R = pose[:3, :3]
     shapes = tuple(_moved(shape, pose) for shape in link.shapes)
-    own = replace(link, com=R @ link.com + pose[:3, 3], inertia=R @ link.inertia @ R.T, shapes=shapes)
-    below = [joint for joint in tree.above.values() if joint.parent == name and joint.kind == "fixed"]
-    return [own, *(part for joint in below for part in _fixed(tree, joint.child, pose @ joint.pose))]
+    own = replace(
+        link, com=R @ link.com + pose[:3, 3], inertia=R @ link.inertia @ R.T, shapes=shapes
+    )
+    below = [
+        joint for joint in tree.above.values() if joint.parent == name and joint.kind == "fixed"
+    ]
+    return [
+        own,
+        *(part for joint in below for part in _fixed(tree, joint.child, pose @ joint.pose)),
+    ]
 
 
 def _moved(shape: UrdfShape, pose: FloatArray) -> UrdfShape:

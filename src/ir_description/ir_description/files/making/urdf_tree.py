@@ -1,4 +1,6 @@
-"""The part of URDF that says how an arm is built: links with masses and shapes, joints with limits."""
+"""The part of URDF that says how an arm is built: links with masses and shapes, joints with
+limits.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +15,15 @@ from ir_description.poses import rotation_from_abc
 from ir_msgs_py.arrays import FloatArray
 
 MOVING = ("revolute", "continuous")
-EXACT = 2e-5  # by which entries of a rotation miss 0 or 1 where angles were written with five digits
+EXACT = (
+    2e-5  # by which entries of a rotation miss 0 or 1 where angles were written with five digits
+)
 
 
 @dataclass(frozen=True, eq=False)
 class UrdfShape:
-    """A collision shape: kind ("mesh", "box", "cylinder", "sphere"), its pose (4, 4) in its link, size (3,)
-    [m] (box: edges; cylinder: radius, length; mesh: scale), and the file of a mesh.
+    """A collision shape: kind ("mesh", "box", "cylinder", "sphere"), its pose (4, 4) in its link,
+    size (3,) [m] (box: edges; cylinder: radius, length; mesh: scale), and the file of a mesh.
     """
 
     kind: str
@@ -30,7 +34,9 @@ class UrdfShape:
 
 @dataclass(frozen=True, eq=False)
 class UrdfLink:
-    """mass [kg] (0: none is given), com (3,) [m], inertia (3, 3) [kg m^2] about it, in the link's frame."""
+    """mass [kg] (0: none is given), com (3,) [m], inertia (3, 3) [kg m^2] about it, in the link's
+    frame.
+    """
 
     name: str
     mass: float
@@ -41,7 +47,9 @@ class UrdfLink:
 
 @dataclass(frozen=True, eq=False)
 class UrdfJoint:
-    """A joint, the pose (4, 4) of its frame in the parent link, limits [rad, rad/s, Nm], 0: not given."""
+    """A joint, the pose (4, 4) of its frame in the parent link, limits [rad, rad/s, Nm], 0: not
+    given.
+    """
 
     name: str
     kind: str
@@ -69,7 +77,9 @@ def urdf_tree(text: str, source: str) -> UrdfTree:
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise RobotFileError(source, 0, "the URDF defines entities: they are not read")
     if "<xacro:" in text:
-        raise RobotFileError(source, 0, "this is a xacro file: expand it first (xacro FILE > robot.urdf)")
+        raise RobotFileError(
+            source, 0, "this is a xacro file: expand it first (xacro FILE > robot.urdf)"
+        )
     try:
         root = Xml.fromstring(text)
     except Xml.ParseError as error:
@@ -91,11 +101,16 @@ def urdf_tree(text: str, source: str) -> UrdfTree:
 
 
 def _link(element: Xml.Element) -> UrdfLink:
-    name, inertial = element.attrib["name"], element.find("inertial")
-    shapes = tuple(shape for one in element.findall("collision") if (shape := _shape(one)) is not None)
+    name = element.attrib["name"]
+    inertial = element.find("inertial")
+    shapes = tuple(
+        shape for one in element.findall("collision") if (shape := _shape(one)) is not None
+    )
     if inertial is None:
         return UrdfLink(name, 0.0, np.zeros(3), np.zeros((3, 3)), shapes)
-    pose, mass, inertia = _origin(inertial), inertial.find("mass"), inertial.find("inertia")
+    pose = _origin(inertial)
+    mass = inertial.find("mass")
+    inertia = inertial.find("inertia")
     keys = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     entries = [float(inertia.get(key, "0")) if inertia is not None else 0.0 for key in keys]
     about = pose[:3, :3] @ inertia_matrix(entries) @ pose[:3, :3].T
@@ -105,9 +120,13 @@ def _link(element: Xml.Element) -> UrdfLink:
 
 
 def _joint(element: Xml.Element) -> UrdfJoint:
-    axis, limit = element.find("axis"), element.find("limit")
-    direction = _numbers(axis.get("xyz", "1 0 0")) if axis is not None else np.array([1.0, 0.0, 0.0])
-    parent, child = element.find("parent"), element.find("child")
+    axis = element.find("axis")
+    limit = element.find("limit")
+    direction = (
+        _numbers(axis.get("xyz", "1 0 0")) if axis is not None else np.array([1.0, 0.0, 0.0])
+    )
+    parent = element.find("parent")
+    child = element.find("child")
     if parent is None or child is None:
         raise ValueError(f"joint {element.attrib['name']} has no parent or no child")
     values = [float(limit.get(key, "0")) if limit is not None else 0.0 for key in _LIMITS]
@@ -133,7 +152,9 @@ def _shape(element: Xml.Element) -> UrdfShape | None:
     for one in () if geometry is None else geometry:
         pose = _origin(element)
         if one.tag == "mesh":
-            return UrdfShape("mesh", pose, _numbers(one.get("scale", "1 1 1")), one.attrib["filename"])
+            return UrdfShape(
+                "mesh", pose, _numbers(one.get("scale", "1 1 1")), one.attrib["filename"]
+            )
         if one.tag == "box":
             return UrdfShape("box", pose, _numbers(one.attrib["size"]))
         if one.tag == "cylinder":
@@ -145,8 +166,11 @@ def _shape(element: Xml.Element) -> UrdfShape | None:
 
 
 def _origin(element: Xml.Element) -> FloatArray:
-    """The pose (4, 4) of an element's origin; angles written with few digits are taken as right angles."""
-    pose, origin = np.eye(4), element.find("origin")
+    """The pose (4, 4) of an element's origin; angles written with few digits are taken as right
+    angles.
+    """
+    pose = np.eye(4)
+    origin = element.find("origin")
     if origin is not None:
         roll, pitch, yaw = np.degrees(_numbers(origin.get("rpy", "0 0 0")))
         R = rotation_from_abc((yaw, pitch, roll))

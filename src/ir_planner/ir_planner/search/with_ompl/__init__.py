@@ -1,4 +1,6 @@
-"""OMPL's planners as searches: each in one file, all through one adapter, each request in its own process."""
+"""OMPL's planners as searches: each in one file, all through one adapter, each request in its own
+process.
+"""
 
 from ir_planner.search.port import Search
 from ir_planner.search.with_ompl.aorrtc import Aorrtc

@@ -18,7 +18,10 @@ class Bkpiece(OverCells):
     planner: ClassVar[str] = "BKPIECE1"
 
     failed_score: float = setting(
-        0.5, "What the score of a cell is multiplied by where a motion failed.", minimum=0.01, maximum=1.0
+        0.5,
+        "What the score of a cell is multiplied by where a motion failed.",
+        minimum=0.01,
+        maximum=1.0,
     )
 
     def parameters(self) -> dict[str, float]:

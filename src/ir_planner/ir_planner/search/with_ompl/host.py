@@ -1,7 +1,8 @@
-"""Asks OMPL's processes: starts the one that has loaded it, hands over problems, kills what is late.
+"""Asks OMPL's processes: starts the one that has loaded it, hands over problems, kills what is
+late.
 
-Nothing here waits without an end: a process that is stopped, or that never answers, costs a request its time
-and no more.
+Nothing here waits without an end: a process that is stopped, or that never answers, costs a request
+its time and no more.
 """
 
 from __future__ import annotations
@@ -29,7 +30,9 @@ _LOOK_S = 0.005  # s between two looks whether the request was cancelled or its 
 _ATTEMPTS = 2  # a host that died since the last request is started again once
 _LAST_S = 0.02  # s on the request's clock, for an answer that is asked for at its end
 _LAST_LOOKS = 400  # at most, where that clock stands
-_PATIENCE = 24_000  # looks, two minutes, until a host that answers nobody is ended: OMPL loads in seconds
+_PATIENCE = (
+    24_000  # looks, two minutes, until a host that answers nobody is ended: OMPL loads in seconds
+)
 Charged = Callable[[int], AbstractContextManager[object]]
 _charged: Charged = lambda process: nullcontext()  # noqa: E731 - until somebody asks
 
@@ -50,12 +53,17 @@ class Host:
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 pass_fds=[theirs.fileno()],
-                env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
+                env={
+                    **os.environ,
+                    "PYTHONPATH": os.pathsep.join(path for path in sys.path if path),
+                },
             )
         self.owner = os.getpid()
 
     def connection(self) -> Connection:
-        """To a new process, which waits for one problem. Raises OSError where the host is gone, or stands."""
+        """To a new process, which waits for one problem. Raises OSError where the host is gone, or
+        stands.
+        """
         ours, theirs = socket.socketpair()
         with theirs, ours:
             socket.send_fds(self._ours, [b"."], [theirs.fileno()])
@@ -106,8 +114,8 @@ def _dropped(host: Host) -> None:
 
 @contextmanager
 def _connected(work: Work) -> Iterator[tuple[Connection, int] | None]:
-    """A connection to a new process, and its id; the process is killed with the context: it waits after its
-    answer. None where the work ended before it was there.
+    """A connection to a new process, and its id; the process is killed with the context: it waits
+    after its answer. None where the work ended before it was there.
     """
     for _ in range(_ATTEMPTS):
         host = _current()
@@ -136,12 +144,16 @@ def _connected(work: Work) -> Iterator[tuple[Connection, int] | None]:
 
 def missing() -> str:
     """How to install OMPL where it isn't; "" where it is."""
-    return "" if find_spec("ompl") else 'OMPL is missing: pip install "ir_planner[ompl]", or pip install ompl'
+    return (
+        ""
+        if find_spec("ompl")
+        else 'OMPL is missing: pip install "ir_planner[ompl]", or pip install ompl'
+    )
 
 
 def charge_to(charged: Charged) -> None:
-    """From now on enter the context of each process in which OMPL answers, by its id; it is left while the
-    process is still there. For who counts what a request costs.
+    """From now on enter the context of each process in which OMPL answers, by its id; it is left
+    while the process is still there. For who counts what a request costs.
     """
     global _charged
     _charged = charged
@@ -170,9 +182,13 @@ def asked(problem: Problem, work: Work) -> Outcome:
 
 
 def _answer(connection: Connection, process: int, problem: Problem, work: Work) -> Outcome:
-    """What the process says to the problem. Both go through a file in memory, which never blocks."""
+    """What the process says to the problem. Both go through a file in memory, which never
+    blocks.
+    """
     with os.fdopen(os.memfd_create("problem"), "r+b") as sheet:
-        pickle.dump(replace(problem, scene=replace(problem.scene)), sheet)  # without what it has computed
+        pickle.dump(
+            replace(problem, scene=replace(problem.scene)), sheet
+        )  # without what it has computed
         sheet.flush()
         try:
             send_handle(connection, sheet.fileno(), process)
@@ -187,7 +203,9 @@ def _answer(connection: Connection, process: int, problem: Problem, work: Work) 
 
 
 def _answered(connection: Connection, work: Work) -> bool:
-    """Whether the process has answered; when the work is over it is asked for what it has found so far."""
+    """Whether the process has answered; when the work is over it is asked for what it has found so
+    far.
+    """
     while not connection.poll(_LOOK_S):
         work.check()
         if work.exhausted:

@@ -17,9 +17,14 @@ class Kpiece(OverCells):
     planner_id: ClassVar[str] = "kpiece"
     planner: ClassVar[str] = "KPIECE1"
 
-    goal_bias: float = setting(0.05, "Share of the motions that aim at a goal.", minimum=0.0, maximum=1.0)
+    goal_bias: float = setting(
+        0.05, "Share of the motions that aim at a goal.", minimum=0.0, maximum=1.0
+    )
     failed_score: float = setting(
-        0.5, "What the score of a cell is multiplied by where a motion failed.", minimum=0.01, maximum=1.0
+        0.5,
+        "What the score of a cell is multiplied by where a motion failed.",
+        minimum=0.01,
+        maximum=1.0,
     )
 
     def parameters(self) -> dict[str, float]:

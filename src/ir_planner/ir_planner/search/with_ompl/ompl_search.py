@@ -13,14 +13,19 @@ from ir_planner.search.with_ompl.problem import Parameters
 
 @dataclass(frozen=True)
 class OmplSearch:
-    """planner_id: name of the search; planner: OMPL's class of it; reverse: it gets the goals as starts."""
+    """planner_id: name of the search; planner: OMPL's class of it; reverse: it gets the goals as
+    starts.
+    """
 
     planner_id: ClassVar[str]
     planner: ClassVar[str]
     reverse: ClassVar[bool] = False
 
     edges: int = setting(
-        100_000_000, "Checks in certified edges before it is given up.", minimum=1, maximum=100_000_000
+        100_000_000,
+        "Checks in certified edges before it is given up.",
+        minimum=1,
+        maximum=100_000_000,
     )
 
     def __post_init__(self) -> None:

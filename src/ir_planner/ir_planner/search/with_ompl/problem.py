@@ -13,9 +13,9 @@ STOP = "stop"
 
 @dataclass(frozen=True)
 class Parameters:
-    """planner: name of a class in ompl.geometric; values: what its set... methods are called with, by the
-    rest of their names; cell [rad]: cells of KPIECE's grid over the first three joints, 0 for OMPL's own
-    projection; reverse: it is asked for the movement from the goals to the start.
+    """planner: name of a class in ompl.geometric; values: what its set... methods are called with,
+    by the rest of their names; cell [rad]: cells of KPIECE's grid over the first three joints, 0
+    for OMPL's own projection; reverse: it is asked for the movement from the goals to the start.
     """
 
     planner: str
@@ -26,8 +26,9 @@ class Parameters:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """From start (n,) to any of goals (G, n), farther from everything than threshold (Z,) m; `edges`: checks
-    before it is given up; `seconds`: after which the process is ended, whatever it does.
+    """From start (n,) to any of goals (G, n), farther from everything than threshold (Z,) m;
+    `edges`: checks before it is given up; `seconds`: after which the process is ended, whatever it
+    does.
     """
 
     scene: PlanningScene
@@ -42,7 +43,8 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """A path (M, n), None where none was found; checks in edges; error: why OMPL could not be asked;
+    """A path (M, n), None where none was found; checks in edges; error: why OMPL could not be
+    asked;
     unusable: because it is installed but can't be loaded.
     """
 

@@ -20,7 +20,9 @@ class Rrt(OmplSearch):
     range: float = setting(
         2.0, "Longest motion that is added at once.", unit="rad", minimum=0.01, maximum=50.0
     )
-    goal_bias: float = setting(0.05, "Share of the motions that aim at a goal.", minimum=0.0, maximum=1.0)
+    goal_bias: float = setting(
+        0.05, "Share of the motions that aim at a goal.", minimum=0.0, maximum=1.0
+    )
 
     def parameters(self) -> dict[str, float]:
         """OMPL's parameters by the names of their set... methods."""

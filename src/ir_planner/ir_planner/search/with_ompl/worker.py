@@ -1,8 +1,11 @@
-"""The processes in which OMPL runs: one that has loaded it, and for each request one forked from that.
+"""The processes in which OMPL runs: one that has loaded it, and for each request one forked from
+that.
 
-OMPL draws from one generator per process and stops where it looks for its end, so each request gets a
-process of its own: the seed decides its answer, and whatever it does it can be killed. Motions are certified
-edges of the same kernel that the project's searches use; what a planner may spend is counted in them.
+OMPL draws from one generator per process and stops where it looks for its end, so each request gets
+a
+process of its own: the seed decides its answer, and whatever it does it can be killed. Motions are
+certified edges of the same kernel that the project's searches use; what a planner may spend is
+counted in them.
 """
 
 from __future__ import annotations
@@ -29,15 +32,20 @@ try:
 except ImportError as error:  # reported to whoever asks
     _REASON = str(error)
 
-STATES_PER_EDGE = 40  # configurations that cost as much as one certified edge, as in the genetic search
+STATES_PER_EDGE = (
+    40  # configurations that cost as much as one certified edge, as in the genetic search
+)
 _LOOK = 64  # checks between two looks whether somebody still waits for the answer
 _PR_SET_PDEATHSIG = 1  # of prctl: the signal that a process gets when its parent ends
-_GRACE = 600.0  # s beyond the ceiling: who asks ends the process at the ceiling, this is for when nobody does
+# s beyond the ceiling: who asks ends the process at the ceiling, this is for when nobody does
+_GRACE = 600.0
 _JOINTS_OF_CELLS = 3  # the first joints carry the arm
 
 
 def main(descriptor: int) -> None:
-    """Fork a process for every connection that arrives over a socket, until its other end is closed."""
+    """Fork a process for every connection that arrives over a socket, until its other end is
+    closed.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who asks
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody waits for the forked: no zombies
     if not _REASON:
@@ -67,8 +75,12 @@ def _answer(connection: Connection, parent: int) -> None:
         problem: Problem = pickle.load(sheet)
         signal.setitimer(signal.ITIMER_REAL, problem.seconds + _GRACE)
         try:
-            outcome = Outcome(None, 0, _REASON, unusable=True) if _REASON else solved(problem, connection)
-        except Exception as error:  # goes to who asked, whatever it is: this process has no other voice
+            outcome = (
+                Outcome(None, 0, _REASON, unusable=True) if _REASON else solved(problem, connection)
+            )
+        except (
+            Exception
+        ) as error:  # goes to who asked, whatever it is: this process has no other voice
             outcome = Outcome(None, 0, f"{type(error).__name__}: {error}")
         sheet.seek(0)
         pickle.dump(outcome, sheet)
@@ -80,13 +92,17 @@ def _answer(connection: Connection, parent: int) -> None:
 class _Counted:
     """Configurations and motions, checked and counted; ends the search when its checks are spent.
 
-    The planner asks `end` in C++, without Python's lock: PRM waits for a thread of its own that asks it too.
+    The planner asks `end` in C++, without Python's lock: PRM waits for a thread of its own that
+    asks it too.
     """
 
     def __init__(self, problem: Problem, connection: Connection) -> None:
         self._space = FreeSpace(problem.scene, problem.threshold, Work(2**62, 1.0, lambda: 0.0))
-        self._most, self._connection = problem.edges * STATES_PER_EDGE, connection
-        self._n, self._spent, self._looks = len(problem.start), 0, 0
+        self._most = problem.edges * STATES_PER_EDGE
+        self._connection = connection
+        self._n = len(problem.start)
+        self._spent = 0
+        self._looks = 0
         self.end = base.plannerNonTerminatingCondition()
 
     @property
@@ -101,7 +117,8 @@ class _Counted:
 
     def motion(self, first: base.State, last: base.State) -> bool:
         """Whether a straight joint movement is certified free."""
-        q0, q1 = np.array([first[0 : self._n]]), np.array([last[0 : self._n]])
+        q0 = np.array([first[0 : self._n]])
+        q1 = np.array([last[0 : self._n]])
         return self._affordable(STATES_PER_EDGE) and bool(self._space.edges_free(q0, q1)[0])
 
     def _affordable(self, states: int) -> bool:
@@ -128,7 +145,8 @@ def solved(problem: Problem, connection: Connection) -> Outcome:
     """One planner, one problem."""
     util.RNG.setSeed(problem.seed % (2**32 - 1) + 1)
     counted = _Counted(problem, connection)
-    n, robot = len(problem.start), problem.scene.cell.robot
+    n = len(problem.start)
+    robot = problem.scene.cell.robot
     bounds = base.RealVectorBounds(n)
     for joint in range(n):
         bounds.setLow(joint, float(robot.position_min[joint]))
@@ -140,7 +158,8 @@ def solved(problem: Problem, connection: Connection) -> Outcome:
     setup.setStateValidityChecker(counted.state)
     validator = _validator(information, counted)
     information.setMotionValidator(validator)
-    begins, ends = problem.start[None], problem.goals
+    begins = problem.start[None]
+    ends = problem.goals
     if problem.parameters.reverse:
         begins, ends = ends, begins
     for configuration in begins:
@@ -180,5 +199,7 @@ def _planner(
     if parameters.cell > 0.0:
         joints = list(range(min(_JOINTS_OF_CELLS, space.getDimension())))
         sizes = [parameters.cell] * len(joints)
-        planner.setProjectionEvaluator(base.RealVectorOrthogonalProjectionEvaluator(space, sizes, joints))
+        planner.setProjectionEvaluator(
+            base.RealVectorOrthogonalProjectionEvaluator(space, sizes, joints)
+        )
     return planner

@@ -28,8 +28,9 @@ class Amount:
 
 @dataclass(frozen=True)
 class Year:
-    """A program in production: its cycles, the energy [J] of a shift and of a year, and what it saves a year
-    [J]. fit_a_shift: cycles that it can make; fewer where it takes longer than those that are counted.
+    """A program in production: its cycles, the energy [J] of a shift and of a year, and what it
+    saves a year [J]. fit_a_shift: cycles that it can make; fewer where it takes longer than those
+    that are counted.
     """
 
     cycles_a_shift: float
@@ -44,8 +45,10 @@ def year_of(found: BeforeAfter, side: Side, costs: Costs) -> Year:
     """A side in production: as many cycles as today's program makes, or as the line asks for."""
     asked = side.cycle_time if side.cycle_time > 0.0 and side is not found.today else 0.0
     seconds = asked or found.today.report.duration
-    shift, year = costs.cycles_per_shift(seconds), costs.cycles_per_year(seconds)
-    report, saving = side.report, side.saving
+    shift = costs.cycles_per_shift(seconds)
+    year = costs.cycles_per_year(seconds)
+    report = side.report
+    saving = side.saving
     cycle = Amount(report.energy, report.energy_low, report.energy_high)
     saved = Amount(saving.saved, saving.saved_low, saving.saved_high)
     fit = costs.cycles_per_shift(max(report.duration, 1e-9))

@@ -9,7 +9,16 @@ from ir_recorder.report.before_after.amounts import Amount, Year, year_of
 from ir_recorder.report.costs import SETTINGS, Costs
 from ir_recorder.report.money import money
 from ir_recorder.report.tables import table
-from ir_recorder.report.words import DASH, joules, kilowatt_hours, millimetres, number, seconds, text, watts
+from ir_recorder.report.words import (
+    DASH,
+    joules,
+    kilowatt_hours,
+    millimetres,
+    number,
+    seconds,
+    text,
+    watts,
+)
 
 WORK = {1: "a power mode", 2: "other times on the same path", 3: "another path"}
 Show = Callable[[float], str]
@@ -19,14 +28,21 @@ OPEN = "zero lies in it: it is open whether anything is saved"
 
 def tiles(found: BeforeAfter, costs: Costs) -> str:
     """The answer in five figures, of the side that the changes lead to."""
-    side, report, today = found.planned, found.planned.report, found.today.report
-    saved, year = side.saving, year_of(found, side, costs).saved
+    side = found.planned
+    report = found.planned.report
+    today = found.today.report
+    saved = side.saving
+    year = year_of(found, side, costs).saved
     sure = "" if saved.certain else OPEN
     between = _between(saved.saved_low, saved.saved_high, joules)
     shown = (
         ("saved a cycle", f"{100.0 * saved.share:.1f} %", between, sure),
         ("saved a year", money(costs.money(year.value), costs.currency), _money(year, costs)),
-        ("CO2 saved a year", number(costs.co2(year.value), "kg"), f"{kilowatt_hours(year.value)} less"),
+        (
+            "CO2 saved a year",
+            number(costs.co2(year.value), "kg"),
+            f"{kilowatt_hours(year.value)} less",
+        ),
         ("cycle time", seconds(report.duration), f"today {seconds(today.duration)}", side.name),
         (
             "peak power",
@@ -51,14 +67,26 @@ def figure_table(found: BeforeAfter, costs: Costs) -> str:
         ("the same in kWh", *(_energy(side, kilowatt_hours) for side in sides)),
         ("saved a cycle", *(_saved(side, side is found.today) for side in sides)),
         ("cycles a shift", *(_cycles(year) for year in years)),
-        ("energy a shift", *(_amount(year.shift if year else None, kilowatt_hours) for year in years)),
-        ("energy a year", *(_amount(year.energy if year else None, kilowatt_hours) for year in years)),
+        (
+            "energy a shift",
+            *(_amount(year.shift if year else None, kilowatt_hours) for year in years),
+        ),
+        (
+            "energy a year",
+            *(_amount(year.energy if year else None, kilowatt_hours) for year in years),
+        ),
         ("costs a year", *(_cost(year.energy if year else None, costs) for year in years)),
-        ("saved a year", *(_cost(year.saved if year and k else None, costs) for k, year in enumerate(years))),
+        (
+            "saved a year",
+            *(_cost(year.saved if year and k else None, costs) for k, year in enumerate(years)),
+        ),
         ("CO2 a year", *(_co2(year, costs) for year in years)),
         (
             "peak power",
-            *(_of(side, watts(side.report.peak_power), _between(*side.peak, watts)) for side in sides),
+            *(
+                _of(side, watts(side.report.peak_power), _between(*side.peak, watts))
+                for side in sides
+            ),
         ),
         ("least clearance", *(_of(side, millimetres(side.report.min_clearance)) for side in sides)),
         ("clearance and limits", *(_proof(side) for side in sides)),
@@ -105,7 +133,9 @@ def _keyed(side: Side) -> Sequence[tuple[tuple[str, int], str]]:
         times[hop.name] = times.get(hop.name, 0) + 1
         mode = hop.power_mode.replace(">", ", ").replace("_", " ").lower()
         between = _between(hop.energy_low, hop.energy_high, joules)
-        cell = _cell(joules(hop.energy), between, f"{seconds(hop.seconds)}{f', {mode}' if mode else ''}")
+        cell = _cell(
+            joules(hop.energy), between, f"{seconds(hop.seconds)}{f', {mode}' if mode else ''}"
+        )
         found.append(((hop.name, times[hop.name]), cell))
     return found
 
@@ -120,18 +150,21 @@ def assumptions(found: BeforeAfter, costs: Costs) -> str:
         items.append(f"{each.name.replace('_', ' ')} {shown}{mark}")
     parameters = found.today.report.power_parameters or "the data sheet"
     said = (
-        "All energies are predicted at the mains by the same model, with 90 % intervals from the uncertainty "
-        f"of the power parameters ({parameters}). What is saved has an interval of its own: the same drawn "
-        "robots drive both programs. Intervals by the data sheet lie mostly above their values: losses that "
-        "it puts at zero can only add. A year has as many cycles for every program as today's can make, in "
-        "the column for the line as many as the line asks for, and there today's program waits at its end as "
-        "well; what is left of a shift counts nothing."
+        "All energies are predicted at the mains by the same model, with 90 % intervals from "
+        f"the uncertainty of the power parameters ({parameters}). What is saved has an interval "
+        "of its own: the same drawn robots drive both programs. Intervals by the data sheet lie "
+        "mostly above their values: losses that it puts at zero can only add. A year has as "
+        "many cycles for every program as today's can make, in the column for the line as many "
+        "as the line asks for, and there today's program waits at its end as well; what is left "
+        "of a shift counts nothing."
     )
     return f'<p class="hint">{text(said)}</p><p class="hint">{text(", ".join(items))}.</p>'
 
 
 def _cell(value: str, *smaller: str) -> str:
-    return f"<b>{text(value)}</b>" + "".join(f"<small>{text(line)}</small>" for line in smaller if line)
+    return f"<b>{text(value)}</b>" + "".join(
+        f"<small>{text(line)}</small>" for line in smaller if line
+    )
 
 
 def _of(side: Side, shown: str, *smaller: str) -> str:
@@ -140,7 +173,9 @@ def _of(side: Side, shown: str, *smaller: str) -> str:
 
 def _energy(side: Side, show: Show) -> str:
     report = side.report
-    return _amount(Amount(report.energy, report.energy_low, report.energy_high) if side.found else None, show)
+    return _amount(
+        Amount(report.energy, report.energy_low, report.energy_high) if side.found else None, show
+    )
 
 
 def _saved(side: Side, own: bool) -> str:
@@ -157,7 +192,8 @@ def _cycles(year: Year | None) -> str:
         return DASH
     few = year.fit_a_shift < _FIT * year.cycles_a_shift
     return _cell(
-        _count(year.cycles_a_shift), f"only {_count(year.fit_a_shift)} fit: it is slower" if few else ""
+        _count(year.cycles_a_shift),
+        f"only {_count(year.fit_a_shift)} fit: it is slower" if few else "",
     )
 
 

@@ -1,4 +1,6 @@
-"""One HTML file: today's program and the planner's, for those who pay and for those who change programs."""
+"""One HTML file: today's program and the planner's, for those who pay and for those who change
+programs.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +53,9 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
     }
     parts = {
         "title": text(f"{cell.name}: today and planned"),
-        "subtitle": text(f"{found.name} ({found.kind}) against what the planner makes of the same stops"),
+        "subtitle": text(
+            f"{found.name} ({found.kind}) against what the planner makes of the same stops"
+        ),
         "problems": _problems(found),
         "tiles": tiles(found, prices),
         "figures": figure_table(found, prices),
@@ -68,7 +72,10 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
 
 
 def _problems(found: BeforeAfter) -> str:
-    items = [*found.notes, *(f"{side.name}: {side.problem}" for side in found.sides if not side.found)]
+    items = [
+        *found.notes,
+        *(f"{side.name}: {side.problem}" for side in found.sides if not side.found),
+    ]
     if not items:
         return ""
     listed = "".join(f"<li>{text(item)}</li>" for item in items)

@@ -1,4 +1,6 @@
-"""Every movement and pause of all programs as columns of numbers, for CSV, Parquet and pandas: SI units."""
+"""Every movement and pause of all programs as columns of numbers, for CSV, Parquet and pandas: SI
+units.
+"""
 
 from __future__ import annotations
 
@@ -32,13 +34,23 @@ def write_before_after_table(
 
 
 def _whole(found: BeforeAfter, side: Side, costs: Costs) -> Mapping[str, Cell]:
-    report, saving, year = side.report, side.saving, year_of(found, side, costs)
+    report = side.report
+    saving = side.saving
+    year = year_of(found, side, costs)
     money = year.saved.of(costs.money)
     kwh = year.energy.of(lambda joules: joules / J_PER_KWH)
     return {
         **{"program": side.name, "what": "cycle", "mode": "", "seconds_s": report.duration},
-        **{"energy_j": report.energy, "energy_low_j": report.energy_low, "energy_high_j": report.energy_high},
-        **{"saved_j": saving.saved, "saved_low_j": saving.saved_low, "saved_high_j": saving.saved_high},
+        **{
+            "energy_j": report.energy,
+            "energy_low_j": report.energy_low,
+            "energy_high_j": report.energy_high,
+        },
+        **{
+            "saved_j": saving.saved,
+            "saved_low_j": saving.saved_low,
+            "saved_high_j": saving.saved_high,
+        },
         **{"peak_w": report.peak_power, "peak_low_w": side.peak[0], "peak_high_w": side.peak[1]},
         **{"clearance_m": report.min_clearance, "shift_cycles": year.cycles_a_shift},
         **_amounts("shift_kwh", year.shift.of(lambda joules: joules / J_PER_KWH)),
@@ -58,7 +70,11 @@ def _changes(found: BeforeAfter, costs: Costs) -> Sequence[Mapping[str, Cell]]:
     cycles = year_of(found, found.planned, costs).cycles_a_year
     return [
         {
-            **{"program": found.towards, "what": f"change {k}: {change.name}", "mode": change.words},
+            **{
+                "program": found.towards,
+                "what": f"change {k}: {change.name}",
+                "mode": change.words,
+            },
             **{"seconds_s": change.seconds[1]},
             **{"saved_j": change.saving.saved},
             **{"saved_low_j": change.saving.saved_low, "saved_high_j": change.saving.saved_high},
@@ -71,8 +87,17 @@ def _changes(found: BeforeAfter, costs: Costs) -> Sequence[Mapping[str, Cell]]:
 def _hops(side: Side) -> Sequence[Mapping[str, Cell]]:
     return [
         {
-            **{"program": side.name, "what": hop.name, "mode": hop.power_mode, "seconds_s": hop.seconds},
-            **{"energy_j": hop.energy, "energy_low_j": hop.energy_low, "energy_high_j": hop.energy_high},
+            **{
+                "program": side.name,
+                "what": hop.name,
+                "mode": hop.power_mode,
+                "seconds_s": hop.seconds,
+            },
+            **{
+                "energy_j": hop.energy,
+                "energy_low_j": hop.energy_low,
+                "energy_high_j": hop.energy_high,
+            },
         }
         for hop in side.hops
     ]

@@ -1,4 +1,6 @@
-"""Many robots and shifts on one page: kWh by robot, mode and movement, and what could be saved by what."""
+"""Many robots and shifts on one page: kWh by robot, mode and movement, and what could be saved by
+what.
+"""
 
 from ir_recorder.report.fleet.members import MOST, Member, member_of, read_members
 from ir_recorder.report.fleet.page import fleet_html, write_fleet

@@ -1,4 +1,6 @@
-"""Which files a fleet is made of: recordings of folders, whose robot each one is of, none of them twice."""
+"""Which files a fleet is made of: recordings of folders, whose robot each one is of, none of them
+twice.
+"""
 
 from __future__ import annotations
 
@@ -16,16 +18,20 @@ _BLOCK = 1 << 16  # bytes of the end of a file: the summary of a recording, whic
 
 @dataclass(frozen=True)
 class RecordedFile:
-    """A recording and the robot that it is of; folder: what makes two robots of one name different ones."""
+    """A recording and the robot that it is of; folder: what makes two robots of one name different
+    ones.
+    """
 
     path: Path
     robot: str
     folder: Path
 
 
-def recordings_below(paths: Sequence[str | Path], roots: FileRoots, said: Said) -> list[RecordedFile]:
-    """The recordings of files and folders, folders with all below them; `said` hears what is left out and
-    why. A folder below one that is named is a robot, else the file is.
+def recordings_below(
+    paths: Sequence[str | Path], roots: FileRoots, said: Said
+) -> list[RecordedFile]:
+    """The recordings of files and folders, folders with all below them; `said` hears what is left
+    out and why. A folder below one that is named is a robot, else the file is.
     """
     found: dict[Path, RecordedFile] = {}
     for path in map(Path, paths):
@@ -54,7 +60,9 @@ def _recorded(path: Path, top: Path | None) -> RecordedFile:
 
 
 def _without_copies(files: Sequence[RecordedFile], said: Said) -> list[RecordedFile]:
-    """Without files that are copies of another one of the same robot; those of another robot are named."""
+    """Without files that are copies of another one of the same robot; those of another robot are
+    named.
+    """
     kept: dict[tuple[int, str], RecordedFile] = {}
     found = []
     for file in files:
@@ -81,12 +89,17 @@ def _content(path: Path) -> tuple[int, str] | None:
 
 
 def _distinguished(files: Sequence[RecordedFile]) -> list[RecordedFile]:
-    """Robots of one name in several folders get the name of the folder above as well, or the whole path."""
+    """Robots of one name in several folders get the name of the folder above as well, or the whole
+    path.
+    """
     above = [f"{file.folder.parent.name}/{file.robot}" for file in files]
     names = [file.robot for file in files]
     for longer in (above, [str(file.folder) for file in files]):
         folders: dict[str, set[Path]] = {}
         for name, file in zip(names, files, strict=True):
             folders.setdefault(name, set()).add(file.folder)
-        names = [more if len(folders[name]) > 1 else name for name, more in zip(names, longer, strict=True)]
+        names = [
+            more if len(folders[name]) > 1 else name
+            for name, more in zip(names, longer, strict=True)
+        ]
     return [replace(file, robot=name) for file, name in zip(files, names, strict=True)]

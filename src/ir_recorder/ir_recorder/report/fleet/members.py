@@ -26,10 +26,11 @@ ENDED = "ended"  # outcome of a step
 
 @dataclass(frozen=True)
 class Member:
-    """A recording of a robot. robot: the folder that the file lies in, or its own name; origin: "measured",
-    "simulated", "recorded", or "predicted" for a plan that was not driven.
+    """A recording of a robot. robot: the folder that the file lies in, or its own name; origin:
+    "measured", "simulated", "recorded", or "predicted" for a plan that was not driven.
 
-    seconds, joules: of a cycle; modes, movements: seconds and joules by name (modes: of the whole recording);
+    seconds, joules: of a cycle; modes, movements: seconds and joules by name (modes: of the whole
+    recording);
     measures: joules of a cycle that each could save at most.
     """
 
@@ -47,9 +48,9 @@ class Member:
 def read_members(
     paths: Sequence[str | Path], roots: FileRoots, left_out: Said, shown: Said = lambda _: None
 ) -> list[Member]:
-    """The members of files and folders, folders with all recordings below them. What can't be read is
-    handed to `left_out` as a sentence; `shown` hears each file before it is read. ReadError where nothing is
-    left.
+    """The members of files and folders, folders with all recordings below them. What can't be read
+    is handed to `left_out` as a sentence; `shown` hears each file before it is read. ReadError
+    where nothing is left.
     """
     members = []
     files = recordings_below(paths, roots, left_out)
@@ -77,8 +78,11 @@ def _say(said: Said, path: Path, sentence: str) -> None:
 
 
 def member_of(analysis: Analysis, robot: str, said: Said = lambda _: None) -> Member | None:
-    """The totals of a recording; None where it has none, and `said` hears why, and what limits them."""
-    recording, savings = analysis.recording, analysis.savings
+    """The totals of a recording; None where it has none, and `said` hears why, and what limits
+    them.
+    """
+    recording = analysis.recording
+    savings = analysis.savings
     cell = analysis.cell.name if analysis.cell is not None else ""
     measures = {lever.name: lever.joules for lever in levers(analysis, most=20)}
     if analysis.program is not None and math.isfinite(analysis.program.whole.energy):
@@ -89,11 +93,21 @@ def member_of(analysis: Analysis, robot: str, said: Said = lambda _: None) -> Me
     total = savings.total
     parts = {"movements": savings.movements, "pauses": savings.pauses}
     movements = {
-        name: Share(name, one.seconds, one.planned) for name, one in parts.items() if one.seconds > 0.0
+        name: Share(name, one.seconds, one.planned)
+        for name, one in parts.items()
+        if one.seconds > 0.0
     }
     measures[PLANNED] = total.saved
     return Member(
-        robot, recording.path.name, cell, "predicted", total.seconds, total.planned, {}, movements, measures
+        robot,
+        recording.path.name,
+        cell,
+        "predicted",
+        total.seconds,
+        total.planned,
+        {},
+        movements,
+        measures,
     )
 
 
@@ -101,14 +115,18 @@ def _driven(
     analysis: Analysis, robot: str, cell: str, measures: Mapping[str, float], said: Said
 ) -> Member | None:
     """The mean cycle of a program that was driven; None where no cycle was driven to its end."""
-    recording, program = analysis.recording, analysis.program
+    recording = analysis.recording
+    program = analysis.program
     assert program is not None  # asked before
     cycles, ended = _cycles(analysis)
     if cycles < 1.0:
         said(f"left out: its program was not driven to the end: {ended}")
         return None
     if cycles != round(cycles):
-        said(f"its last cycle was not driven to the end ({ended}): it counts as {cycles % 1.0:.2f} of one")
+        said(
+            f"its last cycle was not driven to the end ({ended}): it counts as "
+            f"{cycles % 1.0:.2f} of one"
+        )
     if program.unshortened is not None:
         said("the pauses of the run are shortened: its year is one of such cycles")
     return Member(
@@ -127,7 +145,8 @@ def _driven(
 def _cycles(analysis: Analysis) -> tuple[float, str]:
     """How many cycles of its program a recording holds, and of the steps which ended, in words."""
     steps = [result.step for result in analysis.steps]
-    ended, total = sum(step.outcome == ENDED for step in steps), steps[0].total
+    ended = sum(step.outcome == ENDED for step in steps)
+    total = steps[0].total
     return ended / max(total, 1), f"{ended % total or total} of {total} steps ended"
 
 
@@ -136,6 +155,8 @@ def _by_name(rows: Iterator[tuple[str, float, float]]) -> dict[str, Share]:
     for name, seconds, joules in rows:
         before = found.get(name, Share(name, 0.0, 0.0))
         found[name] = Share(
-            name, before.seconds + seconds, before.energy + (joules if math.isfinite(joules) else 0.0)
+            name,
+            before.seconds + seconds,
+            before.energy + (joules if math.isfinite(joules) else 0.0),
         )
     return found

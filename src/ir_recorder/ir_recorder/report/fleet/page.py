@@ -30,7 +30,9 @@ def write_fleet(
     return write_output(path, fleet_html(members, left_out, costs).encode(), PAGE_START, roots)
 
 
-def fleet_html(members: Sequence[Member], left_out: Sequence[str] = (), costs: Costs | None = None) -> str:
+def fleet_html(
+    members: Sequence[Member], left_out: Sequence[str] = (), costs: Costs | None = None
+) -> str:
     """The page as text; left_out: a sentence for each file that could not be used."""
     prices = costs or Costs()
     robots = robots_of(members, prices)
@@ -38,14 +40,19 @@ def fleet_html(members: Sequence[Member], left_out: Sequence[str] = (), costs: C
         _section("Robots", _robots(robots, prices)),
         _section("By power mode", _matrix("mode", by_mode(members, prices), robots)),
         _section("What could be saved, by measure", _potential(members, robots, prices)),
-        _section("By movement and pause", _matrix("movement", by_movement(members, prices), robots)),
+        _section(
+            "By movement and pause", _matrix("movement", by_movement(members, prices), robots)
+        ),
     ]
     title = f"{len(robots)} robots, {len(members)} recordings"
-    head = '<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
+    head = (
+        '<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
+    )
     return (
         f'<!doctype html><html lang="en"><head>{head}<title>{text(title)}</title>'
         f"<style>{asset('page.css')}</style></head><body><header><div><h1>{text(title)}</h1>"
-        f'<p class="subtitle">{text(_origins(members))}; a year of each robot, one cycle after the other</p>'
+        f'<p class="subtitle">{text(_origins(members))}; a year of each robot, one cycle after '
+        "the other</p>"
         f"</div></header><main>{_problems(left_out)}{''.join(sections)}{_assumptions(prices)}</main>"
         f"<script>{asset('export.js')}\nexportButtons();</script></body></html>"
     )
@@ -82,7 +89,17 @@ def _robots(robots: Sequence[Robot], costs: Costs) -> str:
             "",
         )
     )
-    heads = ("robot", "origin", ">recordings", ">cycle", ">energy", ">a year", ">costs", ">CO2", "share")
+    heads = (
+        "robot",
+        "origin",
+        ">recordings",
+        ">cycle",
+        ">energy",
+        ">a year",
+        ">costs",
+        ">CO2",
+        "share",
+    )
     return table(heads, rows, "Robots")
 
 
@@ -95,7 +112,9 @@ def _matrix(what: str, found: Mapping[str, Mapping[str, float]], robots: Sequenc
     if len(names) > _ROWS:
         rest = {r.name: sum(found[name].get(r.name, 0.0) for name in names[_ROWS:]) for r in robots}
         rows.append(_row(REST, rest, robots))
-    return table((what, *(f">{robot.name}" for robot in robots), ">all"), rows, f"kWh a year by {what}")
+    return table(
+        (what, *(f">{robot.name}" for robot in robots), ">all"), rows, f"kWh a year by {what}"
+    )
 
 
 def _row(name: str, own: Mapping[str, float], robots: Sequence[Robot]) -> tuple[str, ...]:
@@ -114,7 +133,8 @@ def _potential(members: Sequence[Member], robots: Sequence[Robot], costs: Costs)
     ]
     heads = ("measure", *(f">{robot.name}" for robot in robots), ">all", ">a year, at most")
     hint = (
-        "Upper bounds, each by itself: together they count some joules twice. What a plan saves is predicted."
+        "Upper bounds, each by itself: together they count some joules twice. What a plan "
+        "saves is predicted."
     )
     return f'<p class="hint">{hint}</p>{table(heads, rows, "kWh a year by measure")}'
 

@@ -1,4 +1,6 @@
-"""Sums over the members of a fleet, in production: joules of a year by robot, mode, movement and measure."""
+"""Sums over the members of a fleet, in production: joules of a year by robot, mode, movement and
+measure.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,9 @@ from ir_recorder.report.fleet.members import Member
 
 @dataclass(frozen=True)
 class Robot:
-    """All members of one robot: recordings, mean seconds and joules of a cycle, joules of a year."""
+    """All members of one robot: recordings, mean seconds and joules of a cycle, joules of a
+    year.
+    """
 
     name: str
     cell: str
@@ -23,7 +27,9 @@ class Robot:
 
 
 def robots_of(members: Sequence[Member], costs: Costs) -> list[Robot]:
-    """The robots, those that take most first. Several recordings of a robot (shifts) are averaged."""
+    """The robots, those that take most first. Several recordings of a robot (shifts) are
+    averaged.
+    """
     found = []
     for name in dict.fromkeys(member.robot for member in members):
         own = [member for member in members if member.robot == name]
@@ -43,15 +49,22 @@ def yearly_of(member: Member, costs: Costs) -> float:
 
 
 def by_mode(members: Sequence[Member], costs: Costs) -> dict[str, dict[str, float]]:
-    """Joules of a year by robot and mode: a recording's modes share its year as they share its joules."""
+    """Joules of a year by robot and mode: a recording's modes share its year as they share its
+    joules.
+    """
     return _summed(
-        members, ((m, s.name, s.energy) for m in members for s in m.modes.values()), costs, share=True
+        members,
+        ((m, s.name, s.energy) for m in members for s in m.modes.values()),
+        costs,
+        share=True,
     )
 
 
 def by_movement(members: Sequence[Member], costs: Costs) -> dict[str, dict[str, float]]:
     """Joules of a year by robot and movement or pause."""
-    return _summed(members, ((m, s.name, s.energy) for m in members for s in m.movements.values()), costs)
+    return _summed(
+        members, ((m, s.name, s.energy) for m in members for s in m.movements.values()), costs
+    )
 
 
 def by_measure(members: Sequence[Member], costs: Costs) -> dict[str, dict[str, float]]:
@@ -62,7 +75,10 @@ def by_measure(members: Sequence[Member], costs: Costs) -> dict[str, dict[str, f
 
 
 def _summed(
-    members: Sequence[Member], rows: Iterator[tuple[Member, str, float]], costs: Costs, share: bool = False
+    members: Sequence[Member],
+    rows: Iterator[tuple[Member, str, float]],
+    costs: Costs,
+    share: bool = False,
 ) -> dict[str, dict[str, float]]:
     """By name, then by robot; largest names first."""
     count = {m.robot: sum(other.robot == m.robot for other in members) for m in members}

@@ -14,15 +14,17 @@ def sentence(log: ConfigurationLog) -> str:
     """What was done at the station."""
     rejected = sum(count for _, count in log.rejected)
     said = (
-        f"Configurations at {log.station} by cyclic coordinate descent, eqs. (1) to (6): "
-        f"of {counted(log.starts, 'random start')} {were(log.accepted, 'accepted')}, {log.distinct} of them "
-        f"distinct; {were(rejected, 'rejected')}"
+        f"Configurations at {log.station} by cyclic coordinate descent, eqs. (1) to (6): of "
+        f"{counted(log.starts, 'random start')} {were(log.accepted, 'accepted')}, {log.distinct} "
+        f"of them distinct; {were(rejected, 'rejected')}"
     )
     return f"{said}: {reasons(log.rejected)}." if rejected else f"{said}."
 
 
 def picture(log: ConfigurationLog, cell: Cell, number: int) -> str:
-    """The cell from the side with the tool's places from sweep to sweep; "" where there is none to show."""
+    """The cell from the side with the tool's places from sweep to sweep; "" where there is none to
+    show.
+    """
     station = next((each for each in cell.stations if each.name == log.station), None)
     if station is None or not log.tracks:
         return ""
@@ -42,5 +44,8 @@ def picture(log: ConfigurationLog, cell: Cell, number: int) -> str:
         view.names(cell),
         view.scale_bar("from the side"),
     )
-    label = f"Search for configurations at {log.station}: {log.accepted} of {log.starts} starts accepted"
+    label = (
+        f"Search for configurations at {log.station}: {log.accepted} of {log.starts} starts "
+        "accepted"
+    )
     return drawing(content, label, f"configurations_{number}")

@@ -1,4 +1,6 @@
-"""A genetic correction: the straight movement, the parts of it that collided, and what became of it."""
+"""A genetic correction: the straight movement, the parts of it that collided, and what became of
+it.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ from ir_recorder.report.methods.view import HEIGHT, WIDTH, View, drawing
 from ir_recorder.report.methods.words import counted
 from ir_recorder.report.words import percent
 
-_CHART, _GAP = (222.0, 92.0), 10.0  # width and height of the chart; to the edges of the drawing
+# width and height of the chart; to the edges of the drawing
+_CHART = (222.0, 92.0)
+_GAP = 10.0
 
 
 def sentence(log: CorrectionLog) -> str:
@@ -20,14 +24,18 @@ def sentence(log: CorrectionLog) -> str:
     before, after = log.costs
     where = f"From {log.start or 'the start'} to {log.goal}" if log.goal else "A movement"
     if not log.generations:
-        return f"{where}: the straight movement of least W (eq. 9) is free, nothing had to be corrected."
+        return (
+            f"{where}: the straight movement of least W (eq. 9) is free, nothing had to be "
+            "corrected."
+        )
     met = f" ({log.met})" if log.met else ""
     more = percent(after / before - 1.0) if before > 0.0 else "0.00 %"
     return (
-        f"{where}: the straight movement of least W (eq. 9) collides{met}. The genetic correction replaced "
-        f"what collides by {counted(log.generations, 'generation')} for "
-        f"{counted(len(log.fitness), 'stretch', 'stretches')}. W of the cheapest corrected path changed by "
-        f"{more}; the movement that is driven was optimised from such paths, and is certified."
+        f"{where}: the straight movement of least W (eq. 9) collides{met}. The genetic "
+        f"correction replaced what collides by {counted(log.generations, 'generation')} for "
+        f"{counted(len(log.fitness), 'stretch', 'stretches')}. W of the cheapest corrected path "
+        f"changed by {more}; the movement that is driven was optimised from such paths, and is "
+        "certified."
     )
 
 
@@ -47,7 +55,9 @@ def picture(log: CorrectionLog, cell: Cell, number: int) -> str:
         view.scale_bar(seen),
         _fitness(log, _emptiest(view, log)),
     )
-    label = f"Genetic correction from {log.start} to {log.goal}: straight movement and corrected path"
+    label = (
+        f"Genetic correction from {log.start} to {log.goal}: straight movement and corrected path"
+    )
     return drawing(content, label, f"correction_{number}")
 
 
@@ -70,9 +80,12 @@ def _best_view(log: CorrectionLog) -> tuple[View, str]:
 
 
 def _emptiest(view: View, log: CorrectionLog) -> tuple[float, float]:
-    """The corner (left, top) where a chart hides least of the paths; the scale bar has one of the four."""
+    """The corner (left, top) where a chart hides least of the paths; the scale bar has one of the
+    four.
+    """
     flat = view.flat(np.vstack([log.straight, log.path, log.driven]))
-    right, bottom = WIDTH - _GAP - _CHART[0], HEIGHT - _GAP - _CHART[1]
+    right = WIDTH - _GAP - _CHART[0]
+    bottom = HEIGHT - _GAP - _CHART[1]
 
     def hidden(corner: tuple[float, float]) -> int:
         return int(((flat >= corner) & (flat <= np.add(corner, _CHART))).all(axis=1).sum())
@@ -81,14 +94,15 @@ def _emptiest(view: View, log: CorrectionLog) -> tuple[float, float]:
 
 
 def _fitness(log: CorrectionLog, corner: tuple[float, float]) -> str:
-    """The best fitness of every generation on a logarithmic axis, one line for each stretch, in a chart with
-    its left top at `corner`.
+    """The best fitness of every generation on a logarithmic axis, one line for each stretch, in a
+    chart with its left top at `corner`.
     """
     values = [value for each in log.fitness for value in each if value > 0.0]
     if len(values) < 2:
         return ""
     (left, top), (width, height) = corner, _CHART
-    low, high = math.log(min(values)), math.log(max(values))
+    low = math.log(min(values))
+    high = math.log(max(values))
     longest = max(len(each) for each in log.fitness)
 
     def at(k: int, value: float) -> str:
@@ -100,7 +114,10 @@ def _fitness(log: CorrectionLog, corner: tuple[float, float]) -> str:
         f'<polyline class="fit" points="{" ".join(at(k, value) for k, value in enumerate(each))}"/>'
         for each in log.fitness
     )
-    frame = f'<rect class="chart" x="{left:g}" y="{top:g}" width="{width:g}" height="{height:g}" rx="5"/>'
+    frame = (
+        f'<rect class="chart" x="{left:g}" y="{top:g}" width="{width:g}" height="{height:g}" '
+        'rx="5"/>'
+    )
     head = f'<text x="{left + 8:g}" y="{top + 20:g}">best fitness, straight: 1</text>'
     ends = f"{max(values):.2f} to {min(values):.2f} in {counted(longest, 'generation')}"
     foot = f'<text class="small" x="{left + 8:g}" y="{top + height - 8:g}">{ends}</text>'

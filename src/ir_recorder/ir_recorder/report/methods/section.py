@@ -1,4 +1,6 @@
-"""The section of the page: one figure for each search, with its sentence; equal ones are counted."""
+"""The section of the page: one figure for each search, with its sentence; equal ones are
+counted.
+"""
 
 from __future__ import annotations
 
@@ -13,15 +15,18 @@ from ir_recorder.report.words import text
 _MOST = 24  # figures
 _KEY = (
     '<p class="hint">Black: the path that was found. Blue: what is driven, optimised from there. '
-    "Dashed: the straight movement. Green: kept or accepted. Red: dropped, rejected or colliding. Grey: "
-    "bodies of the machines, those that are not near the drawn plane as outlines. Paths are those of the "
+    "Dashed: the straight movement. Green: kept or accepted. Red: dropped, rejected or "
+    "colliding. Grey: "
+    "bodies of the machines, those that are not near the drawn plane as outlines. Paths are "
+    "those of the "
     "tool centre point.</p>"
 )
 
 
 def methods_section(analysis: Analysis) -> str:
     """What the paper's methods did for the recorded program; "" where none was asked for."""
-    logs, cell = analysis.recording.searches, analysis.cell
+    logs = analysis.recording.searches
+    cell = analysis.cell
     alike: dict[str, list[SearchLog]] = {}
     for log in logs:
         alike.setdefault(_sentence(log), []).append(log)
@@ -52,7 +57,11 @@ def _times(logs: Sequence[SearchLog]) -> str:
 def _sentence(log: SearchLog) -> str:
     if isinstance(log, WithdrawalLog):
         return withdrawal.sentence(log)
-    return configurations.sentence(log) if isinstance(log, ConfigurationLog) else correction.sentence(log)
+    return (
+        configurations.sentence(log)
+        if isinstance(log, ConfigurationLog)
+        else correction.sentence(log)
+    )
 
 
 def _picture(log: SearchLog, cell: Cell, number: int) -> str:

@@ -1,4 +1,6 @@
-"""A view of a cell along one direction: machines as outlines, what is held as capsules, paths as lines."""
+"""A view of a cell along one direction: machines as outlines, what is held as capsules, paths as
+lines.
+"""
 
 from __future__ import annotations
 
@@ -12,16 +14,21 @@ from ir_msgs_py.arrays import FloatArray
 from ir_recorder.report.shapes import body_mesh
 from ir_recorder.report.words import text
 
-WIDTH, HEIGHT = 560.0, 360.0
+WIDTH = 560.0
+HEIGHT = 360.0
 _MARGIN = 24.0
 _LEAST = 0.4  # m: less is not shown, however short a path is
 _SEEN = 9.0  # of a machine, by each letter of its name, so that the name may stand there
-_LENGTHS, _BAR = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0), 0.3 * WIDTH  # m; the longest bar
+# m; the longest bar
+_LENGTHS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
+_BAR = 0.3 * WIDTH
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """axes (3, 2): directions to the right and up; centre (2,) m of what is shown; scale: units per metre."""
+    """axes (3, 2): directions to the right and up; centre (2,) m of what is shown; scale: units per
+    metre.
+    """
 
     axes: FloatArray
     centre: FloatArray
@@ -32,7 +39,8 @@ class View:
         """The view in which points (N, 3) are seen with `around` metres around them."""
         axes = np.column_stack([right, up])
         flat = points @ axes
-        low, high = flat.min(axis=0) - around, flat.max(axis=0) + around
+        low = flat.min(axis=0) - around
+        high = flat.max(axis=0) + around
         size = np.maximum(high - low, _LEAST)
         scale = float(np.min((np.array([WIDTH, HEIGHT]) - 2.0 * _MARGIN) / size))
         return View(axes, (low + high) / 2.0, scale)
@@ -61,7 +69,9 @@ class View:
 
     def dots(self, points: FloatArray, style: str, radius: float) -> str:
         """Points (N, 3), each a dot."""
-        marks = "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:g}"/>' for x, y in self.flat(points))
+        marks = "".join(
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:g}"/>' for x, y in self.flat(points)
+        )
         return f'<g class="{style}">{marks}</g>' if len(points) else ""
 
     def segments(self, first: FloatArray, second: FloatArray, style: str) -> str:
@@ -73,8 +83,9 @@ class View:
     def machines(
         self, cell: Cell, station: str, near: FloatArray | None = None, depth: float = np.inf
     ) -> str:
-        """The bodies of the machines, those of others than the station's as outlines ("": of none); with
-        `near` (3,) those of its machine alone, as outlines what isn't within `depth` m of the plane there.
+        """The bodies of the machines, those of others than the station's as outlines ("": of none);
+        with `near` (3,) those of its machine alone, as outlines what isn't within `depth` m of the
+        plane there.
         """
         own = cell.station(station).equipment if station else ""
         parts = []
@@ -92,7 +103,9 @@ class View:
         off = (points - (points[0] if near is None else near)) @ self.away
         style = "body" if off.min() < depth and off.max() > -depth else "body behind"
         shape = _listed(_hull(self.flat(points)))
-        return f'<polygon class="{style}" points="{shape}"><title>{text(body.name)}</title></polygon>'
+        return (
+            f'<polygon class="{style}" points="{shape}"><title>{text(body.name)}</title></polygon>'
+        )
 
     def held(self, cell: Cell, load: str, tcp: FloatArray) -> str:
         """Tool and part named in `load` ("gripper+gear") where the tcp has the pose (4, 4)."""
@@ -113,7 +126,9 @@ class View:
         return "".join(lines)
 
     def names(self, cell: Cell, only: str = "") -> str:
-        """The name of each machine, or of one alone, in the middle of what is seen of its bodies."""
+        """The name of each machine, or of one alone, in the middle of what is seen of its
+        bodies.
+        """
         parts = []
         for machine in cell.equipment:
             corners = [_corners(body) for body in machine.world_bodies() if body.kind != "plane"]
@@ -136,7 +151,8 @@ class View:
         """A length to compare with, and from where the drawing is `seen`."""
         lengths = [length for length in _LENGTHS if length * self.scale <= _BAR]
         length = max(lengths, default=_LENGTHS[0])
-        x, y = _MARGIN / 2.0, HEIGHT - _MARGIN / 2.0
+        x = _MARGIN / 2.0
+        y = HEIGHT - _MARGIN / 2.0
         bar = f'<path class="bar" d="M{x:g} {y - 6:g}v6h{length * self.scale:.1f}v-6"/>'
         words = f"{length:g} m, seen {seen}"
         return f'{bar}<text x="{x + length * self.scale + 8:.1f}" y="{y:g}">{words}</text>'
@@ -145,8 +161,8 @@ class View:
 def drawing(content: Iterable[str], label: str, name: str) -> str:
     """The drawing as SVG."""
     return (
-        f'<div class="figure scroll"><svg class="method" id="{name}" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" '
-        f'role="img" aria-label="{text(label)}">{"".join(content)}</svg></div>'
+        f'<div class="figure scroll"><svg class="method" id="{name}" viewBox="0 0 {WIDTH:g} '
+        f'{HEIGHT:g}" role="img" aria-label="{text(label)}">{"".join(content)}</svg></div>'
     )
 
 

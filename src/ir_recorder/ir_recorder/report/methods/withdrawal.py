@@ -23,10 +23,11 @@ def sentence(log: WithdrawalLog) -> str:
     dropped = max(log.candidates - kept, 0)
     why = f" ({reasons(log.rejected)})" if log.rejected else ""
     return (
-        f"Leaving {log.station} by eq. (7): {_why(log)}{counted(log.generations, 'generation')} drew "
-        f"{counted(log.candidates, 'configuration')} around those before; {were(kept, 'kept')}, {dropped} "
-        f"dropped{why}. The total metric distance D to the machine grew from {log.distance[0]:.1f} m to "
-        f"{log.distance[1]:.1f} m, and the best path out was shortened. {_ENTERING}"
+        f"Leaving {log.station} by eq. (7): {_why(log)}{counted(log.generations, 'generation')} "
+        f"drew {counted(log.candidates, 'configuration')} around those before; "
+        f"{were(kept, 'kept')}, {dropped} dropped{why}. The total metric distance D to the "
+        f"machine grew from {log.distance[0]:.1f} m to {log.distance[1]:.1f} m, and the best "
+        f"path out was shortened. {_ENTERING}"
     )
 
 
@@ -35,7 +36,11 @@ def _why(log: WithdrawalLog) -> str:
     if log.blocked:
         reason = log.blocked.removeprefix(f"line out of {log.station}: ")
         return f"the straight line back along the tool is not free ({reason}); "
-    return "the cell asks for it, though the straight line back along the tool is free; " if log.asked else ""
+    return (
+        "the cell asks for it, though the straight line back along the tool is free; "
+        if log.asked
+        else ""
+    )
 
 
 def picture(log: WithdrawalLog, cell: Cell, number: int) -> str:
@@ -43,8 +48,11 @@ def picture(log: WithdrawalLog, cell: Cell, number: int) -> str:
     station = next((each for each in cell.stations if each.name == log.station), None)
     if station is None or len(log.path) < 2:
         return ""
-    view = View.from_the_side(log.path, _sideways(log, station.pose[:3, 3] - cell.base_pose[:3, 3]), 0.4)
-    child, parent = log.kept[1:], log.kept[log.parents[1:]]
+    view = View.from_the_side(
+        log.path, _sideways(log, station.pose[:3, 3] - cell.base_pose[:3, 3]), 0.4
+    )
+    child = log.kept[1:]
+    parent = log.kept[log.parents[1:]]
     content = (
         view.held(cell, log.load, station.pose),
         view.machines(cell, log.station, log.path[0], _DEPTH),
@@ -56,13 +64,15 @@ def picture(log: WithdrawalLog, cell: Cell, number: int) -> str:
         view.names(cell, only=station.equipment),
         view.scale_bar("from the side"),
     )
-    label = f"Withdrawal from {log.station}, seen from the side: {len(log.kept)} kept configurations"
+    label = (
+        f"Withdrawal from {log.station}, seen from the side: {len(log.kept)} kept configurations"
+    )
     return drawing(content, label, f"withdrawal_{number}")
 
 
 def _sideways(log: WithdrawalLog, radial: FloatArray) -> FloatArray:
-    """The horizontal direction (3,) in which the path goes farthest, away from the robot; `radial` (3,): from
-    the robot to the station.
+    """The horizontal direction (3,) in which the path goes farthest, away from the robot; `radial`
+    (3,): from the robot to the station.
     """
     away = (log.path - log.path[0]) * [1.0, 1.0, 0.0]
     reach = np.linalg.norm(away, axis=1)

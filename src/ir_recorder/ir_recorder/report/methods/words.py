@@ -18,7 +18,9 @@ def were(number: int, what: str) -> str:
 
 
 def reasons(counts: Counts) -> str:
-    """The most frequent reasons: "28 gear_held too near belt, 7 not converged, 4 for other reasons"."""
+    """The most frequent reasons: "28 gear_held too near belt, 7 not converged, 4 for other
+    reasons".
+    """
     ordered = sorted(counts, key=lambda item: (-item[1], item[0]))
     shown = ordered if len(ordered) == _SHOWN + 1 else ordered[:_SHOWN]
     parts = [f"{count} {reason}" for reason, count in shown]
