@@ -25,7 +25,7 @@ def searches() -> str:
     """The searches by name, with the first line of their classes."""
     rows = ["| `planner_id` | search |", "| --- | --- |"]
     for name, search in registered().items():
-        first = (type(search).__doc__ or "").splitlines()[0]
+        first = " ".join((type(search).__doc__ or "").split("\n\n")[0].split())
         rows.append(f"| `{name}` | {first} |")
     return "\n".join(rows) + "\n"
 

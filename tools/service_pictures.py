@@ -1,4 +1,4 @@
-"""Draw the pictures of docs/service_movements.md: stage one, the raw walk of eq. (7), the
+"""Draw the pictures of docs/planning.md#service-movements: stage one, the raw walk of eq. (7), the
 candidates.
 
     python tools/service_pictures.py [--folder docs/images]

@@ -44,7 +44,7 @@ SECTIONS = (
         "Understand",
         (
             *_docs(
-                "planning", "programs", "service_movements", "energy", "driver", "plant", "architecture",  # noqa: E501
+                "planning", "energy", "driver", "plant", "architecture",
                 "paper_map", "reproduction", "laws", "benchmarks",
             ),
             "CONTRIBUTING.md",
