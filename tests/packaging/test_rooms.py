@@ -105,9 +105,8 @@ def test_every_face_says_what_it_is_and_names_what_it_offers(package: str) -> No
             continue
         face = importlib.import_module(f"{package}.{room}")
         assert face.__doc__, room
-        assert face.__doc__.splitlines()[0].endswith("."), (
-            f"{package}.{room}: the first line is a sentence"
-        )
+        first = face.__doc__.split("\n\n")[0].rstrip()
+        assert first.endswith("."), f"{package}.{room}: it begins with a sentence"
         assert sorted(set(face.__all__)) == sorted(face.__all__), room
         for name in face.__all__:
             assert hasattr(face, name), f"{package}.{room} has no {name}"
