@@ -29,7 +29,7 @@ from ir_msgs_py import names
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
-from ir_msgs_py.ros.quality import SERVICE
+from ir_msgs_py.ros.topics import SERVICE
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.plc.modbus_map import COILS
 

@@ -12,7 +12,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from ir_cli.main import main
 from ir_msgs.msg import Signal
 from ir_msgs.srv import SetPlcInput
-from ir_msgs_py.ros.background import BackgroundExecutor
+from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.ros.testing import WaitFor
 
 SERVICE = "/machine/set"

@@ -14,8 +14,8 @@ from rclpy.parameter import Parameter
 from ir_description import load_cell
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs_py import names
-from ir_msgs_py.ros.background import BackgroundExecutor
 from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.node import SimDriver
 from ir_sim_driver.node.goal_clients import ClientWatch

@@ -16,7 +16,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from ir_msgs.srv import SetLoad, SetPlcInput, StartPause
-from ir_msgs_py.ros.running import FAILURES_MAX, Spinning, spin
+from ir_msgs_py.ros.node_process import FAILURES_MAX, Spinning, spin
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver import Driver, make_simulation
 from ir_sim_driver.node.services import Services

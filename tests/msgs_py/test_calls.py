@@ -14,9 +14,8 @@ from rclpy.serialization import deserialize_message
 from ir_msgs.action import RunProgram
 from ir_msgs.msg import RecordedCall
 from ir_msgs.srv import GetCell, SetPlcInput
-from ir_msgs_py.ros import calls
-from ir_msgs_py.ros.calls import MOST_BYTES, Calls
-from ir_msgs_py.ros.serving import BoundedService, RecordedActionServer
+from ir_msgs_py.ros import serving as calls
+from ir_msgs_py.ros.serving import MOST_BYTES, BoundedService, Calls, RecordedActionServer
 
 
 @pytest.fixture

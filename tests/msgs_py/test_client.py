@@ -16,7 +16,7 @@ from ir_msgs.srv import GetTrajectory, SetCell
 from ir_msgs_py.errors import CallTimedOutError, RequestRefusedError, ServiceUnavailableError
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.ros import client as client_module
-from ir_msgs_py.ros import goals
+from ir_msgs_py.ros import client as goals
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.waiting import Waiting

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from ir_msgs_py.contact import Contact, MachineState
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.report import DistancePair
-from ir_msgs_py.ros.conversions import (
+from ir_msgs_py.ros.plan_conversions import (
     contact_from_msg,
     contact_to_msg,
     machine_states_from_msg,

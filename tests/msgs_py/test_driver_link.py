@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from ir_msgs.msg import PowerState
-from ir_msgs_py.ros import driver
-from ir_msgs_py.ros.polled import Received
+from ir_msgs_py.ros import node_clients as driver
+from ir_msgs_py.ros.topics import Received
 from ir_msgs_py.ros.waiting import Waiting
 
 

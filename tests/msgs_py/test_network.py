@@ -69,7 +69,7 @@ def test_insecure_leaves_ros_s_own_variables() -> None:
 NODE = """
 import os, sys
 from rclpy.node import Node
-from ir_msgs_py.ros.running import run_node
+from ir_msgs_py.ros.node_process import run_node
 
 class Listed(Node):
     def __init__(self):

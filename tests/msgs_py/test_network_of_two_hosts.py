@@ -17,7 +17,7 @@ NODE = """
 import sys
 from std_srvs.srv import Trigger
 from rclpy.node import Node
-from ir_msgs_py.ros.running import run_node
+from ir_msgs_py.ros.node_process import run_node
 
 class Offering(Node):
     def __init__(self):

@@ -14,8 +14,6 @@ from rclpy.task import Future
 
 from ir_msgs.action import RunProgram
 from ir_msgs.srv import SetPlcInput
-from ir_msgs_py.ros.background import BackgroundExecutor
-from ir_msgs_py.ros.quality import SERVICE
 from ir_msgs_py.ros.serving import (
     SENDS,
     UNDISCOVERED,
@@ -23,6 +21,8 @@ from ir_msgs_py.ros.serving import (
     PatientSender,
     RecordedActionServer,
 )
+from ir_msgs_py.ros.spinning import BackgroundExecutor
+from ir_msgs_py.ros.topics import SERVICE
 from ir_msgs_py.status import StatusCode
 
 MOST = 50

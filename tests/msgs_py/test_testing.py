@@ -8,7 +8,7 @@ import pytest
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
-from ir_msgs_py.ros.background import BackgroundExecutor
+from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.ros.waiting import Waiting
 
 

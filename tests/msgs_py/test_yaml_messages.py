@@ -11,8 +11,13 @@ import yaml
 from ir_msgs.msg import PlanOptions, PowerState, Status, TrajectoryReport
 from ir_msgs.srv import CheckState, EvaluateTrajectory, PlanTrajectory, SetCell, SetLoad
 from ir_msgs_py.errors import MessageTextError, UnknownTypeError
-from ir_msgs_py.ros.types import interface_type, owner_of, type_name
-from ir_msgs_py.ros.yaml_messages import message_from_yaml, message_to_yaml
+from ir_msgs_py.ros.messages import (
+    interface_type,
+    message_from_yaml,
+    message_to_yaml,
+    owner_of,
+    type_name,
+)
 
 SRV_FOLDER = Path(__file__).parents[2] / "ros_ws/src/ir_msgs/srv"
 
@@ -110,7 +115,7 @@ def test_the_pasteable_line_of_every_service_is_its_request(path):
 def test_types_are_found_by_the_names_that_people_type():
     assert interface_type("ir_msgs/srv/CheckState", "srv") is CheckState
     assert interface_type("ir_msgs/CheckState", "srv") is CheckState
-    assert type_name(CheckState, "srv") == "ir_msgs/srv/CheckState"
+    assert type_name(CheckState) == "ir_msgs/srv/CheckState"
     assert owner_of(CheckState.Request(), "Request", "srv") is CheckState
     for name in ("ir_msgs/srv/Nothing", "nowhere/srv/CheckState"):
         with pytest.raises(UnknownTypeError, match="no srv type"):

@@ -24,8 +24,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from ir_msgs.msg import PlannedMovement, PlanOptions
 from ir_msgs_py.names import JOINT_NAMES
-from ir_msgs_py.ros.types import interface_type
-from ir_msgs_py.ros.yaml_messages import message_from_yaml
+from ir_msgs_py.ros.messages import interface_type, message_from_yaml
 
 INTERFACES = Path(__file__).parents[2] / "ros_ws" / "src" / "ir_msgs"
 LINE = re.compile(r'# ros2 (?:service call|action send_goal) \S+ \S+ "(.*)"')

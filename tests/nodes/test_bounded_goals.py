@@ -10,7 +10,7 @@ from rclpy.parameter import Parameter
 from trajectory_msgs.msg import JointTrajectoryPoint, MultiDOFJointTrajectoryPoint
 
 from ir_msgs.action import ExecuteTrajectory
-from ir_msgs_py.ros.quality import ACTION_SERVICES
+from ir_msgs_py.ros.topics import ACTION_SERVICES
 from ir_sim_driver.node import SimDriver, bounded_goals, node
 
 MOST = 10

@@ -25,10 +25,11 @@ from ir_msgs.srv import (
 )
 from ir_msgs_py import names
 from ir_msgs_py.errors import RequestRefusedError
-from ir_msgs_py.ros.background import BackgroundExecutor
 from ir_msgs_py.ros.client import Client
-from ir_msgs_py.ros.conversions import report_from_msg, trajectory_from_msg
-from ir_msgs_py.ros.quality import COMMANDS, LATCHED
+from ir_msgs_py.ros.conversions import trajectory_from_msg
+from ir_msgs_py.ros.plan_conversions import report_from_msg
+from ir_msgs_py.ros.spinning import BackgroundExecutor
+from ir_msgs_py.ros.topics import COMMANDS, LATCHED
 from ir_planner.node.node import PlannerNode
 from ir_sim_driver.controller import surroundings
 from ir_sim_driver.node import SimDriver, announcements

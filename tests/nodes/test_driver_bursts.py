@@ -19,8 +19,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import PlcInputs, PowerMode, PowerState
 from ir_msgs.srv import QueryModes, SetPlcInput
-from ir_msgs_py.ros.background import BackgroundExecutor
-from ir_msgs_py.ros.quality import ACTION_SERVICES, REQUESTS_WAITING, SERVICE
+from ir_msgs_py.ros.spinning import BackgroundExecutor
+from ir_msgs_py.ros.topics import ACTION_SERVICES, REQUESTS_WAITING, SERVICE
 from ir_sim_driver.node import SimDriver
 from ir_sim_driver.node.executions import Executions
 from ir_sim_driver.node.plc_topic import PlcTopic

@@ -18,8 +18,8 @@ from ir_description import load_cell
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs_py import names
 from ir_msgs_py.ros.client import Client
-from ir_msgs_py.ros.clock_guard import heed_times_only
 from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.ros.node_process import heed_times_only
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.node import SimDriver
 

@@ -30,7 +30,7 @@ from ir_msgs_py.errors import CallTimedOutError
 from ir_msgs_py.namespaces import NODES
 from ir_msgs_py.ros import client as client_module
 from ir_msgs_py.ros.client import Client
-from ir_msgs_py.ros.types import interface_type
+from ir_msgs_py.ros.messages import interface_type
 from ir_program_runner.node import ProgramRunnerNode
 from ir_recorder.node import RecorderNode
 from ir_sim_driver.node import SimDriver

@@ -14,7 +14,7 @@ from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import LoadCheck
 from ir_msgs_py import names
 from ir_msgs_py.ros.conversions import trajectory_to_msg
-from ir_msgs_py.ros.quality import ACTION_SERVICES, LATCHED
+from ir_msgs_py.ros.topics import ACTION_SERVICES, LATCHED
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.node import SimDriver
 

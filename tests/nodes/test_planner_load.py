@@ -18,7 +18,7 @@ from ir_description import Cell
 from ir_msgs.action import Plan
 from ir_msgs.msg import PlanOptions, Status
 from ir_msgs.srv import CheckState, SetCell
-from ir_msgs_py.ros.quality import ACTION_SERVICES, REQUESTS_WAITING, SERVICE
+from ir_msgs_py.ros.topics import ACTION_SERVICES, REQUESTS_WAITING, SERVICE
 from ir_planner.node import node as planner_module
 from ir_planner.node.node import PlannerNode
 

@@ -13,8 +13,7 @@ from std_msgs.msg import String
 
 from ir_msgs.msg import Status
 from ir_msgs_py import names
-from ir_msgs_py.ros.types import interface_type
-from ir_msgs_py.ros.yaml_messages import message_from_yaml
+from ir_msgs_py.ros.messages import interface_type, message_from_yaml
 from ir_recorder.node import RecorderNode
 from ir_recorder.play.node import PlayNode
 from ir_recorder.play.schedule import PlaySettings

@@ -24,7 +24,7 @@ from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ir_msgs_py.names import WORLD_FRAME
-from ir_msgs_py.ros.types import interface_type
+from ir_msgs_py.ros.messages import interface_type
 from ir_planner.node.node import PlannerNode
 from ir_program_runner.node import ProgramRunnerNode
 from ir_recorder.listen.topics import TopicSelection

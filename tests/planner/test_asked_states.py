@@ -9,7 +9,7 @@ import pytest
 
 from ir_msgs.srv import CheckState
 from ir_msgs_py.errors import MessageTextError
-from ir_msgs_py.ros.yaml_messages import message_from_yaml
+from ir_msgs_py.ros.messages import message_from_yaml
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
 

@@ -24,7 +24,9 @@ from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros import client
 from ir_msgs_py.ros.client import Client
-from ir_msgs_py.ros.conversions import planned_movement_to_msg, power_mode_to_msg, trajectory_to_msg
+from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.ros.plan_conversions import planned_movement_to_msg
+from ir_msgs_py.ros.power_conversions import power_mode_to_msg
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory

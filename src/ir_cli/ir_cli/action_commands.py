@@ -10,8 +10,7 @@ from typing import Any
 from action_msgs.srv import CancelGoal
 
 from ir_msgs_py.ros.client import Client
-from ir_msgs_py.ros.types import interface_type
-from ir_msgs_py.ros.yaml_messages import message_from_yaml, message_to_yaml
+from ir_msgs_py.ros.messages import interface_type, message_from_yaml, message_to_yaml
 
 from .errors import CommandError
 from .lookup import absolute, checked_type, type_of

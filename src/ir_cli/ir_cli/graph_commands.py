@@ -7,8 +7,7 @@ import sys
 import threading
 
 from ir_msgs_py.ros.client import Client
-from ir_msgs_py.ros.types import interface_type
-from ir_msgs_py.ros.yaml_messages import message_from_yaml, message_to_yaml
+from ir_msgs_py.ros.messages import interface_type, message_from_yaml, message_to_yaml
 
 from .lookup import DISCOVERY_SECONDS, absolute, checked_type, settled, type_of
 from .terminal import SHOWN_ELEMENTS

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from ir_msgs_py.ros.running import run_node
+from ir_msgs_py.ros.node_process import run_node
 from ir_recorder.errors import RecorderError
 from ir_recorder.live.node import LiveNode
 

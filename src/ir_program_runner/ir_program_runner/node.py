@@ -25,19 +25,13 @@ from ir_msgs_py.errors import InvalidValueError, ParameterError
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.program import Event, ProgramState
 from ir_msgs_py.report import PlannedMovement
-from ir_msgs_py.ros.commands import CommandTopic
-from ir_msgs_py.ros.conversions import (
-    planned_movement_from_msg,
-    program_state_to_msg,
-    signal_from_msg,
-    signal_to_msg,
-    status_to_msg,
-)
-from ir_msgs_py.ros.driver import Driver
-from ir_msgs_py.ros.planner import Planner
-from ir_msgs_py.ros.quality import ACTION_SERVICES, COMMANDS
-from ir_msgs_py.ros.running import run_node
+from ir_msgs_py.ros.conversions import status_to_msg
+from ir_msgs_py.ros.node_clients import DriverClient, PlannerClient
+from ir_msgs_py.ros.node_process import run_node
+from ir_msgs_py.ros.plan_conversions import planned_movement_from_msg
+from ir_msgs_py.ros.power_conversions import program_state_to_msg, signal_from_msg, signal_to_msg
 from ir_msgs_py.ros.serving import RecordedActionServer
+from ir_msgs_py.ros.topics import ACTION_SERVICES, COMMANDS, CommandTopic
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.wake_on_lan import magic_packet, send_packet
@@ -85,7 +79,7 @@ class ProgramRunnerNode(Node):
             else machines
         )
         self._waiting = Waiting(self)
-        self._planner = Planner(self, self._waiting, links.planner, links.response_timeout)
+        self._planner = PlannerClient(self, self._waiting, links.planner, links.response_timeout)
         self._driver = self._link_to_driver(links)
         self._jump = ""
         back = JumpThreshold(
@@ -112,8 +106,8 @@ class ProgramRunnerNode(Node):
 
         self.get_logger().info("ready to run programs")
 
-    def _link_to_driver(self, links: LinkSettings) -> Driver:
-        return Driver(
+    def _link_to_driver(self, links: LinkSettings) -> DriverClient:
+        return DriverClient(
             self,
             self._waiting,
             links.driver,

@@ -18,8 +18,7 @@ from ir_msgs_py import names
 from ir_msgs_py.checks import one_line
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.file_roots import FileRoots
-from ir_msgs_py.ros.command_line import CommandLineError, own_words
-from ir_msgs_py.ros.running import run_node
+from ir_msgs_py.ros.node_process import CommandLineError, own_words, run_node
 from ir_recorder.arguments import record_parser
 from ir_recorder.diagnose.node import RecorderDiagnostics, State
 from ir_recorder.errors import PathError, RecorderError, SchemaError, WriteError

@@ -25,10 +25,9 @@ from ir_msgs_py import names
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.file_roots import FileRoots
 from ir_msgs_py.ros.diagnostics import OK, Condition, Diagnostics
-from ir_msgs_py.ros.quality import ACTION_SERVICES
-from ir_msgs_py.ros.refusals import answered
-from ir_msgs_py.ros.running import run_node
-from ir_msgs_py.ros.serving import RecordedActionServer
+from ir_msgs_py.ros.node_process import run_node
+from ir_msgs_py.ros.serving import RecordedActionServer, answered
+from ir_msgs_py.ros.topics import ACTION_SERVICES
 from ir_msgs_py.status import Status, StatusCode
 from ir_recorder.errors import RecorderError
 from ir_studies.errors import SettingsError, StoppedError, StudyError

@@ -24,8 +24,7 @@ from ir_msgs_py import names
 from ir_msgs_py.errors import MsgsError, RequestRefusedError
 from ir_msgs_py.one_sided import one_sided
 from ir_msgs_py.options import PlanOptions
-from ir_msgs_py.ros.answers import ProgramPlan
-from ir_msgs_py.ros.client import Client
+from ir_msgs_py.ros.client import Client, ProgramPlan
 from ir_msgs_py.wake_on_lan import magic_packet, send_packet
 from ir_program_runner.settings import LinkSettings
 from ir_recorder.format import contents

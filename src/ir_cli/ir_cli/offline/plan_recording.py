@@ -17,13 +17,9 @@ from ir_msgs.srv import PlanProgram
 from ir_msgs_py import names
 from ir_msgs_py.file_roots import FileRoots
 from ir_msgs_py.options import PlanOptions
-from ir_msgs_py.ros.conversions import (
-    cell_state_to_msg,
-    plan_options_to_msg,
-    program_savings_to_msg,
-    status_to_msg,
-    trajectory_to_msg,
-)
+from ir_msgs_py.ros.conversions import status_to_msg, trajectory_to_msg
+from ir_msgs_py.ros.plan_conversions import plan_options_to_msg, program_savings_to_msg
+from ir_msgs_py.ros.power_conversions import cell_state_to_msg
 from ir_msgs_py.settings import tree
 from ir_planner import Planner, ProgramPlan, assumed_doors
 from ir_planner.node.announcements import cell_state

@@ -19,12 +19,9 @@ from ir_description.files import power_from_yaml
 from ir_msgs.msg import RecordedCall
 from ir_msgs_py import names
 from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.ros.conversions import (
-    carried_load_from_msg,
-    controller_timers_from_msg,
-    machine_states_from_msg,
-)
-from ir_msgs_py.ros.types import interface_type
+from ir_msgs_py.ros.messages import interface_type
+from ir_msgs_py.ros.plan_conversions import machine_states_from_msg
+from ir_msgs_py.ros.power_conversions import carried_load_from_msg, controller_timers_from_msg
 from ir_msgs_py.settings import changed, tree
 from ir_planner import Planner, PlannerSettings
 from ir_recorder.errors import ReadError

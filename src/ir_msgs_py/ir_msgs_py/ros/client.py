@@ -12,40 +12,312 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import rclpy
+from rclpy.action import ActionClient, get_action_names_and_types
 from rclpy.context import Context
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
 
 from ir_msgs.action import ExecuteTrajectory, Plan, RunProgram
 from ir_msgs.srv import GetTrajectory, OptimizeTrajectory, PlanRegionalMovement, SetCell
 from ir_msgs_py import names
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import CallTimedOutError, RequestRefusedError, ServiceUnavailableError
 from ir_msgs_py.options import PlanOptions
-from ir_msgs_py.report import TrajectoryReport
-from ir_msgs_py.ros.answers import (
-    Execution,
-    MovementPlan,
-    OptimizedTrajectory,
-    ProgramPlan,
-    ProgramRun,
-)
-from ir_msgs_py.ros.background import BackgroundExecutor
+from ir_msgs_py.report import PlannedMovement, PlanningInfo, TrajectoryReport
 from ir_msgs_py.ros.conversions import (
-    plan_options_to_msg,
     status_from_msg,
     trajectory_from_msg,
+    trajectory_given,
     trajectory_to_msg,
 )
-from ir_msgs_py.ros.goals import GoalSender
-from ir_msgs_py.ros.graph import Graph
+from ir_msgs_py.ros.messages import owner_of, type_name
 from ir_msgs_py.ros.network import apply_network
-from ir_msgs_py.ros.quality import SERVICE
-from ir_msgs_py.ros.types import owner_of
+from ir_msgs_py.ros.plan_conversions import (
+    plan_options_to_msg,
+    planned_movement_from_msg,
+    planning_info_from_msg,
+    program_point_from_msg,
+    program_savings_from_msg,
+    report_from_msg,
+)
+from ir_msgs_py.ros.spinning import BackgroundExecutor
+from ir_msgs_py.ros.topics import ACTION_SERVICES, SERVICE
+from ir_msgs_py.savings import ProgramPoint, ProgramSavings
+from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
+
+_DEPTH = 100
+_OWN = "ir_msgs/"
+
+
+class Graph:
+    """The graph as one node sees it; it fills up within moments after the node has started."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+
+    def services(self) -> dict[str, str]:
+        """Service names with their type, without those of actions."""
+        return {
+            name: _chosen(types)
+            for name, types in self._node.get_service_names_and_types()
+            if "/_action/" not in name
+        }
+
+    def actions(self) -> dict[str, str]:
+        """Action names with their type."""
+        return {name: _chosen(types) for name, types in get_action_names_and_types(self._node)}
+
+    def topics(self) -> dict[str, str]:
+        """Topic names with their type, without those of actions."""
+        return {
+            name: _chosen(types)
+            for name, types in self._node.get_topic_names_and_types()
+            if "/_action/" not in name
+        }
+
+    def nodes(self) -> list[str]:
+        """Full names of the nodes."""
+        found = self._node.get_node_names_and_namespaces()
+        return [f"{namespace.rstrip('/')}/{name}" for name, namespace in found]
+
+    def other_type(self, name: str, kind: Any) -> str:
+        """What to add to a sentence when nobody offers the service or topic `name` as the class
+        `kind`: the type that somebody has it with, "" when nobody does.
+        """
+        full = self._node.resolve_service_name(name)
+        own = type_name(kind)
+        known = (*self._node.get_service_names_and_types(), *self._node.get_topic_names_and_types())
+        found = [
+            each for offered, types in known if offered == full for each in types if each != own
+        ]
+        return f"; somebody in the graph has it as {found[0]}" if found else ""
+
+    def publishers(self, topic: str) -> list[Any]:
+        """End points that publish the topic."""
+        infos: list[Any] = self._node.get_publishers_info_by_topic(topic)
+        return infos
+
+    def qos_of_publishers(self, topic: str) -> QoSProfile:
+        """Quality of service with which all present publishers are heard, as `ros2 topic echo`
+        chooses it.
+        """
+        offered = [info.qos_profile for info in self.publishers(topic)]
+        reliable = all(qos.reliability == ReliabilityPolicy.RELIABLE for qos in offered)
+        kept = bool(offered) and all(
+            qos.durability == DurabilityPolicy.TRANSIENT_LOCAL for qos in offered
+        )
+        return QoSProfile(
+            depth=_DEPTH,
+            reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL if kept else DurabilityPolicy.VOLATILE,
+        )
+
+
+def _chosen(types: Sequence[str]) -> str:
+    """The type that counts where somebody offers a name with another one too: this project's."""
+    return next((each for each in types if each.startswith(_OWN)), types[0])
+
+
+GONE = 10.0
+"""s without anybody who offers an action before its goal is given up. The middleware forgets a
+process that died, or was stopped, after 5 s.
+"""
+
+
+class GoalSender:
+    """Sends goals of one node and waits for their results."""
+
+    def __init__(self, node: Node, executor: BackgroundExecutor) -> None:
+        self._node = node
+        self._executor = executor
+        self._clients: dict[tuple[str, Any], ActionClient] = {}
+
+    def send(
+        self,
+        action: str,
+        goal: Any,
+        feedback: Callable[[Any], object] | None,
+        response_timeout: float,
+        result_timeout: float,
+        cancel_grace: float,
+    ) -> Any:
+        """Send the goal and return its result; cancel it on timeout [s] and on an exception while
+        waiting.
+        """
+        action_type = owner_of(goal, "Goal", "action")
+        client = self._executor.run(lambda: self._client(action, action_type))
+        if not self._executor.wait_until(client.server_is_ready, response_timeout):
+            raise ServiceUnavailableError(
+                f"no node offers the action {action} (waited {response_timeout:g} s)"
+            )
+        on_feedback = None if feedback is None else lambda message: feedback(message.feedback)
+        sent: Future = self._executor.run(
+            lambda: client.send_goal_async(goal, feedback_callback=on_feedback)
+        )
+        if not self._executor.wait(sent, response_timeout):
+            raise CallTimedOutError(f"{action} did not take the goal within {response_timeout:g} s")
+        handle = sent.result()
+        if not handle.accepted:
+            raise RequestRefusedError(f"{action} rejected the goal", int(StatusCode.FAILURE))
+        result: Future = self._executor.run(handle.get_result_async)
+        try:
+            if self._ended(action, client, result, result_timeout):
+                self._executor.run(
+                    _nothing
+                )  # feedback that came with the result is called back after it
+                return result.result().result
+        except ServiceUnavailableError:  # nobody is there to cancel it
+            raise
+        except BaseException:  # Ctrl-C in a script must not leave the robot moving
+            self._cancel(handle, result, cancel_grace)
+            raise
+        ended = self._cancel(handle, result, cancel_grace)
+        since = (
+            "the goal was canceled"
+            if ended
+            else f"canceled, it has not ended within {cancel_grace:g} s"
+        )
+        raise CallTimedOutError(f"{action} had no result within {result_timeout:g} s: {since}")
+
+    def destroy(self) -> None:
+        """Let go of the action clients; call it on the spinning thread."""
+        for client in self._clients.values():
+            client.destroy()
+        self._clients.clear()
+
+    def _ended(self, action: str, client: ActionClient, result: Future, timeout: float) -> bool:
+        """Whether the goal's result has come within `timeout` [s]; raises where its node has
+        gone.
+        """
+        now = time.monotonic()
+        deadline = now + timeout
+        seen = now
+        while not self._executor.wait(result, min(0.1 * GONE, deadline - now)):
+            now = time.monotonic()
+            if client.server_is_ready():
+                seen = now
+            elif now - seen >= GONE:
+                raise ServiceUnavailableError(
+                    f"the node that ran {action} has gone: no result will come"
+                )
+            if now >= deadline:
+                return False
+        return True
+
+    def _cancel(self, handle: Any, result: Future, grace: float) -> bool:
+        """Whether the goal has ended within `grace` [s]."""
+        self._executor.run(handle.cancel_goal_async)
+        return self._executor.wait(result, grace)
+
+    def _client(self, action: str, action_type: Any) -> ActionClient:
+        key = (action, action_type)
+        if key not in self._clients:
+            self._clients[key] = ActionClient(self._node, action_type, action, **ACTION_SERVICES)
+        return self._clients[key]
+
+
+@dataclass(frozen=True, eq=False)
+class MovementPlan:
+    """A planned movement; trajectory is None unless the options asked for points."""
+
+    trajectory_id: str
+    trajectory: JointTrajectory | None
+    report: TrajectoryReport
+    info: PlanningInfo
+
+    @classmethod
+    def from_msg(cls, response: Any) -> MovementPlan:
+        """From the response of plan_regional_movement or plan_trajectory."""
+        points = response.trajectory
+        return cls(
+            response.trajectory_id,
+            trajectory_from_msg(points) if trajectory_given(points) else None,
+            report_from_msg(response.report),
+            planning_info_from_msg(response.info),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class OptimizedTrajectory:
+    """A trajectory made cheaper; trajectory is None unless the options asked for points. durations
+    [s] and energies [J], each (P,): the trade of time for energy, the fastest first.
+    """
+
+    trajectory_id: str
+    trajectory: JointTrajectory | None
+    before: TrajectoryReport
+    after: TrajectoryReport
+    durations: FloatArray
+    energies: FloatArray
+    info: PlanningInfo
+
+    @classmethod
+    def from_msg(cls, response: Any) -> OptimizedTrajectory:
+        """From the response of optimize_trajectory."""
+        points = response.trajectory
+        return cls(
+            response.trajectory_id,
+            trajectory_from_msg(points) if trajectory_given(points) else None,
+            report_from_msg(response.before),
+            report_from_msg(response.after),
+            np.array(response.pareto_durations),
+            np.array(response.pareto_energies),
+            planning_info_from_msg(response.info),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramPlan:
+    """A planned program: its steps, the report of the whole, and what it saves; gap [%]: how far
+    above the best chain of configurations it can be. front: programs by cycle time, where they were
+    asked for.
+    """
+
+    program_id: str
+    movements: tuple[PlannedMovement, ...]
+    report: TrajectoryReport
+    info: PlanningInfo
+    gap: float
+    savings: ProgramSavings
+    front: tuple[ProgramPoint, ...]
+
+    @classmethod
+    def from_msg(cls, result: Any) -> ProgramPlan:
+        """From the result of the plan action or the response of plan_program."""
+        return cls(
+            result.program_id,
+            tuple(planned_movement_from_msg(movement) for movement in result.movements),
+            report_from_msg(result.report),
+            planning_info_from_msg(result.info),
+            result.gap,
+            program_savings_from_msg(result.savings),
+            tuple(program_point_from_msg(point) for point in result.front),
+        )
+
+
+@dataclass(frozen=True)
+class ProgramRun:
+    """A program that was run: steps that ended well, duration [s], energy at the mains [J]."""
+
+    executed: int
+    duration: float
+    energy: float
+
+
+@dataclass(frozen=True)
+class Execution:
+    """A trajectory that was driven: largest deviation of the tool [m], energy at the mains [J]."""
+
+    max_tool_deviation: float
+    energy: float
+
 
 _KEPT_WITHIN = (
     0.1  # s between two messages that a publisher has kept; they are sent without a pause

@@ -1,14 +1,14 @@
-"""A frozen settings class as ROS parameters: described, with ranges, and never half changed.
+"""Parameters of a node from a frozen settings class: described, with ranges, never half changed.
 
 A change that a range or the class itself refuses is answered with the reason, and the old values
-stay.
+stay. Every request of rclpy's own parameter services is answered, in bounded sentences.
 """
 
 from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any, Generic, TypeVar
 
@@ -18,13 +18,66 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from ir_msgs_py.checks import one_line
 from ir_msgs_py.errors import MsgsError, ParameterError
-from ir_msgs_py.ros.parameter_services import answer_always
+from ir_msgs_py.ros.serving import ANY
 from ir_msgs_py.settings import Setting, changed, tree
+
+PACKAGE = "rcl_interfaces"
+Callback = Callable[[Any, Any], Any]
+
+
+def answer_always(node: Node) -> None:
+    """Let every request for parameters of the node be answered; once is enough.
+
+    rclpy converts what comes without a look at it: a type of value that is none raises in its
+    callback, and the client waits for ever. A reason repeats the name or the value, however long.
+    What can't be set is refused with what was raised, and what comes after it in the request with
+    it. Whoever asks for values gets none.
+    """
+    for service in node.services:
+        if service.srv_type.__module__.startswith(PACKAGE) and not hasattr(
+            service.callback, "guarded"
+        ):
+            service.callback = _guarded(service.callback)
+
+
+def _guarded(callback: Callback) -> Callback:
+    def answer(request: Any, response: Any) -> Any:
+        try:
+            response = callback(request, response)
+        except ANY as error:
+            response = _refused(request, response, f"{type(error).__name__}: {error}")
+        for result in _results(response):
+            result.reason = one_line(result.reason)
+        return response
+
+    answer.guarded = callback  # type: ignore[attr-defined]
+    return answer
+
+
+def _refused(request: Any, response: Any, reason: str) -> Any:
+    refusal = SetParametersResult(successful=False, reason=reason)
+    if isinstance(
+        request, SetParameters.Request
+    ):  # those before the one that raised have their results
+        missing = len(request.parameters) - len(response.results)
+        response.results = [*response.results, *[refusal] * missing]
+    elif isinstance(request, SetParametersAtomically.Request):
+        response.result = refusal
+    return response
+
+
+def _results(response: Any) -> Sequence[Any]:
+    if isinstance(response, SetParameters.Response):
+        return response.results
+    return [response.result] if isinstance(response, SetParametersAtomically.Response) else []
+
 
 T = TypeVar("T")
 _INT64 = 2**63

@@ -1,34 +1,153 @@
-"""Services that answer every request: what comes while too many wait is refused, nothing is
-dropped.
+"""Services and actions that answer every request, and publish what was answered for recordings.
 
-The middleware keeps only so many requests and drops the oldest without a word. Here each turn of
-the executor takes all that have come into a queue of its own, refuses what exceeds it with a
-sentence, and answers one. What was answered is published for recordings (calls.py).
+The middleware keeps only so many requests and drops the oldest without a word. A BoundedService
+takes, at each turn of the executor, all that have come into a queue of its own, refuses what is
+beyond with a sentence, and answers one. What is raised meanwhile (no descriptor left, a full disk,
+1e308 in a field, a bug) becomes the status of that request, so that the node lives on.
 """
 
 from __future__ import annotations
 
+import array
 import threading
 import time
 import traceback
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, ClassVar
+from weakref import WeakKeyDictionary
 
 from rclpy.action import ActionServer
 from rclpy.callback_groups import CallbackGroup
 from rclpy.executors import await_or_execute
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
 from rclpy.waitable import NumberOfEntities, Waitable
 
-from ir_msgs_py.ros.calls import Calls, type_text
+from ir_msgs.msg import RecordedCall
+from ir_msgs_py import names
 from ir_msgs_py.ros.conversions import status_to_msg
-from ir_msgs_py.ros.polled import PolledGroup
-from ir_msgs_py.ros.quality import REQUESTS_WAITING, SERVICE
-from ir_msgs_py.ros.refusals import ANY, unexpected
+from ir_msgs_py.ros.messages import type_name
+from ir_msgs_py.ros.topics import REQUESTS_WAITING, SERVICE, PolledGroup
 from ir_msgs_py.status import Status, StatusCode
+
+MOST_BYTES = 2 * 2**20
+"""Of a request or an answer: the points of forty movements. What the middleware keeps for a
+recorder that is busy is at most WAITING of these twice.
+"""
+WAITING = 100
+_NUMBER = 8  # bytes; what a number takes at most
+
+
+class Calls:
+    """Publishes the calls of a node on its topic `~/calls`; `of` gives the one that all its
+    services share.
+
+    Where nobody subscribes, nothing is done. A message that is longer than MOST_BYTES is left out
+    (its field is empty), and it is measured before it is copied: a recorder must not cost a node
+    the memory of its answers.
+    """
+
+    _known: ClassVar[WeakKeyDictionary[Node, Calls]] = WeakKeyDictionary()
+
+    def __init__(self, node: Node) -> None:
+        self._clock = node.get_clock()
+        self._name = node.get_fully_qualified_name()
+        self._publisher = node.create_publisher(
+            RecordedCall, f"~/{names.CALLS}", QoSProfile(depth=WAITING)
+        )
+
+    @classmethod
+    def of(cls, node: Node) -> Calls:
+        """Those of a node."""
+        if node not in cls._known:
+            cls._known[node] = cls(node)
+        return cls._known[node]
+
+    def taken(self, name: str, kind: str, request: Any) -> Callable[[Any], None]:
+        """A request of the service or action `name` of the type `kind` is taken now: what to call
+        with its answer. A handler may change the request, so it is copied first where somebody
+        listens by then.
+        """
+        stamp = self._clock.now().to_msg()
+        data = _bounded(request) if self._publisher.get_subscription_count() else None
+
+        def answered(response: Any) -> None:
+            if not self._publisher.get_subscription_count():
+                return
+            call = RecordedCall(node=self._name, service=name, type=kind)
+            call.header.stamp = stamp
+            call.request = _bounded(request) if data is None else data
+            call.response = _bounded(response)
+            self._publisher.publish(call)
+
+        return answered
+
+
+def _bounded(message: Any) -> array.array[int]:
+    """The message's CDR; nothing where it is longer than MOST_BYTES."""
+    data = serialize_message(message) if _left(message, MOST_BYTES) >= 0 else b""
+    return array.array("B", data if len(data) <= MOST_BYTES else b"")
+
+
+def _left(value: Any, left: int) -> int:
+    """How many of `left` bytes a value leaves, about; it ends as soon as none are left."""
+    if left < 0:
+        return left
+    if isinstance(value, str | bytes):
+        return left - len(value)
+    if isinstance(value, array.array):
+        return left - len(value) * value.itemsize
+    if hasattr(value, "nbytes"):
+        return left - int(value.nbytes)
+    for part in _parts(value):
+        if (left := _left(part, left)) < 0:
+            return left
+    return left - _NUMBER
+
+
+def _parts(value: Any) -> Iterable[Any]:
+    if hasattr(value, "get_fields_and_field_types"):
+        return (getattr(value, name) for name in value.get_fields_and_field_types())
+    return value if isinstance(value, list | tuple | set) else ()
+
+
+StatusOf = Callable[[Exception], Status | None]
+
+ANY = (Exception, SystemExit)
+"""What must not end a node. SystemExit: somebody's registered search may call exit()."""
+
+
+def answered(
+    response: Any,
+    source: str,
+    work: Callable[[], Status],
+    status_of: StatusOf,
+    log: Callable[[str], object] = lambda text: None,
+) -> Any:
+    """The response with the status that `work` returns, or that of what it raises.
+
+    source: the node. status_of: the status of an error that a request may end with, None for all
+    others, which are logged with their traceback.
+    """
+    try:
+        status = work()
+    except ANY as error:  # whatever it is: one request must not end the node for all others
+        known = None if isinstance(error, SystemExit) else status_of(error)
+        if known is None:
+            log(traceback.format_exc())
+        status = known or unexpected(error)
+    response.status = status_to_msg(Status(status.code, status.message, source))
+    return response
+
+
+def unexpected(error: BaseException) -> Status:
+    """The status of an error that nobody thought of."""
+    return Status(StatusCode.FAILURE, f"unexpected {type(error).__name__}: {error}")
+
 
 Handler = Callable[[Any, Any], Any]
 
@@ -118,7 +237,7 @@ class BoundedService(Waitable):
             return
         request, header = taken_data
         try:
-            answered = self._calls.taken(self._service.service_name, type_text(self._type), request)
+            answered = self._calls.taken(self._service.service_name, type_name(self._type), request)
             response = self._handler(request, self._type.Response())
             answered(response)
             self._sender.send(response, header)
@@ -183,7 +302,7 @@ class RecordedActionServer(ActionServer):
         self, node: Node, action_type: Any, name: str, *arguments: Any, **options: Any
     ) -> None:
         self._calls = Calls.of(node)
-        self._type_text = type_text(action_type)
+        self._type_text = type_name(action_type)
         self._full_name = node.resolve_topic_name(name)
         with _MAKING, _made_of(_PatientHandle):
             super().__init__(node, action_type, name, *arguments, **options)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:  # importing rclpy costs 0.2 s, and tests of a core don't need
     from rclpy.context import Context
     from rclpy.node import Node
 
-    from ir_msgs_py.ros.background import BackgroundExecutor
+    from ir_msgs_py.ros.spinning import BackgroundExecutor
 
 _DOMAINS = 101  # ids above need other ports than the system leaves free
 _RESERVED: list[socket.socket] = []
@@ -97,7 +97,7 @@ def ros_context(
 @pytest.fixture
 def ros_executor(ros_context: Context) -> Iterator[BackgroundExecutor]:
     """An executor that spins in the background; it destroys the nodes that were added to it."""
-    from ir_msgs_py.ros.background import BackgroundExecutor
+    from ir_msgs_py.ros.spinning import BackgroundExecutor
 
     with BackgroundExecutor(ros_context) as executor:
         yield executor

@@ -16,13 +16,13 @@ from ir_msgs.msg import MachineStates as MachineStatesMsg
 from ir_msgs_py import names
 from ir_msgs_py.announced import CellState
 from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.ros.conversions import (
+from ir_msgs_py.ros.plan_conversions import machine_states_from_msg
+from ir_msgs_py.ros.power_conversions import (
     carried_load_from_msg,
     cell_state_to_msg,
     controller_timers_from_msg,
-    machine_states_from_msg,
 )
-from ir_msgs_py.ros.quality import LATCHED
+from ir_msgs_py.ros.topics import LATCHED
 from ir_planner.planner import Planner
 
 _T = TypeVar("_T")

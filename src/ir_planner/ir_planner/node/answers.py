@@ -8,20 +8,22 @@ from ir_description import Cell, Station
 from ir_msgs.msg import AllowedContact as AllowedContactMsg
 from ir_msgs.msg import Station as StationMsg
 from ir_msgs_py.ros.conversions import (
-    distance_pair_to_msg,
     float_array,
-    ik_solution_to_msg,
-    planned_movement_to_msg,
-    planning_info_to_msg,
-    power_mode_to_msg,
-    program_point_to_msg,
-    program_savings_to_msg,
-    report_to_msg,
-    service_candidate_to_msg,
     stamped_pose_to_msg,
     status_to_msg,
     trajectory_to_msg,
 )
+from ir_msgs_py.ros.plan_conversions import (
+    distance_pair_to_msg,
+    ik_solution_to_msg,
+    planned_movement_to_msg,
+    planning_info_to_msg,
+    program_point_to_msg,
+    program_savings_to_msg,
+    report_to_msg,
+    service_candidate_to_msg,
+)
+from ir_msgs_py.ros.power_conversions import power_mode_to_msg
 from ir_msgs_py.savings import ProgramPoint
 from ir_msgs_py.status import Status
 from ir_planner.asked_states import StatesCheck

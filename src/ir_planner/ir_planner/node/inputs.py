@@ -18,13 +18,13 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.ros.conversions import (
     configuration_from_msg,
     configuration_given,
-    plan_options_from_msg,
     stamped_pose_from_msg,
     stamped_pose_given,
     trajectory_from_msg,
     trajectory_given,
     velocity_from_msg,
 )
+from ir_msgs_py.ros.plan_conversions import plan_options_from_msg
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.asked_states import STATES_MAX

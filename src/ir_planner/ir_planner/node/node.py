@@ -46,17 +46,13 @@ from ir_msgs.srv import (
 )
 from ir_msgs_py import names
 from ir_msgs_py.errors import InvalidValueError, MsgsError
-from ir_msgs_py.ros.conversions import (
-    configuration_from_msg,
-    program_savings_to_msg,
-    trajectory_to_msg,
-)
+from ir_msgs_py.ros.conversions import configuration_from_msg, trajectory_to_msg
 from ir_msgs_py.ros.diagnostics import OK, WARN, Condition, Diagnostics
+from ir_msgs_py.ros.node_process import run_node
 from ir_msgs_py.ros.parameters import Parameters
-from ir_msgs_py.ros.polled import LatestMessage
-from ir_msgs_py.ros.quality import ACTION_SERVICES, LATCHED
-from ir_msgs_py.ros.running import run_node
+from ir_msgs_py.ros.plan_conversions import program_savings_to_msg
 from ir_msgs_py.ros.serving import BoundedService, RecordedActionServer
+from ir_msgs_py.ros.topics import ACTION_SERVICES, LATCHED, LatestMessage
 from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory

@@ -14,7 +14,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import MsgsError, PoseError
 from ir_msgs_py.names import PLANNER
 from ir_msgs_py.ros.conversions import trajectory_to_msg
-from ir_msgs_py.ros.refusals import answered, unexpected
+from ir_msgs_py.ros.serving import answered, unexpected
 from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory

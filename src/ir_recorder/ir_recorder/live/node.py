@@ -37,7 +37,7 @@ from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.conversions import status_from_msg, trajectory_from_msg
 from ir_msgs_py.ros.diagnostics import OK, Condition, Diagnostics
-from ir_msgs_py.ros.polled import PolledTopic
+from ir_msgs_py.ros.topics import PolledTopic
 from ir_recorder.analysis.steps import STARTED, step_label
 from ir_recorder.analysis.tolerances import Tolerances
 from ir_recorder.live.cell_view import CellView, Heard

@@ -23,11 +23,9 @@ from ir_msgs.srv import ControlPlayback
 from ir_msgs_py import names
 from ir_msgs_py.errors import MsgsError, UnknownTypeError
 from ir_msgs_py.file_roots import FileRoots
-from ir_msgs_py.ros.command_line import CommandLineError, own_words
-from ir_msgs_py.ros.refusals import answered
-from ir_msgs_py.ros.running import run_node
-from ir_msgs_py.ros.serving import BoundedService
-from ir_msgs_py.ros.types import interface_type
+from ir_msgs_py.ros.messages import interface_type
+from ir_msgs_py.ros.node_process import CommandLineError, own_words, run_node
+from ir_msgs_py.ros.serving import BoundedService, answered
 from ir_msgs_py.status import Status, StatusCode
 from ir_recorder.arguments import play_parser
 from ir_recorder.errors import RecorderError, SchemaError

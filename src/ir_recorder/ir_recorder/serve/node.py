@@ -9,8 +9,7 @@ from rclpy.node import Node
 
 from ir_msgs.srv import StartRecording, StopRecording
 from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.ros.refusals import answered
-from ir_msgs_py.ros.serving import BoundedService
+from ir_msgs_py.ros.serving import BoundedService, answered
 from ir_msgs_py.status import Status, StatusCode
 from ir_recorder.errors import NothingRecordedError, RecorderError
 from ir_recorder.format.parts import Split

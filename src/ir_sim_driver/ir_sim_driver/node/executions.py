@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 from ir_msgs.msg import LoadCheck
 from ir_msgs_py.checks import one_line
-from ir_msgs_py.ros.conversions import contact_to_msg
+from ir_msgs_py.ros.plan_conversions import contact_to_msg
 from ir_sim_driver.controller import Driver
 from ir_sim_driver.load_check import LoadFinding
 from ir_sim_driver.motion import ErrorCode, Outcome

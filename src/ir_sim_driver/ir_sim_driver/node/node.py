@@ -24,9 +24,9 @@ from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, Sta
 from ir_msgs_py import names
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.ros.diagnostics import Diagnostics
-from ir_msgs_py.ros.quality import ACTION_SERVICES
-from ir_msgs_py.ros.running import run_node
+from ir_msgs_py.ros.node_process import run_node
 from ir_msgs_py.ros.serving import BoundedService
+from ir_msgs_py.ros.topics import ACTION_SERVICES
 from ir_sim_driver.controller import Driver, Joints, Simulation, make_simulation
 from ir_sim_driver.errors import DriverError, PlantStoppedError
 from ir_sim_driver.node.announcements import Announcements

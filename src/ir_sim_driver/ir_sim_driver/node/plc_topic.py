@@ -10,8 +10,8 @@ from ir_msgs.msg import PlcInputs
 from ir_msgs_py import names
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.plc import PlcInputs as Levels
-from ir_msgs_py.ros.commands import CommandTopic
-from ir_msgs_py.ros.conversions import plc_inputs_from_msg
+from ir_msgs_py.ros.power_conversions import plc_inputs_from_msg
+from ir_msgs_py.ros.topics import CommandTopic
 from ir_sim_driver.controller import Driver
 from ir_sim_driver.errors import DriverError
 from ir_sim_driver.plc import TOPIC

@@ -12,8 +12,8 @@ import numpy as np
 
 from ir_description import Cell
 from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.ros.conversions import plc_inputs_to_msg, power_mode_to_msg
-from ir_msgs_py.ros.refusals import answered
+from ir_msgs_py.ros.power_conversions import plc_inputs_to_msg, power_mode_to_msg
+from ir_msgs_py.ros.serving import answered
 from ir_msgs_py.status import Status, StatusCode
 from ir_sim_driver.controller import Driver
 from ir_sim_driver.errors import DriverError, RequestRefusedError

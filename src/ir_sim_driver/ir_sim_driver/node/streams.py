@@ -14,13 +14,13 @@ from sensor_msgs.msg import JointState
 
 from ir_msgs.msg import ControllerState, LoadCheck, PlcInputs, PlcOutputs, PowerState
 from ir_msgs_py import names
-from ir_msgs_py.ros.conversions import (
+from ir_msgs_py.ros.conversions import time_to_msg
+from ir_msgs_py.ros.power_conversions import (
     plc_inputs_to_msg,
     plc_outputs_to_msg,
     power_state_to_msg,
-    time_to_msg,
 )
-from ir_msgs_py.ros.quality import LATCHED
+from ir_msgs_py.ros.topics import LATCHED
 from ir_sim_driver.controller import Frame, Joints
 from ir_sim_driver.node.messages import fill_controller_state, fill_joint_state, fill_load_check
 

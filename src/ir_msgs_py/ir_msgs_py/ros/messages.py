@@ -1,12 +1,14 @@
-"""Messages as YAML: read as `ros2 service call` does, written as `ros2 topic echo` does.
+"""Interface types by the names that people type ("ir_msgs/srv/SetCell"), and messages as YAML.
 
-A scalar is taken by the type of its field, not by YAML's guess: an id of digits stays text.
+Messages are read as `ros2 service call` reads them and written as `ros2 topic echo` writes them. A
+scalar is taken by the type of its field, not by YAML's guess: an id of digits stays text.
 """
 
 from __future__ import annotations
 
 from array import array
 from collections.abc import Mapping
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -21,7 +23,41 @@ from rosidl_parser.definition import (
 )
 
 from ir_msgs_py.errors import MessageTextError, UnknownTypeError
-from ir_msgs_py.ros.types import interface_type
+
+_KINDS = ("msg", "srv", "action")
+
+
+def interface_type(name: str, kind: str) -> Any:
+    """Return the class of a "msg", "srv" or "action"; "ir_msgs/SetCell" is enough where the kind is
+    known.
+    """
+    parts = name.split("/")
+    package = parts[0]
+    interface = parts[-1]
+    if kind not in _KINDS or len(parts) not in (2, 3) or (len(parts) == 3 and parts[1] != kind):
+        raise UnknownTypeError(
+            f'"{name[:80]}" is not the name of a {kind}: write package/{kind}/Name'
+        )
+    try:
+        return getattr(import_module(f"{package}.{kind}"), interface)
+    except (ModuleNotFoundError, AttributeError, ValueError) as error:
+        raise UnknownTypeError(f'no {kind} type "{name[:80]}" is installed here') from error
+
+
+def type_name(interface: Any) -> str:
+    """Name of an interface's class: "ir_msgs/srv/SetCell"."""
+    package, kind = interface.__module__.split(".")[:2]
+    return f"{package}/{kind}/{interface.__name__}"
+
+
+def owner_of(part: Any, suffix: str, kind: str) -> Any:
+    """Return the service or action type that a Request or Goal instance belongs to."""
+    cls = type(part)
+    if not cls.__name__.endswith(f"_{suffix}"):
+        raise UnknownTypeError(f"{cls.__name__} is not the {suffix} of a {kind} type")
+    package = cls.__module__.split(".")[0]
+    return interface_type(f"{package}/{kind}/{cls.__name__.removesuffix(f'_{suffix}')}", kind)
+
 
 _TRUE = frozenset({"true", "yes", "on", "1"})
 _FALSE = frozenset({"false", "no", "off", "0"})

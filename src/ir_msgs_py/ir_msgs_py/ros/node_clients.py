@@ -1,5 +1,4 @@
-"""The driver as a program sees it: its services, its action and its meter, for coroutines of one
-node.
+"""Clients of the driver and of the planner, for coroutines of another node.
 
 Every answer is a Status; nothing blocks, and nothing is waited for without end: while the meter is
 heard the driver is alive, and when it falls silent every wait ends.
@@ -10,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from rclpy.action import ActionClient
@@ -19,21 +19,18 @@ from rclpy.task import Future
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import ControllerTimers as ControllerTimersMsg
 from ir_msgs.msg import PowerState as PowerStateMsg
-from ir_msgs.srv import QueryModes
+from ir_msgs.srv import GetProgram, GetTrajectory, QueryModes
 from ir_msgs.srv import SetLoad as SetLoadSrv
 from ir_msgs.srv import SetPlcInput as SetPlcInputSrv
 from ir_msgs_py.announced import ControllerTimers
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.modes import OFF_THE_NETWORK, Mode
 from ir_msgs_py.power import PowerMode
-from ir_msgs_py.ros.conversions import (
-    controller_timers_from_msg,
-    power_mode_from_msg,
-    status_from_msg,
-    trajectory_to_msg,
-)
-from ir_msgs_py.ros.polled import LatestMessage
-from ir_msgs_py.ros.quality import ACTION_SERVICES, LATCHED, SERVICE
+from ir_msgs_py.report import PlannedMovement
+from ir_msgs_py.ros.conversions import status_from_msg, trajectory_from_msg, trajectory_to_msg
+from ir_msgs_py.ros.plan_conversions import planned_movement_from_msg
+from ir_msgs_py.ros.power_conversions import controller_timers_from_msg, power_mode_from_msg
+from ir_msgs_py.ros.topics import ACTION_SERVICES, LATCHED, SERVICE, LatestMessage
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -44,7 +41,7 @@ stopped.
 """
 
 
-class Driver:
+class DriverClient:
     """Clients of one driver; times in s.
 
     response_timeout: for services, and to take a goal. silence_timeout: without a reading of the
@@ -237,3 +234,55 @@ def _status_of_result(result: Any) -> Status:
 
 def _timed_out(what: str, limit: float) -> Status:
     return Status(StatusCode.TIMED_OUT, f"{what} within {limit:g} s")
+
+
+Fetched = tuple[Status, tuple[PlannedMovement, ...]]
+
+
+class PlannerClient:
+    """Programs and trajectories of one planner by id; timeout [s]: longest wait for each answer."""
+
+    def __init__(self, node: Node, waiting: Waiting, name: str, timeout: float = 2.0) -> None:
+        self._waiting = waiting
+        self._timeout = timeout
+        self._program = node.create_client(GetProgram, f"{name}/get_program", qos_profile=SERVICE)
+        self._trajectory = node.create_client(
+            GetTrajectory, f"{name}/get_trajectory", qos_profile=SERVICE
+        )
+
+    async def program(self, program_id: str) -> Fetched:
+        """Fetch the steps of a planned program, with the points of its movements."""
+        request = GetProgram.Request(program_id=program_id)
+        response = await self._waiting.ask(self._program, request, self._timeout)
+        if isinstance(response, Status):
+            return response, ()
+        status = status_from_msg(response.status)
+        if not status.ok:
+            return status, ()
+        try:
+            movements = [planned_movement_from_msg(movement) for movement in response.movements]
+        except InvalidValueError as error:
+            return Status(StatusCode.INVALID_MOTION_PLAN, f"program {program_id}: {error}"), ()
+        return await self.with_points(movements)
+
+    async def with_points(self, movements: Sequence[PlannedMovement]) -> Fetched:
+        """Fetch the points of those movements that only have an id."""
+        complete = []
+        for movement in movements:
+            if movement.trajectory_id and movement.trajectory is None:
+                request = GetTrajectory.Request(trajectory_id=movement.trajectory_id)
+                response = await self._waiting.ask(self._trajectory, request, self._timeout)
+                status = (
+                    response if isinstance(response, Status) else status_from_msg(response.status)
+                )
+                if not status.ok:
+                    return status, ()
+                try:
+                    points = trajectory_from_msg(response.trajectory)
+                except InvalidValueError as error:
+                    sentence = f"trajectory {movement.trajectory_id}: {error}"
+                    return Status(StatusCode.INVALID_MOTION_PLAN, sentence), ()
+                complete.append(replace(movement, trajectory=points))
+            else:
+                complete.append(movement)
+        return Status.success(), tuple(complete)

@@ -1,7 +1,7 @@
-"""An executor that spins in its own thread, so that scripts and tests can call and wait.
+"""Executors that spin until they are ended: in the calling thread, or in one of their own.
 
-Whatever touches a node's entities is handed over with `run`: clients, and action clients above all,
-race when they are used from two threads.
+Entities of a node that spins in the background are only touched by `run`: clients, and action
+clients above all, race when they are used from two threads.
 """
 
 from __future__ import annotations
@@ -11,16 +11,58 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import (
+    Executor,
+    ExternalShutdownException,
+    ShutdownException,
+    SingleThreadedExecutor,
+)
 from rclpy.node import Node
 from rclpy.task import Future
 
-from ir_msgs_py.ros.running import Spinning
-
 T = TypeVar("T")
+LOOK = 0.1  # s between two looks whether a node goes on
 _POLL = 0.005  # s, for conditions that nobody announces, as the discovery of a service
 _LAST_CALLBACK = 60.0  # s that it may take; nodes are not taken apart under it
+
+
+class Spinning:
+    """Spins an executor in the thread that calls `run`, until any thread calls `end`."""
+
+    def __init__(self) -> None:
+        self._ended = threading.Event()
+        self._executor: Executor | None = None
+
+    def run(
+        self, executor: Executor, goes_on: Callable[[], bool] | None = None, look: float = LOOK
+    ) -> None:
+        """Return after `end`, when the executor's context has ended, or at most `look` [s] after
+        goes_on() is False.
+
+        Raises what a callback raises; `run` may be called again then.
+        """
+        self._executor = executor
+        context = executor.context
+        period = None if goes_on is None else look
+        try:
+            while not self._ended.is_set() and context.ok() and (goes_on is None or goes_on()):
+                executor.spin_once(timeout_sec=period)
+        except (ExternalShutdownException, ShutdownException):
+            return
+        except RCLError:
+            if context.ok():
+                raise  # else somebody ended the context between two lines of the executor
+
+    def end(self) -> None:
+        """Let `run` return after the present callback."""
+        if self._ended.is_set():
+            return
+        self._ended.set()
+        executor = self._executor
+        if executor is not None:
+            executor.create_task(_nothing)  # waking alone does not end a wait, work does
 
 
 class BackgroundExecutor:
@@ -108,3 +150,7 @@ class BackgroundExecutor:
                 self._failure = failure
             else:
                 return
+
+
+def _nothing() -> None:
+    """A task that ends a wait."""

@@ -1,9 +1,9 @@
-"""A node as a process: made, spun until SIGINT or SIGTERM, cleaned up while its context is still
-whole.
+"""A node as a process: its command line, its signals, and spinning until it ends.
 
-rclpy's own signal handlers end the context under the executor and the clean-up, which then fail in
-many ways (ExternalShutdownException, RCLError, KeyboardInterrupt in any line). Here a signal only
-ends the spinning, and a second one finds nothing to cut short.
+rclpy's own signal handlers end the context under the executor and the clean-up, which then fail
+in many ways (ExternalShutdownException, RCLError, KeyboardInterrupt in any line). Here a signal
+only ends the spinning, a second one finds nothing to cut short, and the node is cleaned up while
+its context is still whole.
 """
 
 from __future__ import annotations
@@ -18,65 +18,107 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import rclpy
-from rclpy._rclpy_pybind11 import RCLError
+from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
 from rclpy.executors import (
     Executor,
-    ExternalShutdownException,
-    ShutdownException,
     SingleThreadedExecutor,
 )
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+from rosgraph_msgs.msg import Clock
 
 from ir_msgs_py.checks import one_line
 from ir_msgs_py.errors import ParameterError
-from ir_msgs_py.ros.clock_guard import heed_times_only
-from ir_msgs_py.ros.command_line import CommandLineError, answer_before_start, init_ros
 from ir_msgs_py.ros.network import apply_network
+from ir_msgs_py.ros.spinning import LOOK, Spinning
 
 N = TypeVar("N", bound=Node)
-LOOK = 0.1  # s between two looks whether a node goes on
 FAILURES_MAX = 50
 FAILURES_WITHIN = 60.0
 """So many callbacks may fail within so many seconds: a node that fails more often does nothing
 useful.
 """
+_UNREADABLE = (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError)
+_HELP = """usage: {name} [--ros-args [-p NAME:=VALUE ...] [--params-file FILE] [-r __ns:=/NAMESPACE]]
+
+{about}
+
+It runs until SIGINT or SIGTERM. Its parameters, with units and ranges, are in docs/parameters.md;
+`ros2 param describe /{name} NAME` says the same while it runs. `ir up` starts all nodes of a cell.
+"""  # noqa: E501
 
 
-class Spinning:
-    """Spins an executor in the thread that calls `run`, until any thread calls `end`."""
+class CommandLineError(Exception):
+    """Words that make no sense; the node is not started."""
 
-    def __init__(self) -> None:
-        self._ended = threading.Event()
-        self._executor: Executor | None = None
 
-    def run(
-        self, executor: Executor, goes_on: Callable[[], bool] | None = None, look: float = LOOK
-    ) -> None:
-        """Return after `end`, when the executor's context has ended, or at most `look` [s] after
-        goes_on() is False.
+def answer_before_start(name: str, words: Sequence[str], about: str) -> int | None:
+    """Exit code where the words ask for help or are no words of a node, None where it shall
+    start.
+    """
+    own = list(words[: words.index("--ros-args")] if "--ros-args" in words else words)
+    if {"-h", "--help"} & set(own):
+        sys.stdout.write(_HELP.format(name=name, about=about))
+        return 0
+    if own:
+        sentence = (
+            f"unknown argument {own[0][:100]!a}; parameters are given by --ros-args -p NAME:=VALUE"
+        )
+        sys.stderr.write(f"{name}: {sentence} ({name} --help)\n")
+        return 2
+    return None
 
-        Raises what a callback raises; `run` may be called again then.
-        """
-        self._executor = executor
-        context = executor.context
-        period = None if goes_on is None else look
-        try:
-            while not self._ended.is_set() and context.ok() and (goes_on is None or goes_on()):
-                executor.spin_once(timeout_sec=period)
-        except (ExternalShutdownException, ShutdownException):
+
+def init_ros(words: Sequence[str] | None) -> None:
+    """rclpy.init without its signal handlers; CommandLineError with one line for words that it
+    can't read.
+    """
+    try:
+        rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
+    except _UNREADABLE as error:
+        raise _unreadable(error) from error
+
+
+def own_words(program: str, words: Sequence[str]) -> list[str]:
+    """The words that are not for ROS; CommandLineError for such that ROS can't read."""
+    try:
+        return remove_ros_args([program, *words])[1:]
+    except _UNREADABLE as error:
+        raise _unreadable(error) from error
+
+
+def _unreadable(error: Exception) -> CommandLineError:
+    """What the C library says, without its places in its own source."""
+    if isinstance(error, UnknownROSArgsError):
+        return CommandLineError(f"unknown arguments after --ros-args: {one_line(str(error), 300)}")
+    what = str(error).partition(": ")[2].partition(", at /")[0].removesuffix(".")
+    return CommandLineError(one_line(what or str(error), 300))
+
+
+_SAID_AGAIN = 60.0  # s
+
+
+def heed_times_only(node: Node) -> None:
+    """Let the node ignore times before 1970 on /clock, whenever it begins to listen to one.
+
+    rclpy raises at each of them, and a node that only fails ends.
+    """
+    source = node._time_source
+    take = source.clock_callback
+
+    def heed(message: Clock) -> None:
+        if message.clock.sec >= 0:
+            take(message)
             return
-        except RCLError:
-            if context.ok():
-                raise  # else somebody ended the context between two lines of the executor
+        seconds = message.clock.sec
+        node.get_logger().warning(
+            f"/clock says {seconds} s, which is no time: ignored", throttle_duration_sec=_SAID_AGAIN
+        )
 
-    def end(self) -> None:
-        """Let `run` return after the present callback."""
-        if self._ended.is_set():
-            return
-        self._ended.set()
-        executor = self._executor
-        if executor is not None:
-            executor.create_task(_nothing)  # waking alone does not end a wait, work does
+    source.clock_callback = heed
+    if source._clock_sub is not None:
+        source._clock_sub.callback = heed
 
 
 def run_node(
@@ -170,7 +212,3 @@ def _on_signals(act: Callable[[], None]) -> None:
 
 def _ignore(number: int, frame: object) -> None:
     """What Python does in the main thread when it comes to it: nothing more."""
-
-
-def _nothing() -> None:
-    """A task that ends a wait."""
