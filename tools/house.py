@@ -30,6 +30,7 @@ GENERATED = (
     "parameters.md",
     "mistakes.md",
     "architecture.md",
+    "reproduction.md",
 )
 
 

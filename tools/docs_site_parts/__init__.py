@@ -1,1 +1,0 @@
-"""Parts of the documentation's site: its lists, links, rendering and reference."""
