@@ -31,7 +31,7 @@ from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.topics import SERVICE
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver.plc.modbus_map import COILS
+from ir_sim_driver.plc.modbus import COILS
 
 AT_ONCE = 50  # requests under way
 ANSWERED = 60.0  # s, for a lump of requests

@@ -19,7 +19,7 @@ import time
 from pymodbus.client import ModbusTcpClient
 
 from ir_msgs_py.wake_on_lan import magic_packet
-from ir_sim_driver.plc.modbus_map import COILS, HEARTBEAT, INPUT_REGISTERS, PAUSE
+from ir_sim_driver.plc.modbus import COILS, HEARTBEAT, INPUT_REGISTERS, PAUSE
 
 MODES = {
     0: "stand on motors",

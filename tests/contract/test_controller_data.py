@@ -13,8 +13,8 @@ import pytest
 from ir_description import PowerData, load_power_data
 from ir_msgs_py.modes import REST_MODES, Mode
 from ir_planner import Planner
-from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
+from ir_sim_driver.controller.simulation import make_simulation
 
 FOLDER = files("ir_description") / "data" / "power"
 CONTROLLERS = sorted(entry.name.removesuffix(".yaml") for entry in FOLDER.iterdir())

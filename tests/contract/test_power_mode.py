@@ -17,8 +17,8 @@ from ir_msgs_py.plc import PlcInputs
 from ir_msgs_py.transitions import TransitionTimes
 from ir_planner import Planner
 from ir_recorder.report.picture import MODE_COLOURS
-from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
+from ir_sim_driver.controller.simulation import make_simulation
 
 ROOT = Path(__file__).resolve().parents[2]
 STYLE = ROOT / "src" / "ir_recorder" / "ir_recorder" / "report" / "assets" / "page.css"

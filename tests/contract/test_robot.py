@@ -21,7 +21,7 @@ from ir_description import (
 from ir_kernels import Chain, DynamicsModel, inverse_kinematics
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner, parse_goal
-from ir_sim_driver.controller.assembly import make_simulation
+from ir_sim_driver.controller.simulation import make_simulation
 from ir_sim_driver.motion.goal import TrajectoryGoal
 
 POSITION = 1e-9  # m

@@ -10,9 +10,8 @@ import pytest
 
 from ir_description import Cell, load_cell
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.controller.settings import SimulationSettings
-from ir_sim_driver.controller.simulation import Simulation
+from ir_sim_driver.controller.simulation import Simulation, make_simulation
 from ir_sim_driver.motion.goal import Outcome, TrajectoryGoal
 
 

@@ -12,13 +12,12 @@ from ir_description import Load, load_power_data
 from ir_kernels.chain import Chain
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.modes import Mode
-from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.controller.settings import ControllerSettings
+from ir_sim_driver.controller.simulation import make_simulation
 from ir_sim_driver.plant import nominal_plant, typical_plant
-from ir_sim_driver.plant.bullet_arm import BulletArm
-from ir_sim_driver.plant.drivetrain import Drivetrain
-from ir_sim_driver.plant.gears import Gears
+from ir_sim_driver.plant.drivetrain import Drivetrain, Gears
 from ir_sim_driver.plant.ideal_backend import IdealBackend
+from ir_sim_driver.plant.pybullet_backend import BulletArm
 
 POSITION_TOLERANCE = 1e-9  # m; the centre-of-mass frame is double precision in Bullet
 TORQUE_TOLERANCE = 1e-6  # Nm; sums of a few thousand Nm in another order

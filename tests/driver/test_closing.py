@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from ir_sim_driver.controller.assembly import make_simulation
+from ir_sim_driver.controller.simulation import make_simulation
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import ExecutionSettings, Motion, check_trajectory, checked_route
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from ir_description import AllowedContact, Zone, load_cell, machine_in
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver import make_simulation
-from ir_sim_driver.controller.machines import Machines
+from ir_sim_driver.controller.cell_scene import Machines
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.goal import ErrorCode, TrajectoryGoal
 from ir_sim_driver.plant import carried

@@ -14,8 +14,7 @@ from ir_description import Cell, ProgramStep, cell_to_yaml, load_cell
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
 from ir_planner.planner import Planner
-from ir_sim_driver.controller.assembly import make_simulation
-from ir_sim_driver.controller.simulation import Simulation
+from ir_sim_driver.controller.simulation import Simulation, make_simulation
 from ir_sim_driver.motion.goal import ErrorCode, TrajectoryGoal
 from ir_sim_driver.plant.loads import carried
 

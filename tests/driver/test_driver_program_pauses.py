@@ -20,7 +20,7 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.planner import Planner
 from ir_program_runner import Program, ProgramSettings
 from ir_program_runner import requests as ask
-from ir_sim_driver.controller.assembly import make_simulation
+from ir_sim_driver.controller.simulation import make_simulation
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.motion.goal import ErrorCode, TrajectoryGoal
 from ir_sim_driver.plant.loads import carried

@@ -9,7 +9,7 @@ import pytest
 
 from ir_msgs_py.modes import Mode
 from ir_sim_driver.controller import SupervisionSettings
-from ir_sim_driver.controller.diagnostics import report
+from ir_sim_driver.controller.outputs import report
 from ir_sim_driver.errors import BackendError, RequestRefusedError
 from ir_sim_driver.motion.goal import ErrorCode
 

@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver.controller.assembly import make_simulation
-from ir_sim_driver.controller.diagnostics import report
-from ir_sim_driver.motion.execution_settings import ExecutionSettings
-from ir_sim_driver.motion.goal import ErrorCode, JointTolerance
+from ir_sim_driver.controller.outputs import report
+from ir_sim_driver.controller.simulation import make_simulation
+from ir_sim_driver.motion.goal import ErrorCode, ExecutionSettings, JointTolerance
 from ir_sim_driver.notices import Level
 
 EXACT = 1e-9  # rad; the ideal robot is where it was commanded

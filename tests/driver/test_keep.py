@@ -15,8 +15,8 @@ from ir_description import AllowedContact, load_cell, load_power_data
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver import make_simulation
-from ir_sim_driver.controller.contact import HARDEST
-from ir_sim_driver.controller.keep import Keep
+from ir_sim_driver.controller.cell_scene import Keep
+from ir_sim_driver.controller.contacts import HARDEST
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import Path, TrajectoryGoal
 from ir_sim_driver.plant import carried, typical_plant

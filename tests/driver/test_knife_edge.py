@@ -12,7 +12,7 @@ import pytest
 
 from ir_description import load_cell, robot_urdf
 from ir_kernels.dynamics import DynamicsModel
-from ir_sim_driver.controller.assembly import make_simulation
+from ir_sim_driver.controller.simulation import make_simulation
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import (
     ErrorCode,

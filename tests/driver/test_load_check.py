@@ -17,7 +17,7 @@ from ir_sim_driver import (
     TrajectoryGoal,
     make_simulation,
 )
-from ir_sim_driver.controller.diagnostics import report
+from ir_sim_driver.controller.outputs import report
 from ir_sim_driver.load_check import Declared, Motion, Uncertainty, weighed
 from ir_sim_driver.notices import Level
 from ir_sim_driver.plant import carried

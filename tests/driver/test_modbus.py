@@ -18,14 +18,14 @@ from ir_sim_driver.controller.driver import Driver
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import LinkError, TrajectoryRefusedError
 from ir_sim_driver.plc.inputs import PlcSettings
-from ir_sim_driver.plc.modbus_link import ModbusTcp
-from ir_sim_driver.plc.modbus_map import (
+from ir_sim_driver.plc.modbus import (
     COILS,
     DISCRETE_INPUTS,
     HEARTBEAT,
     INPUT_REGISTERS,
     OPERATING_MODE,
     PAUSE,
+    ModbusTcp,
 )
 
 PERIOD = 2_000_000

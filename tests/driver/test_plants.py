@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from ir_description import load_power_data, load_robot
-from ir_sim_driver.controller.assembly import make_simulation
-from ir_sim_driver.controller.diagnostics import report
 from ir_sim_driver.controller.driver import Driver
+from ir_sim_driver.controller.outputs import report
+from ir_sim_driver.controller.simulation import make_simulation
 from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.plant import (
     PlantFileError,
@@ -21,8 +21,8 @@ from ir_sim_driver.plant import (
     plant_to_yaml,
     typical_plant,
 )
-from ir_sim_driver.plant.gears import Gears
-from ir_sim_driver.plant.typical import CUT, SPREAD
+from ir_sim_driver.plant.drivetrain import Gears
+from ir_sim_driver.plant.plants import CUT, SPREAD
 
 HEAD = "format: ir_sim_driver/plant/1\nname: mine\nrobot: kr210_r2700_extra\n"
 

@@ -10,8 +10,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_sim_driver.node.grid import FOREIGN, OWN, SYSTEM, ClockPolicy, Grid
-from ir_sim_driver.node.real_time import GridThread, ScaledClock
+from ir_sim_driver.node.real_time import (
+    FOREIGN,
+    OWN,
+    SYSTEM,
+    ClockPolicy,
+    Grid,
+    GridThread,
+    ScaledClock,
+)
 
 NS = 1_000_000_000
 PERIOD = 2_000_000

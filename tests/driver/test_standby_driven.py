@@ -21,8 +21,8 @@ from ir_planner.program.pause_lengths import lengths_of
 from ir_planner.program.rests import Step, rests_at
 from ir_planner.program.standby import advice, plan_standby
 from ir_planner.scene import scene_with
-from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.controller.settings import SimulationSettings
+from ir_sim_driver.controller.simulation import make_simulation
 from ir_sim_driver.power import IdleTimes
 
 CELL = load_cell("demo")

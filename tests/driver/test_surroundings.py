@@ -13,7 +13,7 @@ import pytest
 
 from ir_description import Body, cell_hash, load_cell
 from ir_sim_driver.controller import Driver, PlannedCell, surroundings
-from ir_sim_driver.controller.moving_in import take_offered_cell
+from ir_sim_driver.controller.driver import take_offered_cell
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.goal import ErrorCode, Outcome, TrajectoryGoal
 from ir_sim_driver.node.announcements import announced

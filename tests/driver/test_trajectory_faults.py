@@ -16,8 +16,7 @@ from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.motion.execution_settings import ExecutionSettings
-from ir_sim_driver.motion.goal import ErrorCode, JointTolerance
+from ir_sim_driver.motion.goal import ErrorCode, ExecutionSettings, JointTolerance
 
 INVALID = ErrorCode.INVALID_GOAL
 

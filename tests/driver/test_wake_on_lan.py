@@ -13,7 +13,7 @@ from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.wake_on_lan import magic_packet, send_packet, wakes
 from ir_sim_driver.errors import LinkError
 from ir_sim_driver.plc import Controller, WakeOnLan
-from ir_sim_driver.plc.modbus_link import ModbusTcp
+from ir_sim_driver.plc.modbus import ModbusTcp
 from ir_sim_driver.plc.wake_on_lan import WakeListener
 
 MAC = "02:00:00:c4:02:10"

@@ -18,7 +18,7 @@ from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.node import SimDriver
-from ir_sim_driver.node.goal_clients import ClientWatch
+from ir_sim_driver.node.trajectory_actions import ClientWatch
 
 
 @pytest.fixture

@@ -25,10 +25,7 @@ from ir_sim_driver import (
     make_simulation,
 )
 from ir_sim_driver.plc import BITS, SERVICE, TOPIC
-from ir_sim_driver.plc.modbus_link import ModbusTcp
-from ir_sim_driver.plc.modbus_map import COILS, MODBUS
-from ir_sim_driver.plc.modbus_pdu import answered
-from ir_sim_driver.plc.modbus_tables import ControllerTables
+from ir_sim_driver.plc.modbus import COILS, MODBUS, ControllerTables, ModbusTcp, answered
 
 QUICK = TransitionTimes(
     stand_on_brakes_enter=0.05,

@@ -37,9 +37,7 @@ from ir_sim_driver.controller import ControllerSettings
 from ir_sim_driver.node.messages import goal_from_action
 from ir_sim_driver.plant import carried
 from ir_sim_driver.plc import BITS, SERVICE, TOPIC
-from ir_sim_driver.plc.modbus_map import COILS, MODBUS
-from ir_sim_driver.plc.modbus_pdu import answered
-from ir_sim_driver.plc.modbus_tables import ControllerTables
+from ir_sim_driver.plc.modbus import COILS, MODBUS, ControllerTables, answered
 
 PERIOD = 1_000_000  # ns, between two joint states of this driver: every step is judged
 SHORT = TransitionTimes(

@@ -18,7 +18,7 @@ from ir_msgs_py.plc import PlcInputs
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_msgs_py.transitions import TransitionTimes
 from ir_sim_driver import Simulation, SimulationSettings, TrajectoryGoal, make_simulation
-from ir_sim_driver.controller.diagnostics import report
+from ir_sim_driver.controller.outputs import report
 from ir_sim_driver.notices import Level
 
 LOOKS = 12  # steps within which a deviation must be seen: the supervision looks every 4

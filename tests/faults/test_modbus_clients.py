@@ -16,11 +16,15 @@ from pymodbus.client import ModbusTcpClient
 from ir_msgs_py.plc import OperatingMode
 from ir_sim_driver import Driver, make_simulation
 from ir_sim_driver.plc import OpenLink
-from ir_sim_driver.plc.modbus import Limits, ModbusServer
-from ir_sim_driver.plc.modbus_link import ModbusTcp
-from ir_sim_driver.plc.modbus_map import COILS, OPERATING_MODE
-from ir_sim_driver.plc.modbus_pdu import answered
-from ir_sim_driver.plc.modbus_tables import ControllerTables
+from ir_sim_driver.plc.modbus import (
+    COILS,
+    OPERATING_MODE,
+    ControllerTables,
+    Limits,
+    ModbusServer,
+    ModbusTcp,
+    answered,
+)
 
 Opened = Callable[..., int]
 READ_ALL_COILS = struct.pack(">BHH", 1, 0, len(COILS))

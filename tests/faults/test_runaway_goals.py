@@ -19,7 +19,7 @@ from ir_sim_driver import (
     TrajectoryGoal,
     make_simulation,
 )
-from ir_sim_driver.motion.rounding import rounded
+from ir_sim_driver.motion.trajectory_checks import rounded
 
 BARE = replace(
     load_cell("open"), floor=False, equipment=(), stations=(), parts=(), program=(), tasks=()

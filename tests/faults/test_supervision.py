@@ -22,7 +22,7 @@ from ir_sim_driver import (
     TrajectoryRefusedError,
     make_simulation,
 )
-from ir_sim_driver.controller.diagnostics import report
+from ir_sim_driver.controller.outputs import report
 from ir_sim_driver.controller.supervision import Command, Supervision, SupervisionSettings
 from ir_sim_driver.notices import Level
 from ir_sim_driver.plant import Backend

@@ -22,8 +22,8 @@ from ir_msgs.srv import QueryModes, SetPlcInput
 from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.ros.topics import ACTION_SERVICES, REQUESTS_WAITING, SERVICE
 from ir_sim_driver.node import SimDriver
-from ir_sim_driver.node.executions import Executions
-from ir_sim_driver.node.plc_topic import PlcTopic
+from ir_sim_driver.node.command_topics import PlcTopic
+from ir_sim_driver.node.trajectory_actions import Executions
 
 PRESSED = PlcInputs(emergency_stop=True, move_enable=True)
 RELEASED = PlcInputs(move_enable=True)

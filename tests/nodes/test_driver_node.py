@@ -28,7 +28,7 @@ from ir_msgs_py.wake_on_lan import magic_packet
 from ir_sim_driver.controller.mains import Mains
 from ir_sim_driver.node import SimDriver, streams
 from ir_sim_driver.plant import plant_to_yaml, typical_plant
-from ir_sim_driver.plc.modbus_map import COILS
+from ir_sim_driver.plc.modbus import COILS
 
 MAC = "02:00:00:c4:02:10"
 QUICK = {

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from ir_description import load_cell
 from ir_sim_driver.controller import Driver, make_simulation
 from ir_sim_driver.controller.settings import SimulationSettings
-from ir_sim_driver.node.transforms import Transforms, open_transforms
+from ir_sim_driver.node.visualization import Transforms, open_transforms
 from ir_sim_driver.plant import carried
 
 TOLERANCE = 1e-9  # m and rad: quaternions keep double precision

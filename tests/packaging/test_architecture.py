@@ -163,7 +163,7 @@ def test_ros_appears_only_in_nodes_and_parameters(package: str) -> None:
 
 @pytest.mark.parametrize("package", sorted(PROJECT))
 def test_pybullet_appears_in_one_file(package: str) -> None:
-    backend = SRC / "ir_sim_driver" / "ir_sim_driver" / "plant" / "bullet_arm.py"
+    backend = SRC / "ir_sim_driver" / "ir_sim_driver" / "plant" / "pybullet_backend.py"
 
     def forbidden(module: Path, name: str) -> bool:
         return name.partition(".")[0] in ("pybullet", "pybullet_data") and module != backend

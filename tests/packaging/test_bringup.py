@@ -21,7 +21,7 @@ from ir_planner.settings import PlannerSettings
 from ir_program_runner.settings import LinkSettings, ProgramSettings
 from ir_recorder.settings import RecorderSettings
 from ir_sim_driver.controller.settings import ControllerSettings
-from ir_sim_driver.motion.execution_settings import ExecutionSettings
+from ir_sim_driver.motion.goal import ExecutionSettings
 from ir_sim_driver.node.parameters import NodeSettings
 from ir_sim_driver.plc import LINKS
 

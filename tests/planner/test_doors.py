@@ -21,7 +21,7 @@ from ir_planner.heard import Heard
 from ir_planner.program import ProgramPlan, ProgramRequest, plan_program
 from ir_planner.program.doors import doors_along
 from ir_planner.request import Work, parse_goal
-from ir_sim_driver.controller.machines import Machines
+from ir_sim_driver.controller.cell_scene import Machines
 
 DEMO = load_cell("demo")
 OPEN = "lathe_open_door"

@@ -24,8 +24,8 @@ from ir_planner.program.standby import (
 )
 from ir_planner.program.waiting import Trip, best_posture
 from ir_planner.scene.planning_scene import load_text, scene_with
-from ir_sim_driver.controller.assembly import make_simulation
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
+from ir_sim_driver.controller.simulation import make_simulation
 
 CELL = load_cell("demo")
 POWER = load_power_data()

@@ -7,7 +7,7 @@ import numpy as np
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_program_runner.progress import Progress
+from ir_program_runner.program import Progress
 
 
 def move(start=0.0, end=0.0, **fields):

@@ -2,11 +2,10 @@
 machines.
 """
 
-from ir_program_runner.checks import check_program, load_after
 from ir_program_runner.errors import CanceledError, ProgramError, RunnerError, StepFailedError
 from ir_program_runner.fulfilment import DriverPort, Fulfilment, Ports
 from ir_program_runner.machines import Machines
-from ir_program_runner.program import Program, ProgramResult
+from ir_program_runner.program import Program, ProgramResult, check_program, load_after
 from ir_program_runner.settings import LinkSettings, ProgramSettings
 
 __all__ = [

@@ -1,6 +1,4 @@
-"""The node `ir_program_runner`: fetches a program, fulfils its requests and publishes its
-progress.
-"""
+"""The node `ir_program_runner`: fetches a program, fulfils its requests, publishes progress."""
 
 from __future__ import annotations
 
@@ -22,10 +20,12 @@ from ir_msgs.msg import ProgramState as ProgramStateMsg
 from ir_msgs.msg import Signal as SignalMsg
 from ir_msgs_py import names
 from ir_msgs_py.errors import InvalidValueError, ParameterError
+from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.program import Event, ProgramState
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.conversions import status_to_msg
+from ir_msgs_py.ros.diagnostics import OK, WARN, Condition, Diagnostics
 from ir_msgs_py.ros.node_clients import DriverClient, PlannerClient
 from ir_msgs_py.ros.node_process import run_node
 from ir_msgs_py.ros.plan_conversions import planned_movement_from_msg
@@ -35,16 +35,52 @@ from ir_msgs_py.ros.topics import ACTION_SERVICES, COMMANDS, CommandTopic
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.wake_on_lan import magic_packet, send_packet
-from ir_program_runner.checks import MOST_STEPS, check_program, check_request
-from ir_program_runner.diagnose.node import RunnerDiagnostics
 from ir_program_runner.errors import ProgramError
 from ir_program_runner.fulfilment import Fulfilment, Ports
 from ir_program_runner.machines import Machines
 from ir_program_runner.parameters import declare_parameters
-from ir_program_runner.program import Program, ProgramResult
-from ir_program_runner.progress import Progress
+from ir_program_runner.program import (
+    MOST_STEPS,
+    Program,
+    ProgramResult,
+    Progress,
+    check_program,
+    check_request,
+)
 from ir_program_runner.requests import Announce
 from ir_program_runner.settings import LinkSettings
+
+# Diagnostics: a silent driver, or a program that failed, is a warning.
+
+
+class RunnerDiagnostics:
+    """One publisher of the node; `publish` once a second."""
+
+    def __init__(self, node: Node) -> None:
+        self._name = node.get_name()
+        self._diagnostics = Diagnostics(node)
+
+    def publish(
+        self, progress: Progress | None, driver: Status, mode: Mode | None, last: Status
+    ) -> None:
+        """`progress`: of the running program, None for none; `last`: how the one before ended."""
+        level = OK
+        sentence = "ready"
+        values: dict[str, object] = {
+            "driver": str(driver),
+            "mode": "not known" if mode is None else mode.name,
+        }
+        if progress is not None:
+            sentence = f"step {progress.index + 1} of {progress.total}: {progress.phase}"
+            values["program"] = progress.program_id
+        elif not last.ok:
+            level = WARN
+            sentence = f"the last program did not end well: {last}"
+        if not driver.ok:
+            level = WARN
+            sentence = f"{sentence}; {driver.message}"
+        self._diagnostics.publish([Condition(self._name, level, sentence, values)])
+
 
 _KEPT = QoSProfile(depth=5 * MOST_STEPS, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """The longest program is kept for a recorder that comes late; a runner that works for weeks stays

@@ -1,30 +1,34 @@
 """A program as a generator over its steps: it yields requests and is sent outcomes.
 
-One step: wait for its signals, carry its load, move or pause, attach or detach, set its signals.
 Nothing here knows ROS or a clock, so a test runs a day's program in milliseconds.
 """
 
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from ir_msgs_py.modes import Mode
+import numpy as np
+
+from ir_msgs_py.errors import InvalidValueError
+from ir_msgs_py.modes import READY, RESTS, Mode, modes_of
+from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.plc import Signal
+from ir_msgs_py.power import PowerMode
 from ir_msgs_py.program import Event
-from ir_msgs_py.report import PlannedMovement
+from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.transitions import TransitionTimes
-from ir_program_runner.checks import load_after, station_of, step_name
-from ir_program_runner.errors import CanceledError, StepFailedError
-from ir_program_runner.pause import Pause
+from ir_program_runner.errors import CanceledError, ProgramError, StepFailedError
 from ir_program_runner.requests import (
     Announce,
+    AskModes,
     Begin,
     Drive,
     Outcome,
     Phase,
     Request,
+    SendWakePacket,
     SetLoad,
     SetPlcInput,
     SetSignal,
@@ -34,6 +38,296 @@ from ir_program_runner.requests import (
     need,
 )
 from ir_program_runner.settings import ProgramSettings
+
+# Checks of a whole program before its first movement: what can't end well must not start.
+
+MOST_STEPS = 1000  # of a request; a program of a cell has tens
+LONGEST_ID = 256  # characters
+LONGEST_PAUSE = 604_800.0  # s: a week, as for the driver's pauses
+JOINT_TOLERANCE = 0.01  # rad, as the driver's for the first point of a trajectory
+
+
+def check_request(program_id: str, steps: int) -> None:
+    """Raise ProgramError: not exactly one of both is given, or more than a program can have."""
+    sentence = ""
+    if bool(program_id) == bool(steps):
+        sentence = "give either program_id or movements"
+    elif len(program_id) > LONGEST_ID:
+        sentence = f"program_id has {len(program_id)} characters: at most {LONGEST_ID} are taken"
+    elif steps > MOST_STEPS:
+        sentence = f"the program has {steps} movements: at most {MOST_STEPS} are taken"
+    if sentence:
+        raise ProgramError(sentence, StatusCode.INVALID_GOAL_CONSTRAINTS)
+
+
+def check_program(movements: Sequence[PlannedMovement]) -> None:
+    """Raise ProgramError: no steps, no points, a gap between two movements, a bad signal or
+    load.
+    """
+    if not movements:
+        raise ProgramError("the program has no movements")
+    before: PlannedMovement | None = None
+    for index, movement in enumerate(movements):
+        where = step_name(index, len(movements), movement)
+        try:
+            signals = [Signal.parse(text) for text in (*movement.wait_for, *movement.set_signals)]
+            load_after(movement)
+        except InvalidValueError as error:
+            raise ProgramError(f"{where}: {error}") from error
+        del signals
+        if movement.duration > LONGEST_PAUSE:
+            raise ProgramError(
+                f"{where} takes {movement.duration:g} s: at most {LONGEST_PAUSE:g} s are allowed"
+            )
+        if movement.is_pause:
+            continue
+        if movement.trajectory is None:
+            raise ProgramError(f"{where} has no points")
+        if before is not None:
+            _check_gap(where, before, movement)
+        before = movement
+
+
+def station_of(movement: PlannedMovement) -> str:
+    """The station or path whose allowed contacts count in a movement: into it, out of it, along it;
+    "" elsewhere.
+    """
+    kinds = (MovementKind.SERVICE_EXIT, MovementKind.SERVICE_ENTRY, MovementKind.CARTESIAN)
+    service = movement.kind in kinds
+    return movement.to_station if service else ""
+
+
+def load_after(movement: PlannedMovement) -> str:
+    """Return the load text when the step has ended; "" where the step leaves it open."""
+    if not (movement.attach or movement.detach):
+        return movement.load
+    if not movement.load:
+        raise InvalidValueError(
+            f"{movement.attach or movement.detach} is attached or detached, but load is not given"
+        )
+    loads = [] if movement.load == NO_LOAD else movement.load.split(LOAD_SEPARATOR)
+    if movement.detach:
+        if movement.detach not in loads:
+            raise InvalidValueError(
+                f"{movement.detach} is detached, but attached is {movement.load}"
+            )
+        loads.remove(movement.detach)
+    if movement.attach:
+        if movement.attach in loads:
+            raise InvalidValueError(f"{movement.attach} is attached, but it is already")
+        loads.append(movement.attach)
+    return LOAD_SEPARATOR.join(loads) or NO_LOAD
+
+
+def step_name(index: int, total: int, movement: PlannedMovement) -> str:
+    """Name of a step in sentences: "step 2 of 5 (regional lathe -> park)"."""
+    places = " -> ".join(place for place in (movement.from_station, movement.to_station) if place)
+    mode = movement.power_mode if movement.is_pause else ""
+    text = " ".join(part for part in (str(movement.kind), mode, places) if part)
+    return f"step {index + 1} of {total} ({text})"
+
+
+def _check_gap(where: str, before: PlannedMovement, movement: PlannedMovement) -> None:
+    assert before.trajectory is not None
+    assert movement.trajectory is not None
+    end = before.trajectory.reordered(movement.trajectory.joint_names).positions[-1]
+    gap = movement.trajectory.positions[0] - end
+    joint = int(np.argmax(np.abs(gap)))
+    if abs(gap[joint]) > JOINT_TOLERANCE:
+        name = movement.trajectory.joint_names[joint]
+        raise ProgramError(
+            f"{where} starts {gap[joint]:+.4f} rad at {name} from where the movement before ends: "
+            f"at most {JOINT_TOLERANCE} rad are allowed"
+        )
+
+
+# A pause in one power mode or deeper and deeper: go to rest, wake in time, be ready at its end.
+#
+# AB switches the drive bus off, HIB hibernates, DRIVES_OFF closes the brakes. While it hibernates
+# the controller reacts to nothing but a Wake-on-LAN packet; the HIB bit is cleared when it is
+# back.
+
+Requests = Generator[Request, Outcome, Outcome]
+_ASLEEP = (Mode.TO_HIBERNATION, Mode.HIBERNATION)
+_AWAKE = (Mode.FROM_HIBERNATION, *READY, Mode.STAND_ON_BRAKES)
+_ROUNDING = 1e-6  # s; a plan may use the shortest pause exactly
+_LATE = 0.1  # s; a shorter delay is not reported: readings and answers take as long
+# whichever is larger: readings come every 10 ms, answers take as long
+_SHARE = 0.05
+_JOULES = 100.0
+_PULSE = 0.1  # s: a level has to stay 20 ms to count
+_BIT = {row.mode: row.bit or "drives_off" for row in RESTS}
+
+
+class Pause:
+    """One pause; `run()` is the generator that returns a note, "" when all went as planned."""
+
+    def __init__(
+        self, movement: PlannedMovement, settings: ProgramSettings, times: TransitionTimes
+    ) -> None:
+        self._movement = movement
+        self._duration = movement.duration
+        self._modes = modes_of(movement.power_mode)
+        self._settings = settings
+        self._times = times
+        self._mode = Mode.STAND_ON_MOTORS  # the deepest that was asked for
+        self.restarted = False  # whether the controller has hibernated
+
+    def run(self) -> Generator[Request, Outcome, str]:
+        """Spend the pause; raises StepFailedError when the robot isn't ready in the end."""
+        begun = yield Phase("pause")
+        end = begun.now + self._duration
+        if not self._modes:
+            outcome = need((yield WaitUntil(end)))
+            return self._difference(outcome.energy - begun.energy)
+        asked = yield AskModes()
+        known = {mode.mode: mode for mode in asked.modes}
+        times = [known.get(mode, self._times.of(mode)) for mode in self._modes]
+        shortest = sum(each.time_to_pause + each.time_min_length_of_stay for each in times)
+        shortest += times[-1].regular_time_to_operate
+        if self._duration + _ROUNDING < shortest:
+            need((yield WaitUntil(end)))
+            return (
+                f"the pause of {self._duration:g} s is too short for {self._movement.power_mode}, "
+                f"which needs {shortest:g} s: stood on motors"
+            )
+        try:
+            note = yield from self._rest(end, times)
+        except (CanceledError, StepFailedError):
+            yield from self._clear()
+            raise
+        outcome = yield from self._wake(end, times[-1])
+        late = outcome.now - end
+        if late > _LATE:
+            return "; ".join(part for part in (note, f"ready {late:.2f} s late") if part)
+        outcome = need((yield WaitUntil(end)))
+        return note or self._difference(outcome.energy - begun.energy)
+
+    def _difference(self, measured: float) -> str:
+        """What a pause took where it isn't what was planned for this length, "" where it is."""
+        planned = self._movement.report
+        same = (
+            planned.energy > 0.0
+            and abs(planned.duration - self._duration) < _ROUNDING
+            and measured > 0.0
+        )
+        if not same or abs(measured - planned.energy) <= max(_SHARE * planned.energy, _JOULES):
+            return ""
+        return (
+            f"the pause took {measured:.0f} J, {planned.energy:.0f} J were planned: the program "
+            "was planned for other timers, powers or loads than the driver's"
+        )
+
+    def _rest(self, end: float, times: Sequence[PowerMode]) -> Generator[Request, Outcome, str]:
+        """Enter the modes one after the other and stay until it is time to wake."""
+        wake_at = end - times[-1].regular_time_to_operate
+        stay = 0.0
+        for mode, each in zip(self._modes, times, strict=True):
+            yield Phase(f"pause: going to {mode.name}")
+            outcome = yield from self._ask_for(mode)
+            enough = stay + each.time_to_pause + self._settings.enter_timeout
+            patience = min(enough, max(0.0, wake_at - outcome.now))
+            outcome = yield WaitForMode((mode,), patience)
+            if outcome.status.code == StatusCode.TIMED_OUT:
+                found = "not known" if outcome.mode is None else outcome.mode.name
+                note = f"{mode.name} was not reached within {patience:.1f} s, the mode is {found}"
+                need((yield WaitUntil(wake_at)))
+                return note
+            need(outcome)
+            yield Phase(f"pause: {mode.name}")
+            stay = each.time_min_length_of_stay
+        need((yield WaitUntil(wake_at)))
+        return ""
+
+    def _ask_for(self, mode: Mode) -> Requests:
+        """Set the bit of a mode, then clear that of the one before: between the two the robot stays
+        where it is. The controller waits for the shortest stay by itself.
+        """
+        before = self._mode
+        self._mode = mode
+        outcome = need((yield SetPlcInput(_BIT[mode], True)))
+        if before in _BIT:
+            outcome = need((yield SetPlcInput(_BIT[before], False)))
+        if before is Mode.STAND_ON_BRAKES:  # takes the latched drives_off back
+            outcome = need((yield SetPlcInput("drives_on", True)))
+            need((yield WaitUntil(outcome.now + _PULSE)))
+            outcome = need((yield SetPlcInput("drives_on", False)))
+        return outcome
+
+    def _wake(self, end: float, times: PowerMode) -> Requests:
+        """Wake the robot and wait until it stands on motors; then no bit of the pause is left."""
+        outcome = yield Phase("pause: waking")
+        change = times.time_to_pause + times.time_min_length_of_stay + times.regular_time_to_operate
+        limit = max(end, outcome.now + change) + self._settings.ready_timeout
+        if self._mode is Mode.HIBERNATION:
+            outcome = yield from self._wake_by_packets(outcome, limit)
+        else:
+            outcome = need((yield SetPlcInput(_BIT[self._mode], False)))
+        if self._mode is Mode.STAND_ON_BRAKES:
+            outcome = need((yield SetPlcInput("drives_on", True)))
+        outcome = yield WaitForMode(READY, max(0.0, limit - outcome.now))
+        if outcome.status.code == StatusCode.TIMED_OUT:
+            found = "not known" if outcome.mode is None else outcome.mode.name
+            sentence = (
+                f"the robot is not ready {outcome.now - end:.1f} s after the pause: the "
+                f"mode is {found}"
+            )
+            raise StepFailedError(Status(StatusCode.TIMED_OUT, sentence))
+        ready = need(outcome)
+        if self._mode is Mode.HIBERNATION:
+            need((yield SetPlcInput(_BIT[self._mode], False)))
+        elif self._mode is Mode.STAND_ON_BRAKES:
+            need((yield SetPlcInput("drives_on", False)))
+        return ready
+
+    def _wake_by_packets(self, outcome: Outcome, limit: float) -> Requests:
+        """Send packets until the controller starts; one may get lost, or come before it sleeps."""
+        if outcome.mode not in _ASLEEP:  # it has not hibernated, or that is heard late
+            outcome = yield from self._stay_awake()
+            if outcome.status.ok and outcome.mode not in _ASLEEP:
+                return outcome
+        self.restarted = True
+        asleep = outcome.mode in _ASLEEP
+        waking = False
+        while not waking and outcome.now < limit:
+            need((yield SendWakePacket()))
+            outcome = yield WaitForMode((Mode.FROM_HIBERNATION,), self._settings.wake_repeat)
+            if outcome.status.code == StatusCode.ROBOT_STATE_STALE:
+                raise StepFailedError(outcome.status)
+            asleep = asleep or outcome.mode in _ASLEEP
+            waking = outcome.mode is Mode.FROM_HIBERNATION or (asleep and outcome.mode in _AWAKE)
+        return outcome
+
+    def _stay_awake(self) -> Requests:
+        """Take the HIB bit back; whoever doesn't answer hibernates, and who has begun to shows it
+        soon.
+        """
+        outcome = yield SetPlcInput(_BIT[self._mode], False)
+        if outcome.status.ok:
+            seen = yield WaitForMode(_ASLEEP, self._settings.wake_repeat)
+            outcome = replace(seen, status=outcome.status)
+        return outcome
+
+    def _clear(self) -> Generator[Request, Outcome, None]:
+        """After a cancel or a fault: clear the bit of the pause, without waiting for the robot.
+
+        A controller that hibernates is woken; its HIB bit counts no more then and is cleared when a
+        program starts. One that is still entering hibernation sleeps until a packet wakes it.
+        """
+        outcome = yield Phase("pause: leaving")
+        if self._mode is Mode.HIBERNATION and outcome.mode is Mode.HIBERNATION:
+            yield SendWakePacket()
+            return
+        for mode in reversed(self._modes[: self._modes.index(self._mode) + 1]):
+            yield SetPlcInput(_BIT[mode], False)
+        if self._modes[0] is Mode.STAND_ON_BRAKES:
+            yield SetPlcInput("drives_on", True)
+            yield WaitForMode(READY, self._settings.ready_timeout)
+            yield SetPlcInput("drives_on", False)
+
+
+# One step: wait for its signals, carry its load, move or pause, attach or detach, set its
+# signals.
 
 Steps = Generator[Request, Outcome, None]
 STARTING_MODES = (Mode.STAND_ON_MOTORS, Mode.STAND_ON_BRAKES)
@@ -153,3 +447,36 @@ class Program:
             outcome = yield SetLoad(load)
         need(outcome)
         self._carried = load
+
+
+# Progress of a running program by plan.
+
+
+@dataclass
+class Progress:
+    """State of one run; times of a steady clock [s]."""
+
+    program_id: str
+    movements: Sequence[PlannedMovement]
+    started: float
+    index: int = 0
+    phase: str = ""
+    step_started: float | None = None
+
+    @property
+    def total(self) -> int:
+        """Number of steps."""
+        return len(self.movements)
+
+    def begin(self, index: int) -> None:
+        """Step `index` is the next one; it may still wait for its signals."""
+        self.index = index
+        self.step_started = None
+
+    def remaining(self, now: float) -> float:
+        """Planned seconds until the program ends; a step that takes longer counts as nothing
+        more.
+        """
+        elapsed = 0.0 if self.step_started is None else now - self.step_started
+        step = max(0.0, self.movements[self.index].duration - elapsed)
+        return step + sum(movement.duration for movement in self.movements[self.index + 1 :])

@@ -2,16 +2,14 @@
 it.
 """
 
-from ir_sim_driver.controller.assembly import make_simulation
-from ir_sim_driver.controller.diagnostics import Entry, report
 from ir_sim_driver.controller.driver import Bodies, Driver, Snapshot
-from ir_sim_driver.controller.frames import Frame, Joints
+from ir_sim_driver.controller.goal_checks import VettedGoal
 from ir_sim_driver.controller.goals import NO_GOAL
+from ir_sim_driver.controller.outputs import Entry, Frame, Joints, report
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
-from ir_sim_driver.controller.simulation import Simulation
+from ir_sim_driver.controller.simulation import Simulation, make_simulation
 from ir_sim_driver.controller.supervision import SupervisionSettings
 from ir_sim_driver.controller.surroundings import PlannedCell
-from ir_sim_driver.controller.vetting import VettedGoal
 
 __all__ = [
     "NO_GOAL",

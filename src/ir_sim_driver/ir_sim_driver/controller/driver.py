@@ -1,8 +1,7 @@
-"""The driver: a simulation that one thread steps and others ask. Nobody else touches the
-simulation. No ROS.
+"""The driver: a simulation that one thread steps and other threads ask. No ROS.
 
 Everything that touches the simulation holds one lock for a short time; trajectories are checked
-beside it in a thread of their own, so that a long one does not keep anybody waiting.
+beside it in a thread of their own.
 """
 
 from __future__ import annotations
@@ -18,20 +17,43 @@ from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode, PlcInputs
 from ir_msgs_py.power import PowerMode
 from ir_msgs_py.status import StatusCode
-from ir_sim_driver.controller.access import Access
-from ir_sim_driver.controller.cell_side import CellSide
-from ir_sim_driver.controller.diagnostics import Entry, report
-from ir_sim_driver.controller.frames import Frame, Frames, Joints
+from ir_sim_driver.controller.access import Access, CellSide, PlcSide
 from ir_sim_driver.controller.goals import Goals
-from ir_sim_driver.controller.moving_in import take_offered_cell
-from ir_sim_driver.controller.plc_side import PlcSide
+from ir_sim_driver.controller.outputs import Entry, Frame, Frames, Joints, report
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.controller.surroundings import PlannedCell
-from ir_sim_driver.errors import RequestRefusedError
+from ir_sim_driver.errors import BackendError, RequestRefusedError
 from ir_sim_driver.motion import ExecutionSettings, Following, Outcome, TrajectoryGoal
 from ir_sim_driver.notices import Level, Notice
 from ir_sim_driver.plant import Carried, Plant
 from ir_sim_driver.plc import STOP_BIT
+
+
+def take_offered_cell(simulation: Simulation) -> None:
+    """Take the cell that is offered, if any and if the robot stands: tcp, postures, and the load as
+    the cell describes it.
+    """
+    surroundings = simulation.surroundings
+    if surroundings.offered is None or not simulation.stands:
+        return
+    planned = surroundings.take()
+    if planned is None:
+        return
+    simulation.cell = cell = planned.cell
+    notices = simulation.notices
+    simulation.tool.stand_at(cell.base_pose, cell.tcp)
+    load, warning = surroundings.load_in(cell, simulation.load)
+    if warning:
+        notices.add(Level.WARN, warning)
+    try:
+        simulation.set_load(load)
+    except BackendError as error:
+        notices.add(
+            Level.ERROR, f"load {load.text!r} of cell {cell.name!r} can't be carried: {error}"
+        )
+    simulation.cell_watch.stand_in(cell, simulation.load)
+    surroundings.settle(planned)
+    notices.add(Level.OK, f"the robot stands in cell {cell.name!r} now, hash {surroundings.hash}")
 
 
 @dataclass(frozen=True)

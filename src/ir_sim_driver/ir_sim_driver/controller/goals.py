@@ -8,8 +8,8 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
+from ir_sim_driver.controller.goal_checks import VettedGoal
 from ir_sim_driver.controller.simulation import Simulation
-from ir_sim_driver.controller.vetting import VettedGoal
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import ErrorCode, Outcome, TrajectoryGoal
 

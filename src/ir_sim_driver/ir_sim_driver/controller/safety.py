@@ -1,21 +1,142 @@
-"""What stops the robot at once, whatever it does: emergency stop, faults of the supervision, failed
-physics.
+"""Safety stops: emergency stop (STOP 0), faults of the supervision, failed physics, contacts.
 
-A stop is latched: it lasts until somebody recovers, who moves and resumes nothing.
+A stop is latched: it lasts until a person recovers, which moves and resumes nothing.
 """
 
 from __future__ import annotations
 
+import numpy as np
+
 from ir_description import RobotModel
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import StatusCode
-from ir_sim_driver.controller.emergency import EmergencyStop
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.controller.supervision import Command, Fault, Supervision
 from ir_sim_driver.errors import BackendError, RequestRefusedError
-from ir_sim_driver.motion import ErrorCode, Executor, ToolPoint
+from ir_sim_driver.motion import ErrorCode, Executor, Path, ToolPoint
 from ir_sim_driver.notices import Level, Notices
 from ir_sim_driver.plant import Backend
 from ir_sim_driver.plc import Plc
+
+# Excursion: how far the tool leaves its path while the brakes stop the robot.
+
+_AHEAD = 2.0  # s of path that a stop can cover at most
+_SAMPLES = (
+    400  # one every 5 ms: a chord of them leaves the path by less than 0.1 mm at working speed
+)
+
+
+class Excursion:
+    """Collects configurations (n,) while the robot stops; `distance` is the farthest the tool was
+    from the path ahead.
+    """
+
+    def __init__(self, tool: ToolPoint, path: Path | None, s: float, q: FloatArray) -> None:
+        self._tool = tool
+        instants = np.linspace(s, s + _AHEAD, _SAMPLES) if path is not None else np.empty(0)
+        points = [path.position(float(t)) for t in instants] if path is not None else [q]
+        self._path = tool.positions(np.array(points))
+        self._visited = [q]
+
+    def add(self, q: FloatArray) -> None:
+        """Count a configuration (n,)."""
+        self._visited.append(q)
+
+    def distance(self) -> float:
+        """Largest distance [m] of the visited tool points from the path, which is taken as a
+        polyline.
+        """
+        points = self._tool.positions(np.array(self._visited))
+        start = self._path[:-1]
+        step = np.diff(self._path, axis=0)
+        if len(start) == 0:
+            return float(np.linalg.norm(points - self._path[0], axis=1).max())
+        length = np.maximum((step**2).sum(axis=1), 1e-18)
+        along = np.clip(((points[:, None] - start) * step).sum(axis=2) / length, 0.0, 1.0)
+        nearest = start + along[:, :, None] * step
+        return float(np.linalg.norm(points[:, None] - nearest, axis=2).min(axis=1).max())
+
+
+# The emergency stop (STOP 0): motors off, then brakes with all they have, off the path if need
+# be.
+#
+# Between the two lies the brakes' reaction time, in which the arm rolls on and sags. The command
+# is not followed any more; afterwards it is where the robot stands, so nothing can jump or
+# resume.
+
+_STANDS = 1e-9  # rad/s; the brakes bring the speed to zero within a step
+
+
+class EmergencyStop:
+    """Stops `backend` and drops what `executor` does; reaction: steps until the brakes act.
+
+    excursion [m]: how far the tool left its path, or its place, in the last stop.
+    """
+
+    def __init__(
+        self, backend: Backend, executor: Executor, tool: ToolPoint, notices: Notices, reaction: int
+    ) -> None:
+        self._backend = backend
+        self._executor = executor
+        self._tool = tool
+        self._notices = notices
+        self._reaction = reaction
+        self._open = 0
+        self._powered = False
+        self._running: Excursion | None = None
+        self.excursion = 0.0
+
+    @property
+    def stopping(self) -> bool:
+        """Whether the robot still rolls on or slows down."""
+        return self._running is not None
+
+    def start(self, sentence: str, braked: bool, powered: bool = False) -> None:
+        """Stop; the goal ends with this sentence. braked: the brakes are closed; powered: the
+        motors stop the robot until the brakes act, else they are off.
+        """
+        executor = self._executor
+        q = self._backend.q
+        self._running = (
+            None if braked else Excursion(self._tool, executor.path, executor.path_parameter, q)
+        )
+        self._open = 0 if braked else self._reaction
+        self._powered = powered
+        executor.drop(sentence)
+        executor.hold(q)
+
+    def step(self) -> None:
+        """Make a step of dt: coast, or halt, while the brakes react; brake, then rest."""
+        backend = self._backend
+        if self._open > 0:
+            self._open -= 1
+            if self._powered:
+                backend.halt()
+            else:
+                backend.coast()
+            self._visit()
+        elif backend.qd.any():
+            backend.brake()
+            self._visit()
+            if np.abs(backend.qd).max() < _STANDS:
+                self._stopped()
+        else:
+            backend.rest()
+            if self._running is not None:
+                self._stopped()
+
+    def _visit(self) -> None:
+        if self._running is not None:
+            self._running.add(self._backend.q)
+
+    def _stopped(self) -> None:
+        self._backend.reset(self._backend.q)
+        self._executor.hold(self._backend.q)
+        if self._running is not None:
+            self.excursion = self._running.distance()
+            self._running = None
+            off = f"the tool left its path by {self.excursion * 1e3:.1f} mm"
+            self._notices.add(Level.WARN, f"emergency stop: {off}; recover to go on")
 
 
 class Safety:

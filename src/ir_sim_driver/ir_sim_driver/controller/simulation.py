@@ -1,7 +1,6 @@
-"""The robot and its controller as one stepped thing: PLC, power modes, executor, physics, mains
-meter.
+"""The simulation: PLC, power modes, executor, physics and mains meter, stepped together.
 
-One `step` is dt of plant time. Whoever steps it decides how fast time passes. No ROS.
+One `step` is dt of plant time. The caller decides how fast time passes. No ROS.
 """
 
 from __future__ import annotations
@@ -10,22 +9,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from ir_description import Cell, PowerData
+from ir_description import Cell, PowerData, load_cell
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import OFF_THE_NETWORK, READY, Mode
-from ir_msgs_py.plc import PlcOutputs
+from ir_msgs_py.plc import OperatingMode, PlcOutputs
 from ir_msgs_py.status import StatusCode
-from ir_sim_driver.controller.cell_watch import CellWatch
+from ir_sim_driver.controller.contacts import CellWatch
+from ir_sim_driver.controller.goal_checks import VettedGoal, vet
 from ir_sim_driver.controller.mains import Mains
 from ir_sim_driver.controller.mode_control import ModeControl
-from ir_sim_driver.controller.outcomes import Outcomes
 from ir_sim_driver.controller.safety import Safety
 from ir_sim_driver.controller.settings import SimulationSettings
-from ir_sim_driver.controller.speed_scaling import SpeedScaling
 from ir_sim_driver.controller.supervision import PERIOD
 from ir_sim_driver.controller.surroundings import Surroundings
-from ir_sim_driver.controller.vetting import VettedGoal, vet
 from ir_sim_driver.errors import BackendError, RequestRefusedError, TrajectoryRefusedError
 from ir_sim_driver.load_check import LoadChecks
 from ir_sim_driver.motion import (
@@ -35,10 +32,115 @@ from ir_sim_driver.motion import (
     Outcome,
     ToolPoint,
     TrajectoryGoal,
+    manual_scaling,
 )
 from ir_sim_driver.notices import Level, Notices
-from ir_sim_driver.plant import Backend, Carried, Plant, nominal_plant
+from ir_sim_driver.plant import (
+    IDEAL,
+    NOMINAL,
+    Backend,
+    Carried,
+    Plant,
+    carried,
+    ideal_plant,
+    make_backend,
+    nominal_plant,
+    plant_named,
+)
 from ir_sim_driver.plc import Plc, Watchdog
+from ir_sim_driver.power import IdleTimes
+
+# Outcomes of goals: energy, load finding and contact.
+
+
+class Outcomes:
+    """Of the goals of `executor`; energy is what `mains` counts while they run."""
+
+    def __init__(
+        self, executor: Executor, mains: Mains, cell_watch: CellWatch, load_checks: LoadChecks
+    ) -> None:
+        self._executor = executor
+        self._mains = mains
+        self._cell_watch = cell_watch
+        self._load_checks = load_checks
+        self._goals = 0
+        self._energy = 0.0
+        self._ended: list[Outcome] = []
+
+    def next_id(self) -> int:
+        """Id of the goal that starts now."""
+        self._goals += 1
+        return self._goals
+
+    def started(self) -> None:
+        """A goal has started; the one before has ended."""
+        self.collect()
+        self._energy = self._mains.energy()
+
+    def collect(self) -> None:
+        """Take what has ended; a goal that ended by a contact when the robot stands."""
+        if not self._executor.ended or self._cell_watch.unsettled:
+            return
+        for outcome in self._executor.take_outcomes():
+            energy = self._mains.energy() - self._energy
+            self._ended.append(self._completed(replace(outcome, energy=energy)))
+
+    def _completed(self, outcome: Outcome) -> Outcome:
+        contact = self._cell_watch.last
+        if (
+            outcome.code is ErrorCode.CONTACT and contact is not None
+        ):  # its torques are not the load's
+            self._load_checks.begin()
+            return replace(outcome, contact=contact, sentence=contact.sentence)
+        return outcome.weighed(self._load_checks.ended(outcome.label))
+
+    def take(self) -> list[Outcome]:
+        """Goals that ended since the last call."""
+        ended = self._ended
+        self._ended = []
+        return ended
+
+
+# Speed scaling: the factor that was asked for, move_enable, and the tool's speed in T1.
+
+
+class SpeedScaling:
+    """Of what `executor` follows. factor: what was asked for, in [0, 1]."""
+
+    def __init__(self, executor: Executor, tool: ToolPoint, plc: Plc, notices: Notices) -> None:
+        self._executor = executor
+        self._tool = tool
+        self._plc = plc
+        self._notices = notices
+        self.factor = 1.0
+
+    def ask(self, factor: float) -> float:
+        """Take the factor into [0, 1] and return it; NaN and negative ones are ignored with a
+        warning.
+        """
+        if not factor >= 0.0:
+            self._notices.add(Level.WARN, f"speed scaling {factor:g} ignored: it must be in [0, 1]")
+        else:
+            self.factor = min(factor, 1.0)
+        return self.factor
+
+    def holds(self) -> str:
+        """Why path time stands; "" where it may pass."""
+        if not self._plc.levels.move_enable:
+            return "the PLC's move_enable is 0"
+        return "" if self.factor > 0.0 else "the speed scaling is 0"
+
+    def now(self) -> float:
+        """The factor that counts now."""
+        if not self._plc.levels.move_enable:
+            return 0.0
+        path = self._executor.path
+        if path is None or self._plc.operating_mode is not OperatingMode.T1:
+            return self.factor
+        s = self._executor.path_parameter
+        stop_time = self._executor.stop_time
+        return min(self.factor, manual_scaling(self._tool, path, s, stop_time))
+
 
 _HOME = 0.01  # rad off machine home that still count as there
 
@@ -325,3 +427,40 @@ class Simulation:
         self.mains.set_load(load)
         self.dynamics = DynamicsModel(self.robot, load.loads, self.cell.base_pose)
         self.executor.set_dynamics(self.dynamics)
+
+
+# Assembly from names: cell, load and backend.
+
+CELL_TOOL = "cell"
+"""Load text that means the tool of the cell."""
+
+
+def make_simulation(
+    cell: str | Cell = "demo",
+    load: str = CELL_TOOL,
+    backend: str = "pybullet",
+    settings: SimulationSettings | None = None,
+    data: PowerData | None = None,
+    plant: str | Plant = NOMINAL,
+) -> Simulation:
+    """Simulation of a cell (a Cell, the name of a bundled one or a path) with a load text of its
+    loads.
+
+    plant: a Plant or a text that names one, see `plant_named`; the ideal backend has none but its
+    own. Raises what ir_description raises for a cell, RequestRefusedError for a load, SettingsError
+    for a plant, BackendError.
+    """
+    settings = settings or SimulationSettings()
+    cell = load_cell(cell) if isinstance(cell, str) else cell
+    if load == CELL_TOOL:
+        load = "none" if cell.tool is None else cell.tool.name
+    what = carried(cell, load)
+    data = data or cell.robot.controller
+    plant = plant_named(plant, cell.robot, data) if isinstance(plant, str) else plant
+    if backend == IDEAL:
+        plant = ideal_plant(cell.robot, data)
+    if not data.has_table:  # no mode to rest in: the brakes stay open while the robot waits
+        timers = IdleTimes(data.motors_to_brakes_in_program, data.motors_to_brakes_in_command)
+        settings = replace(settings, idle=timers)
+    robot = make_backend(backend, cell, settings.dt, settings.control, plant)
+    return Simulation(cell, data, robot, what, settings, plant)

@@ -2,11 +2,8 @@
 squares.
 """
 
-from ir_sim_driver.load_check.checks import LoadChecks
-from ir_sim_driver.load_check.estimate import Declared, LoadFinding, Motion, weighed
-from ir_sim_driver.load_check.settings import LoadCheckSettings
-from ir_sim_driver.load_check.uncertainty import Uncertainty
-from ir_sim_driver.load_check.watch import LoadWatch
+from ir_sim_driver.load_check.checks import LoadChecks, LoadCheckSettings, LoadWatch
+from ir_sim_driver.load_check.estimate import Declared, LoadFinding, Motion, Uncertainty, weighed
 
 __all__ = [
     "Declared",

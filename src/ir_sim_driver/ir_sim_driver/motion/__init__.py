@@ -1,13 +1,21 @@
 """Trajectories: what is accepted, the path that leads onto one, and its execution step by step."""
 
-from ir_sim_driver.motion.execution_settings import ExecutionSettings
 from ir_sim_driver.motion.executor import Executor, Following
-from ir_sim_driver.motion.goal import ErrorCode, JointTolerance, Outcome, TrajectoryGoal
-from ir_sim_driver.motion.lead_in import Route
-from ir_sim_driver.motion.manual_speed import manual_scaling
+from ir_sim_driver.motion.goal import (
+    ErrorCode,
+    ExecutionSettings,
+    JointTolerance,
+    Outcome,
+    TrajectoryGoal,
+)
 from ir_sim_driver.motion.path import Motion, Path
-from ir_sim_driver.motion.tool_point import ToolPoint
-from ir_sim_driver.motion.trajectory_checks import check_goal, check_trajectory, checked_route
+from ir_sim_driver.motion.tool_point import ToolPoint, manual_scaling
+from ir_sim_driver.motion.trajectory_checks import (
+    Route,
+    check_goal,
+    check_trajectory,
+    checked_route,
+)
 
 __all__ = [
     "ErrorCode",

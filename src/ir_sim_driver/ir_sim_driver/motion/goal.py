@@ -1,13 +1,20 @@
-"""What is asked of the executor and how it ended; codes of control_msgs/FollowJointTrajectory."""
+"""Trajectory goals: tolerances, bounds, and outcomes with the codes of FollowJointTrajectory."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
+import numpy as np
+
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.contact import Contact
+from ir_msgs_py.settings import check_settings, setting
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.load_check import LoadFinding
+
+# Goals and outcomes; codes of control_msgs/FollowJointTrajectory.
 
 
 class ErrorCode(IntEnum):
@@ -88,3 +95,131 @@ class Outcome:
             return self
         sentence = "; ".join(text for text in (self.sentence, finding.sentence) if text)
         return replace(self, sentence=sentence, load_check=finding)
+
+
+# Tolerances of a goal as arrays, and the sentence for the joint that broke one.
+
+
+@dataclass(frozen=True, eq=False)
+class Tolerances:
+    """Largest errors (n,) of position [rad] and speed [rad/s]; infinite where unbounded."""
+
+    position: FloatArray
+    velocity: FloatArray
+    has_velocity: bool
+
+    @classmethod
+    def of(
+        cls, joint_names: Sequence[str], given: Sequence[JointTolerance], default: float
+    ) -> Tolerances:
+        """Arrays in the robot's joint order; 0 means the default [rad] (speed: unbounded), -1
+        unbounded.
+        """
+        position = np.full(len(joint_names), default)
+        velocity = np.full(len(joint_names), np.inf)
+        for tolerance in given:
+            j = joint_names.index(tolerance.name)
+            if tolerance.position != 0.0:
+                position[j] = tolerance.position if tolerance.position > 0.0 else np.inf
+            if tolerance.velocity > 0.0:
+                velocity[j] = tolerance.velocity
+        return cls(position, velocity, bool(np.isfinite(velocity).any()))
+
+    def broken_position(self, joint_names: Sequence[str], error: FloatArray) -> str:
+        """Sentence about the worst position error (n,) [rad]; "" when all are within."""
+        return _worst(joint_names, error, self.position, "position", "rad")
+
+    def broken_velocity(self, joint_names: Sequence[str], error: FloatArray) -> str:
+        """Sentence about the worst speed error (n,) [rad/s]; "" when all are within."""
+        return (
+            _worst(joint_names, error, self.velocity, "velocity", "rad/s")
+            if self.has_velocity
+            else ""
+        )
+
+
+def _worst(names: Sequence[str], error: FloatArray, bound: FloatArray, what: str, unit: str) -> str:
+    size = np.abs(error)
+    if (size <= bound).all():
+        return ""
+    j = int((size - bound).argmax())
+    return (
+        f"{names[j]} {what} error is {error[j]:+.6f} {unit}: the tolerance is {bound[j]:g} {unit}"
+    )
+
+
+# Bounds of trajectories.
+
+
+@dataclass(frozen=True)
+class ExecutionSettings:
+    """Bounds of trajectories and of their execution."""
+
+    start_tolerance: float = setting(
+        0.01,
+        "How far the first point of a trajectory that starts at 0 may lie from the command, per "
+        "joint.",
+        unit="rad",
+        minimum=1e-6,
+        maximum=0.1,
+    )
+    path_tolerance: float = setting(
+        0.05, "Default tolerance per joint while moving.", unit="rad", minimum=1e-6, maximum=1.0
+    )
+    goal_tolerance: float = setting(
+        0.005, "Default tolerance per joint at the end.", unit="rad", minimum=1e-6, maximum=1.0
+    )
+    goal_time: float = setting(
+        2.0,
+        "How long the robot may take to come within the goal tolerance.",
+        unit="s",
+        minimum=0.001,
+        maximum=60.0,
+    )
+    tube: float = setting(
+        0.005,
+        "Largest distance of the tool from its commanded place.",
+        unit="m",
+        minimum=1e-4,
+        maximum=0.1,
+    )
+    stop_time: float = setting(
+        0.3,
+        "Shortest stop along the path from full speed; the limits may make it longer.",
+        unit="s",
+        minimum=0.05,
+        maximum=5.0,
+    )
+    blend_time: float = setting(
+        0.02,
+        "A velocity that jumps by more than the acceleration limit times this is refused.",
+        unit="s",
+        minimum=0.001,
+        maximum=0.1,
+    )
+    bridge_time: float = setting(
+        0.25,
+        "Shortest bridge from a running movement onto a trajectory that starts at 0.",
+        unit="s",
+        minimum=0.05,
+        maximum=5.0,
+    )
+    max_points: int = setting(
+        20_000, "Longest trajectory, in points.", minimum=1, maximum=1_000_000
+    )
+    max_duration: float = setting(3600.0, "Longest trajectory.", unit="s", minimum=1.0, maximum=1e5)
+    max_delay: float = setting(
+        10.0, "How far in the future a header stamp may lie.", unit="s", minimum=0.0, maximum=3600.0
+    )
+    position_slack: float = setting(
+        1e-6, "By how much a position limit may be exceeded.", unit="rad", minimum=0.0, maximum=0.01
+    )
+    limit_slack: float = setting(
+        1e-3,
+        "By what share limits of velocity, acceleration and torque may be exceeded.",
+        minimum=0.0,
+        maximum=0.1,
+    )
+
+    def __post_init__(self) -> None:
+        check_settings(self)

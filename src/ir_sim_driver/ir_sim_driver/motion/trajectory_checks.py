@@ -1,23 +1,342 @@
-"""At the door: is this trajectory one that the robot can and may follow from here?"""
+"""Checks of a trajectory before it is executed: shape, limits at every instant, and the lead-in."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ir_description import RobotModel
+from ir_kernels import Extrema, polynomial_extrema
 from ir_kernels.dynamics import DynamicsModel
+from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_msgs_py.errors import JointNamesError
-from ir_msgs_py.trajectory import JointTrajectory
+from ir_msgs_py.trajectory import NS_PER_S, JointTrajectory
 from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.motion.execution_settings import ExecutionSettings
-from ir_sim_driver.motion.goal import ErrorCode, JointTolerance, TrajectoryGoal
-from ir_sim_driver.motion.lead_in import AT_REST, Route, route_onto
-from ir_sim_driver.motion.limit_checks import Range, check_limits
-from ir_sim_driver.motion.path import Motion
-from ir_sim_driver.motion.rounding import rounded
+from ir_sim_driver.motion.goal import ErrorCode, ExecutionSettings, JointTolerance, TrajectoryGoal
+from ir_sim_driver.motion.path import Motion, Path, quintic
+
+# Trajectories of positions alone: their corners are rounded, so that velocity never jumps.
+#
+# The linear interpolant has corners, which no drive can follow. What is executed is its mean over
+# the last w = blend_time: q~(t) = 1/w int_{t-w}^{t} q(u) du, a piecewise parabola with q~'
+# continuous and q~'' = (q'(t) - q'(t - w)) / w. A cubic Hermite spline through its knots t_i and
+# t_i + w is exactly it.
+
+_APART = 100_000  # ns; between nearer knots the rounding of positions would count as acceleration
+
+
+def rounded(trajectory: JointTrajectory, blend_time: float) -> JointTrajectory:
+    """The trajectory that is executed: itself when it carries velocities, else its mean over
+    blend_time [s].
+
+    It ends blend_time later. Before a first time 0 the robot rests; before a later one the mean
+    continues the first line, so that what leads in meets it in motion.
+    """
+    if trajectory.velocities is not None or len(trajectory.times_ns) < 2:
+        return trajectory
+    window_ns = round(blend_time * NS_PER_S)
+    given = trajectory.times_ns
+    knots = np.unique(np.concatenate((given, given + window_ns)))
+    first = int(given[0])
+    t = (given - first) / NS_PER_S
+    q = trajectory.positions
+    start = q[0] if first == 0 else q[0] - (q[1] - q[0]) / t[1] * blend_time
+    t = np.concatenate(([-blend_time], t, [t[-1] + blend_time]))
+    at = (knots - first) / NS_PER_S
+    now, then = (_interpolated(t, np.vstack((start, q, q[-1])), x) for x in (at, at - blend_time))
+    velocities = (now - then) / blend_time
+    velocities[-1] = 0.0
+    # q~' is a line between knots: its integral keeps neighbours consistent to the last bit
+    steps = np.diff(at)[:, None] * 0.5 * (velocities[1:] + velocities[:-1])
+    mean = 0.5 * (start + q[0]) + np.vstack((np.zeros(q.shape[1]), np.cumsum(steps, axis=0)))
+    mean[-1] = q[-1]
+    kept = _apart(knots)
+    return JointTrajectory(trajectory.joint_names, knots[kept], mean[kept], velocities[kept])
+
+
+def _apart(knots: IntArray) -> IntArray:
+    """Indices of knots (N,) [ns], ascending, that are at least _APART apart; the first and the last
+    stay.
+    """
+    kept = [0]
+    for k in range(1, len(knots) - 1):
+        if knots[k] - knots[kept[-1]] >= _APART and knots[-1] - knots[k] >= _APART:
+            kept.append(k)
+    return np.array([*kept, len(knots) - 1])
+
+
+def _interpolated(t: FloatArray, q: FloatArray, at: FloatArray) -> FloatArray:
+    """Values (M, n) at times (M,) of lines through q (N, n) at t (N,)."""
+    return np.stack([np.interp(at, t, column) for column in q.T], axis=1)
+
+
+# Limits of position, velocity, acceleration and torque, proved for every instant.
+#
+# Positions, velocities and accelerations are compared by the exact extremes of the polynomials,
+# torques by guaranteed bounds (ir_kernels): segments of a nanosecond and paths of an hour alike,
+# nothing is sampled.
+
+
+class Range(NamedTuple):
+    """Smallest and largest position (n,) [rad]."""
+
+    low: FloatArray
+    high: FloatArray
+
+    @classmethod
+    def of(cls, robot: RobotModel) -> Range:
+        """The robot's own."""
+        return cls(robot.position_min, robot.position_max)
+
+    def including(self, q: FloatArray) -> Range:
+        """This range and q (n,): who is outside may come back, and go no farther out."""
+        return Range(np.minimum(self.low, q), np.maximum(self.high, q))
+
+
+class _Excess(NamedTuple):
+    """The earliest instant at which a limit is exceeded most."""
+
+    time: float
+    sentence: str
+
+
+def check_limits(
+    coefficients: FloatArray,
+    durations: FloatArray,
+    start: float,
+    robot: RobotModel,
+    dynamics: DynamicsModel,
+    settings: ExecutionSettings,
+    allowed: Range | None = None,
+) -> None:
+    """Raise TrajectoryRefusedError naming joint, time, value, limit and excess where a limit is
+    exceeded first: of position, velocity, acceleration or torque, in this order.
+
+    Segments (S, n, 6) with durations (S,) [s], the first at time `start` [s] of the trajectory.
+    dynamics: with the present load. allowed: positions, the robot's own range unless given.
+    """
+    if len(durations) == 0:
+        return
+    with np.errstate(over="ignore", invalid="ignore"):
+        if not np.isfinite(coefficients).all():
+            raise TrajectoryRefusedError(
+                ErrorCode.INVALID_GOAL,
+                "points lie too close in time: the polynomial between them is not finite",
+            )
+        position, speed, change = (polynomial_extrema(coefficients, durations, k) for k in range(3))
+    starts = start + np.concatenate(([0.0], np.cumsum(durations)[:-1]))
+    names = robot.joint_names
+    slack = 1.0 + settings.limit_slack
+    allowed = allowed or Range.of(robot)
+    found = [
+        _position_excess(position, starts, names, allowed, settings.position_slack),
+        _excess(speed, starts, names, robot.velocity_max, slack, "rad/s"),
+        _excess(change, starts, names, robot.acceleration_max, slack, "rad/s^2"),
+    ]
+    first = next((each for each in found if each is not None), None)
+    if first is None:  # bounds of torques need motions of sensible size
+        first = _torque_excess(coefficients, durations, start, names, dynamics, slack)
+    if first is not None:
+        raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, first.sentence)
+
+
+def _position_excess(
+    found: Extrema, starts: FloatArray, names: Sequence[str], allowed: Range, slack: float
+) -> _Excess | None:
+    low = _first(~(found.minimum >= allowed.low - slack), found.time_of_minimum, starts)
+    high = _first(~(found.maximum <= allowed.high + slack), found.time_of_maximum, starts)
+    candidates = []
+    for at, values, bounds in (
+        (low, found.minimum, allowed.low),
+        (high, found.maximum, allowed.high),
+    ):
+        if at is not None:
+            time, k, j = at
+            sentence = _sentence(names[j], "is at", values[k, j], float(bounds[j]), time, "rad")
+            candidates.append(_Excess(time, sentence))
+    return min(candidates, default=None)
+
+
+def _excess(
+    found: Extrema,
+    starts: FloatArray,
+    names: Sequence[str],
+    limit: FloatArray,
+    slack: float,
+    unit: str,
+) -> _Excess | None:
+    down = -found.minimum > found.maximum
+    value = np.where(down, found.minimum, found.maximum)
+    when = np.where(down, found.time_of_minimum, found.time_of_maximum)
+    at = _first(~(np.abs(value) <= limit * slack), when, starts)
+    if at is None:
+        return None
+    time, k, j = at
+    return _Excess(time, _sentence(names[j], "needs", value[k, j], float(limit[j]), time, unit))
+
+
+def _torque_excess(
+    coefficients: FloatArray,
+    durations: FloatArray,
+    start: float,
+    names: Sequence[str],
+    dynamics: DynamicsModel,
+    slack: float,
+) -> _Excess | None:
+    bounds = dynamics.torque_bounds(coefficients, durations)
+    beyond = ~(bounds.upper <= slack)  # what cannot be decided is not allowed
+    if not beyond.any():
+        return None
+    j = int(np.where(beyond, bounds.sampled, -np.inf).argmax())
+    q, qd, qdd = Path(coefficients, durations, coefficients[0, :, 0]).motion(float(bounds.time[j]))
+    limit = float(dynamics.torque_limit(qd[None])[0, j])
+    # by the bound: it counts friction of either sign where a joint turns, and what could not be
+    # decided
+    needed = dynamics.inverse_dynamics(q[None], qd[None], qdd[None])[0, j]
+    torque = float(np.copysign(bounds.upper[j] * limit, needed))
+    time = start + float(bounds.time[j])
+    return _Excess(time, _sentence(names[j], "needs", torque, limit, time, "Nm"))
+
+
+def _first(bad: BoolArray, when: FloatArray, starts: FloatArray) -> tuple[float, int, int] | None:
+    """Time [s], segment and joint of the earliest instant `when` (S, n) [s from starts (S,)] that
+    is bad.
+    """
+    if not bad.any():
+        return None
+    k = int(bad.any(axis=1).argmax())
+    j = int(np.where(bad[k], when[k], np.inf).argmin())
+    return float(starts[k] + when[k, j]), k, j
+
+
+def _sentence(name: str, verb: str, value: float, bound: float, time: float, unit: str) -> str:
+    excess = abs(value) - abs(bound) if verb == "needs" else abs(value - bound)
+    sized = bound if value >= 0.0 or verb == "is at" else -bound
+    return (
+        f"{name} {verb} {value:.6g} {unit} at {time:.4f} s: the limit is {sized:.6g} {unit}, "
+        f"exceeded by {excess:.3g} {unit}"
+    )
+
+
+# Lead-in: from where the command is onto a trajectory, without a jump.
+#
+# First time > 0: a polynomial leads in until then. First time 0 at rest: the last difference
+# (within the start tolerance) is closed before path time starts, as slowly as is asked. First
+# time 0 in motion, or with a first velocity: a polynomial bridges to the next point far enough
+# away. A movement that is replaced by one with a later start leads in until that start.
+
+_PEAK = 10.0 / math.sqrt(3.0)  # largest acceleration of a unit quintic step of unit duration
+_SAME = 1e-12  # rad; what rounding leaves of a difference
+AT_REST = 1e-6  # rad/s that still count as standing
+
+
+@dataclass(frozen=True, eq=False)
+class Route:
+    """A path and the path time [s] at which its trajectory starts; the first `lead` segments are
+    not the trajectory's.
+    """
+
+    path: Path
+    offset: float
+    lead: int
+
+
+def route_onto(
+    trajectory: JointTrajectory,
+    now: Motion,
+    acceleration_max: FloatArray,
+    settings: ExecutionSettings,
+    delay: float,
+    share: float,
+) -> Route:
+    """Path from the commanded motion `now` onto and along what is executed of the trajectory.
+
+    acceleration_max (n,) [rad/s^2]. delay [s]: until time 0 of the trajectory; a robot at rest
+    waits for it.
+    share: of acceleration_max, that closing the last difference may use; anything else has its time
+    given. Raises TrajectoryRefusedError.
+    """
+    moving = bool(now.qd.any())
+    first = float(trajectory.times[0]) + (delay if moving else 0.0)
+    executed = rounded(trajectory, settings.blend_time)
+    coefficients, durations = executed.coefficients()
+    if first > 0.0:
+        lead = quintic(now, _motion_at_point(executed, 0), first)
+        return Route(_path([lead, coefficients], [np.array([first]), durations], now.q), 0.0, 1)
+    _check_start(trajectory, now, acceleration_max, settings)
+    if moving or np.abs(_motion_at_point(executed, 0).qd).max() > AT_REST:
+        return _bridged(executed, now, settings.bridge_time)
+    delta = np.abs(trajectory.positions[0] - now.q)
+    if delta.max() <= _SAME:
+        return Route(Path(coefficients, durations, trajectory.positions[0]), 0.0, 0)
+    T = math.sqrt(_PEAK * float((delta / acceleration_max).max()) / share)
+    still = np.zeros_like(delta)
+    closing = quintic(Motion(now.q, still, still), Motion(trajectory.positions[0], still, still), T)
+    return Route(_path([closing, coefficients], [np.array([T]), durations], now.q), T, 1)
+
+
+def _bridged(executed: JointTrajectory, now: Motion, bridge_time: float) -> Route:
+    coefficients, durations = executed.coefficients()
+    if len(durations) == 0:
+        raise TrajectoryRefusedError(
+            ErrorCode.INVALID_GOAL,
+            "the only point has time 0 s and the robot moves: give it a time above 0 s",
+        )
+    k = min(int(np.searchsorted(executed.times, bridge_time)), len(durations))
+    bridge = quintic(now, _motion_at_point(executed, k), float(executed.times[k]))
+    pieces = [bridge, coefficients[k:]], [executed.times[k : k + 1], durations[k:]]
+    return Route(_path(*pieces, now.q), 0.0, 1)
+
+
+def _path(coefficients: list[FloatArray], durations: list[FloatArray], rest: FloatArray) -> Path:
+    return Path(np.concatenate(coefficients), np.concatenate(durations), rest)
+
+
+def _motion_at_point(trajectory: JointTrajectory, k: int) -> Motion:
+    """Motion right after point k; what a trajectory does not say comes from its own polynomial."""
+    samples = trajectory.sample(trajectory.times[k : k + 1])
+    last = k == len(trajectory.times_ns) - 1
+    still = np.zeros(samples.q.shape[1])
+    v = samples.qd[0] if trajectory.velocities is None else trajectory.velocities[k]
+    a = samples.qdd[0] if trajectory.accelerations is None else trajectory.accelerations[k]
+    if last:  # the robot rests there
+        v = still if trajectory.velocities is None else v
+        a = still if trajectory.accelerations is None else a
+    return Motion(trajectory.positions[k], v, a)
+
+
+def _check_start(
+    trajectory: JointTrajectory,
+    now: Motion,
+    acceleration_max: FloatArray,
+    settings: ExecutionSettings,
+) -> None:
+    delta = trajectory.positions[0] - now.q
+    j = int(np.abs(delta).argmax())
+    if abs(delta[j]) > settings.start_tolerance:
+        raise TrajectoryRefusedError(
+            ErrorCode.INVALID_GOAL,
+            f"{trajectory.joint_names[j]} starts at {trajectory.positions[0, j]:.6f} rad, "
+            f"{delta[j]:+.6f} rad from the commanded {now.q[j]:.6f} rad: at most "
+            f"{settings.start_tolerance:g} rad (or a first time above 0 s)",
+        )
+    jump = _motion_at_point(trajectory, 0).qd - now.qd
+    over = np.abs(jump) - settings.blend_time * acceleration_max
+    j = int(over.argmax())
+    if over[j] > 0.0:
+        raise TrajectoryRefusedError(
+            ErrorCode.INVALID_GOAL,
+            f"{trajectory.joint_names[j]} starts with {jump[j]:+.4f} rad/s against the command: "
+            "at most "
+            f"{settings.blend_time * acceleration_max[j]:.4f} rad/s (or a first time above 0 s)",
+        )
+
+
+# Shape of a trajectory, and all checks together.
 
 _NS = 1e-9
 _GENTLENESS = (0.25, 0.1, 0.03, 0.01, 1e-3, 1e-4)

@@ -1,11 +1,11 @@
-"""The node: topics, the action and services of the driver; parse, call, map, reply."""
+"""The node: topics, actions and services of the driver; parse, call, map, reply."""
 
 from __future__ import annotations
 
 import gc
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
@@ -28,22 +28,36 @@ from ir_msgs_py.ros.node_process import run_node
 from ir_msgs_py.ros.serving import BoundedService
 from ir_msgs_py.ros.topics import ACTION_SERVICES
 from ir_sim_driver.controller import Driver, Joints, Simulation, make_simulation
-from ir_sim_driver.errors import DriverError, PlantStoppedError
+from ir_sim_driver.errors import DriverError, LinkError, PlantStoppedError
 from ir_sim_driver.node.announcements import Announcements
-from ir_sim_driver.node.bounded_goals import BoundedActionServer
-from ir_sim_driver.node.executions import Executions
-from ir_sim_driver.node.grid import FOREIGN, OWN, SYSTEM
-from ir_sim_driver.node.links import open_links
-from ir_sim_driver.node.markers import robot_markers
+from ir_sim_driver.node.command_topics import PlcTopic, TrajectoryTopic
 from ir_sim_driver.node.messages import condition_of, hardware_id
 from ir_sim_driver.node.parameters import DriverParameters
-from ir_sim_driver.node.plc_topic import PlcTopic
-from ir_sim_driver.node.real_time import GridThread, ScaledClock
+from ir_sim_driver.node.real_time import FOREIGN, OWN, SYSTEM, GridThread, ScaledClock
 from ir_sim_driver.node.services import Services
 from ir_sim_driver.node.streams import Streams
-from ir_sim_driver.node.trajectory_topic import TrajectoryTopic
-from ir_sim_driver.node.transforms import open_transforms
+from ir_sim_driver.node.trajectory_actions import BoundedActionServer, Executions
+from ir_sim_driver.node.visualization import open_transforms, robot_markers
 from ir_sim_driver.notices import Level, Notice, shortened
+from ir_sim_driver.plc import Link, OpenLink, WakeOnLan
+
+# Links to the PLC; a controller that nothing can wake does not hibernate.
+
+
+def open_links(links: Iterable[Link], driver: Driver) -> dict[str, OpenLink]:
+    """Links by name; one that can't be opened is a warning, as a port that another driver has."""
+    opened: dict[str, OpenLink] = {}
+    for link in links:
+        if not link.wanted:
+            continue
+        try:
+            opened[link.name] = link.open(driver.plc)
+        except LinkError as error:
+            driver.warn(str(error))
+            if link.name == WakeOnLan.name:
+                driver.forbid_hibernation(f"nothing could wake the controller ({error})")
+    return opened
+
 
 try:  # where a ROS installation has it
     from control_msgs.action import FollowJointTrajectory

@@ -4,22 +4,24 @@ meter.
 
 from ir_sim_driver.plant.backend import STANDING, Backend, Work
 from ir_sim_driver.plant.backends import BACKENDS, make_backend
-from ir_sim_driver.plant.base_power import BasePower
 from ir_sim_driver.plant.control import ControlSettings
 from ir_sim_driver.plant.ideal_backend import IdealBackend
 from ir_sim_driver.plant.loads import CUSTOM, Carried, carried, custom_load
-from ir_sim_driver.plant.plant_file import (
+from ir_sim_driver.plant.plant_parameters import NOMINAL, Plant, nominal_plant, standing_watts
+from ir_sim_driver.plant.plants import (
+    IDEAL,
+    TYPICAL,
     PlantFileError,
+    ideal_plant,
     plant_from_yaml,
     plant_hash,
+    plant_named,
     plant_to_yaml,
     read_plant,
+    typical_plant,
 )
-from ir_sim_driver.plant.plant_parameters import NOMINAL, Plant, nominal_plant, standing_watts
-from ir_sim_driver.plant.plants import IDEAL, ideal_plant, plant_named
-from ir_sim_driver.plant.power_meter import MeterReading, PowerMeter
+from ir_sim_driver.plant.power_meter import BasePower, MeterReading, PowerMeter
 from ir_sim_driver.plant.pybullet_backend import PyBulletBackend
-from ir_sim_driver.plant.typical import TYPICAL, typical_plant
 
 __all__ = [
     "BACKENDS",

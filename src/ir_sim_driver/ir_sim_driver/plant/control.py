@@ -24,8 +24,7 @@ from ir_description import Load, RobotModel
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.settings import check_settings, setting
-from ir_sim_driver.plant.drivetrain import Drivetrain
-from ir_sim_driver.plant.gears import SMOOTHING
+from ir_sim_driver.plant.drivetrain import SMOOTHING, Drivetrain
 
 _TURN = 2.0 * np.pi
 _STEEP = 1.0 / SMOOTHING

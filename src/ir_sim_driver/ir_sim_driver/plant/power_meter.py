@@ -1,23 +1,217 @@
-"""The mains meter: base load by mode, axes through the DC link, energy that is the integral of the
-power.
-
-mains = base + supplied + rectifier loss, and supplied = axes + brake resistor + change of the
-capacitor; what an axis takes is mechanical work, copper, inverter and iron losses. All of it is the
-plant's own.
-"""
+"""Mains meter: base load by mode, and the DC link circuit that feeds the axes."""
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_left
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ir_kernels.power import Regeneration
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.modes import Mode
 from ir_sim_driver.plant.backend import Work
-from ir_sim_driver.plant.dc_circuit import DcCircuit
-from ir_sim_driver.plant.drive_losses import DriveLosses
-from ir_sim_driver.plant.plant_parameters import Plant
+from ir_sim_driver.plant.drivetrain import DriveLosses
+from ir_sim_driver.plant.plant_parameters import LinkFigures, Plant, StandingWatts
+
+# Base load: controller by mode, drives that are switched on, tool.
+
+
+class BasePower:
+    """Base load of a plant with these watts."""
+
+    def __init__(self, watts: StandingWatts) -> None:
+        self._figures = watts
+        self._controller = dict(watts.controller)
+        self._controller[Mode.STAND_ON_MOTORS] += watts.drives
+        self.set_tool(0.0, 0.0)
+
+    def set_tool(self, always: float, drive_bus: float) -> None:
+        """Take the tool's watts as declared: always, and more while the drive bus is up."""
+        factor = self._figures.tool
+        self._tool = dict.fromkeys(self._controller, factor * always)
+        for level in (Mode.STAND_ON_MOTORS, Mode.STAND_ON_BRAKES):
+            self._tool[level] += factor * drive_bus
+        self._watts = {
+            level: watts + self._tool[level] for level, watts in self._controller.items()
+        }
+
+    def of(self, level: Mode) -> float:
+        """Watts in STAND_ON_MOTORS or a rest, without holding torque."""
+        return self._watts[level]
+
+    def tool(self, level: Mode) -> float:
+        """Watts of the tool, a part of `of`."""
+        return self._tool[level]
+
+
+# The DC link as a circuit that is stepped: capacitor, rectifier, brake chopper and resistor.
+#
+# Within a step the drives take constant power, so the capacitor's energy E = C U^2 / 2 is known
+# in closed form: it falls straight with the chopper open, and with e^(-2t/RC) with it closed. A
+# step goes from event to event: the rectifier begins to conduct where U falls to the mains'
+# voltage, the chopper closes at its upper and opens at its lower voltage. Nothing is lost: what
+# the mains gave is what the drives, the resistor and the capacitor took.
+
+_EVENTS = 1000  # in one step: far more than any chopper switches
+
+
+class Flows(NamedTuple):
+    """Energies [J] of a step: through the rectifier into the link (negative: fed back), into the
+    brake resistor, and lost in the rectifier, which the mains give on top.
+    """
+
+    supplied: float
+    dissipated: float
+    rectifier: float
+
+
+class DcCircuit:
+    """Steps of dt [s]; stored [J]: in the capacitor, above what the mains charge it to."""
+
+    def __init__(
+        self, figures: LinkFigures, dt: float, regeneration: Regeneration = "shared"
+    ) -> None:
+        self._figures = figures
+        self._dt = dt
+        self._regeneration = regeneration
+        half = 0.5 * figures.capacitance
+        self._rest = half * figures.mains**2
+        self._on = half * (figures.chopper_on**2 - figures.mains**2)
+        self._off = half * (figures.chopper_off**2 - figures.mains**2)
+        self._tau = 0.5 * figures.resistor * figures.capacitance
+        self._closed = False
+        self.stored = 0.0
+
+    @property
+    def voltage(self) -> float:
+        """U [V] of the capacitor."""
+        return math.sqrt(2.0 * (self._rest + self.stored) / self._figures.capacitance)
+
+    def step(self, powers: Sequence[float]) -> Flows:
+        """Let the axes take constant powers [W] for dt."""
+        if self._regeneration == "none":  # every axis has a resistor of its own, nothing is shared
+            braked = sum(-p for p in powers if p < 0.0) * self._dt
+            supplied = self._ideal(sum(powers) * self._dt + braked)[0]
+            return Flows(supplied, braked, self._loss(supplied))
+        power = sum(powers)
+        if power >= 0.0 and self.stored == 0.0:  # what happens most of the time
+            supplied = power * self._dt
+            return Flows(supplied, 0.0, self._loss(supplied))
+        supplied, dissipated = self._events(power)
+        return Flows(supplied, dissipated, self._loss(supplied))
+
+    def steps(self, powers: FloatArray) -> Flows:
+        """Let the axes take powers (K, n) [W] for a step each: the sums of the flows of `step`.
+
+        While the capacitor is empty and the axes take power, as nearly always, steps are summed at
+        once.
+        """
+        total = powers.sum(axis=1)
+        flows = [0.0, 0.0, 0.0]
+        k = 0
+        shared = self._regeneration == "shared"
+        braking = [*np.flatnonzero(total < 0.0).tolist(), len(total)] if shared else []
+        while k < len(total):
+            if shared and self.stored == 0.0 and not self._closed:
+                first = braking[bisect_left(braking, k)]
+                taken = total[k:first]
+                amount = float(taken.sum())
+                flows[0] += amount * self._dt
+                flows[2] += self._losses(amount, float(taken @ taken))
+                if first == len(total):
+                    break
+                k = first
+            for j, flow in enumerate(self.step(powers[k].tolist())):
+                flows[j] += flow
+            k += 1
+        return Flows(*flows)
+
+    def _events(self, power: float) -> tuple[float, float]:
+        """Energies supplied and dissipated in a step of this power."""
+        if self._regeneration == "fed_back" or (self._on == self._off and not self._closed):
+            supplied, over = self._ideal(power * self._dt)
+            return (supplied - over, 0.0) if self._regeneration == "fed_back" else (supplied, over)
+        supplied = dissipated = 0.0
+        left = self._dt
+        for _ in range(_EVENTS):
+            if left <= 0.0:
+                break
+            used, given, lost = (
+                self._braking(power, left) if self._closed else self._free(power, left)
+            )
+            left = left - used
+            supplied = supplied + given
+            dissipated = dissipated + lost
+        return supplied, dissipated
+
+    def _ideal(self, demand: float) -> tuple[float, float]:
+        """Energy from the mains, and over what the capacitor takes, where the chopper has no
+        hysteresis.
+        """
+        stored = self.stored - demand
+        self.stored = min(max(stored, 0.0), self._on)
+        return max(-stored, 0.0), max(stored - self._on, 0.0)
+
+    def _free(self, power: float, left: float) -> tuple[float, float, float]:
+        """Until something switches, with the chopper open: time used, supplied, dissipated."""
+        if power > 0.0:
+            lasts = self.stored / power
+            if lasts <= left:  # the rectifier conducts for the rest of the step
+                self.stored = 0.0
+                return left, power * (left - lasts), 0.0
+        elif power < 0.0:
+            room = self._on - self.stored
+            if room <= -power * left:
+                self.stored = self._on
+                self._closed = True
+                return room / -power, 0.0, 0.0
+        self.stored -= power * left
+        return left, 0.0, 0.0
+
+    def _braking(self, power: float, left: float) -> tuple[float, float, float]:
+        """Until something switches, with the chopper closed."""
+        energy = self._rest + self.stored
+        target = self._rest + self._off
+        settled = -power * self._tau  # where resistor and drives are in balance
+        used = left
+        if settled < target:
+            used = min(left, self._tau * math.log((energy - settled) / (target - settled)))
+        after = settled + (energy - settled) * math.exp(-used / self._tau)
+        if used < left:
+            after = target
+            self._closed = False
+        dissipated = energy - after - power * used
+        self.stored = after - self._rest
+        return used, 0.0, dissipated
+
+    def _loss(self, supplied: float) -> float:
+        """Energy lost in the rectifier for what it gives in a step."""
+        if supplied <= 0.0:
+            return 0.0
+        power = supplied / self._dt
+        return self._losses(power, power * power)
+
+    def _losses(self, power: float, square: float) -> float:
+        """Energy lost in the rectifier in steps whose powers [W] and squares of powers have these
+        sums.
+        """
+        f = self._figures
+        return (
+            self._dt
+            / f.mains
+            * (f.rectifier_drop * power + f.rectifier_resistance / f.mains * square)
+        )
+
+
+# Meter: energy is the integral of the power.
+#
+# mains = base + supplied + rectifier loss, and supplied = axes + brake resistor + change of the
+# capacitor; what an axis takes is mechanical work, copper, inverter and iron losses. All of it is
+# the plant's own.
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,28 +1,349 @@
-"""The robot of a plant in PyBullet, driven by motor torques that a controller makes which does not
-know it.
-
-Rotor inertia is up to 4000 times a link's own and can neither be fed back as a torque (it diverges
-in six steps) nor be added to the links. So every step solves (H + J_r) qdd + h + friction -
-counterbalance = tau for qdd, friction at the speed in the middle of the change (else it chatters at
-rest), and applies H qdd + h to the links.
-"""
+"""The robot in PyBullet: rigid bodies of arm and loads, driven by motor torques."""
 
 from __future__ import annotations
 
+import math
+import os
 from collections.abc import Sequence
 from operator import add, sub
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg.lapack import dposv
 
 from ir_description import Load, RobotModel
 from ir_msgs_py.arrays import FloatArray
+from ir_sim_driver.errors import BackendError
 from ir_sim_driver.plant.backend import STANDING, Work
-from ir_sim_driver.plant.bullet_arm import BulletArm
 from ir_sim_driver.plant.control import ControlSettings, ServoControl
-from ir_sim_driver.plant.drivetrain import Drivetrain
-from ir_sim_driver.plant.gears import Gears
+from ir_sim_driver.plant.drivetrain import Drivetrain, Gears
 from ir_sim_driver.plant.plant_parameters import Plant
+
+# Bodies: one per link, in its principal axes, its loads merged.
+#
+# Bullet turns an inertia into its principal axes, moves it to the joint by -m x y and -m y x, and
+# refuses what rounding leaves unsymmetrical by 1e-15 kg m^2. Given in principal axes nothing is
+# turned; and some mass within parts in a trillion gives the same products in either order.
+
+_ULPS = 1000  # of a figure that are tried, relative 2e-13; one mass in ten is exact
+_THICKNESS = 1e-6  # share of the largest principal moment; a thousand times finer than it is known
+
+
+class Body(NamedTuple):
+    """A link: mass [kg], centre (3,) [m] and principal moments (3,) [kg m^2] about it in its frame,
+    whose pose in that of the link before is pose (4, 4); it turns about axis (3,).
+    """
+
+    mass: float
+    com: FloatArray
+    moments: FloatArray
+    pose: FloatArray
+    axis: FloatArray
+
+
+def bodies_of(robot: RobotModel, loads: Sequence[Load]) -> list[Body]:
+    """The n bodies that move; the loads (in the last link's frame) are parts of the last one."""
+    bodies = []
+    before = np.eye(3)
+    for i in range(robot.n):
+        own = robot.link_mass[i + 1], robot.link_com[i + 1], robot.link_inertia[i + 1]
+        carried = loads if i == robot.n - 1 else ()
+        mass, com, inertia = _merged(
+            [own, *((load.mass, load.com, load.inertia) for load in carried)]
+        )
+        moments, turn = np.linalg.eigh(inertia)
+        turn[:, 0] *= np.linalg.det(turn)
+        pose = np.array(robot.joint_origin[i])
+        pose[:3, 3] = before.T @ pose[:3, 3]
+        pose[:3, :3] = before.T @ pose[:3, :3] @ turn
+        axis = _unit(turn.T @ np.asarray(robot.joint_axis[i]))
+        com = turn.T @ com
+        bodies.append(Body(_symmetrical(mass, com), com, _thick(moments), pose, axis))
+        before = turn
+    return bodies
+
+
+def urdf_of(robot: RobotModel, bodies: Sequence[Body]) -> str:
+    """The URDF text of the bodies on a base that is fixed."""
+    low = np.array(robot.position_min).tolist()
+    high = np.array(robot.position_max).tolist()
+    parts = [_link(0, 1.0, np.zeros(3), np.ones(3))]
+    for i, body in enumerate(bodies):
+        parts.append(_link(i + 1, body.mass, body.com, body.moments))
+        parts.append(
+            f'<joint name="{i + 1}" '
+            f'type="revolute">{_origin(body.pose[:3, 3], _rpy(body.pose[:3, :3]))}'
+            f'<parent link="{i}"/><child link="{i + 1}"/><axis xyz="{_row(body.axis)}"/>'
+            f'<limit lower="{low[i]!r}" upper="{high[i]!r}" velocity="0" effort="0"/></joint>'
+        )
+    return f'<robot name="plant">{"".join(parts)}</robot>'
+
+
+def _merged(
+    parts: Sequence[tuple[float, FloatArray, FloatArray]],
+) -> tuple[float, FloatArray, FloatArray]:
+    """Mass, centre (3,) and inertia (3, 3) about it of rigid bodies, given so each."""
+    mass = float(sum(m for m, _, _ in parts))
+    com = sum((m * np.asarray(c) for m, c, _ in parts), np.zeros(3)) / mass
+    inertia = np.zeros((3, 3))
+    for m, c, own in parts:
+        off = np.asarray(c) - com
+        inertia += np.asarray(own) + m * (off @ off * np.eye(3) - np.outer(off, off))
+    return mass, com, 0.5 * (inertia + inertia.T)
+
+
+def _thick(moments: FloatArray) -> FloatArray:
+    """Principal moments (3,), rising, that Bullet does not take for impossible by rounding, and for
+    zero
+    then: a flat disc fulfils their triangle inequality with equality.
+    """
+    if moments[0] + moments[1] - moments[2] > _THICKNESS * moments[2]:
+        return moments
+    thicker: FloatArray = moments + _THICKNESS * moments[2]
+    return thicker
+
+
+def _unit(axis: FloatArray) -> FloatArray:
+    """The axis (3,) with a length of 1 to the last bit, as Bullet has a sentence for any other."""
+    axis = axis / np.linalg.norm(axis)
+    largest = int(np.abs(axis).argmax())
+    for _ in range(_ULPS):
+        length = math.sqrt(sum(x * x for x in axis.tolist()))
+        if length == 1.0:
+            break
+        axis[largest] = np.nextafter(axis[largest], 0.0 if length > 1.0 else 2.0 * axis[largest])
+    return axis
+
+
+def _symmetrical(mass: float, com: FloatArray) -> float:
+    """The nearest mass above whose products with the coordinates of the centre commute in floating
+    point.
+    """
+    x, y, z = com.tolist()
+    for _ in range(_ULPS):
+        if all((mass * a) * b == (mass * b) * a for a, b in ((x, y), (x, z), (y, z))):
+            break
+        mass = math.nextafter(mass, math.inf)
+    return mass
+
+
+def _link(i: int, mass: float, com: FloatArray, moments: FloatArray) -> str:
+    ixx, iyy, izz = moments.tolist()
+    return (
+        f'<link name="{i}"><inertial>{_origin(com, np.zeros(3))}<mass value="{mass!r}"/><inertia '
+        f'ixx="{ixx!r}" ixy="0" ixz="0" iyy="{iyy!r}" iyz="0" izz="{izz!r}"/></inertial></link>'
+    )
+
+
+def _origin(xyz: FloatArray, rpy: FloatArray) -> str:
+    return f'<origin xyz="{_row(xyz)}" rpy="{_row(rpy)}"/>'
+
+
+def _row(values: FloatArray) -> str:
+    return " ".join(repr(x) for x in values.tolist())
+
+
+def _rpy(R: FloatArray) -> FloatArray:
+    """Roll, pitch, yaw [rad] of a rotation (3, 3). Roll is taken behind yaw, so that next to a
+    pitch of 90 degrees, where yaw is hardly known, their sum still is.
+    """
+    yaw = np.arctan2(R[1, 0], R[0, 0])
+    sin = np.sin(yaw)
+    cos = np.cos(yaw)
+    pitch = np.arctan2(-R[2, 0], cos * R[0, 0] + sin * R[1, 0])
+    roll = np.arctan2(sin * R[0, 2] - cos * R[1, 2], cos * R[1, 1] - sin * R[0, 1])
+    return np.array((roll, pitch, yaw))
+
+
+# Arm: joints and loads as rigid bodies in PyBullet.
+
+GRAVITY = 9.80665
+SPEED_GUARD = 50.0
+"""Speed [rad/s] that all joints together do not reach: beyond it the physics has diverged."""
+
+
+class BulletArm:
+    """Links of `robot` standing at base_pose (4, 4), stepped by dt [s].
+
+    Raises BackendError when PyBullet is missing or has diverged.
+    """
+
+    def __init__(self, robot: RobotModel, dt: float, base_pose: FloatArray) -> None:
+        # the base stays at the origin and gravity turns instead: Bullet's inverse dynamics know no
+        # base pose
+        self._base = base_pose
+        self._gravity = (base_pose[:3, :3].T @ np.array([0.0, 0.0, -GRAVITY])).tolist()
+        self._bullet = _pybullet()
+        self._client = -1
+        self._errors = (
+            self._bullet.error,
+            SystemError,
+            ValueError,
+            TypeError,
+        )  # it raises what C leaves
+        self._robot = robot
+        self._dt = dt
+        self._loads: tuple[Load, ...] = ()
+        self._still = [0.0] * robot.n
+        self._joints = list(range(robot.n))
+
+    def close(self) -> None:
+        """Let go of the physics server."""
+        self._bullet.disconnect(physicsClientId=self._client)
+
+    def connect_again(self) -> None:
+        """Start the physics server again when it is gone."""
+        if not self._bullet.isConnected(self._client):
+            self.carry(self._loads, self._still)
+
+    def carry(self, loads: Sequence[Load], q: Sequence[float]) -> None:
+        """Rebuild the robot with these loads. Raises BackendError where Bullet can't compute with
+        it.
+        """
+        self._loads = tuple(loads)
+        self._build(urdf_of(self._robot, bodies_of(self._robot, self._loads)))
+        self.inverse_dynamics(q, self._still, self._still)
+
+    def mass_matrix(self, q: Sequence[float]) -> tuple[tuple[float, ...], ...]:
+        """Rows of H (n, n) at q, without rotor inertia."""
+        try:
+            rows: tuple[tuple[float, ...], ...] = self._bullet.calculateMassMatrix(
+                self._body, q, physicsClientId=self._client
+            )
+        except self._errors as error:
+            raise _failed(error) from error
+        return rows
+
+    def inverse_dynamics(
+        self, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]
+    ) -> tuple[float, ...]:
+        """Torque H qdd + h (n,) on the links."""
+        try:
+            torque: tuple[float, ...] = self._bullet.calculateInverseDynamics(
+                self._body, q, qd, qdd, physicsClientId=self._client
+            )
+        except self._errors as error:
+            raise _failed(error) from error
+        return torque
+
+    def link_com_position(self, link: int) -> FloatArray:
+        """Centre of mass (3,) of link 1..n in the world [m], the last one's with its loads.
+
+        Bullet keeps this frame in double precision, the link frame itself only in single.
+        """
+        state = self._bullet.getLinkState(
+            self._body,
+            self._joints[link - 1],
+            computeForwardKinematics=True,
+            physicsClientId=self._client,
+        )
+        position: FloatArray = self._base[:3, :3] @ np.array(state[0]) + self._base[:3, 3]
+        return position
+
+    def write(self, q: Sequence[float], qd: Sequence[float]) -> None:
+        """Be at q, moving at qd."""
+        for joint, position, speed in zip(self._joints, q, qd, strict=True):
+            self._call(self._bullet.resetJointState, self._body, joint, position, speed)
+
+    def advance(self, torque: Sequence[float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Make a step with these torques on the links: position (n,), and speed (n,) over the
+        step.
+        """
+        bullet = self._bullet
+        body = self._body
+        joints = self._joints
+        client = self._client
+        try:
+            bullet.setJointMotorControlArray(
+                body, joints, bullet.TORQUE_CONTROL, forces=torque, physicsClientId=client
+            )
+            bullet.stepSimulation(physicsClientId=client)
+            states = bullet.getJointStates(body, joints, physicsClientId=client)
+        except self._errors as error:
+            raise _failed(error) from error
+        positions, speeds, _, _ = zip(*states, strict=True)
+        if not math.hypot(*speeds) < SPEED_GUARD:  # NaN does not pass either
+            raise BackendError(
+                f"the physics has diverged: joints move faster than {SPEED_GUARD:g} rad/s"
+            )
+        return positions, speeds
+
+    def _build(self, text: str) -> None:
+        """Make a new server: the inverse dynamics of a removed body live on in the old one. Where
+        that is not possible the old one stays.
+        """
+        old = self._client
+        self._client = _connect(self._bullet, self._dt, self._gravity)
+        try:
+            self._body = self._load(text)
+        except (OSError, BackendError) as error:
+            self._bullet.disconnect(physicsClientId=self._client)
+            self._client = old
+            raise BackendError(f"PyBullet can't be given the robot: {error}") from error
+        if self._bullet.isConnected(old):
+            self._bullet.disconnect(physicsClientId=old)
+        self._prepare()
+
+    def _load(self, text: str) -> int:
+        """The body of a URDF."""
+        file = os.memfd_create(
+            "robot.urdf"
+        )  # a full or read-only disk is no reason to have no robot
+        try:
+            os.write(file, text.encode())
+            path = f"/proc/self/fd/{file}"
+            flags = self._bullet.URDF_USE_INERTIA_FROM_FILE
+            return int(self._call(self._bullet.loadURDF, path, useFixedBase=True, flags=flags))
+        finally:
+            os.close(file)
+
+    def _prepare(self) -> None:
+        """Take from the body what Bullet adds: damping, collisions, motors."""
+        bullet = self._bullet
+        client = self._client
+        undamped = dict.fromkeys(("linearDamping", "angularDamping", "jointDamping"), 0.0)
+        for link in range(-1, bullet.getNumJoints(self._body, physicsClientId=client)):
+            bullet.changeDynamics(self._body, link, **undamped, physicsClientId=client)
+            bullet.setCollisionFilterGroupMask(self._body, link, 0, 0, physicsClientId=client)
+        for joint in self._joints:  # the built-in motors off
+            bullet.setJointMotorControl2(
+                self._body, joint, bullet.VELOCITY_CONTROL, force=0.0, physicsClientId=client
+            )
+
+    def _call(self, function: Any, *arguments: Any, **more: Any) -> Any:
+        try:
+            return function(*arguments, physicsClientId=self._client, **more)
+        except self._errors as error:
+            raise _failed(error) from error
+
+
+def _failed(error: Exception) -> BackendError:
+    return BackendError(f"PyBullet failed: {error}")
+
+
+def _pybullet() -> Any:
+    try:
+        import pybullet  # a missing PyBullet is reported when it is wanted
+    except ImportError as error:
+        raise BackendError(f"PyBullet is not installed ({error}): use backend ideal") from error
+    return pybullet
+
+
+def _connect(bullet: Any, dt: float, gravity: list[float]) -> int:
+    client = int(bullet.connect(bullet.DIRECT))
+    if client < 0:
+        raise BackendError("PyBullet offers no physics server")
+    bullet.setGravity(*gravity, physicsClientId=client)
+    bullet.setTimeStep(dt, physicsClientId=client)
+    return client
+
+
+# Backend: a plant that is driven by the torques of a controller which does not know it.
+#
+# Rotor inertia is up to 4000 times a link's own and can neither be fed back as a torque (it
+# diverges in six steps) nor be added to the links. So every step solves (H + J_r) qdd + h +
+# friction - counterbalance = tau for qdd, friction at the speed in the middle of the change (else
+# it chatters at rest), and applies H qdd + h to the links.
 
 BRAKE_FACTOR = 1.5
 """Torque of a mechanical brake over the joint's largest motor torque (an estimate; no public

@@ -2,11 +2,19 @@
 by.
 """
 
-from ir_sim_driver.plc.inputs import BITS, POWER_BITS, Plc, PlcSettings
-from ir_sim_driver.plc.links import LINKS, SERVICE, TOPIC, WRITERS
+from ir_sim_driver.plc.inputs import (
+    BITS,
+    LINKS,
+    POWER_BITS,
+    SERVICE,
+    TOPIC,
+    WRITERS,
+    Plc,
+    PlcSettings,
+    Watchdog,
+)
 from ir_sim_driver.plc.port import STOP_BIT, Controller, Link, OpenLink, Readout
 from ir_sim_driver.plc.wake_on_lan import WakeOnLan
-from ir_sim_driver.plc.watchdog import Watchdog
 
 __all__ = [
     "BITS",

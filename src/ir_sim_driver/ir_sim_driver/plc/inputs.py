@@ -1,10 +1,4 @@
-"""The PLC's side of the controller: debounced levels, interlocks of AB, HIB and KS, and the mode
-switch.
-
-Rules of the KR C4 power management: the three bits count only in operating mode EXT, only one at a
-time, and never together with a PROFIenergy pause; a contradiction is ignored with a warning. A bit
-that is already 1 when the controller starts or wakes is ignored until it has been 0 once.
-"""
+"""PLC inputs: who may write them, debounce, interlocks of AB, HIB and KS, heartbeat."""
 
 from __future__ import annotations
 
@@ -18,8 +12,55 @@ from ir_msgs_py.settings import check_settings, setting
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.notices import Level, Notices
-from ir_sim_driver.plc.links import WRITERS
-from ir_sim_driver.plc.port import STOP_BIT
+from ir_sim_driver.plc.modbus import ModbusTcp
+from ir_sim_driver.plc.port import STOP_BIT, Link
+from ir_sim_driver.plc.wake_on_lan import WakeOnLan
+
+# Links that there are: a new one is a module and a line here.
+
+LINKS: tuple[type[Link], ...] = (WakeOnLan, ModbusTcp)
+TOPIC = "topic"
+SERVICE = "service"
+WRITERS = (TOPIC, *(link.name for link in LINKS if link.sets_inputs), SERVICE)
+"""Who may set PLC inputs: the node's topic and service, and links."""
+
+
+# Heartbeat of the PLC, watched from the first one on, in plant time.
+
+
+class Watchdog:
+    """lost: the reason while the link counts as lost, else ""."""
+
+    def __init__(self) -> None:
+        self._deadline = float("inf")
+        self._timeout = 0.0
+        self.lost = ""
+
+    def beat(self, now: float, timeout: float) -> None:
+        """Heartbeat at plant time `now` [s]; the next is due within `timeout` [s]."""
+        self._deadline = now + timeout
+        self._timeout = timeout
+        self.lost = ""
+
+    def forget(self) -> None:
+        """Nobody can be heard now; watching begins again with the next heartbeat."""
+        self._deadline = float("inf")
+        self.lost = ""
+
+    def step(self, now: float) -> bool:
+        """Look at the time; True in the step in which the link is lost."""
+        if now <= self._deadline or self.lost:
+            return False
+        self.lost = f"the PLC's heartbeat is missing for more than {self._timeout:g} s"
+        return True
+
+
+# Levels in, requests out.
+#
+# Rules of the KR C4 power management: the three bits count only in operating mode EXT, only one
+# at a time, and never together with a PROFIenergy pause; a contradiction is ignored with a
+# warning. A bit that is already 1 when the controller starts or wakes is ignored until it has
+# been 0 once.
 
 OWNERS = ("any", *WRITERS)
 RESTART_BIT = "ks"

@@ -1,9 +1,4 @@
-"""Modbus TCP server of the controller: a PLC sets its bits and reads the outputs.
-
-The server has a thread and an event loop of its own. Exception 03 also says what the controller
-refuses, 04 that it is off the network. What clients do is not logged: a million of them leave no
-line.
-"""
+"""Modbus TCP: requests, register map, server and link."""
 
 from __future__ import annotations
 
@@ -11,13 +6,321 @@ import asyncio
 import logging
 import struct
 import threading
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from enum import IntEnum
+from typing import ClassVar, Protocol, TypeVar
 
-from ir_sim_driver.plc.modbus_pdu import ExceptionCode, Tables, answered
+from ir_msgs_py.plc import OperatingMode
+from ir_msgs_py.settings import check_settings, setting
+from ir_msgs_py.status import StatusCode
+from ir_sim_driver.errors import DriverError, LinkError, ModbusRefusedError, RequestRefusedError
+from ir_sim_driver.plc.port import STOP_BIT, Controller, OpenLink, Readout
+
+# Requests in bytes, answered from tables: the part of the protocol that knows no network.
+#
+# The eight functions that read and write bits and registers, as in the MODBUS Application
+# Protocol Specification V1.1b3. What is wrong with a request is answered in its order: function,
+# count, address, value.
+
+READ_COILS = 1
+READ_DISCRETE_INPUTS = 2
+READ_HOLDING = 3
+READ_INPUT = 4
+WRITE_COIL = 5
+WRITE_REGISTER = 6
+WRITE_COILS = 15
+WRITE_REGISTERS = 16
+_REFUSED = 0x80  # mark of a function that was refused
+_MOST_BITS_READ = 2000
+_MOST_BITS_WRITTEN = 1968
+_MOST_REGISTERS_READ = 125
+_MOST_REGISTERS_WRITTEN = 123
+# a single coil
+_ON = 0xFF00
+_OFF = 0x0000
+
+
+class ExceptionCode(IntEnum):
+    """Why a request is refused."""
+
+    FUNCTION = 1
+    ADDRESS = 2
+    VALUE = 3
+    DEVICE_FAILURE = 4
+
+
+class Tables(Protocol):
+    """What requests read and write; each raises ModbusRefusedError, and has done nothing then."""
+
+    def coils(self) -> Sequence[bool]:
+        """All coils."""
+
+    def discrete_inputs(self) -> Sequence[bool]:
+        """All discrete inputs."""
+
+    def holding_registers(self) -> Sequence[int]:
+        """All holding registers."""
+
+    def input_registers(self) -> Sequence[int]:
+        """All input registers."""
+
+    def write_coils(self, start: int, levels: Sequence[bool]) -> None:
+        """Write all of these coils or none."""
+
+    def write_registers(self, start: int, values: Sequence[int]) -> None:
+        """Write all of these holding registers or none."""
+
+
+def answered(request: bytes, tables: Tables) -> bytes:
+    """The PDU that answers a PDU of at least one byte."""
+    function = request[0]
+    body = request[1:]
+    try:
+        return request[:1] + _answer_of(function)(body, tables)
+    except ModbusRefusedError as refusal:
+        code = refusal.code
+    except struct.error:  # shorter than its function asks for
+        code = ExceptionCode.VALUE
+    return bytes((function | _REFUSED, code))
+
+
+def _answer_of(function: int) -> Callable[[bytes, Tables], bytes]:
+    if function not in _ANSWERS:
+        raise ModbusRefusedError(ExceptionCode.FUNCTION)
+    return _ANSWERS[function]
+
+
+def _read_bits(body: bytes, read: Callable[[], Sequence[bool]]) -> bytes:
+    start, count = struct.unpack_from(">HH", body)
+    _check(1 <= count <= _MOST_BITS_READ, ExceptionCode.VALUE)
+    levels = read()
+    _check(start + count <= len(levels), ExceptionCode.ADDRESS)
+    packed = sum(1 << k for k, level in enumerate(levels[start : start + count]) if level)
+    size = _bytes_of(count)
+    return bytes((size,)) + packed.to_bytes(size, "little")
+
+
+def _read_registers(body: bytes, read: Callable[[], Sequence[int]]) -> bytes:
+    start, count = struct.unpack_from(">HH", body)
+    _check(1 <= count <= _MOST_REGISTERS_READ, ExceptionCode.VALUE)
+    values = read()
+    _check(start + count <= len(values), ExceptionCode.ADDRESS)
+    return bytes((2 * count,)) + struct.pack(f">{count}H", *values[start : start + count])
+
+
+def _write_coil(body: bytes, tables: Tables) -> bytes:
+    start, value = struct.unpack_from(">HH", body)
+    _check(value in (_ON, _OFF), ExceptionCode.VALUE)
+    tables.write_coils(start, [value == _ON])
+    return body[:4]
+
+
+def _write_register(body: bytes, tables: Tables) -> bytes:
+    start, value = struct.unpack_from(">HH", body)
+    tables.write_registers(start, [value])
+    return body[:4]
+
+
+def _write_coils(body: bytes, tables: Tables) -> bytes:
+    start, count, size = struct.unpack_from(">HHB", body)
+    packed = body[5:]
+    right = 1 <= count <= _MOST_BITS_WRITTEN and size == len(packed) == _bytes_of(count)
+    _check(right, ExceptionCode.VALUE)
+    number = int.from_bytes(packed, "little")
+    tables.write_coils(start, [bool(number >> k & 1) for k in range(count)])
+    return body[:4]
+
+
+def _write_registers(body: bytes, tables: Tables) -> bytes:
+    start, count, size = struct.unpack_from(">HHB", body)
+    right = 1 <= count <= _MOST_REGISTERS_WRITTEN and size == len(body) - 5 == 2 * count
+    _check(right, ExceptionCode.VALUE)
+    tables.write_registers(start, struct.unpack_from(f">{count}H", body, 5))
+    return body[:4]
+
+
+def _bytes_of(bits: int) -> int:
+    return (bits + 7) // 8
+
+
+def _check(holds: bool, code: ExceptionCode) -> None:
+    if not holds:
+        raise ModbusRefusedError(code)
+
+
+_ANSWERS: dict[int, Callable[[bytes, Tables], bytes]] = {
+    READ_COILS: lambda body, tables: _read_bits(body, tables.coils),
+    READ_DISCRETE_INPUTS: lambda body, tables: _read_bits(body, tables.discrete_inputs),
+    READ_HOLDING: lambda body, tables: _read_registers(body, tables.holding_registers),
+    READ_INPUT: lambda body, tables: _read_registers(body, tables.input_registers),
+    WRITE_COIL: _write_coil,
+    WRITE_REGISTER: _write_register,
+    WRITE_COILS: _write_coils,
+    WRITE_REGISTERS: _write_registers,
+}
+
+
+# Register map: coils and holding registers in, discrete inputs and input registers out.
+#
+# Addresses are zero-based (PDU addresses). 32-bit values take two registers, the high word first.
+
+MODBUS = "modbus"
+"""How sentences and the parameter `plc.owner` call the link."""
+COILS = (
+    "ab",
+    "hib",
+    "ks",
+    "emergency_stop",
+    "drives_on",
+    "drives_off",
+    "conf_mess",
+    "move_enable",
+    "heartbeat",
+)
+"""Coils 0..8; the first eight are the fields of ir_msgs/PlcInputs."""
+HEARTBEAT = COILS.index("heartbeat")
+DISCRETE_INPUTS = ("ab", "bbs", "drives_ready", "alarm_stop", "in_home", "moving")
+"""Discrete inputs 0..5: the fields of ir_msgs/PlcOutputs."""
+OPERATING_MODE = 0
+PAUSE = 1
+"""Holding registers: mode switch (1 T1, 2 T2, 3 AUT, 4 EXT); pause [s] (writing starts one, 0 ends
+it).
+"""
+HOLDING_REGISTERS = 2
+INPUT_REGISTERS = 9
+"""Input registers: 0 mode, 1 target mode, 2 time to target [0.1 s], 3 and 4 power [W], 5 and 6
+energy [J / 100], 7 time to operate [s], 8 alive counter.
+"""
+_WORD = 0xFFFF
+
+
+def discrete_inputs(readout: Readout) -> list[bool]:
+    """Values in the order of DISCRETE_INPUTS."""
+    return [bool(getattr(readout.outputs, name)) for name in DISCRETE_INPUTS]
+
+
+def input_registers(readout: Readout) -> list[int]:
+    """Values of the INPUT_REGISTERS."""
+    return [
+        int(readout.mode),
+        int(readout.target),
+        _clamped(readout.time_to_target * 10.0),
+        *_words(readout.power),
+        *_words(readout.energy / 100.0),
+        _clamped(readout.time_to_operate),
+        readout.alive & _WORD,
+    ]
+
+
+def _clamped(value: float) -> int:
+    return min(max(round(value), 0), _WORD)
+
+
+def _words(value: float) -> tuple[int, int]:
+    number = min(max(round(value), 0), 0xFFFFFFFF)
+    return number >> 16, number & _WORD
+
+
+# Tables: coils and registers act on the controller, inputs are read from it.
 
 T = TypeVar("T")
+
+
+class ControllerTables:
+    """Implements modbus_pdu.Tables on `controller`; watchdog [s]: longest time between
+    heartbeats.
+    """
+
+    def __init__(self, controller: Controller, watchdog: float) -> None:
+        self._controller = controller
+        self._watchdog = watchdog
+        self._pause = 0
+
+    def coils(self) -> list[bool]:
+        """Levels as they were written last, by whomever; the heartbeat reads 0."""
+        self._readout()
+        inputs = self._controller.inputs()
+        return [*(bool(getattr(inputs, name)) for name in COILS[:HEARTBEAT]), False]
+
+    def discrete_inputs(self) -> list[bool]:
+        """The controller's outputs."""
+        return discrete_inputs(self._readout())
+
+    def holding_registers(self) -> list[int]:
+        """Mode switch and pause."""
+        self._readout()
+        registers = [0] * HOLDING_REGISTERS
+        registers[OPERATING_MODE] = int(self._controller.inputs().operating_mode)
+        registers[PAUSE] = self._pause
+        return registers
+
+    def input_registers(self) -> list[int]:
+        """Mode, times, power and energy."""
+        return input_registers(self._readout())
+
+    def write_coils(self, start: int, levels: Sequence[bool]) -> None:
+        """Set levels; any write of the heartbeat's coil is a heartbeat."""
+        if start + len(levels) > len(COILS):
+            raise ModbusRefusedError(ExceptionCode.ADDRESS)
+        named = {COILS[k]: level for k, level in enumerate(levels, start=start)}
+        if self._controller.readout() is None:
+            self._press_asleep(named)
+            return
+        beats = named.pop(COILS[HEARTBEAT], None) is not None
+        if named:
+            _asked(lambda: self._controller.write_inputs(MODBUS, named))
+        if beats:
+            self._controller.heartbeat(self._watchdog)
+
+    def write_registers(self, start: int, values: Sequence[int]) -> None:
+        """Turn the mode switch, start or end a pause, or both at once."""
+        if start + len(values) > HOLDING_REGISTERS:
+            raise ModbusRefusedError(ExceptionCode.ADDRESS)
+        self._readout()
+        wanted = dict(enumerate(values, start=start))
+        position = wanted.get(OPERATING_MODE)
+        pause = wanted.get(PAUSE)
+        if position is not None and not OperatingMode.T1 <= position <= OperatingMode.EXT:
+            raise ModbusRefusedError(ExceptionCode.VALUE)
+        mode = None if position is None else OperatingMode(position)
+        _asked(lambda: self._controller.write_mode_and_pause(MODBUS, mode, pause))
+        self._pause = self._pause if pause is None else pause
+
+    def _press_asleep(self, levels: dict[str, bool]) -> None:
+        """Off the network nothing is heard but a pressed emergency stop, which is latched."""
+        pressed = levels.get(STOP_BIT, False)
+        if pressed:
+            _asked(lambda: self._controller.write_inputs(MODBUS, {STOP_BIT: True}))
+        if not pressed or len(levels) > 1:
+            raise ModbusRefusedError(ExceptionCode.DEVICE_FAILURE)
+
+    def _readout(self) -> Readout:
+        readout = self._controller.readout()
+        if readout is None:
+            raise ModbusRefusedError(ExceptionCode.DEVICE_FAILURE)
+        return readout
+
+
+def _asked(work: Callable[[], T]) -> T:
+    """What the controller refuses as an exception code: 04 when the plant is dead, 03 otherwise."""
+    try:
+        return work()
+    except RequestRefusedError as error:
+        dead = error.code is StatusCode.FAILURE
+        raise ModbusRefusedError(
+            ExceptionCode.DEVICE_FAILURE if dead else ExceptionCode.VALUE
+        ) from error
+    except DriverError as error:
+        raise ModbusRefusedError(ExceptionCode.VALUE) from error
+
+
+# Server.
+#
+# The server has a thread and an event loop of its own. Exception 03 also says what the controller
+# refuses, 04 that it is off the network. What clients do is not logged: a million of them leave
+# no line.
+
 _LOG = logging.getLogger(__name__)
 _HEADER = struct.Struct(">HHHB")  # transaction, protocol, bytes that follow, unit
 _LONGEST = 254  # bytes that follow, of the largest request that there can be
@@ -145,3 +448,67 @@ async def _next_request(reader: asyncio.StreamReader) -> tuple[int, int, bytes] 
     if protocol != 0 or not 2 <= length <= _LONGEST:
         return None
     return transaction, unit, await reader.readexactly(length - 1)
+
+
+# Link: its settings, and the server opened where it is wanted.
+
+
+@dataclass(frozen=True)
+class ModbusTcp:
+    """A PLC can connect by Modbus TCP."""
+
+    name: ClassVar[str] = MODBUS
+    sets_inputs: ClassVar[bool] = True
+
+    modbus: bool = setting(False, "Whether a PLC can connect by Modbus TCP.", read_only=True)
+    modbus_host: str = setting("127.0.0.1", "Address of the Modbus server.", read_only=True)
+    modbus_port: int = setting(
+        5020,
+        "TCP port of the Modbus server; 0 takes a free one. The usual one is 502.",
+        minimum=0,
+        maximum=65535,
+        read_only=True,
+    )
+    modbus_watchdog: float = setting(
+        2.0,
+        "Without a heartbeat for this long the link to the PLC counts as lost, if it has ever "
+        "sent one.",
+        unit="s",
+        minimum=0.1,
+        maximum=3600.0,
+        read_only=True,
+    )
+
+    modbus_connections: int = setting(
+        16,
+        "Modbus clients at once; one more takes the place of the one that has been silent for "
+        "longest.",
+        minimum=1,
+        maximum=1000,
+        read_only=True,
+    )
+    modbus_idle: float = setting(
+        60.0,
+        "A Modbus client that is silent for this long is disconnected.",
+        unit="s",
+        minimum=0.1,
+        maximum=86400.0,
+        read_only=True,
+    )
+
+    def __post_init__(self) -> None:
+        check_settings(self)
+
+    @property
+    def wanted(self) -> bool:
+        """Whether the settings ask for it."""
+        return self.modbus
+
+    def open(self, controller: Controller) -> OpenLink:
+        """Serve the controller. Raises LinkError when the port is taken."""
+        tables = ControllerTables(controller, self.modbus_watchdog)
+        limits = Limits(self.modbus_connections, self.modbus_idle)
+        try:
+            return ModbusServer(self.modbus_host, self.modbus_port, tables, limits)
+        except OSError as error:
+            raise LinkError(f"no Modbus: {error}") from error

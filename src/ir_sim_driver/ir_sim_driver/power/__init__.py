@@ -2,9 +2,15 @@
 pause.
 """
 
-from ir_sim_driver.power.power_modes import NO_DEMAND, Demand, PowerModes
+from ir_sim_driver.power.power_modes import (
+    NO_DEMAND,
+    Demand,
+    IdleTimes,
+    PowerModes,
+    Times,
+    times_of,
+)
 from ir_sim_driver.power.profienergy import PAUSE_MAX, best_mode, best_route, energy_of, mode_table
-from ir_sim_driver.power.transitions import IdleTimes, Times, times_of
 
 __all__ = [
     "NO_DEMAND",

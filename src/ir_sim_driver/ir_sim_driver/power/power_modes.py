@@ -1,13 +1,68 @@
-"""The state machine of the power modes: rests, their transitions, emergency stop."""
+"""State machine of the power modes: rests, transitions with their times, emergency stop."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from ir_msgs_py.modes import DRIVES_ON, READY, RESTS, ROW, Mode, ModeRow
+from ir_msgs_py.settings import check_settings, setting
 from ir_msgs_py.transitions import TransitionTimes
 from ir_sim_driver.errors import SettingsError
-from ir_sim_driver.power.transitions import IdleTimes, Times, times_of
+
+# Times of every rest by its mode, and the controller's own timers.
+
+_WEEK = 604_800.0
+
+
+@dataclass(frozen=True)
+class IdleTimes:
+    """When the controller closes the brakes by itself."""
+
+    motors_to_brakes_in_program: float = setting(
+        20.0,
+        "Standing on motors before the brakes close, in AUT and EXT.",
+        unit="s",
+        minimum=0.0,
+        maximum=_WEEK,
+        read_only=True,
+    )
+    motors_to_brakes_in_command: float = setting(
+        10.0,
+        "Standing on motors before the brakes close, in T1 and T2.",
+        unit="s",
+        minimum=0.0,
+        maximum=_WEEK,
+        read_only=True,
+    )
+
+    def __post_init__(self) -> None:
+        check_settings(self)
+
+
+@dataclass(frozen=True)
+class Times:
+    """Seconds into a rest (enter), out of it to motors on (leave), and at least in it
+    (minimum_stay).
+    """
+
+    enter: float
+    leave: float
+    minimum_stay: float
+
+
+def times_of(transitions: TransitionTimes) -> dict[Mode, Times]:
+    """Times of every rest of the table."""
+    names = {row.mode: row.mode.name for row in RESTS}
+    return {
+        mode: Times(
+            transitions.enter(name), transitions.leave(name), transitions.minimum_stay(name)
+        )
+        for mode, name in names.items()
+    }
+
+
+# State machine.
 
 _INSTANT = 1e-6  # s; sums of steps are not exact
 _TRANSITIONS = {mode: row for row in RESTS for mode in (row.entering, row.leaving)}

@@ -14,7 +14,7 @@ from itertools import pairwise
 
 from ir_msgs_py.modes import ROW, Mode
 from ir_msgs_py.power import PowerMode
-from ir_sim_driver.power.transitions import Times
+from ir_sim_driver.power.power_modes import Times
 
 _ROUNDING = 1e-6  # s; a pause may be just as long as a sequence
 PAUSE_MAX = 604_800.0  # s: a week

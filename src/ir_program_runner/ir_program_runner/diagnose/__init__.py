@@ -1,1 +1,0 @@
-"""The runner's state on /diagnostics."""
