@@ -178,7 +178,7 @@ def test_its_settings_are_fields_with_a_sentence_and_a_range(search: Search) -> 
     for setting in describe(type(search)):
         assert setting.sentence.endswith(".")
         assert setting.bounds or setting.type is bool, f"{setting.name} has no range"
-    assert (type(search).__doc__ or "").splitlines()[0].endswith(".")
+    assert (type(search).__doc__ or "").split("\n\n")[0].rstrip().endswith(".")
 
 
 @pytest.mark.parametrize("name", NAMES)
