@@ -9,12 +9,12 @@ import sys
 import time
 from pathlib import Path
 
-from ir_recorder.read.raw import read_raw
+from ir_recorder.reading.mcap_file import read_raw
 
 WRITER = """
 import sys, time
-from ir_recorder.write import RecordingSession, RecordingWriter
-from ir_recorder.write.worker import Message, RecordingWorker
+from ir_recorder.recording import RecordingSession, RecordingWriter
+from ir_recorder.recording.worker import Message, RecordingWorker
 
 session = RecordingSession(RecordingWriter(sys.argv[1]), {}, time.monotonic_ns())
 session.open_topic("/text", "std_msgs/msg/String", [])

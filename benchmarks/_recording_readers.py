@@ -15,9 +15,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from ir_msgs_py.arrays import FloatArray
 from ir_recorder.errors import ReadError
-from ir_recorder.read.cdr import Columns
-from ir_recorder.read.raw import read_raw
-from ir_recorder.read.raw_values import RawChannel
+from ir_recorder.reading.cdr import Columns
+from ir_recorder.reading.mcap_file import RawChannel, read_raw
 
 Read = Callable[[Sequence[bytes]], FloatArray]
 DAMAGED = 2000

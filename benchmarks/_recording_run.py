@@ -15,7 +15,7 @@ from sensor_msgs.msg import JointState
 from ir_description import cell_to_yaml, load_cell, robot_urdf
 from ir_msgs.msg import ControllerState, PlannedMovement, PowerState, ProgramState
 from ir_recorder.format.qos import QosOffer
-from ir_recorder.write import CellFiles, RecordingSession, RecordingWriter
+from ir_recorder.recording import CellFiles, RecordingSession, RecordingWriter
 
 # ns
 START = 1_700_000_000_000_000_000

@@ -19,7 +19,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from ir_msgs_py.arrays import FloatArray
-from ir_recorder.intervals import alike, mean_of
+from ir_recorder.analysis.intervals import alike, mean_of
 from ir_studies import Means, study_of
 from ir_studies.statistics import EXAMPLE, StatisticsSettings, run_statistics
 from ir_studies.statistics.figures import Comparison

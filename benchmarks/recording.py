@@ -30,8 +30,8 @@ from _recording_readers import reader_rows
 from _recording_run import write_run
 from _results import Claim, add_ending, at_least, at_most, finish, line_of
 
-from ir_recorder.read.cdr import Columns
-from ir_recorder.read.raw import read_raw
+from ir_recorder.reading.cdr import Columns
+from ir_recorder.reading.mcap_file import read_raw
 
 HERE = Path(__file__).resolve().parent
 

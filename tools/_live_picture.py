@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from ir_recorder import Analysis
-from ir_recorder.analysis.shares import mode_name
+from ir_recorder.analysis.results import mode_name
 from ir_recorder.live import LiveServer, Stream
 from ir_recorder.live.cell_view import CellView, Heard
 from ir_recorder.live.server import Answer
-from ir_recorder.read.recording import BitSeries
+from ir_recorder.reading.recording import BitSeries
 
 RATE = 20.0  # Hz, as the node
 WINDOW = 60.0  # s

@@ -13,7 +13,7 @@ from ir_planner.before_after.asked import Asked, AskedProgram, asked_program
 from ir_planner.before_after.costed import costed_steps
 from ir_planner.before_after.stood import assumed_doors, doors_at_the_start
 from ir_planner.program import Doors, ProgramRequest
-from ir_recorder.read.recording import TextEvent
+from ir_recorder.reading.recording import TextEvent
 
 CELL = load_cell("demo")
 SHUT: Doors = (("lathe", ("door_closed",)),)

@@ -15,12 +15,12 @@ from pyarrow import parquet
 from ir_cli.main import main
 from ir_msgs_py.before_after import BeforeAfter
 from ir_planner import Planner
-from ir_recorder.report.before_after import (
+from ir_recorder.report.costs import Costs
+from ir_recorder.report.program_comparison import (
     before_after_columns,
     before_after_html,
     write_before_after_table,
 )
-from ir_recorder.report.costs import Costs
 
 
 def data_of(page: str) -> dict:

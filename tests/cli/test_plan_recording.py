@@ -19,10 +19,10 @@ from ir_msgs.msg import RecordedCall
 from ir_msgs.srv import PlanProgram
 from ir_msgs_py.search_log import ConfigurationLog
 from ir_recorder import Analysis, Verdict, analyse, findings, read_recording, summary
-from ir_recorder.read.raw import RawRecording, read_raw
+from ir_recorder.reading.mcap_file import RawRecording, read_raw
 from ir_recorder.report import report_html
 from ir_recorder.report.compare import comparison_html
-from ir_recorder.report.words import joules
+from ir_recorder.report.number_text import joules
 
 
 def assert_planned_figures_are_those_of_the_answer(analysis: Analysis, raw: RawRecording) -> None:

@@ -40,8 +40,8 @@ def recording(tmp_path_factory):
     from std_msgs.msg import String
 
     from ir_recorder.format.qos import QosOffer
-    from ir_recorder.write.session import RecordingSession
-    from ir_recorder.write.writer import RecordingWriter
+    from ir_recorder.recording.session import RecordingSession
+    from ir_recorder.recording.writer import RecordingWriter
 
     path = tmp_path_factory.mktemp("recording") / "played.mcap"
     session = RecordingSession(RecordingWriter(path), {}, 10**18)
@@ -93,6 +93,6 @@ def test_a_node_that_is_asked_to_end_ends_well(
         assert process.stderr is not None
         process.stderr.close()
     if name == "ir_record":
-        from ir_recorder.read.raw import read_raw
+        from ir_recorder.reading.mcap_file import read_raw
 
         assert read_raw(file).problems == ()

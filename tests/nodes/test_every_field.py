@@ -32,7 +32,7 @@ from ir_msgs_py.ros import client as client_module
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.messages import interface_type
 from ir_program_runner.node import ProgramRunnerNode
-from ir_recorder.node import RecorderNode
+from ir_recorder.node.recorder import RecorderNode
 from ir_sim_driver.node import SimDriver
 
 DRIVER = {"backend": "ideal", "wake_port": 0}

@@ -22,7 +22,7 @@ from sensor_msgs.msg import JointState
 from ir_description import cell_to_yaml, load_cell
 from ir_msgs.msg import CellState, Contact, MachineStates, PowerState, ProgramState
 from ir_msgs_py.ros.spinning import BackgroundExecutor
-from ir_recorder.live import commands
+from ir_recorder.live import server as commands
 from ir_recorder.live.node import LiveNode
 from ir_sim_driver.node import SimDriver
 

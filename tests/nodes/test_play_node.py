@@ -17,10 +17,10 @@ from std_msgs.msg import Float64, String
 from ir_msgs_py import names
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.play.node import PlayNode
-from ir_recorder.play.schedule import PlaySettings
-from ir_recorder.read.raw import read_raw
-from ir_recorder.write.session import RecordingSession
-from ir_recorder.write.writer import RecordingWriter
+from ir_recorder.play.playback import PlaySettings
+from ir_recorder.reading.mcap_file import read_raw
+from ir_recorder.recording.session import RecordingSession
+from ir_recorder.recording.writer import RecordingWriter
 
 START = 1_700_000_000_000_000_000
 

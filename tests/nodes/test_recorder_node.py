@@ -29,12 +29,12 @@ from ir_msgs.msg import PowerState
 from ir_msgs.srv import GetCell, StartRecording, StopRecording
 from ir_msgs_py.status import StatusCode
 from ir_recorder.errors import PathError, ReadError, WriteError
-from ir_recorder.listen.topics import GLOBAL
-from ir_recorder.node import COMMAND_NODE, POLL_PERIOD, RecorderNode
-from ir_recorder.read.raw import read_raw
-from ir_recorder.settings import RecorderSettings
-from ir_recorder.write.worker import FLUSH_PERIOD
-from ir_recorder.write.writer import RecordingWriter
+from ir_recorder.node.recorder import COMMAND_NODE, POLL_PERIOD, RecorderNode
+from ir_recorder.reading.mcap_file import read_raw
+from ir_recorder.recording.settings import RecorderSettings
+from ir_recorder.recording.topics import GLOBAL
+from ir_recorder.recording.worker import FLUSH_PERIOD
+from ir_recorder.recording.writer import RecordingWriter
 
 LATCHED = QoSProfile(
     depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL

@@ -26,9 +26,9 @@ from ir_msgs.srv import (
 )
 from ir_msgs_py import names
 from ir_planner.node.node import PlannerNode
-from ir_recorder.node import RecorderNode
-from ir_recorder.read.raw import RawRecording, read_raw
-from ir_recorder.settings import RecorderSettings
+from ir_recorder.node.recorder import RecorderNode
+from ir_recorder.reading.mcap_file import RawRecording, read_raw
+from ir_recorder.recording.settings import RecorderSettings
 
 STATE = np.array([0.3, -1.4, 1.5, 0.1, 0.4, -0.2]) + 1e-4 / 3.0
 

@@ -14,13 +14,13 @@ from std_msgs.msg import String
 from ir_msgs.msg import Status
 from ir_msgs_py import names
 from ir_msgs_py.ros.messages import interface_type, message_from_yaml
-from ir_recorder.node import RecorderNode
+from ir_recorder.node.recorder import RecorderNode
 from ir_recorder.play.node import PlayNode
-from ir_recorder.play.schedule import PlaySettings
-from ir_recorder.read.raw import RawRecording, read_raw
-from ir_recorder.settings import RecorderSettings
-from ir_recorder.write.session import RecordingSession
-from ir_recorder.write.writer import RecordingWriter
+from ir_recorder.play.playback import PlaySettings
+from ir_recorder.reading.mcap_file import RawRecording, read_raw
+from ir_recorder.recording.session import RecordingSession
+from ir_recorder.recording.settings import RecorderSettings
+from ir_recorder.recording.writer import RecordingWriter
 from ir_sim_driver.node import SimDriver
 
 SRV_FOLDER = Path(__file__).parents[2] / "ros_ws" / "src" / "ir_msgs" / "srv"

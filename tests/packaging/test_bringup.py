@@ -19,7 +19,7 @@ from ir_msgs_py import names
 from ir_msgs_py.settings import describe
 from ir_planner.settings import PlannerSettings
 from ir_program_runner.settings import LinkSettings, ProgramSettings
-from ir_recorder.settings import RecorderSettings
+from ir_recorder.recording.settings import RecorderSettings
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.motion.goal import ExecutionSettings
 from ir_sim_driver.node.parameters import NodeSettings

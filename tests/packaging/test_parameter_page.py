@@ -18,7 +18,7 @@ from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.search import SEARCHES, Ends, Found
 from ir_program_runner.parameters import declare_parameters
-from ir_recorder.parameters import declared_settings
+from ir_recorder.node.recorder import declared_settings
 from ir_sim_driver.node.parameters import DriverParameters
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -34,9 +34,9 @@ from ir_msgs_py.modes import Mode
 from ir_recorder import Analysis, analyse, findings, read_recording
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.format.schemas import SchemaLibrary
+from ir_recorder.recording.session import CellFiles, RecordingSession
+from ir_recorder.recording.writer import RecordingWriter
 from ir_recorder.report import report_html
-from ir_recorder.write.session import CellFiles, RecordingSession
-from ir_recorder.write.writer import RecordingWriter
 
 CELL_YAML = """
 format: ir_cell/1

@@ -11,9 +11,9 @@ import pytest
 from scipy.stats import ttest_1samp
 
 from ir_recorder import Analysis, analyse, findings, read_recording
-from ir_recorder.analysis.agreement import agreement
+from ir_recorder.analysis.indirect import agreement
+from ir_recorder.analysis.intervals import mean_of
 from ir_recorder.analysis.steps import executed_steps
-from ir_recorder.intervals import mean_of
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ir_recorder import Analysis
-from ir_recorder.report.bars import joule_bars
+from ir_recorder.report.charts import joule_bars
 
 
 def test_the_two_sides_differ_by_what_the_mains_gave(analysis: Analysis) -> None:

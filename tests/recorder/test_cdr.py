@@ -11,8 +11,8 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from ir_recorder.format.schemas import SchemaLibrary
-from ir_recorder.read.cdr import Columns
-from ir_recorder.read.raw import read_raw
+from ir_recorder.reading.cdr import Columns
+from ir_recorder.reading.mcap_file import read_raw
 
 
 def test_columns_agree_with_the_decoder_message_by_message(demo_file: Path) -> None:

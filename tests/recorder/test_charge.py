@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from ir_recorder import Analysis, findings
-from ir_recorder.analysis.charge import lost_charges
+from ir_recorder.analysis.analyse import lost_charges
 
 
 class Leaking:

@@ -12,10 +12,10 @@ from mcap.records import Chunk
 from mcap.writer import CompressionType, Writer
 
 from ir_recorder.errors import ReadError
-from ir_recorder.format.definition import MOST_DEPTH, definitions_of
-from ir_recorder.read.chunks import MOST_RECORDS, ChunkReader, ReadLimits
-from ir_recorder.read.raw import read_raw
-from ir_recorder.read.reader import read_recording
+from ir_recorder.format.schemas import MOST_DEPTH, definitions_of
+from ir_recorder.reading.limits import MOST_RECORDS, ChunkReader, ReadLimits
+from ir_recorder.reading.mcap_file import read_raw
+from ir_recorder.reading.reader import read_recording
 
 MIB = 2**20
 

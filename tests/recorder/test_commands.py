@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from ir_msgs_py import names
-from ir_recorder.play.commands import is_command
-from ir_recorder.play.schedule import PlaySettings
+from ir_recorder.play.playback import PlaySettings, is_command
 
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 

@@ -18,11 +18,10 @@ from hypothesis import strategies as st
 
 from ir_msgs_py.savings import ProgramPoint
 from ir_recorder import Analysis, analyse, findings
+from ir_recorder.report.charts import COLOURS, MARKS, Point, front_chart, front_section, pareto
 from ir_recorder.report.compare import comparison_html
-from ir_recorder.report.front import Point, front_chart, front_section, pareto
+from ir_recorder.report.costs import cycle_of
 from ir_recorder.report.headline import source
-from ir_recorder.report.marks import COLOURS, MARKS
-from ir_recorder.report.money import cycle_of
 from ir_recorder.report.page import asset
 from ir_recorder.report.step_table import step_columns, write_table
 from ir_recorder.report_main import main

@@ -10,9 +10,14 @@ import pytest
 from ir_msgs_py.settings import settings_table
 from ir_recorder import Analysis, analyse
 from ir_recorder.errors import CostsError
-from ir_recorder.report.costs import NAMES, Costs, read_costs
-from ir_recorder.report.lever_table import lever_section
-from ir_recorder.report.money import costs_section, cycle_of
+from ir_recorder.report.costs import (
+    NAMES,
+    Costs,
+    costs_section,
+    cycle_of,
+    lever_section,
+    read_costs,
+)
 
 GIVEN = """format: ir_costs/1
 price: 0.5

@@ -23,9 +23,9 @@ from ir_msgs_py.search_log import ConfigurationLog, CorrectionLog, SearchLog, st
 from ir_recorder import read_recording
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.format.schemas import SchemaLibrary
-from ir_recorder.read.front import ACTION
-from ir_recorder.write.session import RecordingSession
-from ir_recorder.write.writer import RecordingWriter
+from ir_recorder.reading.planner_answers import ACTION
+from ir_recorder.recording.session import RecordingSession
+from ir_recorder.recording.writer import RecordingWriter
 
 CALLS = "/ir_planner/calls"
 STATES = "/ir_program_runner/program_state"

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ir_recorder import analyse, findings, read_recording
-from ir_recorder.analysis.external_meter import METER, SHARE, with_meter
+from ir_recorder.analysis.meter import METER, SHARE, with_meter
 from ir_recorder.errors import TraceError
 from ir_recorder.report import report_html
 from ir_recorder.traces import TraceMapping

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ir_recorder import Verdict, summary
-from ir_recorder.analysis.finding import at_least, at_most, near, unchecked
+from ir_recorder.analysis.checks import at_least, at_most, near, unchecked
 
 GOOD = near("good", 1.0, 1.0, 0.1, "J", "why")
 BAD = at_most("bad", 2.0, 1.0, "m", "why")

@@ -24,7 +24,7 @@ from ir_recorder import (
     summary,
 )
 from ir_recorder.analysis.results import StepResult
-from ir_recorder.read.recording import GoalEnd, Recording
+from ir_recorder.reading.recording import GoalEnd, Recording
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 NEAR = Tolerances(

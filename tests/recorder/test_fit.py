@@ -25,8 +25,8 @@ from ir_description import (
 )
 from ir_recorder.errors import FitError
 from ir_recorder.fit import Fit, Source, fit, fit_data, sentences
-from ir_recorder.fit.plausible import check_range, check_readings
-from ir_recorder.fit.residuals import by_window
+from ir_recorder.fit.data import check_range, check_readings
+from ir_recorder.fit.estimate import by_window
 from ir_recorder.measure import PowerModel, Samples, movements
 from ir_recorder.traces import Trace
 

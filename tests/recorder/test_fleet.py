@@ -19,14 +19,18 @@ from ir_recorder import Analysis
 from ir_recorder.report.costs import Costs
 from ir_recorder.report.fleet import (
     Member,
+    by_measure,
+    by_mode,
+    by_movement,
     fleet_columns,
     fleet_html,
     member_of,
     read_members,
+    recordings_below,
+    robots_of,
     write_fleet_table,
+    yearly_of,
 )
-from ir_recorder.report.fleet.files import recordings_below
-from ir_recorder.report.fleet.totals import by_measure, by_mode, by_movement, robots_of, yearly_of
 
 
 @pytest.fixture

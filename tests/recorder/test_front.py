@@ -11,9 +11,9 @@ from rclpy.serialization import serialize_message
 from ir_msgs.action import Plan
 from ir_msgs.msg import PlannedMovement, ProgramPoint, RecordedCall
 from ir_recorder.format.qos import QosOffer
-from ir_recorder.read.front import ACTION, recorded_front
-from ir_recorder.write.session import RecordingSession
-from ir_recorder.write.writer import RecordingWriter
+from ir_recorder.reading.planner_answers import ACTION, recorded_front
+from ir_recorder.recording.session import RecordingSession
+from ir_recorder.recording.writer import RecordingWriter
 
 POINTS = ((31.5, 41_000.0, "a"), (35.25, 39_500.0, "b"), (40.0, 39_100.0, "c"))
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from rclpy.task import Future
 
-from ir_recorder.gather.node import PATIENCE, Asked
+from ir_recorder.node.requests import PATIENCE, RepeatedRequest
 
 
 class Service:
@@ -28,7 +28,7 @@ class Service:
         self.given_up.append(future)
 
 
-def looked(asked: Asked, times: int) -> None:
+def looked(asked: RepeatedRequest, times: int) -> None:
     for _ in range(times):
         asked.each()
 
@@ -36,7 +36,7 @@ def looked(asked: Asked, times: int) -> None:
 def test_a_lost_answer_is_asked_for_again() -> None:
     service = Service()
     taken = list[str]()
-    asked = Asked(service, "request", lambda answer: not taken.append(answer))
+    asked = RepeatedRequest(service, "request", lambda answer: not taken.append(answer))
     looked(asked, 2 * PATIENCE + 1)
     assert len(service.asked) == 3
     assert service.given_up == service.asked[:2], "their answers count no more"
@@ -48,7 +48,7 @@ def test_a_lost_answer_is_asked_for_again() -> None:
 
 def test_an_answer_that_is_not_taken_is_asked_for_at_the_next_look() -> None:
     service = Service()
-    asked = Asked(service, "request", lambda answer: answer == "good")
+    asked = RepeatedRequest(service, "request", lambda answer: answer == "good")
     for answer in ("bad", None, "good"):
         looked(asked, 1)
         service.asked[-1].set_result(answer)
@@ -59,7 +59,7 @@ def test_an_answer_that_is_not_taken_is_asked_for_at_the_next_look() -> None:
 
 def test_a_service_that_has_gone_is_asked_when_it_is_back() -> None:
     service = Service()
-    asked = Asked(service, "request", bool)
+    asked = RepeatedRequest(service, "request", bool)
     looked(asked, 1)
     service.ready = False
     looked(asked, 2 * PATIENCE)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ir_recorder import Analysis, read_recording
-from ir_recorder.analysis.grid import check_grid
+from ir_recorder.analysis.results import check_grid
 
 
 def test_joint_states_lie_on_a_grid_but_for_hibernation(analysis: Analysis) -> None:

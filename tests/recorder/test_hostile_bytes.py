@@ -14,9 +14,9 @@ from sensor_msgs.msg import JointState
 from ir_msgs_py import names
 from ir_recorder import RecorderError
 from ir_recorder.format.qos import QosOffer
-from ir_recorder.read.reader import read_recording
-from ir_recorder.write.session import RecordingSession
-from ir_recorder.write.writer import RecordingWriter
+from ir_recorder.reading.reader import read_recording
+from ir_recorder.recording.session import RecordingSession
+from ir_recorder.recording.writer import RecordingWriter
 
 CASES = 400
 SECOND = 10**9

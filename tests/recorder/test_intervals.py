@@ -12,7 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import ttest_1samp
 
-from ir_recorder.intervals import alike, chance_of, mean_of, median_of, shown_together, skewed
+from ir_recorder.analysis.intervals import (
+    alike,
+    chance_of,
+    mean_of,
+    median_of,
+    shown_together,
+    skewed,
+)
 
 OFTEN = 2000  # samples, by which a share near 0.9 is known within 0.02 (three standard deviations)
 TRUTHS = {"normal": 0.0, "heavy": 0.0, "exponential": 1.0, "lognormal": math.exp(0.5), "zeros": 0.0,

@@ -19,7 +19,7 @@ from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.analysis.clearance import collision_model
 from ir_recorder.live.cell_view import PATH_POINTS, CellView, Heard
-from ir_recorder.live.numbers import states_of
+from ir_recorder.live.stream import states_of
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 

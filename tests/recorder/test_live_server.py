@@ -13,8 +13,16 @@ from typing import Any
 import pytest
 
 from ir_recorder.errors import LiveError
-from ir_recorder.live.commands import BITS, MOST_WAITING, Command, Commands
-from ir_recorder.live.server import MOST_BODY, MOST_CONNECTIONS, Answer, LiveServer
+from ir_recorder.live.server import (
+    BITS,
+    MOST_BODY,
+    MOST_CONNECTIONS,
+    MOST_WAITING,
+    Answer,
+    Command,
+    Commands,
+    LiveServer,
+)
 from ir_recorder.live.stream import Stream
 
 PRESSED = json.dumps({"name": "ab", "value": True})

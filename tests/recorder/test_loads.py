@@ -13,7 +13,7 @@ import pytest
 from ir_msgs_py.modes import Mode
 from ir_recorder import read_recording
 from ir_recorder.analysis.loads import LoadTimeline, after, load_timeline
-from ir_recorder.read.recording import TextEvent
+from ir_recorder.reading.recording import TextEvent
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 

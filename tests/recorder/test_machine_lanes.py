@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from ir_msgs.msg import Contact, MachineStates
 from ir_recorder import read_recording
-from ir_recorder.read.around import contacts, machine_states
-from ir_recorder.read.recording import Recording, TextEvent
-from ir_recorder.report.machine_lanes import machine_lanes
+from ir_recorder.reading.reader import contacts, machine_states
+from ir_recorder.reading.recording import Recording, TextEvent
+from ir_recorder.report.series import machine_lanes
 
 moments = st.lists(
     st.tuples(

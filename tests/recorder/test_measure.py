@@ -17,8 +17,8 @@ import ir_recorder
 from ir_description import load_cell, load_power_data
 from ir_kernels import DcBusParameters, DynamicsModel, dc_bus
 from ir_recorder.measure.arm import arm_torques
-from ir_recorder.measure.bus import bus_flow
-from ir_recorder.measure.filtering import BANDWIDTH, differentiated, half_width
+from ir_recorder.measure.power_model import bus_flow
+from ir_recorder.measure.samples import BANDWIDTH, differentiated, half_width
 
 RECORDER = Path(ir_recorder.__file__).parent
 

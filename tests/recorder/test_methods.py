@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from ir_description import load_cell
 from ir_msgs_py.search_log import ConfigurationLog, CorrectionLog, SearchLog, Track, WithdrawalLog
 from ir_recorder import Analysis
+from ir_recorder.report.cell_outline import HEIGHT, WIDTH, View
 from ir_recorder.report.methods import methods_section
-from ir_recorder.report.methods.view import HEIGHT, WIDTH, View
 
 ROWS = np.array([[1.8, -1.1, 1.0], [1.7, -1.0, 1.2], [1.4, -0.9, 1.2], [1.3, -0.8, 1.3]])
 WITHDRAWAL = WithdrawalLog(

@@ -12,8 +12,8 @@ import pytest
 
 from ir_recorder import PathError, RecorderError, analyse, findings, read_recording
 from ir_recorder.report import report_html, write_report
+from ir_recorder.report.number_text import text
 from ir_recorder.report.picture import write_picture
-from ir_recorder.report.words import text
 
 
 class _Links(HTMLParser):

@@ -8,10 +8,8 @@ from typing import Any
 import pytest
 
 from ir_recorder.errors import RecorderError
-from ir_recorder.play.keys import press
-from ir_recorder.play.player import Player
-from ir_recorder.play.playhead import Playhead, PlayState
-from ir_recorder.play.schedule import DueMessage, PlaySettings
+from ir_recorder.play.node import press
+from ir_recorder.play.playback import DueMessage, Player, Playhead, PlaySettings, PlayState
 
 MESSAGES = [(1_500_000_000, "/b", b"2"), (1_000_000_000, "/a", b"1"), (2_000_000_000, "/a", b"3")]
 

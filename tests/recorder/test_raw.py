@@ -11,8 +11,8 @@ from mcap.writer import Writer
 
 from ir_recorder import RecorderError, analyse, findings
 from ir_recorder.errors import ReadError
-from ir_recorder.read.raw import read_raw
-from ir_recorder.read.reader import read_recording
+from ir_recorder.reading.mcap_file import read_raw
+from ir_recorder.reading.reader import read_recording
 from ir_recorder.report import report_html
 
 

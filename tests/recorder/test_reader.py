@@ -17,9 +17,9 @@ from ir_msgs.msg import PlcInputs, PowerState
 from ir_recorder.errors import ReadError
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.format.schemas import SchemaLibrary
-from ir_recorder.read.reader import read_recording
-from ir_recorder.write.session import RecordingSession
-from ir_recorder.write.writer import RecordingWriter
+from ir_recorder.reading.reader import read_recording
+from ir_recorder.recording.session import RecordingSession
+from ir_recorder.recording.writer import RecordingWriter
 
 
 def test_series_are_what_was_published(demo_file: Path) -> None:

@@ -7,8 +7,7 @@ import pytest
 
 from ir_description import Capsule, load_robot
 from ir_msgs_py.arrays import FloatArray
-from ir_recorder.report.robot_shapes import Part, lathe, robot_parts
-from ir_recorder.report.shapes import Mesh
+from ir_recorder.report.shapes import Mesh, Part, lathe, robot_parts
 
 RIM = 0.13  # m: ends of beams, the counterbalance's pivot aside
 ROBOT = load_robot()

@@ -12,32 +12,22 @@ import pytest
 import ir_recorder
 
 FOLDER = Path(ir_recorder.__file__).parent
-READING = {"errors", "format", "read"}
+READING = {"errors", "format", "reading"}
 KNOWS = {
     "errors": set(),
     "format": {"errors"},
     "arguments": set(),
-    "intervals": set(),
-    "diagnose": set(),
-    "serve": {"errors", "format", "write"},
-    "settings": {"errors", "format"},
-    "parameters": {"settings"},
-    "write": {"errors", "format"},
-    "read": {"errors", "format"},
-    "listen": {"errors", "format"},
-    "gather": {"format", "write"},
+    "recording": {"errors", "format"},
+    "reading": {"errors", "format"},
     "play": READING | {"arguments"},
-    "traces": {"errors", "read"},
+    "traces": {"errors", "reading"},
     "measure": {"errors", "traces"},
-    "fit": {"analysis", "errors", "measure", "read", "report", "traces"},
-    "analysis": READING | {"intervals", "measure", "traces"},
+    "fit": {"analysis", "errors", "measure", "reading", "report", "traces"},
+    "analysis": READING | {"measure", "traces"},
     "report": READING | {"analysis", "measure"},
-    "live": {"analysis", "errors", "read", "report"},
+    "live": {"analysis", "errors", "reading", "report"},
     "report_main": READING | {"analysis", "arguments", "report", "traces"},
-    "node": {
-        *("arguments", "diagnose", "errors", "format", "gather", "listen", "parameters", "serve"),
-        *("settings", "write"),
-    },
+    "node": {"arguments", "errors", "format", "recording"},
     "__init__": READING | {"analysis"},
 }
 FACE = {

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from ir_recorder import Analysis, analyse
-from ir_recorder.read.recording import SavingsEvent
+from ir_recorder.reading.recording import SavingsEvent
 from ir_recorder.report.picture import write_picture
-from ir_recorder.report.savings import savings_lines, savings_section
+from ir_recorder.report.tables import savings_lines, savings_section
 
 
 def test_the_savings_of_the_recording_stand_on_the_page(analysis: Analysis, page: str) -> None:

@@ -10,8 +10,8 @@ import numpy as np
 
 from ir_description import load_cell
 from ir_recorder import read_recording
-from ir_recorder.read.recording import TextEvent
-from ir_recorder.report.door_bodies import door_bodies
+from ir_recorder.reading.recording import TextEvent
+from ir_recorder.report.cell_scene import door_bodies
 
 
 def test_the_motion_is_in_the_page_to_a_hundredth_of_a_degree(

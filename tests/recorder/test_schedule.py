@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from ir_recorder.errors import RecorderError
-from ir_recorder.play.schedule import DueMessage, PlaySettings, schedule
+from ir_recorder.play.playback import DueMessage, PlaySettings, schedule
 
 MESSAGES = [(1_500_000_000, "/b", b"2"), (1_000_000_000, "/a", b"1"), (2_000_000_000, "/a", b"3")]
 

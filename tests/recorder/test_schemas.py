@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from ir_recorder.errors import SchemaError
-from ir_recorder.format.definition import definitions_of
-from ir_recorder.format.schemas import SchemaLibrary
+from ir_recorder.format.schemas import SchemaLibrary, definitions_of
 
 
 def test_a_schema_holds_all_types_a_message_is_built_from() -> None:

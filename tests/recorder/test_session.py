@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ir_recorder.read.raw import read_raw
-from ir_recorder.write.session import CellFiles, RecordingSession
-from ir_recorder.write.writer import RecordingWriter
+from ir_recorder.reading.mcap_file import read_raw
+from ir_recorder.recording.session import CellFiles, RecordingSession
+from ir_recorder.recording.writer import RecordingWriter
 
 
 def test_facts_and_cell_are_in_the_file(tmp_path: Path) -> None:

@@ -11,12 +11,11 @@ import pytest
 from mcap.reader import make_reader
 
 from ir_recorder.errors import PathError, SplitError
-from ir_recorder.format.parts import Split, is_further_part, part_path
+from ir_recorder.format.contents import Split, is_further_part, part_path
 from ir_recorder.format.qos import QosOffer
-from ir_recorder.read.raw import RawRecording, read_raw
-from ir_recorder.write.session import CellFiles, RecordingSession
-from ir_recorder.write.split import check_free
-from ir_recorder.write.writer import RecordingSummary, RecordingWriter
+from ir_recorder.reading.mcap_file import RawRecording, read_raw
+from ir_recorder.recording.session import CellFiles, RecordingSession, check_free
+from ir_recorder.recording.writer import RecordingSummary, RecordingWriter
 
 TOPICS = {
     "/joint_states": ("sensor_msgs/msg/JointState", [QosOffer()]),

@@ -9,7 +9,7 @@ from typing import Any, cast
 import pytest
 
 from ir_recorder import Analysis, analyse
-from ir_recorder.analysis.totals import unshortened_cycle
+from ir_recorder.analysis.analyse import unshortened_cycle
 
 # W with the 155 kg gripper, Table II at machine home
 MOTORS = 735.0

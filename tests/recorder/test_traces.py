@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from ir_recorder.errors import TraceError
 from ir_recorder.traces import clock_offset, mean_power, read_mapping, read_traces, resampled
-from ir_recorder.traces.align import RATE
+from ir_recorder.traces.trace import RATE
 
 JOINTS = ("joint_a1", "joint_a2")
 

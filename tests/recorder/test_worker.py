@@ -17,19 +17,19 @@ from typing import Any
 import pytest
 
 from ir_recorder.errors import WriteError
-from ir_recorder.read.raw import read_raw
-from ir_recorder.write.session import RecordingSession
-from ir_recorder.write.worker import Message, RecordingWorker
-from ir_recorder.write.writer import RecordingWriter
+from ir_recorder.reading.mcap_file import read_raw
+from ir_recorder.recording.session import RecordingSession
+from ir_recorder.recording.worker import Message, RecordingWorker
+from ir_recorder.recording.writer import RecordingWriter
 
 STRING = "std_msgs/msg/String"
 RECORD = """
 import itertools, mmap, struct, sys, threading
 from pathlib import Path
-from ir_recorder.format.parts import Split
-from ir_recorder.write import worker
-from ir_recorder.write.session import RecordingSession
-from ir_recorder.write.writer import RecordingWriter
+from ir_recorder.format.contents import Split
+from ir_recorder.recording import worker
+from ir_recorder.recording.session import RecordingSession
+from ir_recorder.recording.writer import RecordingWriter
 
 file = open(sys.argv[2], "r+b")
 shown = mmap.mmap(file.fileno(), 16)  # handed over; of these with the operating system

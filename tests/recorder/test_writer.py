@@ -17,8 +17,8 @@ from sensor_msgs.msg import JointState
 
 from ir_msgs_py.file_roots import FileRoots
 from ir_recorder.errors import PathError, WriteError
-from ir_recorder.read.raw import read_raw
-from ir_recorder.write.writer import RecordingWriter
+from ir_recorder.reading.mcap_file import read_raw
+from ir_recorder.recording.writer import RecordingWriter
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 

@@ -16,7 +16,7 @@ from scipy.stats import bootstrap, skew, t, ttest_1samp
 
 from ir_cli.main import main
 from ir_planner import Planner
-from ir_recorder.intervals import mean_of
+from ir_recorder.analysis.intervals import mean_of
 from ir_studies import FolderError, Means, SettingsError, read_study, study_of
 from ir_studies.statistics.figures import findings_of
 from ir_studies.statistics.maker import maker

@@ -17,7 +17,7 @@ from _statistics_study import recomputed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_recorder.intervals import Mean
+from ir_recorder.analysis.intervals import Mean
 from ir_studies.layout.search import BATCH
 from ir_studies.statistics.figures import findings_of
 from ir_studies.statistics.runs import Finished

@@ -24,7 +24,7 @@ from ir_msgs_py.errors import CallTimedOutError, ServiceUnavailableError
 from ir_msgs_py.namespaces import NODES
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.status import StatusCode
-from ir_recorder.read.raw import read_raw
+from ir_recorder.reading.mcap_file import read_raw
 
 pytestmark = pytest.mark.long
 

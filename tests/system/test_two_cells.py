@@ -25,7 +25,7 @@ from ir_msgs_py import names
 from ir_msgs_py.namespaces import NODES
 from ir_msgs_py.ros.client import Client
 from ir_recorder import read_recording
-from ir_recorder.read.raw import RawRecording, read_raw
+from ir_recorder.reading.mcap_file import RawRecording, read_raw
 
 CELLS = ("left", "right")
 GOALS = {"left": "A1 20 A2 -90 A3 90 A4 0 A5 0 A6 0", "right": "A1 -20 A2 -90 A3 90 A4 0 A5 0 A6 0"}

@@ -9,7 +9,7 @@ from ir_msgs_py.settings import Setting, tree
 from ir_msgs_py.transitions import PREFIX, TransitionTimes
 from ir_planner import PlannerSettings
 from ir_program_runner import LinkSettings, ProgramSettings
-from ir_recorder.settings import RecorderSettings
+from ir_recorder.recording.settings import RecorderSettings
 from ir_sim_driver import (
     LINKS,
     ControllerSettings,

@@ -2,8 +2,8 @@
 
 from ir_recorder.analysis import Analysis, Finding, Tolerances, Verdict, analyse, findings, summary
 from ir_recorder.errors import PathError, ReadError, RecorderError, SchemaError, WriteError
-from ir_recorder.read.reader import read_recording
-from ir_recorder.read.recording import Recording
+from ir_recorder.reading.reader import read_recording
+from ir_recorder.reading.recording import Recording
 
 __all__ = [
     "Analysis",

@@ -13,14 +13,14 @@ from ir_description import DescriptionError, PowerParameters, load_power_paramet
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.file_roots import FileRoots
 from ir_recorder.analysis import Analysis, analyse, findings
-from ir_recorder.analysis.external_meter import with_meter
+from ir_recorder.analysis.meter import with_meter
 from ir_recorder.arguments import add_roots
 from ir_recorder.errors import FitError, ReadError, RecorderError
 from ir_recorder.format import contents
-from ir_recorder.format.parts import is_further_part
-from ir_recorder.read.front import recorded_front
-from ir_recorder.read.reader import read_recording
-from ir_recorder.read.recording import Recording
+from ir_recorder.format.contents import is_further_part
+from ir_recorder.reading.planner_answers import recorded_front
+from ir_recorder.reading.reader import read_recording
+from ir_recorder.reading.recording import Recording
 from ir_recorder.report import write_report
 from ir_recorder.report.compare import MOST, write_comparison
 from ir_recorder.report.costs import read_costs

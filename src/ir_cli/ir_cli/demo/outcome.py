@@ -17,11 +17,11 @@ from ir_recorder import (
     read_recording,
     summary,
 )
-from ir_recorder.analysis.findings import row_name
+from ir_recorder.analysis.checks import row_name
 from ir_recorder.report import write_report
+from ir_recorder.report.number_text import interval, number
 from ir_recorder.report.picture import write_picture
-from ir_recorder.report.savings import savings_lines
-from ir_recorder.report.words import interval, number
+from ir_recorder.report.tables import savings_lines
 
 MODES_AT_REST = 4
 """Power modes that the tour visits with each load."""

@@ -106,8 +106,8 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run_compare(arguments: argparse.Namespace) -> int:
     """Compare, write the page, print the figures."""
-    from ir_recorder.report.before_after import write_before_after, write_before_after_table
     from ir_recorder.report.costs import Costs, read_costs
+    from ir_recorder.report.program_comparison import write_before_after, write_before_after_table
 
     costs = read_costs(arguments.costs) if arguments.costs else Costs()
     with sentences(), ProgressLine() as line:

@@ -12,7 +12,7 @@ from pathlib import Path
 from ir_description import load_cell, load_power_parameters, power_parameters_to_yaml
 from ir_msgs_py.file_roots import ANYWHERE
 from ir_recorder import analyse, read_recording
-from ir_recorder.analysis.agreement import agreement
+from ir_recorder.analysis.indirect import agreement
 from ir_recorder.fit import Source, fit, fit_data, parameter_rows, write_fit_picture
 from ir_recorder.fit import sentences as fit_sentences
 from ir_recorder.report.files import write_output

@@ -144,7 +144,7 @@ def _page(
 ) -> None:
     """Write the report of the plan; of one that failed with the sentence that says why."""
     from ir_recorder.analysis import analyse, findings
-    from ir_recorder.read import read_recording
+    from ir_recorder.reading import read_recording
     from ir_recorder.report import write_report
 
     with tempfile.TemporaryDirectory() as folder:

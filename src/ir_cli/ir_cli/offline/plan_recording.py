@@ -26,7 +26,7 @@ from ir_planner.node.announcements import cell_state
 from ir_planner.node.answers import fill_program
 from ir_recorder.format import contents
 from ir_recorder.format.qos import QosOffer
-from ir_recorder.write import CellFiles, RecordingSession, RecordingWriter
+from ir_recorder.recording import CellFiles, RecordingSession, RecordingWriter
 
 _DOORS = "doors_at_the_start"
 _DOORS_ARE = "doors at the start are "

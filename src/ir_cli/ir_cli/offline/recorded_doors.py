@@ -8,7 +8,7 @@ from pathlib import Path
 from ir_description import Cell, Equipment
 from ir_planner.program import Doors
 from ir_recorder import read_recording
-from ir_recorder.read.recording import TextEvent
+from ir_recorder.reading.recording import TextEvent
 
 
 class RecordedDoors:

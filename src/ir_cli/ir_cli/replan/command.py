@@ -7,7 +7,7 @@ import sys
 
 from ir_msgs_py.file_roots import FileRoots
 from ir_recorder.arguments import add_roots
-from ir_recorder.read.raw import read_raw
+from ir_recorder.reading.mcap_file import read_raw
 
 from ..terminal import table
 from .again import Replanned, Verdict, replan

@@ -26,10 +26,8 @@ from ir_msgs_py.settings import changed, tree
 from ir_planner import Planner, PlannerSettings
 from ir_recorder.errors import ReadError
 from ir_recorder.format import contents
-from ir_recorder.read.cells import chosen_namespace
-from ir_recorder.read.raw import RawRecording
-from ir_recorder.write.data_files import data_of_cell
-from ir_recorder.write.session import PACKAGES, installed_version
+from ir_recorder.reading.mcap_file import RawRecording, chosen_namespace
+from ir_recorder.recording.session import PACKAGES, data_of_cell, installed_version
 
 _OWN_PLACE = ("cell", "roots")  # settings of the place where it was recorded, not of planning
 _ALWAYS = -1  # ns: what is latched was there before

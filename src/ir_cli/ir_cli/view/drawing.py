@@ -16,8 +16,7 @@ from ir_description import Body, Cell, PartPlaces
 from ir_kernels import Chain
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR
-from ir_recorder.report.robot_shapes import robot_parts
-from ir_recorder.report.shapes import Mesh, body_mesh, capsule_mesh
+from ir_recorder.report.shapes import Mesh, body_mesh, capsule_mesh, robot_parts
 
 from .colours import (
     APPROACH,

@@ -1,8 +1,7 @@
 """Offline analysis of a recording, without ROS."""
 
 from ir_recorder.analysis.analyse import analyse
-from ir_recorder.analysis.finding import Finding, Verdict, summary
-from ir_recorder.analysis.findings import findings
+from ir_recorder.analysis.checks import Finding, Tolerances, Verdict, findings, summary
 from ir_recorder.analysis.results import (
     Analysis,
     ProgramTotals,
@@ -11,7 +10,6 @@ from ir_recorder.analysis.results import (
     StepResult,
     Unshortened,
 )
-from ir_recorder.analysis.tolerances import Tolerances
 
 __all__ = [
     "Analysis",

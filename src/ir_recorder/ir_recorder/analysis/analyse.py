@@ -4,7 +4,9 @@ modes and stations, power at rest, the grid.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -20,23 +22,149 @@ from ir_description import (
 from ir_description.robot import DATA_SHEET, DcLink
 from ir_kernels import KernelError
 from ir_msgs_py.errors import InvalidValueError
+from ir_msgs_py.modes import deepest
 from ir_msgs_py.names import JOINT_NAMES
-from ir_recorder.analysis.charge import lost_charges
 from ir_recorder.analysis.clearance import StepClearance, step_clearances
-from ir_recorder.analysis.grid import check_grid
 from ir_recorder.analysis.indirect import IndirectMeter
 from ir_recorder.analysis.loads import carried, load_timeline
 from ir_recorder.analysis.meter import Meter
-from ir_recorder.analysis.plateaus import plateaus
-from ir_recorder.analysis.power_data import recorded_link, recorded_power_data
-from ir_recorder.analysis.predicted import Predictor
-from ir_recorder.analysis.resting import MOTORS, resting_watts
-from ir_recorder.analysis.results import NAN, Analysis, StepResult, Unshortened
-from ir_recorder.analysis.shares import mode_shares, station_uses
+from ir_recorder.analysis.predicted_power import (
+    BRAKES,
+    MOTORS,
+    Predictor,
+    left_alone_joules,
+    pause_joules,
+    recorded_link,
+    recorded_power_data,
+    resting_watts,
+)
+from ir_recorder.analysis.resting_power import plateaus
+from ir_recorder.analysis.results import (
+    NAN,
+    Analysis,
+    ProgramTotals,
+    Share,
+    StepResult,
+    Unshortened,
+    check_grid,
+    mode_shares,
+    station_uses,
+)
 from ir_recorder.analysis.steps import ExecutedStep, executed_steps
-from ir_recorder.analysis.totals import program_totals, unshortened_cycle
 from ir_recorder.format import contents
-from ir_recorder.read.recording import Recording
+from ir_recorder.reading.recording import Recording
+
+# The program as a whole: movements, pauses and waiting, planned and measured, and the cycle
+# unshortened.
+
+Watts = Callable[[str, StepResult], float]
+"""W of a mode in the posture and with the load of a step, by the data."""
+
+
+def program_totals(
+    results: Sequence[StepResult], meter: Meter | None, unshortened: Unshortened | None
+) -> ProgramTotals | None:
+    """Totals from the start of the first step to the end of the last; None where no step was
+    recorded.
+    """
+    if not results:
+        return None
+    start = results[0].step.start
+    end = results[-1].step.end
+    moved = [result for result in results if not result.step.movement.is_pause]
+    rested = [result for result in results if result.step.movement.is_pause]
+    return ProgramTotals(
+        Share("program", end - start, meter.energy(start, end) if meter else NAN),
+        _measured("movements", moved),
+        _measured("pauses", rested),
+        _planned("movements", moved),
+        _planned("pauses", rested),
+        unshortened,
+    )
+
+
+def unshortened_cycle(
+    results: Sequence[StepResult],
+    fact: str,
+    change: Callable[[str], float],
+    timer: float,
+    watts: Watts,
+    meter: Meter,
+) -> Unshortened | None:
+    """The cycle with its pauses at full length, computed from what was measured; None where none is
+    shorter.
+
+    fact: full lengths of the pauses in a power mode, in their order ("180 s, 1800 s"). change:
+    seconds into a mode and back by the data. timer: seconds after which the controller closes the
+    brakes by itself.
+    """
+    lengths = [float(number) for number in re.findall(r"\d+(?:\.\d+)?(?=\s*s\b)", fact)]
+    if not lengths:
+        return None
+    pauses = [r for r in results if r.step.movement.is_pause and r.step.movement.power_mode]
+    start = results[0].step.start
+    end = results[-1].step.end
+    if len(pauses) != len(lengths):
+        return Unshortened(NAN, NAN, sum(r.seconds for r in pauses), sum(lengths))
+    energy = meter.energy(start, end)
+    seconds = end - start
+    for result, length in zip(pauses, lengths, strict=True):
+        sequence = result.step.movement.power_mode
+        mode = deepest(sequence)
+        motors = watts(MOTORS, result)
+        if (
+            mode != sequence and length >= result.seconds
+        ):  # one after the other: the last one lasts longer
+            full = result.energy + (length - result.seconds) * watts(mode, result)
+        elif mode == MOTORS or length < change(mode):
+            full = left_alone_joules(motors, watts(BRAKES, result), length, timer, change(BRAKES))
+        else:
+            full = pause_joules(watts(mode, result), motors, length, change(mode))
+        energy = energy + full - result.energy
+        seconds = seconds + length - result.seconds
+    return Unshortened(seconds, energy, sum(r.seconds for r in pauses), sum(lengths))
+
+
+def _measured(name: str, results: Sequence[StepResult]) -> Share:
+    return Share(name, sum(r.seconds for r in results), sum(r.energy for r in results))
+
+
+def _planned(name: str, results: Sequence[StepResult]) -> Share:
+    plans = [r.step.movement for r in results]
+    return Share(
+        name,
+        sum(p.duration or p.report.duration for p in plans),
+        sum(p.report.energy for p in plans),
+    )
+
+
+# Charge of the DC link's capacitors that a plan counted on, and that had gone when the robot
+# moved.
+#
+# A program's plan carries what braking leaves to the next movement, less what holding the arm takes
+# in the planned time between. Nodes answer late where the machine is busy: by then more of it has
+# gone.
+
+
+def lost_charges(steps: Sequence[ExecutedStep], meter: Meter | None, link: DcLink) -> list[float]:
+    """J for each step: in the capacitors when it should have begun, less those in them when it did.
+
+    0 where it did not begin late, or where the bus voltage was not recorded.
+    """
+    lost: list[float] = []
+    due = math.inf
+    for step in steps:
+        if not step.index:  # a program begins when it is asked to
+            due = math.inf
+        late = meter is not None and due < step.start
+        gone = (
+            meter.stored(due, link) - meter.stored(step.start, link)
+            if meter is not None and late
+            else 0.0
+        )
+        lost.append(gone if gone > 0.0 else 0.0)
+        due = due + step.movement.duration if step.movement.is_pause else step.end
+    return lost
 
 
 def analyse(recording: Recording, parameters: PowerParameters | None = None) -> Analysis:

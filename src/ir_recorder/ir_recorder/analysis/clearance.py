@@ -19,7 +19,7 @@ from ir_msgs_py.names import LOAD_SEPARATOR
 from ir_msgs_py.report import PlannedMovement
 from ir_recorder.analysis.loads import held_part, normal
 from ir_recorder.analysis.steps import ExecutedStep
-from ir_recorder.read.recording import JointSeries
+from ir_recorder.reading.recording import JointSeries
 
 # s between samples of the profile: 4 cm of tool path. Near its minimum all joint states count
 COARSE = 0.02

@@ -1,28 +1,33 @@
-"""Indirect measurement (section VI of the paper): mains energy rebuilt from what the robot did.
-
-From recorded positions alone: differentiated, torques of the bodies, losses and DC link by code
-that planner and plant know nothing of (`ir_recorder.measure`). From recorded torques: their power
-instead of the bodies'. Both use the power parameters that they are given, by default the data
-sheet's.
-"""
+"""Indirect measurement (section VI of the paper): energy from motion, beside the meter's."""
 
 from __future__ import annotations
+
+import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from ir_description import IDLE, Load, PowerParameters, RobotModel
 from ir_description.robot import DcLink
 from ir_msgs_py.arrays import BoolArray, FloatArray
+from ir_recorder.analysis.intervals import Mean, mean_of, spread_of
+from ir_recorder.analysis.results import Analysis
 from ir_recorder.errors import RecorderError
-from ir_recorder.measure.bus import bus_flow
-from ir_recorder.measure.on_one_grid import samples_of
-from ir_recorder.measure.power_model import PowerModel
-from ir_recorder.measure.second_opinion import available, pinocchio_torques
-from ir_recorder.read.recording import JointSeries
+from ir_recorder.measure.arm import available, pinocchio_torques
+from ir_recorder.measure.power_model import PowerModel, bus_flow
+from ir_recorder.measure.samples import samples_of
+from ir_recorder.reading.recording import JointSeries
 from ir_recorder.traces.trace import Trace
 
+# Indirect measurement (section VI of the paper): mains energy rebuilt from what the robot did.
+#
+# From recorded positions alone: differentiated, torques of the bodies, losses and DC link by code
+# that planner and plant know nothing of (`ir_recorder.measure`). From recorded torques: their power
+# instead of the bodies'. Both use the power parameters that they are given, by default the data
+# sheet's.
+
 _AROUND = 0.5  # s of the recording beside a movement that the filter may look at
-NAN = float("nan")
+NAN = math.nan
 
 
 class IndirectMeter:
@@ -103,3 +108,79 @@ class IndirectMeter:
         tool = sum(load.watts_always + load.watts_drive_bus for load in loads)
         bus = flow.watts.mean() / value("rectifier_efficiency")
         return float((bus + base + value("tool_watts") * tool) * (end - start))
+
+
+# Direct against indirect: the meter's joules beside those from positions, movement by movement.
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A movement of `seconds` [s] by each measurement [J]: the meter, positions, torques, and
+    positions with Pinocchio's torques; NaN where one is not available.
+    """
+
+    label: str
+    seconds: float
+    direct: float
+    indirect: float
+    from_torques: float
+    second_opinion: float
+
+    @property
+    def difference(self) -> float:
+        """Indirect less direct, as a share of direct."""
+        return self.indirect / self.direct - 1.0 if self.direct > 0.0 else NAN
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Movements by both measurements, and the mean of their relative difference.
+
+    spread: standard deviation of the relative difference over movements.
+    """
+
+    movements: tuple[Measured, ...]
+    difference: Mean
+    spread: float
+
+    @property
+    def sentence(self) -> str:
+        """The finding in words, for people."""
+        count = sum(math.isfinite(each.difference) for each in self.movements)
+        if not count:
+            return "direct and indirect measurement can't be compared: one of them is missing"
+        shown = f"{100.0 * self.difference.value:+.1f} %"
+        if math.isnan(self.difference.low):
+            of = "1 movement is" if count == 1 else f"each of {count} movements is"
+            return f"the indirect measurement of {of} {shown} off the meter"
+        low = 100.0 * self.difference.low
+        high = 100.0 * self.difference.high
+        agree = "no difference is shown" if low <= 0.0 <= high else "the two differ"
+        return (
+            f"over {count} movements the indirect measurement is {shown} off the meter, between "
+            f"{low:+.1f} and {high:+.1f} % with 90 % confidence: {agree}; single movements "
+            f"spread by {100.0 * self.spread:.1f} %"
+        )
+
+
+def agreement(analysis: Analysis) -> Agreement:
+    """Both measurements of all movements of a recording that ended."""
+    rows = tuple(
+        Measured(
+            result.step.label,
+            result.seconds,
+            result.energy,
+            result.indirect_energy,
+            result.torque_energy,
+            result.second_opinion,
+        )
+        for result in analysis.movements
+        if result.step.outcome == "ended"
+    )
+    both = [row for row in rows if math.isfinite(row.difference)]
+    differences = np.array([row.difference for row in both])
+    return Agreement(
+        rows,
+        mean_of(differences),
+        spread_of(differences),
+    )

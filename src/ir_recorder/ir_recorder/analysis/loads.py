@@ -9,7 +9,7 @@ import numpy as np
 from ir_description import Cell, Load
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_recorder.analysis.steps import STARTED
-from ir_recorder.read.recording import PowerSeries, Recording
+from ir_recorder.reading.recording import PowerSeries, Recording
 
 STALE = 1.5  # s: how old the load in the diagnostics may be; they come once a second
 TOOL_STEP = 3.0  # W of base load: less than any tool that draws power

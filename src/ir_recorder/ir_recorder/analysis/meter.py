@@ -1,16 +1,22 @@
-"""Joules between two times, read off the mains meter.
-
-A reading's power is the mean since the reading before, so energies are exact at readings and linear
-between them.
-"""
+"""Energy read off the mains meter, or off an external power meter laid on the recording's clock."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from ir_description.robot import DcLink
 from ir_msgs_py.arrays import FloatArray
-from ir_recorder.read.recording import PowerSeries
+from ir_recorder.errors import TraceError
+from ir_recorder.reading.recording import PowerSeries, Recording
+from ir_recorder.traces import Trace, TraceMapping, clock_offset, mean_power, read_traces
+
+# Joules between two times, read off the mains meter.
+#
+# A reading's power is the mean since the reading before, so energies are exact at readings and
+# linear between them.
 
 
 class Meter:
@@ -81,3 +87,91 @@ class Meter:
     def _between(self, cumulative: FloatArray, start: float, end: float) -> float:
         ends: FloatArray = np.interp([start, end], self.time, cumulative)
         return float(ends[1] - ends[0])
+
+
+# A power meter beside a recording: its joules on the recording's time axis, in place of the
+# recorded ones.
+#
+# The meter's file is read by the reader of traces. Its clock is laid onto the recording's by the
+# offset that the mapping gives, or by comparing its power with the recorded one.
+
+MEASURED = "measured"  # the name of the plant: its figures are not the model's
+# facts of such a recording
+METER = "meter"
+OFFSET = "meter_clock_offset"
+SHARE = "meter_against_recorded"
+
+
+@dataclass(frozen=True)
+class MeterPlace:
+    """Seconds that were added to the meter's clock, and how well both powers then agree (1:
+    exactly; NaN: the offset was given).
+    """
+
+    offset: float
+    correlation: float
+
+
+def with_meter(
+    recording: Recording, path: str | Path, mapping: TraceMapping | None = None
+) -> Recording:
+    """The recording with the joules and watts of a meter's file, at its own readings.
+
+    What the meter doesn't cover keeps the recorded figures. The facts name the file, the offset of
+    its clock, and its joules over the recorded ones. TraceError where the file has no power, the
+    recording no meter, or the clocks' offset can't be found.
+    """
+    power = recording.power
+    if power is None or len(power.time) < 2:
+        raise TraceError(f"{recording.path} has no readings that a meter could be laid onto")
+    mapping = mapping or TraceMapping()
+    trace = read_traces(path, mapping, joint_names=())[0]
+    joules = trace.joules()
+    if joules is None:
+        raise TraceError(f"{trace.source}: has neither power nor energy")
+    place = _place(power, trace, joules, mapping)
+    watts = mean_power(trace.time + place.offset, joules, power.time)
+    covered = np.isfinite(watts)
+    if not covered.any():
+        raise TraceError(f"{trace.source}: covers none of the recording's {recording.duration:g} s")
+    steps = np.diff(power.time)
+    recorded = power.power[1:]
+    share = float((watts[covered] @ steps[covered]) / (recorded[covered] @ steps[covered]))
+    found = np.where(covered, watts, recorded)
+    measured = replace(
+        power,
+        power=np.concatenate([power.power[:1], found]),
+        energy=power.energy[0] + np.concatenate([[0.0], np.cumsum(found * steps)]),
+        plant=MEASURED,
+    )
+    return replace(
+        recording,
+        power=measured,
+        hardware=f"meter {Path(path).name}",
+        facts=(*recording.facts, *_facts(path, place, share)),
+    )
+
+
+def _place(
+    power: PowerSeries, trace: Trace, joules: FloatArray, mapping: TraceMapping
+) -> MeterPlace:
+    if np.isfinite(mapping.clock_offset):  # the reader has added it
+        return MeterPlace(0.0, np.nan)
+    watts = np.diff(joules) / np.diff(trace.time)
+    middle = trace.time[1:] - 0.5 * np.diff(trace.time)
+    own = power.time[1:] - 0.5 * np.diff(power.time)
+    found = clock_offset(own, power.power[1:], middle, watts)
+    return MeterPlace(found.seconds, found.correlation)
+
+
+def _facts(path: str | Path, place: MeterPlace, share: float) -> tuple[tuple[str, str], ...]:
+    found = (
+        "as given"
+        if np.isnan(place.correlation)
+        else f"found, the powers agree by {place.correlation:.2f}"
+    )
+    return (
+        (METER, Path(path).name),
+        (OFFSET, f"{place.offset:.3f} s ({found})" if place.offset else found),
+        (SHARE, f"{share:.4f} of the recorded joules"),
+    )

@@ -1,19 +1,84 @@
-"""What an analysis finds, as values."""
+"""Results of an analysis, as values."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from ir_description import Cell
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.modes import Mode
+from ir_msgs_py.report import MovementKind
 from ir_msgs_py.savings import ProgramSavings
 from ir_recorder.analysis.clearance import StepClearance
-from ir_recorder.analysis.grid import GridCheck
 from ir_recorder.analysis.loads import LoadTimeline
-from ir_recorder.analysis.plateaus import Plateau
+from ir_recorder.analysis.resting_power import Plateau
 from ir_recorder.analysis.steps import ExecutedStep
-from ir_recorder.read.recording import Recording
+from ir_recorder.reading.recording import JointSeries, PowerSeries, Recording
+
+# Whether /joint_states lies on a grid without gaps. While the controller hibernates there are none
+# to come.
+
+PERIOD_NS = 2_000_000  # /joint_states come at 500 Hz by contract
+_ASLEEP = (Mode.TO_HIBERNATION, Mode.HIBERNATION, Mode.FROM_HIBERNATION)
+
+
+@dataclass(frozen=True)
+class GridCheck:
+    """Stamps against a grid: how many there are, off the grid, going back; gaps as (time [s],
+    length [s]).
+
+    excused: gaps in which the controller hibernated. Each gap-free stretch has a grid of its own
+    after such a pause.
+    """
+
+    count: int
+    off_grid: int
+    backward: int
+    gaps: tuple[tuple[float, float], ...]
+    excused: int
+
+    @property
+    def clean(self) -> bool:
+        """No gap, nothing off the grid or going back."""
+        return self.count > 0 and not (self.off_grid or self.backward or self.gaps)
+
+
+def check_grid(
+    joints: JointSeries, power: PowerSeries | None, period_ns: int = PERIOD_NS
+) -> GridCheck:
+    """Checks the stamps of /joint_states."""
+    steps = np.diff(joints.stamp_ns)
+    gaps = []
+    excused = 0
+    origin = int(joints.stamp_ns[0]) if len(joints.stamp_ns) else 0
+    off_grid = 0
+    part_start = 0
+    for k in [*np.flatnonzero(steps > period_ns).tolist(), len(steps)]:
+        stretch = joints.stamp_ns[part_start : k + 1]
+        off_grid += int(np.count_nonzero((stretch - origin) % period_ns))
+        if k == len(steps):
+            break
+        part_start = k + 1
+        if power is not None and _asleep(power, joints.time[k], joints.time[k + 1]):
+            excused += 1
+            origin = int(joints.stamp_ns[k + 1])
+        else:
+            gaps.append((float(joints.time[k]), float(steps[k] * 1e-9)))
+    return GridCheck(
+        len(joints.stamp_ns), off_grid, int(np.count_nonzero(steps <= 0)), tuple(gaps), excused
+    )
+
+
+def _asleep(power: PowerSeries, start: float, end: float) -> bool:
+    inside = (power.time >= start) & (power.time <= end)
+    return bool(np.isin(power.mode[inside], [int(mode) for mode in _ASLEEP]).any())
+
+
+# What an analysis finds, as values.
 
 NAN = float("nan")
 
@@ -179,3 +244,61 @@ class Analysis:
             self.seconds - sum(result.seconds for result in self.steps),
             self.energy - sum(result.energy for result in self.steps),
         )
+
+
+# Time and energy by mode of the controller and by station of the program.
+
+
+def mode_name(number: int) -> str:
+    """The name of a mode's number."""
+    try:
+        return Mode(number).name
+    except ValueError:
+        return f"mode {number}"
+
+
+def mode_shares(power: PowerSeries) -> tuple[Share, ...]:
+    """Seconds and joules of each mode; a reading belongs to the mode it reports."""
+    seconds = np.diff(power.time, prepend=power.time[:1])
+    joules = np.diff(power.energy, prepend=power.energy[:1])
+    shares = []
+    for number in np.unique(power.mode):
+        own = power.mode == number
+        shares.append(
+            Share(mode_name(int(number)), float(seconds[own].sum()), float(joules[own].sum()))
+        )
+    return tuple(shares)
+
+
+def station_uses(results: Sequence[StepResult]) -> tuple[StationUse, ...]:
+    """Every step belongs to one stop: service movements, paths and pauses to theirs, a regional
+    movement to the one where it ends.
+    """
+    kinds: dict[str, dict[str, list[StepResult]]] = {}
+    for result in results:
+        movement = result.step.movement
+        if movement.is_pause:
+            kind = "rest"
+            station = movement.to_station or movement.from_station
+        elif movement.kind == MovementKind.SERVICE_EXIT:
+            kind = "service"
+            station = movement.from_station
+        elif movement.kind in (MovementKind.SERVICE_ENTRY, MovementKind.CARTESIAN):
+            kind = "service"
+            station = movement.to_station
+        else:
+            kind = "travel"
+            station = movement.to_station
+        kinds.setdefault(station or "elsewhere", {}).setdefault(kind, []).append(result)
+    return tuple(
+        StationUse(
+            station, *(_share(kind, own.get(kind, [])) for kind in ("rest", "service", "travel"))
+        )
+        for station, own in kinds.items()
+    )
+
+
+def _share(kind: str, results: Sequence[StepResult]) -> Share:
+    return Share(
+        kind, sum(result.seconds for result in results), sum(result.energy for result in results)
+    )

@@ -8,7 +8,7 @@ import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import MovementKind, PlannedMovement
-from ir_recorder.read.recording import ControllerSeries, ProgramEvent, Recording
+from ir_recorder.reading.recording import ControllerSeries, ProgramEvent, Recording
 
 STARTED = "started"
 OPEN = "open"  # no end was recorded

@@ -2,8 +2,7 @@
 
 from ir_recorder.fit.data import FitData, Source, fit_data
 from ir_recorder.fit.estimate import Fit, FittedMovement, fit
-from ir_recorder.fit.picture import write_fit_picture
-from ir_recorder.fit.text import parameter_rows, sentences
+from ir_recorder.fit.presentation import parameter_rows, sentences, write_fit_picture
 
 __all__ = [
     "Fit",

@@ -1,6 +1,4 @@
-"""What a fit is made from: a recording, or traces of joints and of a power meter with its own
-clock.
-"""
+"""Data of a fit: a recording, or traces of joints and of a power meter, checked for sense."""
 
 from __future__ import annotations
 
@@ -10,19 +8,102 @@ from pathlib import Path
 
 import numpy as np
 
-from ir_description import Cell, Load, PowerParameters
-from ir_msgs_py.arrays import FloatArray
+from ir_description import Cell, DescriptionError, Load, PowerParameters, RobotModel, cell_from_yaml
+from ir_msgs_py.arrays import BoolArray, FloatArray
+from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_recorder.analysis.loads import LoadTimeline, carried, load_timeline, normal
 from ir_recorder.errors import FitError
-from ir_recorder.fit.cells import attached_cell
-from ir_recorder.fit.plausible import check_range, check_readings
 from ir_recorder.measure import PowerModel, Samples, samples_of
-from ir_recorder.measure.on_one_grid import LoadRuns
-from ir_recorder.read.reader import read_recording
+from ir_recorder.measure.samples import LoadRuns
+from ir_recorder.reading.reader import read_recording
+from ir_recorder.reading.recording import Recording
 from ir_recorder.traces import Trace, TraceMapping, clock_offset, read_traces
-from ir_recorder.traces.recorded import recorded_traces
+from ir_recorder.traces.reader import recorded_traces
 from ir_recorder.traces.trace import LOAD
+
+# The cell of a recording: its robot, its mounting and what may be held.
+
+
+def attached_cell(recording: Recording | None) -> Cell:
+    """The cell that a recording carries; FitError where there is none."""
+    if recording is None:
+        raise FitError("the file carries no cell: name one with --cell")
+    if not recording.cell_yaml:
+        raise FitError(f"{recording.path}: no cell is attached: name one with --cell")
+    try:
+        return cell_from_yaml(recording.cell_yaml, "the attached cell")
+    except (DescriptionError, InvalidValueError, RecursionError) as error:
+        raise FitError(f"{recording.path}: the attached cell can't be read: {error}") from error
+
+
+# Data that no parameters explain are refused: units that are not what they are taken for, another
+# robot.
+
+MOST_UNEXPLAINED = 0.5  # of the mean power: plants that are fitted leave a tenth at most
+_BEYOND = 0.2  # rad outside a joint's range: referencing and a worn stop are less
+_FEWEST = 20  # windows
+_SELDOM = 0.25  # s: within it an axis is accelerated and braked again
+
+
+def check_explained(measured: FloatArray, fitted: FloatArray, moving: BoolArray) -> None:
+    """FitError where the fitted power (W,) [W] stays so far from the measured that the data can't
+    be those of the model.
+    """
+    for rows, what in ((~moving, "at rest"), (moving, "in motion")):
+        if np.count_nonzero(rows) < _FEWEST:
+            continue
+        mean = float(measured[rows].mean())
+        off = float(np.sqrt(np.mean((measured - fitted)[rows] ** 2)))
+        if off > MOST_UNEXPLAINED * max(mean, 0.0):
+            raise FitError(
+                f"no parameters explain the meter: {what} it shows {mean:.0f} W in the mean, the "
+                f"fit is off by {off:.0f} W (rms). Are the units of power and energy those of "
+                "the headings, modes and loads those that were driven, and is it this robot?"
+            )
+
+
+def check_determined(determined: BoolArray, moving: BoolArray, window: float) -> None:
+    """FitError where the data determine no parameter (P,); moving (W,): in which windows of
+    `window` s.
+    """
+    if determined.any():
+        return
+    seconds = window * len(moving)
+    moved = window * np.count_nonzero(moving)
+    raise FitError(
+        f"the data determine none of the {len(determined)} power parameters, so there is nothing "
+        f"to write: the robot moves in {moved:.1f} of {seconds:.1f} s with watts. Drive several "
+        "axes at several speeds and stay in the power modes; ir energy excite plans such "
+        "movements"
+    )
+
+
+def check_readings(meter: Trace) -> None:
+    """FitError where a meter reads so seldom that movements vanish between its readings."""
+    if meter.period > _SELDOM:
+        raise FitError(
+            f"{meter.source}: a reading of power every {meter.period:.3g} s, a fit needs one every "
+            f"{_SELDOM:g} s at least, better every 0.1 s or less"
+        )
+
+
+def check_range(source: str, robot: RobotModel, q: FloatArray) -> None:
+    """FitError where positions (N, n) [rad] lie beyond what the robot can reach."""
+    beyond = np.fmax(robot.position_min - q, q - robot.position_max)
+    worst = np.nanmax(beyond, axis=0, initial=-np.inf)
+    j = int(worst.argmax())
+    if worst[j] > _BEYOND:
+        value = float(q[np.nanargmax(beyond[:, j]), j])
+        raise FitError(
+            f"{source}: {robot.joint_names[j]} is {value:.3g} rad, {robot.name} reaches "
+            f"{robot.position_min[j]:.3g} to {robot.position_max[j]:.3g} rad. Degrees need a "
+            f"heading that says so: {robot.joint_names[j]}_deg; or is it another robot?"
+        )
+
+
+# What a fit is made from: a recording, or traces of joints and of a power meter with its own
+# clock.
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,14 +1,8 @@
-"""Power parameters from a power meter: regularised least squares with physical bounds, by Gauss and
-Newton.
-
-The prior pulls what the data say little about towards the data sheet. The forward model runs the DC
-link, so its switch and its capacitor are in every step. Residuals of neighbouring instants hang
-together; they count as the fewer independent ones that their autocorrelation leaves, standing and
-moving apart from each other.
-"""
+"""Power parameters from a power meter: regularised least squares with physical bounds."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,18 +11,149 @@ from scipy.optimize import lsq_linear
 from ir_description import PowerParameters, physical_bounds
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_recorder.errors import FitError
-from ir_recorder.fit.plausible import check_determined, check_explained
-from ir_recorder.fit.residuals import (
-    WINDOW,
-    by_window,
-    correlation_length,
-    inverse,
-    rests,
-    safe,
-    scaled,
-)
-from ir_recorder.fit.widening import Stretch, fold_of, widening
+from ir_recorder.fit.data import check_determined, check_explained
 from ir_recorder.measure import PowerModel, Samples, movements
+
+# What a fit needs of matrices and residuals: windows, correlation, inverses.
+
+WINDOW = 5  # samples whose mean is one residual: 50 ms
+_SHORTEST_REST = 0.3  # s
+
+
+def rests(samples: Samples) -> list[tuple[int, int]]:
+    """Rows (first, behind the last) of rests of at least 0.3 s: a posture's error is no noise
+    either.
+    """
+    still = samples.known & ~samples.moving
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
+    return [
+        (a, b) for a, b in edges.reshape(-1, 2).tolist() if (b - a) * samples.step >= _SHORTEST_REST
+    ]
+
+
+def by_window(values: FloatArray) -> FloatArray:
+    """Means (M // WINDOW, ...) of consecutive samples (M, ...)."""
+    count = len(values) // WINDOW
+    return np.asarray(
+        values[: count * WINDOW].reshape(count, WINDOW, *values.shape[1:]).mean(axis=1)
+    )
+
+
+def safe(deviation: FloatArray) -> FloatArray:
+    """Deviations (P,) to divide by: 1 for what is certain."""
+    return np.where(deviation > 0.0, deviation, 1.0)
+
+
+def scaled(prior: PowerParameters) -> FloatArray:
+    """The correlation (P, P) of the prior; 1 on the diagonal for what is certain."""
+    scale = safe(prior.deviation)
+    matrix = prior.covariance / np.outer(scale, scale)
+    matrix[np.diag_indices_from(matrix)] = 1.0
+    return matrix
+
+
+def inverse(precision: FloatArray, deviation: FloatArray) -> FloatArray:
+    """The covariance (P, P), inverted where parameters have deviations of one size; 0 for what is
+    certain.
+    """
+    scale = safe(deviation)
+    inverse = np.linalg.inv(precision * np.outer(scale, scale)) * np.outer(scale, scale)
+    certain = deviation <= 0.0
+    inverse[certain] = 0.0
+    inverse[:, certain] = 0.0
+    return np.asarray(inverse)
+
+
+def correlation_length(residual: FloatArray) -> float:
+    """Residuals (W,) per independent one: 1 + 2 times the autocorrelations up to the first
+    negative.
+    """
+    own = residual - residual.mean() if len(residual) else residual
+    power = float(own @ own)
+    if len(own) < 3 or power <= 0.0:
+        return 1.0
+    total = 1.0
+    for lag in range(1, min(len(own) // 2, 400)):
+        rho = float(own[:-lag] @ own[lag:]) / power
+        if rho <= 0.0:
+            break
+        total += 2.0 * rho
+    return total
+
+
+# How much the noise must count so that a fit explains what it has not seen.
+#
+# What residuals of neighbouring windows share is no noise of the meter but what the model lacks;
+# other movements will meet it too. So every movement and every rest is predicted without the part
+# of the data that it belongs to, and the noise counts for more until the uncertainty of such
+# predictions explains their errors.
+
+FOLDS = 8  # of a recording, each left out once
+_MOST = 1e4  # of the variance of the noise
+_RATIO = 1.25  # from one factor to the next
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A movement or a rest: the fold it belongs to, the sum of what its samples miss, how that sum
+    changes with the parameters (P,), and the variance that the meter alone gives it.
+    """
+
+    fold: int
+    missing: float
+    slope: FloatArray
+    white: float
+
+
+def fold_of(window: int, windows: int) -> int:
+    """The part of a recording that window number `window` of so many belongs to: consecutive
+    ones.
+    """
+    return min(window * FOLDS // max(windows, 1), FOLDS - 1)
+
+
+def widening(
+    slopes: FloatArray,
+    residual: FloatArray,
+    pull: FloatArray,
+    deviation: FloatArray,
+    stretches: Sequence[Stretch],
+) -> float:
+    """The least factor, 1 or more, on the variance of the noise; slopes (W, P) and residual (W,)
+    are weighted by it, pull (P, P) is the prior's precision, deviation (P,) its deviations.
+    """
+    fold = np.array([fold_of(window, len(residual)) for window in range(len(residual))])
+    parts = [
+        (own.T @ own, own.T @ residual[fold == k])
+        for k in range(FOLDS)
+        for own in (slopes[fold == k],)
+    ]
+    whole = np.sum([information for information, _ in parts], axis=0)
+    factor = 1.0
+    while factor < _MOST:
+        errors = []
+        for k, (information, pulled) in enumerate(parts):
+            without = inverse((whole - information) / factor + pull, deviation)
+            shift = without @ pulled / factor
+            errors += [
+                (each.missing + each.slope @ shift) ** 2
+                / (each.slope @ without @ each.slope + each.white)
+                for each in stretches
+                if each.fold == k
+            ]
+        if not errors or np.mean(errors) <= 1.0:
+            break
+        factor *= _RATIO
+    return factor
+
+
+# Power parameters from a power meter: regularised least squares with physical bounds, by Gauss
+# and Newton.
+#
+# The prior pulls what the data say little about towards the data sheet. The forward model runs
+# the DC link, so its switch and its capacitor are in every step. Residuals of neighbouring
+# instants hang together; they count as the fewer independent ones that their autocorrelation
+# leaves, standing and moving apart from each other.
 
 DETERMINED = 0.8  # of the deviation before: what is left of it after the fit, at most
 LEAST_WATTS = 0.5  # noise of a residual, at least: the resolution of meters

@@ -2,7 +2,6 @@
 attachments.
 """
 
-from ir_recorder.format.definition import Field, definitions_of
 from ir_recorder.format.qos import (
     QosOffer,
     QosRequest,
@@ -10,7 +9,7 @@ from ir_recorder.format.qos import (
     offers_to_yaml,
     request_for,
 )
-from ir_recorder.format.schemas import MessageSchema, SchemaLibrary
+from ir_recorder.format.schemas import Field, MessageSchema, SchemaLibrary, definitions_of
 
 __all__ = [
     "Field",

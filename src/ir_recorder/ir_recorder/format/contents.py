@@ -1,8 +1,16 @@
-"""Names of what a recording holds beside its messages: attachments and the record of facts."""
+"""Names of what a recording holds beside its messages, and of its further files."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
+
+from ir_recorder.errors import SplitError
+
+# Names of what a recording holds beside its messages: attachments and the record of facts.
 
 CELL: Final = "cell.yaml"
 URDF: Final = "robot.urdf"
@@ -35,3 +43,74 @@ PLAN: Final = "plan"  # "never driven": a plan, found or not, without a robot
 UNSHORTENED_PAUSES: Final = (
     "unshortened_pauses"  # full lengths of the pauses in power modes: "180 s, 1800 s"
 )
+
+
+# A recording in several files: when the next begins, its name, and what shows that they belong
+# together.
+
+LEAST_SIZE = 1_000_000  # bytes: four chunks
+LEAST_DURATION = 1.0  # s: no file is shorter than what a kill may cost
+
+
+@dataclass(frozen=True)
+class Split:
+    """size [bytes] and duration [s] of a file from which on the next begins; 0: there is none by
+    it.
+    """
+
+    size: int = 0
+    duration: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.size and self.size < LEAST_SIZE:
+            raise SplitError(
+                f"split_size is {self.size} bytes: it must be 0 or at least {LEAST_SIZE:,}"
+            )
+        if not (self.duration == 0.0 or LEAST_DURATION <= self.duration < float("inf")):
+            raise SplitError(
+                f"split_duration is {self.duration:g} s: it must be 0 or at least "
+                f"{LEAST_DURATION:g}"
+            )
+
+    @property
+    def wanted(self) -> bool:
+        """Whether there are several files."""
+        return bool(self.size or self.duration)
+
+    def due(self, size: int, seconds: float) -> bool:
+        """Whether a file of that size and duration is long enough."""
+        return bool(
+            (self.size and size >= self.size) or (self.duration and seconds >= self.duration)
+        )
+
+
+def part_path(first: Path, part: int) -> Path:
+    """The file of a part: shift.mcap, shift_1.mcap, shift_2.mcap."""
+    return first if part == 0 else first.with_name(f"{first.stem}_{part}{first.suffix}")
+
+
+def is_further_part(path: Path, part: str) -> bool:
+    """Whether a file with the fact `part` goes on what a first file beside it begins."""
+    first = path.with_name(f"{path.stem.removesuffix(f'_{part}')}{path.suffix}")
+    return part not in ("", "0") and first != path and first.exists()
+
+
+def part_facts(recording: str, part: int, repeated: Mapping[str, int]) -> dict[str, str]:
+    """The metadata record of a part; repeated: how many messages of a topic it has again at its
+    begin.
+    """
+    return {
+        RECORDING: recording,
+        PART: str(part),
+        REPEATED: json.dumps(dict(repeated)),
+    }
+
+
+def repeated_messages(text: str) -> dict[str, int]:
+    """How many messages by topic a part has again; none where the text is damaged."""
+    try:
+        found = json.loads(text) if text else {}
+    except (json.JSONDecodeError, RecursionError):
+        return {}
+    items = found.items() if isinstance(found, dict) else ()
+    return {topic: count for topic, count in items if isinstance(count, int) and count > 0}

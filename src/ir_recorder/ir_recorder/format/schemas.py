@@ -1,11 +1,4 @@
-"""Definitions of message types as a recording carries them, from the installed interface packages.
-
-MCAP's `ros2msg` encoding: the text of the type, then the texts of all types it is built from, read
-from `share/<package>/msg/*.msg`; the type's hash (RIHS01, REP-2016) from the .json beside it. Types
-that rosidl
-derives from actions and services have no such text, and readers refuse their names: they aren't
-recorded.
-"""
+"""Definitions of message types: read from their text, and from the installed interface packages."""
 
 from __future__ import annotations
 
@@ -17,8 +10,141 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ir_recorder.errors import SchemaError
-from ir_recorder.format.definition import SEPARATOR, fields_of
+from ir_recorder.errors import ReadError, SchemaError
+
+# Fields of a ROS 2 message definition, read from its text without ROS.
+#
+# A definition is the .msg text; in a recording the texts of all types it is built from follow,
+# separated by a line of 80 "=" and a line "MSG: package/Type" (the `ros2msg` schema of MCAP).
+
+_NUMBERS = (
+    "float32",
+    "float64",
+    "int8",
+    "uint8",
+    "int16",
+    "uint16",
+    "int32",
+    "uint32",
+    "int64",
+    "uint64",
+)
+TEXTS = ("string", "wstring")
+PRIMITIVES = frozenset(("bool", "byte", "char", *TEXTS, *_NUMBERS))
+MOST_DEPTH = 32  # types inside types; those of ROS 2 reach 6
+MOST_FIELDS = 100_000  # of one message without its sequences; those of ROS 2 reach some hundreds
+SEPARATOR = "=" * 80
+_FIELD = re.compile(
+    r"^(?P<type>[A-Za-z][\w/]*)(?:<=\d+)?(?P<array>\[[^\]]*\])?\s+"
+    r"(?P<name>[a-z]\w*)(?P<rest>.*)$"
+)
+
+
+@dataclass(frozen=True)
+class Field:
+    """One field: base type ("float64", "string", "std_msgs/Header"), and how many of it.
+
+    `count` is None for a single value, a number for a fixed array, -1 for a sequence.
+    """
+
+    name: str
+    type: str
+    count: int | None
+
+    @property
+    def primitive(self) -> bool:
+        """Whether the type is one of the language's own."""
+        return self.type in PRIMITIVES
+
+
+def fields_of(text: str, package: str) -> tuple[Field, ...]:
+    """Fields of one .msg text; constants and comments are left out, types get their package's
+    name.
+    """
+    fields = []
+    for line in text.splitlines():
+        match = _FIELD.match(line.split("#", 1)[0].strip())
+        if match is None or match["rest"].lstrip().startswith("="):
+            continue
+        name = match["type"]
+        if name not in PRIMITIVES:
+            parts = name.split("/")
+            name = f"{parts[0]}/{parts[-1]}" if len(parts) > 1 else f"{package}/{name}"
+        fields.append(Field(match["name"], name, _count(match["array"])))
+    return tuple(fields)
+
+
+def definitions_of(name: str, text: str) -> dict[str, tuple[Field, ...]]:
+    """All types of a concatenated schema: "package/Type" -> fields; `name` is that of the first
+    ("pkg/msg/Type").
+    """
+    definitions = {}
+    head, *others = re.split(rf"^{SEPARATOR}\s*$", text, flags=re.MULTILINE)
+    definitions[short_name(name)] = fields_of(head, name.split("/", 1)[0])
+    for section in others:
+        title, _, body = section.lstrip("\n").partition("\n")
+        own = short_name(title.removeprefix("MSG:").strip())
+        definitions[own] = fields_of(body, own.split("/", 1)[0])
+    _check_size(short_name(name), definitions, {}, ())
+    return definitions
+
+
+def _check_size(
+    name: str,
+    definitions: dict[str, tuple[Field, ...]],
+    sizes: dict[str, int],
+    above: tuple[str, ...],
+) -> int:
+    """Fields of one message of the type, arrays of fixed length counted out and at least one.
+
+    ReadError for a type that contains itself, is built too deep, or has too many fields: a reader
+    that walks it would not come to an end.
+    """
+    if name in sizes:
+        return sizes[name]
+    if name in above:
+        raise ReadError(f"the definition of {name[:80]} contains itself")
+    if len(above) >= MOST_DEPTH:
+        raise ReadError(
+            f"the definition of {above[0][:80]} is built deeper than {MOST_DEPTH} types"
+        )
+    total = 1
+    for field in definitions.get(name, ()):
+        count = 1 if field.count is None or field.count < 0 else field.count
+        inner = (
+            1 if field.primitive else _check_size(field.type, definitions, sizes, (*above, name))
+        )
+        values = 1 if field.primitive and field.type not in TEXTS else count
+        if count == 0:
+            raise ReadError(
+                f"the definition of {name[:80]} has an array of no elements: {field.name[:80]}"
+            )
+        total += inner * values
+        if total > MOST_FIELDS:
+            raise ReadError(f"the definition of {name[:80]} has more than {MOST_FIELDS} fields")
+    sizes[name] = total
+    return total
+
+
+def short_name(name: str) -> str:
+    """Shorten "pkg/msg/Type" to "pkg/Type"."""
+    parts = name.split("/")
+    return f"{parts[0]}/{parts[-1]}"
+
+
+def _count(array: str | None) -> int | None:
+    if array is None:
+        return None
+    inside = array[1:-1]
+    return int(inside) if inside.isdigit() else -1
+
+
+# Definitions of message types as a recording carries them, from the installed interface packages.
+#
+# MCAP's `ros2msg` encoding: the text of the type, then the texts of all types it is built from,
+# read from `share/<package>/msg/*.msg`; the type's hash (RIHS01, REP-2016) from the .json beside
+# it. Types that rosidl derives from actions and services have no such text, and readers refuse
+# their names: they aren't recorded.
 
 # names of packages and types as ROS 2 has them: no path, no dot, nothing to import but an interface
 # package

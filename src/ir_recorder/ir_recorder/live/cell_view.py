@@ -21,9 +21,8 @@ from ir_msgs_py.checks import one_line
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.analysis.clearance import allowed_pairs, collision_model, pair_name, places_after
-from ir_recorder.read.recording import TextEvent
-from ir_recorder.report.cell_scene import cell_scene, matrix, part_meshes
-from ir_recorder.report.door_bodies import door_bodies
+from ir_recorder.reading.recording import TextEvent
+from ir_recorder.report.cell_scene import cell_scene, door_bodies, matrix, part_meshes
 from ir_recorder.report.series import Json, floats
 
 PATH_POINTS = 200  # of a planned path: a corner every 2 cm of a long movement

@@ -38,14 +38,12 @@ from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.conversions import status_from_msg, trajectory_from_msg
 from ir_msgs_py.ros.diagnostics import OK, Condition, Diagnostics
 from ir_msgs_py.ros.topics import PolledTopic
+from ir_recorder.analysis.checks import Tolerances
 from ir_recorder.analysis.steps import STARTED, step_label
-from ir_recorder.analysis.tolerances import Tolerances
 from ir_recorder.live.cell_view import CellView, Heard
-from ir_recorder.live.commands import Command, Commands
-from ir_recorder.live.numbers import levels, machines, number, power_values, states_of, text
-from ir_recorder.live.server import LiveServer
-from ir_recorder.live.stream import Stream
-from ir_recorder.read.decoded import contact_sentence, movement_from
+from ir_recorder.live.server import Command, Commands, LiveServer
+from ir_recorder.live.stream import Stream, levels, machines, number, power_values, states_of, text
+from ir_recorder.reading.messages import contact_sentence, movement_from
 from ir_recorder.report.series import Json
 
 PERIOD = 0.05  # s: a person sees no more pictures a second

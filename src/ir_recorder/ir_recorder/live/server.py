@@ -13,18 +13,99 @@ browser that is slow or dead costs its own connection and nothing else.
 from __future__ import annotations
 
 import json
+import queue
+import re
+import secrets
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
+from dataclasses import dataclass, field, fields
+from functools import cache
+from hmac import compare_digest
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, NamedTuple
 
 from ir_msgs_py.checks import one_line
+from ir_msgs_py.plc import PlcInputs
 from ir_recorder.errors import LiveError
-from ir_recorder.live.guard import ADDRESS, Guard
-from ir_recorder.live.page import NONCE, live_page
 from ir_recorder.live.stream import Stream
+from ir_recorder.report.page import asset
+
+# Who is answered: browsers on this machine that look at this page, and none that another page
+# sent.
+#
+# A page from elsewhere can make a browser ask a server on loopback, under a name that it lets
+# point there (DNS rebinding) or under its own address. The header Host says which name was asked
+# for, Origin which page asked. The token is in the address that the command prints, behind #: it
+# is never sent to a server on its own.
+
+ADDRESS = "127.0.0.1"
+TOKEN_HEADER = "X-Live-Token"
+NAMES = (ADDRESS, "localhost")
+_OWN_SITES = (
+    "same-origin",
+    "none",
+)  # of Sec-Fetch-Site: this page, or a person who typed the address
+
+
+@dataclass(frozen=True)
+class Guard:
+    """Judges requests to a port of this machine; the token is made anew at each start."""
+
+    port: int
+    token: str = field(default_factory=lambda: secrets.token_urlsafe(24))
+
+    @property
+    def origins(self) -> tuple[str, ...]:
+        """Origins of the page."""
+        return tuple(f"http://{name}:{self.port}" for name in NAMES)
+
+    def refusal(self, headers: Mapping[str, str]) -> str:
+        """Why a request is not answered, "" where it is."""
+        if headers.get("Host", "") not in {f"{name}:{self.port}" for name in NAMES}:
+            return f"this server answers to {ADDRESS}:{self.port} and localhost:{self.port} only"
+        origin = headers.get("Origin")
+        site = headers.get("Sec-Fetch-Site", "none")
+        if (origin is not None and origin not in self.origins) or site not in _OWN_SITES:
+            return "another page's requests are not answered"
+        return ""
+
+    def command_refusal(self, headers: Mapping[str, str]) -> str:
+        """Why a request that acts is not answered, "" where it is."""
+        given = headers.get(TOKEN_HEADER, "").encode("utf-8", "replace")
+        if not compare_digest(given, self.token.encode()):
+            return "the buttons need the address that `ir live` printed: it ends with a token"
+        if headers.get("Content-Type", "").partition(";")[0].strip() != "application/json":
+            return "a request has to be application/json"
+        return ""
+
+
+# The page of the live view: the report's styles, charts and 3D view, and what feeds them.
+
+SCRIPTS = (
+    "charts.js",
+    "renderer.js",
+    "motion.js",
+    "export.js",
+    "live_motion.js",
+    "live_panel.js",
+    "live.js",
+)
+NONCE = secrets.token_urlsafe(18)
+"""Of this process: only the page's own script and style run."""
+
+
+@cache
+def live_page() -> str:
+    """The page as text; it holds nothing of the cell."""
+    parts = {
+        "nonce": NONCE,
+        "style": asset("page.css") + asset("live.css"),
+        "script": "\n".join(asset(script) for script in SCRIPTS),
+    }
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("live.html"))
+
 
 MOST_CONNECTIONS = 32
 """Browsers and their requests at a time. Each that watches costs a thread that wakes 20 times a
@@ -250,3 +331,59 @@ def _command(body: bytes) -> tuple[str, bool] | None:
     name = content["name"]
     value = content["value"]
     return (name, value) if isinstance(name, str) and isinstance(value, bool) else None
+
+
+# What browsers ask for, handed from their threads to the node's and answered there.
+
+BITS = tuple(field.name for field in fields(PlcInputs) if field.name != "operating_mode")
+MOST_WAITING = 16
+"""s: a driver answers within 20 ms."""
+
+
+_UNANSWERED = Answer(False, f"the driver has not answered within {PATIENCE:g} s")
+
+
+@dataclass(eq=False)
+class Command:
+    """A level asked for; `answer` lets the browser's thread go on, once."""
+
+    name: str
+    value: bool
+    _done: threading.Event = field(default_factory=threading.Event)
+    _answer: Answer = _UNANSWERED
+
+    def answer(self, done: bool, sentence: str) -> None:
+        """Says what came of it."""
+        self._answer = Answer(done, sentence)
+        self._done.set()
+
+    def wait(self) -> Answer:
+        """The answer, or that there was none in time."""
+        self._done.wait(PATIENCE)
+        return self._answer
+
+
+class Commands:
+    """A short queue; `press` is called by browsers' threads, `take` by the node."""
+
+    def __init__(self) -> None:
+        self._queue: queue.Queue[Command] = queue.Queue(MOST_WAITING)
+
+    def press(self, name: str, value: bool) -> Answer:
+        """Asks and waits; refuses what is no bit, and what comes faster than it is answered."""
+        if name not in BITS:
+            return Answer(False, f"{name[:60]!r} is no bit of the PLC: known are {', '.join(BITS)}")
+        command = Command(name, value)
+        try:
+            self._queue.put_nowait(command)
+        except queue.Full:
+            return Answer(False, f"{MOST_WAITING} requests wait already")
+        return command.wait()
+
+    def take(self) -> Iterator[Command]:
+        """What has been asked since the last time."""
+        while True:
+            try:
+                yield self._queue.get_nowait()
+            except queue.Empty:
+                return

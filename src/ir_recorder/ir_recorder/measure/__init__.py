@@ -2,8 +2,13 @@
 alone.
 """
 
-from ir_recorder.measure.on_one_grid import planned_samples, samples_of, standing_sample
 from ir_recorder.measure.power_model import PowerModel
-from ir_recorder.measure.samples import Samples, movements
+from ir_recorder.measure.samples import (
+    Samples,
+    movements,
+    planned_samples,
+    samples_of,
+    standing_sample,
+)
 
 __all__ = ["PowerModel", "Samples", "movements", "planned_samples", "samples_of", "standing_sample"]

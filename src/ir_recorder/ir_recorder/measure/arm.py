@@ -1,20 +1,22 @@
-"""Torques of a moving arm, one rigid body after another: what each of them asks of every joint
-before it.
-
-Velocities and accelerations go outwards from the base; the force and moment that a body needs are
-projected onto the axes (Kane's method). Nothing here is shared with planner, driver or kernels:
-this is what their torques are compared with.
-"""
+"""Torques of a moving arm, by recursion over its rigid bodies; by Pinocchio as a second opinion."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 
 import numpy as np
 
 from ir_description import Load, RobotModel
 from ir_msgs_py.arrays import FloatArray
+
+# Torques of a moving arm, one rigid body after another: what each of them asks of every joint
+# before it.
+#
+# Velocities and accelerations go outwards from the base; the force and moment that a body needs are
+# projected onto the axes (Kane's method). Nothing here is shared with planner, driver or kernels:
+# this is what their torques are compared with.
 
 GRAVITY = 9.80665  # m/s^2, standard
 
@@ -145,3 +147,40 @@ def spring_torque(robot: RobotModel, q: FloatArray) -> FloatArray:
     pressure = spring.charge_pressure * (1.0 - stroke / spring.gas_volume) ** -spring.exponent
     torque[:, spring.joint] = -spring.piston_area * pressure * lengthening
     return torque
+
+
+# Torques by Pinocchio, where it is installed: a second opinion on those of `arm`.
+
+
+def available() -> bool:
+    """Whether Pinocchio is installed."""
+    return find_spec("pinocchio") is not None
+
+
+def pinocchio_torques(
+    robot: RobotModel, loads: Sequence[Load], base_pose: FloatArray, motion: FloatArray
+) -> ArmTorques:
+    """The same as `arm_torques` at motion (3, N, n); what the loads ask for counts among the
+    links.
+    """
+    import pinocchio
+
+    q, _, qdd = motion
+    model = pinocchio.Model()
+    parent = 0
+    model.gravity.linear = np.asarray(base_pose)[:3, :3].T @ [0.0, 0.0, -GRAVITY]
+    for i, (origin, axis) in enumerate(zip(robot.joint_origin, robot.joint_axis, strict=True)):
+        place = pinocchio.SE3(origin[:3, :3].copy(), origin[:3, 3].copy())
+        joint = pinocchio.JointModelRevoluteUnaligned(axis.copy())
+        parent = model.addJoint(parent, joint, place, f"joint_{i}")
+        bodies = [(robot.link_mass[i + 1], robot.link_com[i + 1], robot.link_inertia[i + 1])]
+        bodies += [(load.mass, load.com, load.inertia) for load in loads if i == robot.n - 1]
+        for mass, com, inertia in bodies:
+            body = pinocchio.Inertia(float(mass), np.array(com), np.array(inertia))
+            model.appendBodyToJoint(parent, body, pinocchio.SE3.Identity())
+    data = model.createData()
+    rows = [pinocchio.rnea(model, data, *row).copy() for row in motion.transpose(1, 0, 2)]
+    torque = np.array(rows).reshape(q.shape)
+    return ArmTorques(
+        torque, np.zeros_like(q), qdd * robot.reflected_inertia, spring_torque(robot, q)
+    )

@@ -1,43 +1,346 @@
-"""Charts and tables that the page shows of an analysis: a new one is a function, and a line here.
-
-The page (assets/page.html) holds the place of each as {{name}}.
-"""
+"""Charts as SVG: bars of joules, and energy over cycle time with its Pareto front."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
-from ir_recorder.analysis import Analysis
-from ir_recorder.analysis.agreement import agreement
-from ir_recorder.report.bars import joule_bars
-from ir_recorder.report.methods import methods_section
-from ir_recorder.report.sankey import sankey_section
-from ir_recorder.report.savings import savings_section
-from ir_recorder.report.tables import (
-    fact_table,
-    measurement_table,
-    mode_table,
-    problem_list,
-    resting_table,
-    station_table,
-    step_table,
-    warning_table,
+import numpy as np
+
+from ir_msgs_py.savings import ProgramPoint
+from ir_recorder.analysis import Analysis, StepResult
+from ir_recorder.report.number_text import joules, seconds, text
+
+# Bars of joules per movement: what consumers took right of zero, what braking axes gave left of
+# it.
+#
+# Every piece is the net energy of one consumer over the movement. The sum of both sides is what the
+# mains gave, but for what stays in the capacitors; it stands beside the bar.
+
+TICKS = 5  # of the axis, about: labels of "12.3 kJ" stay apart on a telephone
+
+
+@dataclass(frozen=True)
+class _Piece:
+    style: str
+    name: str
+    joules: float
+
+
+@dataclass(frozen=True)
+class _Scale:
+    """From joules to percent of the track's width."""
+
+    low: float
+    high: float
+
+    def at(self, value: float) -> float:
+        return 100.0 * (value - self.low) / (self.high - self.low)
+
+
+def joule_bars(results: Sequence[StepResult]) -> str:
+    """One bar per movement; a line marks the plan, a diamond what the mains gave."""
+    if not results:
+        return '<p class="empty">No movements were recorded.</p>'
+    pieces = [_pieces(result) for result in results]
+    ends = [_taken(own) for own in pieces] + [r.step.movement.report.energy for r in results]
+    scale = _Scale(min(_given(own) for own in pieces), max(*ends, 1.0))
+    rows = [_row(result, own, scale) for result, own in zip(results, pieces, strict=True)]
+    return f'<div class="joules">{_axis(scale)}{"".join(rows)}</div>'
+
+
+def _pieces(result: StepResult) -> list[_Piece]:
+    own = [_Piece("base", "controller, drives and tool", result.base_energy)]
+    own += [
+        _Piece(f"a{j + 1}", f"axis A{j + 1}", float(v)) for j, v in enumerate(result.joint_energy)
+    ]
+    own.append(_Piece("dissipated", "brake resistor", result.dissipated_energy))
+    return [piece for piece in own if np.isfinite(piece.joules)]
+
+
+def _taken(pieces: Sequence[_Piece]) -> float:
+    return sum(piece.joules for piece in pieces if piece.joules > 0.0)
+
+
+def _given(pieces: Sequence[_Piece]) -> float:
+    return sum(piece.joules for piece in pieces if piece.joules < 0.0)
+
+
+def _row(result: StepResult, own: Sequence[_Piece], scale: _Scale) -> str:
+    label = f"{result.step.index + 1} {result.step.label}"
+    plan = result.step.movement.report.energy
+    track = [_drawn(piece, start, scale) for piece, start in _stacked(own)]
+    track.append(_mark("zero", 0.0, "zero", scale))
+    track.append(_mark("plan", plan, f"predicted {joules(plan)}", scale))
+    if np.isfinite(result.energy):
+        track.append(_mark("net", result.energy, f"at the mains {joules(result.energy)}", scale))
+    sides = f"{joules(_taken(own))} taken, {joules(-_given(own))} returned" if own else ""
+    return (
+        f'<div class="row"><span class="label">{text(label)}</span>'
+        f'<div class="track">{"".join(track)}</div>'
+        f'<span class="value"><b>{text(joules(result.energy))}</b><small>{text(sides)}</small></span></div>'  # noqa: E501
+    )
+
+
+def _stacked(own: Sequence[_Piece]) -> list[tuple[_Piece, float]]:
+    """Each piece with the joules at its left end."""
+    placed = []
+    right = 0.0
+    left = 0.0
+    for piece in own:
+        if piece.joules >= 0.0:
+            placed.append((piece, right))
+            right += piece.joules
+        else:
+            left += piece.joules
+            placed.append((piece, left))
+    return placed
+
+
+def _drawn(piece: _Piece, start: float, scale: _Scale) -> str:
+    width = scale.at(start + abs(piece.joules)) - scale.at(start)
+    verb = "takes" if piece.joules >= 0.0 else "returns"
+    words = f"{piece.name} {verb} {joules(abs(piece.joules))}"
+    place = f"left:{scale.at(start):.2f}%;width:{width:.2f}%"
+    return f'<i class="piece {piece.style}" style="{place}" title="{text(words)}"></i>'
+
+
+def _mark(style: str, value: float, words: str, scale: _Scale) -> str:
+    return f'<i class="{style}" style="left:{scale.at(value):.2f}%" title="{text(words)}"></i>'
+
+
+def _axis(scale: _Scale) -> str:
+    step = tick_step(scale.high - scale.low)
+    first = int(np.ceil(scale.low / step))
+    last = int(scale.high / step)
+    ticks = [
+        f'<span style="left:{scale.at(k * step):.2f}%">{text(joules(k * step))}</span>'
+        for k in range(first, last + 1)
+    ]
+    track = f'<div class="track">{"".join(ticks)}</div>'
+    return (
+        f'<div class="row axis"><span class="label"></span>{track}<span class="value"></span></div>'
+    )
+
+
+def tick_step(span: float) -> float:
+    """A round step (1, 2 or 5 times a power of ten) that divides a span into about TICKS."""
+    raw = span / TICKS
+    power = 10.0 ** np.floor(np.log10(raw))
+    return float(next(power * m for m in (1, 2, 5, 10) if power * m >= raw))
+
+
+# How named curves and points of one drawing differ: by a colour, a mark, and beyond seven by a
+# dash too.
+#
+# The colours are those of Okabe and Ito, which the colour-blind distinguish; axes.js draws curves
+# with them.
+
+COLOURS = 7
+MARKS = (
+    "M-4 0A4 4 0 1 0 4 0A4 4 0 1 0 -4 0Z",
+    "M-3.6 -3.6H3.6V3.6H-3.6Z",
+    "M0 -4.8L4.6 3.4H-4.6Z",
+    "M0 -5.2L5.2 0L0 5.2L-5.2 0Z",
+    "M0 4.8L4.6 -3.4H-4.6Z",
+    "M-1.4 -4.6H1.4V-1.4H4.6V1.4H1.4V4.6H-1.4V1.4H-4.6V-1.4H-1.4Z",
+    "M-5 -2H5V2H-5Z",
+    "M-2 -5H2V5H-2Z",
 )
+"""SVG paths about the origin; as many as share no factor with the colours, so that 56 pairs
+differ.
+"""
 
-Chart = Callable[[Analysis], str]
-"""HTML or SVG of an analysis, whatever is missing in it; texts of the recording are escaped."""
 
-CHARTS: Mapping[str, Chart] = {
-    "problems": lambda analysis: problem_list(analysis.problems),
-    "bars": lambda analysis: joule_bars(analysis.movements),
-    "flows": sankey_section,
-    "steps": step_table,
-    "savings": savings_section,
-    "methods": methods_section,
-    "stations": station_table,
-    "modes": mode_table,
-    "resting": resting_table,
-    "measurements": lambda analysis: measurement_table(agreement(analysis)),
-    "warnings": warning_table,
-    "facts": fact_table,
-}
+def mark(index: int, x: float, y: float, inside: str) -> str:
+    """The mark of a series at a place of a drawing, as SVG around what belongs to it."""
+    path = MARKS[index % len(MARKS)]
+    colour = index % COLOURS + 1
+    place = f"translate({x:.1f} {y:.1f})"
+    return f'<path class="s{colour}" transform="{place}" d="{path}">{inside}</path>'
+
+
+# Energy over cycle time as a drawing: programs as points, those that no other one beats joined by
+# a line.
+
+WIDTH = 720.0
+HEIGHT = 300.0
+_LEFT = 84.0
+_RIGHT = 190.0
+_TOP = 18.0
+_BOTTOM = 44.0
+# how wide and how high a name is, and how far it stands below its middle
+_NAME = 90.0
+_LINE = 14.0
+_HALF = 4.0
+# span of an axis: what differs by less reads alike
+_LEAST_S = 0.05
+_LEAST_J = 5.0
+
+
+@dataclass(frozen=True)
+class Point:
+    """A program: cycle time [s], energy [J] at the mains, and whether that is simulated or
+    predicted.
+    """
+
+    name: str
+    seconds: float
+    energy: float
+    source: str
+
+
+def front_section(analysis: Analysis, planned: Sequence[ProgramPoint] = ()) -> str:
+    """Section of the page: this run, the planned front, the common program, what was planned in its
+    time.
+    """
+    savings = analysis.savings
+    program = analysis.program
+    if savings is None and not planned:
+        return ""
+    total = savings.total if savings is not None else None
+    run = program.whole if program is not None and math.isfinite(program.whole.energy) else None
+    points = [
+        *(
+            [Point("this run", run.seconds, run.energy, analysis.recording.origin)]
+            if run is not None
+            else ()
+        ),
+        *(Point("", point.cycle_time, point.energy, "predicted") for point in planned),
+    ]
+    if total is not None:
+        points.append(Point("common program", total.seconds, total.common, "predicted"))
+        points.append(Point("planned in its time", total.seconds, total.planned, "predicted"))
+    hint = (
+        "Left is faster, down is cheaper; the line joins programs that no other one beats in both."
+    )
+    head = f'<h2>Energy over cycle time</h2><p class="hint">{hint}</p>'
+    drawn = front_chart(points)
+    return f'<section id="front">{head}{drawn}</section>' if drawn else ""
+
+
+def pareto(points: Sequence[Point]) -> list[Point]:
+    """Points that no other one beats, by their time."""
+    best: list[Point] = []
+    for point in sorted(points, key=lambda p: (p.seconds, p.energy)):
+        if not best or point.energy < best[-1].energy:
+            best.append(point)
+    return best
+
+
+def front_chart(points: Sequence[Point], along: str = "cycle time") -> str:
+    """The drawing as SVG, its axis named `along`; "" for fewer than two points."""
+    if len(points) < 2:
+        return ""
+    times = [p.seconds for p in points]
+    energies = [p.energy for p in points]
+    x = _Axis(min(times), max(times), _LEAST_S, _LEFT, WIDTH - _RIGHT)
+    y = _Axis(min(energies), max(energies), _LEAST_J, HEIGHT - _BOTTOM, _TOP)
+    line = " ".join(f"{x.at(p.seconds):.1f},{y.at(p.energy):.1f}" for p in pareto(points))
+    heights = _heights(points, x, y)
+    marks = "".join(_mark_front(point, k, heights[k], x, y) for k, point in enumerate(points))
+    said = "; ".join(
+        f"{p.name} {seconds(p.seconds)}, {joules(p.energy)}, {p.source}" for p in points
+    )
+    return (
+        '<div class="figure scroll"><svg class="front" id="energy_over_cycle_time" '
+        f'viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{text(said)}">'
+        f'{_grid(x, y, along)}<polyline class="line" points="{line}"/>{marks}</svg></div>'
+    )
+
+
+@dataclass(frozen=True)
+class _Axis:
+    """From values to drawing units, with a margin of a tenth."""
+
+    low: float
+    high: float
+    least: float
+    start: float
+    end: float
+
+    @property
+    def span(self) -> float:
+        """Of what is shown without the margin, the middle of the values in its middle."""
+        return max(self.high - self.low, self.least)
+
+    @property
+    def first(self) -> float:
+        """The value at the start."""
+        return 0.5 * (self.low + self.high) - 0.6 * self.span
+
+    def at(self, value: float) -> float:
+        return self.start + (value - self.first) / (1.2 * self.span) * (self.end - self.start)
+
+    def ticks(self) -> list[float]:
+        step = tick_step(1.2 * self.span)
+        first = math.ceil(self.first / step)
+        last = math.floor((self.first + 1.2 * self.span) / step)
+        return [k * step for k in range(first, last + 1)]
+
+
+def _grid(x: _Axis, y: _Axis, along: str) -> str:
+    right = WIDTH - _RIGHT
+    bottom = HEIGHT - _BOTTOM
+    parts = []
+    for value in y.ticks():
+        at = y.at(value)
+        parts.append(f'<path class="grid" d="M{_LEFT:g} {at:.1f}H{right:g}"/>')
+        parts.append(
+            f'<text x="{_LEFT - 8:g}" y="{at + 4:.1f}" text-anchor="end">{joules(value)}</text>'
+        )
+    for value in x.ticks():
+        at = x.at(value)
+        parts.append(f'<path class="grid" d="M{at:.1f} {_TOP:g}V{bottom:g}"/>')
+        parts.append(
+            f'<text x="{at:.1f}" y="{bottom + 18:g}" text-anchor="middle">{seconds(value)}</text>'
+        )
+    middle = (_LEFT + right) / 2.0
+    return (
+        "".join(parts)
+        + f'<text x="{middle:g}" y="{HEIGHT - 6:g}" text-anchor="middle">{along}</text>'
+    )
+
+
+def _heights(points: Sequence[Point], x: _Axis, y: _Axis) -> list[float]:
+    """Where the names of points go: beside them, or below another name that stands there, and all
+    of them higher where the last would stand below the drawing.
+    """
+    heights = [y.at(point.energy) for point in points]
+    named = sorted((k for k, point in enumerate(points) if point.name), key=heights.__getitem__)
+    placed: list[tuple[float, float]] = []
+    for k in named:
+        at = x.at(points[k].seconds)
+        for other, high in sorted(placed, key=lambda one: one[1]):
+            if abs(other - at) < _NAME and abs(high - heights[k]) < _LINE:
+                heights[k] = high + _LINE
+        placed.append((at, heights[k]))
+    below: list[tuple[float, float]] = []
+    for k in sorted(named, key=heights.__getitem__, reverse=True):
+        at = x.at(points[k].seconds)
+        lower = [high - _LINE for other, high in below if abs(other - at) < _NAME]
+        heights[k] = min(heights[k], HEIGHT - _BOTTOM - _HALF, *lower)
+        below.append((at, heights[k]))
+    return heights
+
+
+def _mark_front(point: Point, index: int, label: float, x: _Axis, y: _Axis) -> str:
+    at = x.at(point.seconds)
+    high = y.at(point.energy)
+    name = point.name or "program of the front"
+    words = f"{name}, {point.source}: {seconds(point.seconds)}, {joules(point.energy)}"
+    title = f"<title>{text(words)}</title>"
+    if point.source == "predicted":
+        drawn = f'<circle class="hollow" cx="{at:.1f}" cy="{high:.1f}" r="6">{title}</circle>'
+    else:
+        drawn = mark(index, at, high, title)
+    leader = (
+        f'<path class="grid" d="M{at:.1f} {high:.1f}L{at + 10:.1f} {label:.1f}"/>'
+        if label != high
+        else ""
+    )
+    return (
+        f'{leader}{drawn}<text x="{at + 12:.1f}" y="{label + 4:.1f}" '
+        f'class="name">{text(point.name)}</text>'
+    )

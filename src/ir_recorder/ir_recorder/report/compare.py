@@ -18,17 +18,14 @@ from ir_recorder.analysis import Analysis, Finding, summary
 from ir_recorder.analysis.flows import energy_flows
 from ir_recorder.analysis.results import ProgramTotals, Share
 from ir_recorder.analysis.steps import step_label
-from ir_recorder.report.axes import Curves, packed
-from ir_recorder.report.costs import Costs
+from ir_recorder.report.charts import Point, front_chart
+from ir_recorder.report.costs import Costs, cycle_of, money, planned_clearance, planned_share
 from ir_recorder.report.files import write_output
-from ir_recorder.report.front import Point, front_chart
 from ir_recorder.report.headline import plant_of
-from ir_recorder.report.money import cycle_of, money
+from ir_recorder.report.number_text import DASH, joules, millimetres, percent, seconds, text, watts
 from ir_recorder.report.page import PAGE_START, asset
-from ir_recorder.report.planned import planned_clearance, planned_share
-from ir_recorder.report.series import Json
+from ir_recorder.report.series import Curves, Json, packed
 from ir_recorder.report.tables import table
-from ir_recorder.report.words import DASH, joules, millimetres, percent, seconds, text, watts
 
 MOST = 12  # recordings on one page: more columns than that are not read
 SCRIPTS = ("charts.js", "axes.js", "export.js", "compare.js")

@@ -1,20 +1,9 @@
-"""What joules cost: price, currency, shifts and the grid's CO2, from a file or as assumed.
-
-::
-
-    format: ir_costs/1
-    price: 0.24            # per kWh
-    currency: EUR
-    grid: 0.35             # kg CO2 per kWh
-    shift_hours: 8.0
-    shifts_per_day: 2
-    days_per_year: 240
-    parts_per_cycle: 1
-    availability: 0.85     # share of a shift in which cycles run
-"""
+"""Energy, money and CO2 of a cycle: prices, savings, and the biggest levers."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -22,8 +11,31 @@ from ir_description import DescriptionFileError
 from ir_description.files import plain_yaml
 from ir_msgs_py.errors import InvalidValueError, MsgsError
 from ir_msgs_py.file_roots import ANYWHERE, FileRoots
+from ir_msgs_py.report import PlannedMovement
+from ir_msgs_py.savings import Saving
 from ir_msgs_py.settings import Setting, check_settings, describe, setting
+from ir_recorder.analysis import Analysis
+from ir_recorder.analysis.flows import levers
+from ir_recorder.analysis.results import Share
 from ir_recorder.errors import CostsError
+from ir_recorder.report.number_text import (
+    DASH,
+    joules,
+    kilowatt_hours,
+    number,
+    seconds,
+    share,
+    text,
+)
+from ir_recorder.report.tables import table
+
+# What joules cost: price, currency, shifts and the grid's CO2, from a file or as assumed.
+#
+# ::
+#
+# format: ir_costs/1 price: 0.24            # per kWh currency: EUR grid: 0.35             # kg
+# CO2 per kWh shift_hours: 8.0 shifts_per_day: 2 days_per_year: 240 parts_per_cycle: 1
+# availability: 0.85     # share of a shift in which cycles run
 
 FORMAT = "ir_costs/1"
 _CURRENCY_MAX = 12  # characters
@@ -122,3 +134,199 @@ def _checked(where: str, key: str, value: object) -> float | str:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise CostsError(f"{where} is {str(value)[:40]!r}, it must be a number")
     return float(value)
+
+
+# Figures of a program that was planned and not driven.
+
+_PARTS = {"whole": (True, False), "movements": (False,), "pauses": (True,)}
+
+
+def planned_share(steps: Sequence[PlannedMovement], part: str = "whole") -> Share | None:
+    """Time and energy of the whole program, its movements or its pauses; None for no plan or
+    another part.
+    """
+    if not steps or part not in _PARTS:
+        return None
+    own = [step for step in steps if step.is_pause in _PARTS[part]]
+    return Share(part, sum(step.duration for step in own), sum(step.report.energy for step in own))
+
+
+def planned_interval(steps: Sequence[PlannedMovement]) -> tuple[float, float] | None:
+    """90 % interval of the whole energy [J], None where the plan has none."""
+    low, high = (
+        sum(getattr(step.report, name) for step in steps) for name in ("energy_low", "energy_high")
+    )
+    return (low, high) if high > low else None
+
+
+def planned_clearance(steps: Sequence[PlannedMovement]) -> float:
+    """The least clearance of the movements [m], NaN without any."""
+    return min((step.report.min_clearance for step in steps if not step.is_pause), default=math.nan)
+
+
+# What a cycle costs and what its plan saves: joules, money and CO2 per part, per shift and per
+# year.
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """Energy [J] and time [s] of the cycle that the costs are of; name: which cycle that is."""
+
+    name: str
+    energy: float
+    seconds: float
+
+
+def cycle_of(analysis: Analysis) -> Cycle | None:
+    """The cycle as it is in production: with full pauses where the run's are shortened; of a plan
+    that was not driven the planned one; None without either.
+    """
+    program = analysis.program
+    savings = analysis.savings
+    planned = planned_share(analysis.recording.planned)
+    if program is None and planned is not None:
+        return Cycle("planned program, predicted", planned.energy, planned.seconds)
+    if program is None and savings is not None and savings.total.seconds > 0.0:
+        name = "planned in the common program's time, predicted"
+        return Cycle(name, savings.total.planned, savings.total.seconds)
+    if program is None or not math.isfinite(program.whole.energy) or program.whole.seconds <= 0.0:
+        return None
+    full = program.unshortened
+    if full is not None and math.isfinite(full.energy):
+        return Cycle(
+            "cycle with full pauses, computed from this run and the data", full.energy, full.seconds
+        )
+    name = "this run" if full is None else "this run, its pauses shortened"
+    return Cycle(name, program.whole.energy, program.whole.seconds)
+
+
+def costs_section(analysis: Analysis, costs: Costs) -> str:
+    """Section of the page; "" where no program was executed or its energy is unknown."""
+    cycle = cycle_of(analysis)
+    if cycle is None:
+        return ""
+    shift = costs.cycles_per_shift(cycle.seconds)
+    year = costs.cycles_per_year(cycle.seconds)
+    counts = (1.0 / costs.parts_per_cycle, shift, year)
+    rows = [_row(cycle.name, cycle.energy, cycle.seconds, counts, costs)]
+    rows += _saved(analysis, counts, costs)
+    heads = ("", ">a cycle", ">a part", ">a shift", ">a year")
+    origin = (
+        analysis.recording.origin
+        if analysis.program is not None
+        else "not there: nothing was driven"
+    )
+    return (
+        '<section id="costs"><h2>What a cycle costs</h2>'
+        f'<p class="hint">Energy of the run is {text(origin)}; savings are predicted, with their '
+        "90 % "
+        "interval, at the same number of cycles.</p>"
+        f"{table(heads, rows, 'What a cycle costs')}{_assumptions(costs, counts)}</section>"
+    )
+
+
+def _row(
+    name: str, energy: float, length: float, counts: tuple[float, ...], costs: Costs
+) -> tuple[str, ...]:
+    cycle = f"<b>{joules(energy)}</b><small>{seconds(length)}</small>"
+    return (text(name), cycle, *(_priced(energy * count, costs) for count in counts))
+
+
+def _priced(energy: float, costs: Costs) -> str:
+    return (
+        f"<b>{text(money(costs.money(energy), costs.currency))}</b><small>{kilowatt_hours(energy)}</small><small>{number(costs.co2(energy), 'kg')} "  # noqa: E501
+        "CO2</small>"
+    )
+
+
+def money(value: float, currency: str) -> str:
+    """An amount with its currency; small ones with four significant digits."""
+    if not math.isfinite(value):
+        return DASH
+    shown = (
+        f"{value:,.0f}"
+        if abs(value) >= 100.0
+        else f"{value:.2f}"
+        if abs(value) >= 1.0
+        else f"{value:.4f}"
+    )
+    return f"{shown.replace(',', ' ')} {currency}"
+
+
+def _saved(analysis: Analysis, counts: tuple[float, ...], costs: Costs) -> list[tuple[str, ...]]:
+    savings = analysis.savings
+    if savings is None:
+        return []
+    program = analysis.program
+    cut = (
+        " (pauses as shortened)" if program is not None and program.unshortened is not None else ""
+    )
+    parts = [("saved by its movements", savings.movements, "")]
+    if savings.pauses.seconds > 0.0:
+        parts += [
+            ("saved in its pauses", savings.pauses, cut),
+            ("saved together", savings.total, cut),
+        ]
+    return [_saving(f"{name}{note}", saving, counts, costs) for name, saving, note in parts]
+
+
+def _saving(name: str, saving: Saving, counts: tuple[float, ...], costs: Costs) -> tuple[str, ...]:
+    cells = [f"<b>{joules(saving.saved)}</b>{_joule_range(saving)}"]
+    for count in counts:
+        low, high = (costs.money(end * count) for end in (saving.saved_low, saving.saved_high))
+        amount = text(money(costs.money(saving.saved * count), costs.currency))
+        between = (
+            f"<small>{text(money(low, ''))}to {text(money(high, ''))}</small>" if high > low else ""
+        )
+        cells.append(f"<b>{amount}</b>{between}")
+    return (text(name), *cells)
+
+
+def _joule_range(saving: Saving) -> str:
+    if saving.saved_high <= saving.saved_low:
+        return ""
+    return f"<small>{joules(saving.saved_low)} to {joules(saving.saved_high)}</small>"
+
+
+def _assumptions(costs: Costs, counts: tuple[float, ...]) -> str:
+    """What the amounts rest on; what no file gave is named an assumption."""
+    items = []
+    for each in SETTINGS:
+        value = getattr(costs, each.name)
+        shown = value if isinstance(value, str) else f"{value:g} {each.unit}".strip()
+        mark = "" if each.name in costs.given else " (assumed)"
+        items.append(f"{each.name.replace('_', ' ')} {shown}{mark}")
+    a_shift, a_year = (f"{count:,.0f}".replace(",", " ") for count in counts[1:3])
+    made = f"{a_shift} cycles a shift, {a_year} a year"
+    assumed = "" if set(NAMES) <= set(costs.given) else " Give your own with --costs costs.yaml."
+    return f'<p class="hint">{text(made)}; {text(", ".join(items))}.{assumed}</p>'
+
+
+# The biggest levers as a table: joules, share, money a year, and what would save them.
+
+
+def lever_section(analysis: Analysis, costs: Costs) -> str:
+    """Section of the page; "" where no lever is known."""
+    found = levers(analysis)
+    program = analysis.program
+    cycle = cycle_of(analysis)
+    if not found or program is None or cycle is None:
+        return ""
+    yearly = costs.cycles_per_year(cycle.seconds)
+    rows = (
+        (
+            text(lever.name),
+            f"at most <b>{joules(lever.joules)}</b>",
+            share(lever.joules, program.whole.energy),
+            text(money(costs.money(lever.joules * yearly), costs.currency)),
+            f"{text(lever.means)}<small>counted: {text(lever.basis)}</small>",
+        )
+        for lever in found
+    )
+    heads = ("lever", ">joules of this run", ">share", ">a year, at most", "what would save them")
+    return (
+        '<section id="levers"><h2>The biggest levers</h2><p class="hint">Upper bounds from '
+        "figures of this "
+        "run, each by itself: together they count some joules twice.</p>"
+        f"{table(heads, rows, 'The biggest levers')}</section>"
+    )

@@ -10,21 +10,19 @@ import numpy as np
 from ir_msgs_py.arrays import FloatArray
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.clearance import StepClearance
-from ir_recorder.analysis.shares import mode_name
+from ir_recorder.analysis.results import mode_name
 from ir_recorder.analysis.steps import ExecutedStep
-from ir_recorder.read.recording import BitSeries
-from ir_recorder.report.axes import axis_curves
-from ir_recorder.report.machine_lanes import machine_lanes
-from ir_recorder.report.planned_motion import (
+from ir_recorder.reading.recording import BitSeries
+from ir_recorder.report.motion_scene import (
     blamed,
     failed_scene,
     lanes,
     planned_scene,
     planned_side,
+    scene,
 )
-from ir_recorder.report.scene import scene
-from ir_recorder.report.series import Json, envelope, floats
-from ir_recorder.report.words import mode_words
+from ir_recorder.report.number_text import mode_words
+from ir_recorder.report.series import Json, axis_curves, envelope, floats, machine_lanes
 
 MOST_POINTS = 24_000  # of the power curve: 4 minutes as they were read
 _BITS = {

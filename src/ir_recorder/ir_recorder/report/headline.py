@@ -10,10 +10,16 @@ from datetime import UTC, datetime, timedelta
 from ir_msgs_py.one_sided import one_sided
 from ir_recorder.analysis import Analysis, Finding, ProgramTotals, Share, Verdict, summary
 from ir_recorder.format.contents import OWN_FACTS, VERSION
-from ir_recorder.report.costs import NAMES, Costs
-from ir_recorder.report.money import cycle_of, money
-from ir_recorder.report.planned import planned_clearance, planned_interval, planned_share
-from ir_recorder.report.words import (
+from ir_recorder.report.costs import (
+    NAMES,
+    Costs,
+    cycle_of,
+    money,
+    planned_clearance,
+    planned_interval,
+    planned_share,
+)
+from ir_recorder.report.number_text import (
     DASH,
     joules,
     kilowatt_hours,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 
@@ -12,16 +12,49 @@ from ir_description import load_power_data
 from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_msgs_py.savings import ProgramPoint
 from ir_recorder.analysis import Analysis, Finding, Tolerances
-from ir_recorder.report.charts import CHARTS
-from ir_recorder.report.check_tables import check_table
-from ir_recorder.report.costs import Costs
+from ir_recorder.analysis.indirect import agreement
+from ir_recorder.report.charts import front_section, joule_bars
+from ir_recorder.report.costs import Costs, costs_section, lever_section
 from ir_recorder.report.data import page_data
 from ir_recorder.report.files import write_output
-from ir_recorder.report.front import front_section
 from ir_recorder.report.headline import notes, source, subtitle, tiles, verdict
-from ir_recorder.report.lever_table import lever_section
-from ir_recorder.report.money import costs_section
-from ir_recorder.report.words import joules, text
+from ir_recorder.report.methods import methods_section
+from ir_recorder.report.number_text import joules, text
+from ir_recorder.report.sankey import sankey_section
+from ir_recorder.report.tables import (
+    check_table,
+    fact_table,
+    measurement_table,
+    mode_table,
+    problem_list,
+    resting_table,
+    savings_section,
+    station_table,
+    step_table,
+    warning_table,
+)
+
+# Charts and tables that the page shows of an analysis: a new one is a function, and a line here.
+#
+# The page (assets/page.html) holds the place of each as {{name}}.
+
+Chart = Callable[[Analysis], str]
+"""HTML or SVG of an analysis, whatever is missing in it; texts of the recording are escaped."""
+
+CHARTS: Mapping[str, Chart] = {
+    "problems": lambda analysis: problem_list(analysis.problems),
+    "bars": lambda analysis: joule_bars(analysis.movements),
+    "flows": sankey_section,
+    "steps": step_table,
+    "savings": savings_section,
+    "methods": methods_section,
+    "stations": station_table,
+    "modes": mode_table,
+    "resting": resting_table,
+    "measurements": lambda analysis: measurement_table(agreement(analysis)),
+    "warnings": warning_table,
+    "facts": fact_table,
+}
 
 _ASSETS = files("ir_recorder") / "report" / "assets"
 PAGE_START = b"<!doctype html>"

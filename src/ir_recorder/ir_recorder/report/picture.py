@@ -14,13 +14,13 @@ from ir_kernels import Chain
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_recorder.analysis import Analysis
-from ir_recorder.analysis.shares import mode_name
+from ir_recorder.analysis.results import mode_name
 from ir_recorder.errors import RecorderError
-from ir_recorder.read.recording import PowerSeries
+from ir_recorder.reading.recording import PowerSeries
 from ir_recorder.report.files import write_output
-from ir_recorder.report.savings import savings_lines
+from ir_recorder.report.number_text import joules, mode_words
 from ir_recorder.report.series import envelope
-from ir_recorder.report.words import joules, mode_words
+from ir_recorder.report.tables import savings_lines
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.flows import EnergyFlows, energy_flows
+from ir_recorder.report.number_text import joules, share, text
 from ir_recorder.report.tables import table
-from ir_recorder.report.words import joules, share, text
 
 WIDTH = 860.0
 TALL = 250.0

@@ -17,13 +17,13 @@ from ir_recorder.analysis import Analysis, StepResult
 from ir_recorder.errors import PathError, RecorderError
 from ir_recorder.report.files import write_output
 
-Cell = str | float | int
+TableValue = str | float | int
 _TEXTS = ("recording", "origin", "plant", "label", "kind", "mode", "load", "outcome")
 CSV_START = b"recording,"
 PARQUET_START = b"PAR1"
 
 
-def step_columns(analyses: Sequence[Analysis]) -> dict[str, list[Cell]]:
+def step_columns(analyses: Sequence[Analysis]) -> dict[str, list[TableValue]]:
     """All steps of all recordings, a column for each figure; NaN where it wasn't recorded."""
     rows = [_row(analysis, result) for analysis in analyses for result in analysis.steps]
     names = list(dict.fromkeys(name for row in rows for name in row)) or ["recording"]
@@ -32,7 +32,7 @@ def step_columns(analyses: Sequence[Analysis]) -> dict[str, list[Cell]]:
     }
 
 
-def _row(analysis: Analysis, result: StepResult) -> dict[str, Cell]:
+def _row(analysis: Analysis, result: StepResult) -> dict[str, TableValue]:
     step = result.step
     near = result.clearance
     movement = step.movement
@@ -62,7 +62,7 @@ def write_table(
 
 
 def write_columns(
-    columns: Mapping[str, Sequence[Cell]],
+    columns: Mapping[str, Sequence[TableValue]],
     path: str | Path,
     start: bytes,
     roots: FileRoots = ANYWHERE,
@@ -77,7 +77,7 @@ def write_columns(
     raise PathError(f"{path}: a table ends in .csv or .parquet")
 
 
-def _csv(columns: Mapping[str, Sequence[Cell]]) -> bytes:
+def _csv(columns: Mapping[str, Sequence[TableValue]]) -> bytes:
     """Texts that a spreadsheet would take for a formula get an apostrophe; NaN is an empty cell."""
     out = StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -87,13 +87,13 @@ def _csv(columns: Mapping[str, Sequence[Cell]]) -> bytes:
     return out.getvalue().encode()
 
 
-def _shown(value: Cell) -> str:
+def _shown(value: TableValue) -> str:
     if isinstance(value, str):
         return f"'{value}" if value[:1] in ("=", "+", "-", "@", "\t", "\r") else value
     return "" if math.isnan(value) else repr(value)
 
 
-def _parquet(columns: Mapping[str, Sequence[Cell]]) -> bytes:
+def _parquet(columns: Mapping[str, Sequence[TableValue]]) -> bytes:
     try:
         import pyarrow as arrow
         from pyarrow import parquet

@@ -1,25 +1,32 @@
-"""Tables of the page: movements, stations, modes, Table II, facts."""
+"""Tables of the page: movements, stations, modes, Table II, facts, checks and savings."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 
 from ir_msgs_py.report import TrajectoryReport
-from ir_recorder.analysis import Analysis
-from ir_recorder.analysis.agreement import Agreement
-from ir_recorder.analysis.findings import row_name
+from ir_msgs_py.savings import ProgramSavings, Saving
+from ir_recorder.analysis import Analysis, Finding, Verdict
+from ir_recorder.analysis.checks import row_name
+from ir_recorder.analysis.indirect import Agreement
 from ir_recorder.analysis.results import Share, StepResult
-from ir_recorder.report.words import (
+from ir_recorder.format import contents
+from ir_recorder.report.number_text import (
     DASH,
+    interval,
     joules,
     millimetres,
     mode_words,
+    number,
     percent,
     seconds,
     text,
     watts,
 )
+
+# Tables of the page: movements, stations, modes, Table II, facts.
 
 MOST_WARNINGS = 100  # a node that repeats itself must not fill the page
 LONGEST_TEXT = 500  # characters of one warning
@@ -239,3 +246,193 @@ def _bar(value: float, most: float, kind: str) -> str:
 
 def _number(head: str) -> str:
     return ' class="n"' if head.startswith(">") else ""
+
+
+# Checks as tables: for each kind the one that is nearest to its bound, then the checks
+# themselves.
+
+_KIND = re.compile(
+    r"energy of .* from joint states$|energy of |duration of |.*? (?=on \d)|power at rest|Table "
+    r"II|goals of"
+)
+_ORDER = (Verdict.HOLDS, Verdict.FAILS, Verdict.NOT_CHECKED)
+_STYLES = {Verdict.HOLDS: "good", Verdict.FAILS: "bad", Verdict.NOT_CHECKED: "open"}
+_NAMES = {
+    "energy of": "energy against the plan",
+    "duration of": "duration against the plan",
+    "goals of": "goals",
+}
+
+
+def check_table(findings: Sequence[Finding]) -> str:
+    """All checks: by kind, then what fails and what was not checked, and what holds folded away."""
+    shown = [f for f in findings if not f.ok]
+    held = [f for f in findings if f.ok]
+    rows = [_check(f) for f in sorted(shown, key=lambda f: f.verdict is not Verdict.FAILS)]
+    heads = ("", "check", ">found", ">allowed", ">expected", "reason of the bound", "note")
+    top = table(heads, rows, "Checks that fail or were not made", "checks") if rows else ""
+    top = _kinds(findings) + top
+    if not held:
+        return top or '<p class="empty">Nothing was checked.</p>'
+    below = table(heads, [_check(f) for f in held], "Checks that hold", "checks")
+    count = f"{len(held)} checks hold" if len(held) > 1 else "1 check holds"
+    return f"{top}<details><summary>{count}</summary>{below}</details>"
+
+
+def _check(finding: Finding) -> tuple[str, ...]:
+    return (
+        f'<b class="{_STYLES[finding.verdict]}">{finding.verdict}</b>',
+        text(finding.name),
+        text(number(finding.measured, finding.unit)),
+        text(interval(finding.low, finding.high, finding.unit)),
+        text(number(finding.expected, finding.unit)),
+        text(finding.reason),
+        text(finding.note),
+    )
+
+
+def _kinds(findings: Sequence[Finding]) -> str:
+    """One row for each kind of check."""
+    kinds: dict[str, list[Finding]] = {}
+    for finding in findings:
+        kinds.setdefault(_kind(finding), []).append(finding)
+    if not kinds:
+        return ""
+    heads = (
+        "kind",
+        ">hold",
+        ">fail",
+        ">not checked",
+        "nearest to its bound",
+        ">found",
+        ">allowed",
+        "reason of the bound",
+    )
+    return table(
+        heads, [_kind_row(kind, own) for kind, own in kinds.items()], "Checks by kind", "kinds"
+    )
+
+
+def _kind(finding: Finding) -> str:
+    found = _KIND.match(finding.name)
+    name = found[0].strip() if found else finding.name
+    return (
+        "energy from joint states" if name.endswith("from joint states") else _NAMES.get(name, name)
+    )
+
+
+def _kind_row(kind: str, own: Sequence[Finding]) -> tuple[str, ...]:
+    count = {verdict: sum(f.verdict is verdict for f in own) for verdict in Verdict}
+    made = [finding for finding in own if finding.verdict is not Verdict.NOT_CHECKED]
+    row = (text(kind), *(_count(count[verdict], verdict) for verdict in _ORDER))
+    if not made:
+        return (*row, "", "", "", text(own[0].note))
+    near = min(made, key=_room)
+    allowed = interval(near.low, near.high, near.unit)
+    return (
+        *row,
+        text(near.name),
+        text(number(near.measured, near.unit)),
+        text(allowed),
+        text(near.reason),
+    )
+
+
+def _count(number: int, verdict: Verdict) -> str:
+    return f'<b class="{_STYLES[verdict]}">{number}</b>' if number else "0"
+
+
+def _room(finding: Finding) -> float:
+    """How far within its bounds a check lies, as a share of them; negative where it fails."""
+    to_bound = min(finding.high - finding.measured, finding.measured - finding.low)
+    width = (finding.high - finding.low) / 2.0
+    return (
+        to_bound / (width if math.isfinite(width) else max(abs(finding.measured), 1e-9))
+        if width
+        else 0.0
+    )
+
+
+# What the program saves by its plan, in three figures, each with its baseline.
+
+Row = tuple[str, Saving, str]
+
+
+def savings_section(analysis: Analysis) -> str:
+    """Section of the page; "" where the recording carries no savings."""
+    savings = analysis.savings
+    if savings is None:
+        return ""
+    cells = (
+        (
+            text(name),
+            joules(saving.common),
+            joules(saving.planned),
+            f"<b>{_share_savings(saving)}</b>{_within(saving)}",
+            seconds(saving.seconds),
+            text(baseline),
+        )
+        for name, saving, baseline in _rows(analysis, savings)
+    )
+    heads = ("", ">baseline", ">planned", ">saved", ">time", "held against")
+    return (
+        '<section id="savings"><h2>What the program saves</h2>'
+        '<p class="hint">Predicted energies at the mains, over the same seconds, with the 90 % '
+        "interval of "
+        "what is saved; nothing here is simulated or measured. Losses that the data sheet puts "
+        "at zero can "
+        "only add; where the common program has more of them, the interval lies mostly above the "
+        "value.</p>"
+        f"{table(heads, cells, 'What the program saves')}"
+        f"<details><summary>In words</summary><p>{text(savings.sentence)}; program "
+        f"{text(savings.program_id)}.</p></details></section>"
+    )
+
+
+def savings_lines(analysis: Analysis) -> list[str]:
+    """A sentence for each figure; none where the recording carries no savings."""
+    savings = analysis.savings
+    if savings is None:
+        return []
+    return [
+        f"{name}: {_share_savings(saving)} saved by plan (predicted), "
+        f"{joules(saving.planned)} instead of {joules(saving.common)} "
+        f"in {seconds(saving.seconds)}{_sure(saving)}, against {baseline}"
+        for name, saving, baseline in _rows(analysis, savings)
+    ]
+
+
+def _rows(analysis: Analysis, savings: ProgramSavings) -> list[Row]:
+    """Name, figures and baseline; the row of pauses only where there are any."""
+    common = (
+        f"synchronous S-curve PTP at 100 % through the same stations ({savings.around} of "
+        f"{savings.across} around bodies)"
+    )
+    shortened = (
+        " (pauses shortened)" if analysis.recording.fact(contents.UNSHORTENED_PAUSES) else ""
+    )
+    rows = [("movements", savings.movements, common)]
+    if savings.pauses.seconds > 0.0:
+        rows.append(("pauses", savings.pauses, f"the controller's own timers{shortened}"))
+    return [*rows, ("total", savings.total, f"both{shortened}")]
+
+
+def _within(saving: Saving) -> str:
+    words = _sure(saving).removeprefix(", ")
+    return f"<small>{text(words)}</small>" if words else ""
+
+
+def _sure(saving: Saving) -> str:
+    """The interval of what is saved; "" where the recording has none."""
+    if saving.saved_low == saving.saved_high:
+        return ""
+    within = f", 90 % interval {joules(saving.saved_low)} to {joules(saving.saved_high)}"
+    return (
+        within
+        if saving.certain
+        else f"{within}: zero lies in it, so it is open whether anything is saved"
+    )
+
+
+def _share_savings(saving: Saving) -> str:
+    return f"{100.0 * saving.share:.1f} %"

@@ -1,9 +1,8 @@
 """Measured data from anywhere: one reader of CSV, Parquet and recordings, units, clocks, gaps."""
 
-from ir_recorder.traces.align import ClockOffset, clock_offset, mean_power, resampled
-from ir_recorder.traces.mapping import TraceMapping, read_mapping
+from ir_recorder.traces.columns import TraceMapping, read_mapping
 from ir_recorder.traces.reader import column_names, read_traces
-from ir_recorder.traces.trace import Trace
+from ir_recorder.traces.trace import ClockOffset, Trace, clock_offset, mean_power, resampled
 
 __all__ = [
     "ClockOffset",

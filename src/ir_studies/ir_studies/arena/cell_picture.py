@@ -10,8 +10,8 @@ from scipy.spatial import ConvexHull
 from ir_description import Cell
 from ir_kernels import Chain
 from ir_msgs_py.arrays import FloatArray
+from ir_recorder.report.number_text import text
 from ir_recorder.report.shapes import body_mesh, capsule_mesh
-from ir_recorder.report.words import text
 
 WIDTH = 220.0  # of the drawing; its height follows
 _AZIMUTH = math.radians(35.0)

@@ -16,13 +16,12 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.file_roots import ANYWHERE
 from ir_planner.search import SEARCHES
 from ir_planner.search.with_ompl import needs_ompl
-from ir_recorder.report.axes import Curves, packed
+from ir_recorder.report.charts import Point, front_chart
 from ir_recorder.report.files import write_output
-from ir_recorder.report.front import Point, front_chart
+from ir_recorder.report.number_text import DASH, joules, millimetres, percent, seconds, text
 from ir_recorder.report.page import PAGE_START, asset
-from ir_recorder.report.series import Json
+from ir_recorder.report.series import Curves, Json, packed
 from ir_recorder.report.tables import table
-from ir_recorder.report.words import DASH, joules, millimetres, percent, seconds, text
 from ir_studies.arena.cell_picture import cell_picture
 from ir_studies.arena.figures import (
     GRID,

@@ -19,9 +19,9 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.file_roots import ANYWHERE
 from ir_planner.checks import Interval
 from ir_recorder.report.files import write_output
+from ir_recorder.report.number_text import DASH, joules, millimetres, percent, text
 from ir_recorder.report.page import PAGE_START
 from ir_recorder.report.tables import table
-from ir_recorder.report.words import DASH, joules, millimetres, percent, text
 from ir_studies.layout.finals import Final
 from ir_studies.layout.freedom import Variable
 from ir_studies.layout.placement import Known

@@ -13,8 +13,8 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ir_description import Cell
 from ir_msgs_py.arrays import FloatArray
+from ir_recorder.report.number_text import joules, text
 from ir_recorder.report.shapes import body_mesh, capsule_mesh
-from ir_recorder.report.words import joules, text
 from ir_studies.layout.placement import Known
 
 WIDTH = 520.0  # of a drawing; its height follows

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from ir_recorder.report.words import joules, percent
+from ir_recorder.report.number_text import joules, percent
 from ir_studies.layout.finals import Final, mean_cost
 from ir_studies.layout.placement import Known
 from ir_studies.layout.search import BATCH

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ir_recorder.report.bars import tick_step
-from ir_recorder.report.words import text
+from ir_recorder.report.charts import tick_step
+from ir_recorder.report.number_text import text
 from ir_studies.statistics.figures import Comparison
 
 WIDTH = 720.0

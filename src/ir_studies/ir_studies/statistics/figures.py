@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
-from ir_recorder.intervals import (
+from ir_recorder.analysis.intervals import (
     ALIKE,
     Mean,
     alike,

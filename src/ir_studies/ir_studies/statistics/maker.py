@@ -17,7 +17,7 @@ from ir_msgs_py.options import TIMINGS, PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Goal, MovementPlan, Planner, PlannerError
 from ir_recorder.analysis.indirect import IndirectMeter
-from ir_recorder.read.recording import JointSeries
+from ir_recorder.reading.recording import JointSeries
 from ir_recorder.traces import Trace
 from ir_sim_driver import DriverError, carried
 from ir_studies.errors import DrivingError, StudyError

@@ -7,12 +7,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from ir_msgs_py.file_roots import ANYWHERE
-from ir_recorder.intervals import Mean
+from ir_recorder.analysis.intervals import Mean
 from ir_recorder.report.files import write_output
+from ir_recorder.report.number_text import DASH, text
 from ir_recorder.report.page import PAGE_START
 from ir_recorder.report.step_table import write_columns
 from ir_recorder.report.tables import table
-from ir_recorder.report.words import DASH, text
 from ir_studies.page import page
 from ir_studies.statistics.dots import dots
 from ir_studies.statistics.figures import Comparison, Findings

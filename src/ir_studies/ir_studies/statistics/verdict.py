@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from ir_recorder.intervals import ALIKE
-from ir_recorder.report.words import DASH
+from ir_recorder.analysis.intervals import ALIKE
+from ir_recorder.report.number_text import DASH
 from ir_studies.statistics.failures import NO_PAIR, NOT_DRIVEN
 from ir_studies.statistics.figures import Comparison, Findings
 from ir_studies.statistics.settings import DRAWN, StatisticsSettings

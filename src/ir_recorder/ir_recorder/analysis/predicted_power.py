@@ -1,0 +1,156 @@
+"""Mains power predicted by the data: at rest, and of planned movements."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import yaml
+
+from ir_description import (
+    Cell,
+    DescriptionError,
+    Load,
+    PowerData,
+    PowerParameters,
+    RobotModel,
+    interval_over,
+    load_power_data,
+)
+from ir_description.files import power_from_yaml
+from ir_description.robot import DcLink
+from ir_kernels import DynamicsModel
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.errors import InvalidValueError
+from ir_msgs_py.report import TrajectoryReport
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_recorder.format import contents
+from ir_recorder.measure import PowerModel, Samples, planned_samples, standing_sample
+from ir_recorder.reading.recording import Recording
+
+# The figures of controller and DC link that a recording was made with, not those of this
+# installation.
+
+_PLANT = {  # of a plant file's dc_link
+    "voltage": "mains_v",
+    "capacitance": "capacitance_f",
+    "chopper_on": "chopper_on_v",
+    "chopper_off": "chopper_off_v",
+}
+
+
+def recorded_power_data(recording: Recording) -> tuple[PowerData, str]:
+    """The attached data of the controller, and a sentence where they can't be read; else the
+    bundled ones.
+    """
+    if not recording.power_yaml:
+        return load_power_data(), ""
+    try:
+        return power_from_yaml(recording.power_yaml, contents.POWER), ""
+    except (DescriptionError, InvalidValueError) as error:
+        return load_power_data(), f"the attached {contents.POWER} can't be read: {error}"
+
+
+def recorded_link(recording: Recording, data: PowerData) -> DcLink:
+    """The DC link of the simulated plant where one is recorded, whose mains may have another
+    voltage; else that of the data.
+    """
+    try:
+        page = yaml.safe_load(recording.plant_yaml) if recording.plant_yaml else {}
+        figures = page.get("dc_link", {})
+        return replace(
+            data.dc_link,
+            **{name: float(figures[key]) for name, key in _PLANT.items() if key in figures},
+        )
+    except (yaml.YAMLError, AttributeError, TypeError, ValueError, InvalidValueError):
+        return data.dc_link
+
+
+# Mains power of a robot at rest, by the data of controller, tool and robot: mode, load and
+# posture.
+
+MOTORS = "STAND_ON_MOTORS"
+BRAKES = "STAND_ON_BRAKES"
+_BUS_UP = (MOTORS, BRAKES)  # modes in which the drive bus feeds the tool
+
+
+def resting_watts(
+    mode: str, q: FloatArray, cell: Cell, loads: tuple[Load, ...], data: PowerData
+) -> float:
+    """W at the mains in a mode at q (n,): controller, tool, and with motors on drives and holding
+    torque.
+    """
+    watts = data.resting(mode).controller_watts + sum(load.watts_always for load in loads)
+    if mode in _BUS_UP:
+        watts += sum(load.watts_drive_bus for load in loads)
+    if mode != MOTORS:
+        return float(watts)
+    model = DynamicsModel(cell.robot, loads)
+    still = np.zeros((1, cell.robot.n))
+    held = model.inverse_dynamics(q[None, :], still, still)
+    return float(watts + data.drives_and_brake_release + model.axis_power(still, held).sum())
+
+
+def left_alone_joules(
+    motors: float, brakes: float, seconds: float, timer: float, change: float
+) -> float:
+    """J of a pause on motors: after `timer` [s] the controller closes the brakes by itself.
+
+    motors, brakes [W]: at rest in the two modes; change [s]: closing and opening, at `motors`.
+    """
+    if seconds <= timer + change:
+        return motors * seconds
+    return motors * (timer + change) + brakes * (seconds - timer - change)
+
+
+def pause_joules(watts: float, motors: float, seconds: float, change: float) -> float:
+    """J of a pause of `seconds` in a mode of `watts`; `change` [s] of it, in and out, at `motors`
+    [W].
+    """
+    return motors * change + watts * (seconds - change)
+
+
+# What given power parameters predict for planned movements, with the 90 % interval.
+#
+# The plan's own figures are of the parameters that it was planned with.
+
+_DRAWS = 400
+
+
+class Predictor:
+    """Energies of movements of one robot, mounted at base_pose (4, 4), by these parameters."""
+
+    def __init__(
+        self, robot: RobotModel, link: DcLink, base_pose: FloatArray, parameters: PowerParameters
+    ) -> None:
+        self._model = PowerModel(robot, link, base_pose, parameters)
+        self._parameters = parameters
+        self._draws = parameters.draws(_DRAWS, 0)
+
+    def report(
+        self, planned: TrajectoryReport, trajectory: JointTrajectory, loads: Sequence[Load]
+    ) -> TrajectoryReport:
+        """The plan's report with energy [J], interval and name of these parameters."""
+        samples = planned_samples(trajectory, loads, self._parameters.modes)
+        energy, low, high = self._energies(samples)
+        return replace(
+            planned,
+            energy=energy,
+            energy_low=low,
+            energy_high=high,
+            power_parameters=self._parameters.name,
+        )
+
+    def standing(self, q: FloatArray, loads: Sequence[Load]) -> tuple[float, float, float]:
+        """Power [W] while it stands at q (n,) on motors, with the ends of its 90 % interval."""
+        return self._energies(standing_sample(q, loads, self._parameters.modes))
+
+    def _energies(self, samples: Samples) -> tuple[float, float, float]:
+        """Energy [J] of samples, and the ends of its 90 % interval."""
+        prepared = self._model.prepare(samples)
+        expected = self._draws.mean(axis=0)
+        energy = samples.step * float(self._model.watts(self._parameters.mean, prepared).sum())
+        watts, slopes = self._model.watts_and_slopes(expected, prepared)
+        drawn = samples.step * (watts.sum() + (self._draws - expected) @ slopes.sum(axis=0))
+        return energy, *interval_over(energy, drawn - energy)

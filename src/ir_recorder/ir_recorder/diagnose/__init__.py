@@ -1,3 +1,0 @@
-"""The recorder's state on /diagnostics."""
-
-__all__: list[str] = []

@@ -1,0 +1,158 @@
+"""A fit as sentences, as a table and as a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ir_description import PowerParameters, parameter_unit
+from ir_msgs_py.file_roots import ANYWHERE
+from ir_recorder.errors import FitError
+from ir_recorder.fit.estimate import Fit, FittedMovement
+from ir_recorder.report.files import write_output
+from ir_recorder.report.picture import PICTURE_START
+
+# A fit in words: what the data determined, what they did not, and how well it then agrees.
+
+
+def sentences(found: Fit) -> tuple[str, ...]:
+    """The findings for people, one sentence each."""
+    own = int(found.determined.sum())
+    lines = [f"{own} of {len(found.determined)} parameters are determined by the data"]
+    if found.kept:
+        lines.append(
+            f"kept at the prior, because the data say little of them: {', '.join(found.kept)}"
+        )
+    if not found.movements:
+        lines.append(
+            "nothing moves for 0.3 s or longer in these data: friction, masses and losses in "
+            "motion were not "
+            "determined, and movements are predicted as before; ir energy excite plans some"
+        )
+    else:
+        lines.append(
+            f"energy of {len(found.movements)} movements is off the meter by "
+            f"{_share(found.movements, 'before')} before, by {_share(found.movements, 'after')} "
+            "after (median and largest, in the fitted data)"
+        )
+    rest, moving = found.noise
+    lines.append(
+        f"power over 50 ms is off by {rest:.1f} W at rest and {moving:.1f} W in motion (rms)"
+    )
+    if found.inflation > 1.0:
+        lines.append(
+            f"noise counts {found.inflation:.1f} times: the model lacks something, and movements "
+            f"that were not driven will meet it too"
+        )
+    return tuple(lines)
+
+
+def _share(movements: Sequence[FittedMovement], field: str) -> str:
+    shares = np.array([abs(getattr(each, field) / each.measured - 1.0) for each in movements])
+    return f"{100.0 * np.median(shares):.1f} % and {100.0 * shares.max():.1f} %"
+
+
+def parameter_rows(found: Fit, prior: PowerParameters) -> list[dict[str, object]]:
+    """One row per parameter: before, after, deviations, whether determined."""
+    names = found.parameters.names
+    return [
+        {
+            "parameter": name,
+            "unit": parameter_unit(name),
+            "before": float(prior.mean[k]),
+            "before_deviation": float(prior.deviation[k]),
+            "value": float(found.parameters.mean[k]),
+            "deviation": float(found.parameters.deviation[k]),
+            "determined": bool(found.determined[k]),
+        }
+        for k, name in enumerate(names)
+    ]
+
+
+# A fit as one picture: powers over time, residuals by movement, and parameters against their
+# prior.
+
+_MOST_SECONDS = 60.0  # of powers that are shown: a few movements, not an hour
+_MEASURED = "#39434f"
+_BEFORE = "#e8590c"
+_AFTER = "#5b8def"
+
+
+def write_fit_picture(found: Fit, prior: PowerParameters, path: Path) -> Path:
+    """Write the picture as PNG and return its absolute path; FitError where matplotlib isn't
+    installed.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise FitError("a picture needs matplotlib: pip install matplotlib") from error
+    figure = Figure(figsize=(10.0, 9.5), dpi=110, layout="constrained", facecolor="white")
+    powers, residuals, parameters = figure.subplots(3, 1, height_ratios=(1.0, 0.8, 1.2))
+    _powers(powers, found)
+    _residuals(residuals, found)
+    _parameters(parameters, found, prior)
+    for axes in (powers, residuals, parameters):
+        axes.grid(color="#dde3ea", linewidth=0.6)
+        axes.set_axisbelow(True)
+        for side in ("top", "right"):
+            axes.spines[side].set_visible(False)
+    picture = BytesIO()
+    figure.savefig(picture, format="png")
+    return write_output(path, picture.getvalue(), PICTURE_START, ANYWHERE)
+
+
+def _powers(axes: Any, found: Fit) -> None:
+    begin = found.movements[0].start - 1.0 if found.movements else found.time[0]
+    rows = (found.time >= begin) & (found.time <= begin + _MOST_SECONDS)
+    for values, colour, label in (
+        (found.measured, _MEASURED, "meter"),
+        (found.before, _BEFORE, "before the fit"),
+        (found.after, _AFTER, "after the fit"),
+    ):
+        axes.plot(found.time[rows], values[rows] / 1e3, color=colour, linewidth=0.9, label=label)
+    axes.set(xlabel="time [s]", ylabel="power at the mains [kW]")
+    axes.legend(frameon=False, fontsize=8.5)
+
+
+def _residuals(axes: Any, found: Fit) -> None:
+    number = np.arange(1, len(found.movements) + 1)
+    for values, colour, label in (
+        ([each.before for each in found.movements], _BEFORE, "before the fit"),
+        ([each.after for each in found.movements], _AFTER, "after the fit"),
+    ):
+        shares = [
+            100.0 * (v / m.measured - 1.0) for v, m in zip(values, found.movements, strict=True)
+        ]
+        axes.plot(number, shares, "o", color=colour, markersize=4, label=label)
+    axes.axhline(0.0, color=_MEASURED, linewidth=0.8)
+    axes.set(xlabel="movement", ylabel="energy off the meter [%]")
+    axes.legend(frameon=False, fontsize=8.5)
+
+
+def _parameters(axes: Any, found: Fit, prior: PowerParameters) -> None:
+    """Each parameter in deviations of its prior: where it went, and what uncertainty is left."""
+    scale = np.where(prior.deviation > 0.0, prior.deviation, 1.0)
+    moved = (found.parameters.mean - prior.mean) / scale
+    left = found.parameters.deviation / scale
+    place = np.arange(len(moved))
+    for rows, colour, label in (
+        (found.determined, _AFTER, "determined by the data"),
+        (~found.determined, "#adb5bd", "kept at the prior"),
+    ):
+        axes.errorbar(
+            place[rows],
+            moved[rows],
+            yerr=left[rows],
+            fmt="o",
+            markersize=3.5,
+            color=colour,
+            label=label,
+        )
+    axes.axhspan(-1.0, 1.0, color="#f1f3f5", zorder=0)
+    axes.set_xticks(place, found.parameters.names, rotation=90, fontsize=6.5)
+    axes.set_ylabel("deviations of the prior")
+    axes.legend(frameon=False, fontsize=8.5)

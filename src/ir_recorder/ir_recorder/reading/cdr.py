@@ -1,0 +1,186 @@
+"""Columns out of many CDR messages of one type at once, without ROS.
+
+A topic at 500 Hz has messages of one layout: the offsets are found by walking the first one, then
+every field of all messages is one strided view. Messages of another layout (a longer text, an empty
+array) form their own group. Source: OMG CDR (XCDR1, little endian), alignment counted after the
+four bytes of the encapsulation header.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_recorder.errors import ReadError
+from ir_recorder.format.schemas import TEXTS, Field, definitions_of, short_name
+
+_DTYPES = {"bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1"} | {
+    f"{kind}{bits}": f"<{kind[0]}{bits // 8}"
+    for kind in ("int", "uint", "float")
+    for bits in (16, 32, 64)
+}
+_HEADER = 4  # bytes: encapsulation kind and options
+_LITTLE_ENDIAN = 1  # kind CDR_LE
+MOST_LAYOUTS = 2000  # each costs a pass over the messages left; a topic at a fixed rate has a few
+_LENGTH = struct.Struct("<I")
+
+
+@dataclass(frozen=True)
+class _Leaf:
+    """Where a field stands in the bytes: `count` values of a dtype, or a text of `count` bytes."""
+
+    path: str
+    dtype: str  # "" for a text
+    offset: int
+    count: int
+
+
+@dataclass(frozen=True)
+class _Layout:
+    leaves: dict[str, _Leaf]
+    lengths: tuple[int, ...]  # offsets of the words that decide the layout
+
+
+class Columns:
+    """Fields of N messages by path ("header.stamp.sec", "position")."""
+
+    def __init__(self, messages: Sequence[bytes], type_name: str, schema: str) -> None:
+        definitions = definitions_of(type_name, schema)
+        self.count = len(messages)
+        self._groups: list[tuple[IntArray, NDArray[np.uint8], _Layout]] = []
+        sizes = np.array([len(message) for message in messages], dtype=np.int64)
+        for size in np.unique(sizes):
+            open_rows = np.flatnonzero(sizes == size)
+            block = np.frombuffer(
+                b"".join(messages[int(i)] for i in open_rows), dtype=np.uint8
+            ).reshape(-1, size)
+            while len(open_rows):
+                if len(self._groups) == MOST_LAYOUTS:
+                    raise ReadError(f"its messages have more than {MOST_LAYOUTS} different layouts")
+                layout = _layout(bytes(block[0]), definitions, short_name(type_name))
+                words = [o + k for o in layout.lengths for k in range(4)]
+                same = (block[:, words] == block[0, words]).all(axis=1)
+                self._groups.append((open_rows[same], block[same], layout))
+                open_rows = open_rows[~same]
+                block = block[~same]
+
+    def numbers(self, path: str, width: int | None = None) -> FloatArray:
+        """A numeric field as (N,), or (N, width) for an array; missing values are NaN."""
+        out = np.full(self.count if width is None else (self.count, width), np.nan)
+        for rows, block, layout in self._groups:
+            leaf = layout.leaves.get(path)
+            if leaf is None or not leaf.dtype:
+                continue
+            values = _values(block, leaf)
+            if width is None:
+                out[rows] = values[:, 0] if leaf.count else np.nan
+            else:
+                used = min(width, leaf.count)
+                out[rows, :used] = values[:, :used]
+        return out
+
+    def integers(self, path: str) -> IntArray:
+        """A whole-number field as (N,); 0 where it is missing."""
+        out = np.zeros(self.count, dtype=np.int64)
+        for rows, block, layout in self._groups:
+            leaf = layout.leaves.get(path)
+            if leaf is not None and leaf.dtype and leaf.count:
+                out[rows] = _values(block, leaf)[:, 0]
+        return out
+
+    def texts(self, path: str) -> list[str]:
+        """A text field of every message; "" where it is missing."""
+        out = [""] * self.count
+        for rows, block, layout in self._groups:
+            leaf = layout.leaves.get(path)
+            if leaf is None or leaf.dtype:
+                continue
+            part = np.ascontiguousarray(block[:, leaf.offset : leaf.offset + leaf.count])
+            for row, data in zip(rows, part, strict=True):
+                out[row] = data.tobytes().rstrip(b"\0").decode(errors="replace")
+        return out
+
+    def stamps(self, path: str = "header.stamp") -> IntArray:
+        """A time field as (N,) nanoseconds."""
+        return self.integers(f"{path}.sec") * 1_000_000_000 + self.integers(f"{path}.nanosec")
+
+
+def _values(block: NDArray[np.uint8], leaf: _Leaf) -> NDArray[np.generic]:
+    dtype = np.dtype(leaf.dtype)
+    part = np.ascontiguousarray(block[:, leaf.offset : leaf.offset + leaf.count * dtype.itemsize])
+    return part.view(dtype).reshape(len(block), leaf.count)
+
+
+def _layout(data: bytes, definitions: dict[str, tuple[Field, ...]], name: str) -> _Layout:
+    walker = _Walker(data, definitions)
+    try:
+        walker.structure(name, "")
+    except (struct.error, KeyError) as error:
+        raise ReadError(
+            f"a message of type {name} with {len(data)} bytes doesn't fit its definition: {error!r}"
+        ) from error
+    return _Layout(walker.leaves, tuple(walker.lengths))
+
+
+class _Walker:
+    """Goes through one message and notes where its fields stand."""
+
+    def __init__(self, data: bytes, definitions: dict[str, tuple[Field, ...]]) -> None:
+        if len(data) < _HEADER or data[1] != _LITTLE_ENDIAN:
+            raise ReadError("a message isn't little-endian CDR")
+        self._data = data
+        self._definitions = definitions
+        self._at = _HEADER
+        self.leaves: dict[str, _Leaf] = {}
+        self.lengths: list[int] = []
+
+    def structure(self, name: str, prefix: str) -> None:
+        fields = self._definitions[name]
+        if not fields:
+            self._at += 1  # an empty structure has one byte in CDR
+        for field in fields:
+            path = f"{prefix}{field.name}"
+            count = 1 if field.count is None else field.count
+            if count < 0:
+                count = self._length()
+            if field.primitive and field.type not in TEXTS:
+                self._numbers(path, _DTYPES[field.type], count)
+            else:
+                for index in range(count):
+                    own = path if field.count is None else f"{path}[{index}]"
+                    if field.primitive:
+                        self._text(own)
+                    else:
+                        self.structure(field.type, f"{own}.")
+
+    def _numbers(self, path: str, dtype: str, count: int) -> None:
+        size = np.dtype(dtype).itemsize
+        if count:
+            self._align(size)
+        self.leaves[path] = _Leaf(path, dtype, self._at, count)
+        self._advance(size * count)
+
+    def _text(self, path: str) -> None:
+        length = self._length()
+        self.leaves[path] = _Leaf(path, "", self._at, length)
+        self._advance(length)
+
+    def _length(self) -> int:
+        self._align(4)
+        self.lengths.append(self._at)
+        (length,) = _LENGTH.unpack_from(self._data, self._at)
+        self._at += 4
+        return int(length)
+
+    def _align(self, size: int) -> None:
+        self._at += (_HEADER - self._at) % size
+
+    def _advance(self, size: int) -> None:
+        self._at += size
+        if self._at > len(self._data):
+            raise struct.error(f"{self._at - len(self._data)} bytes are missing")

@@ -1,0 +1,278 @@
+"""Planner's answers in a recording: steps, savings, searches and Pareto fronts."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from ir_msgs_py import names
+from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.file_roots import ANYWHERE, FileRoots
+from ir_msgs_py.report import PlannedMovement, TrajectoryReport
+from ir_msgs_py.savings import ProgramPoint
+from ir_msgs_py.search_log import CorrectionLog, SearchLog, log_of
+from ir_recorder.errors import ReadError, SchemaError
+from ir_recorder.format.schemas import SEPARATOR, SchemaLibrary, fields_of, installed_prefixes
+from ir_recorder.reading.cdr import Columns
+from ir_recorder.reading.mcap_file import RawChannel, chosen_namespace, read_raw
+from ir_recorder.reading.messages import decoder_of
+from ir_recorder.reading.recording import ProgramEvent, Recording
+
+# The Pareto front of a program, from the planner's answers that a recording holds; read without
+# ROS.
+#
+# An answer is the result of the action ir_msgs/action/Plan as CDR. Its definition isn't in the
+# file: it is that of the installed interfaces, without which no front is read.
+
+ACTION = "ir_msgs/action/Plan"
+MOST_POINTS = 50  # of a front, by the request
+
+
+def recorded_front(
+    path: str | Path, roots: FileRoots = ANYWHERE, namespace: str | None = None
+) -> tuple[ProgramPoint, ...]:
+    """The last front that a planner answered with, by cycle time; empty where there is none.
+    ReadError as `read_recording`.
+    """
+    raw = read_raw(path, roots)
+    prefix = chosen_namespace(raw, namespace)[0].rstrip("/")
+    channel = raw.channel(f"{prefix}/{names.PLANNER}/{names.CALLS}")
+    definition = result_definition()
+    if channel is None or channel.message_encoding != "cdr" or not definition:
+        return ()
+    for answer in answers(channel):
+        points = front_of(answer, definition)
+        if points:
+            return points
+    return ()
+
+
+def answers(channel: RawChannel, kinds: tuple[str, ...] = (ACTION,)) -> Iterator[bytes]:
+    """Results and answers of these types, the last one first; what can't be decoded is left out."""
+    try:
+        decode = decoder_of(channel)
+    except Exception:  # a damaged schema makes the parser raise nearly anything
+        return
+    for data in reversed(channel.messages):
+        try:
+            call = decode(data) if decode else None
+            kind, answer = (call.type, bytes(call.response)) if call is not None else ("", b"")
+        except Exception:  # damaged bytes: the decoder raises nearly anything
+            continue
+        if kind in kinds and answer:
+            yield answer
+
+
+def front_of(answer: bytes, definition: str) -> tuple[ProgramPoint, ...]:
+    """The front in one result, CDR with its definition; empty where it has none or makes no
+    sense.
+    """
+    try:
+        columns = Columns([answer], f"{ACTION.replace('/action/', '/msg/')}_Result", definition)
+    except ReadError:
+        return ()
+    points = []
+    for k in range(MOST_POINTS):
+        seconds, energy = (
+            float(columns.numbers(f"front[{k}].{name}")[0]) for name in ("cycle_time", "energy")
+        )
+        if not np.isfinite([seconds, energy]).all():
+            break
+        points.append(ProgramPoint(seconds, energy, columns.texts(f"front[{k}].program_id")[0]))
+    return tuple(points)
+
+
+@cache
+def result_definition() -> str:
+    """Text of the result's type and of all it is built from; "" where the interfaces aren't
+    installed.
+    """
+    package, _, name = ACTION.split("/")
+    files = [
+        prefix / "share" / package / "action" / f"{name}.action" for prefix in installed_prefixes()
+    ]
+    text = next((file.read_text(encoding="utf-8") for file in files if file.is_file()), "")
+    parts = re.split(r"^---\s*$", text, flags=re.MULTILINE)
+    if len(parts) != 3:
+        return ""
+    library = SchemaLibrary()
+    sections = dict[str, str]()
+    try:
+        for field in fields_of(parts[1], package):
+            if not field.primitive:
+                own, inner = field.type.split("/")
+                head, *others = library.schema(f"{own}/msg/{inner}").text.split(
+                    f"{SEPARATOR}\nMSG: "
+                )
+                sections[field.type] = head
+                for other in others:
+                    title, _, body = other.partition("\n")
+                    sections[title] = body
+    except SchemaError:
+        return ""
+    return parts[1] + "".join(
+        f"{SEPARATOR}\nMSG: {title}\n{body}\n" for title, body in sections.items()
+    )
+
+
+# The steps of the last program that was planned, from the planner's answer that a recording holds.
+#
+# The answers of ir_msgs/action/Plan and ir_msgs/srv/PlanProgram have the same fields.
+
+SERVICE = "ir_msgs/srv/PlanProgram"
+MOST_STEPS = 1_000
+
+
+def planned_steps(channel: RawChannel | None) -> tuple[PlannedMovement, ...]:
+    """Steps of the last answer on a planner's calls that has some, without points; empty where none
+    has.
+    """
+    definition = result_definition()
+    if channel is None or channel.message_encoding != "cdr" or not definition:
+        return ()
+    for answer in answers(channel, (ACTION, SERVICE)):
+        if steps := _steps_of(answer, definition):
+            return steps
+    return ()
+
+
+def _steps_of(answer: bytes, definition: str) -> tuple[PlannedMovement, ...]:
+    try:
+        columns = Columns([answer], f"{ACTION.replace('/action/', '/msg/')}_Result", definition)
+    except ReadError:
+        return ()
+    steps: list[PlannedMovement] = []
+    for k in range(MOST_STEPS):
+        seconds = float(columns.numbers(f"movements[{k}].duration")[0])
+        if not math.isfinite(seconds):
+            break
+        try:
+            steps.append(_step(columns, f"movements[{k}]", seconds))
+        except MsgsError:
+            return ()
+    return tuple(steps)
+
+
+def _step(columns: Columns, place: str, seconds: float) -> PlannedMovement:
+    def text(name: str) -> str:
+        return columns.texts(f"{place}.{name}")[0]
+
+    def number(name: str) -> float:
+        return float(columns.numbers(f"{place}.report.{name}")[0])
+
+    return PlannedMovement(
+        kind=text("kind"),
+        from_station=text("from_station"),
+        to_station=text("to_station"),
+        power_mode=text("power_mode"),
+        load=text("load"),
+        duration=seconds,
+        report=TrajectoryReport(
+            duration=seconds,
+            energy=number("energy"),
+            energy_low=number("energy_low"),
+            energy_high=number("energy_high"),
+            peak_power=number("peak_power"),
+            min_clearance=number("min_clearance"),
+        ),
+    )
+
+
+# What the plans behind a recorded run save, and what their searches did, from the planner's
+# answers.
+
+MOST_STAGES = 2_000
+
+
+def with_plans(found: Recording, channel: RawChannel | None) -> Recording:
+    """The recording with searches and savings of its plans, by the planner's calls; all savings
+    where no plan is known.
+    """
+    plans = _driven_plans(channel, found.events)
+    logs = tuple(
+        log if plan.own else _not_driven(log) for plan in plans for log in _logs_of(plan.answer)
+    )
+    ids = {plan.answer.texts("savings.program_id")[0] for plan in plans}
+    savings = tuple(
+        event for event in found.savings if not plans or event.savings.program_id in ids
+    )
+    return replace(found, searches=logs, savings=savings)
+
+
+@dataclass(frozen=True, eq=False)
+class _Driven:
+    """A planner's answer; own: its program itself was driven, not one of its front or its
+    savings.
+    """
+
+    answer: Columns
+    own: bool
+
+
+def _driven_plans(
+    channel: RawChannel | None, events: Sequence[ProgramEvent]
+) -> tuple[_Driven, ...]:
+    """Of the programs that were driven, in the order in which they were, each by the last answer on
+    a planner's calls that has it; of the last planned program where none was driven.
+
+    A program that was planned before the recording, or by nobody in it, has none.
+    """
+    definition = result_definition()
+    if channel is None or not definition:
+        return ()
+    recorded = list(answers(channel, (ACTION, SERVICE)))
+    driven: dict[str, set[str]] = {}
+    for event in events:
+        driven.setdefault(event.program_id, set()).add(event.movement.trajectory_id)
+    if not driven:
+        return tuple(_Driven(plan, True) for plan in islice(_plans(recorded, definition), 1))
+    found: list[_Driven] = []
+    for program, trajectories in driven.items():
+        ids = (
+            {program} if program else trajectories - {""}
+        )  # steps that a client handed over have no name
+        named = [
+            answer for answer in recorded if ids and all(each.encode() in answer for each in ids)
+        ]
+        plans = [plan for plan in _plans(named, definition) if ids <= _ids(plan)]
+        own = [plan for plan in plans if program in ("", plan.texts("program_id")[0])]
+        found += [_Driven(plan, bool(own)) for plan in (own or plans)[:1]]
+    return tuple(found)
+
+
+def _plans(recorded: Iterable[bytes], definition: str) -> Iterator[Columns]:
+    """Answers that have a program."""
+    for answer in recorded:
+        try:
+            columns = Columns([answer], f"{ACTION.replace('/action/', '/msg/')}_Result", definition)
+        except ReadError:
+            continue
+        if columns.texts("program_id")[0]:
+            yield columns
+
+
+def _ids(plan: Columns) -> set[str]:
+    """Of the programs and trajectories in an answer."""
+    points = (f"front[{k}].program_id" for k in range(MOST_POINTS))
+    steps = (f"movements[{k}].trajectory_id" for k in range(MOST_STEPS))
+    return {plan.texts(name)[0] for name in ("program_id", "savings.program_id", *points, *steps)}
+
+
+def _logs_of(columns: Columns) -> tuple[SearchLog, ...]:
+    def of_stage(k: int, field: str) -> str:
+        return columns.texts(f"info.stages[{k}].{field}")[0]
+
+    found = (log_of(of_stage(k, "name"), of_stage(k, "note")) for k in range(MOST_STAGES))
+    return tuple(log for log in found if log is not None)
+
+
+def _not_driven(log: SearchLog) -> SearchLog:
+    """The log without the movement of another program."""
+    return replace(log, driven=np.zeros((0, 3))) if isinstance(log, CorrectionLog) else log

@@ -1,0 +1,336 @@
+"""Reads a recording into typed series, without ROS: what is damaged or missing becomes a sentence,
+not a refusal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from ir_msgs_py import names
+from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_msgs_py.checks import one_line
+from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.file_roots import ANYWHERE, FileRoots
+from ir_msgs_py.namespaces import owns_diagnostic, owns_logger
+from ir_msgs_py.plc import PlcInputs, PlcOutputs
+from ir_recorder.errors import ReadError
+from ir_recorder.format import contents
+from ir_recorder.reading.cdr import Columns
+from ir_recorder.reading.limits import ReadLimits
+from ir_recorder.reading.mcap_file import RawChannel, RawRecording, chosen_namespace, read_raw
+from ir_recorder.reading.messages import contact_sentence, decoder_of, movement_from, savings_from
+from ir_recorder.reading.planner_answers import planned_steps, with_plans
+from ir_recorder.reading.recording import (
+    BitSeries,
+    ControllerSeries,
+    GoalEnd,
+    JointSeries,
+    PowerSeries,
+    ProgramEvent,
+    Recording,
+    SavingsEvent,
+    TextEvent,
+    TopicSummary,
+)
+
+# What happens around the robot, as events: the states of machines, and what the robot touches.
+
+
+def machine_states(messages: Iterable[tuple[float, Any]]) -> Iterator[TextEvent]:
+    """The state of each machine; "closed>open" while it changes."""
+    for time, message in messages:
+        for name, state, ahead in zip(
+            message.equipment, message.states, message.next, strict=False
+        ):
+            yield TextEvent(time, str(name), f"{state}>{ahead}" if ahead else str(state))
+
+
+def contacts(messages: Iterable[tuple[float, Any]]) -> Iterator[TextEvent]:
+    """What was touched, by the body that stands there."""
+    for time, message in messages:
+        yield TextEvent(time, str(message.pair.body_b), contact_sentence(message))
+
+
+_T = TypeVar("_T")
+_OF_A_RUN = (names.JOINT_STATES, names.POWER_STATE, names.CONTROLLER_STATE, names.PROGRAM_STATE)
+_CALLS = f"{names.PLANNER}/{names.CALLS}"
+_WARN = 30  # rcl_interfaces/Log
+# action_msgs/GoalStatus
+_OUTCOMES = {
+    1: "accepted",
+    2: "executing",
+    3: "canceling",
+    4: "succeeded",
+    5: "canceled",
+    6: "aborted",
+}
+_IN_BITS = tuple(bit.name for bit in fields(PlcInputs) if bit.type == "bool")
+_OUT_BITS = tuple(bit.name for bit in fields(PlcOutputs) if bit.type == "bool")
+
+
+def read_recording(
+    path: str | Path,
+    roots: FileRoots = ANYWHERE,
+    limits: ReadLimits | None = None,
+    namespace: str | None = None,
+) -> Recording:
+    """The recording of one cell in a file below `roots`, read within `limits`.
+
+    namespace: of the cell ("/cell_1"); None: the first one, with a sentence where there are more.
+    ReadError when the file is no recording, or holds no cell of that namespace.
+    """
+    return _Reader(read_raw(path, roots, limits), namespace).recording()
+
+
+class _Reader:
+    def __init__(self, raw: RawRecording, namespace: str | None) -> None:
+        self._raw = raw
+        self._problems = list(raw.problems)
+        times = [channel.log_time for channel in raw.channels if len(channel.log_time)]
+        self._start = int(min(t.min() for t in times)) if times else 0
+        self._end = int(max(t.max() for t in times)) if times else 0
+        self._namespace, others = chosen_namespace(raw, namespace)
+        self._problems += [others] if others else []
+        self._prefix = f"{self._namespace.rstrip('/')}/"
+
+    def recording(self) -> Recording:
+        raw = self._raw
+        for channel in raw.channels:
+            if channel.message_encoding != "cdr" and channel.messages:
+                self._problems.append(
+                    f"{channel.topic} is {channel.message_encoding}, not cdr: left out"
+                )
+        found = Recording(
+            path=raw.path,
+            start_ns=self._start,
+            duration=(self._end - self._start) * 1e-9,
+            topics=tuple(
+                TopicSummary(c.topic, c.type, len(c.messages), c.message_encoding)
+                for c in raw.channels
+            ),
+            joints=self._series(names.JOINT_STATES, self._joints),
+            power=self._series(names.POWER_STATE, self._power),
+            controller=self._series(names.CONTROLLER_STATE, self._controller),
+            plc_inputs=self._plc_inputs(),
+            plc_outputs=self._series(
+                names.PLC_OUTPUTS, self._bits(_OUT_BITS, stamped=True), needed=False
+            ),
+            events=tuple(self._events()),
+            loads=tuple(self._loads()),
+            signals=tuple(self._signals()),
+            machines=tuple(machine_states(self._messages(names.MACHINE_STATES))),
+            contacts=tuple(contacts(self._messages(names.CONTACTS))),
+            warnings=tuple(self._warnings()),
+            goals=tuple(self._goals()),
+            savings=tuple(
+                SavingsEvent(t, savings_from(m)) for t, m in self._messages(names.PROGRAM_SAVINGS)
+            ),
+            hardware=self._hardware(),
+            cell_yaml=self._attached(contents.CELL),
+            urdf=self._attached(contents.URDF) or self._text(names.ROBOT_DESCRIPTION),
+            power_yaml=self._attached(contents.POWER),
+            plant_yaml=self._text(names.PLANT),
+            facts=raw.facts,
+            problems=tuple(map(one_line, self._problems)),
+        )
+        found = with_plans(found, self._channel(_CALLS))
+        if found.joints is not None or found.power is not None or found.events:
+            return found
+        planned = planned_steps(self._channel(_CALLS))
+        missing = {f"{self._prefix}{name} isn't in the recording" for name in _OF_A_RUN}
+        kept = tuple(problem for problem in found.problems if problem not in missing)
+        return replace(found, planned=planned, problems=kept) if planned else found
+
+    def _channel(self, name: str) -> RawChannel | None:
+        channel = self._raw.channel(name if name.startswith("/") else self._prefix + name)
+        return channel if channel is not None and channel.message_encoding == "cdr" else None
+
+    def _series(
+        self, name: str, build: Callable[[Columns, RawChannel], _T], needed: bool = True
+    ) -> _T | None:
+        channel = self._channel(name)
+        if channel is None:
+            if needed:
+                self._problems.append(f"{self._prefix}{name} isn't in the recording")
+            return None
+        try:
+            return build(Columns(channel.messages, channel.type, channel.schema_text), channel)
+        except ReadError as error:
+            self._problems.append(f"{channel.topic} can't be read: {error}")
+            return None
+
+    def _seconds(self, stamps: IntArray) -> FloatArray:
+        return np.asarray((stamps - self._start) * 1e-9, dtype=np.float64)
+
+    def _joints(self, columns: Columns, channel: RawChannel) -> JointSeries:
+        first = next(self._decoded(channel), None)
+        if first is None:
+            raise ReadError("no message can be decoded")
+        joint_names = tuple(first[1].name)
+        stamps = columns.stamps()
+        n = len(joint_names)
+        return JointSeries(
+            joint_names,
+            stamps,
+            self._seconds(stamps),
+            columns.numbers("position", n),
+            columns.numbers("velocity", n),
+            columns.numbers("effort", n),
+        )
+
+    def _power(self, columns: Columns, channel: RawChannel) -> PowerSeries:
+        return PowerSeries(
+            self._seconds(columns.stamps()),
+            columns.integers("mode"),
+            columns.integers("target_mode"),
+            columns.numbers("power"),
+            columns.numbers("energy"),
+            columns.numbers("base_power"),
+            columns.numbers("bus_voltage"),
+            columns.numbers("burnt_power"),
+            columns.numbers("joint_power", len(names.JOINT_NAMES)),
+            columns.numbers("joint_torque", len(names.JOINT_NAMES)),
+            columns.numbers("tool_power"),
+            columns.numbers("rectifier_loss"),
+            columns.numbers("joint_temperature", len(names.JOINT_NAMES)),
+            next((name for name in reversed(columns.texts("plant")) if name), ""),
+        )
+
+    def _controller(self, columns: Columns, channel: RawChannel) -> ControllerSeries:
+        return ControllerSeries(
+            self._seconds(columns.stamps()),
+            tuple(columns.texts("trajectory_id")),
+            columns.numbers("path_time"),
+            columns.numbers("speed_scaling"),
+            columns.numbers("tool_deviation"),
+            columns.numbers("error.positions", len(names.JOINT_NAMES)),
+        )
+
+    def _bits(
+        self, bits: tuple[str, ...], stamped: bool
+    ) -> Callable[[Columns, RawChannel], BitSeries]:
+        def build(columns: Columns, channel: RawChannel) -> BitSeries:
+            times = columns.stamps() if stamped else channel.log_time
+            levels = np.stack([columns.integers(bit) for bit in bits], axis=1)
+            return BitSeries(self._seconds(times), bits, levels)
+
+        return build
+
+    def _plc_inputs(self) -> BitSeries | None:
+        """The levels in force, whoever set them; in a recording without them those sent on the
+        topic.
+        """
+        bits = self._bits(_IN_BITS, stamped=False)
+        in_force = self._series(names.PLC_INPUTS_IN_FORCE, bits, needed=False)
+        return in_force or self._series(names.PLC_INPUTS, bits, needed=False)
+
+    def _events(self) -> Iterator[ProgramEvent]:
+        broken = 0
+        for time, message in self._messages(names.PROGRAM_STATE, needed=True):
+            try:
+                movement = movement_from(message.movement)
+            except MsgsError as error:
+                broken += 1
+                if broken == 1:
+                    self._problems.append(
+                        f"a program event at {time:.2f} s makes no sense: {error}"
+                    )
+                continue
+            yield ProgramEvent(
+                self._stamp(message.header.stamp),
+                message.program_id,
+                int(message.index),
+                int(message.total),
+                message.event,
+                movement,
+                message.note,
+            )
+
+    def _loads(self) -> Iterator[TextEvent]:
+        """The attached load by the driver's diagnostics: key "load"."""
+        for _, message in self._messages(names.DIAGNOSTICS):
+            for status in message.status:
+                if not self._of_driver(status.name):
+                    continue
+                for pair in status.values:
+                    if pair.key == "load":
+                        yield TextEvent(self._stamp(message.header.stamp), "load", pair.value)
+
+    def _signals(self) -> Iterator[TextEvent]:
+        for name in (names.SIGNALS, names.MACHINE_SIGNALS):
+            for time, message in self._messages(name):
+                yield TextEvent(time, message.name, "1" if message.value else "0")
+
+    def _warnings(self) -> Iterator[TextEvent]:
+        for time, message in self._messages(names.ROSOUT):
+            if message.level >= _WARN and owns_logger(self._namespace, message.name):
+                yield TextEvent(time, message.name, message.msg)
+        for contact in contacts(self._messages(names.CONTACTS)):
+            yield TextEvent(contact.time, names.SIM_DRIVER, contact.text)
+
+    def _goals(self) -> Iterator[GoalEnd]:
+        """How every goal of planner and runner ended, by the status of their actions."""
+        for action in (names.PLAN, names.RUN_PROGRAM):
+            last: dict[bytes, int] = {}
+            for _, message in self._messages(f"{action}/_action/status"):
+                for goal in message.status_list:
+                    last[bytes(goal.goal_info.goal_id.uuid)] = int(goal.status)
+            for status in last.values():
+                yield GoalEnd(action, status, _OUTCOMES.get(status, f"status {status}"))
+
+    def _hardware(self) -> str:
+        for _, message in self._messages(names.DIAGNOSTICS):
+            for status in message.status:
+                if self._of_driver(status.name) and status.hardware_id:
+                    return str(status.hardware_id)
+        return ""
+
+    def _of_driver(self, name: str) -> bool:
+        return names.SIM_DRIVER in name and owns_diagnostic(self._namespace, name)
+
+    def _text(self, name: str) -> str:
+        """The first text of a topic."""
+        return next((str(message.data) for _, message in self._messages(name)), "")
+
+    def _messages(self, name: str, needed: bool = False) -> Iterator[tuple[float, Any]]:
+        channel = self._channel(name)
+        if channel is not None:
+            yield from self._decoded(channel)
+        elif needed:
+            self._problems.append(f"{self._prefix}{name} isn't in the recording")
+
+    def _decoded(self, channel: RawChannel) -> Iterator[tuple[float, Any]]:
+        """Messages one by one with their log time [s]; undecodable ones are counted."""
+        try:
+            decode = decoder_of(channel)
+        except Exception as error:  # a damaged schema makes the parser raise nearly anything
+            self._problems.append(
+                f"{channel.topic}: definition of {channel.type} can't be read ({error})"
+            )
+            return
+        failed = 0
+        for stamp, data in zip(channel.log_time.tolist(), channel.messages, strict=True):
+            try:
+                message = decode(data) if decode else None
+            except Exception:  # damaged bytes: the decoder raises nearly anything
+                message = None
+            if message is None:
+                failed += 1
+            else:
+                yield (stamp - self._start) * 1e-9, message
+        if failed:
+            self._problems.append(
+                f"{channel.topic}: {failed} of {len(channel.messages)} messages can't be decoded"
+            )
+
+    def _stamp(self, stamp: Any) -> float:
+        return float((stamp.sec * 1_000_000_000 + stamp.nanosec - self._start) * 1e-9)
+
+    def _attached(self, name: str) -> str:
+        data = self._raw.attachment(name)
+        return data.decode(errors="replace") if data is not None else ""

@@ -1,0 +1,235 @@
+"""A recording in progress: channels, attachments, and further files that stand alone."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
+from pathlib import Path
+
+from ir_description import DescriptionError, cell_from_yaml, cell_to_yaml, load_cell, robot_urdf
+from ir_msgs_py.errors import InvalidValueError
+from ir_recorder.errors import PathError
+from ir_recorder.format import contents
+from ir_recorder.format.contents import Split, part_facts, part_path
+from ir_recorder.format.qos import QosOffer
+from ir_recorder.recording.writer import RecordingSummary, RecordingWriter, checked_path
+
+# What a further file of a recording repeats, so that it can be read alone.
+
+
+def check_free(path: str | Path, split: Split) -> None:
+    """PathError where the second file of a recording would meet another one."""
+    second = part_path(checked_path(path), 1)
+    if split.wanted and second.exists():
+        raise PathError(f"{second} is there already; choose another path or set overwrite")
+
+
+class LatchedMessages:
+    """The last messages of latched topics, as many as there are publishers."""
+
+    def __init__(self) -> None:
+        self._kept: dict[str, deque[bytes]] = {}
+
+    def open(self, topic: str, offers: Sequence[QosOffer]) -> None:
+        """Keep those of a topic, where its publishers latch."""
+        if offers and all(offer.transient_local for offer in offers):
+            self._kept[topic] = deque(maxlen=len(offers))
+
+    def keep(self, topic: str, data: bytes) -> None:
+        """A message of any topic."""
+        if topic in self._kept:
+            self._kept[topic].append(data)
+
+    def all(self) -> list[tuple[str, bytes]]:
+        """Topics and messages."""
+        return [(topic, data) for topic, kept in self._kept.items() for data in kept]
+
+    def counts(self) -> dict[str, int]:
+        """How many there are of each topic."""
+        return {topic: len(kept) for topic, kept in self._kept.items() if kept}
+
+
+# Data that a cell refers to by name, as a recording carries them: the robot's and its controller's
+# files.
+
+
+def data_of_cell(cell_yaml: str) -> dict[str, str]:
+    """Texts by attachment; empty for a text that is no cell."""
+    try:
+        robot = cell_from_yaml(cell_yaml, "the attached cell").robot
+    except (DescriptionError, InvalidValueError):
+        return {}
+    data = files("ir_description") / "data"
+    if robot.document:  # the cell's text has it, its controller included
+        return {contents.ROBOT: robot.document}
+    found = {contents.ROBOT: data / "robots" / f"{robot.name}.yaml"}
+    found[contents.POWER] = data / "power" / f"{robot.controller.name}.yaml"
+    return {
+        name: path.read_text(encoding="utf-8") for name, path in found.items() if path.is_file()
+    }
+
+
+# One recording in progress: channels by topic, what is attached, and what became of it. No ROS
+# here.
+
+# those whose numbers a recording holds, and whose versions decide them
+PACKAGES = (
+    *(
+        "ir_planner",
+        "ir_sim_driver",
+        "ir_program_runner",
+        "ir_kernels",
+        "ir_description",
+        "ir_msgs_py",
+    ),
+    *("ir_msgs", "numpy", "scipy", "pybullet", "rclpy"),
+)
+
+
+@dataclass(frozen=True)
+class CellFiles:
+    """The cell in its own file format, and the robot's URDF."""
+
+    cell_yaml: str
+    urdf: str
+
+
+class RecordingSession:
+    """Feeds a writer, and the next one where `split` says so (`open_next` opens it).
+
+    Every method may raise WriteError, after which the session is over.
+    """
+
+    def __init__(
+        self,
+        writer: RecordingWriter,
+        facts: Mapping[str, str],
+        time: int,
+        split: Split | None = None,
+        open_next: Callable[[Path], RecordingWriter] = RecordingWriter,
+    ) -> None:
+        self._writer = writer
+        self._open_next = open_next
+        self._split = split or Split()
+        self._latched = LatchedMessages()
+        self._first = writer.path
+        self._part = 0
+        self._begun = time
+        self._name = f"{writer.path.stem} {time}"
+        self._topics: dict[str, tuple[str, Sequence[QosOffer]]] = {}
+        self._channels: dict[str, int] = {}
+        self._attached: dict[str, tuple[str, bytes]] = {}
+        self._messages = 0
+        self._span = (0, 0)
+        own = {
+            contents.VERSION: installed_version("ir_recorder"),
+            contents.STARTED: str(time),
+            contents.PACKAGES: ", ".join(f"{name} {installed_version(name)}" for name in PACKAGES),
+        }
+        self._facts = {**own, **facts}
+        self._head()
+
+    @property
+    def path(self) -> str:
+        """Where the first file grows."""
+        return str(self._first)
+
+    @property
+    def messages(self) -> int:
+        """How many messages were written, those that further files repeat not counted."""
+        return self._messages
+
+    def holds(self, name: str) -> bool:
+        """Whether an attachment of that name is in."""
+        return name in self._attached
+
+    def open_topic(self, topic: str, type_name: str, offers: Sequence[QosOffer]) -> None:
+        """Opens the channel of a topic; SchemaError when its type isn't installed."""
+        if topic not in self._channels:
+            self._channels[topic] = self._writer.register(topic, type_name, offers)
+            self._topics[topic] = type_name, offers
+            self._latched.open(topic, offers)
+
+    def message(self, topic: str, data: bytes, time: int) -> None:
+        """Appends a message of an open topic, received at `time` [ns]."""
+        if self._split.wanted and self._split.due(self._writer.size, (time - self._begun) * 1e-9):
+            self._next_file(time)
+        self._writer.write(self._channels[topic], time, data)
+        self._latched.keep(topic, data)
+        first, last = self._span if self._messages else (time, time)
+        self._span = min(first, time), max(last, time)
+        self._messages += 1
+
+    def attach_cell(self, files: CellFiles, time: int) -> None:
+        """Puts cell, URDF and the data of robot and controller beside the messages, once."""
+        if self.holds(contents.CELL):
+            return
+        self.attach(contents.CELL, files.cell_yaml, time)
+        if files.urdf:
+            self.attach(contents.URDF, files.urdf, time)
+        for name, text in data_of_cell(files.cell_yaml).items():
+            self.attach(name, text, time)
+
+    def attach(self, name: str, text: str, time: int) -> None:
+        """Puts a text beside the messages; the first of a name stays."""
+        if name not in self._attached:
+            media = "application/xml" if name == contents.URDF else "application/yaml"
+            self._attached[name] = media, text.encode()
+            self._writer.attach(name, media, text.encode(), time)
+
+    def flush(self) -> None:
+        """Leaves no message in memory."""
+        self._writer.flush()
+
+    def finish(self) -> RecordingSummary:
+        """Closes the file with its indexes."""
+        self._writer.finish()
+        paths = tuple(part_path(self._first, part) for part in range(self._part + 1))
+        first, last = self._span
+        return RecordingSummary(self._first, self._messages, (last - first) * 1e-9, paths)
+
+    def _head(self) -> None:
+        """What every file begins with."""
+        self._writer.facts(contents.FACTS, self._facts)
+        if self._split.wanted:
+            record = part_facts(self._name, self._part, self._latched.counts())
+            self._writer.facts(contents.PARTS, record)
+
+    def _next_file(self, time: int) -> None:
+        """Ends the file and begins another that can be read alone."""
+        self._writer.finish()
+        self._part = self._part + 1
+        self._begun = time
+        self._writer = self._open_next(part_path(self._first, self._part))
+        self._head()
+        for name, (media, data) in self._attached.items():
+            self._writer.attach(name, media, data, time)
+        for topic, (type_name, offers) in self._topics.items():
+            self._channels[topic] = self._writer.register(topic, type_name, offers)
+        for topic, data in self._latched.all():
+            self._writer.write(self._channels[topic], time, data)
+
+
+def installed_version(package: str) -> str:
+    """The version of a package, "unknown" where it isn't installed."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "unknown"
+
+
+# The cell as a recording carries it, so that the file can be read on its own.
+
+
+def files_of_cell(name_or_path: str) -> CellFiles:
+    """Files of a bundled cell or of one on disk; PathError when there is none or it is broken."""
+    try:
+        cell = load_cell(name_or_path)
+    except DescriptionError as error:
+        raise PathError(f"cell {name_or_path[:200]!r} can't be attached: {error}") from error
+    return CellFiles(
+        cell_to_yaml(cell), robot_urdf(cell.robot, cell.tool, cell.tcp, cell.base_pose)
+    )

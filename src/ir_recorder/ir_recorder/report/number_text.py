@@ -1,0 +1,100 @@
+"""Numbers as text: units, digits, thousands and durations."""
+
+from __future__ import annotations
+
+import math
+from html import escape
+from unicodedata import category
+
+DASH = "–"
+_UNSEEN = ("Cc", "Cf", "Cs")  # categories of Unicode: control, format, surrogate
+
+
+def joules(value: float) -> str:
+    """Whole joules ("1 235 J"), from 10 kJ on "12.3 kJ"."""
+    if not math.isfinite(value):
+        return DASH
+    if abs(value) >= 10_000.0:
+        return f"{value / 1000.0:,.1f} kJ".replace(",", " ")
+    return f"{value:,.0f} J".replace(",", " ")
+
+
+def watts(value: float) -> str:
+    """Watts without decimals, below 10 W with one."""
+    if not math.isfinite(value):
+        return DASH
+    return f"{value:,.0f} W".replace(",", " ") if abs(value) >= 10.0 else f"{value:.1f} W"
+
+
+def kilowatt_hours(value: float) -> str:
+    """Joules as kWh with three significant digits, whole ones from 100 on, Wh below 0.01."""
+    if not math.isfinite(value):
+        return DASH
+    kwh = value / 3.6e6
+    if abs(kwh) < 0.01:
+        return f"{1e3 * kwh:.3g} Wh"
+    return f"{kwh:,.0f} kWh".replace(",", " ") if abs(kwh) >= 100.0 else f"{kwh:.3g} kWh"
+
+
+def seconds(value: float) -> str:
+    """Seconds with two decimals, from ten minutes on as minutes."""
+    if not math.isfinite(value):
+        return DASH
+    return f"{value:.2f} s" if value < 600.0 else f"{value / 60.0:.1f} min"
+
+
+def millimetres(value: float) -> str:
+    """Metres as millimetres."""
+    return f"{value * 1000.0:,.1f} mm".replace(",", " ") if math.isfinite(value) else DASH
+
+
+def percent(value: float) -> str:
+    """A ratio as a signed percentage."""
+    if not math.isfinite(value):
+        return DASH
+    shown = f"{value * 100.0:+.2f}"
+    return "0.00 %" if shown in ("+0.00", "-0.00") else f"{shown} %"
+
+
+def share(part: float, whole: float) -> str:
+    """A part of a whole as a percentage."""
+    return percent(part / whole).lstrip("+") if whole > 0.0 else DASH
+
+
+def number(value: float, unit: str) -> str:
+    """A number with its unit: lengths in mm, the rest with four significant digits."""
+    if not math.isfinite(value):
+        return DASH
+    if unit == "m":
+        return millimetres(value)
+    return (
+        f"{value:.4g} {unit}".strip()
+        if abs(value) < 1e4
+        else f"{value:,.0f} {unit}".replace(",", " ")
+    )
+
+
+def interval(low: float, high: float, unit: str) -> str:
+    """Bounds as bounds: "at most 5.0 mm", "at least 20.0 mm", "520 J to 545 J"."""
+    if math.isinf(low) and math.isfinite(high):
+        return f"at most {number(high, unit)}"
+    if math.isinf(high) and math.isfinite(low):
+        return f"at least {number(low, unit)}"
+    if math.isfinite(low) and math.isfinite(high):
+        return f"{number(low, unit)} to {number(high, unit)}"
+    return DASH
+
+
+def mode_words(name: str) -> str:
+    """A mode's name as words: "bus power off"."""
+    return name.lower().replace("_", " ")
+
+
+def text(value: object) -> str:
+    """Anything as HTML text; characters that steer a terminal or the direction of writing are
+    replaced.
+    """
+    seen = "".join(
+        "\ufffd" if category(c) in _UNSEEN and c not in "\n\t" else c for c in str(value)
+    )
+    return escape(seen, quote=True)

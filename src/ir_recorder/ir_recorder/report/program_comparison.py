@@ -1,0 +1,456 @@
+"""Page of today's program beside the planner's: figures with intervals, changes, both motions."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ir_description import Cell
+from ir_msgs_py.before_after import BeforeAfter, Change, Side
+from ir_msgs_py.file_roots import ANYWHERE, FileRoots
+from ir_recorder.report.cell_scene import cell_scene
+from ir_recorder.report.charts import Point, front_chart
+from ir_recorder.report.costs import J_PER_KWH, SETTINGS, Costs, money
+from ir_recorder.report.files import write_output
+from ir_recorder.report.motion_scene import motion_of, power_curves
+from ir_recorder.report.number_text import (
+    DASH,
+    joules,
+    kilowatt_hours,
+    millimetres,
+    number,
+    seconds,
+    text,
+    watts,
+)
+from ir_recorder.report.page import PAGE_START, asset
+from ir_recorder.report.step_table import TableValue, write_columns
+from ir_recorder.report.tables import table
+
+# Joules of a cycle as those of a shift and a year, and as money and CO2, bounds included.
+
+
+@dataclass(frozen=True)
+class Amount:
+    """A value with the ends of its 90 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    def of(self, unit: Callable[[float], float]) -> Amount:
+        """The same in another unit."""
+        return Amount(unit(self.value), unit(self.low), unit(self.high))
+
+    def times(self, count: float) -> Amount:
+        """So many of it."""
+        return self.of(lambda value: value * count)
+
+
+@dataclass(frozen=True)
+class Year:
+    """A program in production: its cycles, the energy [J] of a shift and of a year, and what it
+    saves a year [J]. fit_a_shift: cycles that it can make; fewer where it takes longer than those
+    that are counted.
+    """
+
+    cycles_a_shift: float
+    cycles_a_year: float
+    fit_a_shift: float
+    shift: Amount
+    energy: Amount
+    saved: Amount
+
+
+def year_of(found: BeforeAfter, side: Side, costs: Costs) -> Year:
+    """A side in production: as many cycles as today's program makes, or as the line asks for."""
+    asked = side.cycle_time if side.cycle_time > 0.0 and side is not found.today else 0.0
+    seconds = asked or found.today.report.duration
+    shift = costs.cycles_per_shift(seconds)
+    year = costs.cycles_per_year(seconds)
+    report = side.report
+    saving = side.saving
+    cycle = Amount(report.energy, report.energy_low, report.energy_high)
+    saved = Amount(saving.saved, saving.saved_low, saving.saved_high)
+    fit = costs.cycles_per_shift(max(report.duration, 1e-9))
+    return Year(shift, year, fit, cycle.times(shift), cycle.times(year), saved.times(year))
+
+
+# Figures of today's program and of the planner's as tables: each energy with its 90 % interval.
+
+WORK = {1: "a power mode", 2: "other times on the same path", 3: "another path"}
+Show = Callable[[float], str]
+_FIT = 0.999  # of the cycles: fewer are said
+OPEN = "zero lies in it: it is open whether anything is saved"
+
+
+def tiles(found: BeforeAfter, costs: Costs) -> str:
+    """The answer in five figures, of the side that the changes lead to."""
+    side = found.planned
+    report = found.planned.report
+    today = found.today.report
+    saved = side.saving
+    year = year_of(found, side, costs).saved
+    sure = "" if saved.certain else OPEN
+    between = _between(saved.saved_low, saved.saved_high, joules)
+    shown = (
+        ("saved a cycle", f"{100.0 * saved.share:.1f} %", between, sure),
+        ("saved a year", money(costs.money(year.value), costs.currency), _money(year, costs)),
+        (
+            "CO2 saved a year",
+            number(costs.co2(year.value), "kg"),
+            f"{kilowatt_hours(year.value)} less",
+        ),
+        ("cycle time", seconds(report.duration), f"today {seconds(today.duration)}", side.name),
+        (
+            "peak power",
+            watts(report.peak_power),
+            _between(*side.peak, watts),
+            f"today {watts(today.peak_power)}",
+        ),
+    )
+    return "".join(
+        f'<div class="tile"><span>{text(name)}</span>{_cell(value, *lines)}</div>'
+        for name, value, *lines in shown
+    )
+
+
+def figure_table(found: BeforeAfter, costs: Costs) -> str:
+    """Every figure, a column for each program."""
+    sides = [found.today, *found.sides]
+    years = [year_of(found, side, costs) if side.found else None for side in sides]
+    rows = [
+        ("cycle time", *(_of(side, seconds(side.report.duration)) for side in sides)),
+        ("energy a cycle", *(_energy(side, joules) for side in sides)),
+        ("the same in kWh", *(_energy(side, kilowatt_hours) for side in sides)),
+        ("saved a cycle", *(_saved(side, side is found.today) for side in sides)),
+        ("cycles a shift", *(_cycles(year) for year in years)),
+        (
+            "energy a shift",
+            *(_amount(year.shift if year else None, kilowatt_hours) for year in years),
+        ),
+        (
+            "energy a year",
+            *(_amount(year.energy if year else None, kilowatt_hours) for year in years),
+        ),
+        ("costs a year", *(_cost(year.energy if year else None, costs) for year in years)),
+        (
+            "saved a year",
+            *(_cost(year.saved if year and k else None, costs) for k, year in enumerate(years)),
+        ),
+        ("CO2 a year", *(_co2(year, costs) for year in years)),
+        (
+            "peak power",
+            *(
+                _of(side, watts(side.report.peak_power), _between(*side.peak, watts))
+                for side in sides
+            ),
+        ),
+        ("least clearance", *(_of(side, millimetres(side.report.min_clearance)) for side in sides)),
+        ("clearance and limits", *(_proof(side) for side in sides)),
+    ]
+    return table(("", *(f">{side.name}" for side in sides)), rows, "Figures")
+
+
+def change_table(found: BeforeAfter, costs: Costs) -> str:
+    """The changes that save most, the least work first."""
+    if not found.changes:
+        return '<p class="empty">No change saves as much as a joule.</p>'
+    cycles = year_of(found, found.planned, costs).cycles_a_year
+    rows = [_change(k, change, cycles, costs) for k, change in enumerate(found.changes, start=1)]
+    heads = ("#", "where", "work", "what to do", ">saved a cycle", ">saved a year")
+    return table(heads, rows, "Changes")
+
+
+def _change(k: int, change: Change, cycles: float, costs: Costs) -> tuple[str, ...]:
+    saving = change.saving
+    between = _between(saving.saved_low, saving.saved_high, joules)
+    return (
+        str(k),
+        text(change.name),
+        text(WORK[change.work]),
+        text(change.words),
+        _cell(joules(saving.saved), between, "" if saving.certain else OPEN),
+        text(money(costs.money(saving.saved * cycles), costs.currency)),
+    )
+
+
+def hop_table(found: BeforeAfter) -> str:
+    """Seconds and joules of every movement and pause, matched by their stops."""
+    sides = [side for side in (found.today, *found.sides) if side.found]
+    keyed = [dict(_keyed(side)) for side in sides]
+    keys = list(dict.fromkeys(key for own in keyed for key in own))
+    rows = [(text(key[0]), *(own.get(key, DASH) for own in keyed)) for key in keys]
+    return table(("", *(f">{side.name}" for side in sides)), rows, "Movements and pauses")
+
+
+def _keyed(side: Side) -> Sequence[tuple[tuple[str, int], str]]:
+    times: dict[str, int] = {}
+    found = []
+    for hop in side.hops:
+        times[hop.name] = times.get(hop.name, 0) + 1
+        mode = hop.power_mode.replace(">", ", ").replace("_", " ").lower()
+        between = _between(hop.energy_low, hop.energy_high, joules)
+        cell = _cell(
+            joules(hop.energy), between, f"{seconds(hop.seconds)}{f', {mode}' if mode else ''}"
+        )
+        found.append(((hop.name, times[hop.name]), cell))
+    return found
+
+
+def assumptions(found: BeforeAfter, costs: Costs) -> str:
+    """What the amounts rest on; what no file gave is named an assumption."""
+    items = []
+    for each in SETTINGS:
+        value = getattr(costs, each.name)
+        shown = value if isinstance(value, str) else f"{value:g} {each.unit}".strip()
+        mark = "" if each.name in costs.given else " (assumed)"
+        items.append(f"{each.name.replace('_', ' ')} {shown}{mark}")
+    parameters = found.today.report.power_parameters or "the data sheet"
+    said = (
+        "All energies are predicted at the mains by the same model, with 90 % intervals from "
+        f"the uncertainty of the power parameters ({parameters}). What is saved has an interval "
+        "of its own: the same drawn robots drive both programs. Intervals by the data sheet lie "
+        "mostly above their values: losses that it puts at zero can only add. A year has as "
+        "many cycles for every program as today's can make, in the column for the line as many "
+        "as the line asks for, and there today's program waits at its end as well; what is left "
+        "of a shift counts nothing."
+    )
+    return f'<p class="hint">{text(said)}</p><p class="hint">{text(", ".join(items))}.</p>'
+
+
+def _cell(value: str, *smaller: str) -> str:
+    return f"<b>{text(value)}</b>" + "".join(
+        f"<small>{text(line)}</small>" for line in smaller if line
+    )
+
+
+def _of(side: Side, shown: str, *smaller: str) -> str:
+    return _cell(shown, *smaller) if side.found else DASH
+
+
+def _energy(side: Side, show: Show) -> str:
+    report = side.report
+    return _amount(
+        Amount(report.energy, report.energy_low, report.energy_high) if side.found else None, show
+    )
+
+
+def _saved(side: Side, own: bool) -> str:
+    if own or not side.found:
+        return DASH
+    saving = side.saving
+    between = _between(saving.saved_low, saving.saved_high, joules)
+    doubt = "" if saving.certain else OPEN
+    return _cell(f"{100.0 * saving.share:.1f} %", joules(saving.saved), between, doubt)
+
+
+def _cycles(year: Year | None) -> str:
+    if year is None:
+        return DASH
+    few = year.fit_a_shift < _FIT * year.cycles_a_shift
+    return _cell(
+        _count(year.cycles_a_shift),
+        f"only {_count(year.fit_a_shift)} fit: it is slower" if few else "",
+    )
+
+
+def _count(cycles: float) -> str:
+    return f"{cycles:,.0f}".replace(",", " ")
+
+
+def _amount(amount: Amount | None, show: Show) -> str:
+    if amount is None:
+        return DASH
+    return _cell(show(amount.value), _between(amount.low, amount.high, show))
+
+
+def _cost(energy: Amount | None, costs: Costs) -> str:
+    if energy is None:
+        return DASH
+    return _cell(money(costs.money(energy.value), costs.currency), _money(energy, costs))
+
+
+def _co2(year: Year | None, costs: Costs) -> str:
+    return _amount(year.energy.of(costs.co2) if year else None, lambda value: number(value, "kg"))
+
+
+def _money(energy: Amount, costs: Costs) -> str:
+    amount = energy.of(costs.money)
+    return f"{money(amount.low, '').strip()} to {money(amount.high, '').strip()}"
+
+
+def _proof(side: Side) -> str:
+    if not side.found:
+        return text(f"none: {side.problem}")
+    return '<b class="good">proved</b>' if side.certified else '<b class="bad">not certified</b>'
+
+
+def _between(low: float, high: float, show: Show) -> str:
+    return f"{show(low)} to {show(high)}"
+
+
+# One HTML file: today's program and the planner's, for those who pay and for those who change
+# programs.
+
+SCRIPTS = ("charts.js", "axes.js", "renderer.js", "motion.js", "export.js", "before_after.js")
+
+
+def write_before_after(
+    found: BeforeAfter,
+    cell: Cell,
+    path: str | Path,
+    costs: Costs | None = None,
+    roots: FileRoots = ANYWHERE,
+) -> Path:
+    """Writes the page below `roots`; its absolute path. PathError when it can't be written."""
+    return write_output(path, before_after_html(found, cell, costs).encode(), PAGE_START, roots)
+
+
+def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None) -> str:
+    """The page as text; without `costs` with those that are assumed."""
+    prices = costs or Costs()
+    there = [found.today, *(side for side in found.sides if side.found)]
+    data = {
+        "end": max(side.report.duration for side in there),
+        "cell": cell_scene(cell),
+        "sides": [motion_of(side, cell) for side in there],
+        "planned": found.towards,
+        "axes": [power_curves(there)],
+    }
+    parts = {
+        "title": text(f"{cell.name}: today and planned"),
+        "subtitle": text(
+            f"{found.name} ({found.kind}) against what the planner makes of the same stops"
+        ),
+        "problems": _problems(found),
+        "tiles": tiles(found, prices),
+        "figures": figure_table(found, prices),
+        "assumptions": assumptions(found, prices),
+        "changes": change_table(found, prices),
+        "hops": hop_table(found),
+        "front": front_chart([_point(side) for side in there]),
+        "choices": "".join(_choice(side, found.towards) for side in there[1:]),
+        "style": asset("page.css") + asset("before_after.css"),
+        "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
+        "script": "\n".join(asset(script) for script in SCRIPTS),
+    }
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("before_after.html"))
+
+
+def _problems(found: BeforeAfter) -> str:
+    items = [
+        *found.notes,
+        *(f"{side.name}: {side.problem}" for side in found.sides if not side.found),
+    ]
+    if not items:
+        return ""
+    listed = "".join(f"<li>{text(item)}</li>" for item in items)
+    return f'<div class="problems"><b>Mind</b><ul>{listed}</ul></div>'
+
+
+def _point(side: Side) -> Point:
+    return Point(side.name, side.report.duration, side.report.energy, "predicted")
+
+
+def _choice(side: Side, towards: str) -> str:
+    chosen = " selected" if side.name == towards else ""
+    return f'<option value="{text(side.name)}"{chosen}>{text(side.name)}</option>'
+
+
+# Every movement and pause of all programs as columns of numbers, for CSV, Parquet and pandas: SI
+# units.
+
+START = b"program,"
+
+
+def before_after_columns(
+    found: BeforeAfter, costs: Costs | None = None
+) -> dict[str, list[TableValue]]:
+    """A row for each program, for each of its movements and pauses, and for each change."""
+    prices = costs or Costs()
+    sides = [side for side in (found.today, *found.sides) if side.found]
+    rows = [row for side in sides for row in (_whole(found, side, prices), *_hops(side))]
+    rows += _changes(found, prices)
+    return {name: [row.get(name, math.nan) for row in rows] for name in rows[0]}
+
+
+def write_before_after_table(
+    found: BeforeAfter, path: str | Path, costs: Costs | None = None, roots: FileRoots = ANYWHERE
+) -> Path:
+    """Writes the rows as .csv or .parquet below `roots`; RecorderError for another ending."""
+    return write_columns(before_after_columns(found, costs), path, START, roots)
+
+
+def _whole(found: BeforeAfter, side: Side, costs: Costs) -> Mapping[str, TableValue]:
+    report = side.report
+    saving = side.saving
+    year = year_of(found, side, costs)
+    money = year.saved.of(costs.money)
+    kwh = year.energy.of(lambda joules: joules / J_PER_KWH)
+    return {
+        **{"program": side.name, "what": "cycle", "mode": "", "seconds_s": report.duration},
+        **{
+            "energy_j": report.energy,
+            "energy_low_j": report.energy_low,
+            "energy_high_j": report.energy_high,
+        },
+        **{
+            "saved_j": saving.saved,
+            "saved_low_j": saving.saved_low,
+            "saved_high_j": saving.saved_high,
+        },
+        **{"peak_w": report.peak_power, "peak_low_w": side.peak[0], "peak_high_w": side.peak[1]},
+        **{"clearance_m": report.min_clearance, "shift_cycles": year.cycles_a_shift},
+        **_amounts("shift_kwh", year.shift.of(lambda joules: joules / J_PER_KWH)),
+        **_amounts("year_kwh", kwh),
+        **_amounts("year_money", year.energy.of(costs.money)),
+        **_amounts("year_co2_kg", year.energy.of(costs.co2)),
+        **_amounts("year_saved_money", money),
+    }
+
+
+def _amounts(name: str, amount: Amount) -> Mapping[str, TableValue]:
+    return {name: amount.value, f"{name}_low": amount.low, f"{name}_high": amount.high}
+
+
+def _changes(found: BeforeAfter, costs: Costs) -> Sequence[Mapping[str, TableValue]]:
+    """The changes in their order, with the seconds that they take then."""
+    cycles = year_of(found, found.planned, costs).cycles_a_year
+    return [
+        {
+            **{
+                "program": found.towards,
+                "what": f"change {k}: {change.name}",
+                "mode": change.words,
+            },
+            **{"seconds_s": change.seconds[1]},
+            **{"saved_j": change.saving.saved},
+            **{"saved_low_j": change.saving.saved_low, "saved_high_j": change.saving.saved_high},
+            **{"year_saved_money": costs.money(change.saving.saved * cycles)},
+        }
+        for k, change in enumerate(found.changes, start=1)
+    ]
+
+
+def _hops(side: Side) -> Sequence[Mapping[str, TableValue]]:
+    return [
+        {
+            **{
+                "program": side.name,
+                "what": hop.name,
+                "mode": hop.power_mode,
+                "seconds_s": hop.seconds,
+            },
+            **{
+                "energy_j": hop.energy,
+                "energy_low_j": hop.energy_low,
+                "energy_high_j": hop.energy_high,
+            },
+        }
+        for hop in side.hops
+    ]

@@ -1,3 +1,0 @@
-"""The recorder's services."""
-
-__all__: list[str] = []

@@ -1,0 +1,196 @@
+"""Columns of a table: headings with units, and mapping files where headings don't say."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from ir_description import DescriptionFileError
+from ir_description.files import plain_yaml
+from ir_msgs_py.errors import InvalidValueError
+from ir_recorder.errors import TraceError
+from ir_recorder.traces.trace import TIME
+
+# Headings of columns as people write them: "power [kW]", "time_ms", "joint_a1 (deg)"; all become
+# SI.
+
+FACTORS: dict[str, float] = {
+    "s": 1.0,
+    "ms": 1e-3,
+    "us": 1e-6,
+    "ns": 1e-9,
+    "min": 60.0,
+    "h": 3600.0,
+    "rad": 1.0,
+    "mrad": 1e-3,
+    "deg": math.radians(1.0),
+    "rad/s": 1.0,
+    "mrad/s": 1e-3,
+    "deg/s": math.radians(1.0),
+    "rad/s^2": 1.0,
+    "deg/s^2": math.radians(1.0),
+    "nm": 1.0,
+    "w": 1.0,
+    "kw": 1e3,
+    "j": 1.0,
+    "kj": 1e3,
+    "wh": 3600.0,
+    "kwh": 3.6e6,
+    "v": 1.0,
+    "a": 1.0,
+}
+"""SI value of one of each unit, by its lower-case name."""
+
+_BRACKETS = re.compile(r"^(?P<name>[^\[\(]+?)\s*[\[\(]\s*(?P<unit>[^\]\)]+?)\s*[\]\)]$")
+_ENDING = re.compile(r"^(?P<name>.+)_(?P<unit>[a-zA-Z]+)$")
+
+
+def factor(unit: str, where: str) -> float:
+    """What a value in this unit is multiplied by; TraceError names the known units."""
+    known = FACTORS.get(unit.strip().lower().replace("²", "^2").replace("s2", "s^2"))
+    if known is None:
+        raise TraceError(f"{where}: unit {unit[:20]!r} is unknown, known are {', '.join(FACTORS)}")
+    return known
+
+
+def parsed(heading: str, where: str) -> tuple[str, float]:
+    """Name and factor of a heading; without a unit the values are SI."""
+    heading = heading.strip()
+    found = _BRACKETS.match(heading)
+    if found:
+        return found["name"].strip(), factor(found["unit"], where)
+    found = _ENDING.match(heading)
+    if found and found["unit"].lower() in FACTORS and found["unit"].lower() not in ("v", "a"):
+        return found["name"], FACTORS[found["unit"].lower()]
+    return heading, 1.0
+
+
+# A small file that says what the columns of a trace are, where their headings do not.
+#
+# ::
+#
+# format: ir_trace/1 columns: time: {column: "t", unit: ms} power: {column: "P total", unit: kW}
+# clock_offset: 0.12     # s, added to the file's time power_is: mean         # of the time since
+# the row before, or: sample
+
+FORMAT = "ir_trace/1"
+_KEYS = ("format", "columns", "clock_offset", "power_is")
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a file: its heading, and what its values are multiplied by."""
+
+    heading: str
+    factor: float = 1.0
+
+
+@dataclass(frozen=True)
+class TraceMapping:
+    """Columns of a file by the names that they mean; empty: the headings say it themselves.
+
+    clock_offset [s] is added to the file's time, NaN where it is to be found by comparing. sampled:
+    power is the value of an instant, else the mean since the row before.
+    """
+
+    columns: Mapping[str, Column] = field(default_factory=lambda: MappingProxyType({}))
+    clock_offset: float = math.nan
+    sampled: bool = False
+
+
+def read_mapping(path: Path) -> TraceMapping:
+    """The mapping of a file; TraceError with the key that is wrong."""
+    try:
+        tree = plain_yaml(path)
+    except DescriptionFileError as error:
+        raise TraceError(str(error)) from error
+    except InvalidValueError as error:
+        raise TraceError(f"{path}: {error}") from error
+    if not isinstance(tree, dict) or tree.get("format") != FORMAT:
+        raise TraceError(f"{path}: is no mapping of a trace, which begins with format: {FORMAT}")
+    unknown = [str(key)[:40] for key in tree if key not in _KEYS]
+    if unknown:
+        raise TraceError(f"{path}: key {unknown[0]!r} is unknown, known are {', '.join(_KEYS)}")
+    meaning = tree.get("power_is", "mean")
+    if meaning not in ("mean", "sample"):
+        raise TraceError(f"{path}: power_is is {str(meaning)[:40]!r}, it must be mean or sample")
+    return TraceMapping(
+        _columns(path, tree.get("columns")), _offset(path, tree), meaning == "sample"
+    )
+
+
+def _columns(path: Path, tree: Any) -> Mapping[str, Column]:
+    if not isinstance(tree, dict) or "time" not in tree:
+        raise TraceError(f"{path}: columns must name at least time")
+    return MappingProxyType(
+        {str(name): _column(f"{path}: {name}", each) for name, each in tree.items()}
+    )
+
+
+def _column(where: str, tree: Any) -> Column:
+    if isinstance(tree, str):
+        return Column(tree)
+    if not isinstance(tree, dict) or not set(tree) <= {"column", "unit"} or "column" not in tree:
+        raise TraceError(f"{where[:200]}: must be {{column: heading, unit: unit}}")
+    return Column(str(tree["column"]), factor(str(tree["unit"]), where) if "unit" in tree else 1.0)
+
+
+def _offset(path: Path, tree: Mapping[str, Any]) -> float:
+    offset = tree.get("clock_offset", math.nan)
+    if isinstance(offset, bool) or not isinstance(offset, int | float) or math.isinf(offset):
+        raise TraceError(
+            f"{path}: clock_offset is {str(offset)[:40]!r}, it must be a number of seconds"
+        )
+    return float(offset)
+
+
+# Which columns of a table are read: by their names, with a unit or without, or by a mapping.
+
+Wanted = Callable[[str], bool]
+"""Whether a column of this name is read where no mapping names the columns."""
+
+
+def chosen(
+    headings: Sequence[str], where: str, wanted: Wanted, mapping: TraceMapping
+) -> dict[str, tuple[int, float]]:
+    """Place and factor to SI of each column by its name; TraceError without a time, or with two of
+    a name.
+    """
+    places: dict[str, tuple[int, float]] = {}
+    for name, column in mapping.columns.items():
+        if column.heading not in headings:
+            raise TraceError(
+                f"{where}: there is no column {column.heading[:80]!r}, {_known(headings)}"
+            )
+        if headings.count(column.heading) > 1:
+            raise TraceError(f"{where}: column {column.heading[:80]} is there twice")
+        places[name] = headings.index(column.heading), column.factor
+    for k, heading in enumerate([] if mapping.columns else headings):
+        name, scale = _named(heading, where, wanted)
+        if not wanted(name):
+            continue
+        if name in places:
+            raise TraceError(f"{where}: column {name} is there twice")
+        places[name] = k, scale
+    if TIME not in places:
+        raise TraceError(f"{where}: there is no column time, {_known(headings)}")
+    return places
+
+
+def _named(heading: str, where: str, wanted: Wanted) -> tuple[str, float]:
+    """Name and factor of a heading; a unit in brackets has to be known only where the name is
+    wanted.
+    """
+    bare = heading.split("[")[0].split("(")[0].strip()
+    if wanted(heading) or (bare != heading and not wanted(bare)):
+        return heading, 1.0
+    return parsed(heading, where)
+
+
+def _known(headings: Sequence[str]) -> str:
+    return f"there is: {', '.join(headings)[:200]}"

@@ -1,0 +1,315 @@
+"""Traces as tables in CSV or Parquet files."""
+
+from __future__ import annotations
+
+import csv
+import os
+import stat
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from datetime import datetime
+from itertools import compress, islice, pairwise
+from pathlib import Path
+from sys import intern
+from types import MappingProxyType
+from typing import Any, TextIO
+
+import numpy as np
+
+from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
+from ir_recorder.errors import TraceError
+from ir_recorder.traces.columns import TraceMapping, Wanted, chosen
+from ir_recorder.traces.trace import LOAD, MODE, TIME, Trace
+
+# Files of measurements as a user names them: regular ones of a bounded size.
+
+BYTES_MAX = 500_000_000
+
+
+def opened(path: Path) -> int:
+    """A descriptor of a file of at most BYTES_MAX; never waits on a FIFO or a device. Raises
+    TraceError.
+    """
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise TraceError(f"{path}: can't be opened: {reason}") from error
+    status = os.fstat(descriptor)
+    fault = "is not a regular file" if not stat.S_ISREG(status.st_mode) else ""
+    if not fault and status.st_size > BYTES_MAX:
+        fault = f"has {status.st_size} bytes, at most {BYTES_MAX} are read"
+    if fault:
+        os.close(descriptor)
+        raise TraceError(f"{path}: {fault}")
+    return descriptor
+
+
+# Traces as CSV: a line of headings, then numbers; commas, semicolons, tabs or spaces between
+# them.
+#
+# Read in blocks, so that memory holds the wanted columns only. An empty cell and NaN are missing
+# values. Where no commas separate, they may be decimal. Time may be written as date and time of
+# ISO 8601. A row that says the same as the one before, and a last line that was cut, are left
+# out; the trace's problems say so. The text is UTF-8, or UTF-16 with its byte order mark
+# ("Unicode text" of a spreadsheet).
+
+VALUES_MAX = 50_000_000  # 400 MB of memory
+_BLOCK = 10_000  # lines that are converted at a time
+WORDS = (MODE, LOAD)  # columns of words
+
+
+def read_csv(path: Path, wanted: Wanted, mapping: TraceMapping) -> Trace:
+    """The trace of a CSV file; TraceError with the line and the column that is wrong."""
+    with _lines(path) as file:
+        try:
+            return _Reader(path, file, wanted, mapping, _cut(file)).trace()
+        except csv.Error as error:
+            raise TraceError(f"{path}: {error}") from error
+
+
+def _lines(path: Path) -> TextIO:
+    """The lines of a file in UTF-8 or, where it begins so, UTF-16."""
+    descriptor = opened(path)
+    utf_16 = os.pread(descriptor, 2, 0) in (BOM_UTF16_LE, BOM_UTF16_BE)
+    return os.fdopen(
+        descriptor, encoding="utf-16" if utf_16 else "utf-8-sig", errors="replace", newline=""
+    )
+
+
+def _cut(file: TextIO) -> bool:
+    """Whether the last line lacks its end: what writes the file may have been stopped in it."""
+    size = os.fstat(file.fileno()).st_size
+    end = os.pread(file.fileno(), 2, max(size - 2, 0)).strip(b"\0")  # UTF-16 has two bytes for each
+    return not end.endswith((b"\r", b"\n"))
+
+
+class _Reader:
+    """cut: the last line has no end; one that lacks values is left out then."""
+
+    def __init__(
+        self, path: Path, file: Iterator[str], wanted: Wanted, mapping: TraceMapping, cut: bool
+    ) -> None:
+        self._path = path
+        self._mapping = mapping
+        self._cut = cut
+        self._file = file
+        self._begin = 0
+        self._problems: list[str] = []
+        header = self._header()
+        self._delimiter = max(
+            ";\t, ", key=lambda sign: (header.count(sign) > 0, sign != " ", header.count(sign))
+        )
+        self._headings = [each.strip() for each in next(self._split([header]), [])]
+        self._places = chosen(self._headings, f"{path}:{self._begin}", wanted, mapping)
+
+    def _split(self, lines: Iterable[str]) -> Iterator[list[str]]:
+        """Rows of cells; several spaces separate as one does."""
+        return csv.reader(lines, delimiter=self._delimiter, skipinitialspace=self._delimiter == " ")
+
+    def _header(self) -> str:
+        for line in self._file:
+            self._begin += 1
+            if "\0" in line:
+                fault = "has zero bytes: it is no text in UTF-8, nor in UTF-16 with its mark"
+                raise TraceError(f"{self._path}:{self._begin}: {fault}; save it as CSV UTF-8")
+            if line.strip() and not line.startswith("#"):
+                return line
+        raise TraceError(f"{self._path}: has 0 points, a trace has at least 2")
+
+    def trace(self) -> Trace:
+        """All rows."""
+        numbers = [name for name in self._places if name not in WORDS]
+        texts: dict[str, list[str]] = {name: [] for name in self._places if name in WORDS}
+        blocks = []
+        lines = []
+        size = 0
+        line = self._begin
+        following = list(islice(self._file, _BLOCK))
+        while block := following:
+            following = list(islice(self._file, _BLOCK))
+            plain = None if texts else self._plain(block, numbers)
+            if plain is not None:
+                blocks.append(plain)
+                lines.append(line + 1 + np.arange(len(block)))
+            else:
+                own = self._rows(block, line, last=not following)
+                blocks.append(self._block(own, numbers))
+                lines.append(np.array([number for number, _ in own], np.int64))
+                for name, words in texts.items():
+                    words.extend(intern(row[self._places[name][0]].strip()) for _, row in own)
+            line = line + len(block)
+            size = size + blocks[-1].size
+            if size > VALUES_MAX:
+                raise TraceError(f"{self._path}:{line}: more than {VALUES_MAX} values, the limit")
+        values = np.concatenate(blocks) if blocks else np.empty((0, len(numbers)))
+        columns = {name: np.ascontiguousarray(values[:, k]) for k, name in enumerate(numbers)}
+        spoken = {name: tuple(each) for name, each in texts.items()}
+        still = not (np.diff(columns[TIME]) > 0.0).all()
+        if still and not (kept := _once(values, spoken)).all():
+            self._problems.append(f"{np.count_nonzero(~kept)} rows repeat the one before: left out")
+            columns = {name: each[kept] for name, each in columns.items()}
+            spoken = {name: tuple(compress(each, kept)) for name, each in spoken.items()}
+            lines = [np.concatenate(lines)[kept]]
+        time = columns.pop(TIME)
+        self._check_time(time, lines)
+        texts_of = MappingProxyType(spoken)
+        problems = tuple(self._problems)
+        sampled = self._mapping.sampled
+        return Trace(str(self._path), time, MappingProxyType(columns), texts_of, problems, sampled)
+
+    def _rows(self, block: Sequence[str], before: int, last: bool) -> list[tuple[int, list[str]]]:
+        """The lines of a block as rows of cells with their numbers; blank ones are none."""
+        own = [(before + k, row) for k, row in enumerate(self._split(block), 1) if row]
+        if self._cut and last and own and len(own[-1][1]) < len(self._headings):
+            self._problems.append(f"line {own.pop()[0]}, the last one, was cut: left out")
+        return own
+
+    def _plain(self, block: Sequence[str], names: Sequence[str]) -> FloatArray | None:
+        """Values of these columns (rows, names) in SI where the lines hold finite numbers alone, by
+        NumPy's parser; None where anything else is in them.
+        """
+        between = len(self._headings) - 1
+        if any(line.count(self._delimiter) != between for line in block):
+            return None
+        places = [self._places[name][0] for name in names]
+        try:
+            values = np.loadtxt(
+                block, delimiter=self._delimiter, usecols=places, comments=None, ndmin=2
+            )
+        except ValueError:
+            return None
+        if values.shape != (len(block), len(names)) or not np.isfinite(values).all():
+            return None
+        return np.asarray(values * [self._places[name][1] for name in names])
+
+    def _block(self, rows: Sequence[tuple[int, Sequence[str]]], names: Sequence[str]) -> FloatArray:
+        """Values of these columns (rows, names) in SI."""
+        values = np.empty((len(rows), len(names)))
+        for k, (line, row) in enumerate(rows):
+            if len(row) != len(self._headings):
+                raise TraceError(
+                    f"{self._path}:{line}: has {len(row)} values, "
+                    f"the header names {len(self._headings)} columns"
+                )
+            for j, name in enumerate(names):
+                place, scale = self._places[name]
+                values[k, j] = scale * self._number(row[place], name, line)
+        return values
+
+    def _number(self, text: str, name: str, line: int) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = self._unusual(text.strip(), name, line)
+        else:
+            if value - value != 0.0 and (
+                value == value or name == TIME
+            ):  # inf; nan is a missing value
+                raise TraceError(f"{self._path}:{line}: {name} is {text[:40]!a}, it must be finite")
+        return value
+
+    def _unusual(self, text: str, name: str, line: int) -> float:
+        if not text and name != TIME:
+            return float("nan")
+        try:
+            if self._delimiter != "," and text.count(",") == 1:
+                return float(text.replace(",", "."))
+            if name == TIME:
+                return datetime.fromisoformat(text).timestamp()
+        except ValueError:
+            pass
+        raise TraceError(f"{self._path}:{line}: {name} is {text[:40]!a}, it must be a number")
+
+    def _check_time(self, time: FloatArray, lines: Sequence[IntArray]) -> None:
+        back = np.flatnonzero(np.diff(time) <= 0.0)
+        if len(back):
+            k = int(back[0]) + 1
+            line = np.concatenate(lines)[k]
+            raise TraceError(
+                f"{self._path}:{line}: time is {time[k]:.12g} s, it must increase: the row "
+                f"before has {time[k - 1]:.12g} s"
+            )
+
+
+def _once(values: FloatArray, spoken: Mapping[str, Sequence[str]]) -> BoolArray:
+    """Which rows (N,) say something else than the one before, in values (N, columns) or words."""
+    before = values[:-1]
+    after = values[1:]
+    kept = np.ones(len(values), bool)
+    kept[1:] = ((before != after) & ~(np.isnan(before) & np.isnan(after))).any(axis=1)
+    for words in spoken.values():
+        kept[1:] |= [first != second for first, second in pairwise(words)]
+    return kept
+
+
+# Traces as Parquet, by the optional pyarrow: the same columns as in CSV.
+
+
+def read_parquet(path: Path, wanted: Wanted, mapping: TraceMapping) -> Trace:
+    """The trace of a Parquet file; TraceError where pyarrow isn't installed or a column makes no
+    sense.
+    """
+    try:
+        from pyarrow import ArrowException, parquet
+    except ImportError as error:
+        raise TraceError(f"{path}: Parquet needs pyarrow: pip install pyarrow") from error
+    try:
+        with os.fdopen(opened(path), "rb") as stream:
+            file = parquet.ParquetFile(stream)
+            places = chosen(
+                [str(name) for name in file.schema_arrow.names], str(path), wanted, mapping
+            )
+            if file.metadata.num_rows * len(places) > VALUES_MAX:
+                raise TraceError(f"{path}: more than {VALUES_MAX} values, the limit")
+            table = _read(file, [place for place, _ in places.values()])
+    except (ArrowException, OSError) as error:
+        raise TraceError(f"{path}: {error}") from error
+    columns = dict[str, FloatArray]()
+    texts = dict[str, tuple[str, ...]]()
+    for (name, (_, scale)), column in zip(places.items(), table, strict=True):
+        if name in WORDS:
+            texts[name] = tuple(
+                "" if each is None else str(each).strip() for each in column.to_pylist()
+            )
+        else:
+            columns[name] = scale * _numbers(path, column, name)
+    time = columns.pop(TIME)
+    return Trace(
+        str(path), time, MappingProxyType(columns), MappingProxyType(texts), sampled=mapping.sampled
+    )
+
+
+def _read(file: Any, places: list[int]) -> list[Any]:
+    """The columns at these places of the schema; only they are read."""
+    names = [file.schema_arrow.names[place] for place in places]
+    table = file.read(columns=names)
+    return [table.column(name) for name in names]
+
+
+def _numeric(types: Any) -> tuple[Callable[[Any], bool], ...]:
+    """What holds numbers; a column without a single value is of type null."""
+    return types.is_integer, types.is_floating, types.is_decimal, types.is_null
+
+
+def _numbers(path: Path, column: Any, name: str) -> FloatArray:
+    """Values (N,), NaN where a cell is empty; times may be dates. TraceError for what is no
+    number.
+    """
+    from pyarrow import ArrowException, types
+
+    if name == TIME and types.is_timestamp(column.type):
+        instants = column.to_numpy().astype("datetime64[ns]")
+        numbers = np.where(np.isnat(instants), np.nan, instants.astype(np.int64) * 1e-9)
+    elif any(each(column.type) for each in _numeric(types)):
+        try:
+            numbers = np.array(column.cast("float64").to_numpy(), np.float64)
+        except ArrowException as error:
+            raise TraceError(f"{path}: column {name}: {error}") from error
+    else:
+        raise TraceError(f"{path}: column {name} is of {column.type}, it must be of numbers")
+    wrong = np.flatnonzero(~np.isfinite(numbers) if name == TIME else np.isinf(numbers))
+    if len(wrong):
+        row = int(wrong[0])
+        raise TraceError(f"{path}: row {row + 1}: {name} is {numbers[row]:g}, it must be finite")
+    return numbers
