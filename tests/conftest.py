@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import sys
-from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -25,22 +24,6 @@ settings.register_profile(
     "repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("repeatable")
-
-
-_HERE = Path(__file__).parent
-REAL_TIME = (_HERE / "nodes", _HERE / "system")
-"""Folders of tests in which nodes talk over DDS in real time, on a machine that others may use
-too.
-"""
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Repeat a failed test of real nodes once: what fails twice is a fault, and the run counts what
-    did not ("1 rerun"). Nothing else is repeated.
-    """
-    for item in items:
-        if any(item.path.is_relative_to(folder) for folder in REAL_TIME):
-            item.add_marker(pytest.mark.flaky(reruns=1))
 
 
 def pytest_configure(config: pytest.Config) -> None:
