@@ -14,13 +14,8 @@ from rclpy.task import Future
 
 from ir_msgs.action import RunProgram
 from ir_msgs.srv import SetPlcInput
-from ir_msgs_py.ros.serving import (
-    SENDS,
-    UNDISCOVERED,
-    BoundedService,
-    PatientSender,
-    RecordedActionServer,
-)
+from ir_msgs_py.ros.rclpy_inside import SENDS, UNDISCOVERED, PatientSender
+from ir_msgs_py.ros.serving import BoundedService, RecordedActionServer
 from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.ros.topics import SERVICE
 from ir_msgs_py.status import StatusCode

@@ -18,7 +18,6 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import rclpy
-from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
 from rclpy.executors import (
     Executor,
     SingleThreadedExecutor,
@@ -26,11 +25,11 @@ from rclpy.executors import (
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
-from rosgraph_msgs.msg import Clock
 
 from ir_msgs_py.checks import one_line
 from ir_msgs_py.errors import ParameterError
 from ir_msgs_py.ros.network import apply_network
+from ir_msgs_py.ros.rclpy_inside import UNREADABLE_ARGUMENTS, heed_times_only, survive_clients
 from ir_msgs_py.ros.spinning import LOOK, Spinning
 
 N = TypeVar("N", bound=Node)
@@ -39,7 +38,6 @@ FAILURES_WITHIN = 60.0
 """So many callbacks may fail within so many seconds: a node that fails more often does nothing
 useful.
 """
-_UNREADABLE = (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError)
 _HELP = """usage: {name} [--ros-args [-p NAME:=VALUE ...] [--params-file FILE] [-r __ns:=/NAMESPACE]]
 
 {about}
@@ -76,7 +74,7 @@ def init_ros(words: Sequence[str] | None) -> None:
     """
     try:
         rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
-    except _UNREADABLE as error:
+    except UNREADABLE_ARGUMENTS as error:
         raise _unreadable(error) from error
 
 
@@ -84,41 +82,16 @@ def own_words(program: str, words: Sequence[str]) -> list[str]:
     """The words that are not for ROS; CommandLineError for such that ROS can't read."""
     try:
         return remove_ros_args([program, *words])[1:]
-    except _UNREADABLE as error:
+    except UNREADABLE_ARGUMENTS as error:
         raise _unreadable(error) from error
 
 
 def _unreadable(error: Exception) -> CommandLineError:
     """What the C library says, without its places in its own source."""
-    if isinstance(error, UnknownROSArgsError):
+    if type(error).__name__ == "UnknownROSArgsError":
         return CommandLineError(f"unknown arguments after --ros-args: {one_line(str(error), 300)}")
     what = str(error).partition(": ")[2].partition(", at /")[0].removesuffix(".")
     return CommandLineError(one_line(what or str(error), 300))
-
-
-_SAID_AGAIN = 60.0  # s
-
-
-def heed_times_only(node: Node) -> None:
-    """Let the node ignore times before 1970 on /clock, whenever it begins to listen to one.
-
-    rclpy raises at each of them, and a node that only fails ends.
-    """
-    source = node._time_source
-    take = source.clock_callback
-
-    def heed(message: Clock) -> None:
-        if message.clock.sec >= 0:
-            take(message)
-            return
-        seconds = message.clock.sec
-        node.get_logger().warning(
-            f"/clock says {seconds} s, which is no time: ignored", throttle_duration_sec=_SAID_AGAIN
-        )
-
-    source.clock_callback = heed
-    if source._clock_sub is not None:
-        source._clock_sub.callback = heed
 
 
 def run_node(
@@ -182,6 +155,7 @@ def spin(
     """
     failures: deque[float] = deque(maxlen=FAILURES_MAX)
     heed_times_only(node)
+    survive_clients(node)
     while True:
         try:
             return spinning.run(executor, goes_on, look)

@@ -9,19 +9,14 @@ beyond with a sentence, and answers one. What is raised meanwhile (no descriptor
 from __future__ import annotations
 
 import array
-import threading
-import time
 import traceback
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from typing import Any, ClassVar
 from weakref import WeakKeyDictionary
 
-from rclpy.action import ActionServer
 from rclpy.callback_groups import CallbackGroup
 from rclpy.executors import await_or_execute
-from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
@@ -31,6 +26,14 @@ from ir_msgs.msg import RecordedCall
 from ir_msgs_py import names
 from ir_msgs_py.ros.conversions import status_to_msg
 from ir_msgs_py.ros.messages import type_name
+from ir_msgs_py.ros.rclpy_inside import (
+    PatientActionServer,
+    PatientSender,
+    can_take_requests,
+    forget_request,
+    send_to_whoever_is_left,
+    take_request,
+)
 from ir_msgs_py.ros.topics import REQUESTS_WAITING, SERVICE, PolledGroup
 from ir_msgs_py.status import Status, StatusCode
 
@@ -151,23 +154,14 @@ def unexpected(error: BaseException) -> Status:
 
 Handler = Callable[[Any, Any], Any]
 
-UNDISCOVERED = 0.09
-"""Seconds that the middleware waits, less a tenth, for a client that it has not discovered (0.1
-s).
-"""
-
-SENDS = 10
-"""A second: more than a busy machine takes to discover a client, and no longer than a dead one may
-hold up the others.
-"""
-
 
 class BoundedService(Waitable):
     """A service of `node` whose responses have a `status`; at most `waiting` requests wait in it.
 
     handler: from request and response to the response; requests are answered in the order in which
     they came. What it raises, and a response that can't be sent, is answered as a failure and
-    logged.
+    logged; a client that has gone is a warning. Where rclpy's insides are missing, it is a service
+    as rclpy has it: the middleware's queue is the only one.
     """
 
     def __init__(
@@ -190,8 +184,14 @@ class BoundedService(Waitable):
             service_type, name, handler, qos_profile=SERVICE, callback_group=untouched
         )
         self._calls = Calls.of(node)
-        self._more = node.create_guard_condition(_nothing, callback_group=untouched)
         self._sender = PatientSender(self._service.send_response)
+        if not can_take_requests(self._service):
+            node.destroy_service(self._service)
+            self._service = node.create_service(
+                service_type, name, self._answer, qos_profile=SERVICE, callback_group=group
+            )
+            return
+        self._more = node.create_guard_condition(_nothing, callback_group=untouched)
         self._waiting: deque[tuple[Any, Any]] = deque()
         self._index = 0
         node.add_waitable(self)
@@ -222,9 +222,8 @@ class BoundedService(Waitable):
     def take_data(self) -> tuple[Any, Any] | None:
         """Take all that have come; the one to be answered now."""
         while True:
-            with self._service.handle:
-                taken = self._service.handle.service_take_request(self._type.Request)
-            if taken is None or taken[1] is None:
+            taken = take_request(self._service)
+            if taken is None:
                 return self._waiting.popleft() if self._waiting else None
             if len(self._waiting) < self._most:
                 self._waiting.append(taken)
@@ -236,67 +235,42 @@ class BoundedService(Waitable):
         if taken_data is None:
             return
         request, header = taken_data
+        self._send(self._answer(request, self._type.Response()), header)
+
+    def _answer(self, request: Any, response: Any) -> Any:
+        """The handler's response, or that of what it raises."""
         try:
             answered = self._calls.taken(self._service.service_name, type_name(self._type), request)
-            response = self._handler(request, self._type.Response())
+            response = self._handler(request, response)
             answered(response)
-            self._sender.send(response, header)
         except ANY as error:
             self._log(traceback.format_exc())
-            self._say(unexpected(error), header)
+            response = self._response(unexpected(error))
+        return response
 
     def _refuse(self, header: Any) -> None:
         sentence = (
             f"{self._most} requests of {self._service.service_name} are waiting: send fewer at once"
         )
-        self._say(Status(StatusCode.FAILURE, sentence), header)
+        self._send(self._response(Status(StatusCode.FAILURE, sentence)), header)
 
-    def _say(self, status: Status, header: Any) -> None:
+    def _send(self, response: Any, header: Any) -> None:
+        """Send a response, or that it can't be sent; whether or not its client is still there."""
+        try:
+            send_to_whoever_is_left(lambda: self._sender.send(response, header))
+        except ANY as error:
+            self._log(traceback.format_exc())
+            failure = self._response(unexpected(error))
+            send_to_whoever_is_left(lambda: self._sender.send(failure, header))
+
+    def _response(self, status: Status) -> Any:
         response = self._type.Response()
         response.status = status_to_msg(Status(status.code, status.message, self._source))
-        self._sender.send(response, header)
+        return response
 
 
-class _PatientHandle(_rclpy.ActionServer):
-    """rclpy's handle of an action server, whose responses reach a client that is discovered late.
-
-    A goal whose client does not hear that it was accepted would not even be executed.
-    """
-
-    def send_goal_response(self, header: Any, response: Any) -> None:
-        """That a goal is taken or not."""
-        self._patiently(super().send_goal_response, header, response)
-
-    def send_cancel_response(self, header: Any, response: Any) -> None:
-        """Which goals will end."""
-        self._patiently(super().send_cancel_response, header, response)
-
-    def send_result_response(self, header: Any, response: Any) -> None:
-        """What became of a goal."""
-        self._patiently(super().send_result_response, header, response)
-
-    def _patiently(self, send: Callable[[Any, Any], None], header: Any, response: Any) -> None:
-        failures: list[Exception] = []
-
-        def attempt(response: Any, header: Any) -> None:
-            failures.clear()
-            try:
-                send(header, response)
-            except _rclpy.RCLError as error:
-                failures.append(error)
-
-        if not hasattr(self, "_sender"):
-            self._sender = PatientSender(lambda response, attempt: attempt(response))
-        self._sender.send(response, lambda response: attempt(response, header))
-        if failures:
-            raise failures[0]
-
-
-_MAKING = threading.Lock()
-
-
-class RecordedActionServer(ActionServer):
-    """An ActionServer whose goals and results are published for recordings."""
+class RecordedActionServer(PatientActionServer):
+    """An action server whose goals and results are published for recordings."""
 
     def __init__(
         self, node: Node, action_type: Any, name: str, *arguments: Any, **options: Any
@@ -304,57 +278,28 @@ class RecordedActionServer(ActionServer):
         self._calls = Calls.of(node)
         self._type_text = type_name(action_type)
         self._full_name = node.resolve_topic_name(name)
-        with _MAKING, _made_of(_PatientHandle):
-            super().__init__(node, action_type, name, *arguments, **options)
+        super().__init__(node, action_type, name, *arguments, **options)
 
-    async def _execute_goal(self, execute_callback: Any, goal_handle: Any) -> None:
+    def register_execute_callback(self, execute_callback: Any) -> None:
+        """Let a goal be executed by this callback where it names none."""
+        super().register_execute_callback(self._recorded(execute_callback))
+
+    def notify_execute(self, goal_handle: Any, execute_callback: Any) -> None:
+        """Let a goal be executed, by its own callback where it has one."""
+        own = None if execute_callback is None else self._recorded(execute_callback)
+        super().notify_execute(goal_handle, own)
+
+    def _recorded(self, execute_callback: Any) -> Any:
+        """The callback, and around it what a recording needs."""
+
         async def execute(goal: Any) -> Any:
             answered = self._calls.taken(self._full_name, self._type_text, goal.request)
             result = await await_or_execute(execute_callback, goal)
             answered(result)
-            goal._goal_request = type(goal.request)()  # rclpy keeps the goal as long as its result
+            forget_request(goal)
             return result
 
-        await super()._execute_goal(execute, goal_handle)
-
-
-class PatientSender:
-    """Sends a response again where the server has not discovered its client yet.
-
-    A client may see the server before the server sees it. The middleware then waits UNDISCOVERED,
-    drops the response and warns; only the time it took shows it. A client ignores an answer that it
-    has already. One
-    that is never discovered has died: what follows is sent once, until a client takes its answer at
-    once.
-    """
-
-    def __init__(
-        self, send: Callable[[Any, Any], None], clock: Callable[[], float] = time.monotonic
-    ) -> None:
-        self._send = send
-        self._clock = clock
-        self._patient = True
-
-    def send(self, response: Any, header: Any) -> None:
-        """Send it, for about a second at most."""
-        for _ in range(SENDS if self._patient else 1):
-            begun = self._clock()
-            self._send(response, header)
-            if self._clock() - begun < UNDISCOVERED:
-                self._patient = True
-                return
-        self._patient = False
-
-
-@contextmanager
-def _made_of(handle: type) -> Iterator[None]:
-    """rclpy makes its action servers of this class meanwhile."""
-    plain = _rclpy.ActionServer
-    _rclpy.ActionServer = handle
-    try:
-        yield
-    finally:
-        _rclpy.ActionServer = plain
+        return execute
 
 
 def _nothing() -> None:

@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
-from rclpy._rclpy_pybind11 import RCLError
 from rclpy.context import Context
 from rclpy.executors import (
     Executor,
@@ -21,6 +20,8 @@ from rclpy.executors import (
 )
 from rclpy.node import Node
 from rclpy.task import Future
+
+from ir_msgs_py.ros.rclpy_inside import RCLError, survive_clients
 
 T = TypeVar("T")
 LOOK = 0.1  # s between two looks whether a node goes on
@@ -82,6 +83,7 @@ class BackgroundExecutor:
 
     def add_node(self, node: Node) -> Node:
         """Spin this node too; it is destroyed with the executor."""
+        survive_clients(node)
         self._nodes.append(node)
         self._executor.add_node(node)
         return node

@@ -17,6 +17,8 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+from ir_msgs_py.ros.rclpy_inside import can_take_messages, take_message
+
 REQUESTS_WAITING = 1000
 """Requests of a service that wait for their answers at most; what comes beyond is refused
 (`serving.BoundedService`).
@@ -63,6 +65,31 @@ class PolledGroup(CallbackGroup):
         """Nothing began."""
 
 
+class _Taken:
+    """The messages of a topic that nobody is woken for; of those that rclpy calls back with where
+    its insides are missing.
+    """
+
+    def __init__(self, node: Node, message_type: Any, topic: str, qos: QoSProfile) -> None:
+        self._came: deque[tuple[Any, dict[str, int]]] = deque(maxlen=max(1, qos.depth))
+        self._subscription = node.create_subscription(
+            message_type, topic, self._keep, qos, callback_group=PolledGroup()
+        )
+        self._polled = can_take_messages(self._subscription)
+        if not self._polled:
+            node.destroy_subscription(self._subscription)
+            self._subscription = node.create_subscription(message_type, topic, self._keep, qos)
+
+    def next(self) -> tuple[Any, dict[str, int]] | None:
+        """The next message with its times [ns]; None when there is none."""
+        if self._polled:
+            return take_message(self._subscription)
+        return self._came.popleft() if self._came else None
+
+    def _keep(self, message: Any, info: dict[str, int]) -> None:
+        self._came.append((message, info))
+
+
 class Received(NamedTuple):
     """A message, and how long ago it came [s]."""
 
@@ -75,17 +102,14 @@ class LatestMessage:
 
     def __init__(self, node: Node, message_type: Any, topic: str) -> None:
         newest = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-        self._subscription = node.create_subscription(
-            message_type, topic, lambda message: None, newest, callback_group=PolledGroup()
-        )
+        self._taken = _Taken(node, message_type, topic, newest)
 
     def take(self) -> Received | None:
         """Return the newest message that has come since the last call, None when none has."""
-        with self._subscription.handle:
-            taken = self._subscription.handle.take_message(self._subscription.msg_type, False)
-        if taken is None:
+        found = self._taken.next()
+        if found is None:
             return None
-        message, info = taken
+        message, info = found
         return Received(message, max(0.0, (time.time_ns() - info["received_timestamp"]) * 1e-9))
 
 
@@ -94,19 +118,16 @@ class PolledTopic:
 
     def __init__(self, node: Node, message_type: Any, topic: str, qos: QoSProfile) -> None:
         self._most = max(1, qos.depth)
-        self._subscription = node.create_subscription(
-            message_type, topic, lambda message: None, qos, callback_group=PolledGroup()
-        )
+        self._taken = _Taken(node, message_type, topic, qos)
 
     def take(self) -> list[Any]:
         """Return what has come since the last call, oldest first; at most the depth asked for."""
         taken: list[Any] = []
-        with self._subscription.handle:
-            while len(taken) < self._most:
-                found = self._subscription.handle.take_message(self._subscription.msg_type, False)
-                if found is None:
-                    break
-                taken.append(found[0])
+        while len(taken) < self._most:
+            found = self._taken.next()
+            if found is None:
+                break
+            taken.append(found[0])
         return taken
 
 
@@ -149,8 +170,7 @@ class CommandTopic:
     def _waiting(self) -> Iterator[tuple[int, bool, Any]]:
         for latching, subscription in self._subscriptions:
             for _ in range(REQUESTS_WAITING):  # who floods the topic does not hold the node here
-                with subscription.handle:
-                    taken = subscription.handle.take_message(subscription.msg_type, False)
+                taken = take_message(subscription) if can_take_messages(subscription) else None
                 if taken is None:
                     break
                 yield taken[1]["source_timestamp"], latching, taken[0]

@@ -1,0 +1,306 @@
+"""The insides of rclpy that this project uses, in this file only.
+
+rclpy documents no way to take a message when it is wanted, to send a response again, to read who
+wrote a request, or to drop a request that was answered. Each function here says what happens where
+an rclpy has no such part: then the node behaves as plain rclpy does. `part` finds them all, so that
+a test can hide them.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from rclpy.action import ActionServer
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
+
+
+def part(owner: Any, name: str) -> Any:
+    """An attribute that rclpy does not document; None where this rclpy has none."""
+    return getattr(owner, name, None)
+
+
+class _NeverRaisedError(Exception):
+    """Stands for an exception that this rclpy does not have."""
+
+
+RCLError: type[Exception] = getattr(_rclpy, "RCLError", _NeverRaisedError)
+InvalidHandle: type[Exception] = getattr(_rclpy, "InvalidHandle", _NeverRaisedError)
+UNREADABLE_ARGUMENTS: tuple[type[Exception], ...] = (
+    RCLError,
+    getattr(_rclpy, "RCLInvalidROSArgsError", _NeverRaisedError),
+    getattr(_rclpy, "UnknownROSArgsError", _NeverRaisedError),
+)
+"""Raised by rclpy.init for words that it can't read."""
+
+UNSENT = (RCLError, InvalidHandle)
+"""Raised by a response that can't be sent: its client has gone, or its server is being
+destroyed.
+"""
+
+_SAID_AGAIN = 60.0  # s between two warnings of one kind
+
+
+def send(attempt: Callable[[], object]) -> None:
+    """Call `attempt`, and let a warning of it be a warning.
+
+    rclpy warns of a client that it has not discovered from its C code. Where a filter makes
+    exceptions of warnings, that is a SystemError.
+    """
+    try:
+        attempt()
+    except SystemError as error:
+        if not isinstance(error.__cause__, Warning):
+            raise
+        _warn(f"{error.__cause__}")
+
+
+def send_to_whoever_is_left(attempt: Callable[[], object]) -> None:
+    """Call `attempt`; a client that has gone is a warning, and what else is raised stays raised."""
+    try:
+        send(attempt)
+    except UNSENT as error:
+        _warn(f"a response was not sent, its client may have gone away: {error}")
+
+
+def _warn(sentence: str) -> None:
+    get_logger("ir_msgs_py").warning(sentence, throttle_duration_sec=_SAID_AGAIN)
+
+
+def survive_clients(node: Node) -> None:
+    """Let no client of the node's plain services end its executor by going away.
+
+    rclpy sends their responses unguarded: parameters, the description of types.
+    """
+    for service in node.services:
+        plain = part(service, "send_response")
+        if plain is None or hasattr(service, "survives"):
+            continue
+
+        def answer(response: Any, header: Any, plain: Callable[..., object] = plain) -> None:
+            send_to_whoever_is_left(lambda: plain(response, header))
+
+        with suppress(AttributeError):  # a service that takes no attributes is left as it is
+            service.send_response = answer
+            service.survives = True
+
+
+def heed_times_only(node: Node) -> None:
+    """Let the node ignore times before 1970 on /clock, whenever it begins to listen to one.
+
+    rclpy raises at each of them, and a node that only fails ends. Without that inside each such
+    time is a callback that failed.
+    """
+    source = part(node, "_time_source")
+    take = part(source, "clock_callback")
+    if take is None:
+        return
+
+    def heed(message: Clock) -> None:
+        if message.clock.sec >= 0:
+            take(message)
+            return
+        seconds = message.clock.sec
+        node.get_logger().warning(
+            f"/clock says {seconds} s, which is no time: ignored", throttle_duration_sec=_SAID_AGAIN
+        )
+
+    source.clock_callback = heed
+    subscription = part(source, "_clock_sub")
+    if subscription is not None:
+        subscription.callback = heed
+
+
+def can_take_messages(subscription: Any) -> bool:
+    """Whether `take_message` works; otherwise the executor has to call back."""
+    return part(part(subscription, "handle"), "take_message") is not None
+
+
+def take_message(subscription: Any) -> tuple[Any, dict[str, int]] | None:
+    """The next message of a subscription that no executor waits for, with its times [ns]."""
+    with subscription.handle:
+        taken: tuple[Any, dict[str, int]] | None = subscription.handle.take_message(
+            subscription.msg_type, False
+        )
+    return taken
+
+
+def can_take_requests(service: Any) -> bool:
+    """Whether `take_request` works; otherwise the executor has to call the service's handler."""
+    return part(part(service, "handle"), "service_take_request") is not None
+
+
+def take_request(service: Any) -> tuple[Any, Any] | None:
+    """The next request of a service that no executor waits for, with its header."""
+    with service.handle:
+        taken = service.handle.service_take_request(service.srv_type.Request)
+    return None if taken is None or taken[1] is None else taken
+
+
+_PARTICIPANT = 12  # bytes of an endpoint's identity that all endpoints of a participant share
+_VALUE = 2 * ctypes.sizeof(ctypes.c_void_p)  # where an object of pybind11 points to what it wraps
+
+
+class _RequestId(ctypes.Structure):
+    """rmw_request_id_t."""
+
+    _fields_ = (("writer", ctypes.c_uint8 * 16), ("sequence_number", ctypes.c_int64))
+
+
+def participant_of(request_id: Any) -> bytes:
+    """Participant of who wrote a request; b"" where it is not known.
+
+    A request carries the identity of the endpoint that wrote it, which rclpy keeps for itself; its
+    first bytes are those of the process's participant.
+    """
+    if part(_rclpy, "rmw_request_id_t") is not type(request_id):
+        return b""
+    value = ctypes.c_void_p.from_address(id(request_id) + _VALUE).value
+    if not value:
+        return b""
+    found = _RequestId.from_address(value)
+    same = found.sequence_number == request_id.sequence_number
+    return bytes(found.writer)[:_PARTICIPANT] if same else b""
+
+
+def forget_request(goal: Any) -> None:
+    """Drop what a goal asked for: rclpy keeps it as long as the result, a quarter of an hour.
+
+    Without that inside it is kept so long.
+    """
+    if part(goal, "_goal_request") is not None:
+        goal._goal_request = type(goal.request)()
+
+
+UNDISCOVERED = 0.09
+"""Seconds that the middleware waits, less a tenth, for a client that it has not discovered
+(0.1 s).
+"""
+
+SENDS = 10
+"""A second: more than a busy machine takes to discover a client, and no longer than a dead one may
+hold up the others.
+"""
+
+
+class PatientSender:
+    """Sends a response again where the server has not discovered its client yet.
+
+    A client may see the server before the server sees it. The middleware then waits UNDISCOVERED,
+    drops the response and warns; only the time it took shows it. A client ignores an answer that it
+    has already. One that is never discovered has died: what follows is sent once, until a client
+    takes its answer at once.
+    """
+
+    def __init__(
+        self, send: Callable[[Any, Any], None], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._send = send
+        self._clock = clock
+        self._patient = True
+
+    def send(self, response: Any, header: Any) -> None:
+        """Send it, for about a second at most; raises what the last attempt raised."""
+        for _ in range(SENDS if self._patient else 1):
+            begun = self._clock()
+            failure: Exception | None = None
+            try:
+                send(lambda: self._send(response, header))
+            except UNSENT as error:
+                failure = error
+            if self._clock() - begun < UNDISCOVERED:
+                self._patient = True
+                break
+        else:
+            self._patient = False
+        if failure is not None:
+            raise failure
+
+
+def _patient(plain: type) -> type:
+    """rclpy's handle of an action server, whose responses reach a client that is discovered late.
+
+    A goal whose client does not hear that it was accepted is not executed: rclpy expects an
+    RCLError then. The other two responses raise nothing when their client has gone.
+    """
+
+    class PatientHandle(plain):  # type: ignore[valid-type, misc]
+        def send_goal_response(self, header: Any, response: Any) -> None:
+            try:
+                self._patiently(super().send_goal_response, header, response)
+            except UNSENT as error:
+                raise RCLError(str(error)) from error
+
+        def send_cancel_response(self, header: Any, response: Any) -> None:
+            each = super().send_cancel_response
+            send_to_whoever_is_left(lambda: self._patiently(each, header, response))
+
+        def send_result_response(self, header: Any, response: Any) -> None:
+            each = super().send_result_response
+            send_to_whoever_is_left(lambda: self._patiently(each, header, response))
+
+        def _patiently(self, send: Callable[[Any, Any], None], header: Any, response: Any) -> None:
+            if not hasattr(self, "_sender"):
+                self._sender = PatientSender(lambda response, attempt: attempt(response))
+            self._sender.send(response, lambda response: send(header, response))
+
+    return PatientHandle
+
+
+_MAKING = threading.Lock()
+
+
+@contextmanager
+def _patient_handles() -> Iterator[None]:
+    """rclpy makes the handles of its action servers patient meanwhile; plain where it has none."""
+    plain = part(_rclpy, "ActionServer")
+    if plain is None:
+        yield
+        return
+    with _MAKING:
+        _rclpy.ActionServer = _patient(plain)
+        try:
+            yield
+        finally:
+            _rclpy.ActionServer = plain
+
+
+class PatientActionServer(ActionServer):
+    """An ActionServer whose responses reach clients that are discovered late, that survives those
+    that have gone, and whose requests for goals a subclass may see first.
+
+    Where rclpy's insides are missing, `goal_class` and `goal_came` are not called.
+    """
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        with _patient_handles():
+            super().__init__(*arguments, **options)
+
+    def goal_class(self) -> Any:
+        """Class that the next request for a goal is converted to."""
+        return self.action_type.Impl.SendGoalService.Request
+
+    def goal_came(self, request_id: Any, request: Any) -> None:
+        """Look at a request for a goal before it is accepted."""
+
+    def take_data(self) -> dict[str, Any]:
+        """Take what has come, goals by `goal_class`."""
+        goal = None
+        take = part(part(self, "_handle"), "take_goal_request")
+        lock = part(self, "_lock")
+        if take is not None and lock is not None and part(self, "_is_goal_request_ready"):
+            self._is_goal_request_ready = False
+            with lock:
+                goal = take(self.goal_class())
+        data: dict[str, Any] = super().take_data()
+        if goal is not None and all(goal):
+            data["goal"] = goal
+            self.goal_came(*goal)
+        return data
