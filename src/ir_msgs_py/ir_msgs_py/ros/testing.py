@@ -13,6 +13,7 @@ discovery, so tests run in parallel. A test over processes overrides `ros_discov
 
 from __future__ import annotations
 
+import atexit
 import os
 import socket
 import time
@@ -29,7 +30,6 @@ if TYPE_CHECKING:  # importing rclpy costs 0.2 s, and tests of a core don't need
     from ir_msgs_py.ros.spinning import BackgroundExecutor
 
 _DOMAINS = 101  # ids above need other ports than the system leaves free
-_RESERVED: list[socket.socket] = []
 _POLL = 0.005
 _PATIENCE = 120.0
 """Longest wait [s] where a test chooses none: a busy machine does within it what a free one does at
@@ -62,7 +62,7 @@ def own_domain() -> int:
         except OSError:  # somebody has it
             name.close()
             continue
-        _RESERVED.append(name)
+        atexit.register(name.close)
         return domain
     raise RuntimeError(f"each of the {_DOMAINS} domains for tests is in use")
 
