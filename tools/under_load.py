@@ -73,20 +73,22 @@ def main() -> int:
     with load(given.busy):
         for k in range(1, given.runs + 1):
             begun = time.monotonic()
-            run = subprocess.run(
-                command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-            )
+            log = OUTPUT / f"run_{k:03d}.log"
+            with log.open("w", encoding="utf-8") as output:
+                code = subprocess.run(
+                    command, cwd=ROOT, stdout=output, stderr=subprocess.STDOUT
+                ).returncode
             seconds = time.monotonic() - begun
-            (OUTPUT / f"run_{k:03d}.log").write_text(run.stdout, encoding="utf-8")
-            passed, failed, errors, reruns, skipped = counts_of(run.stdout).values()
+            said = log.read_text(encoding="utf-8", errors="replace")
+            passed, failed, errors, reruns, skipped = counts_of(said).values()
             print(
                 f"{k:3d}  {passed:6d}  {failed:6d}  {errors:6d}  {reruns:6d}  {skipped:7d}"
                 f"  {seconds:7.0f}  {os.getloadavg()[0]:5.1f}"
             )
-            for line in re.findall(r"^(?:FAILED|ERROR) .*", run.stdout, re.MULTILINE):
+            for line in re.findall(r"^(?:FAILED|ERROR) .*", said, re.MULTILINE):
                 print(f"     {line[:160]}")
             sys.stdout.flush()
-            failures += run.returncode != 0
+            failures += code != 0
     print(f"{given.runs - failures} of {given.runs} runs green")
     return int(failures > 0)
 

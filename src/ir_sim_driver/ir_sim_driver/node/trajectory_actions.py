@@ -10,36 +10,12 @@ from typing import Any, Protocol
 from ir_msgs.msg import LoadCheck
 from ir_msgs_py.checks import one_line
 from ir_msgs_py.ros.plan_conversions import contact_to_msg
+from ir_msgs_py.ros.rclpy_inside import part, participant_of
 from ir_msgs_py.ros.serving import RecordedActionServer
 from ir_sim_driver.controller import Driver
 from ir_sim_driver.load_check import LoadFinding
 from ir_sim_driver.motion import ErrorCode, Outcome
 from ir_sim_driver.node.messages import fill_load_check, fill_points, goal_from_action
-
-# Client of a goal, and whether its process is still there.
-#
-# A goal names no client. Its request carries the identity of the endpoint that wrote it, which
-# rclpy keeps for itself; its first bytes are those of the process's participant, as in the
-# identity of the subscription that every action client has to the feedback.
-
-_PARTICIPANT = 12  # bytes of an endpoint's identity that all endpoints of a participant share
-_VALUE = 2 * ctypes.sizeof(ctypes.c_void_p)  # where an object of pybind11 points to what it wraps
-
-
-class _RequestId(ctypes.Structure):
-    """rmw_request_id_t."""
-
-    _fields_ = (("writer", ctypes.c_uint8 * 16), ("sequence_number", ctypes.c_int64))
-
-
-def participant_of(request_id: Any) -> bytes:
-    """Participant of who wrote a request; b"" where it is not known."""
-    value = ctypes.c_void_p.from_address(id(request_id) + _VALUE).value
-    if not value:
-        return b""
-    found = _RequestId.from_address(value)
-    same = found.sequence_number == request_id.sequence_number
-    return bytes(found.writer)[:_PARTICIPANT] if same else b""
 
 
 class ClientWatch:
@@ -116,17 +92,21 @@ class _CountedRequest:
     """Looks like the class `request` to rclpy, and leaves points out where there are more than
     most().
 
-    left_out: points of the request that was converted last, 0 where it is whole.
+    left_out: points of the request that was converted last, 0 where it is whole. Where the class
+    has no such function, it is the class itself: the driver then counts what was converted.
     """
 
     def __init__(self, request: Any, most: Callable[[], int]) -> None:
         kind = type(request)
-        if kind._CONVERT_TO_PY is None:
+        self.left_out = 0
+        self.as_class: Any = request
+        if part(kind, "_CONVERT_TO_PY") is None:
             kind.__import_type_support__()
-        capsule = kind._CONVERT_TO_PY
+        capsule = part(kind, "_CONVERT_TO_PY")
+        if capsule is None:
+            return
         address = _api.PyCapsule_GetPointer(capsule, _api.PyCapsule_GetName(capsule))
         convert = _Convert(address)
-        self.left_out = 0
 
         def counted(message: int) -> int | None:
             head = _GoalRequest.from_address(message)
@@ -144,15 +124,13 @@ class _CountedRequest:
             "_DESTROY_ROS_MESSAGE": kind._DESTROY_ROS_MESSAGE,
             "_CONVERT_TO_PY": _api.PyCapsule_New(pointer, None, None),
         }
-        self.as_class: Any = type("CountedRequest", (), own)()
+        self.as_class = type("CountedRequest", (), own)()
 
 
 class BoundedActionServer(RecordedActionServer):
     """An action server of goals that begin with a trajectory; most: points that are converted at
     most.
     """
-
-    _is_goal_request_ready: bool
 
     def __init__(
         self, node: Any, action_type: Any, *arguments: Any, most: Callable[[], int], **options: Any
@@ -170,22 +148,18 @@ class BoundedActionServer(RecordedActionServer):
         """Participant of who has sent a goal; b"" where it is not known. Asked once."""
         return self._clients.pop(goal_id, b"")
 
-    def take_data(self) -> dict[str, Any]:
-        """Take what has come, goals by the counting class."""
-        goal = None
-        if self._is_goal_request_ready:
-            self._is_goal_request_ready = False
-            with self._lock:
-                goal = self._handle.take_goal_request(self._counted.as_class)
-        data: dict[str, Any] = super().take_data()
-        if goal is not None and all(goal):
-            data["goal"] = goal
-            while len(self._clients) >= _CLIENTS_KEPT:  # of goals that rclpy has not accepted
-                del self._clients[next(iter(self._clients))]
-            self._clients[bytes(goal[1].goal_id.uuid)] = participant_of(goal[0])
-            if self._counted.left_out:
-                self._points[bytes(goal[1].goal_id.uuid)] = self._counted.left_out
-        return data
+    def goal_class(self) -> Any:
+        """The counting class."""
+        return self._counted.as_class
+
+    def goal_came(self, request_id: Any, request: Any) -> None:
+        """Note who has sent the goal, and how many points were left out."""
+        key = bytes(request.goal_id.uuid)
+        while len(self._clients) >= _CLIENTS_KEPT:  # of goals that rclpy has not accepted
+            del self._clients[next(iter(self._clients))]
+        self._clients[key] = participant_of(request_id)
+        if self._counted.left_out:
+            self._points[key] = self._counted.left_out
 
 
 # Execution of goals: given to the driver, followed with feedback, canceled, answered.
