@@ -231,7 +231,7 @@ def _patient(plain: type) -> type:
     RCLError then. The other two responses raise nothing when their client has gone.
     """
 
-    class PatientHandle(plain):  # type: ignore[valid-type, misc]
+    class PatientHandle(plain):
         def send_goal_response(self, header: Any, response: Any) -> None:
             try:
                 self._patiently(super().send_goal_response, header, response)
