@@ -12,8 +12,8 @@ import numpy as np
 from _results import Claim, at_most
 
 from ir_description import Cell, cell_to_yaml, load_cell
+from ir_msgs_py.announcements import Event
 from ir_msgs_py.options import PlanOptions
-from ir_msgs_py.program import Event
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner import Planner

@@ -14,8 +14,8 @@ from _results import Claim, at_least, line_of
 
 from ir_cli.offline.today_trace import today_of_trace
 from ir_krl import follow, parse
-from ir_msgs_py.before_after import BeforeAfter
 from ir_msgs_py.report import MovementKind
+from ir_msgs_py.savings import BeforeAfter
 from ir_planner import (
     Planner,
     before_after,

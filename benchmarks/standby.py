@@ -18,9 +18,8 @@ from _standby_search import Controller
 
 from ir_description import load_cell, load_power_data
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.modes import Mode
+from ir_msgs_py.modes import Mode, TransitionTimes
 from ir_msgs_py.names import NO_LOAD
-from ir_msgs_py.transitions import TransitionTimes
 from ir_planner.checks.states import state_check
 from ir_planner.program import lengths_of
 from ir_planner.program.rests import Rests, rests_at

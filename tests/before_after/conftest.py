@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from ir_krl import follow, parse
-from ir_msgs_py.before_after import BeforeAfter
+from ir_msgs_py.savings import BeforeAfter
 from ir_planner import Planner, before_after, evaluate_krl, today_of_krl, tool_in_flange
 
 OLD = (Path(__file__).parent / "old.src").read_text(encoding="utf-8")

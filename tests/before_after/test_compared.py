@@ -7,8 +7,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ir_msgs_py.before_after import BeforeAfter
 from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.savings import BeforeAfter
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import (
     Planner,

@@ -13,7 +13,7 @@ import pytest
 from pyarrow import parquet
 
 from ir_cli.main import main
-from ir_msgs_py.before_after import BeforeAfter
+from ir_msgs_py.savings import BeforeAfter
 from ir_planner import Planner
 from ir_recorder.report.costs import Costs
 from ir_recorder.report.program_comparison import (

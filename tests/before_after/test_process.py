@@ -14,8 +14,8 @@ import pytest
 from ir_cli.main import main
 from ir_description import CellPath
 from ir_krl import follow, parse
-from ir_msgs_py.before_after import BeforeAfter, Side
 from ir_msgs_py.report import MovementKind
+from ir_msgs_py.savings import BeforeAfter, Side
 from ir_planner import (
     EvaluatedProgram,
     Planner,

@@ -12,9 +12,8 @@ import pytest
 
 from ir_description import cell_from_yaml, load_power_data
 from ir_msgs.msg import PowerMode
-from ir_msgs_py.modes import MODES, RESTS, ModeRow
+from ir_msgs_py.modes import MODES, RESTS, ModeRow, TransitionTimes
 from ir_msgs_py.plc import PlcInputs
-from ir_msgs_py.transitions import TransitionTimes
 from ir_planner import Planner
 from ir_recorder.report.picture import MODE_COLOURS
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings

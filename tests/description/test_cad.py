@@ -17,13 +17,13 @@ import trimesh
 
 from ir_cli.main import main
 from ir_description import Body, CellFileError, cell_from_yaml, cell_to_yaml, load_cell
-from ir_description.files import coacd_process, piece_cache, solid_mesh
+from ir_description.files import convex_pieces as coacd_process
 from ir_description.files import convex_pieces as convex
-from ir_description.files.convex_pieces import ConvexPieces, contains
+from ir_description.files import solid_mesh
+from ir_description.files import solid_mesh as piece_cache
+from ir_description.files.convex_pieces import ConvexPieces, contains, protrusion, winding
 from ir_description.files.mesh import is_closed
-from ir_description.files.piece_cache import pieces_of
-from ir_description.files.protrusion import protrusion, winding
-from ir_description.files.solid_mesh import triangles_from_obj
+from ir_description.files.solid_mesh import pieces_of, triangles_from_obj
 from ir_description.shapes import point_distance
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError

@@ -18,11 +18,11 @@ from ir_description import (
     UnknownNameError,
     bundled_cells,
     cell_from_yaml,
-    cell_process,
     cell_to_yaml,
     load_cell,
     read_cell_apart,
 )
+from ir_description import library as cell_process
 
 LONG = (
     "# " + "x" * cell_process.CHARACTERS_HERE + "\n"
@@ -119,7 +119,7 @@ def test_a_process_without_an_answer_says_why(
     reads = f"cell_process.load_cell = lambda name: exec({dies!r})"
     slow = "import time\nwhile time.process_time() < 1.1: pass"
     own = (
-        "from ir_description import cell_process\ncell_process.PROCESSOR_SECONDS = "
+        "from ir_description import library as cell_process\ncell_process.PROCESSOR_SECONDS = "
         f"1\n{reads}\n{slow}\n"
     )
     program.write_text(f"#!{sys.executable}\n{own}cell_process.main()\n", encoding="utf-8")

@@ -13,7 +13,8 @@ import yaml
 
 from ir_description import cell_from_yaml, cell_to_yaml, check_cell
 from ir_description.cell import PAUSE_POWER_MODES, ZONE_KINDS
-from ir_description.files import body_reader, cell_reader, program_reader
+from ir_description.files import cell_reader, program_reader
+from ir_description.files import equipment_reader as body_reader
 from ir_description.shapes import KINDS
 
 DOCS = Path(__file__).parents[2] / "docs"

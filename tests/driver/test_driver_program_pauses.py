@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from ir_description import Cell, cell_to_yaml, load_cell
+from ir_msgs_py.announcements import Event
 from ir_msgs_py.modes import modes_of
 from ir_msgs_py.options import PlanOptions
-from ir_msgs_py.program import Event
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.planner import Planner

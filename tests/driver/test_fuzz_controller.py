@@ -11,9 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_msgs_py.modes import Mode
+from ir_msgs_py.modes import Mode, TransitionTimes
 from ir_msgs_py.plc import OperatingMode, PlcInputs
-from ir_msgs_py.transitions import TransitionTimes
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import DriverError
 from ir_sim_driver.plant.loads import carried

@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymodbus.client import ModbusTcpClient
 
-from ir_msgs_py.modes import Mode
-from ir_msgs_py.transitions import TransitionTimes
+from ir_msgs_py.modes import Mode, TransitionTimes
 from ir_sim_driver.controller.driver import Driver
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import LinkError, TrajectoryRefusedError

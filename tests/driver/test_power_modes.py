@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ir_msgs_py.modes import ROW, Mode
-from ir_msgs_py.transitions import TransitionTimes
+from ir_msgs_py.modes import ROW, Mode, TransitionTimes
 from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.power import NO_DEMAND, Demand, IdleTimes, PowerModes
 

@@ -14,9 +14,8 @@ import pytest
 
 from ir_description import load_cell, load_power_data
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.modes import Mode
+from ir_msgs_py.modes import Mode, TransitionTimes
 from ir_msgs_py.names import NO_LOAD
-from ir_msgs_py.transitions import TransitionTimes
 from ir_planner.program.pause_lengths import lengths_of
 from ir_planner.program.rests import Step, rests_at
 from ir_planner.program.standby import advice, plan_standby

@@ -10,7 +10,7 @@ from typing import cast
 import pytest
 
 from ir_msgs_py.errors import InvalidValueError
-from ir_msgs_py.wake_on_lan import magic_packet, send_packet, wakes
+from ir_msgs_py.plc import magic_packet, send_packet, wakes
 from ir_sim_driver.errors import LinkError
 from ir_sim_driver.plc import Controller, WakeOnLan
 from ir_sim_driver.plc.modbus import ModbusTcp

@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 from pymodbus.client import ModbusTcpClient
 
-from ir_msgs_py.modes import OFF_THE_NETWORK, Mode
+from ir_msgs_py.modes import OFF_THE_NETWORK, Mode, TransitionTimes
 from ir_msgs_py.plc import PlcInputs
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_msgs_py.transitions import TransitionTimes
 from ir_sim_driver import (
     Driver,
     RequestRefusedError,

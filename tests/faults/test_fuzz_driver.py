@@ -19,11 +19,10 @@ import pytest
 
 from ir_description import Cell, load_cell
 from ir_msgs.action import ExecuteTrajectory
-from ir_msgs_py.modes import Mode
+from ir_msgs_py.modes import Mode, TransitionTimes
 from ir_msgs_py.plc import OperatingMode, PlcInputs
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_msgs_py.transitions import TransitionTimes
 from ir_sim_driver import (
     Driver,
     DriverError,

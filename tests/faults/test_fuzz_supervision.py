@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 
 from ir_description import load_cell
-from ir_msgs_py.modes import OFF_THE_NETWORK, Mode
+from ir_msgs_py.modes import OFF_THE_NETWORK, Mode, TransitionTimes
 from ir_msgs_py.plc import PlcInputs
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_msgs_py.transitions import TransitionTimes
 from ir_sim_driver import Simulation, SimulationSettings, TrajectoryGoal, make_simulation
 from ir_sim_driver.controller.outputs import report
 from ir_sim_driver.notices import Level

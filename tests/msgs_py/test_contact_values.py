@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ir_msgs_py.contact import Contact, MachineState
+from ir_msgs_py.announcements import Contact, MachineState
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.ros.plan_conversions import (

@@ -16,16 +16,15 @@ from rclpy.serialization import deserialize_message, serialize_message
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
 
-from ir_msgs_py import announced, options, plc, power, program, report
-from ir_msgs_py.candidates import IkSolution, ServiceCandidate
+from ir_msgs_py import announcements, modes, options, plc, report
 from ir_msgs_py.errors import InvalidValueError, JointNamesError, PoseError, TrajectoryError
-from ir_msgs_py.modes import REST_MODES, Mode
+from ir_msgs_py.modes import REST_MODES, Mode, TransitionTimes
 from ir_msgs_py.names import JOINT_NAMES
+from ir_msgs_py.report import IkSolution, ServiceCandidate
 from ir_msgs_py.ros import conversions, plan_conversions, power_conversions
 from ir_msgs_py.savings import ProgramPoint, ProgramSavings, Saving
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_msgs_py.transitions import TransitionTimes
 
 numbers = st.floats(-1e6, 1e6)
 lengths = st.floats(0.0, 1e6)
@@ -98,14 +97,14 @@ reports = st.builds(
 )
 seconds = st.floats(0.0, 604_800.0)
 timers = st.builds(
-    announced.ControllerTimers,
+    announcements.ControllerTimers,
     seconds,
     st.builds(
         TransitionTimes, **{field.name: seconds for field in dataclasses.fields(TransitionTimes)}
     ),
 )
 loads = st.builds(
-    announced.CarriedLoad,
+    announcements.CarriedLoad,
     texts,
     lengths,
     arrays(3),
@@ -148,8 +147,8 @@ pauses = st.builds(
     duration=lengths,
     power_mode=st.sampled_from(["", *REST_MODES]),
 )
-modes = st.builds(
-    power.PowerMode,
+mode_values = st.builds(
+    modes.PowerMode,
     mode=st.sampled_from(Mode),
     pe_mode_id=st.integers(0, 255),
     power=numbers,
@@ -162,7 +161,7 @@ modes = st.builds(
     break_even=st.one_of(lengths, st.just(float("inf"))),
 )
 power_states = st.builds(
-    power.PowerState,
+    modes.PowerState,
     stamp_ns=stamps,
     mode=st.sampled_from(Mode),
     target_mode=st.sampled_from(Mode),
@@ -225,12 +224,12 @@ pointless = (movements | pauses).map(
     lambda movement: dataclasses.replace(movement, trajectory=None)
 )
 program_states = st.builds(
-    program.ProgramState,
+    announcements.ProgramState,
     stamp_ns=stamps,
     program_id=texts,
     index=st.integers(0, 3),
     total=st.integers(4, 9),
-    event=st.sampled_from(program.Event),
+    event=st.sampled_from(announcements.Event),
     movement=pointless,
     note=texts,
 )
@@ -258,7 +257,7 @@ ROUND_TRIPS = {
     "planned_movement": movements | pauses,
     "program_savings": program_savings,
     "program_point": st.builds(ProgramPoint, numbers, numbers, texts),
-    "power_mode": modes,
+    "power_mode": mode_values,
     "power_state": power_states,
     "plc_inputs": plc_inputs,
     "plc_outputs": plc_outputs,
@@ -321,7 +320,7 @@ def test_a_stamped_pose_comes_back_within_rounding(T):
 
 @given(poses(), texts, st.booleans())
 def test_a_cell_comes_back_with_its_machines(T, text, enabled):
-    cell = announced.CellState(text, "0123", "format: x", ("lathe",), (T,), (enabled,), (text,))
+    cell = announcements.CellState(text, "0123", "format: x", ("lathe",), (T,), (enabled,), (text,))
     again = power_conversions.cell_state_from_msg(power_conversions.cell_state_to_msg(cell))
     np.testing.assert_allclose(again.poses[0], T, atol=1e-14)
     assert same(dataclasses.replace(again, poses=()), dataclasses.replace(cell, poses=()))
@@ -345,7 +344,7 @@ def test_a_cell_comes_back_with_its_machines(T, text, enabled):
     ],
 )
 def test_timers_that_no_controller_has_are_refused(change, sentence):
-    msg = power_conversions.controller_timers_to_msg(announced.ControllerTimers(20.0))
+    msg = power_conversions.controller_timers_to_msg(announcements.ControllerTimers(20.0))
     for name, value in change.items():
         setattr(msg, name, value)
     with pytest.raises(InvalidValueError, match=sentence):

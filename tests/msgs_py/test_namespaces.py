@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ir_msgs_py.namespaces import NODES, diagnostic_name, owns_diagnostic, owns_logger, owns_node
+from ir_msgs_py.names import NODES, diagnostic_name, owns_diagnostic, owns_logger, owns_node
 
 NAMESPACES = st.lists(st.from_regex(r"[a-z][a-z0-9_]{0,5}", fullmatch=True), max_size=3).map(
     lambda parts: "/" + "/".join(parts)

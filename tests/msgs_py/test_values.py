@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ir_msgs_py import modes, plc, power, program, report
+from ir_msgs_py import announcements as program
+from ir_msgs_py import modes, plc, report
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import Status, StatusCode
@@ -76,11 +77,11 @@ NAN = float("nan")
         ),
         (lambda: modes.checked_mode(7), "power mode is 7: known are 0 STAND_ON_MOTORS"),
         (
-            lambda: power.PowerMode(mode=modes.Mode.MOVING, time_to_pause=-1.0),
+            lambda: modes.PowerMode(mode=modes.Mode.MOVING, time_to_pause=-1.0),
             "time_to_pause of MOVING is -1 s",
         ),
         (
-            lambda: power.PowerMode(mode=modes.Mode.MOVING, break_even=NAN),
+            lambda: modes.PowerMode(mode=modes.Mode.MOVING, break_even=NAN),
             "break_even of MOVING is nan",
         ),
         (lambda: plc.Signal("", True), "name of a signal is ''"),

@@ -27,7 +27,7 @@ from ir_cli.nodes import cell_nodes
 from ir_cli.processes import NodeProcesses
 from ir_msgs.msg import Status
 from ir_msgs_py.errors import CallTimedOutError
-from ir_msgs_py.namespaces import NODES
+from ir_msgs_py.names import NODES
 from ir_msgs_py.ros import client as client_module
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.messages import interface_type

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from rclpy.node import Node
 
+from ir_msgs_py.modes import PREFIX, TransitionTimes
 from ir_msgs_py.settings import describe
-from ir_msgs_py.transitions import PREFIX, TransitionTimes
 from ir_program_runner.parameters import declare_parameters
 
 

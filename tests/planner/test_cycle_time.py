@@ -15,8 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_description import Cell, PowerData
+from ir_msgs_py.modes import TransitionTimes
 from ir_msgs_py.options import PlanOptions
-from ir_msgs_py.transitions import TransitionTimes
 from ir_planner import Planner
 from ir_planner.checks import Consumption
 from ir_planner.errors import RequestError

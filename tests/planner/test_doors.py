@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_description import ProgramStep, Signal, load_cell, load_power_data
-from ir_msgs_py.contact import MachineState
+from ir_msgs_py.announcements import MachineState
+from ir_msgs_py.modes import TransitionTimes
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
-from ir_msgs_py.transitions import TransitionTimes
 from ir_planner import Planner
 from ir_planner.heard import Heard
 from ir_planner.program import ProgramPlan, ProgramRequest, plan_program

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_description import load_cell, load_power_data
-from ir_msgs_py.transitions import TransitionTimes
+from ir_msgs_py.modes import TransitionTimes
 from ir_planner.errors import RequestError
 from ir_planner.program.pause_lengths import lengths_of
 from ir_planner.program.standby import (

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from ir_msgs_py.one_sided import one_sided
+from ir_msgs_py.savings import one_sided
 from ir_recorder import Analysis, analyse, findings
 from ir_recorder.report import report_html
 from ir_recorder.report.headline import source, tiles, verdict

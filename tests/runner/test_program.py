@@ -10,14 +10,12 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from ir_msgs_py.modes import Mode
+from ir_msgs_py.modes import Mode, PowerMode, TransitionTimes
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.plc import Signal
-from ir_msgs_py.power import PowerMode
 from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_msgs_py.transitions import TransitionTimes
 from ir_program_runner import requests as ask
 from ir_program_runner.errors import CanceledError
 from ir_program_runner.program import Program

@@ -19,8 +19,9 @@ from ir_msgs.action import ExecuteTrajectory, RunProgram
 from ir_msgs.msg import PowerState, ProgramState, Status
 from ir_msgs.msg import Signal as SignalMsg
 from ir_msgs.srv import GetProgram, GetTrajectory, QueryModes, SetLoad, SetPlcInput
-from ir_msgs_py.modes import Mode
+from ir_msgs_py.modes import Mode, TransitionTimes
 from ir_msgs_py.names import JOINT_NAMES
+from ir_msgs_py.plc import magic_packet
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros import client
 from ir_msgs_py.ros.client import Client
@@ -30,8 +31,6 @@ from ir_msgs_py.ros.power_conversions import power_mode_to_msg
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_msgs_py.transitions import TransitionTimes
-from ir_msgs_py.wake_on_lan import magic_packet
 from ir_program_runner.machines import Machines
 from ir_program_runner.node import ProgramRunnerNode
 

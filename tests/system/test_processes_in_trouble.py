@@ -21,7 +21,7 @@ from ir_cli.processes import NodeProcesses
 from ir_msgs.srv import CheckState, QueryModes, SetCell, StartRecording
 from ir_msgs_py import names
 from ir_msgs_py.errors import CallTimedOutError, ServiceUnavailableError
-from ir_msgs_py.namespaces import NODES
+from ir_msgs_py.names import NODES
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.status import StatusCode
 from ir_recorder.reading.mcap_file import read_raw

@@ -22,7 +22,7 @@ from sensor_msgs.msg import JointState
 from ir_msgs.msg import Status
 from ir_msgs.srv import CheckState, StartRecording, StopRecording
 from ir_msgs_py import names
-from ir_msgs_py.namespaces import NODES
+from ir_msgs_py.names import NODES
 from ir_msgs_py.ros.client import Client
 from ir_recorder import read_recording
 from ir_recorder.reading.mcap_file import RawRecording, read_raw

@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from ir_msgs_py.namespaces import NODES
+from ir_msgs_py.names import NODES
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.network import DOMAIN
 

@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 
 from ir_msgs_py.errors import ParameterError
-from ir_msgs_py.namespaces import NODES
+from ir_msgs_py.names import NODES
 from ir_msgs_py.settings import Setting
 
 from .errors import CommandError

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from ir_msgs_py.modes import PREFIX, TransitionTimes
 from ir_msgs_py.settings import Setting, tree
-from ir_msgs_py.transitions import PREFIX, TransitionTimes
 from ir_planner import PlannerSettings
 from ir_program_runner import LinkSettings, ProgramSettings
 from ir_recorder.recording.settings import RecorderSettings

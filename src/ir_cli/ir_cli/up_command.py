@@ -12,7 +12,7 @@ from rclpy.exceptions import InvalidNamespaceException
 from rclpy.validate_namespace import validate_namespace
 
 from ir_description import Cell, load_cell
-from ir_msgs_py.namespaces import NODES
+from ir_msgs_py.names import NODES
 from ir_msgs_py.ros.network import DOMAIN, MOST_DOMAIN
 
 from .alone import alone

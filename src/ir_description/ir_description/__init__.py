@@ -21,7 +21,6 @@ from ir_description.cell import (
     machine_in,
     sweep_speeds,
 )
-from ir_description.cell_process import read_cell_apart
 from ir_description.cell_review import Finding, check_cell
 from ir_description.errors import (
     CellFileError,
@@ -53,6 +52,7 @@ from ir_description.library import (
     load_power_parameters,
     load_robot,
     power_marks,
+    read_cell_apart,
     robot_marks,
     robot_named,
 )

@@ -5,8 +5,8 @@ Conversions to and from messages, the client for scripts and the test fixtures a
 `ir_msgs_py.ros`: nothing else here knows rclpy.
 """
 
+from ir_msgs_py.announcements import Event, ProgramState
 from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
-from ir_msgs_py.candidates import IkSolution, ServiceCandidate
 from ir_msgs_py.errors import (
     CallTimedOutError,
     ClientError,
@@ -21,27 +21,41 @@ from ir_msgs_py.errors import (
     TrajectoryError,
     UnknownTypeError,
 )
-from ir_msgs_py.modes import MODES, REST_MODES, Mode, ModeRow
+from ir_msgs_py.modes import (
+    MODES,
+    REST_MODES,
+    Mode,
+    ModeRow,
+    PowerMode,
+    PowerState,
+    TransitionTimes,
+)
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.options import OBJECTIVES, TIMINGS, PlanOptions
-from ir_msgs_py.plc import PLC_INPUT_NAMES, OperatingMode, PlcInputs, PlcOutputs, Signal
-from ir_msgs_py.power import PowerMode, PowerState
-from ir_msgs_py.program import Event, ProgramState
+from ir_msgs_py.plc import (
+    PLC_INPUT_NAMES,
+    OperatingMode,
+    PlcInputs,
+    PlcOutputs,
+    Signal,
+    magic_packet,
+    send_packet,
+)
 from ir_msgs_py.report import (
     DistancePair,
+    IkSolution,
     MovementKind,
     PairKind,
     PlannedMovement,
     PlanningInfo,
     PlanningStage,
     Rejection,
+    ServiceCandidate,
     TrajectoryReport,
 )
 from ir_msgs_py.settings import Setting, check_settings, describe, setting, settings_table
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory, Samples
-from ir_msgs_py.transitions import TransitionTimes
-from ir_msgs_py.wake_on_lan import magic_packet, send_packet
 
 __all__ = [
     "JOINT_NAMES",

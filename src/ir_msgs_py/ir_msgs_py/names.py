@@ -1,7 +1,8 @@
 """Names of nodes, topics, services, actions, joints and frames: a contract, spelled once.
 
 All names are relative, so a namespace moves a whole cell; a script outside puts a "/" before them.
-Topics and services of a node carry its name: `ir_planner/set_cell`.
+Topics and services of a node carry its name: `ir_planner/set_cell`. On the topics that all cells
+share (/diagnostics, /rosout, /parameter_events) the sender's name says whose a message is.
 """
 
 from __future__ import annotations
@@ -100,3 +101,46 @@ RUN_STUDY: Final = f"{STUDIES}/run_study"
 # load texts: names of the cell's loads joined by LOAD_SEPARATOR, or nothing attached
 LOAD_SEPARATOR: Final = "+"
 NO_LOAD: Final = "none"
+
+
+# Senders on the topics that all cells share: the namespace is a part of the name, so that two cells
+# in one graph are kept apart. Namespaces are absolute: "/" or "/cell_1".
+
+NODES = (PLANNER, SIM_DRIVER, PROGRAM_RUNNER, RECORDER)
+"""The nodes of a cell."""
+
+
+def diagnostic_name(namespace: str, name: str) -> str:
+    """Name of a status: "ir_sim_driver: plant", in a namespace "cell_1/ir_sim_driver: plant"."""
+    return f"{namespace}/{name}".strip("/")
+
+
+def owns_diagnostic(namespace: str, name: str) -> bool:
+    """Whether the status of this name comes from a node right in the namespace."""
+    return _parent(f"/{name.partition(':')[0]}") == _bare(namespace)
+
+
+def owns_node(namespace: str, fully_qualified: str) -> bool:
+    """Whether a node ("/cell_1/ir_planner") is right in the namespace."""
+    return _parent(fully_qualified) == _bare(namespace)
+
+
+def owns_logger(namespace: str, logger: str) -> bool:
+    """Whether a logger ("cell_1.ir_planner") belongs to a node right in the namespace.
+
+    A dot also parts a logger from those below it ("ir_planner.action"): those of a cell's nodes are
+    known.
+    """
+    prefix = "".join(f"{part}." for part in _bare(namespace).split("/") if part)
+    if not logger.startswith(prefix):
+        return False
+    node, dot, _ = logger.removeprefix(prefix).partition(".")
+    return not dot or node in NODES
+
+
+def _bare(namespace: str) -> str:
+    return namespace.rstrip("/")
+
+
+def _parent(name: str) -> str:
+    return name.rpartition("/")[0]

@@ -1,10 +1,14 @@
-"""What a program saves against the common program, in three figures; and the points of its Pareto
-front.
-"""
+"""Savings of a program: against the common program, along the Pareto front, and against today's."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+
+import numpy as np
+
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.checks import read_only, set_field
+from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 
 
 @dataclass(frozen=True)
@@ -73,3 +77,105 @@ class ProgramPoint:
     cycle_time: float
     energy: float
     program_id: str
+
+
+# Today's program and the planner's side by side: the planner's answer, and what a report shows.
+
+
+@dataclass(frozen=True)
+class Hop:
+    """All movements from one stop to the next, or one pause: seconds, and energy [J] at the mains
+    with its 90 % interval.
+    """
+
+    name: str
+    is_pause: bool
+    seconds: float
+    energy: float
+    energy_low: float
+    energy_high: float
+    power_mode: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """A program of the comparison. name: "today", "same cycle time", "free", "for the line";
+    cycle_time [s] that it was asked for (0: free).
+
+    movements, report, hops: empty where `problem` says why there is none. time (N,) s, watts (N,):
+    power at the mains, means over even steps. saving: of today's energy; where the line needs more
+    time than today's program takes, of today's that waits at its end. peak: ends of the 90 %
+    interval of its peak power [W].
+    """
+
+    name: str
+    cycle_time: float
+    movements: tuple[PlannedMovement, ...] = ()
+    report: TrajectoryReport = field(default_factory=TrajectoryReport)
+    hops: tuple[Hop, ...] = ()
+    time: FloatArray = field(default_factory=lambda: np.zeros(0))
+    watts: FloatArray = field(default_factory=lambda: np.zeros(0))
+    saving: Saving = field(default_factory=Saving)
+    problem: str = ""
+    peak: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name in ("time", "watts"):
+            set_field(self, name, read_only(getattr(self, name), name, (None,)))
+
+    @property
+    def found(self) -> bool:
+        """Whether there is such a program."""
+        return bool(self.movements)
+
+    @property
+    def certified(self) -> bool:
+        """Whether all of its movements are."""
+        return all(step.report.certified for step in self.movements if not step.is_pause)
+
+
+@dataclass(frozen=True)
+class Change:
+    """One movement or pause, as it is today and as it is planned: what is to be done, and what that
+    saves.
+
+    work: 1 a power mode, 2 other times on the same path, 3 another path. seconds: today's and
+    planned.
+    saving: its interval is by common draws.
+    """
+
+    name: str
+    work: int
+    words: str
+    seconds: tuple[float, float]
+    saving: Saving
+
+
+@dataclass(frozen=True, eq=False)
+class BeforeAfter:
+    """today, and the planner's programs for the same stops and pauses; changes: from today to the
+    side `towards`, those that save most, the least work first. kind: what today's program is read
+    from.
+    """
+
+    name: str
+    kind: str
+    today: Side
+    sides: tuple[Side, ...]
+    towards: str
+    changes: tuple[Change, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def planned(self) -> Side:
+        """The side that the changes lead to."""
+        return next(side for side in self.sides if side.name == self.towards)
+
+
+ONE_SIDED = "mostly above it: losses that the data sheet puts at zero can only add"
+_NEAR = 0.2  # of the interval: a value so near to its lower end
+
+
+def one_sided(value: float, low: float, high: float) -> str:
+    """The reason where a value [J] is near the lower end of its interval, else ""."""
+    return ONE_SIDED if high > low and value - low < _NEAR * (high - low) else ""

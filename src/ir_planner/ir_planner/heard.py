@@ -6,9 +6,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from ir_description import Cell, PowerData
-from ir_msgs_py.announced import DATA, DRIVER, CarriedLoad, ControllerTimers
-from ir_msgs_py.contact import MachineState
-from ir_msgs_py.transitions import TransitionTimes
+from ir_msgs_py.announcements import DATA, DRIVER, CarriedLoad, ControllerTimers, MachineState
+from ir_msgs_py.modes import TransitionTimes
 from ir_planner.program import Doors
 
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from ir_description import Cell
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.modes import TransitionTimes
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_msgs_py.transitions import TransitionTimes
 from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.program import Lengths, Standby, Trip, best_posture, lengths_of
 from ir_planner.regional import MovementPlan

@@ -8,9 +8,8 @@ from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from ir_msgs_py.modes import Mode
+from ir_msgs_py.modes import Mode, PowerMode
 from ir_msgs_py.plc import Signal
-from ir_msgs_py.power import PowerMode
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_program_runner import requests as ask

@@ -19,10 +19,10 @@ from ir_msgs.action import RunProgram
 from ir_msgs.msg import ProgramState as ProgramStateMsg
 from ir_msgs.msg import Signal as SignalMsg
 from ir_msgs_py import names
+from ir_msgs_py.announcements import Event, ProgramState
 from ir_msgs_py.errors import InvalidValueError, ParameterError
 from ir_msgs_py.modes import Mode
-from ir_msgs_py.plc import Signal
-from ir_msgs_py.program import Event, ProgramState
+from ir_msgs_py.plc import Signal, magic_packet, send_packet
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.conversions import status_to_msg
 from ir_msgs_py.ros.diagnostics import OK, WARN, Condition, Diagnostics
@@ -34,7 +34,6 @@ from ir_msgs_py.ros.serving import RecordedActionServer
 from ir_msgs_py.ros.topics import ACTION_SERVICES, COMMANDS, CommandTopic
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
-from ir_msgs_py.wake_on_lan import magic_packet, send_packet
 from ir_program_runner.errors import ProgramError
 from ir_program_runner.fulfilment import Fulfilment, Ports
 from ir_program_runner.machines import Machines

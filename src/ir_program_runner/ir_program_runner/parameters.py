@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from rclpy.node import Node
 
+from ir_msgs_py.modes import PREFIX, TransitionTimes
 from ir_msgs_py.ros.parameters import Parameters
-from ir_msgs_py.transitions import PREFIX, TransitionTimes
 from ir_program_runner.settings import LinkSettings, ProgramSettings
 
 

@@ -10,15 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_msgs_py.announcements import Event
 from ir_msgs_py.errors import InvalidValueError
-from ir_msgs_py.modes import READY, RESTS, Mode, modes_of
+from ir_msgs_py.modes import READY, RESTS, Mode, PowerMode, TransitionTimes, modes_of
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.plc import Signal
-from ir_msgs_py.power import PowerMode
-from ir_msgs_py.program import Event
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
-from ir_msgs_py.transitions import TransitionTimes
 from ir_program_runner.errors import CanceledError, ProgramError, StepFailedError
 from ir_program_runner.requests import (
     Announce,

@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, field
 
-from ir_msgs_py.modes import Mode
+from ir_msgs_py.announcements import Event
+from ir_msgs_py.modes import Mode, PowerMode
 from ir_msgs_py.plc import Signal
-from ir_msgs_py.power import PowerMode
-from ir_msgs_py.program import Event
 from ir_msgs_py.status import Status
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_program_runner.errors import StepFailedError

@@ -22,10 +22,10 @@ from ir_description import Cell, cell_to_yaml, load_cell
 from ir_msgs.srv import StartRecording, StopRecording
 from ir_msgs_py import names
 from ir_msgs_py.errors import MsgsError, RequestRefusedError
-from ir_msgs_py.one_sided import one_sided
 from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.plc import magic_packet, send_packet
 from ir_msgs_py.ros.client import Client, ProgramPlan
-from ir_msgs_py.wake_on_lan import magic_packet, send_packet
+from ir_msgs_py.savings import one_sided
 from ir_program_runner.settings import LinkSettings
 from ir_recorder.format import contents
 

@@ -9,9 +9,7 @@ import re
 import sys
 from pathlib import Path
 
-from ir_description.files.piece_cache import pieces_of
-from ir_description.files.solid_mesh import UNITS
-from ir_description.files.solid_reader import PIECES, PIECES_MAX, SolidReader
+from ir_description.files.solid_mesh import PIECES, PIECES_MAX, UNITS, SolidReader, pieces_of
 
 from ..errors import InputError
 from .asking import sentences

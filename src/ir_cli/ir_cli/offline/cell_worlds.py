@@ -10,8 +10,7 @@ import numpy as np
 
 from ir_description import Cell, Equipment, InvalidValueError, cell_to_yaml, load_cell, robot_named
 from ir_description.cell import shape_register, zone_around
-from ir_description.files.world_reader import read_world
-from ir_description.files.world_writer import WRITERS
+from ir_description.files.worlds import WRITERS, read_world
 
 from ..errors import InputError
 from .asking import add_cell, sentences

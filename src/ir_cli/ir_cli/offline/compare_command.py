@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from ir_msgs_py.before_after import BeforeAfter, Side
+from ir_msgs_py.savings import BeforeAfter, Side
 from ir_planner import Planner, before_after, before_after_common, evaluate_krl, today_of_krl
 
 from ..errors import InputError

@@ -6,8 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from ir_msgs_py.one_sided import one_sided
 from ir_msgs_py.report import TrajectoryReport
+from ir_msgs_py.savings import one_sided
 from ir_planner import assumed_doors
 
 from .asking import (

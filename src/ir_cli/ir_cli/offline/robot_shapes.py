@@ -14,7 +14,7 @@ import numpy as np
 
 from ir_description import Capsule, InvalidValueError
 from ir_description.files.making import DriveSheet, UrdfArm, fitted
-from ir_description.files.making.urdf_tree import UrdfShape
+from ir_description.files.making.urdf_arm import UrdfShape
 from ir_description.files.mesh import read_stl
 from ir_kernels import Chain, CollisionModel
 from ir_msgs_py.arrays import FloatArray

@@ -1,14 +1,16 @@
 """The cell: equipment with its stations, parts, the program, and what must hold between them."""
 
-from ir_description.cell.cell import Cell, Task, check_posture
-from ir_description.cell.checks import (
+from ir_description.cell.cell import (
     BODIES_MAX,
+    Cell,
     NameRegister,
+    Task,
     check_base_contact,
     check_contact,
     check_follows,
     check_part_mass,
     check_path,
+    check_posture,
     check_step,
     check_switch,
     shape_register,
@@ -21,8 +23,10 @@ from ir_description.cell.equipment import (
     ZONE_KINDS,
     ZONE_MAX,
     AllowedContact,
+    CellPath,
     Equipment,
     EquipmentState,
+    Part,
     StateSwitch,
     Station,
     StationSearch,
@@ -31,7 +35,6 @@ from ir_description.cell.equipment import (
     zone_around,
 )
 from ir_description.cell.moving import cell_in, machine_in, sweep_speeds
-from ir_description.cell.part import Part
 from ir_description.cell.program import (
     AUTO,
     PAUSE_MAX,
@@ -42,7 +45,6 @@ from ir_description.cell.program import (
     ProgramStep,
     StepKind,
 )
-from ir_description.cell.tool_path import CellPath
 
 __all__ = [
     "APPROACH_MAX",

@@ -1,4 +1,4 @@
-"""Equipment: machines grouped from bodies, with states, a forbidden zone and stations."""
+"""Things in a cell: machines with states, zones and stations; parts; paths of the tool."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ import numpy as np
 from ir_description.arrays import frozen, frozen_pose, in_range
 from ir_description.errors import UnknownNameError
 from ir_description.poses import composed, pose_of
+from ir_description.robot import Load
 from ir_description.shapes import SIZE_MAX, Body
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.cartesian import CartesianPath
 from ir_msgs_py.errors import InvalidValueError
 
 ZoneKind = Literal["OPEN", "SEMI_CLOSED", "CLOSED"]
@@ -259,3 +261,75 @@ def station_at(
         approach_distance=approach_distance,
         search=search,
     )
+
+
+# A part: a load while it is held, bodies of the cell while it lies at a station.
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """load and bodies stand in the part's own frame; grasp (4, 4) is that frame in the tcp when it
+    is held.
+
+    station: where it lies, "" for nowhere (held, or not there). Lying at a station means lying as
+    it is held when the tcp stands at the station.
+    """
+
+    load: Load
+    bodies: tuple[Body, ...]
+    grasp: FloatArray
+    station: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "grasp", frozen_pose(self.grasp, f"grasp of {self.load.name}"))
+        if self.load.kind != "part":
+            raise InvalidValueError(
+                f"the load of part {self.name} is of kind {self.load.kind}, must be part"
+            )
+        if any(body.kind == "plane" for body in self.bodies):
+            raise InvalidValueError(f"part {self.name} has a plane as body; a part is finite")
+
+    @property
+    def name(self) -> str:
+        """The name of the part."""
+        return self.load.name
+
+    def held(self, tcp: FloatArray) -> Load:
+        """Return the load in the frame of the last link, where the tcp (4, 4) stands."""
+        return self.load.placed(composed(tcp, self.grasp))
+
+    def lying(self, station_pose: FloatArray) -> tuple[Body, ...]:
+        """Return its bodies in the world, lying where the tcp (4, 4) would hold it."""
+        pose = composed(station_pose, self.grasp)
+        return tuple(body.placed(pose) for body in self.bodies)
+
+
+# A path of the tool that a cell has a name for: a seam, an edge, a bead.
+
+
+@dataclass(frozen=True, eq=False)
+class CellPath:
+    """path: its poses are poses of the tcp in the cell. equipment: the machine that it belongs to
+    and moves with, "": none. The allowed contacts hold inside that machine's zone, as a station's
+    do.
+    """
+
+    name: str
+    path: CartesianPath
+    equipment: str = ""
+    allowed_contacts: tuple[AllowedContact, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.allowed_contacts and not self.equipment:
+            raise InvalidValueError(
+                f"path {self.name} allows contacts but names no equipment: they hold in a "
+                "machine's zone"
+            )
+
+    def moved(self, by: FloatArray) -> CellPath:
+        """The path where its machine has been moved by a transform (4, 4) of the world."""
+        segments = tuple(
+            replace(segment, poses=tuple(by @ pose for pose in segment.poses))
+            for segment in self.path.segments
+        )
+        return replace(self, path=replace(self.path, start=by @ self.path.start, segments=segments))

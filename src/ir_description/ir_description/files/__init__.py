@@ -1,19 +1,18 @@
 """Files and texts: cells, robots, power figures and meshes in, cells and URDF out."""
 
-from ir_description.files.cell_hash import cell_hash
 from ir_description.files.cell_reader import cell_errors, read_cell
-from ir_description.files.cell_writer import cell_to_yaml
-from ir_description.files.confidence import confidence_marks
-from ir_description.files.controller_reader import bundled_controller, bundled_controllers
-from ir_description.files.mesh import read_regular_file
-from ir_description.files.path_reader import path_from_yaml
-from ir_description.files.places import is_path
+from ir_description.files.cell_writer import cell_hash, cell_to_yaml
+from ir_description.files.file_access import is_path, is_utf16, read_regular_file, text_of
 from ir_description.files.plain_yaml import plain_yaml
-from ir_description.files.power_file import power_from_yaml
-from ir_description.files.power_parameters_file import (
+from ir_description.files.power_file import (
+    bundled_controller,
+    bundled_controllers,
+    confidence_marks,
+    power_from_yaml,
     power_parameters_from_yaml,
     power_parameters_to_yaml,
 )
+from ir_description.files.program_reader import path_from_yaml
 from ir_description.files.robot_file import (
     read_robot,
     robot_errors,
@@ -21,7 +20,6 @@ from ir_description.files.robot_file import (
     robot_from_yaml,
 )
 from ir_description.files.subject_lines import subject_line
-from ir_description.files.text_file import is_utf16, text_of
 from ir_description.files.urdf import robot_urdf
 
 __all__ = [

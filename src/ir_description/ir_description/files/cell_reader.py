@@ -35,16 +35,24 @@ from ir_description.cell import (
 )
 from ir_description.errors import CellFileError, RobotFileError, UnknownNameError
 from ir_description.files.all_errors import document_errors
-from ir_description.files.body_reader import BodyReader, read_pose
-from ir_description.files.equipment_reader import read_equipment
+from ir_description.files.equipment_reader import (
+    BodyReader,
+    read_equipment,
+    read_part,
+    read_pose,
+    read_tool,
+)
+from ir_description.files.file_access import inside, is_path
 from ir_description.files.hints import other_angle_unit
 from ir_description.files.items import Item, Table, read_items
-from ir_description.files.load_reader import read_part, read_tool
-from ir_description.files.path_reader import PATHS_MAX, read_paths
-from ir_description.files.places import inside, is_path
-from ir_description.files.program_reader import read_signal, read_step
+from ir_description.files.program_reader import (
+    PATHS_MAX,
+    read_paths,
+    read_signal,
+    read_step,
+    read_tasks,
+)
 from ir_description.files.robot_file import read_robot, robot_of
-from ir_description.files.task_reader import read_tasks
 from ir_description.robot import Load, RobotModel
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError

@@ -1,13 +1,13 @@
-"""Writes a Cell as a cell file: what `read_cell` reads back is the same cell, bit for bit.
+"""A cell as text, and its content hash.
 
-Numbers are the shortest decimals that give the same float. Orientations are written as A, B, C
-where these give the same matrix, else as the matrix; postures in degrees where these give the same
-radians. Meshes stand as vertices.
+`read_cell` reads the text back as the same cell, bit for bit.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from ir_description.cell import (
     Station,
 )
 from ir_description.files.cell_reader import FORMAT
-from ir_description.files.path_reader import path_lines
+from ir_description.files.program_reader import path_lines
 from ir_description.poses import abc_from_rotation, rotation_from_abc
 from ir_description.robot import Load
 from ir_description.shapes import Body, Capsule
@@ -255,3 +255,30 @@ def _word(value: bool) -> str:
 def _quoted(text: str) -> str:
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
     return f'"{escaped}"'
+
+
+# The content hash: of all that a plan depends on, and of nothing else.
+
+_LENGTH = 16  # hexadecimal digits, as ids of trajectories have
+
+
+def cell_hash(cell: Cell) -> str:
+    """Hash of bodies, poses, states, zones, stations, loads and robot; its program and its texts
+    don't count.
+
+    The state of a machine that a signal switches doesn't count either: doors move while a program
+    runs, and a movement that relies on a state says so. The file of a cell, written and read again,
+    has the same hash.
+    """
+    machines = tuple(_unswitched(machine) for machine in cell.equipment)
+    place = replace(
+        cell, description="", equipment=machines, program=(), signals=(), tasks=(), paths=()
+    )
+    content = f"{cell_to_yaml(place)}\n{cell.robot!r}"
+    return hashlib.sha256(content.encode()).hexdigest()[:_LENGTH]
+
+
+def _unswitched(machine: Equipment) -> Equipment:
+    if machine.switch is None:
+        return machine
+    return replace(machine, state=machine.states[0].name, switch=None)

@@ -1,27 +1,235 @@
 """A closed mesh as convex pieces that contain it, and what that costs in distance and volume.
 
-Approximate convex decomposition (CoACD, Wei et al., 2022) gives pieces. They are widened by a
-margin until
-every point of the mesh lies in one of them, and that is proved: a triangle lies in a convex piece
-where its corners do; one that lies in none is cut into four. So the pieces are never smaller than
-the mesh.
+CoACD divides the mesh, in a process of its own. How far the pieces stick out is bounded, not
+sampled.
 """
 
 from __future__ import annotations
 
+import io
+import resource
+import subprocess
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull, QhullError, cKDTree
 
-from ir_description.files.coacd_process import CORNERS, decomposed
 from ir_description.files.mesh import HULL_VERTICES_MAX, open_edges
-from ir_description.files.protrusion import protrusion
-from ir_msgs_py.arrays import BoolArray, FloatArray
+from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_msgs_py.errors import InvalidValueError
+
+# How far convex pieces stick out of the solid that they stand for: a bound, not a sample.
+# A triangle of a piece's surface is at most as far from the solid as its centre is, and its own
+# radius more, and no farther from a triangle of the solid than its corners are; one whose centre
+# is deeper inside than its radius does not stick out at all. Those that could be the worst are cut
+# until the bound is near what was found.
+
+NEAR = 1.1
+"""The bound is at most this many times the largest distance found, plus SHARE of the size."""
+SHARE = 0.01
+_WORK = 100_000_000  # points times triangles
+_POINTS = 40_000
+_ROUNDS = 24
+_SAMPLES = 60_000  # of the mesh's surface: where its nearest triangles are looked for
+_NEIGHBOURS = 4
+_CHUNK = 2_000_000
+
+
+def protrusion(pieces: Sequence[FloatArray], triangles: FloatArray) -> float:
+    """A bound [m] of the distance from the pieces (V, 3) to the solid in a closed mesh (T, 3,
+    3).
+    """
+    solid = _Solid(triangles)
+    left = np.concatenate([piece[ConvexHull(piece).simplices] for piece in pieces])
+    points = triangles.reshape(-1, 3)
+    size = float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
+    found = 0.0
+    bound = 0.0
+    looked = 0
+    most = min(_POINTS, _WORK // len(triangles))
+    for _ in range(_ROUNDS):
+        distance, worst = solid.distances(left)
+        looked += len(left)
+        found = max(found, float(distance.max(initial=0.0)))
+        target = NEAR * found + SHARE * size
+        open_ = worst > target
+        bound = max(bound, float(worst[~open_].max(initial=0.0)))
+        if not open_.any() or looked > most:
+            return max(bound, float(worst.max(initial=0.0)))
+        left = halved(left[open_])
+    return max(bound, float(worst.max()))
+
+
+class _Solid:
+    """A closed mesh (T, 3, 3): distances to it, and what lies inside."""
+
+    def __init__(self, triangles: FloatArray) -> None:
+        self._triangles = triangles
+        parts = triangles
+        owner = np.arange(len(triangles))
+        while 2 * len(parts) < _SAMPLES:
+            long = _longest(parts) >= np.quantile(_longest(parts), 0.5)
+            parts = np.concatenate([parts[~long], halved(parts[long])])
+            owner = np.concatenate([owner[~long], np.tile(owner[long], 2)])
+        self._owner: IntArray = owner
+        centres = parts.mean(axis=1)
+        self._step = float(np.linalg.norm(parts - centres[:, None], axis=2).max())
+        self._tree = cKDTree(centres)
+
+    def distances(self, parts: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Of triangles (N, 3, 3): bounds of the distance to the solid, of the centres and of all
+        (N,).
+        """
+        centres = parts.mean(axis=1)
+        radius = np.linalg.norm(parts - centres[:, None], axis=2).max(axis=1)
+        samples, nearest = self._tree.query(centres, k=_NEIGHBOURS)
+        there = self._triangles[self._owner[nearest]]
+        inside = winding(self._triangles, centres) > 0.5
+        candidates = range(_NEIGHBOURS)
+        to_mesh = np.min([_point_triangle(centres, there[:, k]) for k in candidates], axis=0)
+        distance = np.where(inside, 0.0, to_mesh)
+        # the distance to a triangle is convex: over another one it is largest in a corner
+        corners = [
+            [_point_triangle(parts[:, c], there[:, k]) for c in range(3)] for k in candidates
+        ]
+        worst = np.minimum(distance + radius, np.max(corners, axis=1).min(axis=0))
+        deep = inside & (np.asarray(samples)[:, 0] - self._step >= radius)
+        return distance, np.where(deep, 0.0, worst)
+
+
+def winding(triangles: FloatArray, points: FloatArray) -> FloatArray:
+    """How often a closed mesh (T, 3, 3) winds about each point (N, 3): 1 inside, 0 outside."""
+    found = np.zeros(len(points))
+    size = max(1, _CHUNK // len(triangles))
+    for k in range(0, len(points), size):
+        a, b, c = (triangles[None, :, i] - points[k : k + size, None] for i in range(3))
+        la, lb, lc = (np.linalg.norm(each, axis=2) for each in (a, b, c))
+        above = np.einsum("nti,nti->nt", a, np.cross(b, c))
+        below = la * lb * lc + (a * b).sum(2) * lc + (b * c).sum(2) * la + (c * a).sum(2) * lb
+        found[k : k + size] = np.arctan2(above, below).sum(axis=1) / (2.0 * np.pi)
+    return found
+
+
+def halved(triangles: FloatArray) -> FloatArray:
+    """Two triangles (2 T, 3, 3) instead of each, by the middle of its longest edge; first halves
+    first.
+    """
+    edges = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
+    rows = np.arange(len(triangles))
+    at = edges.argmax(axis=1)
+    a, b, c = (triangles[rows, (at + k) % 3] for k in range(3))
+    middle = (a + b) / 2.0
+    return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+
+
+def _longest(triangles: FloatArray) -> FloatArray:
+    longest: FloatArray = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(
+        axis=1
+    )
+    return longest
+
+
+def _point_triangle(points: FloatArray, triangles: FloatArray) -> FloatArray:
+    """Distance (N,) of each point (N, 3) from its triangle (N, 3, 3)."""
+    a = triangles[:, 0]
+    b = triangles[:, 1]
+    c = triangles[:, 2]
+    found = np.min([_point_segment(points, *ends) for ends in ((a, b), (b, c), (c, a))], axis=0)
+    normal = np.cross(b - a, c - a)
+    height = np.einsum("ni,ni->n", points - a, normal)
+    square = np.einsum("ni,ni->n", normal, normal)
+    foot = points - (height / square)[:, None] * normal
+    sides = [
+        np.einsum("ni,ni->n", np.cross(q - p, foot - p), normal) >= 0.0
+        for p, q in ((a, b), (b, c), (c, a))
+    ]
+    nearest: FloatArray = np.where(np.all(sides, axis=0), np.abs(height) / np.sqrt(square), found)
+    return nearest
+
+
+def _point_segment(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    along = end - start
+    share = np.einsum("ni,ni->n", points - start, along) / np.einsum("ni,ni->n", along, along)
+    distance: FloatArray = np.linalg.norm(
+        points - (start + np.clip(share, 0.0, 1.0)[:, None] * along), axis=1
+    )
+    return distance
+
+
+# CoACD in a process of its own: it is native code that hostile meshes can crash, and it takes its
+# time. The seed is fixed: the same mesh gives the same pieces.
+
+MISSING = (
+    'a mesh is divided by coacd, which is missing: pip install "ir_description[cad]", or '
+    "pip install coacd"
+)
+CONCAVITY = 0.03
+"""Concavity at which a piece is not divided any more, as a share of the mesh's size."""
+PROCESSOR_SECONDS = 600
+MEMORY_BYTES = 6_000_000_000
+PROGRAM = f"from {__name__} import main; main()"
+_SEED = 0
+CORNERS = 64
+"""Of a piece, at most."""
+
+
+def decomposed(triangles: FloatArray, most: int, share: int = 1) -> list[FloatArray]:
+    """Corners (V, 3) of at most `most` convex pieces of a closed mesh (T, 3, 3), in one of `share`
+    parts of PROCESSOR_SECONDS. Raises InvalidValueError.
+    """
+    if find_spec("coacd") is None:
+        raise InvalidValueError(MISSING)
+    corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    stream = io.BytesIO()
+    faces = index.reshape(-1, 3).astype(np.int32)
+    seconds = max(PROCESSOR_SECONDS // share, 1)
+    np.savez(stream, corners=corners, faces=faces, most=most, seconds=seconds)
+    process = subprocess.run(
+        [sys.executable, "-c", PROGRAM],
+        input=stream.getvalue(),
+        capture_output=True,
+    )
+    if process.returncode != 0:
+        last = process.stderr.decode(errors="replace").strip().splitlines()[-1:]
+        raise InvalidValueError(
+            f"the mesh can't be divided into convex pieces (code {process.returncode}: "
+            f"{''.join(last)[:120]})"
+        )
+    with np.load(io.BytesIO(process.stdout), allow_pickle=False) as found:
+        pieces = [np.asarray(found[key], dtype=np.float64) for key in found.files]
+    if not pieces:
+        raise InvalidValueError("the mesh can't be divided into convex pieces: there are none")
+    return pieces
+
+
+def main() -> None:
+    """Read a mesh from standard input, and write its pieces to standard output."""
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    import coacd
+
+    with np.load(io.BytesIO(sys.stdin.buffer.read()), allow_pickle=False) as given:
+        mesh = coacd.Mesh(given["corners"], given["faces"])
+        most = int(given["most"])
+        seconds = int(given["seconds"])
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+    coacd.set_log_level("error")
+    found = coacd.run_coacd(
+        mesh,
+        threshold=CONCAVITY,
+        max_convex_hull=most,
+        preprocess_mode="off",
+        max_ch_vertex=CORNERS,
+        seed=_SEED,
+    )
+    stream = io.BytesIO()
+    np.savez(stream, **{f"piece_{k:04d}": corners for k, (corners, _) in enumerate(found)})
+    sys.stdout.buffer.write(stream.getvalue())
+
 
 MARGINS = (0.0005, 0.001, 0.002, 0.004, 0.008, 0.016)
 """Metres by which pieces are widened; the first is taken with which they contain the mesh."""

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import stat
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +10,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ir_description.arrays import frozen
 from ir_description.errors import shown
+from ir_description.files.file_access import read_regular_file
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
 
@@ -31,31 +30,6 @@ rounding).
 
 _BINARY = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
-
-
-def read_regular_file(path: Path, limit: int) -> bytes:
-    """Return the content of a regular file of at most `limit` bytes; never blocks on a FIFO or
-    device.
-    """
-    try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise InvalidValueError(
-            f"file {shown(str(path), 200)} can't be opened: {reason}"
-        ) from error
-    try:
-        status = os.fstat(descriptor)
-        if not stat.S_ISREG(status.st_mode):
-            raise InvalidValueError(f"file {shown(str(path), 200)} is not a regular file")
-        if status.st_size > limit:
-            raise InvalidValueError(
-                f"file {shown(str(path))} has {status.st_size} bytes, must be at most {limit} bytes"
-            )
-        with os.fdopen(descriptor, "rb", closefd=False) as file:
-            return file.read(limit)
-    finally:
-        os.close(descriptor)
 
 
 def mesh_path(folder: Path, name: str, suffixes: tuple[str, ...] = (".stl",)) -> Path:

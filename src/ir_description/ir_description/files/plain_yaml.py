@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 
 from ir_description.errors import DescriptionFileError
-from ir_description.files.mesh import read_regular_file
+from ir_description.files.file_access import read_regular_file
 from ir_description.files.yaml_tree import parse_yaml
 
 BYTES_MAX = 100_000

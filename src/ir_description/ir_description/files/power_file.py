@@ -1,19 +1,85 @@
-"""Reads a power file (data/power/*.yaml) into PowerData."""
+"""Power data as files: the figures of a controller, fitted parameters, marks of confidence."""
 
 from __future__ import annotations
 
-from ir_description.errors import RobotFileError
-from ir_description.files.confidence import marks_of
-from ir_description.files.figures import figure
+from collections.abc import Callable, Iterator
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from ir_description.errors import RobotFileError, UnknownNameError
+from ir_description.files.file_access import inside, is_path, read_regular_file, text_of
 from ir_description.files.items import Item, Table, read_items
+from ir_description.files.yaml_tree import Node, Scalar, parse_yaml
 from ir_description.robot import (
+    USUAL_LINK,
     ControllerMode,
     DcLink,
     EnergyShare,
     MeasuredPower,
     PlcBit,
     PowerData,
+    PowerParameters,
+    parameter_unit,
+    without_table,
 )
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.errors import InvalidValueError
+
+# The confidence mark of each figure of a robot or power file, by its place.
+
+
+def confidence_marks(text: str, source: str = "<text>") -> dict[str, str]:
+    """Return H, M or L by place: "drives.friction_viscous_nms_rad", "links.link_2.mass_kg",
+    "modes.HIBERNATION.controller_w". Entries of lists go by their name.
+    """
+    return marks_of(parse_yaml(text, source, RobotFileError))
+
+
+def marks_of(node: Node) -> dict[str, str]:
+    """The same of a tree."""
+    return dict(_marks(node, ""))
+
+
+def _marks(node: Node, place: str) -> Iterator[tuple[str, str]]:
+    content = node.content
+    if isinstance(content, list):
+        for i, element in enumerate(content):
+            yield from _marks(element, f"{place}.{_text(element, 'name') or i}")
+    elif isinstance(content, dict):
+        mark = _text(node, "confidence")
+        if mark and "value" in content:
+            yield place, mark
+            return
+        for key, entry in content.items():
+            yield from _marks(entry.node, f"{place}.{key}" if place else key)
+
+
+def _text(node: Node, key: str) -> str:
+    """The text under a key of a mapping, "" where there is none."""
+    content = node.content
+    if not isinstance(content, dict) or key not in content:
+        return ""
+    value = content[key].node.content
+    return value.text if isinstance(value, Scalar) else ""
+
+
+# A figure of a robot or power file: its value with its source and confidence.
+
+CONFIDENCES = ("H", "M", "L")
+
+
+def figure(item: Item) -> Item:
+    """Return the value of a figure: a mapping of value, source, confidence and perhaps a note."""
+    table = item.table(("value", "source", "confidence"), ("note",))
+    table["source"].text()
+    table["confidence"].choice(CONFIDENCES)
+    if "note" in table:
+        table["note"].text(400)
+    return table["value"]
+
 
 FORMAT = "ir_description/power/1"
 
@@ -133,3 +199,181 @@ def _table_1_row(item: Item) -> EnergyShare:
     return EnergyShare(
         consumer=table["consumer"].name(), percent=table["value"].number(0, 100, "%")
     )
+
+
+# Power parameters (`ir_description/power_parameters/1`): what a fit found, with covariance. A file
+# names the parameters that it knows; the others stay as the data of its robot and controller have
+# them.
+
+PARAMETERS_FORMAT = "ir_description/power_parameters/1"
+_DIGITS = ".9g"
+_BIG = 1e12
+
+
+def power_parameters_from_yaml(
+    text: str, source: str, data_sheet: Callable[[str, str], PowerParameters]
+) -> PowerParameters:
+    """Return the parameters a text describes; data_sheet: those of a robot and a controller by
+    their names. Errors name file and line.
+    """
+    root = read_items(text, source, RobotFileError)
+    top = root.table(
+        ("format", "name", "robot", "controller", "parameters"), ("source", "correlation")
+    )
+    top["format"].choice((PARAMETERS_FORMAT,))
+    if "source" in top:
+        top["source"].text(400)
+    with root.blamed():
+        start = data_sheet(top["robot"].name(), top["controller"].name())
+    mean, deviation, sources = _given(top["parameters"], start)
+    correlation = _correlation(top.get("correlation"), start.names)
+    with root.blamed():
+        return PowerParameters(
+            name=top["name"].name(),
+            robot=start.robot,
+            controller=start.controller,
+            joints=start.joints,
+            modes=start.modes,
+            mean=mean,
+            covariance=correlation * np.outer(deviation, deviation),
+            sources=sources,
+        )
+
+
+def _given(item: Item, start: PowerParameters) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
+    """Mean, deviations and sources with those that the file names, else those of `start`."""
+    mean = start.mean.copy()
+    deviation = start.deviation.copy()
+    sources = list(start.sources)
+    known: list[str] = []
+    for entry in item.list(0, len(start.names)):
+        row = entry.table(("name", "value", "deviation"), ("unit", "source"))
+        name = row["name"].choice(start.names)
+        if name in known:
+            row["name"].fail(f"is {name}, which is named twice")
+        if "unit" in row and row["unit"].text() != parameter_unit(name):
+            row["unit"].fail(f"must be {parameter_unit(name)}, which is the unit of {name}")
+        known.append(name)
+        k = start.index(name)
+        mean[k] = row["value"].number(-_BIG, _BIG)
+        deviation[k] = row["deviation"].number(0.0, _BIG)
+        sources[k] = row["source"].text() if "source" in row else "file"
+    return mean, deviation, tuple(sources)
+
+
+def power_parameters_to_yaml(parameters: PowerParameters, source: str = "") -> str:
+    """Return the file of all parameters; source: one line that says where they are from."""
+    lines = [f"format: {PARAMETERS_FORMAT}", f"name: {parameters.name}"]
+    lines += [f"robot: {parameters.robot}", f"controller: {parameters.controller}"]
+    lines += [f"source: {_quoted(source)}"] if source else []
+    lines.append("parameters:")
+    rows = zip(
+        parameters.names, parameters.mean, parameters.deviation, parameters.sources, strict=True
+    )
+    for name, value, deviation, origin in rows:
+        unit = parameter_unit(name)
+        shown = f", unit: {_quoted(unit)}" if unit else ""
+        lines.append(
+            f"  - {{name: {name}, value: "
+            f"{value:{_DIGITS}}, deviation: {deviation:{_DIGITS}}{shown}, source: {_quoted(origin)}}}"  # noqa: E501
+        )
+    return "\n".join([*lines, *_correlation_lines(parameters)]) + "\n"
+
+
+def _correlation(item: Item | None, names: tuple[str, ...]) -> FloatArray:
+    """Correlation (P, P) of a list of names and the rows below the diagonal; 0 where nothing is
+    said.
+    """
+    matrix = np.eye(len(names))
+    if item is None:
+        return matrix
+    table = item.table(("names", "below"))
+    listed = [entry.choice(names) for entry in table["names"].list(2, len(names))]
+    if len(set(listed)) < len(listed):
+        table["names"].fail("names a parameter twice")
+    places = [names.index(name) for name in listed]
+    rows = table["below"].list(len(places) - 1, len(places) - 1)
+    for k, row in enumerate(rows, start=1):
+        values = row.numbers(k, -1.0, 1.0)
+        matrix[places[k], places[:k]] = values
+        matrix[places[:k], places[k]] = values
+    return matrix
+
+
+def _correlation_lines(parameters: PowerParameters) -> list[str]:
+    deviation = parameters.deviation
+    scale = np.where(deviation > 0.0, deviation, 1.0)
+    matrix = parameters.covariance / np.outer(scale, scale)
+    off = np.abs(matrix - np.diag(np.diag(matrix))).max(axis=1)
+    places = np.flatnonzero(off > 1e-9)
+    if len(places) < 2:
+        return []
+    names = ", ".join(parameters.names[k] for k in places)
+    lines = ["correlation:", f"  names: [{names}]", "  below: # the diagonal, row by row"]
+    for row in range(1, len(places)):
+        values = ", ".join(f"{value:.6g}" for value in matrix[places[row], places[:row]])
+        lines.append(f"    - [{values}]")
+    return lines
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+# The controller of a robot file: a bundled table, one in a file beside it, one written out, or
+# none. Without a table: its watts while the motors are on and its DC link, as far as known.
+
+_POWER = files("ir_description") / "data" / "power"
+NONE = "none"
+BYTES_MAX = 1_000_000
+
+
+def bundled_controllers() -> tuple[str, ...]:
+    """Names of the tables that come with the package."""
+    names = (entry.name for entry in _POWER.iterdir())
+    return tuple(sorted(name.removesuffix(".yaml") for name in names if name.endswith(".yaml")))
+
+
+@cache
+def bundled_controller(name: str) -> PowerData:
+    """The bundled table of that name; the same object for the same name."""
+    if name not in bundled_controllers():
+        raise UnknownNameError("controller", name, bundled_controllers())
+    path = _POWER / f"{name}.yaml"
+    return power_from_yaml(path.read_text(encoding="utf-8"), path.name)
+
+
+def read_controller(item: Item, folder: Path | None) -> PowerData:
+    """The power figures that a robot file names, or holds."""
+    if not item.is_scalar():
+        return power_of(item) if item.holds("format") else _without_table(item)
+    name = item.text()
+    if name == NONE:
+        return without_table()
+    with item.blamed():
+        if not is_path(name):
+            return bundled_controller(name)
+        try:
+            return power_from_yaml(_text_controller_reader(name, folder), name)
+        except RobotFileError as error:
+            raise InvalidValueError(str(error)) from error
+
+
+def controller_document(item: Item, power: PowerData, folder: Path | None) -> Node:
+    """What a robot file that needs no other file says of its controller."""
+    if item.is_scalar() and is_path(item.text()):
+        return parse_yaml(_text_controller_reader(item.text(), folder), power.name, RobotFileError)
+    return item.node
+
+
+def _text_controller_reader(name: str, folder: Path | None) -> str:
+    return text_of(read_regular_file(inside(folder, name), BYTES_MAX), name, RobotFileError)
+
+
+def _without_table(item: Item) -> PowerData:
+    table = item.table((), ("standing_w", "dc_link"))
+    watts = figure(table["standing_w"]).number(0, 1e5, "W") if "standing_w" in table else 0.0
+    link = dc_link(table["dc_link"]) if "dc_link" in table else USUAL_LINK
+    own = marks_of(item.node)
+    marks = {"modes.STAND_ON_MOTORS.controller_w": own["standing_w"]} if "standing_w" in own else {}
+    return without_table(watts, link, {**own, **marks})

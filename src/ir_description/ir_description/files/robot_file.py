@@ -13,14 +13,10 @@ import numpy as np
 
 from ir_description.errors import RobotFileError
 from ir_description.files.all_errors import document_errors
-from ir_description.files.confidence import marks_of
-from ir_description.files.controller_reader import controller_document, read_controller
-from ir_description.files.figures import figure
+from ir_description.files.file_access import read_regular_file, text_of
 from ir_description.files.items import Item, Table, read_items
-from ir_description.files.mesh import read_regular_file
-from ir_description.files.text_file import text_of
-from ir_description.files.yaml_text import yaml_text
-from ir_description.files.yaml_tree import Entry, Node
+from ir_description.files.power_file import controller_document, figure, marks_of, read_controller
+from ir_description.files.yaml_tree import Entry, Node, yaml_text
 from ir_description.poses import rotation_from_abc
 from ir_description.robot import Counterbalance, RobotModel, without_table
 from ir_description.shapes import Capsule

@@ -1,14 +1,18 @@
-"""Closed triangle meshes of machines from CAD: STL, OBJ and glTF files inside the cell file's
-folder.
+"""Closed meshes of machines from CAD (STL, OBJ, glTF), as the convex pieces that contain them.
 
-glTF's y axis points up, a cell's z: such meshes are turned. Nothing outside the folder is ever
-opened, whatever a file refers to.
+glTF's y axis points up, a cell's z: such meshes are turned. Nothing outside the cell file's folder
+is ever opened, whatever a file refers to. Pieces are kept by the content of their mesh, because
+dividing one takes seconds to minutes.
 """
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
+import os
+import tempfile
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,11 +21,20 @@ from typing import Any
 import numpy as np
 
 from ir_description.errors import shown
+from ir_description.files.convex_pieces import (
+    CONCAVITY,
+    MARGINS,
+    ConvexPieces,
+    contains,
+    convex_pieces,
+)
+from ir_description.files.file_access import read_regular_file
+from ir_description.files.items import Table
 from ir_description.files.mesh import (
     BYTES_MAX,
+    CELL_TRIANGLES_MAX,
     TRIANGLES_MAX,
     mesh_path,
-    read_regular_file,
     triangles_from_stl,
 )
 from ir_msgs_py.arrays import FloatArray
@@ -159,3 +172,116 @@ def _checked(triangles: FloatArray) -> FloatArray:
     if not np.isfinite(triangles).all():
         raise InvalidValueError("the mesh has corners that are not finite")
     return triangles + 0.0  # no zeros that differ by their sign
+
+
+# Pieces that were kept are checked again when they are taken: that they contain the mesh is proved
+# each time.
+
+VERSION = "1"
+FOLDER = "IR_CACHE"
+"""Variable of the environment with the folder; the user's own cache where it is not set."""
+_BYTES_MAX = 50_000_000
+
+
+def pieces_of(triangles: FloatArray, most: int) -> ConvexPieces:
+    """At most `most` convex pieces that contain a mesh (T, 3, 3) [m], divided now or before."""
+    path = _folder() / f"{_key(triangles, most)}.npz"
+    known = _read(path)
+    if known is not None and contains(known.vertices, triangles):
+        return known
+    found = convex_pieces(triangles, most)
+    with suppress(OSError):  # a cache that can't be written costs time only
+        _write(path, found)
+    return found
+
+
+def _folder() -> Path:
+    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(os.environ.get(FOLDER) or Path(base) / "ir") / "pieces"
+
+
+def _key(triangles: FloatArray, most: int) -> str:
+    settings = f"{VERSION} {most} {CONCAVITY} {MARGINS}"
+    return hashlib.sha256(settings.encode() + np.ascontiguousarray(triangles).tobytes()).hexdigest()
+
+
+def _read(path: Path) -> ConvexPieces | None:
+    """What was kept, None where nothing was, or something else stands there."""
+    try:
+        if path.stat().st_size > _BYTES_MAX:
+            return None
+        with np.load(path, allow_pickle=False) as kept:
+            numbers = kept["numbers"]
+            names = sorted(name for name in kept.files if name != "numbers")
+            vertices = tuple(np.asarray(kept[name], dtype=np.float64) for name in names)
+        margin, protrusion, volume, of_pieces = (float(each) for each in numbers)
+    except Exception:  # whatever a broken file makes NumPy raise: it is made anew
+        return None
+    if not all(
+        each.ndim == 2 and each.shape[1] == 3 and np.isfinite(each).all() for each in vertices
+    ):
+        return None
+    return ConvexPieces(vertices, margin, protrusion, volume, of_pieces)
+
+
+def _write(path: Path, pieces: ConvexPieces) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    numbers = np.array([pieces.margin, pieces.protrusion, pieces.volume, pieces.of_pieces])
+    arrays = {f"piece_{k:04d}": each for k, each in enumerate(pieces.vertices)}
+    with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".npz", delete=False) as file:
+        np.savez(file, numbers=numbers, **arrays)  # type: ignore[arg-type]  # a name is no keyword of savez
+    os.replace(file.name, path)
+
+
+# The entry `mesh: press.stl` of a cell file.
+
+PIECES = 32
+"""Pieces of a mesh, unless its entry says otherwise."""
+PIECES_MAX = 200
+SIZE_MAX = 100.0
+"""Farthest corner [m] of a mesh from its origin: beyond, the unit is hardly meant."""
+
+
+class SolidReader:
+    """Reads the meshes of one cell; those that it names twice once."""
+
+    def __init__(self, folder: Path | None) -> None:
+        self._folder = folder
+        self._triangles = 0
+        self._known: dict[tuple[str, str, int], tuple[FloatArray, ...]] = {}
+
+    def read(self, table: Table) -> tuple[FloatArray, ...]:
+        """Return the corners (V, 3) [m] of each piece of the mesh that an entry describes."""
+        name = table["mesh"].text()
+        unit = table["unit"].choice(tuple(UNITS))
+        most = table["pieces"].integer(1, PIECES_MAX) if "pieces" in table else PIECES
+        with table["mesh"].blamed():
+            if (name, unit, most) not in self._known:
+                self._known[name, unit, most] = pieces_of(self.triangles(name, unit), most).vertices
+            return self._known[name, unit, most]
+
+    def triangles(self, name: str, unit: str) -> FloatArray:
+        """Return the triangles (T, 3, 3) [m] of a mesh file. Raises InvalidValueError."""
+        if self._folder is None:
+            raise InvalidValueError("a mesh file can be named only in a cell file, this is a text")
+        triangles = read_solid(self._folder, name).triangles * UNITS[unit]
+        self._triangles += len(triangles)
+        if self._triangles > CELL_TRIANGLES_MAX:
+            raise InvalidValueError(
+                f"the cell's mesh files have {self._triangles} triangles so far, "
+                f"must have at most {CELL_TRIANGLES_MAX} together"
+            )
+        reach = float(np.abs(triangles).max())
+        if reach > SIZE_MAX:
+            raise InvalidValueError(
+                f"the mesh reaches {reach:g} m in {unit}, must stay within {SIZE_MAX:g} m: "
+                "is its unit another?"
+            )
+        return triangles
+
+
+def piece_names(name: str, count: int) -> tuple[str, ...]:
+    """Names of the bodies that stand for a mesh: its own where it is one, else name.1, name.2 and
+    so on.
+    """
+    return (name,) if count == 1 else tuple(f"{name}.{k}" for k in range(1, count + 1))

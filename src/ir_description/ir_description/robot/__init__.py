@@ -1,7 +1,5 @@
 """The robot, what it carries, and the power figures of its controller."""
 
-from ir_description.robot.frames import TOOL0, FramePose, fixed_frames, moving_frames
-from ir_description.robot.load import MASS_MAX, Load, total_mass
 from ir_description.robot.power import (
     NO_TABLE,
     USUAL_LINK,
@@ -15,16 +13,28 @@ from ir_description.robot.power import (
 )
 from ir_description.robot.power_parameters import (
     AXIS_UNITS,
+    DATA_SHEET,
     IDLE,
+    RELATIVE_DEVIATION,
     SCALARS,
     PowerParameters,
     interval_over,
     parameter_names,
     parameter_unit,
     physical_bounds,
+    prior,
 )
-from ir_description.robot.prior import DATA_SHEET, RELATIVE_DEVIATION, prior
-from ir_description.robot.robot import Counterbalance, RobotModel
+from ir_description.robot.robot import (
+    MASS_MAX,
+    TOOL0,
+    Counterbalance,
+    FramePose,
+    Load,
+    RobotModel,
+    fixed_frames,
+    moving_frames,
+    total_mass,
+)
 
 __all__ = [
     "AXIS_UNITS",

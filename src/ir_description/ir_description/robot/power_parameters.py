@@ -1,28 +1,99 @@
-"""What the joules of a robot follow from, as one named vector with its covariance.
+"""Parameters of a robot's energy: one named vector with its covariance, and where it starts.
 
-Per joint the friction, the copper losses and three losses that the data sheet does not have (zero
-there); for the whole robot scales of masses and of watts, the rectifier, idle inverters and the
-controller's watts by mode. A fit
-gives the same vector with another mean and covariance, so planner, driver and report load both
-alike.
+The prior follows from the marks of confidence of the data. Draws of the vector respect what physics
+allows.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import ndtr, ndtri
 
 from ir_description.arrays import frozen
 from ir_description.errors import UnknownNameError
-from ir_description.robot.load import Load
 from ir_description.robot.power import PowerData
-from ir_description.robot.robot import RobotModel
-from ir_description.robot.truncated import truncated_normal
-from ir_msgs_py.arrays import FloatArray
+from ir_description.robot.robot import Load, RobotModel
+from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.errors import InvalidValueError
+
+# Draws of a normal distribution that physics cuts off: correlations hold at the bounds too.
+#
+# Only parameters that have a bound within reach are drawn one after the other, each from its own
+# distribution given the others (Geweke, 1991); the others follow from them in one step.
+
+_REACH = 6.0  # standard deviations: what lies beyond is not drawn in a lifetime
+_SWEEPS = 60
+_RIDGE = 1e-9  # relative: covariances of a file are rounded
+
+
+def truncated_normal(
+    mean: FloatArray,
+    covariance: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    count: int,
+    seed: int,
+) -> FloatArray:
+    """Vectors (count, P) of N(mean (P,), covariance (P, P)) between low and high (P,).
+
+    What has no deviation stays at its mean.
+    """
+    generator = np.random.default_rng(seed)
+    deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    free = deviation > 0.0
+    scale = deviation[free]
+    matrix = covariance[np.ix_(free, free)] / np.outer(scale, scale)
+    matrix = matrix + _RIDGE * np.eye(len(matrix))
+    least = (low - mean)[free] / scale
+    most = (high - mean)[free] / scale
+    near = np.asarray((least > -_REACH) | (most < _REACH))
+    drawn = np.empty((count, len(scale)))
+    drawn[:, near] = _bounded(matrix[np.ix_(near, near)], least[near], most[near], count, generator)
+    drawn[:, ~near] = _following(matrix, near, drawn[:, near], generator)
+    result = np.tile(mean, (count, 1))
+    result[:, free] += scale * np.clip(drawn, least, most)
+    return np.asarray(np.clip(result, low, high))
+
+
+def _bounded(
+    matrix: FloatArray,
+    least: FloatArray,
+    most: FloatArray,
+    count: int,
+    generator: np.random.Generator,
+) -> FloatArray:
+    """Draws (count, B) about 0 with covariance (B, B) between the bounds (B,)."""
+    size = len(matrix)
+    precision = np.linalg.inv(matrix)
+    deviation = 1.0 / np.sqrt(np.diag(precision))
+    alone = np.array_equal(matrix, np.diag(np.diag(matrix)))
+    drawn = np.clip(np.zeros((count, size)), least, most)
+    for _ in range(1 if alone else _SWEEPS):
+        for j in range(size):
+            middle = drawn[:, j] - drawn @ precision[:, j] * deviation[j] ** 2
+            first = ndtr((least[j] - middle) / deviation[j])
+            last = ndtr((most[j] - middle) / deviation[j])
+            share = first + (last - first) * generator.random(count)
+            value = middle + deviation[j] * ndtri(np.clip(share, 1e-12, 1.0 - 1e-12))
+            drawn[:, j] = np.clip(value, least[j], most[j])
+    return drawn
+
+
+def _following(
+    matrix: FloatArray, near: BoolArray, given: FloatArray, generator: np.random.Generator
+) -> FloatArray:
+    """Draws (count, F) of those that are not near a bound, given the others (count, B)."""
+    own = matrix[np.ix_(~near, ~near)]
+    across = matrix[np.ix_(~near, near)]
+    gain = np.linalg.solve(matrix[np.ix_(near, near)], across.T).T if near.any() else across
+    values, vectors = np.linalg.eigh(own - gain @ across.T)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    return np.asarray(given @ gain.T + generator.standard_normal((len(given), len(own))) @ root.T)
+
 
 AXIS_UNITS = {
     "viscous": "Nm s/rad",
@@ -232,3 +303,140 @@ class PowerParameters:
             replace(m, controller_watts=self.value(f"watts.{m.name}")) for m in data.modes
         )
         return replace(data, modes=modes, drives_and_brake_release=self.value("drives_watts"))
+
+
+# How far a robot may be from its data sheet, before anything is measured: from the marks of
+# confidence.
+#
+# This is the one table of the planner's assumptions: its intervals, the reserve of torque and the
+# start of a fit read it. The plants of the simulation are drawn by rules of their own
+# (docs/plant.md), so that what holds on them is a finding.
+
+DATA_SHEET = "data_sheet"
+"""Name of the parameters that are the data's own."""
+
+RELATIVE_DEVIATION = {"H": 0.02, "M": 0.10, "L": 0.30}
+"""Standard deviation as a share of the value, by the mark of confidence in the data."""
+
+_FACTORS = {"viscous": 1.5, "coulomb": 1.5}
+"""Friction is this much less certain than its mark says: it changes with temperature, grease and
+wear.
+"""
+
+COUNTERBALANCE = 0.03
+"""Gas pressure of the counterbalance: filled and checked to a few per cent, whatever its geometry's
+mark.
+"""
+
+LOAD_MASS = 0.01
+TOOL_WATTS = 0.20
+"""Of the declared load and of the tool's declared watts: the cell files have no marks."""
+
+IRON_SHARE = 0.005
+"""Iron loss at full speed, as a share of peak torque times full speed: half normal, its scale."""
+
+INVERTER_WATTS = 3.0
+"""W per Nm of motor torque: 1 to 2 V across each conducting switch, 1 to 2 A per Nm; half
+normal.
+"""
+
+GEAR_SHARE = 0.04
+"""Loss of the gears that grows with the torque, beyond the friction that the data have; half
+normal.
+"""
+
+IDLE_WATTS = 10.0
+"""Per axis: switching losses of an inverter without a current; half normal. The data count them
+with the drives, which they can't exceed; but they come from the DC link, where braking axes pay for
+them.
+"""
+
+RECTIFIER_LOSS = 0.02
+"""Diode rectifier and mains filter; half normal below 1."""
+
+
+_PLACES = {
+    "viscous": "drives.friction_viscous_nms_rad",
+    "coulomb": "drives.friction_coulomb_nm",
+    "copper": "drives.copper_loss_w_per_nm2",
+    "rotor_inertia": "drives.reflected_inertia_kgm2",
+    "drives_watts": "drives_and_brake_release_w",
+}
+
+Marks = Mapping[str, str]
+"""H, M or L by the place of a figure in its file."""
+
+
+def prior(robot: RobotModel, power: PowerData, marks: Marks) -> PowerParameters:
+    """The parameters as the data have them, independent, with the deviations of this module."""
+    joints = robot.joint_names
+    modes = tuple(mode.name for mode in power.modes)
+    names = parameter_names(joints, modes)
+    watts = [
+        float(robot.idle_loss.sum()),
+        power.drives_and_brake_release,
+        *(mode.controller_watts for mode in power.modes),
+    ]
+    means = (
+        robot.friction_viscous,
+        robot.friction_coulomb,
+        robot.copper_loss,
+        robot.iron_loss,
+        robot.inverter_loss,
+        robot.gear_loss,
+    )  # in the order of AXIS_UNITS
+    mean = np.concatenate([*means, np.ones(len(SCALARS)), watts])
+    known = [_mark(name, robot, marks) for name in names]
+    share = np.array([RELATIVE_DEVIATION.get(mark, 0.0) for mark in known])
+    deviation = (
+        np.abs(mean)
+        * share
+        * np.array([_FACTORS.get(name.partition(".")[0], 1.0) for name in names])
+    )
+    for name, value in _assumed(robot, power).items():
+        deviation[names.index(name)] = value
+    return PowerParameters(
+        name=DATA_SHEET,
+        robot=robot.name,
+        controller=power.name,
+        joints=joints,
+        modes=modes,
+        mean=mean,
+        covariance=np.diag(deviation**2),
+        sources=tuple(f"data {mark}" if mark else "assumed" for mark in known),
+    )
+
+
+def _assumed(robot: RobotModel, power: PowerData) -> dict[str, float]:
+    """Standard deviations of what the data have no mark for."""
+    iron = IRON_SHARE * robot.envelope_torque[:, 0] / robot.velocity_max
+    return {
+        **{
+            f"iron.{joint}": float(value)
+            for joint, value in zip(robot.joint_names, iron, strict=True)
+        },
+        **{f"inverter.{joint}": INVERTER_WATTS for joint in robot.joint_names},
+        **{f"gear.{joint}": GEAR_SHARE for joint in robot.joint_names},
+        "load_mass": LOAD_MASS,
+        "counterbalance": COUNTERBALANCE,
+        "tool_watts": TOOL_WATTS,
+        "rectifier_efficiency": RECTIFIER_LOSS,
+        IDLE: min(IDLE_WATTS * robot.n, power.drives_and_brake_release),
+    }
+
+
+def _mark(name: str, robot: RobotModel, marks: Marks) -> str:
+    """The mark of a parameter; "" where the data say nothing of it."""
+    kind, _, part = name.partition(".")
+    if kind == "link_mass":
+        return _of_most(robot, marks)
+    place = f"modes.{part}.controller_w" if kind == "watts" else _PLACES.get(kind)
+    return marks.get(place, "L") if place else ""
+
+
+def _of_most(robot: RobotModel, marks: Marks) -> str:
+    """The mark that most of the moving mass has."""
+    mass_of = dict.fromkeys(RELATIVE_DEVIATION, 0.0)
+    for link, mass in zip(robot.link_names[1:], robot.link_mass[1:], strict=True):
+        mass_of[marks.get(f"links.{link}.mass_kg", "L")] += float(mass)
+    return max(mass_of, key=lambda mark: mass_of[mark])

@@ -1,23 +1,22 @@
 """The robot as data: chain, limits, bodies, drives, torque envelope, counterbalance, capsules.
 
-Figures and their sources: data/robots/*.yaml, docs/robot_data.md. n joints, links 0..n with 0 =
-base_link.
+With it the loads of its flange, and the tree of frames from the cell to the tool centre point.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ir_description.arrays import frozen, frozen_inertia, frozen_pose, in_range
+from ir_description.arrays import frozen, frozen_inertia, frozen_pose, in_range, transformed
 from ir_description.robot.power import PowerData, without_table
 from ir_description.shapes import Capsule
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
-
-__all__ = ["Capsule", "Counterbalance", "RobotModel"]
+from ir_msgs_py.names import WORLD_FRAME
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,3 +212,112 @@ class RobotModel:
             raise InvalidValueError(
                 f"counterbalance on joint {self.counterbalance.joint}, must be in [0, {n - 1}]"
             )
+
+
+# A load of the flange: the tool, or a part that the tool holds.
+
+MASS_MAX = 2000.0
+"""Largest mass [kg] a load may claim; what the robot carries is limited by
+RobotModel.rated_payload.
+"""
+
+LoadKind = Literal["tool", "part"]
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """What moves with the last link.
+
+    A tool is mass data plus watts, a part is mass only. com (3,) [m] and the capsules stand in the
+    frame of the last link for a tool, in the part's own frame for a part (see `placed`). inertia
+    (3, 3) [kg m^2] is about com.
+    """
+
+    name: str
+    kind: LoadKind
+    mass: float
+    com: FloatArray
+    inertia: FloatArray
+    capsules: tuple[Capsule, ...] = ()
+    watts_always: float = 0.0
+    watts_drive_bus: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("tool", "part"):
+            raise InvalidValueError(f"kind of load is {self.kind!r}, must be tool or part")
+        set_ = object.__setattr__
+        set_(self, "mass", in_range(self.mass, 0.0, MASS_MAX, "kg", "mass", open_low=True))
+        set_(self, "com", frozen(self.com, (3,), "com"))
+        set_(self, "inertia", frozen_inertia(self.inertia, "inertia"))
+        set_(self, "watts_always", in_range(self.watts_always, 0.0, 1e5, "W", "watts_always"))
+        set_(
+            self,
+            "watts_drive_bus",
+            in_range(self.watts_drive_bus, 0.0, 1e5, "W", "watts_drive_bus"),
+        )
+        names = [capsule.name for capsule in self.capsules]
+        if len(set(names)) != len(names):
+            raise InvalidValueError(f"load {self.name} names a capsule twice")
+
+    def placed(self, pose: FloatArray) -> Load:
+        """Return the load with its geometry re-expressed by the pose (4, 4) of its frame in another
+        frame.
+        """
+        pose = frozen_pose(pose, "pose")
+        R = pose[:3, :3]
+        inertia = R @ self.inertia @ R.T
+        return replace(
+            self,
+            com=transformed(pose, self.com),
+            inertia=(inertia + inertia.T) / 2.0,
+            capsules=tuple(capsule.placed(pose) for capsule in self.capsules),
+        )
+
+
+def total_mass(loads: tuple[Load, ...]) -> float:
+    """Return the sum of masses [kg]."""
+    return float(np.sum([load.mass for load in loads]))
+
+
+# The tree of frames from the cell to the tool centre point: which hangs on which, and where.
+
+TOOL0 = np.array(
+    [[0.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+)
+"""Pose (4, 4) of tool0 at the flange: its z points out."""
+
+
+class FramePose(NamedTuple):
+    """A frame and its pose (4, 4) [m] in its parent."""
+
+    parent: str
+    name: str
+    pose: FloatArray
+
+
+def fixed_frames(
+    robot: RobotModel, loads: Iterable[Load], tcp: FloatArray, base_pose: FloatArray
+) -> tuple[FramePose, ...]:
+    """Frames that no joint moves: base in the cell, flange, tool0, tcp (4, 4) and loads at the
+    flange.
+    """
+    at = np.eye(4)
+    return (
+        FramePose(WORLD_FRAME, robot.link_names[0], base_pose),
+        FramePose(robot.link_names[-1], "flange", at),
+        FramePose("flange", "tool0", TOOL0),
+        FramePose("flange", "tcp", tcp),
+        *(FramePose("flange", f"load_{load.name}", at) for load in loads),
+    )
+
+
+def moving_frames(robot: RobotModel, link_poses: FloatArray) -> tuple[FramePose, ...]:
+    """Frames of the joints, from the poses (n+1, 4, 4) of the links in any one frame."""
+    names = robot.link_names
+    return tuple(
+        FramePose(names[i], names[i + 1], np.linalg.solve(link_poses[i], link_poses[i + 1]))
+        for i in range(robot.n)
+    )
+
+
+__all__ = ["Capsule", "Counterbalance", "RobotModel"]

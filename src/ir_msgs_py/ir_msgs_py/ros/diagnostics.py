@@ -13,7 +13,7 @@ from rclpy.node import Node
 
 from ir_msgs_py import names
 from ir_msgs_py.checks import one_line
-from ir_msgs_py.namespaces import diagnostic_name
+from ir_msgs_py.names import diagnostic_name
 
 OK, WARN, ERROR = (
     int(level[0]) for level in (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR)

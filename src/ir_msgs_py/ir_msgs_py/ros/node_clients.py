@@ -22,10 +22,9 @@ from ir_msgs.msg import PowerState as PowerStateMsg
 from ir_msgs.srv import GetProgram, GetTrajectory, QueryModes
 from ir_msgs.srv import SetLoad as SetLoadSrv
 from ir_msgs.srv import SetPlcInput as SetPlcInputSrv
-from ir_msgs_py.announced import ControllerTimers
+from ir_msgs_py.announcements import ControllerTimers
 from ir_msgs_py.errors import InvalidValueError
-from ir_msgs_py.modes import OFF_THE_NETWORK, Mode
-from ir_msgs_py.power import PowerMode
+from ir_msgs_py.modes import OFF_THE_NETWORK, Mode, PowerMode
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.conversions import status_from_msg, trajectory_from_msg, trajectory_to_msg
 from ir_msgs_py.ros.plan_conversions import planned_movement_from_msg

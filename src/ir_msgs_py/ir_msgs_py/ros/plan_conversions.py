@@ -23,16 +23,17 @@ from ir_msgs.msg import Rejection as RejectionMsg
 from ir_msgs.msg import Saving as SavingMsg
 from ir_msgs.msg import ServiceCandidate as ServiceCandidateMsg
 from ir_msgs.msg import TrajectoryReport as TrajectoryReportMsg
-from ir_msgs_py.candidates import IkSolution, ServiceCandidate
-from ir_msgs_py.contact import Contact, MachineState
+from ir_msgs_py.announcements import Contact, MachineState
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import (
     DistancePair,
+    IkSolution,
     PlannedMovement,
     PlanningInfo,
     PlanningStage,
     Rejection,
+    ServiceCandidate,
     TrajectoryReport,
 )
 from ir_msgs_py.ros.conversions import (

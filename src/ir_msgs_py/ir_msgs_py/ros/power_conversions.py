@@ -17,12 +17,18 @@ from ir_msgs.msg import PowerMode as PowerModeMsg
 from ir_msgs.msg import PowerState as PowerStateMsg
 from ir_msgs.msg import ProgramState as ProgramStateMsg
 from ir_msgs.msg import Signal as SignalMsg
-from ir_msgs_py.announced import CarriedLoad, CellState, ControllerTimers
+from ir_msgs_py.announcements import CarriedLoad, CellState, ControllerTimers, ProgramState
 from ir_msgs_py.errors import InvalidValueError, ParameterError
-from ir_msgs_py.modes import RESTS, checked_mode
+from ir_msgs_py.modes import (
+    AXES,
+    METER,
+    RESTS,
+    PowerMode,
+    PowerState,
+    TransitionTimes,
+    checked_mode,
+)
 from ir_msgs_py.plc import PlcInputs, PlcOutputs, Signal
-from ir_msgs_py.power import AXES, METER, PowerMode, PowerState
-from ir_msgs_py.program import ProgramState
 from ir_msgs_py.ros.conversions import (
     float_array,
     point_from_msg,
@@ -33,7 +39,6 @@ from ir_msgs_py.ros.conversions import (
     time_to_msg,
 )
 from ir_msgs_py.ros.plan_conversions import planned_movement_from_msg, planned_movement_to_msg
-from ir_msgs_py.transitions import TransitionTimes
 
 _POWER_MODE = tuple(field.name for field in fields(PowerMode))
 _INPUTS = tuple(field.name for field in fields(PlcInputs))

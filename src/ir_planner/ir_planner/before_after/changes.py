@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.before_after import Change
 from ir_msgs_py.report import MovementKind
+from ir_msgs_py.savings import Change
 from ir_planner.before_after.costs_of import Costed, CostedHop, hops_of, saving
 
 MOST = 5

@@ -6,13 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from ir_description import ProgramStep
+from ir_msgs_py.announcements import MachineState
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.before_after import BeforeAfter, Side
-from ir_msgs_py.contact import MachineState
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
-from ir_msgs_py.savings import Saving
+from ir_msgs_py.savings import BeforeAfter, Saving, Side
 from ir_msgs_py.status import StatusCode
 from ir_planner.before_after.asked import Asked, asked_program
 from ir_planner.before_after.changes import changes

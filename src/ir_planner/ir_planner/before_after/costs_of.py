@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.before_after import Hop, Side
 from ir_msgs_py.report import MovementKind, PlannedMovement
-from ir_msgs_py.savings import Saving
+from ir_msgs_py.savings import Hop, Saving, Side
 from ir_planner.before_after.peaks import peak_interval
 from ir_planner.checks import interval, movement_energy, total_report
 from ir_planner.program import ProgramRequest, Spreads

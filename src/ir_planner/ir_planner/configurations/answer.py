@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.candidates import IkSolution
-from ir_msgs_py.report import PlanningInfo
+from ir_msgs_py.report import IkSolution, PlanningInfo
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.configurations.interaction_point import searched_configurations
 from ir_planner.configurations.inverse_kinematics import (

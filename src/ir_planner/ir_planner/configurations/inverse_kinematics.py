@@ -12,7 +12,7 @@ import numpy as np
 
 from ir_kernels.collision import MinDistance
 from ir_msgs_py.arrays import FloatArray, IntArray
-from ir_msgs_py.candidates import IkSolution
+from ir_msgs_py.report import IkSolution
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import nearest_pair
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, movement_cost

@@ -14,7 +14,7 @@ from ir_msgs.msg import CellState as CellStateMsg
 from ir_msgs.msg import ControllerTimers as ControllerTimersMsg
 from ir_msgs.msg import MachineStates as MachineStatesMsg
 from ir_msgs_py import names
-from ir_msgs_py.announced import CellState
+from ir_msgs_py.announcements import CellState
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.ros.plan_conversions import machine_states_from_msg
 from ir_msgs_py.ros.power_conversions import (

@@ -6,9 +6,8 @@ the charge feeds the holding torque; with the brakes closed it stays.
 
 from dataclasses import replace
 
-from ir_msgs_py.modes import modes_of
+from ir_msgs_py.modes import TransitionTimes, modes_of
 from ir_msgs_py.report import PlannedMovement
-from ir_msgs_py.transitions import TransitionTimes
 from ir_planner.checks import MovementEnergy, carried, holding_watts, peak_power
 from ir_planner.program.pauses import Pause
 from ir_planner.scene import PlanningScene

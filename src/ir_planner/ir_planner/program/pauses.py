@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.modes import DEEPER, modes_of
+from ir_msgs_py.modes import DEEPER, TransitionTimes, modes_of
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
-from ir_msgs_py.transitions import TransitionTimes
 from ir_planner.program.rests import BRAKES, MOTORS, Rests, rests_at
 from ir_planner.scene import PlanningScene
 

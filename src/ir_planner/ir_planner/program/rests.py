@@ -15,8 +15,7 @@ from itertools import combinations
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.modes import REST_MODES
-from ir_msgs_py.transitions import TransitionTimes
+from ir_msgs_py.modes import REST_MODES, TransitionTimes
 from ir_planner.checks import holding_watts
 from ir_planner.scene import PlanningScene
 

@@ -11,9 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.modes import REST_MODES, Mode
-from ir_msgs_py.power import PowerMode
-from ir_msgs_py.transitions import TransitionTimes
+from ir_msgs_py.modes import REST_MODES, Mode, PowerMode, TransitionTimes
 from ir_planner.checks import Interval, interval, spread
 from ir_planner.program.pause_lengths import Lengths, lengths_of
 from ir_planner.program.pause_slopes import pause_slope, same_steps

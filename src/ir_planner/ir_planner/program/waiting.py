@@ -7,7 +7,7 @@ its end; where the end is not known, the robot is woken at the end and ready whe
 from dataclasses import dataclass, replace
 
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.transitions import TransitionTimes
+from ir_msgs_py.modes import TransitionTimes
 from ir_planner.program.pause_lengths import Lengths
 from ir_planner.program.standby import Standby, advice
 from ir_planner.scene import PlanningScene

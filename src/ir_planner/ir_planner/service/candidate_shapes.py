@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ir_msgs_py.candidates import ServiceCandidate
+from ir_msgs_py.report import ServiceCandidate
 from ir_planner.checks import CLOSEST, PATH, ZONES, Colour, Shape
 from ir_planner.scene import PlanningScene
 

@@ -10,8 +10,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ir_msgs_py.candidates import ServiceCandidate
-from ir_msgs_py.report import PlanningInfo
+from ir_msgs_py.report import PlanningInfo, ServiceCandidate
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import nearest_pair
 from ir_planner.errors import TimingError

@@ -16,7 +16,7 @@ from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.checks import one_line
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.file_roots import ANYWHERE, FileRoots
-from ir_msgs_py.namespaces import owns_diagnostic, owns_logger
+from ir_msgs_py.names import owns_diagnostic, owns_logger
 from ir_msgs_py.plc import PlcInputs, PlcOutputs
 from ir_recorder.errors import ReadError
 from ir_recorder.format import contents

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 from ir_msgs_py import names
-from ir_msgs_py.namespaces import NODES
+from ir_msgs_py.names import NODES
 from ir_recorder.errors import TopicsError
 
 SHARED = (

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
-from ir_msgs_py.one_sided import one_sided
+from ir_msgs_py.savings import one_sided
 from ir_recorder.analysis import Analysis, Finding, ProgramTotals, Share, Verdict, summary
 from ir_recorder.format.contents import OWN_FACTS, VERSION
 from ir_recorder.report.costs import (

@@ -9,8 +9,8 @@ import numpy as np
 
 from ir_description import Cell, PartPlaces, data_sheet_of
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.before_after import Side
 from ir_msgs_py.report import PlannedMovement, TrajectoryReport
+from ir_msgs_py.savings import Side
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.clearance import places_after

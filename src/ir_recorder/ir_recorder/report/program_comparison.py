@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ir_description import Cell
-from ir_msgs_py.before_after import BeforeAfter, Change, Side
 from ir_msgs_py.file_roots import ANYWHERE, FileRoots
+from ir_msgs_py.savings import BeforeAfter, Change, Side
 from ir_recorder.report.cell_scene import cell_scene
 from ir_recorder.report.charts import Point, front_chart
 from ir_recorder.report.costs import J_PER_KWH, SETTINGS, Costs, money

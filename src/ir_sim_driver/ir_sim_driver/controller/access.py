@@ -6,7 +6,7 @@ import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
-from ir_msgs_py.contact import Contact, MachineState
+from ir_msgs_py.announcements import Contact, MachineState
 from ir_msgs_py.plc import OperatingMode, PlcInputs
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.simulation import Simulation

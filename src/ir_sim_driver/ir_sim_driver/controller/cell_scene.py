@@ -14,8 +14,8 @@ import numpy as np
 from ir_description import AllowedContact, Body, Capsule, Cell, Equipment, cell_in, sweep_speeds
 from ir_kernels.chain import Chain
 from ir_kernels.collision import CollisionModel
+from ir_msgs_py.announcements import MachineState
 from ir_msgs_py.arrays import BoolArray, FloatArray
-from ir_msgs_py.contact import MachineState
 from ir_msgs_py.errors import InvalidValueError
 from ir_sim_driver.plant import Carried
 

@@ -12,8 +12,8 @@ import numpy as np
 from ir_description import Body, Cell
 from ir_kernels.collision import CollisionModel
 from ir_kernels.dynamics import DynamicsModel
+from ir_msgs_py.announcements import Contact, MachineState
 from ir_msgs_py.arrays import BoolArray, FloatArray
-from ir_msgs_py.contact import Contact, MachineState
 from ir_msgs_py.report import DistancePair
 from ir_sim_driver.controller.cell_scene import (
     ALLOWED_DEPTH,

@@ -10,12 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ir_description import Capsule, Cell, FramePose, fixed_frames, moving_frames, robot_urdf
-from ir_msgs_py.announced import ControllerTimers
+from ir_msgs_py.announcements import ControllerTimers
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.modes import Mode
+from ir_msgs_py.modes import Mode, PowerMode
 from ir_msgs_py.plc import OperatingMode, PlcInputs
-from ir_msgs_py.power import PowerMode
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.access import Access, CellSide, PlcSide
 from ir_sim_driver.controller.goals import Goals

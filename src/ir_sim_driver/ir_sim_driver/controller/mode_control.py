@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from ir_msgs_py.modes import DRIVES_ON, OFF_THE_NETWORK, READY, RESTS, ROW, Mode
+from ir_msgs_py.modes import DRIVES_ON, OFF_THE_NETWORK, READY, RESTS, ROW, Mode, PowerMode
 from ir_msgs_py.plc import OperatingMode, PlcOutputs
-from ir_msgs_py.power import PowerMode
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.errors import RequestRefusedError

@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.modes import Mode
+from ir_msgs_py.modes import Mode, PowerState
 from ir_msgs_py.plc import PlcInputs, PlcOutputs
-from ir_msgs_py.power import PowerState
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.load_check import LoadFinding
 from ir_sim_driver.motion import Following

@@ -6,10 +6,9 @@ from dataclasses import dataclass, field
 from typing import cast
 
 from ir_kernels.power import REGENERATIONS, Regeneration
-from ir_msgs_py.modes import REST_MODES, Mode
+from ir_msgs_py.modes import REST_MODES, Mode, TransitionTimes
 from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.settings import check_settings, setting
-from ir_msgs_py.transitions import TransitionTimes
 from ir_sim_driver.controller.supervision import SupervisionSettings
 from ir_sim_driver.load_check import LoadCheckSettings
 from ir_sim_driver.motion import ExecutionSettings

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from rclpy.node import Node
 
+from ir_msgs_py.modes import PREFIX, TransitionTimes
 from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.settings import check_settings, setting
-from ir_msgs_py.transitions import PREFIX, TransitionTimes
 from ir_sim_driver.controller import ControllerSettings, SimulationSettings, SupervisionSettings
 from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.load_check import LoadCheckSettings

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
+from ir_msgs_py.plc import CONTROLLER_MAC, WAKE_PORT, mac_bytes, wakes
 from ir_msgs_py.settings import check_settings, setting
-from ir_msgs_py.wake_on_lan import CONTROLLER_MAC, WAKE_PORT, mac_bytes, wakes
 from ir_sim_driver.errors import LinkError
 from ir_sim_driver.plc.port import Controller, OpenLink
 

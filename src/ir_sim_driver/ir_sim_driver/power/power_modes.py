@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ir_msgs_py.modes import DRIVES_ON, READY, RESTS, ROW, Mode, ModeRow
+from ir_msgs_py.modes import DRIVES_ON, READY, RESTS, ROW, Mode, ModeRow, TransitionTimes
 from ir_msgs_py.settings import check_settings, setting
-from ir_msgs_py.transitions import TransitionTimes
 from ir_sim_driver.errors import SettingsError
 
 # Times of every rest by its mode, and the controller's own timers.

@@ -12,8 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import pairwise
 
-from ir_msgs_py.modes import ROW, Mode
-from ir_msgs_py.power import PowerMode
+from ir_msgs_py.modes import ROW, Mode, PowerMode
 from ir_sim_driver.power.power_modes import Times
 
 _ROUNDING = 1e-6  # s; a pause may be just as long as a sequence

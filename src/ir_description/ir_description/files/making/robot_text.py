@@ -5,18 +5,224 @@ touch.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
 
 import numpy as np
 
-from ir_description.files.making.drive_sheet import DriveSheet, Value
-from ir_description.files.making.urdf_arm import UrdfArm
+from ir_description.errors import RobotFileError
+from ir_description.files.items import Item, Table, read_items
+from ir_description.files.making.urdf_arm import AXES, UrdfArm
+from ir_description.files.power_file import figure
 from ir_description.files.robot_file import FORMAT
-from ir_description.files.yaml_text import yaml_text
-from ir_description.files.yaml_tree import Node
+from ir_description.files.yaml_tree import Node, yaml_text
 from ir_description.poses import abc_from_rotation
 from ir_description.shapes import Capsule
 from ir_msgs_py.arrays import FloatArray
+
+# The sheet of drive figures beside a URDF: what a URDF does not say, each known, or estimated and
+# marked so. The estimates are the proportions of the KR 210 R2700 extra, whose drives are known:
+# see `TEMPLATE`, which says for each figure what it is and what happens where it is unknown.
+
+SHEET_FORMAT = "ir_description/drives/1"
+TEMPLATE = (files("ir_description") / "data" / "drives.yaml").read_text(encoding="utf-8")
+UNKNOWN = "unknown"
+
+RAMP = 0.3  # s from rest to full speed: KR 210 0.28 to 0.52 s
+JERK_TIME = 0.1  # s from no to full acceleration
+RATIO = 100.0
+ROTOR_SHARE = 1.0 / 3.0  # of the peak torque that the rotor alone takes at the acceleration limit
+FRICTION_SHARE = 0.08  # of the peak torque, each: Coulomb, and viscous at full speed
+COPPER_SHARE = 0.03  # of the peak power, lost in the windings at peak torque
+# of full speed; torque there and at full speed, of the peak
+BEND = 0.62
+AT_BEND = 0.9
+AT_FULL = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Value:
+    """A figure: numbers (any shape), where they are from, how sure they are, and a note."""
+
+    numbers: FloatArray
+    source: str
+    confidence: str
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class DriveSheet:
+    """name, title, joint_names, link_names ((): those of the URDF); values: figures by their key in
+    a robot file; controller, counterbalance: as they were written, None where not; radii (7,) [m]
+    of capsules for links without a mesh.
+    """
+
+    name: str
+    title: str
+    joint_names: tuple[str, ...]
+    link_names: tuple[str, ...]
+    values: dict[str, Value]
+    controller: Node | None
+    counterbalance: Node | None
+    radii: FloatArray | None
+
+
+_KEYS = ("format", "name", "rated_payload_kg", "machine_home_deg")
+_ROWS = {
+    "position_min_deg": ("deg", -3600.0),
+    "position_max_deg": ("deg", -3600.0),
+    "velocity_deg_s": ("deg/s", 0.0),
+    "acceleration_rad_s2": ("rad/s^2", 0.0),
+    "jerk_deg_s3": ("deg/s^3", 0.0),
+    "gear_ratio": ("", 0.0),
+    "gear_peak_torque_nm": ("Nm", 0.0),
+    "motor_peak_torque_nm": ("Nm", 0.0),
+    "reflected_inertia_kgm2": ("kg m^2", 0.0),
+    "friction_viscous_nms_rad": ("Nm s/rad", 0.0),
+    "friction_coulomb_nm": ("Nm", 0.0),
+    "copper_loss_w_per_nm2": ("W/Nm^2", 0.0),
+}
+_OPTIONAL = (
+    "title",
+    "joint_names",
+    "link_names",
+    "controller",
+    "counterbalance",
+    "capsule_radius_m",
+    "envelope_rad_s_nm",
+    *_ROWS,
+)
+
+
+def drive_sheet(text: str, source: str, arm: UrdfArm) -> DriveSheet:
+    """Read a sheet for an arm, and estimate what it does not know. Raises RobotFileError."""
+    top = read_items(text, source, RobotFileError).table(_KEYS, _OPTIONAL)
+    top["format"].choice((SHEET_FORMAT,))
+    known = {
+        key: value for key, (unit, low) in _ROWS.items() if (value := _row(top, key, unit, low))
+    }
+    known["rated_payload_kg"] = _value(
+        top["rated_payload_kg"], lambda item: item.number(0, 1e4, "kg", above=True)
+    )
+    known["machine_home_deg"] = _value(
+        top["machine_home_deg"], lambda item: item.numbers(AXES, -3600, 3600, "deg")
+    )
+    if "envelope_rad_s_nm" in top and not _unknown(top["envelope_rad_s_nm"]):
+        known["envelope_rad_s_nm"] = _value(top["envelope_rad_s_nm"], _envelope)
+    _complete(known, arm, source)
+    radii = (
+        top["capsule_radius_m"].numbers(AXES + 1, 0, 100, "m", above=True)
+        if "capsule_radius_m" in top
+        else None
+    )
+    return DriveSheet(
+        name=top["name"].name(),
+        title=top["title"].text(64) if "title" in top else "",
+        joint_names=_names(top, "joint_names", AXES),
+        link_names=_names(top, "link_names", AXES + 1),
+        values=known,
+        controller=top["controller"].node if "controller" in top else None,
+        counterbalance=top["counterbalance"].node if "counterbalance" in top else None,
+        radii=radii,
+    )
+
+
+def _unknown(item: Item) -> bool:
+    return item.is_scalar() and item.text() == UNKNOWN
+
+
+def _row(top: Table, key: str, unit: str, low: float) -> Value | None:
+    if key not in top or _unknown(top[key]):
+        return None
+    return _value(top[key], lambda item: item.numbers(AXES, low, 1e12, unit))
+
+
+def _value(item: Item, read: Callable[[Item], object]) -> Value:
+    numbers = np.array(read(figure(item)))
+    table = item.table(("value", "source", "confidence"), ("note",))
+    note = table["note"].text(400) if "note" in table else ""
+    return Value(numbers, table["source"].text(), table["confidence"].text(), note)
+
+
+def _envelope(item: Item) -> FloatArray:
+    joints = item.list(AXES, AXES)
+    count = len(joints[0].list(1, 50))
+    return np.array([joint.rows(2, 0, 1e12, count=(count, count)) for joint in joints])
+
+
+def _names(top: Table, key: str, count: int) -> tuple[str, ...]:
+    return tuple(item.name() for item in top[key].list(count, count)) if key in top else ()
+
+
+def _complete(known: dict[str, Value], arm: UrdfArm, source: str) -> None:
+    """Take from the URDF what it has, and estimate the rest."""
+
+    def taken(key: str, numbers: list[float], what: str) -> None:
+        if key in known:
+            return
+        if not all(numbers):
+            joint = arm.joints[[bool(n) for n in numbers].index(False)].name
+            raise RobotFileError(
+                source, 0, f"{key} is unknown and the URDF has no {what} for {joint}"
+            )
+        known[key] = Value(np.array(numbers), "URDF", "M")
+
+    def estimated(key: str, numbers: FloatArray, note: str) -> None:
+        known.setdefault(key, Value(np.asarray(numbers), "estimate", "L", note))
+
+    turning = [joint.kind == "continuous" for joint in arm.joints]
+    ends = [
+        (-360.0, 360.0) if turn else tuple(np.degrees([joint.lower, joint.upper]))
+        for joint, turn in zip(arm.joints, turning, strict=True)
+    ]
+    known.setdefault("position_min_deg", Value(np.array([low for low, _ in ends]), "URDF", "M"))
+    known.setdefault("position_max_deg", Value(np.array([high for _, high in ends]), "URDF", "M"))
+    taken(
+        "velocity_deg_s",
+        [float(np.degrees(joint.velocity)) for joint in arm.joints],
+        "velocity limit",
+    )
+    taken("gear_peak_torque_nm", [joint.effort for joint in arm.joints], "effort limit")
+    speed = np.radians(known["velocity_deg_s"].numbers)
+    peak = known["gear_peak_torque_nm"].numbers
+    estimated("acceleration_rad_s2", speed / RAMP, f"full speed in {RAMP:g} s")
+    reached = known["acceleration_rad_s2"].numbers
+    estimated(
+        "jerk_deg_s3", np.degrees(reached) / JERK_TIME, f"full acceleration in {JERK_TIME:g} s"
+    )
+    estimated(
+        "gear_ratio",
+        np.full(AXES, RATIO),
+        "usual; only the split between motor and gear follows from it",
+    )
+    ratio = known["gear_ratio"].numbers
+    estimated("motor_peak_torque_nm", peak / ratio, "as much as the gear takes")
+    estimated(
+        "reflected_inertia_kgm2",
+        ROTOR_SHARE * peak / reached,
+        "a third of the peak torque at the acceleration limit",
+    )
+    estimated(
+        "friction_viscous_nms_rad",
+        FRICTION_SHARE * peak / speed,
+        "8 % of the peak torque at full speed",
+    )
+    estimated("friction_coulomb_nm", FRICTION_SHARE * peak, "8 % of the peak torque")
+    motor = known["motor_peak_torque_nm"].numbers
+    estimated(
+        "copper_loss_w_per_nm2",
+        COPPER_SHARE * peak * speed / motor**2,
+        "3 % of the peak power at peak torque",
+    )
+    least = np.minimum(peak, motor * ratio)
+    pairs = [[[BEND * v, AT_BEND * t], [v, AT_FULL * t]] for v, t in zip(speed, least, strict=True)]
+    estimated(
+        "envelope_rad_s_nm",
+        np.array(pairs),
+        "peak torque to 62 % of full speed, half of it at full speed",
+    )
+
 
 _DIGITS = 11  # significant ones: more than any figure has, fewer than rounding spoils
 _JOINT_ROWS = (
@@ -92,7 +298,7 @@ def _lines(
     yield from _written("counterbalance", sheet.counterbalance)
     yield "capsules:"
     for capsule in capsules:
-        ends = f"p0: {_row(capsule.p0)}, p1: {_row(capsule.p1)}, radius: {_row(capsule.radius)}"
+        ends = f"p0: {_flow(capsule.p0)}, p1: {_flow(capsule.p1)}, radius: {_flow(capsule.radius)}"
         yield f"  - {{name: {capsule.name}, link: {links[capsule.link]}, {ends}}}"
     pairs = list(self_pairs)
     yield "self_pairs:" if pairs else "self_pairs: []"
@@ -120,14 +326,14 @@ def _written(key: str, node: Node | None) -> Iterator[str]:
 
 def _figure(value: Value) -> str:
     note = f", note: {json.dumps(value.note)}" if value.note else ""
-    own = _row(value.numbers)
+    own = _flow(value.numbers)
     return (
         f"{{value: {own}, source: {json.dumps(value.source)}, confidence: "
         f"{value.confidence}{note}}}"
     )
 
 
-def _row(values: FloatArray | float) -> str:
+def _flow(values: FloatArray | float) -> str:
     return json.dumps(_rounded(np.asarray(values, dtype=np.float64).tolist()))
 
 
