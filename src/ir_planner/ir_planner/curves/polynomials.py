@@ -1,19 +1,29 @@
-"""Exact extremes of a trajectory between its points: what a limit is compared with.
+"""Polynomials of a trajectory: exact extremes between its points, and samples at many instants.
 
 A trajectory is q(t) = sum_k c_k t^k in the local time of each segment, coefficients (S, n, K).
-Extremes are those of the compiled core. The travel of a joint is the distance between its ends, or
-where it turns in
-between, that between its turning points: they are bracketed between the roots of the next
-derivative, down to a line, so none is missed and no sampling takes part.
+Limits are compared with extremes, which the compiled core finds. The travel of a joint is the
+distance between its ends, or where it turns in between, that between its turning points: they are
+bracketed between the roots of the next derivative, down to a line, so none is missed and no
+sampling takes part.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ir_kernels import Extrema, polynomial_extrema
+from ir_kernels import Extrema, polynomial_extrema, polynomial_samples
 from ir_msgs_py.arrays import BoolArray, FloatArray
+from ir_msgs_py.trajectory import JointTrajectory, Samples
+
+# Exact extremes of a trajectory between its points: what a limit is compared with.
+#
+# A trajectory is q(t) = sum_k c_k t^k in the local time of each segment, coefficients (S, n, K).
+# Extremes are those of the compiled core. The travel of a joint is the distance between its ends, or
+# where it turns in
+# between, that between its turning points: they are bracketed between the roots of the next
+# derivative, down to a line, so none is missed and no sampling takes part.
 
 _NOTHING = (
     1e-9  # rad: what higher powers may add to a cubic, as a point per knot of a spline rounds them
@@ -156,3 +166,16 @@ def _turning_travel(position: FloatArray) -> FloatArray:
 def _with_ends(points: FloatArray) -> FloatArray:
     rows = len(points)
     return np.concatenate([np.zeros((rows, 1)), points, np.ones((rows, 1))], axis=1)
+
+
+# Where a trajectory is at many instants: the interpolant that everything rests on, by the compiled
+# core.
+
+
+def motion_at(trajectory: JointTrajectory, times: NDArray[np.floating]) -> Samples:
+    """q, qd, qdd (M, n) at times (M,) s within the trajectory; jerk (0, n) is left out."""
+    coefficients, durations = trajectory.coefficients()
+    if len(durations) == 0:
+        return trajectory.sample(times)
+    found = polynomial_samples(coefficients, durations, trajectory.times[:-1], times)
+    return Samples(*found, np.zeros((0, coefficients.shape[1])))
