@@ -1,9 +1,15 @@
 """Curves over time and path: arc length, polynomials, splines through points, uniform B-splines."""
 
-from ir_planner.curves.arc_length import at_shares, evenly_spaced
 from ir_planner.curves.polynomials import Extremes, extremes, motion_at
 from ir_planner.curves.splines import natural_durations, spline_through, to_ppoly, virtual_knots
-from ir_planner.curves.uniform_spline import UniformSpline, along_motion, along_path, fewest_seconds
+from ir_planner.curves.uniform_spline import (
+    UniformSpline,
+    along_motion,
+    along_path,
+    at_shares,
+    evenly_spaced,
+    fewest_seconds,
+)
 
 __all__ = [
     "Extremes",
