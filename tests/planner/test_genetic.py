@@ -20,7 +20,7 @@ from ir_msgs_py.errors import ParameterError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner.checks.free_space import FreeSpace
-from ir_planner.curves.splines import spline_through, to_ppoly, virtual_knots
+from ir_planner.curves.joint_spline import spline_through, to_ppoly, virtual_knots
 from ir_planner.errors import CancelledError
 from ir_planner.request.work import Work
 from ir_planner.scene.movement_cost import movement_cost, path_cost

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from ir_planner.curves.splines import spline_through, to_ppoly, virtual_knots
+from ir_planner.curves.joint_spline import spline_through, to_ppoly, virtual_knots
 from ir_planner.curves.uniform_spline import at_shares, evenly_spaced
 
 FloatArray = NDArray[np.float64]

@@ -1,7 +1,12 @@
 """Curves over time and path: arc length, polynomials, splines through points, uniform B-splines."""
 
+from ir_planner.curves.joint_spline import (
+    natural_durations,
+    spline_through,
+    to_ppoly,
+    virtual_knots,
+)
 from ir_planner.curves.polynomials import Extremes, extremes, motion_at
-from ir_planner.curves.splines import natural_durations, spline_through, to_ppoly, virtual_knots
 from ir_planner.curves.uniform_spline import (
     UniformSpline,
     along_motion,
