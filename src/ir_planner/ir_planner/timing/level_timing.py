@@ -6,9 +6,8 @@ import numpy as np
 
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_planner.scene import STILL, Dynamics, MotionLimits, torque_use
-from ir_planner.timing.level_law import LEVELS, LevelLaw, LevelLaws, level_laws
 from ir_planner.timing.ptp import fastest_law, free_law, path_limits
-from ir_planner.timing.time_law import GRID_S, Law
+from ir_planner.timing.time_law import GRID_S, LEVELS, Law, LevelLaw, LevelLaws, level_laws
 
 _SPEEDS = np.array([1.0, 0.96, 0.92, 0.87, 0.82, 0.76, 0.7, 0.62, 0.54, 0.45])
 _HALVINGS = 7
