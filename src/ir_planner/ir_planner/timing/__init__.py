@@ -8,7 +8,6 @@ from ir_planner.timing.durations import (
     check_duration,
     check_requested,
 )
-from ir_planner.timing.level_timing import fastest
 from ir_planner.timing.limit_use import lasting_longer
 from ir_planner.timing.movement import Movement
 from ir_planner.timing.objective import (
@@ -20,7 +19,7 @@ from ir_planner.timing.objective import (
     objective_weights,
     request_cost,
 )
-from ir_planner.timing.ptp import free_law
+from ir_planner.timing.ptp import fastest, free_law
 from ir_planner.timing.spline_timing import time_spline
 from ir_planner.timing.straight_steps import distinct, straight_steps
 from ir_planner.timing.time_law import GRID_NS, GRID_S, StepLaws, TimeLaw
