@@ -14,7 +14,7 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import extremes, spline_through, virtual_knots
 from ir_planner.scene.motion_limits import torque_use
 from ir_planner.scene.planning_scene import PlanningScene
-from ir_planner.timing.spline_use import spline_use
+from ir_planner.timing.spline_timing import spline_use
 
 NAMES = tuple(f"joint_a{k}" for k in range(1, 7))
 ROUNDING = 1e-9  # relative: two formulas for the same cubics

@@ -11,16 +11,101 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dgtsv
 
 from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import extremes, natural_durations, spline_through, virtual_knots
 from ir_planner.errors import TimingError
-from ir_planner.scene import Dynamics, MotionLimits
+from ir_planner.scene import Dynamics, MotionLimits, torque_use
 from ir_planner.timing.limit_use import lasting_longer
 from ir_planner.timing.ptp import torque_per_segment
-from ir_planner.timing.spline_use import spline_use
 from ir_planner.timing.time_law import GRID_NS, GRID_S
+
+# How much of the limits the spline of eq. (10) through points uses, interval by interval: for
+# rounds that change the times and ask again.
+#
+# It is the spline of `spline_through` from rest to rest, by its accelerations at the knots: a
+# tridiagonal system. A virtual knot halves its interval, so next to it one coefficient of the system
+# vanishes. Extremes of cubics are closed forms; torque is sampled. Nothing here is sent: the
+# trajectory is made and judged by others.
+
+_SHARES = np.linspace(0.0, 1.0, 9)[:, None]  # of a segment, where torque is sampled
+
+
+def spline_use(
+    points: FloatArray, seconds: FloatArray, limits: MotionLimits, dynamics: Dynamics
+) -> FloatArray:
+    """By what factor each of the M-1 intervals should last longer, above 1 where a limit is
+    exceeded.
+
+    points (M, n), M >= 3, passed after `seconds` (M-1,) each.
+    """
+    span = np.concatenate([[0.5 * seconds[0]], seconds, [0.5 * seconds[-1]]])
+    span[[1, -2]] = span[[0, -1]]
+    q, qd, qdd = _knots(points, span)
+    h = span[:, None]
+    jerk = np.diff(qdd, axis=0) / h
+    speed = np.abs(qd)
+    change = np.abs(qdd)
+    turning = np.zeros_like(jerk)  # speed where a joint's acceleration changes its sign
+    np.divide(qdd[:-1] ** 2, 2.0 * jerk, out=turning, where=qdd[:-1] * qdd[1:] < 0.0)
+    use = lasting_longer(
+        limits,
+        np.maximum.reduce([speed[:-1], speed[1:], np.abs(qd[:-1] - turning)]),
+        np.maximum(change[:-1], change[1:]),
+        np.abs(jerk),
+        _torque(q, qd, qdd, jerk, h, dynamics),
+    )
+    result: FloatArray = use[1:-1].copy()  # the first and the last interval have two segments each
+    result[0], result[-1] = max(result[0], use[0]), max(result[-1], use[-1])
+    return result
+
+
+def _knots(points: FloatArray, span: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """q, qd, qdd (M+2, n) at the knots of the spline whose segments last `span` (M+1,) s."""
+    q = np.concatenate([points[:1], points[:1], points[1:-1], points[-1:], points[-1:]])
+    h = span[:, None]
+    slope = np.diff(q, axis=0) / h
+    slope[[0, -1]] = 0.0  # what is not known of the virtual knots stands in the matrix
+    slope[1] = (q[2] - q[0]) / h[1]
+    slope[-2] = (q[-1] - q[-3]) / h[-2]
+    diagonal = 2.0 * (span[:-1] + span[1:])
+    diagonal[0] = 6.0 * span[0]
+    diagonal[-1] = 6.0 * span[-1]
+    beside = span[1:-1]
+    lower = beside.copy()
+    upper = beside.copy()
+    lower[0] = 0.0
+    upper[-1] = 0.0
+    qdd = np.zeros_like(q)
+    qdd[1:-1] = dgtsv(lower, diagonal, upper, 6.0 * np.diff(slope, axis=0))[3]
+    q[1] += h[0] ** 2 * qdd[1] / 6.0
+    q[-2] += h[-1] ** 2 * qdd[-2] / 6.0
+    qd = np.zeros_like(q)
+    qd[1:-1] = (np.diff(q, axis=0) / h - h * (2.0 * qdd[:-1] + qdd[1:]) / 6.0)[1:]
+    return q, qd, qdd
+
+
+def _torque(
+    q: FloatArray,
+    qd: FloatArray,
+    qdd: FloatArray,
+    jerk: FloatArray,
+    h: FloatArray,
+    dynamics: Dynamics,
+) -> FloatArray:
+    """Largest sampled share (S, n) of the torque envelope in each segment."""
+    t = (h * _SHARES[:, 0])[:, :, None]
+    q, qd, qdd, jerk = (x[:, None] for x in (q[:-1], qd[:-1], qdd[:-1], jerk))
+    states = (
+        q + t * (qd + t * (0.5 * qdd + t * jerk / 6.0)),
+        qd + t * (qdd + 0.5 * t * jerk),
+        qdd + t * jerk,
+    )
+    use = torque_use(dynamics, *(x.reshape(-1, x.shape[2]) for x in states))
+    return np.asarray(use.reshape(states[0].shape).max(axis=1))
+
 
 _ROUNDS = 14
 _STRETCHES = 12
