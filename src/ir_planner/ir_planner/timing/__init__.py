@@ -2,18 +2,16 @@
 
 from ir_planner.timing.baseline import baseline, baseline_costs_at_least
 from ir_planner.timing.blending import TimedPath, blended, standing, stretched
-from ir_planner.timing.durations import (
-    DURATION_SLACK,
-    at_best_duration,
-    check_duration,
-    check_requested,
-)
 from ir_planner.timing.limit_use import lasting_longer
 from ir_planner.timing.movement import Movement
 from ir_planner.timing.objective import (
+    DURATION_SLACK,
     ObjectiveWeights,
+    at_best_duration,
     at_the_mains,
     best_stretch,
+    check_duration,
+    check_requested,
     coarse_energy_cost,
     objective_value,
     objective_weights,

@@ -12,9 +12,8 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.request import Context
 from ir_planner.scene import STILL, MotionLimits
 from ir_planner.timing.blending import TimedPath, blended, stretched
-from ir_planner.timing.durations import DURATION_SLACK, at_best_duration
 from ir_planner.timing.movement import Movement
-from ir_planner.timing.objective import least_stretched_cost
+from ir_planner.timing.objective import DURATION_SLACK, at_best_duration, least_stretched_cost
 from ir_planner.timing.ptp import free_law, path_limits, torque_per_segment
 from ir_planner.timing.time_law import StepLaws
 from ir_planner.timing.torque_shares import within_torque
