@@ -29,9 +29,9 @@ from ir_planner.request.context import Context
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.timing.blending import stretched
+from ir_planner.timing.movement import TORQUE_SHARES
 from ir_planner.timing.objective import objective_weights
 from ir_planner.timing.spline_timing import time_spline
-from ir_planner.timing.torque_shares import TORQUE_SHARES
 from ir_planner.trajectories.through_points import Reference, plan_through
 
 FloatArray = NDArray[np.float64]

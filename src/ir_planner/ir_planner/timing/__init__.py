@@ -3,7 +3,7 @@
 from ir_planner.timing.baseline import baseline, baseline_costs_at_least
 from ir_planner.timing.blending import TimedPath, blended, standing, stretched
 from ir_planner.timing.limit_use import lasting_longer
-from ir_planner.timing.movement import Movement
+from ir_planner.timing.movement import TORQUE_SHARES, Movement, within_torque
 from ir_planner.timing.objective import (
     DURATION_SLACK,
     ObjectiveWeights,
@@ -21,7 +21,6 @@ from ir_planner.timing.ptp import fastest, free_law
 from ir_planner.timing.spline_timing import time_spline
 from ir_planner.timing.straight_steps import distinct, straight_steps
 from ir_planner.timing.time_law import GRID_NS, GRID_S, StepLaws, TimeLaw
-from ir_planner.timing.torque_shares import TORQUE_SHARES, within_torque
 
 __all__ = [
     "DURATION_SLACK",

@@ -21,11 +21,10 @@ from ir_planner.scene import STILL, Dynamics, MotionLimits
 from ir_planner.timing.asynchronous import farthest_from_line, joining, own_laws
 from ir_planner.timing.blending import TimedPath, blended, largest_overlaps, standing
 from ir_planner.timing.limit_use import lasting_longer
-from ir_planner.timing.movement import Movement
+from ir_planner.timing.movement import Movement, within_torque
 from ir_planner.timing.objective import at_best_duration, coarse_energy_cost
 from ir_planner.timing.ptp import fastest, fastest_law, torque_per_segment
 from ir_planner.timing.time_law import GRID_S, Law, StepLaws
-from ir_planner.timing.torque_shares import within_torque
 
 MakeLaw = Callable[[FloatArray, FloatArray, MotionLimits, Dynamics], Law]
 # how steps are timed, and the share of the acceleration they may use; the fastest first. The
