@@ -24,12 +24,11 @@ from ir_planner.request.goals import Goal
 from ir_planner.request.work import Work
 from ir_planner.scene.motion_limits import MotionLimits, torque_use
 from ir_planner.scene.planning_scene import PlanningScene
-from ir_planner.timing.asynchronous import own_laws
 from ir_planner.timing.blending import TimedPath, blended, largest_overlaps, standing, stretched
 from ir_planner.timing.objective import best_stretch
 from ir_planner.timing.ptp import fastest, fastest_law
 from ir_planner.timing.spline_timing import time_spline
-from ir_planner.timing.straight_steps import straight_steps
+from ir_planner.timing.straight_steps import own_laws, straight_steps
 from ir_planner.timing.time_law import StepLaws, TimeLaw
 
 _spec = importlib.util.spec_from_file_location(
