@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ir_planner.curves import UniformSpline, along_path, fewest_seconds
-from ir_planner.optimize.slowing import slowed_to_limits
+from ir_planner.optimize.spline_cost import slowed_to_limits
 from ir_planner.scene import MotionLimits, PlanningScene, torque_use
 
 SLOWEST = 1e3  # times as long: inertia is gone

@@ -22,7 +22,7 @@ from ir_planner.optimize.fixed_path import FixedPath, never_back
 from ir_planner.optimize.passing import Passing
 from ir_planner.optimize.profile_descent import optimised_profile
 from ir_planner.optimize.refinement import EDGES_PER_INTERVAL, SPEED_MARGINS
-from ir_planner.optimize.slowing import slowed_to_limits
+from ir_planner.optimize.spline_cost import slowed_to_limits
 from ir_planner.request import Context
 from ir_planner.scene import MotionLimits, PlanningScene, torque_use
 from ir_planner.timing import lasting_longer

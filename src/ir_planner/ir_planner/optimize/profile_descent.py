@@ -4,7 +4,7 @@ duration.
 
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.optimize.fixed_path import FixedPath
-from ir_planner.optimize.terms import spline_cost
+from ir_planner.optimize.spline_cost import spline_cost
 from ir_planner.request import Context
 from ir_planner.scene import MotionLimits
 from ir_planner.timing import objective_weights

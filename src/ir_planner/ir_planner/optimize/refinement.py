@@ -21,9 +21,8 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import Violation
 from ir_planner.curves import UniformSpline, along_motion, along_path, fewest_seconds
 from ir_planner.optimize.by_value import within_duration
-from ir_planner.optimize.slowing import beyond_limits, slowed_to_limits
+from ir_planner.optimize.spline_cost import beyond_limits, slowed_to_limits, spline_cost
 from ir_planner.optimize.stages import QUICK, THOROUGH, Effort, Stage, decisive
-from ir_planner.optimize.terms import spline_cost
 from ir_planner.request import Context
 from ir_planner.scene import PROOF_TOLERANCE, MotionLimits, tcp_inside
 from ir_planner.search import at_nine_shares
