@@ -20,9 +20,7 @@ from ir_planner.checks.verification import verify
 from ir_planner.curves.uniform_spline import along_path
 from ir_planner.errors import CancelledError, RequestError
 from ir_planner.optimize.fixed_path import FixedPath, never_back
-from ir_planner.optimize.passing import Passing
-from ir_planner.optimize.path_timing import PathTiming, along_its_path
-from ir_planner.optimize.rescaling import KEPT
+from ir_planner.optimize.path_timing import KEPT, Passing, PathTiming, along_its_path
 from ir_planner.optimize.spline_cost import spline_cost
 from ir_planner.regional.regional import MovementPlan
 from ir_planner.request.context import Context
