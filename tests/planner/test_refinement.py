@@ -18,8 +18,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_planner.checks.evaluation import evaluate_trajectory
 from ir_planner.curves.uniform_spline import UniformSpline, along_path
 from ir_planner.errors import RequestError
-from ir_planner.optimize.movement_over import movement_over
-from ir_planner.optimize.refinement import Refinement
+from ir_planner.optimize.refinement import Refinement, movement_over
 from ir_planner.request.context import Context
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene

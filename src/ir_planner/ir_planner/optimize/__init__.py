@@ -4,8 +4,6 @@ compared.
 
 from ir_planner.optimize.descents import Descents, path_of
 from ir_planner.optimize.estimate import estimate
-from ir_planner.optimize.movement_over import movement_over
-from ir_planner.optimize.near import optimised_near, optimised_near_best
 from ir_planner.optimize.path_timing import (
     QUICK_TIMING,
     PathTiming,
@@ -14,8 +12,18 @@ from ir_planner.optimize.path_timing import (
     rescaled,
 )
 from ir_planner.optimize.portfolio import Portfolio
-from ir_planner.optimize.refinement import FEWEST, MOST, SPACING, Refinement
-from ir_planner.optimize.stages import EXACT, QUICK, THOROUGH
+from ir_planner.optimize.refinement import (
+    EXACT,
+    FEWEST,
+    MOST,
+    QUICK,
+    SPACING,
+    THOROUGH,
+    Refinement,
+    movement_over,
+    optimised_near,
+    optimised_near_best,
+)
 
 __all__ = [
     "EXACT",

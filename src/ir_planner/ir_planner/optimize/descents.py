@@ -11,10 +11,10 @@ from ir_planner.optimize.refinement import (
     MOST,
     SLOWER,
     SPACING,
+    THOROUGH,
     Refinement,
     Solution,
 )
-from ir_planner.optimize.stages import THOROUGH
 from ir_planner.request import Context
 from ir_planner.scene import PlanningScene
 from ir_planner.timing import Movement

@@ -18,10 +18,10 @@ from ir_planner.optimize.refinement import (
     SHARE_OF_WORK,
     SLOWER,
     SPACING,
+    THOROUGH,
     Refinement,
     Solution,
 )
-from ir_planner.optimize.stages import THOROUGH
 
 FIRST_LOOK = 12  # evaluations from every path
 ALONE = 30  # from a path that has no rivals

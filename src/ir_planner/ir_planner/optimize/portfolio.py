@@ -17,8 +17,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import TimingError
 from ir_planner.optimize.estimate import first_looks
-from ir_planner.optimize.refinement import Refinement, Solution
-from ir_planner.optimize.stages import EXACT, QUICK, THOROUGH, Effort
+from ir_planner.optimize.refinement import EXACT, QUICK, THOROUGH, Effort, Refinement, Solution
 from ir_planner.search import COARSE, apart, fewest_corners, first_different
 from ir_planner.timing import Movement, straight_steps
 

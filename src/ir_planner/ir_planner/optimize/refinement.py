@@ -8,7 +8,7 @@ clearance is proved; a pair that comes too near gets a larger clearance margin, 
 continues.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -20,9 +20,7 @@ from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import Violation
 from ir_planner.curves import UniformSpline, along_motion, along_path, fewest_seconds
-from ir_planner.optimize.by_value import within_duration
 from ir_planner.optimize.spline_cost import beyond_limits, slowed_to_limits, spline_cost
-from ir_planner.optimize.stages import QUICK, THOROUGH, Effort, Stage, decisive
 from ir_planner.request import Context
 from ir_planner.scene import PROOF_TOLERANCE, MotionLimits, tcp_inside
 from ir_planner.search import at_nine_shares
@@ -32,9 +30,140 @@ from ir_planner.timing import (
     Movement,
     check_duration,
     check_requested,
+    distinct,
     objective_weights,
+    straight_steps,
     within_torque,
 )
+
+# The stages of a descent: from a coarse spline and a smooth cost to a fine one and the bus as it
+# is.
+#
+# A movement of least energy holds the power of the common bus near zero for long: what one joint
+# gives, another takes. There the cost of a joule jumps from nothing to its full price, and a descent
+# on the exact bus ends at the kink long before the least energy. So the switch is rounded, less from
+# stage to stage, until the
+# rounding weighs less than NEGLIGIBLE of the cost: movements of few joules take more stages.
+
+NEGLIGIBLE = 5e-3  # share of the cost
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One descent: halvings of the coarse spline's intervals (level), W over which the switch of
+    the bus is rounded, stiffness of the penalties, evaluations of the cost, and the gain of ten
+    steps that ends it.
+    """
+
+    level: int
+    smoothing: float
+    stiffness: float
+    evaluations: int
+    tolerance: float
+
+
+@dataclass(frozen=True)
+class Effort:
+    """The stages of a refinement, the coarse one first."""
+
+    stages: tuple[Stage, ...]
+
+    @property
+    def coarse(self) -> int:
+        """Evaluations on the coarse spline."""
+        return self.stages[0].evaluations
+
+    def after(self, level: int) -> Iterator[Stage]:
+        """The stages on finer splines."""
+        return (stage for stage in self.stages if stage.level > level)
+
+    @property
+    def last(self) -> Stage:
+        """With penalties as stiff as they get."""
+        return self.stages[-1]
+
+
+def decisive(stage: Stage, last: Stage, rounding: float) -> Stage:
+    """The stage itself, or the last one at once where the rounding of the bus, in shares of the
+    cost per W of smoothing, doesn't matter any more.
+    """
+    return replace(last, level=stage.level) if stage.smoothing * rounding < NEGLIGIBLE else stage
+
+
+QUICK = Effort(
+    (
+        Stage(0, 200.0, 1.0, 50, 1e-4),
+        Stage(1, 60.0, 2.0, 60, 1e-4),
+        Stage(2, 10.0, 8.0, 40, 1e-4),
+        Stage(2, 2.0, 40.0, 30, 1e-4),
+    )
+)
+THOROUGH = Effort(
+    (
+        Stage(0, 200.0, 1.0, 80, 5e-5),
+        Stage(1, 60.0, 2.0, 200, 2e-5),
+        Stage(2, 20.0, 4.0, 100, 5e-5),
+        Stage(2, 5.0, 16.0, 80, 5e-5),
+        Stage(2, 1.5, 40.0, 60, 5e-5),
+    )
+)
+# Where a duration is requested there are joules alone to gain. Movements of few joules need long
+# descents at
+# every stage: one that ended early on a coarse spline ends elsewhere on the fine one, 2 to 8 %
+# above.
+EXACT = Effort(
+    (
+        *(
+            replace(stage, evaluations=3 * stage.evaluations, tolerance=stage.tolerance / 5)
+            for stage in THOROUGH.stages
+        ),
+        Stage(3, 0.3, 40.0, 300, 1e-5),
+    )
+)
+
+
+# Little energy in a requested duration, by what a second is worth: for durations so short that a
+# descent at the duration itself ends beyond the limits.
+#
+# A descent of free duration always ends within the limits, because its result is slowed down to them.
+# From the fastest movement on, a second is worth less from step to step, until the movement needs all
+# of the time.
+
+Near = Callable[[Movement, Context], Movement | None]  # by descent from a known movement
+# W: what a second is worth at first, and by how much less or more then
+_FIRST = 16_000.0
+_STEP = 4.0
+_DESCENTS = 5
+_ENOUGH = 0.985  # of the duration: slower would save little more than stretching does
+
+
+def within_duration(fastest: Movement, context: Context, near: Near) -> Movement | None:
+    """The cheapest movement found that takes the duration which the context requests, from one that
+    takes at most as long; None where none is certified.
+    """
+    requested = context.options.duration
+    best = None
+    known = fastest
+    value = _FIRST
+    late = 0.0
+    early = 0.0
+    for _ in range(_DESCENTS):
+        asked = replace(context.asking("time_and_energy").options, time_value=value)
+        found = near(known, replace(context, options=asked))
+        duration = found.trajectory.duration if found is not None else float("inf")
+        if found is None or duration > requested * (1.0 + DURATION_SLACK):
+            late = value
+        else:
+            known = found
+            early = value
+            slower = replace(found, context=context).stretched_by(max(requested / duration, 1.0))
+            if slower.certified and (best is None or slower.cost < best.cost):
+                best = slower
+            if duration > _ENOUGH * requested:
+                break
+        value = (late * early) ** 0.5 if late and early else (_STEP * late or early / _STEP)
+    return best
+
 
 SPACING = 0.1  # s between the knots of the coarsest spline
 # control points of the coarsest spline
@@ -340,3 +469,48 @@ class Refinement:
                 return None
             slowed = slowed.lasting(options.duration)
         return slowed.trajectory(self.context.joint_names)
+
+
+# The movement over a given free path.
+
+
+def movement_over(path: FloatArray, context: Context) -> Movement:
+    """The movement over a free path (M, n): optimised, or in straight steps where that isn't
+    certified; where the joints are to take their own time, in straight steps if that serves no
+    worse.
+
+    Raises TimingError when a torque does not suffice, RequestError when the requested duration is
+    too short.
+    """
+    if context.options.timing == "asynchronous":
+        common = movement_over(path, context.with_timing("synchronous"))
+        own = straight_steps(distinct(path), context)
+        return own if own.certified and own.cost <= common.cost else common
+    path = distinct(path)
+    if len(path) > 1:
+        refinement = Refinement(context)
+        for effort in (
+            THOROUGH,
+            QUICK,
+        ):  # the second ends elsewhere, where the first isn't certified
+            found = refinement.refined(refinement.coarse(path, effort.coarse), path, effort)
+            if found is not None and found.certified:
+                return found
+        refinement.check_requested()
+    return straight_steps(path, context)
+
+
+# A movement that is known, optimised again for another objective, value of a second or
+# duration.
+
+
+def optimised_near(known: Movement, context: Context) -> Movement | None:
+    """The movement by descent from a known one; None where that can't be certified."""
+    return Refinement(context).near([known])
+
+
+def optimised_near_best(known: Sequence[Movement], context: Context) -> Movement | None:
+    """The movement by descent from that of known ones, at least one, whose coarse solution costs
+    least; None where that can't be certified.
+    """
+    return Refinement(context).near(known)
