@@ -3,7 +3,6 @@ compared.
 """
 
 from ir_planner.optimize.descents import Descents, path_of
-from ir_planner.optimize.estimate import estimate
 from ir_planner.optimize.path_timing import (
     QUICK_TIMING,
     PathTiming,
@@ -11,7 +10,7 @@ from ir_planner.optimize.path_timing import (
     along_its_path,
     rescaled,
 )
-from ir_planner.optimize.portfolio import Portfolio
+from ir_planner.optimize.portfolio import Portfolio, estimate
 from ir_planner.optimize.refinement import (
     EXACT,
     FEWEST,

@@ -9,17 +9,76 @@ cheapest coarse solutions are refined, which is where the clearance is proved; t
 movement is the answer, and more work makes it better.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_kernels import SplineStarts
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
+from ir_planner.curves import UniformSpline, along_path
 from ir_planner.errors import TimingError
-from ir_planner.optimize.estimate import first_looks
-from ir_planner.optimize.refinement import EXACT, QUICK, THOROUGH, Effort, Refinement, Solution
+from ir_planner.optimize.refinement import (
+    EDGES_PER_INTERVAL,
+    EXACT,
+    FEWEST,
+    MOST,
+    QUICK,
+    SHARE_OF_WORK,
+    SLOWER,
+    SPACING,
+    THOROUGH,
+    Effort,
+    Refinement,
+    Solution,
+)
 from ir_planner.search import COARSE, apart, fewest_corners, first_different
 from ir_planner.timing import Movement, straight_steps
+
+# What a movement will cost, in a few per cent of the work of the certified answer.
+#
+# A first look at all paths says which is the cheapest; it descends further on a spline with twice the
+# knots. Its cost includes penalties, nothing is proved.
+
+FIRST_LOOK = 12  # evaluations from every path
+ALONE = 30  # from a path that has no rivals
+_FURTHER = replace(THOROUGH.stages[1], evaluations=140)
+
+
+def first_looks(
+    paths: list[FloatArray], refinement: Refinement, evaluations: int
+) -> list[Solution]:
+    """Coarse solutions near paths (M, n), which need not be free; in one call where all have one
+    cost.
+    """
+    work = refinement.context.work
+    options = refinement.context.options
+    most = len(paths) * evaluations * MOST * EDGES_PER_INTERVAL
+    begin = refinement.begun(along_path(paths[0], FEWEST, 1.0), evaluations) if paths else None
+    alike = begin is not None and len(begin.kept) == 1 and options.objective != "movement_cost"
+    if begin is None or not alike or most > SHARE_OF_WORK * work.left:
+        return [refinement.coarse(path, evaluations) for path in paths]
+    work.check()
+    found = refinement.cost(begin, paths[0]).descend_along(
+        paths,
+        SplineStarts(SPACING, SLOWER, FEWEST, MOST, options.duration),
+        evaluations=evaluations,
+        tolerance=begin.stage.tolerance,
+    )
+    splines = [UniformSpline(each.control, each.interval) for each in found]
+    for each, spline in zip(found, splines, strict=True):
+        work.spend(int(np.ceil(each.evaluations * spline.intervals * EDGES_PER_INTERVAL)))
+    return [begin.ended(spline, each.value) for spline, each in zip(splines, found, strict=True)]
+
+
+def estimate(paths: list[FloatArray], refinement: Refinement) -> Solution:
+    """The coarse solution that is cheapest, from paths (M, n), at least one, which need not be
+    free.
+    """
+    looks = first_looks(paths, refinement, FIRST_LOOK if len(paths) > 1 else ALONE)
+    k = min(range(len(looks)), key=lambda k: looks[k].cost)
+    return refinement.staged(looks[k], _FURTHER, paths[k])
+
 
 _BETTER = 0.99  # share of the cost below which an alike path replaces another
 _FOLLOWED = 7  # guesses that are followed after the first look
