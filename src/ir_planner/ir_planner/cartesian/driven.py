@@ -8,8 +8,7 @@ import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.cartesian.joint_curve import JointCurve
-from ir_planner.scene import MotionLimits, PlanningScene, torque_use
-from ir_planner.timing import lasting_longer
+from ir_planner.scene import MotionLimits, PlanningScene, lasting_longer, torque_use
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,8 +23,8 @@ from ir_planner.optimize.fixed_path import FixedPath, never_back
 from ir_planner.optimize.refinement import EDGES_PER_INTERVAL, SPEED_MARGINS
 from ir_planner.optimize.spline_cost import slowed_to_limits, spline_cost
 from ir_planner.request import Context
-from ir_planner.scene import MotionLimits, PlanningScene, torque_use
-from ir_planner.timing import Movement, lasting_longer, objective_weights, within_torque
+from ir_planner.scene import MotionLimits, PlanningScene, lasting_longer, torque_use
+from ir_planner.timing import Movement, objective_weights, within_torque
 
 # The descent on the speed profile along a fixed path: s at the knots of a uniform spline; its
 # duration.

@@ -9,8 +9,8 @@ from ir_kernels import SplineCost, SplineTerms
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.curves import UniformSpline
 from ir_planner.request import Context
-from ir_planner.scene import MotionLimits, PlanningScene, torque_use
-from ir_planner.timing import ObjectiveWeights, lasting_longer
+from ir_planner.scene import MotionLimits, PlanningScene, lasting_longer, torque_use
+from ir_planner.timing import ObjectiveWeights
 
 # The objective and the limits of a request as the compiled cost of splines takes them.
 

@@ -3,7 +3,7 @@ W.
 """
 
 from ir_planner.scene.drives import Drives
-from ir_planner.scene.motion_limits import STILL, Dynamics, MotionLimits, torque_use
+from ir_planner.scene.motion_limits import STILL, Dynamics, MotionLimits, lasting_longer, torque_use
 from ir_planner.scene.movement_cost import movement_cost, path_cost
 from ir_planner.scene.planning_scene import (
     PROOF_TOLERANCE,
@@ -23,6 +23,7 @@ __all__ = [
     "Dynamics",
     "MotionLimits",
     "PlanningScene",
+    "lasting_longer",
     "load_text",
     "movement_cost",
     "path_cost",

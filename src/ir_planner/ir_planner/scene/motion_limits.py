@@ -62,3 +62,28 @@ class MotionLimits:
 def torque_use(dynamics: Dynamics, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
     """Share (N, n) of the torque envelope that a motion needs."""
     return np.abs(dynamics.inverse_dynamics(q, qd, qdd)) / dynamics.torque_limit(qd)
+
+
+def lasting_longer(
+    limits: MotionLimits,
+    velocity: FloatArray,
+    acceleration: FloatArray,
+    jerk: FloatArray,
+    torque: FloatArray,
+) -> FloatArray:
+    """By what factor (...) each part of a motion should last longer, from its largest values
+    (..., n); at most 1: within the limits. torque: share of the envelope.
+
+    When a motion lasts f times as long on the same path, its velocities fall by f, its
+    accelerations by f^2 and its jerks by f^3. The part of the torque that accelerates falls by f^2;
+    gravity stays, so for torque the factor is an estimate, to be applied again.
+    """
+    factors: FloatArray = np.maximum.reduce(
+        [
+            (velocity / limits.velocity).max(axis=-1),
+            np.sqrt((acceleration / limits.acceleration).max(axis=-1)),
+            np.cbrt((jerk / limits.jerk).max(axis=-1)),
+            np.sqrt(torque.max(axis=-1) / limits.torque_share),
+        ]
+    )
+    return factors

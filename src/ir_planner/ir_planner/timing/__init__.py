@@ -2,7 +2,6 @@
 
 from ir_planner.timing.baseline import baseline, baseline_costs_at_least
 from ir_planner.timing.blending import TimedPath, blended, standing, stretched
-from ir_planner.timing.limit_use import lasting_longer
 from ir_planner.timing.movement import TORQUE_SHARES, Movement, within_torque
 from ir_planner.timing.objective import (
     DURATION_SLACK,
@@ -44,7 +43,6 @@ __all__ = [
     "distinct",
     "fastest",
     "free_law",
-    "lasting_longer",
     "objective_value",
     "objective_weights",
     "request_cost",

@@ -17,8 +17,7 @@ from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import extremes, natural_durations, spline_through, virtual_knots
 from ir_planner.errors import TimingError
-from ir_planner.scene import Dynamics, MotionLimits, torque_use
-from ir_planner.timing.limit_use import lasting_longer
+from ir_planner.scene import Dynamics, MotionLimits, lasting_longer, torque_use
 from ir_planner.timing.ptp import torque_per_segment
 from ir_planner.timing.time_law import GRID_NS, GRID_S
 
