@@ -27,8 +27,7 @@ from _variants import variant_files
 
 from ir_kernels.collision import FREE
 from ir_planner.checks import FreeSpace
-from ir_planner.optimize import Refinement
-from ir_planner.optimize import portfolio as estimate
+from ir_planner.optimize import Refinement, estimate
 from ir_planner.planner import Planner
 from ir_planner.regional.exploration import first_paths
 from ir_planner.request import Context, Work

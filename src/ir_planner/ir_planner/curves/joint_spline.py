@@ -3,8 +3,7 @@ ends.
 
 Each segment runs in its own normalised time u in [0, 1]. The first and the last segment carry the
 conditions at the ends, the middle ones join with continuous q, qd and qdd. Giving q, qd and qdd at
-both
-ends leaves no freedom for two of the inner positions: the second and the second last knot are
+both ends leaves no freedom for two of the inner positions: the second and the second last knot are
 virtual, their positions follow. (As printed the linear coefficient of the last segment ends in a_f
 t_n / 2; only with a_f t_n^2 / 2 do the end conditions hold.)
 """

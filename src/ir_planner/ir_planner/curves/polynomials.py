@@ -17,14 +17,6 @@ from ir_kernels import Extrema, polynomial_extrema, polynomial_samples
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.trajectory import JointTrajectory, Samples
 
-# Exact extremes of a trajectory between its points: what a limit is compared with.
-#
-# A trajectory is q(t) = sum_k c_k t^k in the local time of each segment, coefficients (S, n, K).
-# Extremes are those of the compiled core. The travel of a joint is the distance between its ends, or
-# where it turns in
-# between, that between its turning points: they are bracketed between the roots of the next
-# derivative, down to a line, so none is missed and no sampling takes part.
-
 _NOTHING = (
     1e-9  # rad: what higher powers may add to a cubic, as a point per knot of a spline rounds them
 )
@@ -166,10 +158,6 @@ def _turning_travel(position: FloatArray) -> FloatArray:
 def _with_ends(points: FloatArray) -> FloatArray:
     rows = len(points)
     return np.concatenate([np.zeros((rows, 1)), points, np.ones((rows, 1))], axis=1)
-
-
-# Where a trajectory is at many instants: the interpolant that everything rests on, by the compiled
-# core.
 
 
 def motion_at(trajectory: JointTrajectory, times: NDArray[np.floating]) -> Samples:

@@ -13,8 +13,6 @@ import numpy as np
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 
-# Configurations along a path by the share of its length that lies before them.
-
 
 def at_shares(path: FloatArray, shares: FloatArray) -> FloatArray:
     """Configurations (K, n) on the polyline `path` (M, n) at shares (K,) in [0, 1] of its Euclidean

@@ -26,9 +26,6 @@ from ir_planner.request import Context
 from ir_planner.scene import MotionLimits, PlanningScene, lasting_longer, torque_use
 from ir_planner.timing import Movement, objective_weights, within_torque
 
-# The descent on the speed profile along a fixed path: s at the knots of a uniform spline; its
-# duration.
-
 _SPARSE = 40  # places of the path for the weight of an objective
 _GAIN = 1e-5  # share of the value that ten steps must gain together
 
@@ -59,8 +56,7 @@ def optimised_profile(
     return found.s, found.duration, found.evaluations
 
 
-# Points that a uniform spline passes exactly: the correction of its control points of least
-# jerk.
+# Points that a spline passes exactly, by the correction of its control points of least jerk.
 
 _KNOT = 0.02  # intervals: what is nearer to a knot is passed there
 _PER_POINT = 2.0  # control points that each point must have to itself
@@ -203,8 +199,8 @@ class TimingEffort:
     descents: tuple[tuple[float, float], ...]
 
 
-# service lines of the bundled cells: not more J than with the thorough effort, in two thirds of the
-# time
+# Service lines of the bundled cells: not more J than with the thorough effort, in two thirds of the
+# time.
 QUICK_TIMING = TimingEffort(250, ((40.0, 100.0), (400.0, 5.0)))
 THOROUGH_TIMING = TimingEffort(250, ((40.0, 100.0), (40.0, 20.0), (400.0, 3.0)))
 
@@ -333,8 +329,6 @@ def _use(spline: UniformSpline, limits: MotionLimits, scene: PlanningScene) -> F
     shape = (spline.intervals, _TORQUE_SAMPLES, -1)
     return lasting_longer(limits, speed, acceleration, jerk, torque.reshape(shape).max(axis=1))
 
-
-# A movement with a better time scaling along its path, certified.
 
 KEPT = 1e-3  # rad by which a time scaling may leave its path: some millimetres of the tool at most
 

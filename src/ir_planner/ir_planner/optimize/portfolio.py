@@ -3,10 +3,9 @@ movement near it.
 
 Each new free path is shortened and gets a coarse solution: a short descent on a coarse spline
 estimates what it may come to, and paths whose coarse solutions are alike count once. Guesses, which
-need not be free,
-descend too: a few evaluations show which of them are worth as many as a free path gets. The
-cheapest coarse solutions are refined, which is where the clearance is proved; the best refined
-movement is the answer, and more work makes it better.
+need not be free, descend too: a few evaluations show which of them are worth as many as a free path
+gets. The cheapest coarse solutions are refined, which is where the clearance is proved; the best
+refined movement is the answer, and more work makes it better.
 """
 
 from dataclasses import dataclass, replace
@@ -35,10 +34,9 @@ from ir_planner.optimize.refinement import (
 from ir_planner.search import COARSE, apart, fewest_corners, first_different
 from ir_planner.timing import Movement, straight_steps
 
-# What a movement will cost, in a few per cent of the work of the certified answer.
-#
-# A first look at all paths says which is the cheapest; it descends further on a spline with twice the
-# knots. Its cost includes penalties, nothing is proved.
+# Estimates, in a few per cent of the work of the certified answer: a first look at all paths says
+# which is the cheapest, and that one descends further on a spline with twice the knots. Their cost
+# includes penalties; nothing is proved.
 
 FIRST_LOOK = 12  # evaluations from every path
 ALONE = 30  # from a path that has no rivals

@@ -36,14 +36,14 @@ from ir_planner.timing import (
     within_torque,
 )
 
-# The stages of a descent: from a coarse spline and a smooth cost to a fine one and the bus as it
-# is.
+# The stages of a descent lead from a coarse spline and a smooth cost to a fine spline and the exact
+# bus.
 #
-# A movement of least energy holds the power of the common bus near zero for long: what one joint
-# gives, another takes. There the cost of a joule jumps from nothing to its full price, and a descent
-# on the exact bus ends at the kink long before the least energy. So the switch is rounded, less from
-# stage to stage, until the
-# rounding weighs less than NEGLIGIBLE of the cost: movements of few joules take more stages.
+# A movement of least energy holds the power of the common bus near zero for long: one joint takes
+# what another gives. There the cost of a joule jumps from nothing to its full price, and a descent
+# on the exact bus ends at the kink long before the least energy. So the switch is rounded, less
+# from stage to stage, until the rounding weighs less than NEGLIGIBLE of the cost: movements of few
+# joules take more stages.
 
 NEGLIGIBLE = 5e-3  # share of the cost
 
@@ -107,10 +107,9 @@ THOROUGH = Effort(
         Stage(2, 1.5, 40.0, 60, 5e-5),
     )
 )
-# Where a duration is requested there are joules alone to gain. Movements of few joules need long
-# descents at
-# every stage: one that ended early on a coarse spline ends elsewhere on the fine one, 2 to 8 %
-# above.
+# Where a duration is requested, joules alone can be saved. Movements of few joules need long
+# descents at every stage: one that ended early on a coarse spline ends elsewhere on the fine one, 2
+# to 8 % above.
 EXACT = Effort(
     (
         *(
@@ -122,12 +121,10 @@ EXACT = Effort(
 )
 
 
-# Little energy in a requested duration, by what a second is worth: for durations so short that a
-# descent at the duration itself ends beyond the limits.
-#
-# A descent of free duration always ends within the limits, because its result is slowed down to them.
-# From the fastest movement on, a second is worth less from step to step, until the movement needs all
-# of the time.
+# Little energy in a requested duration that is so short that a descent at the duration itself ends
+# beyond the limits. A descent of free duration always ends within the limits, because its result is
+# slowed down to them: from the fastest movement on, a second is worth less from step to step, until
+# the movement needs all of the time.
 
 Near = Callable[[Movement, Context], Movement | None]  # by descent from a known movement
 # W: what a second is worth at first, and by how much less or more then
@@ -471,9 +468,6 @@ class Refinement:
         return slowed.trajectory(self.context.joint_names)
 
 
-# The movement over a given free path.
-
-
 def movement_over(path: FloatArray, context: Context) -> Movement:
     """The movement over a free path (M, n): optimised, or in straight steps where that isn't
     certified; where the joints are to take their own time, in straight steps if that serves no
@@ -498,10 +492,6 @@ def movement_over(path: FloatArray, context: Context) -> Movement:
                 return found
         refinement.check_requested()
     return straight_steps(path, context)
-
-
-# A movement that is known, optimised again for another objective, value of a second or
-# duration.
 
 
 def optimised_near(known: Movement, context: Context) -> Movement | None:

@@ -12,8 +12,6 @@ from ir_planner.request import Context
 from ir_planner.scene import MotionLimits, PlanningScene, lasting_longer, torque_use
 from ir_planner.timing import ObjectiveWeights
 
-# The objective and the limits of a request as the compiled cost of splines takes them.
-
 _MARGIN = 1e-3  # m of clearance beyond S_m that the descent asks for
 _SCALE = 1e-2  # m that lack count like a limit used twice
 _FAR = -1e3  # m: no pair is ever that near, so clearance costs nothing
@@ -57,9 +55,6 @@ def spline_cost(
     )
     return SplineCost(scene.collision, scene.dynamics, terms)
 
-
-# A uniform spline within the limits: the same path and speed profile, as much slower as they ask
-# for.
 
 _TORQUE_SAMPLES = 6  # per interval; the proof comes after
 _ROUNDS = 25

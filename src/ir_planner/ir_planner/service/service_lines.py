@@ -16,8 +16,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import FreeSpace, first_too_near
 from ir_planner.errors import TimingError
-from ir_planner.optimize import QUICK_TIMING, rescaled
-from ir_planner.optimize import refinement as movement_over
+from ir_planner.optimize import QUICK_TIMING, movement_over, rescaled
 from ir_planner.request import Context
 from ir_planner.scene import MotionLimits
 from ir_planner.service.withdrawals import ExitPath

@@ -14,7 +14,7 @@ from ir_msgs_py.report import PlanningInfo, ServiceCandidate
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import nearest_pair
 from ir_planner.errors import TimingError
-from ir_planner.optimize import refinement as movement_over
+from ir_planner.optimize import movement_over
 from ir_planner.request import Context, Journal
 from ir_planner.service.exit import Exit
 from ir_planner.service.exit_search import ExitSearch

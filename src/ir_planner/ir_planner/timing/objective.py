@@ -210,8 +210,6 @@ def _drawn(axes: FloatArray, steps: FloatArray, scene: PlanningScene) -> FloatAr
     return np.asarray(bus.mains.reshape(motions, count + 1)[:, :-1].sum(axis=1) * steps)
 
 
-# The duration of a movement whose path is settled: as requested, or the best for the objective.
-
 DURATION_SLACK = 1e-6  # relative: what rounding to nanoseconds may add to a duration
 
 

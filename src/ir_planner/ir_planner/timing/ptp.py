@@ -162,8 +162,7 @@ def _best_law(
     return None
 
 
-# The fastest law with levels: each level as high as the torque in its band of speed allows, found
-# by halving.
+# Several levels per ramp: each as high as the torque in its band of speed allows, found by halving.
 
 _SPEEDS_LEVEL_TIMING = np.array([1.0, 0.96, 0.92, 0.87, 0.82, 0.76, 0.7, 0.62, 0.54, 0.45])
 _PER_PHASE_LEVEL_TIMING = 6

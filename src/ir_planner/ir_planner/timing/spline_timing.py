@@ -21,13 +21,11 @@ from ir_planner.scene import Dynamics, MotionLimits, lasting_longer, torque_use
 from ir_planner.timing.ptp import torque_per_segment
 from ir_planner.timing.time_law import GRID_NS, GRID_S
 
-# How much of the limits the spline of eq. (10) through points uses, interval by interval: for
-# rounds that change the times and ask again.
-#
-# It is the spline of `spline_through` from rest to rest, by its accelerations at the knots: a
-# tridiagonal system. A virtual knot halves its interval, so next to it one coefficient of the system
-# vanishes. Extremes of cubics are closed forms; torque is sampled. Nothing here is sent: the
-# trajectory is made and judged by others.
+# The use of limits by the spline of `spline_through` from rest to rest, interval by interval: for
+# rounds that change the times and ask again. The accelerations at the knots follow from a
+# tridiagonal system. A virtual knot halves its interval, so next to it one coefficient of the
+# system vanishes. Extremes of cubics are closed forms; torque is sampled, and the trajectory that
+# is made of it is proved later.
 
 _SHARES = np.linspace(0.0, 1.0, 9)[:, None]  # of a segment, where torque is sampled
 

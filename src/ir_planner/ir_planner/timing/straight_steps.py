@@ -24,13 +24,11 @@ from ir_planner.timing.objective import at_best_duration, coarse_energy_cost
 from ir_planner.timing.ptp import fastest, fastest_law, torque_per_segment
 from ir_planner.timing.time_law import GRID_S, Law, LawLimits, StepLaws, TimeLaw, phase_steps
 
-# Asynchronous PTP: every joint takes its own time and stops when it has arrived.
-#
-# Each joint has its own fastest law. Where all of them together ask too much of some joint's torque,
-# single
-# joints keep to the synchronous law of the step, as few as possible: the movement never takes longer
-# than the synchronous one. The joints leave the straight line between start and goal. Where that is
-# not free, joints keep to the synchronous law too, those first that leave the line most.
+# Asynchronous PTP: every joint takes its own time and stops when it has arrived. Where all of the
+# fastest laws together ask too much of some joint's torque, single joints keep to the synchronous
+# law of the step, as few as possible: the movement never takes longer than the synchronous one. The
+# joints leave the straight line between start and goal. Where that is not free, joints keep to the
+# synchronous law too, those first that leave the line most.
 
 _SAMPLE = 4  # grid steps
 

@@ -19,15 +19,6 @@ import numpy as np
 
 from ir_msgs_py.arrays import FloatArray, IntArray
 
-# Time laws s(t) of piecewise constant jerk from 0 to 1, at rest at both ends: seven phases on a
-# grid of 1 ms.
-#
-# Phases: jerk up, constant acceleration, jerk down, constant speed, and the same for braking; the two
-# halves may differ. All durations are whole milliseconds: switches of several laws then never come
-# closer than 1 ms, stretching by a factor of six decimals keeps whole nanoseconds, and the
-# interpolant of the points is the law itself. Given the durations, speed, accelerations and jerks
-# follow from the distance: rounding durations up never breaks a limit.
-
 GRID_S = 1e-3
 GRID_NS = 1_000_000
 _NEWTON_STEPS = 40
@@ -253,12 +244,7 @@ class StepLaws:
         return s, sd, sdd
 
 
-# Time laws whose ramps step down in levels: much acceleration while slow, less near full speed.
-#
-# The torque envelope of a drive falls with its speed, so one acceleration for the whole ramp is
-# either too much at its end or too little at its start. Here each ramp has a level per band of speed,
-# joined by constant jerk. Durations are whole grid steps; the accelerations follow from the distance
-# 1 and equal speed of both ramps.
+# Laws whose ramps have a level of acceleration per band of speed, joined by constant jerk.
 
 BANDS = np.array([0.6, 0.84, 1.0])  # upper ends of the bands, as shares of the cruising speed
 LEVELS = len(BANDS)
@@ -345,8 +331,7 @@ class LevelLaw:
 
 def level_laws(speed: FloatArray, up: FloatArray, down: FloatArray, jerk: float) -> LevelLaws:
     """Laws that cruise at about `speed` (K,) and whose ramps have levels `up` and `down` (K,
-    LEVELS), all >
-    0.
+    LEVELS), all > 0.
     """
     rising = _ramp_level_law(speed, up, jerk)
     falling = _ramp_level_law(speed, down, jerk)
