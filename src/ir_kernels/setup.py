@@ -29,6 +29,7 @@ OPTIMISE = [
     "-g0",
     "-fno-math-errno",
     "-fno-trapping-math",
+    "-ffp-contract=off",  # the same sums and products in every build, whether it has FMA or not
 ]
 SANITIZE = [
     "-O1",

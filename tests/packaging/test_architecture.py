@@ -14,7 +14,7 @@ SRC = Path(__file__).resolve().parents[2] / "src"
 BASE_KNOWS: dict[str, set[str]] = {
     "ir_msgs_py": set(),
     "ir_kernels": {"ir_msgs_py"},
-    "ir_description": {"ir_msgs_py"},
+    "ir_description": {"ir_msgs_py", "ir_kernels"},
 }
 BASE = set(BASE_KNOWS)
 LANGUAGE = {"ir_krl": {"ir_msgs_py", "ir_description"}}

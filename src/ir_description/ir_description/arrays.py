@@ -11,6 +11,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
 
@@ -122,5 +123,5 @@ def solid_box_inertia(mass: float, size: ArrayLike) -> FloatArray:
 
 def transformed(pose: FloatArray, points: FloatArray) -> FloatArray:
     """Return the points (N, 3) or (3,) moved by a pose (4, 4)."""
-    moved: FloatArray = points @ pose[:3, :3].T + pose[:3, 3]
+    moved: FloatArray = portable.matmul(points, pose[:3, :3].T) + pose[:3, 3]
     return moved

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ir_description.arrays import frozen
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
 
@@ -18,6 +19,7 @@ QUATERNION_TOLERANCE = 1e-3
 """A quaternion this far from unit length is normalised, beyond it is refused."""
 MATRIX_TOLERANCE = 1e-6
 """A matrix this far from orthonormal is made so, beyond it is refused."""
+_POLAR_STEPS = 3
 
 
 def pose_of(position: ArrayLike, rotation: ArrayLike | None = None) -> FloatArray:
@@ -32,12 +34,12 @@ def pose_of(position: ArrayLike, rotation: ArrayLike | None = None) -> FloatArra
 def inverse(pose: FloatArray) -> FloatArray:
     """Return the inverse (4, 4) of a pose."""
     R = pose[:3, :3].T
-    return pose_of(-R @ pose[:3, 3], R)
+    return pose_of(-portable.matmul(R, pose[:3, 3]), R)
 
 
 def composed(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return first @ second (4, 4) as a read-only pose (4, 4) whose last row is exact."""
-    pose = first @ second
+    pose = portable.matmul(first, second)
     pose[3] = (0.0, 0.0, 0.0, 1.0)
     return frozen(pose, (4, 4), "pose")
 
@@ -48,7 +50,8 @@ def _cos_sin(angle_deg: float) -> tuple[float, float]:
     quarter = turn / 90.0
     if quarter == round(quarter):
         return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarter) % 4]
-    return math.cos(math.radians(turn)), math.sin(math.radians(turn))
+    radians = math.radians(turn)
+    return float(portable.cos(radians)), float(portable.sin(radians))
 
 
 def rotation_from_abc(abc_deg: ArrayLike) -> FloatArray:
@@ -84,7 +87,7 @@ def rotation_from_quaternion(xyzw: ArrayLike) -> FloatArray:
     normalised.
     """
     q = frozen(xyzw, (4,), "quaternion")
-    length = float(np.linalg.norm(q))
+    length = portable.norm(q)
     if abs(length - 1.0) > QUATERNION_TOLERANCE:
         raise InvalidValueError(
             f"quaternion has length {length:g}, must be 1 within {QUATERNION_TOLERANCE:g} (order "
@@ -108,6 +111,6 @@ def rotation_from_matrix(rows: ArrayLike) -> FloatArray:
         raise InvalidValueError("rotation is not a right-handed orthonormal matrix")
     if error <= 1e-12:
         return R
-    left, _, right = np.linalg.svd(R)
-    nearest: FloatArray = left @ right
-    return nearest
+    for _ in range(_POLAR_STEPS):  # towards the nearest rotation (Higham 1986), quadratically
+        R = 0.5 * (R + portable.inv(R).T)
+    return R

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "elementary.hpp"
+
 namespace ir {
 namespace {
 
@@ -68,7 +70,7 @@ Chain::Chain(int count, const double* joint_origin, const double* joint_axis, co
     joint.turn = std::fabs(joint.sine) < aligned && joint.cosine > 0 ? Joint::parallel
                  : std::fabs(joint.cosine) < aligned                 ? Joint::perpendicular
                                                                      : Joint::oblique;
-    joint.offset = std::atan2(joint.cosine * step[3] + joint.sine * step[6], step[0]);
+    joint.offset = ir::arc_tangent(joint.cosine * step[3] + joint.sine * step[6], step[0]);
   }
   double base_turn[9];
   for (int i = 0; i < 3; ++i) {

@@ -1,5 +1,6 @@
 // The exact distance of a capsule's axis from each kind of body.
 #include "cylinder.hpp"
+#include "elementary.hpp"
 #include "model.hpp"
 
 namespace ir {
@@ -7,8 +8,8 @@ namespace ir {
 const Quarter quarter = [] {
   Quarter table;
   for (int k = 0; k <= 16; ++k) {
-    table.c[k] = std::cos(k * (3.14159265358979323846 / 32));
-    table.s[k] = std::sin(k * (3.14159265358979323846 / 32));
+    table.c[k] = ir::cosine(k * (3.14159265358979323846 / 32));
+    table.s[k] = ir::sine(k * (3.14159265358979323846 / 32));
   }
   table.c[16] = 0.0;
   return table;

@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "elementary.hpp"
+
 namespace ir::dynamics {
 namespace {
 
@@ -152,7 +154,7 @@ Body body_of(const ChainInput& in, const Lines& lines, int i, const Frame& frame
 double gas_force_per_length(const ChainInput& in, double square) {
   const double length = std::sqrt(square);
   const double volume = in.gas_volume - in.piston_area * (length - in.rod_length);
-  return in.charge_pressure * std::pow(in.gas_volume / volume, in.exponent) * in.piston_area / length;
+  return in.charge_pressure * ir::power(in.gas_volume / volume, in.exponent) * in.piston_area / length;
 }
 
 // Chebyshev interpolation over all lengths that the geometry allows, rewritten in powers of the scaled square.
@@ -163,14 +165,14 @@ Balance<double> balance_of(const ChainInput& in, const Joint<double>* joints) {
   if (b.joint < 0) return b;
   const auto [bx, bz] = in.pivot;
   const auto [ex, ez] = in.eye;
-  const double C = std::cos(joints[b.joint].theta0), S = std::sin(joints[b.joint].theta0);
+  const double C = ir::cosine(joints[b.joint].theta0), S = ir::sine(joints[b.joint].theta0);
   const auto in_theta = [C, S](double cosine, double sine, double& of_cos, double& of_sin) {
     of_cos = cosine * C - sine * S;  // cosine cos q + sine sin q, written in theta = q + theta0
     of_sin = cosine * S + sine * C;
   };
   in_theta(ez * bx - ex * bz, -ex * bx - ez * bz, b.lever_cos, b.lever_sin);
   const double centre = bx * bx + bz * bz + ex * ex + ez * ez;
-  const double half = 2.0 * std::hypot(bx, bz) * std::hypot(ex, ez);
+  const double half = 2.0 * ir::length(bx, bz) * ir::length(ex, ez);
   const double scale = half > 0.0 ? 1.0 / half : 0.0;
   in_theta(-2.0 * (bx * ex + bz * ez) * scale, -2.0 * (bx * ez - bz * ex) * scale, b.square_cos, b.square_sin);
   constexpr int m = Balance<double>::kTerms;
@@ -179,7 +181,7 @@ Balance<double> balance_of(const ChainInput& in, const Joint<double>* joints) {
     double sum = 0.0;
     for (int j = 0; j < m; ++j) {
       const double angle = M_PI * (j + 0.5) / m;
-      sum += gas_force_per_length(in, centre + half * std::cos(angle)) * std::cos(k * angle);
+      sum += gas_force_per_length(in, centre + half * ir::cosine(angle)) * ir::cosine(k * angle);
     }
     chebyshev[k] = (k == 0 ? 1.0 : 2.0) / m * sum;
   }
@@ -220,7 +222,7 @@ Model<double> build_model(const ChainInput& in) {  // long: one block per part o
       const Mat3 to_before = transpose(f.axes());
       r = to_before * (g.o - f.o);
       const Vec3 x = to_before * g.x;  // = (cos theta, cos alpha sin theta, sin alpha sin theta)
-      j.theta0 = std::atan2(j.cos_alpha * x[1] + j.sin_alpha * x[2], x[0]);
+      j.theta0 = ir::arc_tangent(j.cos_alpha * x[1] + j.sin_alpha * x[2], x[0]);
     }
     j.turn = j.sin_alpha == 0.0 && j.cos_alpha > 0.0 ? Joint<double>::kParallel
              : j.cos_alpha == 0.0                    ? Joint<double>::kPerpendicular

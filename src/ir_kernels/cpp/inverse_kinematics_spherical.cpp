@@ -6,6 +6,8 @@
 #include <cmath>
 #include <complex>
 
+#include "elementary.hpp"
+
 namespace ir::inverse {
 namespace {
 
@@ -84,7 +86,7 @@ class Solver {
     upper_length_ = size(upper_);
     fore_length_ = size(fore_);
     const Complex opening = times(std::conj(upper_), fore_);
-    opening_ = std::arg(opening);
+    opening_ = ir::arc_tangent(opening.imag(), opening.real());
     unopened_ = std::conj(opening) / size(opening);
     free_q4_ = std::clamp(0.0, arm.low[3], arm.high[3]);
   }
@@ -100,7 +102,7 @@ class Solver {
     const double d = arm_.lateral;
     if (radius < std::abs(d) - kReachTolerance) return;
     const double reach = arm_.forward * std::sqrt(std::max(radius * radius - d * d, 0.0));
-    const double heading = radius > 0.0 ? std::atan2(centre.y, centre.x) : 0.0;
+    const double heading = radius > 0.0 ? ir::arc_tangent(centre.y, centre.x) : 0.0;
     for (int back = 0; back < 2; ++back)
       arm(heading, back ? -reach : reach, centre, turned, 4 * back, index, out);
   }
@@ -109,7 +111,7 @@ class Solver {
   void arm(double heading, double reach, const Vec& centre, const Mat& turned, int branch, long index,
            IkSolutions& out) const {
     double q[6];
-    q[0] = heading - std::atan2(arm_.lateral, reach);
+    q[0] = heading - ir::arc_tangent(arm_.lateral, reach);
     const Complex target = Complex{centre.z, reach} - shoulder_;
     const double distance = size(target), longest = upper_length_ + fore_length_;
     const double shortest = std::abs(upper_length_ - fore_length_);
@@ -119,15 +121,15 @@ class Solver {
                     (2.0 * upper_length_ * fore_length_);
     cosine = stretched ? std::copysign(1.0, cosine) : std::clamp(cosine, -1.0, 1.0);
     const double sine = std::sqrt((1.0 - cosine) * (1.0 + cosine));
-    const double bend = std::atan2(sine, cosine);
-    const double s1 = std::sin(q[0]), c1 = std::cos(q[0]);
+    const double bend = ir::arc_tangent(sine, cosine);
+    const double s1 = ir::sine(q[0]), c1 = ir::cosine(q[0]);
     const auto unturn = [=](const Vec& v) { return Vec{c1 * v.x + s1 * v.y, c1 * v.y - s1 * v.x, v.z}; };
     const Vec pointing = unturn(turned * z6_), across = unturn(turned * z5_);
     for (int low = 0; low < (stretched ? 1 : 2); ++low) {
       const Complex turn = times(Complex{cosine, low ? -sine : sine}, unopened_);
       const Complex elbow = upper_ + times(fore_, turn);
       const Complex shoulder = times(target, std::conj(elbow));
-      q[1] = std::arg(shoulder);
+      q[1] = ir::arc_tangent(shoulder.imag(), shoulder.real());
       q[2] = arm_.elbow_sign * ((low ? -bend : bend) - opening_);
       const double length = size(shoulder);
       const Complex lift = length > 0.0 ? times(shoulder / length, turn) : turn;  // exp(i (q2 +- q3))
@@ -143,11 +145,11 @@ class Solver {
     const double c = dot(p, z4_), a = dot(p, z5_), b = dot(p, e3_);
     const double s = std::sqrt(a * a + b * b);
     const bool singular = s < kSingularWrist;
-    const double q4 = singular ? free_q4_ : std::atan2(a, -b);
-    const double s4 = singular ? std::sin(q4) : a / s, c4 = singular ? std::cos(q4) : -b / s;
+    const double q4 = singular ? free_q4_ : ir::arc_tangent(a, -b);
+    const double s4 = singular ? ir::sine(q4) : a / s, c4 = singular ? ir::cosine(q4) : -b / s;
     const double v1 = dot(v, z4_), v2 = dot(v, z5_), v3 = dot(v, e3_);
-    const double q5 = std::atan2(s, c);
-    const double q6 = std::atan2(v1 * s + (c4 * v3 - s4 * v2) * c, c4 * v2 + s4 * v3);
+    const double q5 = ir::arc_tangent(s, c);
+    const double q6 = ir::arc_tangent(v1 * s + (c4 * v3 - s4 * v2) * c, c4 * v2 + s4 * v3);
     q[3] = q4;
     q[4] = q5 - arm_.wrist_zero;
     q[5] = q6;

@@ -227,20 +227,26 @@ template <class V> IR_INLINE void sincos_reducible(V x, V& s, V& c) {
   c = with_sign_of((V)((quarter + 1) << to_sign), odd ? sine : cosine);
 }
 
-// Of `n` angles; where one is out of reach of the reduction the C library is asked, lane by lane.
+// An angle less its whole turns, in extended precision: the remainder of a division is exact on every processor.
+inline double without_turns(double x) {
+  constexpr long double turn = 6.283185307179586476925286766559005768L;
+  if (!std::isfinite(x)) return std::numeric_limits<double>::quiet_NaN();
+  return static_cast<double>(std::fmod(static_cast<long double>(x), turn));
+}
+
+// Of `n` angles; lanes that are out of reach of the reduction lose their whole turns first.
 template <int known_n = 0, class V> IR_INLINE void sincos(int n, const V* x, V* s, V* c) {
   if (known_n) n = known_n;
   V squares{};
   for (int i = 0; i < n; ++i) squares += x[i] * x[i];
-  if (__builtin_expect(any(squares > reducible<V> * reducible<V>), 0)) {
-    for (int i = 0; i < n; ++i)
-      for (int k = 0; k < Lanes<V>::width; ++k) {
-        s[i][k] = std::sin(x[i][k]);
-        c[i][k] = std::cos(x[i][k]);
-      }
-    return;
+  const bool far = any(squares > reducible<V> * reducible<V>);
+  for (int i = 0; i < n; ++i) {
+    V near = x[i];
+    if (__builtin_expect(far, 0))
+      for (int k = 0; k < Lanes<V>::width; ++k)
+        if (!(std::fabs(near[k]) <= reducible<V>)) near[k] = static_cast<Scalar<V>>(without_turns(near[k]));
+    sincos_reducible(near, s[i], c[i]);
   }
-  for (int i = 0; i < n; ++i) sincos_reducible(x[i], s[i], c[i]);
 }
 
 }  // namespace ir

@@ -29,4 +29,5 @@ PYBIND11_MODULE(IR_MODULE, m) {
   bind_inverse_kinematics(m);
   bind_spline(m);
   bind_search(m);
+  bind_portable(m);
 }

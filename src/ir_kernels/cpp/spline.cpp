@@ -7,6 +7,7 @@
 #include "bending_metric.hpp"
 #include "bindings.hpp"
 #include "descent.hpp"
+#include "elementary.hpp"
 #include "spline_cost.hpp"
 #include "spline_profile.hpp"
 #include "spline_starts.hpp"
@@ -159,7 +160,7 @@ class SplineCost {
     const double first = interval;
     const auto function = [&](const std::vector<double>& at, std::vector<double>& gradient) {
       std::copy_n(at.begin(), size, inner);
-      const double now = first * std::exp(at[size]);
+      const double now = first * ir::exponential(at[size]);
       double of_interval;
       const double value = cost(all, K, row, now, slopes.data(), of_interval);
       std::copy_n(slopes.begin() + 3 * n_, size, gradient.begin());
@@ -172,7 +173,7 @@ class SplineCost {
     };
     const ir::Descent done = ir::descend(x, function, precondition, most, tolerance);
     std::copy_n(x.begin(), size, inner);
-    interval = first * std::exp(x[size]);
+    interval = first * ir::exponential(x[size]);
     return done;
   }
 
@@ -180,7 +181,7 @@ class SplineCost {
   // long: the function and its derivative side by side
   ir::Descent profiled(ir::SplineCost& cost, const ir::CubicPath& path, const double* s, int C, double& duration, bool fixed,
                        int most, double tolerance, double* result) const {
-    const ir::Banded knots = ir::knots_of(C), metric = ir::jerk_metric(C, profile_bending * std::pow(C + 3, 3));
+    const ir::Banded knots = ir::knots_of(C), metric = ir::jerk_metric(C, profile_bending * static_cast<double>(C + 3) * (C + 3) * (C + 3));
     const int K = C + 6;
     const std::vector<std::int32_t> row(K - 3, 0);
     std::vector<double> all(static_cast<std::size_t>(K) * n_), slopes(all.size()), along(static_cast<std::size_t>(C) * n_),
@@ -193,7 +194,7 @@ class SplineCost {
     const auto place = [&](const std::vector<double>& at, int i) {
       return std::min(std::max(s[i] + profile_scale * at[i], 0.0), 1.0);
     };
-    const auto lasts = [&](const std::vector<double>& at) { return duration * std::exp(profile_time * at[C]); };
+    const auto lasts = [&](const std::vector<double>& at) { return duration * ir::exponential(profile_time * at[C]); };
     const auto function = [&](const std::vector<double>& at, std::vector<double>& gradient) {
       for (int i = 0; i < C; ++i) path.at(place(at, i), inner + i * n_, &along[static_cast<std::size_t>(i) * n_]);
       for (int k = 0; k < C * n_; ++k) inner[k] *= 6.0;

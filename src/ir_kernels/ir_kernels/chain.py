@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ir_kernels import compiled, data
+from ir_kernels import compiled, data, portable
 from ir_kernels.data import ChainLike
 from ir_kernels.errors import InputError
 from ir_msgs_py.arrays import FloatArray
@@ -72,7 +72,7 @@ class Chain:
 
     def tcp_poses(self, q: ArrayLike) -> FloatArray:
         """(N, 4, 4): pose of the tool centre point in the world at q (N, n)."""
-        poses: FloatArray = self.link_poses(q)[:, -1] @ self.tcp
+        poses: FloatArray = portable.matmul(self.link_poses(q)[:, -1], self.tcp)
         return poses
 
     def jacobian(self, q: ArrayLike) -> FloatArray:

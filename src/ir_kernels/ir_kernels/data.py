@@ -12,7 +12,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ir_kernels import arguments
+from ir_kernels import arguments, portable
 from ir_kernels.errors import InputError
 from ir_msgs_py.arrays import FloatArray, IntArray
 
@@ -125,7 +125,9 @@ def poses(value: ArrayLike, name: str) -> FloatArray:
     """(N, 4, 4) rigid transforms."""
     result = array(value, name, (None, 4, 4))
     rotation = result[:, :3, :3]
-    deviation = np.abs(rotation @ rotation.transpose(0, 2, 1) - np.eye(3)).max(initial=0.0)
+    deviation = np.abs(portable.matmul(rotation, rotation.transpose(0, 2, 1)) - np.eye(3)).max(
+        initial=0.0
+    )
     if deviation > ROTATION_TOLERANCE or (result[:, 3] != [0.0, 0.0, 0.0, 1.0]).any():
         raise InputError(
             f"{name} is not a rigid transform: R R^T deviates from 1 by {deviation:.2g}, "

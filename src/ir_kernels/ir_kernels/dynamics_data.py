@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ir_kernels import portable
 from ir_kernels.errors import InputError
 from ir_kernels.robot_like import CounterbalanceLike, LoadLike, RobotLike
 from ir_msgs_py.arrays import FloatArray
@@ -112,7 +113,7 @@ def lump(
     lumped = np.zeros((3, 3))
     for m, c, own_inertia in zip(masses, centres, inertias, strict=True):
         d = c - centre
-        lumped += own_inertia + m * (d @ d * np.eye(3) - np.outer(d, d))
+        lumped += own_inertia + m * (portable.matmul(d, d) * np.eye(3) - np.outer(d, d))
     return total, centre, lumped
 
 
@@ -129,7 +130,7 @@ def _counterbalance(data: CounterbalanceLike | None) -> CounterbalanceData | Non
         rod_length_at_charge=float(data.rod_length_at_charge),
         exponent=float(data.exponent),
     )
-    longest = float(np.hypot(*packed.pivot) + np.hypot(*packed.rod_eye))
+    longest = float(portable.hypot(*packed.pivot) + portable.hypot(*packed.rod_eye))
     if packed.gas_volume - packed.piston_area * (longest - packed.rod_length_at_charge) <= 0.0:
         raise InputError(
             f"counterbalance: at its longest ({longest:.3f} m) the rod leaves no volume for the "
@@ -165,7 +166,9 @@ def dynamics_data(
         mass=_frozen("robot.link_mass", mass, (n,)),
         com=_frozen("robot.link_com", com, (n, 3)),
         inertia=_frozen("robot.link_inertia", inertia, (n, 3, 3)),
-        gravity=_frozen("gravity", pose[:3, :3].T @ np.array([0.0, 0.0, -float(gravity)]), (3,)),
+        gravity=_frozen(
+            "gravity", portable.matmul(pose[:3, :3].T, np.array([0.0, 0.0, -float(gravity)])), (3,)
+        ),
         rotor_inertia=_frozen("robot.reflected_inertia", robot.reflected_inertia, (n,)),
         viscous=_frozen("robot.friction_viscous", robot.friction_viscous, (n,)),
         coulomb=_frozen("robot.friction_coulomb", robot.friction_coulomb, (n,)),

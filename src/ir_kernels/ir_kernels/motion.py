@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ir_kernels import compiled
+from ir_kernels import compiled, portable
 from ir_kernels.arguments import checked
 from ir_kernels.errors import InputError
 from ir_kernels.limits import segments
@@ -43,6 +43,6 @@ def polynomial_samples(
 
 def _at(c: FloatArray, t: FloatArray) -> FloatArray:
     """Values (M, n) of polynomials (M, n, K) at times (M,)."""
-    powers = t[:, None, None] ** np.arange(c.shape[2])
+    powers = portable.power(t[:, None, None], np.arange(c.shape[2]))
     values: FloatArray = (c * powers).sum(axis=2)
     return values

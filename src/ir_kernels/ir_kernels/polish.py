@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_kernels.chain import Chain
 from ir_kernels.ik_set import Found
 from ir_msgs_py.arrays import FloatArray
@@ -46,9 +47,14 @@ def newton(
         if step < steps:
             J = chain.jacobian(q)
             JT = np.swapaxes(J, 1, 2)
-            change = (JT @ np.linalg.solve(J @ JT + _DAMPING * np.eye(6), error[:, :, None]))[
-                :, :, 0
-            ]
+            change = (
+                portable.matmul(
+                    JT,
+                    portable.solve(
+                        portable.matmul(J, JT) + _DAMPING * np.eye(6), error[:, :, None]
+                    ),
+                )
+            )[:, :, 0]
             q = q + np.clip(change, -_MOST, _MOST)
     return best, least
 
@@ -56,11 +62,11 @@ def newton(
 def pose_error(chain: Chain, poses: FloatArray, q: FloatArray) -> FloatArray:
     """(M, 6): metres and radians from the tcp at q (M, 6) to poses (M, 4, 4)."""
     now = chain.tcp_poses(q)
-    R = poses[:, :3, :3] @ np.swapaxes(now[:, :3, :3], 1, 2)
+    R = portable.matmul(poses[:, :3, :3], np.swapaxes(now[:, :3, :3], 1, 2))
     twist = 0.5 * np.stack(
         [R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1
     )
     sine = np.linalg.norm(twist, axis=1)
-    angle = np.arctan2(sine, 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0))
+    angle = portable.arctan2(sine, 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0))
     factor = np.where(sine > 1e-8, angle / np.where(sine > 1e-8, sine, 1.0), 1.0)
     return np.concatenate([poses[:, :3, 3] - now[:, :3, 3], factor[:, None] * twist], axis=1)

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ir_kernels import compiled
+from ir_kernels import compiled, portable
 from ir_kernels.arguments import checked, finite
 from ir_kernels.errors import InputError
 from ir_kernels.reference import power as reference
@@ -131,12 +131,12 @@ def drive_energy(
     power = checked("axis_power", axis_power, None, None)
     steps = _steps(dt, len(power))
     bus = dc_bus(power, steps, parameters, stored)
-    axes = finite("axis_power", steps @ power)
+    axes = finite("axis_power", portable.matmul(steps, power))
     axes.setflags(write=False)
     return DriveEnergy(
-        mains=float(steps @ bus.mains),
+        mains=float(portable.matmul(steps, bus.mains)),
         axes=axes,
-        dissipated=float(steps @ bus.dissipated),
+        dissipated=float(portable.matmul(steps, bus.dissipated)),
         capacitor_change=float(bus.stored[-1] - stored),
         peak=float(bus.mains.max()),
     )

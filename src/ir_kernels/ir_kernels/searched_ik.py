@@ -12,7 +12,7 @@ answer is exact; that none is missed is measured (benchmarks/robots.py).
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ir_kernels import data
+from ir_kernels import data, portable
 from ir_kernels.arguments import shaped
 from ir_kernels.arm_lines import arm_lines
 from ir_kernels.chain import Chain
@@ -125,16 +125,18 @@ class SearchedIk:
         upper = lines.o[2] - lines.o[1]
         z = lines.z
         turned = lines.turned
-        length = np.linalg.norm(upper - (upper @ z[1]) * z[1])
+        length = portable.norm(upper - (portable.matmul(upper, z[1])) * z[1])
         for pair in range(4):
             q6, total, _ = wrist_and_sum(lines, X, E4, q1[:, pair], q5[:, pair], 0.0)
-            back = turned(0, -q1[:, pair]) @ X @ turned(5, -q6) @ turned(4, -q5[:, pair])
-            back = back @ turned(3, -q4)  # = E2 E3
-            elbow = back[:, :3, :3] @ lines.o[2] + back[:, :3, 3] - lines.o[1]
+            back = portable.matmul(
+                turned(0, -q1[:, pair]), X, turned(5, -q6), turned(4, -q5[:, pair])
+            )
+            back = portable.matmul(back, turned(3, -q4))  # = E2 E3
+            elbow = portable.matmul(back[:, :3, :3], lines.o[2]) + back[:, :3, 3] - lines.o[1]
             q2 = angle_about(z[1], np.broadcast_to(upper, elbow.shape), elbow)
             q3 = lines.parallel(2) * (total - q2)
             rows.append(np.stack([q1[:, pair], q2, q3, q4, q5[:, pair], q6], axis=1))
-            apart = np.linalg.norm(elbow - (elbow @ z[1])[:, None] * z[1], axis=1)
+            apart = np.linalg.norm(elbow - (portable.matmul(elbow, z[1]))[:, None] * z[1], axis=1)
             lacks.append(np.where(exists[:, pair], apart - length, np.inf))
         return np.stack(rows, axis=1), np.stack(lacks, axis=1), beyond
 

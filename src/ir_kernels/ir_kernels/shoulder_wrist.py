@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_kernels.arm_lines import ArmLines
 from ir_msgs_py.arrays import BoolArray, FloatArray
 
@@ -47,12 +48,12 @@ class _Sum(NamedTuple):
         far the cosine is beyond 1 (N,); 0 where any angle does. A cosine up to 1 + slack counts as
         if it were as much below 1.
         """
-        length = np.hypot(self.cosine, self.sine)
+        length = portable.hypot(self.cosine, self.sine)
         any_angle = length < _NOTHING
         ratio = (value - self.constant) / np.where(any_angle, 1.0, length)
         folded = np.where(np.abs(ratio) > 1.0, np.sign(ratio) * (2.0 - np.abs(ratio)), ratio)
-        turn = np.arccos(np.clip(folded, -1.0, 1.0))
-        middle = np.arctan2(self.sine, self.cosine)
+        turn = portable.arccos(np.clip(folded, -1.0, 1.0))
+        middle = portable.arctan2(self.sine, self.cosine)
         angle = np.where(
             any_angle[:, None], 0.0, middle[:, None] + turn[:, None] * np.array([1.0, -1.0])
         )
@@ -77,11 +78,15 @@ def shoulder_and_wrist(
     """
     z = lines.z
     o = lines.o
-    seen = np.swapaxes(E4[:, :3, :3], 1, 2) @ z[1]  # z2 before axis 4 turned
-    aim1 = _along(z[1], -z[0], X[:, :3, :3] @ z[5])
+    seen = portable.matmul(np.swapaxes(E4[:, :3, :3], 1, 2), z[1])  # z2 before axis 4 turned
+    aim1 = _along(z[1], -z[0], portable.matmul(X[:, :3, :3], z[5]))
     aim5 = _along(seen, z[4], np.broadcast_to(z[5], seen.shape))
-    reach1 = _along(z[1], -z[0], (X[:, :3, :3] @ o[5] + X[:, :3, 3]) - o[0])
-    fixed = seen @ o[4] + E4[:, :3, 3] @ z[1] - z[1] @ o[0]
+    reach1 = _along(z[1], -z[0], (portable.matmul(X[:, :3, :3], o[5]) + X[:, :3, 3]) - o[0])
+    fixed = (
+        portable.matmul(seen, o[4])
+        + portable.matmul(E4[:, :3, 3], z[1])
+        - portable.matmul(z[1], o[0])
+    )
     if lines.meet:
         q1, reached, far = reach1.angles(fixed, slack)
         return _one_by_one(q1, reached, far, aim1, aim5, slack)
@@ -95,7 +100,11 @@ def _one_by_one(
 ) -> Pairs:
     pairs = []
     for k in (0, 1):
-        value = aim1.cosine * np.cos(q1[:, k]) + aim1.sine * np.sin(q1[:, k]) + aim1.constant
+        value = (
+            aim1.cosine * portable.cos(q1[:, k])
+            + aim1.sine * portable.sin(q1[:, k])
+            + aim1.constant
+        )
         q5, aimed, off = aim5.angles(value, slack)
         each = (q1[:, k], reached & aimed, np.maximum(far, off))
         first, exists, beyond = (np.repeat(column[:, None], 2, axis=1) for column in each)
@@ -114,33 +123,32 @@ def _together(aim1: _Sum, aim5: _Sum, reach1: _Sum, reach5: _Sum, slack: float) 
     adj = np.stack(
         [np.stack([N[:, 1, 1], -N[:, 0, 1]], 1), np.stack([-N[:, 1, 0], N[:, 0, 0]], 1)], 1
     )
-    A = adj @ M
-    a = (adj @ m[:, :, None])[:, :, 0]
+    A = portable.matmul(adj, M)
+    a = (portable.matmul(adj, m[:, :, None]))[:, :, 0]
     w = _unit_roots(A, a, det)
-    beyond = np.log(np.abs(w))
-    q1 = np.angle(w) + np.where(
-        np.abs(beyond) > NEAR_UNIT, beyond, 0.0
-    )  # a pair that just left the circle
-    x = np.stack([np.cos(q1), np.sin(q1)], axis=1)  # (n, 2, 4)
-    y = (A @ x + a[:, :, None]) * np.sign(det)[:, None, None]
+    beyond = portable.log(np.sqrt((w * w).sum(axis=2)))
+    q1 = portable.arctan2(w[..., 1], w[..., 0])
+    q1 = q1 + np.where(np.abs(beyond) > NEAR_UNIT, beyond, 0.0)  # a pair that just left the circle
+    x = np.stack([portable.cos(q1), portable.sin(q1)], axis=1)  # (n, 2, 4)
+    y = (portable.matmul(A, x) + a[:, :, None]) * np.sign(det)[:, None, None]
     far = np.where(np.abs(beyond) > NEAR_UNIT, np.abs(beyond), 0.0)
-    return Pairs(q1, np.arctan2(y[:, 1], y[:, 0]), np.abs(beyond) <= slack, far)
+    return Pairs(q1, portable.arctan2(y[:, 1], y[:, 0]), np.abs(beyond) <= slack, far)
 
 
 def _unit_roots(A: FloatArray, a: FloatArray, det: FloatArray) -> FloatArray:
-    """Roots w (n, 4) of |A x + a|^2 = det^2 as a polynomial in w = exp(i q1), x = (cos q1, sin
-    q1).
+    """Roots w (n, 4), real and imaginary parts (n, 4, 2), of |A x + a|^2 = det^2 as a polynomial in
+    w = exp(i q1), x = (cos q1, sin q1).
     """
-    p = 0.5 * (A[:, :, 0] - 1j * A[:, :, 1])  # A x + a = p w + conj(p) / w + a
-    square = (p * p).sum(axis=1)
-    mixed = 2.0 * (p * a).sum(axis=1)
-    middle = 2.0 * (np.abs(p) ** 2).sum(axis=1) + (a * a).sum(axis=1) - det**2
-    rows = np.stack([square, mixed, middle + 0j, np.conj(mixed), np.conj(square)], axis=1)
-    size = np.abs(rows).max(axis=1)
-    leading = np.where(
-        np.abs(rows[:, 0]) < 1e-14 * np.maximum(size, 1e-300), 1e-14 * size + 1e-300, rows[:, 0]
-    )
-    companion = np.zeros((len(rows), 4, 4), complex)
-    companion[:, 0, :] = -rows[:, 1:] / leading[:, None]
-    companion[:, [1, 2, 3], [0, 1, 2]] = 1.0
-    return np.asarray(np.linalg.eigvals(companion))
+    p = 0.5 * A * np.array([1.0, -1.0])  # A x + a = p w + conj(p) / w + a, p as (n, 2, 2)
+    sizes = (p * p).sum(axis=1)
+    square = np.stack([sizes[:, 0] - sizes[:, 1], 2.0 * (p[:, :, 0] * p[:, :, 1]).sum(axis=1)], 1)
+    mixed = 2.0 * (p * a[:, :, None]).sum(axis=1)
+    middle = 2.0 * sizes.sum(axis=1) + (a * a).sum(axis=1) - det**2
+    centre = np.stack([middle, np.zeros_like(middle)], axis=1)
+    conjugate = np.array([1.0, -1.0])
+    rows = np.stack([square, mixed, centre, mixed * conjugate, square * conjugate], axis=1)
+    lengths = np.sqrt((rows * rows).sum(axis=2))
+    size = lengths.max(axis=1)
+    nothing = lengths[:, 0] < 1e-14 * np.maximum(size, 1e-300)
+    rows[nothing, 0] = np.stack([1e-14 * size + 1e-300, np.zeros_like(size)], axis=1)[nothing]
+    return portable.roots(rows)

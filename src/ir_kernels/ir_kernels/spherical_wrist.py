@@ -5,10 +5,9 @@ Branch numbers 0..7, in bits: 4 the arm reaches backwards over its base, 2 the o
 other wrist.
 """
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from ir_kernels import compiled, data
+from ir_kernels import compiled, data, portable
 from ir_kernels.arguments import shaped
 from ir_kernels.chain import Chain
 from ir_kernels.ik_set import IkSet, limits
@@ -38,8 +37,8 @@ class SphericalWristIk:
         self.chain = chain
         self.geometry = wrist_geometry(chain)
         self.position_min, self.position_max = limits(position_min, position_max)
-        self._to_base = np.linalg.inv(chain.base_pose)
-        self._from_tcp = np.linalg.inv(chain.tcp)
+        self._to_base = portable.inv(chain.base_pose)
+        self._from_tcp = portable.inv(chain.tcp)
         self._core = None
         if core is not None and hasattr(core, "SphericalWristIk"):
             bounds = (self.position_min, self.position_max)
@@ -55,7 +54,7 @@ class SphericalWristIk:
         result = None if self._core is None else self._core.solve(targets)
         if result is None:  # no compiled core, or it refused a pose: the check says which and why
             data.poses(targets, "poses")
-            hand = self._to_base @ targets @ self._from_tcp
+            hand = portable.matmul(self._to_base, targets, self._from_tcp)
             result = reference.solve(self.geometry, hand, self.position_min, self.position_max)
         for array in result:
             array.setflags(write=False)

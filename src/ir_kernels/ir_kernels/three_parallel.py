@@ -9,7 +9,7 @@ Branch numbers 0..7: +4 for the second shoulder, +2 for the other elbow, +1 for 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ir_kernels import data
+from ir_kernels import data, portable
 from ir_kernels.arguments import shaped
 from ir_kernels.arm_lines import ArmLines, arm_lines
 from ir_kernels.chain import Chain
@@ -101,24 +101,28 @@ class ThreeParallelIk:
         z = lines.z
         o = lines.o
         turned = lines.turned
-        back = turned(0, -q1) @ X @ turned(5, -q6) @ turned(4, -q5)  # = E2 E3 E4
-        target = back[:, :3, :3] @ o[3] + back[:, :3, 3] - o[1]
+        back = portable.matmul(turned(0, -q1), X, turned(5, -q6), turned(4, -q5))  # = E2 E3 E4
+        target = portable.matmul(back[:, :3, :3], o[3]) + back[:, :3, 3] - o[1]
         normal = _normal(z[1])
         across = np.cross(z[1], normal)
 
-        def planar(vector: FloatArray) -> FloatArray:
-            return np.asarray(vector @ normal + 1j * (vector @ across))
+        def planar(vector: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+            x = portable.matmul(vector, normal)
+            y = portable.matmul(vector, across)
+            return x, y, portable.hypot(x, y)
 
-        upper = planar(o[2] - o[1])
-        fore = planar(o[3] - o[2])
-        aim = planar(target)
-        a = abs(upper)
-        b = abs(fore)
-        distance = np.abs(aim)
+        upper_x, upper_y, a = planar(o[2] - o[1])
+        fore_x, fore_y, b = planar(o[3] - o[2])
+        aim_x, aim_y, distance = planar(target)
         cosine = (distance**2 - a**2 - b**2) / (2.0 * a * b)
-        bend = np.arccos(np.clip(cosine, -1.0, 1.0)) * (-1.0 if other else 1.0)
-        turn = bend - np.angle(np.conj(upper) * fore)
-        q2 = np.angle(aim * np.conj(upper + fore * np.exp(1j * turn)))
+        bend = portable.arccos(np.clip(cosine, -1.0, 1.0)) * (-1.0 if other else 1.0)
+        opening = (upper_x * fore_y - upper_y * fore_x, upper_x * fore_x + upper_y * fore_y)
+        turn = bend - portable.arctan2(*opening)
+        cos = portable.cos(turn)
+        sin = portable.sin(turn)
+        arm_x = upper_x + fore_x * cos - fore_y * sin
+        arm_y = upper_y + fore_x * sin + fore_y * cos
+        q2 = portable.arctan2(aim_y * arm_x - aim_x * arm_y, aim_x * arm_x + aim_y * arm_y)
         reached = (distance <= a + b + STRETCHED) & (distance >= abs(a - b) - STRETCHED)
         twice = other & (np.abs(cosine) >= 1.0)
         q4 = lines.parallel(3) * (total - q2 - turn)
@@ -129,8 +133,8 @@ def displacements(chain: Chain, lines: ArmLines, targets: FloatArray) -> FloatAr
     """(N, 4, 4): how the hand is displaced from q = 0 in link 0, for poses of the tcp in the
     world.
     """
-    hand = np.linalg.inv(chain.base_pose) @ targets @ np.linalg.inv(chain.tcp)
-    return np.asarray(hand @ np.linalg.inv(lines.hand))
+    hand = portable.matmul(portable.inv(chain.base_pose), targets, portable.inv(chain.tcp))
+    return np.asarray(portable.matmul(hand, portable.inv(lines.hand)))
 
 
 def wrist_and_sum(
@@ -145,26 +149,34 @@ def wrist_and_sum(
     R5 = turned(4, q5)[:, :3, :3]
     R4 = E4[:, :3, :3]
     R = X[:, :3, :3]
-    before = np.swapaxes(R4 @ R5, 1, 2) @ z[1]  # = R6 (R^T R1 z2)
-    after = (np.swapaxes(R, 1, 2) @ R1) @ z[1]
+    before = portable.matmul(np.swapaxes(portable.matmul(R4, R5), 1, 2), z[1])  # = R6 (R^T R1 z2)
+    after = portable.matmul(np.swapaxes(R, 1, 2), R1, z[1])
     singular = np.linalg.norm(np.cross(before, z[5]), axis=1) < SINGULAR
     q6 = np.where(singular, free, angle_about(z[5], after, before))
-    left = np.swapaxes(R1, 1, 2) @ R @ np.swapaxes(R4 @ R5 @ turned(5, q6)[:, :3, :3], 1, 2)
+    left = portable.matmul(
+        np.swapaxes(R1, 1, 2),
+        R,
+        np.swapaxes(portable.matmul(R4, R5, turned(5, q6)[:, :3, :3]), 1, 2),
+    )
     normal = _normal(z[1])
-    return q6, angle_about(z[1], np.broadcast_to(normal, after.shape), left @ normal), singular
+    return (
+        q6,
+        angle_about(z[1], np.broadcast_to(normal, after.shape), portable.matmul(left, normal)),
+        singular,
+    )
 
 
 def angle_about(axis: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
     """Angles (N,) by which a turn about an axis (3,) brings vectors (N, 3) into the planes of
     others.
     """
-    u = start - (start @ axis)[:, None] * axis
-    v = end - (end @ axis)[:, None] * axis
-    return np.asarray(np.arctan2(np.cross(u, v) @ axis, (u * v).sum(axis=1)))
+    u = start - (portable.matmul(start, axis))[:, None] * axis
+    v = end - (portable.matmul(end, axis))[:, None] * axis
+    return np.asarray(portable.arctan2(portable.matmul(np.cross(u, v), axis), (u * v).sum(axis=1)))
 
 
 def _normal(z: FloatArray) -> FloatArray:
     """A unit vector perpendicular to z (3,)."""
     helper = np.eye(3)[int(np.argmin(np.abs(z)))]
     across = np.cross(z, helper)
-    return np.asarray(across / np.linalg.norm(across))
+    return np.asarray(across / portable.norm(across))

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_kernels.chain import Chain
 from ir_kernels.errors import InputError
 from ir_msgs_py.arrays import FloatArray
@@ -43,9 +44,8 @@ class WristGeometry:
 def _meeting_point(o: FloatArray, z: FloatArray) -> FloatArray:
     """Point nearest to the three lines, or InputError when it isn't on each of them."""
     normal = np.eye(3) - z[:, :, None] * z[:, None, :]
-    point = np.linalg.lstsq(
-        normal.reshape(-1, 3), np.einsum("kij,kj->ki", normal, o).ravel(), rcond=None
-    )[0]
+    feet = np.einsum("kij,kj->ki", normal, o)
+    point = portable.least_squares(normal.reshape(-1, 3), feet.reshape(-1, 1))[:, 0]
     miss = float(np.linalg.norm(np.einsum("kij,kj->ki", normal, point - o), axis=1).max())
     if miss > POINT_TOLERANCE:
         raise InputError(
@@ -57,11 +57,11 @@ def _meeting_point(o: FloatArray, z: FloatArray) -> FloatArray:
 
 def _check_axes(z: FloatArray) -> None:
     """Raise InputError where the directions (6, 3) of the axes are not those of the closed form."""
-    conditions = {
-        "axes 1 and 2 are not perpendicular: z1.z2": z[0] @ z[1],
-        "axes 2 and 3 are not parallel: |z2 x z3|": np.linalg.norm(np.cross(z[1], z[2])),
-        "axes 4 and 5 are not perpendicular: z4.z5": z[3] @ z[4],
-        "axes 5 and 6 are not perpendicular: z5.z6": z[4] @ z[5],
+    conditions: dict[str, float] = {
+        "axes 1 and 2 are not perpendicular: z1.z2": float(portable.matmul(z[0], z[1])),
+        "axes 2 and 3 are not parallel: |z2 x z3|": portable.norm(np.cross(z[1], z[2])),
+        "axes 4 and 5 are not perpendicular: z4.z5": float(portable.matmul(z[3], z[4])),
+        "axes 5 and 6 are not perpendicular: z5.z6": float(portable.matmul(z[4], z[5])),
     }
     for sentence, value in conditions.items():
         if abs(value) > ANGLE_TOLERANCE:
@@ -74,18 +74,18 @@ def wrist_geometry(chain: Chain) -> WristGeometry:
     """
     if chain.n != 6:
         raise InputError(f"chain has {chain.n} joints, the closed form needs 6")
-    to_base = np.linalg.inv(chain.base_pose)
-    links = to_base @ chain.link_poses(np.zeros((1, 6)))[0]
+    to_base = portable.inv(chain.base_pose)
+    links = portable.matmul(to_base, chain.link_poses(np.zeros((1, 6)))[0])
     frames = links[1:]
     z = np.einsum("kij,kj->ki", frames[:, :3, :3], chain.joint_axis)
     o = frames[:, :3, 3]
     _check_axes(z)
     centre = _meeting_point(o[3:], z[3:])
     plane = np.stack([np.cross(z[1], z[0]), z[1], z[0]])
-    foot = o[0] + z[0] * (z[0] @ (o[1] - o[0]))
+    foot = o[0] + z[0] * (portable.matmul(z[0], o[1] - o[0]))
 
     def planar(vector: FloatArray) -> complex:
-        return complex(plane[2] @ vector, plane[0] @ vector)
+        return complex(portable.matmul(plane[2], vector), portable.matmul(plane[0], vector))
 
     for array in (z, plane, foot):
         array.setflags(write=False)
@@ -101,13 +101,17 @@ def wrist_geometry(chain: Chain) -> WristGeometry:
         axis=z,
         plane=plane,
         axis_point=foot,
-        lateral=float(z[1] @ (centre - foot)),
+        lateral=float(portable.matmul(z[1], centre - foot)),
         forward=-1.0 if shoulder.imag < -POINT_TOLERANCE else 1.0,
         shoulder=shoulder,
         upper_arm=upper_arm,
         forearm=forearm,
-        elbow_sign=float(np.sign(z[1] @ z[2])),
-        wrist_zero=float(np.arctan2(z[4] @ np.cross(z[3], z[5]), z[3] @ z[5])),
+        elbow_sign=float(np.sign(portable.matmul(z[1], z[2]))),
+        wrist_zero=float(
+            portable.arctan2(
+                portable.matmul(z[4], np.cross(z[3], z[5])), portable.matmul(z[3], z[5])
+            )
+        ),
         hand=frames[5],
-        wrist_in_hand=frames[5, :3, :3].T @ (centre - frames[5, :3, 3]),
+        wrist_in_hand=portable.matmul(frames[5, :3, :3].T, centre - frames[5, :3, 3]),
     )

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_kernels.reference.chain import axes, axis_rotation, jacobian, link_poses
 from ir_msgs_py.arrays import FloatArray, IntArray
 
@@ -39,7 +40,7 @@ class Problem:
 def tcp_poses(problem: Problem, q: FloatArray) -> FloatArray:
     """Poses of the tcp (P, 4, 4) in the world at q (P, n)."""
     links = link_poses(problem.joint_origin, problem.joint_axis, problem.base_pose, q)
-    return np.asarray(links[:, -1] @ problem.tcp)
+    return np.asarray(portable.matmul(links[:, -1], problem.tcp))
 
 
 def psi(problem: Problem, poses: FloatArray) -> FloatArray:
@@ -58,7 +59,7 @@ def rotation_vector(R: FloatArray) -> FloatArray:
         [R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1
     )
     length = np.linalg.norm(twice_sine, axis=1)
-    angle = np.arctan2(length, np.trace(R, axis1=1, axis2=2) - 1.0)
+    angle = portable.arctan2(length, np.trace(R, axis1=1, axis2=2) - 1.0)
     return np.asarray(
         twice_sine * np.where(length > 1e-12, angle / np.maximum(length, 1e-12), 0.5)[:, None]
     )
@@ -67,7 +68,7 @@ def rotation_vector(R: FloatArray) -> FloatArray:
 def errors(problem: Problem, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Psi, distance [m] and rotation angle [rad] (P,) at q (P, n)."""
     poses = tcp_poses(problem, q)
-    relative = np.swapaxes(poses[:, :3, :3], 1, 2) @ problem.pose[:3, :3]
+    relative = portable.matmul(np.swapaxes(poses[:, :3, :3], 1, 2), problem.pose[:3, :3])
     sine = np.linalg.norm(
         np.stack(
             [
@@ -78,7 +79,7 @@ def errors(problem: Problem, q: FloatArray) -> tuple[FloatArray, FloatArray, Flo
         ),
         axis=0,
     )
-    angle = np.arctan2(sine, np.trace(relative, axis1=1, axis2=2) - 1.0)
+    angle = portable.arctan2(sine, np.trace(relative, axis1=1, axis2=2) - 1.0)
     return psi(problem, poses), np.linalg.norm(poses[:, :3, 3] - problem.pose[:3, 3], axis=1), angle
 
 
@@ -107,7 +108,7 @@ def best_value(
     """The joint value (P,) within [low, high] that minimises Psi, of equal ones the nearest to q
     (P,).
     """
-    free = q + np.arctan2(k3, k2 - k1)
+    free = q + portable.arctan2(k3, k2 - k1)
     turns = 2.0 * np.pi * np.arange(-1, 2)
     candidates = free[:, None] + turns
     inside = (candidates >= low) & (candidates <= high)
@@ -115,7 +116,7 @@ def best_value(
     nearest = np.take_along_axis(candidates, distance.argmin(axis=1)[:, None], axis=1)[:, 0]
 
     def gain(value: float) -> FloatArray:
-        return np.asarray((k2 - k1) * np.cos(value - q) + k3 * np.sin(value - q))
+        return np.asarray((k2 - k1) * portable.cos(value - q) + k3 * portable.sin(value - q))
 
     at_limit = np.where(gain(low) >= gain(high), low, high)
     return np.where(inside.any(axis=1), nearest, at_limit)
@@ -126,7 +127,7 @@ def sweep(problem: Problem, q: FloatArray) -> FloatArray:
     q = q.copy()
     links = link_poses(problem.joint_origin, problem.joint_axis, problem.base_pose, q)
     origin, direction = axes(problem.joint_axis, links)
-    pose = links[:, -1] @ problem.tcp
+    pose = portable.matmul(links[:, -1], problem.tcp)
     for i in reversed(range(q.shape[1])):
         k1, k2, k3 = coefficients(problem, direction[:, i], origin[:, i], pose)
         low = float(problem.position_min[i])
@@ -134,8 +135,8 @@ def sweep(problem: Problem, q: FloatArray) -> FloatArray:
         value = best_value(q[:, i], k1, k2, k3, low, high)
         for p in range(len(q)):  # the joints inside of i stay: only the tool turns about axis i
             turn = axis_rotation(direction[p, i], (value - q[:, i])[p : p + 1])[0]
-            pose[p, :3, :3] = turn @ pose[p, :3, :3]
-            pose[p, :3, 3] = origin[p, i] + turn @ (pose[p, :3, 3] - origin[p, i])
+            pose[p, :3, :3] = portable.matmul(turn, pose[p, :3, :3])
+            pose[p, :3, 3] = origin[p, i] + portable.matmul(turn, pose[p, :3, 3] - origin[p, i])
         q[:, i] = value
     return q
 
@@ -146,8 +147,10 @@ def newton_step(problem: Problem, q: FloatArray, damping: FloatArray) -> FloatAr
     """
     links = link_poses(problem.joint_origin, problem.joint_axis, problem.base_pose, q)
     J = jacobian(problem.joint_axis, links, problem.tcp)
-    pose = links[:, -1] @ problem.tcp
-    turn = rotation_vector(problem.pose[:3, :3] @ np.swapaxes(pose[:, :3, :3], 1, 2))
+    pose = portable.matmul(links[:, -1], problem.tcp)
+    turn = rotation_vector(
+        portable.matmul(problem.pose[:3, :3], np.swapaxes(pose[:, :3, :3], 1, 2))
+    )
     error = np.concatenate(
         [problem.pose[:3, 3] - pose[:, :3, 3], problem.rotation_length * turn], axis=1
     )
@@ -157,8 +160,8 @@ def newton_step(problem: Problem, q: FloatArray, damping: FloatArray) -> FloatAr
         (q >= problem.position_max) & (gradient > 0.0)
     )
     J = np.where(held[:, None, :], 0.0, J)
-    normal = np.swapaxes(J, 1, 2) @ J + damping[:, None, None] * np.eye(q.shape[1])
-    step = np.linalg.solve(normal, np.where(held, 0.0, gradient)[:, :, None])[:, :, 0]
+    normal = portable.matmul(np.swapaxes(J, 1, 2), J) + damping[:, None, None] * np.eye(q.shape[1])
+    step = portable.solve(normal, np.where(held, 0.0, gradient)[:, :, None])[:, :, 0]
     return np.asarray(np.clip(q + step, problem.position_min, problem.position_max))
 
 

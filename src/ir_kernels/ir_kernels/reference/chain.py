@@ -4,6 +4,7 @@ transforms.
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 
 
@@ -12,8 +13,8 @@ def axis_rotation(axis: FloatArray, angle: FloatArray) -> FloatArray:
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     outer = np.outer(axis, axis)
-    s = np.sin(angle)[:, None, None]
-    c = np.cos(angle)[:, None, None]
+    s = portable.sin(angle)[:, None, None]
+    c = portable.cos(angle)[:, None, None]
     result: FloatArray = outer + c * (np.eye(3) - outer) + s * cross
     return result
 
@@ -28,7 +29,7 @@ def link_poses(
         turn = np.zeros((len(q), 4, 4))
         turn[:, :3, :3] = axis_rotation(axis, q[:, i])
         turn[:, 3, 3] = 1.0
-        result[:, i + 1] = result[:, i] @ origin @ turn
+        result[:, i + 1] = portable.matmul(result[:, i], origin, turn)
     return result
 
 
@@ -56,6 +57,6 @@ def jacobian(joint_axis: FloatArray, poses: FloatArray, tcp: FloatArray) -> Floa
     """(N, 6, n): linear, then angular velocity of the tcp (4, 4 in link n) in the world, per joint
     velocity.
     """
-    point = (poses[:, -1] @ tcp)[:, :3, 3]
+    point = (portable.matmul(poses[:, -1], tcp))[:, :3, 3]
     linear = point_jacobian(joint_axis, poses, point, len(joint_axis))
     return np.concatenate([linear, axes(joint_axis, poses)[1].transpose(0, 2, 1)], axis=1)
