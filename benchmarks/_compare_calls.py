@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from _compare_face import name_of, planner_of
 
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.cartesian import CartesianPath, CartesianSegment
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
@@ -152,6 +154,53 @@ def through(cell: str, k: int, points: int, timed: bool, **changed: Any) -> Answ
     reference = name_of("Reference")(given.positions, given.times if timed else None)
     asked = options(safety_distance=tasks_of(cell)[k][3], **changed)
     return movement_of(planner(cell).plan_trajectory(reference, asked))
+
+
+def pose(x: float, y: float, z: float, tilt: float = 0.0) -> FloatArray:
+    """The tool's axis downwards, tilted by an angle whose sine and cosine are exact fractions."""
+    turned = np.array([[-tilt, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, -tilt]])
+    T = np.eye(4)
+    T[:3, :3] = turned / np.array([[np.sqrt(1.0 + tilt**2)], [1.0], [np.sqrt(1.0 + tilt**2)]])
+    T[:3, 3] = (x, y, z)
+    return T
+
+
+def _segments(kind: str, *poses: FloatArray) -> tuple[CartesianSegment, ...]:
+    if kind == "line":
+        return tuple(CartesianSegment(kind, (one,)) for one in poses)
+    return (CartesianSegment(kind, poses),)
+
+
+BEGIN = pose(1.8, -0.3, 1.2)
+END = pose(1.8, 0.3, 1.2)
+MIDDLE = pose(1.7, 0.0, 1.3)
+PATHS = {
+    "line": CartesianPath(BEGIN, _segments("line", END), tool_speed=0.25),
+    "free angle": CartesianPath(BEGIN, _segments("line", END), tool_speed=0.25, free_angle=1.0),
+    "turning": CartesianPath(BEGIN, _segments("line", pose(1.9, 0.3, 1.4, 0.2)), tool_speed=0.4),
+    "circle": CartesianPath(BEGIN, _segments("circle", pose(1.6, 0.0, 1.2), END), tool_speed=0.2),
+    "spline": CartesianPath(
+        BEGIN,
+        _segments("spline", MIDDLE, pose(1.8, 0.2, 1.2, 0.1), pose(1.9, 0.4, 1.2)),
+        tool_speed=0.2,
+    ),
+    "corner": CartesianPath(
+        pose(1.7, -0.2, 1.2),
+        _segments("line", pose(1.7, 0.2, 1.2), pose(1.9, 0.2, 1.2)),
+        0.15,
+        blending_radius=0.08,
+    ),
+}
+
+
+def along_path(cell: str, name: str) -> Answer:
+    plan = planner(cell).plan_cartesian(PATHS[name], options())
+    return {
+        "status": int(plan.status.code),
+        "id": identity(plan.trajectory),
+        "tool_error": plan.tool_error,
+        **numbers_of(plan.report),
+    }
 
 
 def evaluated(cell: str, k: int) -> Answer:

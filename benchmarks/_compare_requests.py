@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy as np
 from _compare_calls import (
+    PATHS,
     Answer,
+    along_path,
     evaluated,
     ik,
     moved,
@@ -53,6 +55,7 @@ def requests() -> Iterator[Request]:
     yield from _variants()
     yield from _services()
     yield from _trajectories()
+    yield from _paths()
     yield from _questions()
     yield from _refused()
 
@@ -146,6 +149,11 @@ def _trajectories() -> Iterator[Request]:
                     partial(through, cell, k, POINTS, timed),
                 )
             yield Request("evaluate", f"{name} evaluated", partial(evaluated, cell, k))
+
+
+def _paths() -> Iterator[Request]:
+    for name in PATHS:
+        yield Request("plan_cartesian", f"open path {name}", partial(along_path, "open", name))
 
 
 def _questions() -> Iterator[Request]:

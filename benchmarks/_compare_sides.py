@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -37,16 +38,18 @@ def environment(root: Path) -> dict[str, str]:
 
 
 class Side:
-    """The process of one checkout; `requests`: group and name of each."""
+    """The process of one checkout, with changed variables of its environment; `requests`: group and
+    name of each.
+    """
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, changed: Mapping[str, str] | None = None) -> None:
         self.root = root.resolve()
         self.process = subprocess.Popen(
             [sys.executable, str(WORKER)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
-            env=environment(root),
+            env=environment(root) | dict(changed or {}),
         )
         first = self._line()
         if Path(first["checkout"]) != self.root:

@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from ir_description import Cell, InvalidValueError, Load, cell_from_yaml, cell_to_yaml, load_cell
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
@@ -144,11 +145,11 @@ def _moved(cell: Cell, name: str, by: FloatArray) -> Cell:
     shift[:3, 3] = by
     for machine in cell.equipment:
         if machine.name == name:
-            return cell.with_equipment(name, pose=shift @ machine.pose)
+            return cell.with_equipment(name, pose=portable.matmul(shift, machine.pose))
     for station in cell.stations:
         if station.name == name:
             own = cell.machine(station.equipment).pose
-            return cell.with_station(name, np.linalg.inv(own) @ shift @ station.pose)
+            return cell.with_station(name, portable.matmul(portable.inv(own), shift, station.pose))
     known = [
         *(machine.name for machine in cell.equipment),
         *(station.name for station in cell.stations),

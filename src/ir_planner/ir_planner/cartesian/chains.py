@@ -13,6 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_planner.cartesian.layers import Layers
 from ir_planner.cartesian.refusal import NoChainError
@@ -158,7 +159,9 @@ def _edge_joules(
     qd = steps / seconds[:, None]
     power = scene.dynamics.drive_power(q + 0.5 * steps, qd, np.zeros_like(qd)).sum(axis=1)
     share = (np.abs(qd) / scene.limits.velocity).max(axis=1)
-    return np.asarray((np.maximum(power, 0.0) + _OVERSPEED_WATTS * share**8) * seconds)
+    return np.asarray(
+        (np.maximum(power, 0.0) + _OVERSPEED_WATTS * portable.power(share, 8)) * seconds
+    )
 
 
 def _cheapest(
@@ -199,13 +202,13 @@ def _different(
     robot = scene.cell.robot
     middle = 0.5 * (robot.position_min + robot.position_max)
     away = (np.abs(q[last] - middle) / (robot.position_max - robot.position_min)).max(axis=1)
-    digits = np.round(np.log(np.maximum(cost[last], 1e-12)) / _SAME)
+    digits = np.round(portable.log(np.maximum(cost[last], 1e-12)) / _SAME)
     order = last[np.lexsort((away, digits))]
     firsts = np.sort(np.unique(family[order], return_index=True)[1])
     (apart, most), kept = bounds, list[int]()
     for node in [*order[firsts], *np.delete(order, firsts)]:
         if len(kept) == most:
             break
-        if all(np.abs(np.sin(0.5 * (q[node] - q[other]))).max() > apart for other in kept):
+        if all(np.abs(portable.sin(0.5 * (q[node] - q[other]))).max() > apart for other in kept):
             kept.append(int(node))
     return np.array(kept, dtype=np.int64)

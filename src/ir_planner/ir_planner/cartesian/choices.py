@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.cartesian import CartesianPath
 from ir_planner.cartesian.best import DrivenPath, best_along, timed, within_limits
@@ -91,7 +92,9 @@ def _different(whole: Drawn) -> list[Chain]:
     by_start, _ = chains_through(asked, layers, _OF_EACH, by_start=True)
     kept: list[Chain] = []
     for chain in sorted((*by_end, *by_start), key=lambda one: one.joules):
-        if all(np.abs(np.sin(0.5 * (chain.q - other.q))).max() > 0.5 * _SAME for other in kept):
+        if all(
+            np.abs(portable.sin(0.5 * (chain.q - other.q))).max() > 0.5 * _SAME for other in kept
+        ):
             kept.append(chain)
     return kept
 

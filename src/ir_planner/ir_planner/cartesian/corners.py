@@ -6,12 +6,13 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import TANGENT, CartesianPath
 from ir_planner.cartesian.parts import Part
 from ir_planner.cartesian.tool_path import ToolPath, covered, joint_bend
+from ir_planner.curves import turn_of
 
 SMOOTHING = (
     2e-5  # m by which a smoothed joint may leave the parts, well below the 0.1 mm of the whole
@@ -55,7 +56,9 @@ def joint_between(before: Part, after: Part, asked: float) -> Joint:
     half = 0.5 * min(before.length, after.length)
     first = before.places.tangent(np.array([before.length]))[0]
     second = after.places.tangent(np.array([0.0]))[0]
-    angle = float(np.arctan2(np.linalg.norm(np.cross(first, second)), first @ second))
+    angle = float(
+        portable.arctan2(portable.norm(np.cross(first, second)), portable.matmul(first, second))
+    )
     if angle > REVERSAL:
         return Joint(0.0, angle)
     if asked > 0.0 and angle > _TANGENT:
@@ -85,7 +88,7 @@ def _left_by(before: Part, after: Part, radius: float) -> tuple[float, float]:
         after.places.at(np.maximum(u, 0.0)),
     )
     there = after.turning.at(np.array([0.0]))[0]
-    turned = before.turning.at(left) @ there.T @ after.turning.at(right)
+    turned = portable.matmul(before.turning.at(left), there.T, after.turning.at(right))
     asked = np.where(
         (u < 0.0)[:, None, None],
         before.turning.at(np.minimum(before.length + u, before.length)),
@@ -101,4 +104,4 @@ def _largest(difference: FloatArray) -> float:
 
 
 def _turn(first: FloatArray, second: FloatArray) -> float:
-    return float(Rotation.from_matrix(first.transpose(0, 2, 1) @ second).magnitude().max())
+    return float(turn_of(portable.matmul(first.transpose(0, 2, 1), second)).max())

@@ -4,6 +4,7 @@ singularity.
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.status import StatusCode
 from ir_planner.cartesian.asked import Asked
@@ -48,18 +49,20 @@ def _steps(asked: Asked, layers: Layers, at: IntArray, last: int) -> FloatArray:
     Jacobian.
     """
     poses = asked.whole.poses(layers.s[last : last + 2])
-    turned = poses[:, None, :3, :3] @ about_tool(layers.angle[at])[None]
+    turned = portable.matmul(poses[:, None, :3, :3], about_tool(layers.angle[at])[None])
     chain = asked.context.scene.chain
     twist = np.zeros((len(at), 6))
     twist[:, :3] = poses[1, :3, 3] - poses[0, :3, 3]
-    rotation = turned[1] @ turned[0].transpose(0, 2, 1)
+    rotation = portable.matmul(turned[1], turned[0].transpose(0, 2, 1))
     twist[:, 3:] = 0.5 * np.stack(
         [rotation[:, b, a] - rotation[:, a, b] for a, b in _CYCLIC], axis=1
     )
     jacobian = chain.jacobian(layers.q[at])
-    square = jacobian.transpose(0, 2, 1) @ jacobian + _DAMPED * np.eye(jacobian.shape[2])
+    square = portable.matmul(jacobian.transpose(0, 2, 1), jacobian) + _DAMPED * np.eye(
+        jacobian.shape[2]
+    )
     right = np.einsum("mji,mj->mi", jacobian, twist)
-    return np.asarray(np.linalg.solve(square, right[:, :, None])[:, :, 0])
+    return np.asarray(portable.solve(square, right[:, :, None])[:, :, 0])
 
 
 _CYCLIC = ((1, 2), (2, 0), (0, 1))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.cartesian.joint_curve import JointCurve
 from ir_planner.scene import MotionLimits, PlanningScene, lasting_longer, torque_use
@@ -49,7 +50,7 @@ def with_speed(
     j1 = j[:, None]
     qd = first * v1
     qdd = second * v1**2 + first * a1
-    qddd = third * v1**3 + 3.0 * second * v1 * a1 + first * j1
+    qddd = third * portable.power(v1, 3) + 3.0 * second * v1 * a1 + first * j1
     return Driven(t, s, v, q, qd, qdd, qddd)
 
 

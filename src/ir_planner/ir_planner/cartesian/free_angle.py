@@ -10,8 +10,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
+from scipy.interpolate import BSpline
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.cartesian.chains import Chain
 from ir_planner.cartesian.joint_curve import Angle, followed, tool_poses
@@ -59,7 +60,7 @@ class _Problem:
             return None
         if not self.space.states_free(q).all():
             return None
-        return replace(near, q=q, angles=self.basis @ control)
+        return replace(near, q=q, angles=portable.matmul(self.basis, control))
 
 
 def angle_along(
@@ -74,7 +75,7 @@ def angle_along(
     problem = _problem(path, chain, free_angle, space, fixed)
     begun = _fitted(problem)
     if begun is None:
-        return Angle(make_interp_spline(chain.s, chain.angles, k=1)), chain
+        return Angle(portable.interpolating_spline(chain.s, chain.angles, 1)), chain
     control, smooth = begun
     cost = _cost(smooth, space.scene)
     for _ in range(_STEPS):
@@ -114,8 +115,12 @@ def _fitted(problem: _Problem) -> tuple[FloatArray, Chain] | None:
     wanted = problem.chain.angles
     bend = np.diff(np.eye(basis.shape[1]), n=2, axis=0)
     for weight in _FITS:
-        normal = basis.T @ basis + weight * len(wanted) * bend.T @ bend
-        control = np.linalg.solve(normal + 1e-9 * np.eye(len(normal)), basis.T @ wanted)
+        normal = portable.matmul(basis.T, basis) + portable.matmul(
+            weight * len(wanted) * bend.T, bend
+        )
+        control = portable.solve(
+            normal + 1e-9 * np.eye(len(normal)), portable.matmul(basis.T, wanted)
+        )
         control = np.clip(control, -problem.bound, problem.bound)
         if problem.fixed:
             control[0] = wanted[0]
@@ -151,14 +156,14 @@ def _step(problem: _Problem, control: FloatArray, chain: Chain) -> FloatArray:
     high = np.minimum(problem.bound - control, _FARTHEST)
     if problem.fixed:
         low[0] = high[0] = 0.0
-    normal = slopes.T @ slopes
-    right = -slopes.T @ residual
+    normal = portable.matmul(slopes.T, slopes)
+    right = portable.matmul(-slopes.T, residual)
     normal += 1e-9 * np.trace(normal) / len(normal) * np.eye(len(normal))
     step = np.zeros(len(control))
     open_ = np.ones(len(control), dtype=bool)
     for _ in range(4):  # what meets a bound stays there
-        rest = right - normal[:, ~open_] @ step[~open_]
-        step[open_] = np.linalg.solve(normal[np.ix_(open_, open_)], rest[open_])
+        rest = right - portable.matmul(normal[:, ~open_], step[~open_])
+        step[open_] = portable.solve(normal[np.ix_(open_, open_)], rest[open_])
         beyond = open_ & ((step < low) | (step > high))
         step = np.clip(step, low, high)
         if not beyond.any():
@@ -175,9 +180,11 @@ def _columns(problem: _Problem, chain: Chain) -> Iterator[FloatArray]:
     jacobian = scene.chain.jacobian(chain.q)
     axis = scene.chain.tcp_poses(chain.q)[:, :3, 0]
     turning = np.concatenate([np.zeros_like(axis), axis], axis=1)
-    damped = jacobian.transpose(0, 2, 1) @ jacobian + 1e-6 * np.eye(jacobian.shape[2])
+    damped = portable.matmul(jacobian.transpose(0, 2, 1), jacobian) + 1e-6 * np.eye(
+        jacobian.shape[2]
+    )
     right = np.einsum("mji,mj->mi", jacobian, turning)
-    turned = np.linalg.solve(damped, right[:, :, None])[:, :, 0]
+    turned = portable.solve(damped, right[:, :, None])[:, :, 0]
     for column in problem.basis.T:
         moves, bends = _rates(replace(chain, q=column[:, None] * turned), scene)
         yield np.concatenate([moves.ravel(), bends.ravel()])

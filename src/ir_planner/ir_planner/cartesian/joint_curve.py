@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
+from scipy.interpolate import BSpline
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import StatusCode
 from ir_planner.cartesian.chains import JUMP, Chain
@@ -87,7 +88,7 @@ def tool_poses(path: ToolPath, angle: Angle | None, s: FloatArray) -> FloatArray
     """Poses (M, 4, 4) of the tcp at s (M,), turned about the tool's axis."""
     poses = path.poses(s)
     if angle is not None:
-        poses[:, :3, :3] = poses[:, :3, :3] @ about_tool(angle(s))
+        poses[:, :3, :3] = portable.matmul(poses[:, :3, :3], about_tool(angle(s)))
     return poses
 
 
@@ -107,7 +108,7 @@ def curve_of(
     for finer in _FINER:
         s = _divided(rough, finer)
         q = followed(tool_poses(path, angle, s), s, chain, scene)
-        curve = JointCurve(make_interp_spline(s, q, k=_DEGREE), *ends)
+        curve = JointCurve(portable.interpolating_spline(s, q, _DEGREE), *ends)
         middle = 0.5 * (s[1:] + s[:-1])
         error = _errors(curve.spline(middle), tool_poses(path, angle, middle), scene)
         worst = float(error.max())

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_msgs_py.status import StatusCode
 from ir_planner.cartesian.orientations import about_tool
@@ -40,7 +41,7 @@ def samples(path: ToolPath, spacing: float) -> FloatArray:
     rough = np.unique(np.concatenate([np.linspace(a, b, 9) for a, b in itertools.pairwise(breaks)]))
     rotations = path.poses(rough)[:, :3, :3]
     turned = np.einsum("mji,mjk->mik", rotations[:-1], rotations[1:])
-    turns = np.arccos(np.clip(0.5 * (np.trace(turned, axis1=1, axis2=2) - 1.0), -1.0, 1.0))
+    turns = portable.arccos(np.clip(0.5 * (np.trace(turned, axis1=1, axis2=2) - 1.0), -1.0, 1.0))
     steps = np.ceil(np.maximum(np.diff(rough) / spacing, turns / SPACING_TURN) - 1e-9).astype(int)
     steps = np.maximum(steps, 1)
     parts = [
@@ -88,7 +89,7 @@ def configurations_at(
     """
     angles = angles_of(free_angle)
     poses = np.repeat(path.poses(s), len(angles), axis=0)
-    poses[:, :3, :3] = poses[:, :3, :3] @ about_tool(np.tile(angles, len(s)))
+    poses[:, :3, :3] = portable.matmul(poses[:, :3, :3], about_tool(np.tile(angles, len(s))))
     scene = space.scene
     found = (scene.inverse_kinematics_once if turning.any() else scene.inverse_kinematics).solve(
         poses
@@ -104,10 +105,10 @@ def _begun(
     """The layers with one configuration in the first: the start."""
     wanted = path.poses(layers.s[:1])[0]
     there = space.scene.chain.tcp_poses(start[None])[0]
-    away = float(np.linalg.norm(there[:3, 3] - wanted[:3, 3]))
-    turned = wanted[:3, :3].T @ there[:3, :3]
-    angle = float(np.arctan2(turned[2, 1], turned[1, 1]))
-    tilt = float(np.arccos(np.clip(turned[0, 0], -1.0, 1.0)))
+    away = float(portable.norm(there[:3, 3] - wanted[:3, 3]))
+    turned = portable.matmul(wanted[:3, :3].T, there[:3, :3])
+    angle = float(portable.arctan2(turned[2, 1], turned[1, 1]))
+    tilt = float(portable.arccos(np.clip(turned[0, 0], -1.0, 1.0)))
     if away > _START_M or tilt > _START_RAD or abs(angle) > free_angle + _START_RAD:
         raise PathRefusedError(
             f"the tcp of start is {away * 1e3:.3g} mm and "

@@ -5,9 +5,10 @@ from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import BSpline
-from scipy.spatial.transform import Rotation, RotationSpline
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
+from ir_planner.curves import RotationSpline, rotation_of, rotation_vector, turn_of
 
 
 @dataclass(frozen=True)
@@ -40,19 +41,19 @@ class Evenly:
     @staticmethod
     def between(start: FloatArray, end: FloatArray, length: float) -> "Evenly":
         """The shortest turn between rotations (3, 3)."""
-        return Evenly(start, Rotation.from_matrix(start.T @ end).as_rotvec(), length)
+        return Evenly(start, rotation_vector(portable.matmul(start.T, end)), length)
 
     def at(self, s: FloatArray) -> FloatArray:
         """Rotations (M, 3, 3) at s (M,) m."""
         if not self.turn.any():
             return np.broadcast_to(self.start, (len(s), 3, 3))
         share = np.asarray(s)[:, None] / self.length
-        return np.asarray(self.start @ Rotation.from_rotvec(share * self.turn).as_matrix())
+        return portable.matmul(self.start, rotation_of(share * self.turn))
 
     @property
     def rates(self) -> "Rates":
         """How fast it turns."""
-        rate = float(np.linalg.norm(self.turn)) / self.length
+        rate = float(portable.norm(self.turn)) / self.length
         return Rates(rate, rate**2)
 
 
@@ -62,20 +63,20 @@ class ThroughPoses:
     """
 
     def __init__(self, s: FloatArray, rotations: FloatArray) -> None:
-        self._spline = RotationSpline(s, Rotation.from_matrix(rotations))
+        self._spline = RotationSpline(s, rotations)
         self._end = float(s[-1])
 
     def at(self, s: FloatArray) -> FloatArray:
         """Rotations (M, 3, 3) at s (M,) m."""
-        return np.asarray(self._spline(np.clip(s, 0.0, self._end)).as_matrix())
+        return self._spline(np.clip(s, 0.0, self._end))
 
     @cached_property
     def rates(self) -> "Rates":
         """How fast it turns: in each piece R = R_k exp(v) with a cubic v, so that |R'| <= |v'| and
         |R''| <= |v''| + 3/2 |v'|^2.
         """
-        cubic, square, line = (self._spline.interpolator.c[k] for k in range(3))
-        h = np.diff(self._spline.interpolator.x)[:, None]
+        cubic, square, line = self._spline.cubics[:3]
+        h = np.diff(self._spline.x)[:, None]
         second = [2.0 * square, 2.0 * square + 6.0 * cubic * h]
         first = [line, line + 2.0 * square * h + 3.0 * cubic * h**2]
         bulge = h[:, 0] ** 2 / 8.0 * np.linalg.norm(6.0 * cubic, axis=1)
@@ -92,13 +93,13 @@ def rates_of(angle: BSpline) -> Rates:
 
 def turn_between(first: FloatArray, second: FloatArray) -> float:
     """Angle [rad] between two rotations (3, 3)."""
-    return float(Rotation.from_matrix(first.T @ second).magnitude())
+    return float(turn_of(portable.matmul(first.T, second)))
 
 
 def about_tool(angle: FloatArray) -> FloatArray:
     """Rotations (M, 3, 3) by angles (M,) rad about the tool's axis, x."""
-    c = np.cos(angle)
-    s = np.sin(angle)
+    c = portable.cos(angle)
+    s = portable.sin(angle)
     turned = np.zeros((len(angle), 3, 3))
     turned[:, 0, 0] = 1.0
     turned[:, 1, 1] = turned[:, 2, 2] = c

@@ -7,8 +7,9 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
+from scipy.interpolate import BSpline
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 
 STRAIGHT = 1e-6  # m: three places nearer to a line than this are no circle
@@ -48,7 +49,7 @@ class Line:
     @cached_property
     def length(self) -> float:
         """m."""
-        return float(np.linalg.norm(self.end - self.start))
+        return float(portable.norm(self.end - self.start))
 
     @property
     def curvature(self) -> float:
@@ -89,12 +90,12 @@ class Arc:
     @cached_property
     def length(self) -> float:
         """m."""
-        return abs(self.angle) * float(np.linalg.norm(self.radius))
+        return abs(self.angle) * float(portable.norm(self.radius))
 
     @property
     def curvature(self) -> float:
         """The same all along [1/m]."""
-        return 1.0 / float(np.linalg.norm(self.radius))
+        return 1.0 / float(portable.norm(self.radius))
 
     @property
     def breaks(self) -> FloatArray:
@@ -104,13 +105,15 @@ class Arc:
     def at(self, s: FloatArray) -> FloatArray:
         """Places (M, 3) m at s (M,)."""
         turned = np.asarray(s)[:, None] * self._rate
-        return np.asarray(self.centre + np.cos(turned) * self.radius + np.sin(turned) * self.across)
+        return np.asarray(
+            self.centre + portable.cos(turned) * self.radius + portable.sin(turned) * self.across
+        )
 
     def tangent(self, s: FloatArray) -> FloatArray:
         """Unit tangents (M, 3) at s (M,)."""
         turned = np.asarray(s)[:, None] * self._rate
         return np.asarray(
-            (np.cos(turned) * self.across - np.sin(turned) * self.radius) * self._rate
+            (portable.cos(turned) * self.across - portable.sin(turned) * self.radius) * self._rate
         )
 
     @property
@@ -128,16 +131,20 @@ def arc_through(
     a = via - start
     b = end - start
     normal = np.cross(a, b)
-    size = float(normal @ normal)
-    nearest = min(float(a @ a), float(b @ b))
-    if nearest < STRAIGHT**2 or size < (STRAIGHT * float(np.linalg.norm(b))) ** 2:
+    size = float(portable.matmul(normal, normal))
+    nearest = min(float(portable.matmul(a, a)), float(portable.matmul(b, b)))
+    if nearest < STRAIGHT**2 or size < (STRAIGHT * float(portable.norm(b))) ** 2:
         return None
-    centre = start + np.cross(float(a @ a) * b - float(b @ b) * a, normal) / (2.0 * size)
+    centre = start + np.cross(
+        float(portable.matmul(a, a)) * b - float(portable.matmul(b, b)) * a, normal
+    ) / (2.0 * size)
     radius = start - centre
     across = np.cross(normal / np.sqrt(size), radius)
     if angle is None:
         reach = end - centre
-        angle = float(np.arctan2(reach @ across, reach @ radius)) % (2.0 * np.pi)
+        angle = float(
+            portable.arctan2(portable.matmul(reach, across), portable.matmul(reach, radius))
+        ) % (2.0 * np.pi)
     return Arc(centre, radius, across, angle)
 
 
@@ -149,7 +156,7 @@ class Through:
     def __init__(self, places: FloatArray) -> None:
         steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
         u = np.concatenate([[0.0], np.cumsum(steps)])
-        self._curve = make_interp_spline(u, places, k=min(3, len(u) - 1))
+        self._curve = portable.interpolating_spline(u, places, min(3, len(u) - 1))
         self._arc = ArcLength(np.unique(self._curve.t), self._speed)
         self.at_points = self._arc.of(u)  # arc length at each place (N,)
         self.length = self._arc.length
@@ -196,7 +203,7 @@ class ArcLength:
         share = np.linspace(0.0, 1.0, _PER_PIECE + 1)[:-1]
         u = (breaks[:-1, None] + share * np.diff(breaks)[:, None]).ravel()
         self._u = np.append(u, breaks[-1])
-        self._speed: BSpline = make_interp_spline(self._u, speed(self._u), k=3)
+        self._speed: BSpline = portable.interpolating_spline(self._u, speed(self._u), 3)
         self._length: BSpline = self._speed.antiderivative()
         self._offset = float(self._length(breaks[0]))
         self._s = np.asarray(self._length(self._u)) - self._offset

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_planner.cartesian.driven import use_of, with_speed
 from ir_planner.cartesian.joint_curve import JointCurve
@@ -13,7 +14,7 @@ from ir_planner.scene import MotionLimits, PlanningScene
 USED = 0.97  # of a limit: the interpolant between points needs a little more than the samples
 PER_RAMP = 13
 ENOUGH = 1.0 + 1e-4
-_RAMPS = np.geomspace(0.01, 10.0, 13)  # s
+_RAMPS = portable.geomspace(0.01, 10.0, 13)  # s
 _FINER = 8
 _ZOOMS = 3
 

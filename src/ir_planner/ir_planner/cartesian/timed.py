@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
+from scipy.interpolate import BSpline
 from scipy.ndimage import convolve1d, maximum_filter1d
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import StatusCode
 from ir_planner.cartesian.driven import Driven, driven, use_of
@@ -68,14 +69,16 @@ class TimedStroke:
             t = self._longer(tau) - self._longer(0.0)
             g = 1.0 / self.slowness(tau)
             g1 = -self.slowness(tau, nu=1) * g**2  # by tau
-            g2 = -self.slowness(tau, nu=2) * g**2 + 2.0 * self.slowness(tau, nu=1) ** 2 * g**3
+            g2 = -self.slowness(tau, nu=2) * g**2 + 2.0 * self.slowness(
+                tau, nu=1
+            ) ** 2 * portable.power(g, 3)
             first = g
             second = g * g1
             third = g * g1**2 + g**2 * g2
             v, a, j = (
                 v * first,
                 a * first**2 + v * second,
-                j * first**3 + 3.0 * a * first * second + v * third,
+                j * portable.power(first, 3) + 3.0 * a * first * second + v * third,
             )
         return driven(self.curve, t, self.curve.begin + s, v, a, j)
 
@@ -223,7 +226,7 @@ def _slowed(
     if use_of(begun, limits, scene).max() > most * 1.5:
         raise _refused(begun, limits, scene, tolerance)
     for _ in range(_ROUNDS):
-        slowed = replace(made, slowness=make_interp_spline(knots, slowness, k=5))
+        slowed = replace(made, slowness=portable.interpolating_spline(knots, slowness, 5))
         use = use_of(slowed.at(tau), limits, scene)
         if use.max() <= ENOUGH:
             return slowed
@@ -264,6 +267,6 @@ def _worst(motion: Driven, k: int, limits: MotionLimits, scene: PlanningScene) -
         "torque": torque / limits.torque_share,
     }
     powers = {"velocity": 1.0, "acceleration": 0.5, "jerk": 1.0 / 3.0, "torque": 0.5}
-    what = max(shares, key=lambda name: float(shares[name].max() ** powers[name]))
+    what = max(shares, key=lambda name: float(portable.power(shares[name].max(), powers[name])))
     j = int(np.argmax(shares[what]))
     return f"{scene.cell.robot.joint_names[j]} needs {shares[what][j]:.2f} times its {what} limit"

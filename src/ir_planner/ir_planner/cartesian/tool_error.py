@@ -12,6 +12,7 @@ from dataclasses import astuple, dataclass
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.cartesian.joint_curve import Angle, tool_poses
 from ir_planner.cartesian.points import SentPath
@@ -113,7 +114,7 @@ class _Stroke:
         jacobian = self.scene.chain.jacobian(moved.q)[:, :3]
         velocity = np.einsum("mij,mj->mi", jacobian, moved.qd)
         sags = squared * self.motion.between(self.motion.jerk, times) / 8.0
-        turn = 2.0 * np.arcsin(min(norm / (2.0 * _ROOT), 1.0))
+        turn = 2.0 * portable.arcsin(min(norm / (2.0 * _ROOT), 1.0))
         return Kept(away, float(turn), self._off(tau, velocity, sags))
 
     def _turned(self, u: FloatArray) -> FloatArray:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import extremes
@@ -49,12 +50,12 @@ def tool_motion(trajectory: JointTrajectory, scene: PlanningScene) -> ToolMotion
         """Sums (S,) of terms times the distance from their outermost axes, from those up to each
         axis.
         """
-        return np.asarray(np.diff(sums, axis=1, prepend=0.0) @ reach)
+        return np.asarray(portable.matmul(np.diff(sums, axis=1, prepend=0.0), reach))
 
     return ToolMotion(
         trajectory.times,
         outermost(a + v**2),
-        outermost(j + 3.0 * a * v + v**3),
+        outermost(j + 3.0 * a * v + portable.power(v, 3)),
         np.asarray(a[:, -1] + v[:, -1] ** 2),
     )
 
@@ -63,5 +64,5 @@ def _reach(scene: PlanningScene) -> FloatArray:
     """Farthest (n,) m that the tcp can be from each axis."""
     chain = scene.chain
     links = np.linalg.norm(chain.joint_origin[1:, :3, 3], axis=1)
-    tail = np.append(links, np.linalg.norm(chain.tcp[:3, 3]))
+    tail = np.append(links, portable.norm(chain.tcp[:3, 3]))
     return np.asarray(np.cumsum(tail[::-1])[::-1])

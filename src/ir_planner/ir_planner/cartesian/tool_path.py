@@ -13,8 +13,9 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
+from scipy.interpolate import BSpline
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_planner.cartesian.orientations import Rates, about_tool, rates_of
 from ir_planner.cartesian.parts import Part
@@ -30,14 +31,14 @@ def covered(u: FloatArray, radius: float) -> FloatArray:
     radius.
     """
     y = np.clip((u + radius) / (2.0 * radius), 0.0, 1.0)
-    inside = 2.0 * radius * y**5 * (7.0 + y * (-14.0 + y * (10.0 - 2.5 * y)))
+    inside = 2.0 * radius * portable.power(y, 5) * (7.0 + y * (-14.0 + y * (10.0 - 2.5 * y)))
     return np.where(u >= radius, u, inside)
 
 
 def covering(u: FloatArray, radius: float) -> FloatArray:
     """The derivative of `covered` (M,)."""
     y = np.clip((u + radius) / (2.0 * radius), 0.0, 1.0)
-    return np.asarray(y**4 * (35.0 + y * (-84.0 + y * (70.0 - 20.0 * y))))
+    return np.asarray(portable.power(y, 4) * (35.0 + y * (-84.0 + y * (70.0 - 20.0 * y))))
 
 
 def joint_bend(before: Part, after: Part, radius: float) -> float:
@@ -51,7 +52,7 @@ def joint_bend(before: Part, after: Part, radius: float) -> float:
         after.places.tangent(np.array([0.0]))[0],
     )
     bends = before.places.curvature + after.places.curvature
-    corner = float(np.linalg.norm(ends[1] - ends[0]))
+    corner = float(portable.norm(ends[1] - ends[0]))
     return bends + 35.0 / (32.0 * radius) * (corner + bends * radius)
 
 
@@ -171,7 +172,9 @@ class ToolPath:
         for k, chosen in self._owners(u):
             result[chosen] = self._of_part(k, u[chosen])
         if self.headings:
-            result[:, :3, :3] = result[:, :3, :3] @ about_tool(self._heading(self._clipped(u)))
+            result[:, :3, :3] = portable.matmul(
+                result[:, :3, :3], about_tool(self._heading(self._clipped(u)))
+            )
         return result
 
     def tangents(self, u: FloatArray) -> FloatArray:
@@ -226,9 +229,9 @@ class ToolPath:
             turned = other.turning.at(along)
             there = other.turning.at(corner)[0]
             if earlier:
-                poses[:, :3, :3] = turned @ there.T @ poses[:, :3, :3]
+                poses[:, :3, :3] = portable.matmul(turned, there.T, poses[:, :3, :3])
             else:
-                poses[:, :3, :3] = poses[:, :3, :3] @ there.T @ turned
+                poses[:, :3, :3] = portable.matmul(poses[:, :3, :3], there.T, turned)
         return poses
 
     def _clipped(self, u: FloatArray) -> FloatArray:
@@ -249,14 +252,14 @@ class ToolPath:
             given[chosen] = self._of_part(k, u[chosen])
         local = np.einsum("mji,mj->mi", given[:, :3, :3], tangents)
         local /= np.linalg.norm(local, axis=1)[:, None]
-        across = np.hypot(local[:, 1], local[:, 2])
-        if across.min() < np.sin(_ALONG_AXIS):
+        across = portable.hypot(local[:, 1], local[:, 2])
+        if across.min() < portable.sin(_ALONG_AXIS):
             place = float(u[int(np.argmin(across))])
             raise HeadingError(
                 place if self._arc is None else float(self._arc.of(np.array([place]))[0])
             )
-        angle = np.unwrap(np.arctan2(local[:, 2], local[:, 1]))
-        return make_interp_spline(u, angle - angle[0], k=3)
+        angle = np.unwrap(portable.arctan2(local[:, 2], local[:, 1]))
+        return portable.interpolating_spline(u, angle - angle[0], 3)
 
 
 class HeadingError(Exception):

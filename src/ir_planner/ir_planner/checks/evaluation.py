@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status
@@ -71,7 +72,7 @@ def measured(
     clearance = clearance_profile(trajectory, scene, station)
     report = TrajectoryReport(
         duration=trajectory.duration,
-        movement_cost=float(verification.travel @ scene.weights),
+        movement_cost=float(portable.matmul(verification.travel, scene.weights)),
         energy=energy.total,
         joint_energy=energy.joints,
         base_energy=energy.base,

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from ir_description import PowerParameters, interval_over
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.energy_slopes import Sampled, energy_and_slope, sampled_energy
@@ -53,7 +54,7 @@ def expected_scene(scene: PlanningScene) -> PlanningScene:
 
 def spread(slope: FloatArray, parameters: PowerParameters) -> FloatArray:
     """What the drawn robots add (ROBOTS,) J to an energy that is linear with this slope (P,)."""
-    return (robots(parameters) - parameters.mean) @ slope
+    return portable.matmul(robots(parameters) - parameters.mean, slope)
 
 
 def movement_spread(trajectory: JointTrajectory, scene: PlanningScene) -> FloatArray:
@@ -62,7 +63,7 @@ def movement_spread(trajectory: JointTrajectory, scene: PlanningScene) -> FloatA
     there = expected_scene(scene)
     expected_energy, slope = energy_and_slope(at, there)
     drawn = robots(scene.parameters) - there.parameters.mean
-    return expected_energy - sampled_energy(at, scene) + drawn @ slope
+    return expected_energy - sampled_energy(at, scene) + portable.matmul(drawn, slope)
 
 
 def interval(nominal: float, added: FloatArray) -> Interval:

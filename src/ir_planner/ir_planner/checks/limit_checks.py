@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.trajectory import JointTrajectory
@@ -99,7 +100,7 @@ def jump_violation(trajectory: JointTrajectory, joint_names: tuple[str, ...]) ->
     coefficients, durations = trajectory.coefficients()
     if len(durations) < 2:
         return None
-    powers = durations[:-1, None, None] ** np.arange(6)
+    powers = portable.power(durations[:-1, None, None], np.arange(6))
     order = np.arange(6)
     before = coefficients[:-1] * powers
     ends = (

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ir_kernels import CcdSettings, ccd
+from ir_kernels import CcdSettings, ccd, portable
 from ir_kernels.reference.ccd import best_value
 from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_planner.configurations.set_back import NONE, shares_back
@@ -134,7 +134,7 @@ class _Descent:
         links = self.scene.chain.link_poses(q)
         tcp = np.array(self.scene.chain.tcp_poses(q))
         for i in reversed(range(q.shape[1])):
-            z = links[:, i + 1, :3, :3] @ self.axis[i]
+            z = portable.matmul(links[:, i + 1, :3, :3], self.axis[i])
             o = links[:, i + 1, :3, 3]
             value = best_value(
                 q[:, i], *self._k(z, o, tcp), float(self.low[i]), float(self.high[i])
@@ -143,8 +143,8 @@ class _Descent:
             q, distance, pair = self._stepped(q, i, value, distance)
             blocked = np.where(pair >= 0, pair, blocked)
             turn = _rotations(z, q[:, i] - before)
-            tcp[:, :3, 3] = o + (turn @ (tcp[:, :3, 3] - o)[:, :, None])[:, :, 0]
-            tcp[:, :3, :3] = turn @ tcp[:, :3, :3]
+            tcp[:, :3, 3] = o + (portable.matmul(turn, (tcp[:, :3, 3] - o)[:, :, None]))[:, :, 0]
+            tcp[:, :3, :3] = portable.matmul(turn, tcp[:, :3, :3])
         return q, distance, blocked
 
     def _k(
@@ -155,9 +155,9 @@ class _Descent:
         target = self.pose[:3, 3] - o
         wo = ROTATION_LENGTH**2 / 2.0
         M = target[:, :, None] * current[:, None, :] + wo * (
-            self.pose[:3, :3] @ tcp[:, :3, :3].transpose(0, 2, 1)
+            portable.matmul(self.pose[:3, :3], tcp[:, :3, :3].transpose(0, 2, 1))
         )
-        k1 = ((M @ z[:, :, None])[:, :, 0] * z).sum(axis=1)
+        k1 = ((portable.matmul(M, z[:, :, None]))[:, :, 0] * z).sum(axis=1)
         k2 = np.trace(M, axis1=1, axis2=2)
         curl = np.stack(
             [M[:, 2, 1] - M[:, 1, 2], M[:, 0, 2] - M[:, 2, 0], M[:, 1, 0] - M[:, 0, 1]], axis=1
@@ -242,6 +242,6 @@ def _rotations(axis: FloatArray, angle: FloatArray) -> FloatArray:
     K[:, 1, 0] = axis[:, 2]
     K[:, 2, 0] = -axis[:, 1]
     K[:, 2, 1] = axis[:, 0]
-    sine = np.sin(angle)[:, None, None]
-    versine = (1.0 - np.cos(angle))[:, None, None]
-    return np.asarray(np.eye(3) + sine * K + versine * (K @ K))
+    sine = portable.sin(angle)[:, None, None]
+    versine = (1.0 - portable.cos(angle))[:, None, None]
+    return np.asarray(np.eye(3) + sine * K + versine * (portable.matmul(K, K)))

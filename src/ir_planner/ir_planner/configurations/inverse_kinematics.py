@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_kernels.collision import MinDistance
 from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.report import IkSolution
@@ -83,7 +84,7 @@ def no_configuration(
     place = f"{what} at ({x:.3f}, {y:.3f}, {z:.3f}) m"
     if found.reached == 0:
         wrist = scene.chain.base_pose[:3, 3]
-        away = float(np.linalg.norm(np.array([x, y, z]) - wrist))
+        away = float(portable.norm(np.array([x, y, z]) - wrist))
         return Status(
             StatusCode.NO_IK_SOLUTION,
             f"{place} can't be reached in this orientation within the joint limits (the tcp "
@@ -109,15 +110,17 @@ def ranked_solutions(
     solutions = []
     for q, branch in zip(found.q, found.branch, strict=True):
         T = scene.chain.tcp_poses(q[None])[0]
-        R = T[:3, :3].T @ np.asarray(pose)[:3, :3]
+        R = portable.matmul(T[:3, :3].T, np.asarray(pose)[:3, :3])
         twist = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
         closest = nearest_pair(scene, q, threshold)
         solutions.append(
             IkSolution(
                 joint_names=names,
                 q=q,
-                position_error=float(np.linalg.norm(T[:3, 3] - np.asarray(pose)[:3, 3])),
-                rotation_error=float(np.arctan2(np.linalg.norm(twist), 0.5 * (np.trace(R) - 1.0))),
+                position_error=float(portable.norm(T[:3, 3] - np.asarray(pose)[:3, 3])),
+                rotation_error=float(
+                    portable.arctan2(portable.norm(twist), 0.5 * (np.trace(R) - 1.0))
+                ),
                 branch=int(branch),
                 turns=tuple(int(turn) for turn in np.ceil((q - np.pi) / (2.0 * np.pi) - 1e-12)),
                 clearance=np.inf if closest is None else closest.distance,

@@ -7,6 +7,13 @@ from ir_planner.curves.joint_spline import (
     virtual_knots,
 )
 from ir_planner.curves.polynomials import Extremes, extremes, motion_at
+from ir_planner.curves.rotations import (
+    RotationSpline,
+    rotation_of,
+    rotation_vector,
+    turn_of,
+    turned_evenly,
+)
 from ir_planner.curves.uniform_spline import (
     UniformSpline,
     along_motion,
@@ -18,6 +25,7 @@ from ir_planner.curves.uniform_spline import (
 
 __all__ = [
     "Extremes",
+    "RotationSpline",
     "UniformSpline",
     "along_motion",
     "along_path",
@@ -27,7 +35,11 @@ __all__ = [
     "fewest_seconds",
     "motion_at",
     "natural_durations",
+    "rotation_of",
+    "rotation_vector",
     "spline_through",
     "to_ppoly",
+    "turn_of",
+    "turned_evenly",
     "virtual_knots",
 ]

@@ -9,11 +9,11 @@ t_n / 2; only with a_f t_n^2 / 2 do the end conditions hold.)
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from scipy.interpolate import PPoly, make_interp_spline
+from scipy.interpolate import PPoly
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 
 
@@ -60,8 +60,8 @@ def spline_through(
     rest = (np.zeros(points.shape[1]), np.zeros(points.shape[1]))
     (v0, a0), (vf, af) = start or rest, end or rest
     full = np.concatenate([np.repeat(knots[0], 4), knots[1:-1], np.repeat(knots[-1], 4)])
-    ends: Any = ([(1, v0), (2, a0)], [(1, vf), (2, af)])
-    spline = make_interp_spline(point_times, points, k=3, t=full, bc_type=ends)
+    ends = ((v0, a0), (vf, af))
+    spline = portable.interpolating_spline(point_times, points, knots=full, ends=ends)
     q = spline(knots)
     qd = spline(knots, 1)
     qdd = spline(knots, 2)

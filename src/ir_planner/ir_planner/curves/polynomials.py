@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ir_kernels import Extrema, polynomial_extrema, polynomial_samples
+from ir_kernels import Extrema, polynomial_extrema, polynomial_samples, portable
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.trajectory import JointTrajectory, Samples
 
@@ -115,7 +115,8 @@ def extremes(coefficients: FloatArray, durations: FloatArray) -> Extremes:
         velocity=_size(speed),
         acceleration=_size(change),
         jerk=_size(jerk),
-        positions=coefficients * durations[:, None, None] ** np.arange(coefficients.shape[2]),
+        positions=coefficients
+        * portable.power(durations[:, None, None], np.arange(coefficients.shape[2])),
         turning=(speed.minimum < 0.0) & (speed.maximum > 0.0),
     )
 

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
-from scipy.spatial.transform import Rotation, Slerp
+from scipy.interpolate import BSpline
 
+from ir_kernels import portable
 from ir_krl import KrlMotionError, Motion
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.cartesian import Arc, Line, arc_through
+from ir_planner.curves import turn_of, turned_evenly
 from ir_planner.krl.geometry import Arm
 
 _STEP_M = 4e-3  # between samples of a tool path
@@ -72,7 +73,9 @@ def through_axes(points: FloatArray) -> AxisCurve:
     steps = np.abs(np.diff(points, axis=0)).max(axis=1)
     u = np.concatenate([[0.0], np.cumsum(np.maximum(steps, 1e-9))])
     u /= u[-1]
-    return AxisCurve(make_interp_spline(u, points, k=min(_DEGREE, len(points) - 1)), 0.0, 0.0)
+    return AxisCurve(
+        portable.interpolating_spline(u, points, min(_DEGREE, len(points) - 1)), 0.0, 0.0
+    )
 
 
 def tool_ends(
@@ -104,15 +107,14 @@ def drawn_from(motion: Motion, first: FloatArray, arm: Arm) -> tuple[FloatArray,
 def tool_curve(motion: Motion, start: FloatArray, arm: Arm) -> AxisCurve:
     """A LIN or CIRC from the configuration `start` (n,). Raises KrlMotionError."""
     first, last, path = tool_ends(motion, start, arm)
-    ends = Rotation.from_matrix(np.stack([first[:3, :3], last[:3, :3]]))
-    turning = float((ends[0].inv() * ends[1]).magnitude())
+    turning = float(turn_of(portable.matmul(first[:3, :3].T, last[:3, :3])))
     fine = np.ceil(max(path.length / _STEP_M, turning / _STEP_RAD)) + 1
     u = np.linspace(0.0, 1.0, int(np.clip(fine, _SAMPLES_MIN, _SAMPLES_MAX)))
     poses = np.tile(np.eye(4), (len(u), 1, 1))
     poses[:, :3, 3] = path.at(u * path.length)
-    poses[:, :3, :3] = Slerp([0.0, 1.0], ends)(u).as_matrix()
+    poses[:, :3, :3] = turned_evenly(first[:3, :3], last[:3, :3], u)
     q = followed(poses, motion, start, arm)
-    return AxisCurve(make_interp_spline(u, q, k=_DEGREE), path.length, turning)
+    return AxisCurve(portable.interpolating_spline(u, q, _DEGREE), path.length, turning)
 
 
 def followed(poses: FloatArray, motion: Motion, start: FloatArray, arm: Arm) -> FloatArray:

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from ir_description import Cell
+from ir_kernels import portable
 from ir_krl import (
     Attached,
     Part,
@@ -121,8 +122,13 @@ def attached(scene: PlanningScene) -> Attached:
     if tool is None:
         return Attached(tool_in_flange(cell.tcp), 0.0, np.zeros(3), np.zeros(3))
     turn = tool_in_flange(np.eye(4))[:3, :3]
-    inertia = turn @ tool.inertia @ turn.T
-    return Attached(tool_in_flange(cell.tcp), tool.mass, turn @ tool.com, np.diag(inertia).copy())
+    inertia = portable.matmul(turn, tool.inertia, turn.T)
+    return Attached(
+        tool_in_flange(cell.tcp),
+        tool.mass,
+        portable.matmul(turn, tool.com),
+        np.diag(inertia).copy(),
+    )
 
 
 def _written_as(step: PlannedMovement, scene: PlanningScene, judge: Judge) -> list[Part]:
@@ -215,7 +221,8 @@ def _needed(report: TrajectoryReport) -> float:
     )
     roots = (1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 2.0)
     return max(
-        float(ratio.max(initial=0.0) ** root) for ratio, root in zip(ratios, roots, strict=True)
+        float(portable.power(ratio.max(initial=0.0), root))
+        for ratio, root in zip(ratios, roots, strict=True)
     )
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ir_kernels import portable
 from ir_krl import Part, WrittenPath
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import PlannedMovement
@@ -127,7 +128,9 @@ def _written(
     count = max(int(np.ceil(along[-1] / _SPACING)), _FEWEST) * finer
     times = np.interp(np.linspace(0.0, along[-1], count + 1)[1:], along, stroke.times)
     times[-1] = stroke.times[-1]
-    poses = Arm(scene).flange(planned.sample(times).q) @ tool_in_flange(scene.cell.tcp)
+    poses = portable.matmul(
+        Arm(scene).flange(planned.sample(times).q), tool_in_flange(scene.cell.tcp)
+    )
     acceleration = float(np.abs(np.gradient(stroke.speed, stroke.times)).max())
     comment = f"along {step.to_station}: {along[-1]:.3f} m at {stroke.top:.3g} m/s"
     return WrittenPath(comment, poses, stroke.top, acceleration * share)

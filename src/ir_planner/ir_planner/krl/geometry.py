@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_description.poses import abc_from_rotation, inverse, rotation_from_abc
+from ir_kernels import portable
 from ir_krl import FRAME_NAMES, KrlMotionError, Place, Target
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.krl.status_turn import meeting
@@ -22,7 +23,7 @@ _WITHIN = 1e-9  # rad beyond a limit that rounding may leave
 
 def tool_in_flange(tcp: FloatArray) -> FloatArray:
     """The tool (4, 4) as TOOL_DATA gives it, of the cell's tcp (4, 4) in the last link."""
-    return np.asarray(inverse(FLANGE) @ tcp)
+    return np.asarray(portable.matmul(inverse(FLANGE), tcp))
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,16 +35,20 @@ class Arm:
     def flange(self, q: FloatArray) -> FloatArray:
         """KUKA's flange (N, 4, 4) in the robot's foot, of q (N, n)."""
         chain = self.scene.chain
-        return np.asarray(inverse(chain.base_pose) @ chain.link_poses(q)[:, -1] @ FLANGE)
+        return np.asarray(
+            portable.matmul(inverse(chain.base_pose), chain.link_poses(q)[:, -1], FLANGE)
+        )
 
     def tcp(self, flange: FloatArray) -> FloatArray:
         """The cell's tcp (N, 4, 4) in the world, of KUKA's flange (N, 4, 4) in the robot's foot."""
         chain = self.scene.chain
-        return np.asarray(chain.base_pose @ flange @ inverse(FLANGE) @ chain.tcp)
+        return np.asarray(portable.matmul(chain.base_pose, flange, inverse(FLANGE), chain.tcp))
 
     def tool_pose(self, target: Target, q: FloatArray) -> FloatArray:
         """Where the target's tool is at q (n,), in the target's base (4, 4)."""
-        return np.asarray(inverse(target.base) @ self.flange(q[None])[0] @ target.tool)
+        return np.asarray(
+            portable.matmul(inverse(target.base), self.flange(q[None])[0], target.tool)
+        )
 
     def pose(self, target: Target, now: FloatArray) -> FloatArray:
         """The target's frame as a pose (4, 4) [m] in its base; what it leaves open is as in `now`
@@ -58,9 +63,9 @@ class Arm:
             step[:3, 3] = xyz
             step[:3, :3] = rotation_from_abc(abc)
             if target.in_tool:
-                return np.asarray(now @ step)
+                return np.asarray(portable.matmul(now, step))
             found[:3, 3] = now[:3, 3] + xyz
-            found[:3, :3] = step[:3, :3] @ now[:3, :3]
+            found[:3, :3] = portable.matmul(step[:3, :3], now[:3, :3])
             return found
         here = abc_from_rotation(now[:3, :3])
         full = [given.get(name, here[k]) for k, name in enumerate(FRAME_NAMES[3:])]
@@ -74,7 +79,7 @@ class Arm:
         """All configurations (m, n) within the limits for each tool pose (N, 4, 4) in the target's
         base.
         """
-        tcp = self.tcp(target.base @ poses @ inverse(target.tool))
+        tcp = self.tcp(portable.matmul(target.base, poses, inverse(target.tool)))
         found = self.scene.inverse_kinematics.solve(tcp)
         return [found.of_pose(k) for k in range(len(poses))]
 

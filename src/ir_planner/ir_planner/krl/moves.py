@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_krl import KrlMotionError, Place, Speeds
 from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_planner.krl.curves import AxisLine, Curve
@@ -53,7 +54,7 @@ class Move:
         sdd = sdd[:, None]
         qd = first * sd
         qdd = second * sd**2 + first * sdd
-        return q, qd, qdd, third * sd**3 + 3.0 * second * sd * sdd
+        return q, qd, qdd, third * portable.power(sd, 3) + 3.0 * second * sd * sdd
 
 
 def move(
@@ -74,7 +75,7 @@ def move(
     slower = 1.0
     for _ in range(_ROUNDS):
         v, a, j = bounds
-        made = Move(curve, free_law((v / slower, a / slower**2, j / slower**3)))
+        made = Move(curve, free_law((v / slower, a / slower**2, j / (slower**2 * slower))))
         needed = max(_excess(made, limits, scene), least / max(made.law.total * GRID_S, GRID_S))
         if needed <= 1.0 + 1e-9:
             return made
@@ -108,7 +109,7 @@ def _law_bounds(curve: Curve, speeds: Speeds, limits: MotionLimits) -> tuple[flo
         if size > STILL:
             v = min(v, speed * speeds.override / size)
             a = min(a, acceleration * speeds.override**2 / size)
-            j = min(j, acceleration * speeds.override**3 / (size * RAMP))
+            j = min(j, acceleration * speeds.override**2 * speeds.override / (size * RAMP))
     return min(v, _HUGE), min(a, _HUGE), min(j, _HUGE)
 
 
@@ -120,7 +121,7 @@ def _excess(made: Move, limits: MotionLimits, scene: PlanningScene) -> float:
     factors = [
         float((np.abs(qd) / limits.velocity).max()),
         float(np.sqrt((np.abs(qdd) / limits.acceleration).max())),
-        float(np.cbrt((np.abs(qddd) / limits.jerk).max())),
+        float(portable.cbrt((np.abs(qddd) / limits.jerk).max())),
         float(np.sqrt(torque / TORQUE)),
     ]
     return max(factors)

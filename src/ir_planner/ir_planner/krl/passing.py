@@ -10,9 +10,10 @@ where that can be, with the least changes.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
+from scipy.interpolate import BSpline
 from scipy.optimize import linprog
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.scene import PlanningScene, torque_use
 
@@ -30,8 +31,9 @@ _CHANGED = 0.01  # cost of a slowness on average: small, so that durations decid
 
 def resting_spline(times: FloatArray, points: FloatArray) -> BSpline:
     """The spline of degree five through points (M, n) at times (M,) s, at rest at both ends."""
-    rest = [(order, np.zeros(points.shape[1])) for order in (1, 2)]
-    return make_interp_spline(times, points, k=_DEGREE, bc_type=(rest, rest))  # type: ignore[arg-type]
+    still = np.zeros(points.shape[1])
+    rest = (still, still)
+    return portable.interpolating_spline(times, points, _DEGREE, ends=(rest, rest))
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +49,7 @@ class _Problem:
 
     def lasting(self, slowness: FloatArray) -> FloatArray:
         """Seconds (M,) between points, with a logarithm of the slowness (K,)."""
-        return np.asarray(self.steps * np.exp(self.basis @ slowness))
+        return np.asarray(self.steps * portable.exp(portable.matmul(self.basis, slowness)))
 
     def used(self, slowness: FloatArray) -> FloatArray:
         """Shares (R,) of the limits at samples."""
@@ -111,7 +113,9 @@ def _change(problem: _Problem, slowness: FloatArray, used: FloatArray, trust: fl
     limits = np.column_stack(
         [slopes, np.zeros_like(slopes), -np.ones(len(rows)), np.zeros(len(rows))]
     )
-    longer = np.concatenate([lasting @ problem.basis / planned, np.zeros(count), [0.0, -1.0]])
+    longer = np.concatenate(
+        [portable.matmul(lasting, problem.basis) / planned, np.zeros(count), [0.0, -1.0]]
+    )
     above, below = (np.column_stack([sign * one, -one, none, none]) for sign in (1.0, -1.0))
     found = linprog(
         np.concatenate([np.zeros(count), np.full(count, _CHANGED / count), [_MISSED, 1.0]]),

@@ -8,13 +8,13 @@ its first part.
 """
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
-from scipy.spatial.transform import Rotation, RotationSpline, Slerp
 
+from ir_kernels import portable
 from ir_krl import KrlMotionError, Motion, SplineBlock, TimeBlock
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.cartesian import Line
+from ir_planner.curves import RotationSpline, turn_of, turned_evenly
 from ir_planner.krl.curves import AxisCurve, drawn_from, followed, through_axes
 from ir_planner.krl.geometry import Arm
 from ir_planner.krl.passing import resting_spline
@@ -124,8 +124,7 @@ def _part(part: Motion, now: FloatArray, arm: Arm) -> list[FloatArray]:
     share = np.linspace(0.0, 1.0, count + 1)[1:]
     poses = np.tile(np.eye(4), (count, 1, 1))
     poses[:, :3, 3] = path.at(share * path.length)
-    ends = Rotation.from_matrix(np.stack([now[:3, :3], last[:3, :3]]))
-    poses[:, :3, :3] = Slerp([0.0, 1.0], ends)(share).as_matrix()
+    poses[:, :3, :3] = turned_evenly(now[:3, :3], last[:3, :3], share)
     return list(poses)
 
 
@@ -140,8 +139,9 @@ def _tool_spline(block: SplineBlock, start: FloatArray, arm: Arm) -> AxisCurve:
     u = np.concatenate([[0.0], np.cumsum(steps)]) / length
     fine = np.linspace(0.0, 1.0, int(np.clip(length / _STEP_M, _SAMPLES_MIN, _SAMPLES_MAX)))
     along = np.tile(np.eye(4), (len(fine), 1, 1))
-    along[:, :3, 3] = make_interp_spline(u, stacked[:, :3, 3], k=min(3, len(u) - 1))(fine)
-    along[:, :3, :3] = RotationSpline(u, Rotation.from_matrix(stacked[:, :3, :3]))(fine).as_matrix()
+    places = portable.interpolating_spline(u, stacked[:, :3, 3], min(3, len(u) - 1))
+    along[:, :3, 3] = places(fine)
+    along[:, :3, :3] = RotationSpline(u, stacked[:, :3, :3])(fine)
     q = followed(along, first, start, arm)
-    turning = float(Rotation.from_matrix(stacked[0, :3, :3].T @ stacked[-1, :3, :3]).magnitude())
-    return AxisCurve(make_interp_spline(fine, q, k=_DEGREE), length, turning)
+    turning = float(turn_of(portable.matmul(stacked[0, :3, :3].T, stacked[-1, :3, :3])))
+    return AxisCurve(portable.interpolating_spline(fine, q, _DEGREE), length, turning)

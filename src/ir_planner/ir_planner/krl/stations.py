@@ -1,9 +1,10 @@
 """Which station or posture a configuration stands at."""
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
+from ir_planner.curves import turn_of
 from ir_planner.request import POSTURES
 from ir_planner.scene import PlanningScene
 
@@ -16,8 +17,8 @@ def station_at(scene: PlanningScene, q: FloatArray) -> str:
     """Name of the station whose pose the tcp has at q (n,), else ""."""
     tcp = scene.chain.tcp_poses(q[None])[0]
     for station in scene.cell.stations:
-        away = float(np.linalg.norm(station.pose[:3, 3] - tcp[:3, 3]))
-        turned = Rotation.from_matrix(station.pose[:3, :3].T @ tcp[:3, :3]).magnitude()
+        away = float(portable.norm(station.pose[:3, 3] - tcp[:3, 3]))
+        turned = turn_of(portable.matmul(station.pose[:3, :3].T, tcp[:3, :3]))
         if away <= PLACE_TOLERANCE and turned <= TURN_TOLERANCE:
             return station.name
     return ""

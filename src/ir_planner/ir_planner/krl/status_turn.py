@@ -8,7 +8,7 @@ nothing: a position that was taught there may carry either.
 
 import numpy as np
 
-from ir_kernels import Chain
+from ir_kernels import Chain, portable
 from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 
 _UNDECIDED = 1e-4  # rad or m: nearer to 0 than this, either bit is taken
@@ -21,10 +21,10 @@ def _signs(chain: Chain, q: FloatArray) -> FloatArray:
     poses = chain.link_poses(q)
     shoulder, elbow, wrist = (poses[:, k, :3, 3] for k in (2, 3, 5))
     foot = chain.base_pose
-    seen = (wrist - foot[:3, 3]) @ foot[:3, :3]  # in the robot's foot
+    seen = portable.matmul(wrist - foot[:3, 3], foot[:3, :3])  # in the robot's foot
     turned = q[:, 0] * chain.robot.joint_axis[0, 2]
-    before = np.cos(turned) * seen[:, 0] + np.sin(turned) * seen[:, 1]
-    axis = poses[:, 3, :3, :3] @ chain.robot.joint_axis[2]
+    before = portable.cos(turned) * seen[:, 0] + portable.sin(turned) * seen[:, 1]
+    axis = portable.matmul(poses[:, 3, :3, :3], chain.robot.joint_axis[2])
     bent = np.einsum("ni,ni->n", np.cross(elbow - shoulder, wrist - elbow), axis)
     return np.column_stack([before, -bent, q[:, 4], q])
 
@@ -32,8 +32,9 @@ def _signs(chain: Chain, q: FloatArray) -> FloatArray:
 def status_turn(chain: Chain, q: FloatArray) -> tuple[int, int]:
     """S and T of a configuration q (n,) [rad]."""
     negative = _signs(chain, q[None])[0] < 0.0
-    bits = [int(negative[:3] @ (1 << np.arange(3))), int(negative[3:] @ (1 << np.arange(q.size)))]
-    return bits[0], bits[1]
+    status = negative[:3] * (1 << np.arange(3))
+    turn = negative[3:] * (1 << np.arange(q.size))
+    return int(status.sum()), int(turn.sum())
 
 
 def meeting(chain: Chain, q: FloatArray, status: int | None, turn: int | None) -> BoolArray:

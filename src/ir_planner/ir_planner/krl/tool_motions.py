@@ -5,9 +5,9 @@ allows.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
 
 from ir_description.poses import inverse
+from ir_kernels import portable
 from ir_krl import Blend, Motion, Speeds, SplineBlock, Target
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import (
@@ -20,6 +20,7 @@ from ir_msgs_py.cartesian import (
     CartesianSegment,
 )
 from ir_planner.cartesian import Line
+from ir_planner.curves import turn_of, turned_evenly
 from ir_planner.krl.curves import tool_ends
 from ir_planner.krl.geometry import Arm, tool_in_flange
 from ir_planner.krl.splines import spline_poses
@@ -51,9 +52,8 @@ def tool_motion(motion: Motion, start: FloatArray, arm: Arm) -> ToolMotion | Non
     share = np.linspace(0.0, 1.0, 2 * pieces + 1)
     poses = np.tile(np.eye(4), (len(share), 1, 1))
     poses[:, :3, 3] = path.at(share * path.length)
-    ends = Rotation.from_matrix(np.stack([first[:3, :3], last[:3, :3]]))
-    poses[:, :3, :3] = Slerp([0.0, 1.0], ends)(share).as_matrix()
-    turning = float((ends[0].inv() * ends[1]).magnitude())
+    poses[:, :3, :3] = turned_evenly(first[:3, :3], last[:3, :3], share)
+    turning = float(turn_of(portable.matmul(first[:3, :3].T, last[:3, :3])))
     speed = _speed(motion.speeds, path.length, turning)
     if path.length < _SHORTEST or not _described(motion.target, turning, speed, arm):
         return None
@@ -72,8 +72,8 @@ def tool_spline(block: SplineBlock, start: FloatArray, arm: Arm) -> ToolMotion |
     first = block.parts[0]
     poses = spline_poses(block, start, arm)
     length = float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).sum())
-    turns = Rotation.from_matrix(poses[:-1, :3, :3]).inv() * Rotation.from_matrix(poses[1:, :3, :3])
-    turning = float(turns.magnitude().sum())
+    turns = portable.matmul(poses[:-1, :3, :3].transpose(0, 2, 1), poses[1:, :3, :3])
+    turning = float(turn_of(turns).sum())
     speed = _speed(first.speeds, length, turning)
     if len(poses) > POSES_MAX or not _described(first.target, turning, speed, arm):
         return None
@@ -84,7 +84,7 @@ def tool_spline(block: SplineBlock, start: FloatArray, arm: Arm) -> ToolMotion |
 
 def _in_cell(poses: FloatArray, target: Target, arm: Arm) -> FloatArray:
     """The cell's tcp (N, 4, 4) where the target's tool has `poses` (N, 4, 4) in its base."""
-    return arm.tcp(target.base @ poses @ inverse(target.tool))
+    return arm.tcp(portable.matmul(target.base, poses, inverse(target.tool)))
 
 
 def _described(target: Target, turning: float, speed: float, arm: Arm) -> bool:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from ir_description import Cell, CellPath
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import POSES_MAX, CartesianPath, CartesianSegment
 from ir_msgs_py.errors import InvalidValueError, PoseError
@@ -58,7 +59,7 @@ def _segment(msg: Any, frame: FloatArray, k: int) -> CartesianSegment:
     poses = []
     for i, pose in enumerate(msg.poses):
         try:
-            poses.append(frame @ pose_from_msg(pose))
+            poses.append(portable.matmul(frame, pose_from_msg(pose)))
         except PoseError as error:
             raise PoseError(f"segments[{k}].poses[{i}]: {error}", error.code) from error
     try:

@@ -2,15 +2,10 @@
 profile.
 """
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
-from scipy.linalg import cholesky_banded
-from scipy.linalg.lapack import dpbtrs
 
-from ir_kernels import CubicPath
+from ir_kernels import CubicPath, portable
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import UniformSpline
@@ -49,7 +44,7 @@ class FixedPath:
         s = np.concatenate([[0.0], np.cumsum(middle * np.diff(self._share))])
         self._s = s / s[-1]
         self.q = q
-        spline = make_interp_spline(self._s, q, k=3)
+        spline = portable.interpolating_spline(self._s, q)
         breaks = np.unique(spline.t)
         begins = breaks[:-1]
         cubics = [spline(begins), spline(begins, 1), spline(begins, 2) / 2, spline(begins, 3) / 6]
@@ -71,7 +66,7 @@ class FixedPath:
     def finer(self, s: FloatArray) -> FloatArray:
         """The same speed profile with a knot more in every interval."""
         knots = np.concatenate([[0.0], np.arange(2.0, len(s) + 2.0), [len(s) + 3.0]])
-        profile = make_interp_spline(knots, np.concatenate([[0.0], s, [1.0]]), k=3)
+        profile = portable.interpolating_spline(knots, np.concatenate([[0.0], s, [1.0]]))
         return np.clip(profile(np.arange(2.0, 2.0 * len(s) + 5.0) / 2.0), 0.0, 1.0)
 
     def knots_at_points(self, s: FloatArray) -> FloatArray:
@@ -120,7 +115,9 @@ def from_knots(right: FloatArray) -> FloatArray:
     """The control points (C, n) whose values at their knots, times 6, are `right` (C, n); the
     matrix is symmetric.
     """
-    return np.asarray(dpbtrs(_knot_factor(len(right)), right)[0])
+    bands = np.ones((2, len(right)))
+    bands[1] = 4.0
+    return portable.solve_banded(bands, right)
 
 
 def never_back(s: FloatArray) -> FloatArray:
@@ -136,14 +133,6 @@ def never_back(s: FloatArray) -> FloatArray:
     rising[1] = max(rising[1], _FIRST * rising[2])
     rising[-2] = min(rising[-2], 1.0 - _FIRST * (1.0 - rising[-3]))
     return np.asarray((rising[:-2] + 4.0 * rising[1:-1] + rising[2:]) / 6.0)
-
-
-@lru_cache(maxsize=64)
-def _knot_factor(count: int) -> FloatArray:
-    """Factor of the matrix that leads from control points to knots, times 6."""
-    bands = np.ones((2, count))
-    bands[1] = 4.0
-    return np.asarray(cholesky_banded(bands))
 
 
 def _in_order(positions: FloatArray, points: FloatArray) -> NDArray[np.int64]:

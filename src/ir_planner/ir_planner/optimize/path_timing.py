@@ -12,10 +12,9 @@ time.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
-from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.ndimage import convolve1d, maximum_filter1d
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import UniformSpline
@@ -104,11 +103,11 @@ class Passing:
             return spline
         count = len(spline.control)
         rows = _basis(self.at, count)[:, 3:-3]
-        root = (cholesky_banded(jerk_bands(count, 1.0, _LITTLE)[:, 3:-3]), False)
-        spread = cho_solve_banded(root, rows.T)
+        spread = portable.solve_banded(jerk_bands(count, 1.0, _LITTLE)[:, 3:-3], rows.T)
         missing = self.points - _values(spline.control, self.at)[0]
         control = spline.control.copy()
-        control[3:-3] += spread @ np.linalg.lstsq(rows @ spread, missing, rcond=None)[0]
+        pull = portable.least_squares(portable.matmul(rows, spread), missing)
+        control[3:-3] += portable.matmul(spread, pull)
         return UniformSpline(control, spline.interval)
 
     def sent(
@@ -142,7 +141,13 @@ def _basis(at: FloatArray, count: int) -> FloatArray:
     """Weights (P, count) of the control points where `at` (P,) knots have gone by."""
     k = np.clip(np.floor(at).astype(int), 0, count - 4)
     u = at - k
-    weights = (1 - u) ** 3, 3 * u**3 - 6 * u**2 + 4, -3 * u**3 + 3 * u**2 + 3 * u + 1, u**3
+    cube = u**2 * u
+    weights = (
+        (1 - u) ** 2 * (1 - u),
+        3 * cube - 6 * u**2 + 4,
+        -3 * cube + 3 * u**2 + 3 * u + 1,
+        cube,
+    )
     rows = np.zeros((len(at), count))
     for i, weight in enumerate(weights):
         rows[np.arange(len(at)), k + i] = weight / 6.0
@@ -160,7 +165,7 @@ def _values(control: FloatArray, at: FloatArray) -> tuple[FloatArray, FloatArray
         + (-3 * u**2 + 2 * u + 1) * c[2]
         + u**2 * c[3]
     ) / 2.0
-    return _basis(at, len(control)) @ control, slope
+    return portable.matmul(_basis(at, len(control)), control), slope
 
 
 def jerk_bands(count: int, weight: float, size: float) -> FloatArray:
@@ -312,7 +317,7 @@ def _slowed_where_needed(
         widest = maximum_filter1d(np.maximum(use - 1.0, 0.0), 2 * _AROUND + 1)
         longer = 1.0 + convolve1d(widest, window / window.sum())
         times = np.concatenate([[0.0], np.cumsum(longer)])
-        profile = make_interp_spline(times[knots], np.concatenate([[0.0], s, [1.0]]), k=3)
+        profile = portable.interpolating_spline(times[knots], np.concatenate([[0.0], s, [1.0]]))
         slower = times[-1] / len(longer)
         duration *= slower
         s = never_back(np.clip(profile(np.arange(2, len(longer) - 1) * slower), 0.0, 1.0))

@@ -8,6 +8,7 @@ clearance is proved; a pair that comes too near gets a larger clearance margin, 
 continues.
 """
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -158,7 +159,7 @@ def within_duration(fastest: Movement, context: Context, near: Near) -> Movement
                 best = slower
             if duration > _ENOUGH * requested:
                 break
-        value = (late * early) ** 0.5 if late and early else (_STEP * late or early / _STEP)
+        value = math.sqrt(late * early) if late and early else (_STEP * late or early / _STEP)
     return best
 
 

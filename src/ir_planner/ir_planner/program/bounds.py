@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.scene import MotionLimits, PlanningScene
 
@@ -56,10 +57,10 @@ def least_cost(
     robot = scene.cell.robot
     seconds = least_seconds(distance, limits)
     rise = potential_energy(second, scene)[None] - potential_energy(first, scene)[:, None]
-    work = rise + distance @ robot.friction_coulomb
-    viscous = (
-        distance**2
-    ) @ robot.friction_viscous  # J s: joules at an even speed, times the duration
+    work = rise + portable.matmul(distance, robot.friction_coulomb)
+    viscous = portable.matmul(
+        distance**2, robot.friction_viscous
+    )  # J s: joules at an even speed, times the duration
     with np.errstate(divide="ignore", invalid="ignore"):
         best = np.sqrt(rates.joule * viscous / rates.second) if rates.second > 0.0 else np.inf
         if scene.dc_bus.regeneration != "fed_back":  # energy from the mains is never negative

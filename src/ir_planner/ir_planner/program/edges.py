@@ -8,6 +8,7 @@ is the straight segment, and exact where that is free; else the path found.
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.program.bounds import least_cost
@@ -197,7 +198,7 @@ class TravelEdges:
 
 def _turned(q: FloatArray) -> bytes:
     """What configurations (..., n) have in common that differ by whole turns of joints."""
-    return np.round(np.stack([np.sin(q), np.cos(q)]), 6).tobytes()
+    return np.round(np.stack([portable.sin(q), portable.cos(q)]), 6).tobytes()
 
 
 def _arrivals(nodes: list[Node]) -> FloatArray:

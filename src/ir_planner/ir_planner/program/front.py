@@ -6,6 +6,7 @@ request with a point's cycle time looks for a better one as well.
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_planner.program.choice import Choice
 from ir_planner.program.cycle_plan import TimedChoice, task_of
 from ir_planner.program.cycle_time import shared_out
@@ -29,7 +30,7 @@ def front_of(choice: Choice, count: int, standing: float, progress: Progress) ->
     values.bracket(0.0)
     shortest = values.shortest * _FULLEST
     longest = max(2.0 * values.own_seconds + standing, shortest)
-    times = np.geomspace(shortest, longest, count) if count > 1 else np.array([shortest])
+    times = portable.geomspace(shortest, longest, count) if count > 1 else np.array([shortest])
     for k, seconds in enumerate(times.tolist()):
         progress("pareto front", k, count, choice.chain.cost)
         if not work.exhausted:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_planner.program.bounds import Rates
 from ir_planner.program.movements import Failure, Movements, Near, rates_of
 from ir_planner.program.station_graph import Part
@@ -19,13 +20,12 @@ from ir_planner.request import Context
 from ir_planner.timing import Movement
 
 _LEAST = 250.0  # W: a second less of moving and more of waiting on brakes saves more than that
-_STEP = (
-    2.0**0.5
-)  # between two rungs: a mixture of neighbours is within about a percent of the rung between
+# between two rungs: a mixture of neighbours is within about a percent of the rung between
+_STEP = float(np.sqrt(2.0))
 # up to 181 kW: from 22 kW on movements are within a percent of the fastest, but a cycle just above
 # the shortest lies there, and the last of that percent costs more than anything before
 _RUNGS = 20
-LADDER = tuple(_LEAST * _STEP**k for k in range(_RUNGS))
+LADDER = tuple(float(_LEAST * portable.power(_STEP, k)) for k in range(_RUNGS))
 FASTEST = _RUNGS  # the rung on which time alone counts
 _MIDDLE = 8  # 4 kW
 _REACH = 3.01  # rungs: paths change little over three times the value, and above the middle
@@ -53,7 +53,11 @@ class Ladder:
         rates = rates_of(own.context)
         value = rates.second / rates.joule if rates.joule else np.inf
         searched = own.context.options.objective != "movement_cost"
-        place = float((np.log(value) - np.log(_LEAST)) / np.log(_STEP)) if value > 0.0 else -np.inf
+        place = (
+            float((portable.log(value) - portable.log(_LEAST)) / portable.log(_STEP))
+            if value > 0.0
+            else -np.inf
+        )
         self._place = (float(FASTEST) if np.isinf(value) else place) if searched else -np.inf
 
     @property

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Context, Journal
@@ -68,7 +69,7 @@ def withdrawn_lines(
 
 def _turned(a: FloatArray, b: FloatArray) -> bool:
     """Whether two configurations differ by whole turns only."""
-    return bool(np.abs(np.sin(0.5 * (a - b))).max() < _SAME)
+    return bool(np.abs(portable.sin(0.5 * (a - b))).max() < _SAME)
 
 
 def _exit_paths(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, label
 
 from ir_description import Body, RobotModel
+from ir_kernels import portable
 from ir_msgs_py.arrays import BoolArray, FloatArray
 
 FloatArray32 = NDArray[np.float32]
@@ -40,13 +41,13 @@ class Reach:
     @staticmethod
     def of(robot: RobotModel, base: FloatArray) -> "Reach":
         """Of a robot on its base (4, 4)."""
-        frame = base @ robot.joint_origin[0]
-        axis = frame[:3, :3] @ robot.joint_axis[0]
-        shoulder = frame[:3, :3] @ robot.joint_origin[1][:3, 3]
-        height = float(shoulder @ axis)
+        frame = portable.matmul(base, robot.joint_origin[0])
+        axis = portable.matmul(frame[:3, :3], robot.joint_axis[0])
+        shoulder = portable.matmul(frame[:3, :3], robot.joint_origin[1][:3, 3])
+        height = float(portable.matmul(shoulder, axis))
         steps = np.cumsum(np.append(0.0, np.linalg.norm(robot.joint_origin[2:, :3, 3], axis=1)))
         return Reach(
-            frame[:3, 3], axis, height, float(np.linalg.norm(shoulder - height * axis)), steps
+            frame[:3, 3], axis, height, float(portable.norm(shoulder - height * axis)), steps
         )
 
     def beyond_circle(self, link: int, offset: float) -> float:
@@ -112,6 +113,11 @@ class BallField:
         return int(self.nearest.ravel()[places[np.argmax(self.left.ravel()[places])]])
 
 
+def _hypot(x: FloatArray, y: FloatArray) -> FloatArray:
+    """As np.hypot in the arrays' own precision; lengths of metres can't overflow."""
+    return np.asarray(np.sqrt(x * x + y * y))
+
+
 def _from_circle(low: FloatArray, count: int, reach: Reach) -> FloatArray32:
     """Distance (X, Y, Z) m of the cubes' centres from where joint 2 may be."""
     lines = [
@@ -123,7 +129,7 @@ def _from_circle(low: FloatArray, count: int, reach: Reach) -> FloatArray32:
     a, b, c = (np.float32(value) for value in reach.axis)
     along = a * x + b * y + c * z
     across = np.sqrt(np.maximum(x * x + y * y + z * z - along * along, np.float32(0.0)))
-    return np.asarray(np.hypot(across - np.float32(reach.circle), along - np.float32(reach.height)))
+    return np.asarray(_hypot(across - np.float32(reach.circle), along - np.float32(reach.height)))
 
 
 def distance_at_most(body: Body, points: FloatArray) -> FloatArray:
@@ -131,7 +137,7 @@ def distance_at_most(body: Body, points: FloatArray) -> FloatArray:
     negative. Exact,
     but for meshes: the distance from their nearest vertex.
     """
-    local = (points - body.pose[:3, 3]) @ body.pose[:3, :3]
+    local = portable.matmul(points - body.pose[:3, 3], body.pose[:3, :3])
     x, y, z = np.moveaxis(local, -1, 0)
     if body.kind == "plane":
         return np.asarray(np.maximum(z, 0.0))
@@ -143,8 +149,8 @@ def distance_at_most(body: Body, points: FloatArray) -> FloatArray:
         )
     radius, length, _ = body.size
     if body.kind == "cylinder":
-        beside = np.maximum(np.hypot(x, y) - radius, 0.0)
-        return np.asarray(np.hypot(beside, np.maximum(np.abs(z) - 0.5 * length, 0.0)))
+        beside = np.maximum(_hypot(x, y) - radius, 0.0)
+        return np.asarray(_hypot(beside, np.maximum(np.abs(z) - 0.5 * length, 0.0)))
     above = np.maximum(np.abs(z) - 0.5 * length, 0.0) if body.kind == "capsule" else z
     return np.asarray(np.maximum(np.sqrt(x * x + y * y + above * above) - radius, 0.0))
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import FreeSpace
@@ -57,13 +58,14 @@ def enclosure(ends: Ends, space: FreeSpace) -> Enclosure | None:
     if not bodies or not balls:
         return None
     reach = Reach.of(scene.cell.robot, scene.cell.base_pose)
-    beyond = [reach.beyond_circle(ball.link, float(np.linalg.norm(ball.point))) for ball in balls]
+    beyond = [reach.beyond_circle(ball.link, float(portable.norm(ball.point))) for ball in balls]
     lengths = np.array([kept[body.name] for body in bodies])
     field = BallField.of(bodies, lengths, reach, max(beyond), max(ball.radius for ball in balls))
     links = scene.chain.link_poses(np.concatenate([ends.start[None], ends.goals]))
     for ball, farthest in zip(balls, beyond, strict=True):
         cubes = [
-            field.cube(pose[:3, :3] @ ball.point + pose[:3, 3]) for pose in links[:, ball.link]
+            field.cube(portable.matmul(pose[:3, :3], ball.point) + pose[:3, 3])
+            for pose in links[:, ball.link]
         ]
         if _joined(field, ball.radius, farthest, cubes):
             continue

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_description import Capsule
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import FreeSpace
@@ -112,7 +113,7 @@ def _turned(near: Capsule, far: Capsule, scene: PlanningScene) -> dict[int, floa
     if first >= last:
         return {}
     origin = robot.joint_origin[first]
-    before = _beside(near, origin[:3, 3], origin[:3, :3] @ robot.joint_axis[first])
+    before = _beside(near, origin[:3, 3], portable.matmul(origin[:3, :3], robot.joint_axis[first]))
     return {first: 2.0 * before, last: 2.0 * _beside(far, np.zeros(3), robot.joint_axis[last])}
 
 
@@ -121,4 +122,4 @@ def _beside(capsule: Capsule, point: FloatArray, axis: FloatArray) -> float:
     frame.
     """
     ends = np.stack([capsule.p0, capsule.p1]) - point
-    return float(np.linalg.norm(np.cross(ends, axis / np.linalg.norm(axis)), axis=1).max())
+    return float(np.linalg.norm(np.cross(ends, axis / portable.norm(axis)), axis=1).max())

@@ -5,6 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 
 STILL = 1e-9  # rad: nothing moves
@@ -49,7 +50,7 @@ class MotionLimits:
         return MotionLimits(
             self.velocity * share,
             self.acceleration * share**2,
-            self.jerk * share**3,
+            self.jerk * portable.power(share, 3),
             self.torque_share * share**2,
             self.torque_reserve,
         )
@@ -82,7 +83,7 @@ def lasting_longer(
         [
             (velocity / limits.velocity).max(axis=-1),
             np.sqrt((acceleration / limits.acceleration).max(axis=-1)),
-            np.cbrt((jerk / limits.jerk).max(axis=-1)),
+            portable.cbrt((jerk / limits.jerk).max(axis=-1)),
             np.sqrt(torque.max(axis=-1) / limits.torque_share),
         ]
     )

@@ -7,6 +7,7 @@ weights equal; it starts at the joint.) W ranks movements; it is not their energ
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 
 
@@ -26,9 +27,9 @@ def movement_weights(
 
 def movement_cost(weights: FloatArray, start: FloatArray, goal: FloatArray) -> FloatArray:
     """W of the movement from `start` to `goal`, shapes (..., n) that broadcast; result (...)."""
-    return np.asarray(np.abs(np.asarray(goal) - np.asarray(start)) @ weights)
+    return np.asarray(portable.matmul(np.abs(np.asarray(goal) - np.asarray(start)), weights))
 
 
 def path_cost(weights: FloatArray, waypoints: FloatArray) -> float:
     """W summed over the steps of a path (N, n)."""
-    return float(np.sum(np.abs(np.diff(waypoints, axis=0)) @ weights))
+    return float(np.sum(portable.matmul(np.abs(np.diff(waypoints, axis=0)), weights)))

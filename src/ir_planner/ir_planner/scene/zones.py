@@ -7,6 +7,7 @@ are checked with the plain safety distance.
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import motion_at
@@ -26,7 +27,7 @@ def tcp_inside(q: FloatArray, scene: PlanningScene, station: str, margin: float)
     if zone is None:
         return np.zeros(len(q), dtype=bool)
     tcp = scene.chain.tcp_poses(q)[:, :3, 3]
-    local = (tcp - zone.pose[:3, 3]) @ zone.pose[:3, :3]
+    local = portable.matmul(tcp - zone.pose[:3, 3], zone.pose[:3, :3])
     beyond = np.maximum(np.abs(local) - 0.5 * zone.size, 0.0)
     return np.asarray(np.linalg.norm(beyond, axis=1) <= margin)
 

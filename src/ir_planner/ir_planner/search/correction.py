@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_kernels.collision import FREE, Certificates
 from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_planner.checks import FreeSpace
@@ -111,7 +112,9 @@ def _round_stretch(
     for attempt in range(settings.attempts):
         if attempt and _price(path) > space.work.left:
             break
-        before, after = colliding_stretch(path, proof, space, settings.margin * _WIDER**attempt)
+        before, after = colliding_stretch(
+            path, proof, space, settings.margin * float(portable.power(_WIDER, attempt))
+        )
         finer = replace(settings, samples=min(settings.samples * (attempt + 1), SAMPLES_MAX))
         found = evolve(before[-1], after[0], space, finer, rng)
         generations += found.generations

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_kernels.collision import FREE, Certificates
 from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_planner.checks import FreeSpace
@@ -103,7 +104,9 @@ def path_matrix(shape: str, vias: int, samples: int) -> FloatArray:
         return np.ascontiguousarray(np.array(hats).T)
     spline = to_ppoly(spline_through(np.eye(vias + 2), times, virtual_knots(times)))
     u = np.linspace(0.0, 1.0, _FINE)
-    progress = np.maximum.accumulate(spline(u) @ times)  # of points that lie evenly on a line
+    progress = np.maximum.accumulate(
+        portable.matmul(spline(u), times)
+    )  # of points that lie evenly on a line
     return np.ascontiguousarray(spline(np.interp(even, progress, u)))
 
 
@@ -171,7 +174,7 @@ class _Breeder:
     def samples(self, vias: FloatArray) -> FloatArray:
         """(S, N, n): the paths of individuals."""
         count, v, n = vias.shape
-        mixed = self.blend @ vias.transpose(1, 0, 2).reshape(v, count * n)
+        mixed = portable.matmul(self.blend, vias.transpose(1, 0, 2).reshape(v, count * n))
         paths: FloatArray = mixed.reshape(-1, count, n) + self.fixed[:, None, :]
         return paths
 
@@ -187,7 +190,9 @@ class _Breeder:
         low = self.space.low
         high = self.space.high
         excess = np.maximum(np.maximum(low - q, q - high), 0.0).sum(axis=(0, 2))
-        cost = (np.abs(np.diff(q, axis=0)) @ self.weights).sum(axis=0) / self.straight
+        cost = (portable.matmul(np.abs(np.diff(q, axis=0)), self.weights)).sum(
+            axis=0
+        ) / self.straight
         worst = np.argmax(lack, axis=0)
         columns = np.arange(count)
         fitness = (
@@ -212,7 +217,9 @@ class _Breeder:
         rng = self.rng
         n = len(self.a)
         count = s.islands * self.per_island * s.first
-        spread = np.exp(rng.uniform(np.log(s.spread_least), np.log(s.spread_most), (count, 1, 1)))
+        spread = portable.exp(
+            rng.uniform(portable.log(s.spread_least), portable.log(s.spread_most), (count, 1, 1))
+        )
         line = self.a + self.along * (self.b - self.a)
         noise = rng.standard_normal((count, 1, n)) + _OWN * rng.standard_normal((count, s.vias, n))
         vias = np.clip(line + spread * noise, self.space.low, self.space.high)
@@ -243,7 +250,7 @@ class _Breeder:
         share = rng.uniform(-_BEYOND, 1.0 + _BEYOND, (count, 1, n)) * crossed[:, None, None]
         child = vias + share * (people.vias[father] - vias)
         child += self._parting(people, mother) * (rng.random(count) < s.parting)[:, None, None]
-        spread = people.spread[mother] * np.exp(s.adaptation * rng.standard_normal(count))
+        spread = people.spread[mother] * portable.exp(s.adaptation * rng.standard_normal(count))
         spread = np.clip(spread, s.mutation_least, _LARGEST)
         noise = rng.standard_normal((count, 1, n)) + _OWN * rng.standard_normal(vias.shape)
         mutated = rng.random((count, 1, n)) < s.mutated_share
@@ -262,7 +269,7 @@ class _Breeder:
         sample = people.sample[rows]
         pair = np.maximum(people.pair[rows], 0)
         blend = self.blend[sample]  # (N, V)
-        q = self.fixed[sample] + (blend[:, None, :] @ vias)[:, 0]
+        q = self.fixed[sample] + (portable.matmul(blend[:, None, :], vias))[:, 0]
         gradient = self.space.scene.collision.gradients(q, pair)
         size = np.maximum((gradient**2).sum(axis=1) * (blend**2).sum(axis=1), 1e-3)
         lack = np.clip(people.shortfall[rows], 0.0, 1.0) * self.rng.uniform(1.0, 2.0, len(rows))

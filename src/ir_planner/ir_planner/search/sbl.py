@@ -174,7 +174,7 @@ class _Sbl:
         length = np.abs(np.diff(q, axis=0)).max(axis=1)
         level = np.array([bridge.tested if owner < 0 else trees.tested[owner] for owner in owners])
         while not self.space.work.exhausted:
-            piece = np.where(level < _CERTIFIED, length / 2.0 ** np.minimum(level, 60), 0.0)
+            piece = np.where(level < _CERTIFIED, length / (1 << np.minimum(level, 60)), 0.0)
             k = int(piece.argmax())
             if piece[k] <= self.settings.resolution:
                 break

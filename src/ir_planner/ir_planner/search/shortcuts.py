@@ -7,6 +7,7 @@ from.
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.scene import movement_cost, path_cost
@@ -94,7 +95,13 @@ def _best_pull(
     before: FloatArray, via: FloatArray, after: FloatArray, space: FreeSpace, weights: FloatArray
 ) -> FloatArray:
     step = after - before
-    along = float(np.clip((via - before) @ step / max(float(step @ step), 1e-12), 0.05, 0.95))
+    along = float(
+        np.clip(
+            portable.matmul(via - before, step) / max(float(portable.matmul(step, step)), 1e-12),
+            0.05,
+            0.95,
+        )
+    )
     inside = np.clip(via, np.minimum(before, after), np.maximum(before, after))
     targets = [before + along * step, inside]
     for joint in range(len(via)):

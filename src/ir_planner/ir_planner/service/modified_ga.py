@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_kernels.collision import FREE
 from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_msgs_py.settings import check_settings, setting
@@ -177,8 +178,8 @@ class _Walker:
         """One generation: perturb, drop, rank, certify, keep the best."""
         owner = np.repeat(np.arange(len(parents)), offspring)
         mean = self._mean(parents)
-        spread = parents.sigma[owner] * 10.0 ** self.rng.uniform(
-            -self.settings.spread_decades, 0.0, len(owner)
+        spread = parents.sigma[owner] * portable.power(
+            10.0, self.rng.uniform(-self.settings.spread_decades, 0.0, len(owner))
         )
         noise = spread[:, None] * self.rng.standard_normal((len(owner), parents.q.shape[1]))
         away = self.rng.random(len(owner))[
@@ -227,7 +228,9 @@ class _Walker:
         target = np.zeros((len(q), 6, 1))
         target[:, :3, 0] = -self.scene.chain.tcp_poses(q)[:, :3, 0]
         turned = J.transpose(0, 2, 1)
-        rate: FloatArray = (turned @ np.linalg.solve(J @ turned + _DAMPED, target))[:, :, 0]
+        rate: FloatArray = (
+            portable.matmul(turned, portable.solve(portable.matmul(J, turned) + _DAMPED, target))
+        )[:, :, 0]
         return rate
 
     def _free(

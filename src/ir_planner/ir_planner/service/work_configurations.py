@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_description import Station
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import FreeSpace, too_near
@@ -74,7 +75,7 @@ def work_configurations(
         )
     chosen: list[FloatArray] = []
     for q in found.q:
-        if all(np.abs(np.sin(0.5 * (q - other))).max() > _SAME_BRANCH for other in chosen):
+        if all(np.abs(portable.sin(0.5 * (q - other))).max() > _SAME_BRANCH for other in chosen):
             chosen.append(q)
     return chosen[:_BRANCHES], Status.success()
 

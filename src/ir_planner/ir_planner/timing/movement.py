@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
@@ -82,7 +83,7 @@ class Movement:
     @property
     def consumption(self) -> Consumption:
         """What objectives count of it: a fraction of the work of a report."""
-        cost = float(self.verification.travel @ self.context.scene.weights)
+        cost = float(portable.matmul(self.verification.travel, self.context.scene.weights))
         return Consumption(self.trajectory.duration, cost, self.energy.total, self.energy.base)
 
     @cached_property

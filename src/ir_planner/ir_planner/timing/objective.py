@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_kernels import dc_bus
+from ir_kernels import dc_bus, portable
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
@@ -27,7 +27,7 @@ _SLOWER = np.array(
     [*_FACTORS, 3.0, 4.0, 6.0, 9.0, 14.0]
 )  # where a second costs what holding costs, and no more
 # so near that the least cost is hardly missed; how many for J
-_CLOSE = 1.05 ** np.arange(54.0)
+_CLOSE = portable.power(1.05, np.arange(54.0))
 _USUAL = 18
 _REFINED = 5
 _COARSE_STEP = 4e-3  # s: energies are compared, not reported

@@ -96,7 +96,7 @@ def fastest_law(
     if use.max() <= limits.torque_share:
         return free
     top = float(law_states(np.array([free.steps])).sd[0, 3])
-    slower: FloatArray = top * 0.5 ** np.arange(3.0, 9.0)
+    slower: FloatArray = top / 2 ** np.arange(3, 9)
     best = _best_law(start, delta, top * _SPEEDS, (a, j), limits.torque_share, dynamics)
     if best is None:
         best = _best_law(start, delta, slower, (a, j), limits.torque_share, dynamics)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgtsv
 
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import extremes, natural_durations, spline_through, virtual_knots
@@ -126,7 +127,7 @@ def time_spline(
         steps = _even(1.5 * natural_durations(points, limits.velocity))
         for _ in range(_ROUNDS):
             use = spline_use(points, np.asarray(steps * GRID_S), limits, dynamics)
-            steps = _even(steps * GRID_S * np.clip(use, 0.6, 1.7) ** 0.6)
+            steps = _even(steps * GRID_S * portable.power(np.clip(use, 0.6, 1.7), 0.6))
     else:
         steps = _even(given)
     for k in range(_STRETCHES):

@@ -5,8 +5,7 @@ Each is optimised at a duration of its own, from its neighbour among others. Ene
 beyond the duration at which it is least, slower costs more of both.
 """
 
-import numpy as np
-
+from ir_kernels import portable
 from ir_planner.errors import RequestError
 from ir_planner.optimize import Descents
 from ir_planner.request import Context
@@ -45,7 +44,7 @@ def pareto_front(known: list[Movement], context: Context) -> tuple[Movement, ...
         descend(points[0], asked)
     ends = non_dominated(points)
     neighbour = ends[-1]
-    between = np.geomspace(ends[0].report.duration, ends[-1].report.duration, COUNT)[1:-1]
+    between = portable.geomspace(ends[0].report.duration, ends[-1].report.duration, COUNT)[1:-1]
     for duration in between[::-1] if len(ends) > 1 else ():  # slow movements lead to fast ones
         neighbour = descend(neighbour, context.asking("energy", float(duration))) or neighbour
     descend(neighbour, fastest)
