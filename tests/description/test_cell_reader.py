@@ -36,7 +36,6 @@ from ir_description import (
     load_cell,
     load_robot,
 )
-from ir_description.arrays import solid_box_inertia
 from ir_description.cell import ZONE_KINDS, StationSearch, station_at, zone_around
 from ir_description.poses import (
     abc_from_rotation,
@@ -47,6 +46,7 @@ from ir_description.poses import (
 )
 from ir_description.shapes import KINDS
 from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import solid_box_inertia
 
 ROBOT = load_robot()
 ROTATION_TOLERANCE = 1e-14  # a few roundings of a product of three matrices

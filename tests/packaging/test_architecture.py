@@ -12,12 +12,13 @@ import pytest
 SRC = Path(__file__).resolve().parents[2] / "src"
 
 BASE_KNOWS: dict[str, set[str]] = {
-    "ir_msgs_py": set(),
-    "ir_kernels": {"ir_msgs_py"},
-    "ir_description": {"ir_msgs_py", "ir_kernels"},
+    "ir_values": set(),
+    "ir_msgs_py": {"ir_values"},
+    "ir_kernels": {"ir_values", "ir_msgs_py"},
+    "ir_description": {"ir_values", "ir_msgs_py", "ir_kernels"},
 }
 BASE = set(BASE_KNOWS)
-LANGUAGE = {"ir_krl": {"ir_msgs_py", "ir_description"}}
+LANGUAGE = {"ir_krl": {"ir_values", "ir_msgs_py", "ir_description"}}
 ROOMS = {"ir_planner", "ir_sim_driver", "ir_program_runner", "ir_recorder"}
 KNOWS = {
     **BASE_KNOWS,
@@ -28,7 +29,7 @@ KNOWS = {
     "ir_cli": BASE | ROOMS | set(LANGUAGE) | {"ir_studies"},
 }
 PROJECT = set(KNOWS)
-CORE_READS_NO_CLOCK = {"ir_kernels", "ir_description", "ir_krl", "ir_planner"}
+CORE_READS_NO_CLOCK = {"ir_values", "ir_kernels", "ir_description", "ir_krl", "ir_planner"}
 
 
 def modules(package: str) -> list[Path]:

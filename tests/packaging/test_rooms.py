@@ -22,7 +22,7 @@ ROOMS = {
         "node",
     ),
     "ir_description": (
-        "errors", "arrays", "poses", "shapes", "robot", "cell", "files", "library",
+        "poses", "shapes", "robot", "cell", "files", "library",
         "cell_review",
     ),
     "ir_sim_driver": (

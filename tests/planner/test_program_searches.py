@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 
 from ir_description import Cell, PowerData, cell_from_yaml, cell_to_yaml, load_cell
-from ir_description.errors import DescriptionError
 from ir_kernels import Chain
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
@@ -35,6 +34,7 @@ from ir_planner.errors import RequestError
 from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
 from ir_planner.request.work import Work
 from ir_planner.service import ModifiedGa
+from ir_values.errors import DescriptionError
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 from _coal_shapes import along_z, solid

@@ -22,13 +22,6 @@ from ir_description.cell import (
     sweep_speeds,
 )
 from ir_description.cell_review import Finding, check_cell
-from ir_description.errors import (
-    CellFileError,
-    DescriptionError,
-    DescriptionFileError,
-    RobotFileError,
-    UnknownNameError,
-)
 from ir_description.files import (
     cell_hash,
     cell_to_yaml,
@@ -75,8 +68,15 @@ from ir_description.robot import (
     prior,
 )
 from ir_description.shapes import Body, Capsule
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.plc import Signal
+from ir_values.errors import (
+    CellFileError,
+    DescriptionError,
+    DescriptionFileError,
+    InvalidValueError,
+    RobotFileError,
+    UnknownNameError,
+)
 
 __all__ = [
     "AXIS_UNITS",

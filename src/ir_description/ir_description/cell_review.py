@@ -17,7 +17,7 @@ from ir_description.cell import AUTO, Cell, Zone
 from ir_description.poses import abc_from_rotation
 from ir_description.robot import PowerData
 from ir_description.shapes import Body, Capsule, capsule_distance, overlapping, point_distance
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 OVERLAPS_MAX = 1_000
 """Zones that overlap are named up to this many pairs."""

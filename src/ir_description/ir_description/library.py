@@ -26,13 +26,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ir_description.cell import Cell
-from ir_description.errors import (
-    CellFileError,
-    DescriptionError,
-    RobotFileError,
-    UnknownNameError,
-    shown,
-)
 from ir_description.files import (
     bundled_controller,
     cell_errors,
@@ -48,7 +41,14 @@ from ir_description.files import (
 )
 from ir_description.robot import DATA_SHEET, PowerData, PowerParameters, RobotModel, prior
 from ir_msgs_py.cartesian import CartesianPath
-from ir_msgs_py.errors import InvalidValueError
+from ir_values.errors import (
+    CellFileError,
+    DescriptionError,
+    InvalidValueError,
+    RobotFileError,
+    UnknownNameError,
+    shown,
+)
 
 _DATA = files("ir_description") / "data"
 

@@ -10,10 +10,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ir_description.arrays import frozen
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import InvalidValueError
+from ir_values.arrays import FloatArray, frozen
+from ir_values.errors import InvalidValueError
 
 QUATERNION_TOLERANCE = 1e-3
 """A quaternion this far from unit length is normalised, beyond it is refused."""
@@ -114,3 +113,9 @@ def rotation_from_matrix(rows: ArrayLike) -> FloatArray:
     for _ in range(_POLAR_STEPS):  # towards the nearest rotation (Higham 1986), quadratically
         R = 0.5 * (R + portable.inv(R).T)
     return R
+
+
+def transformed(pose: FloatArray, points: FloatArray) -> FloatArray:
+    """Return the points (N, 3) or (3,) moved by a pose (4, 4)."""
+    moved: FloatArray = portable.matmul(points, pose[:3, :3].T) + pose[:3, 3]
+    return moved

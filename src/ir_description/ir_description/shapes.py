@@ -11,10 +11,9 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from ir_description.arrays import frozen, frozen_pose, in_range, transformed
-from ir_description.poses import composed, pose_of
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import InvalidValueError
+from ir_description.poses import composed, pose_of, transformed
+from ir_values.arrays import FloatArray, frozen, frozen_pose, in_range
+from ir_values.errors import InvalidValueError
 
 BodyKind = Literal["box", "cylinder", "sphere", "capsule", "plane", "mesh"]
 KINDS: tuple[BodyKind, ...] = get_args(BodyKind)

@@ -6,21 +6,6 @@ Conversions to and from messages, the client for scripts and the test fixtures a
 """
 
 from ir_msgs_py.announcements import Event, ProgramState
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
-from ir_msgs_py.errors import (
-    CallTimedOutError,
-    ClientError,
-    InvalidValueError,
-    JointNamesError,
-    MessageTextError,
-    MsgsError,
-    ParameterError,
-    PoseError,
-    RequestRefusedError,
-    ServiceUnavailableError,
-    TrajectoryError,
-    UnknownTypeError,
-)
 from ir_msgs_py.modes import (
     MODES,
     REST_MODES,
@@ -53,9 +38,24 @@ from ir_msgs_py.report import (
     ServiceCandidate,
     TrajectoryReport,
 )
-from ir_msgs_py.settings import Setting, check_settings, describe, setting, settings_table
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory, Samples
+from ir_values.arrays import BoolArray, FloatArray, IntArray
+from ir_values.errors import (
+    CallTimedOutError,
+    ClientError,
+    InvalidValueError,
+    IrError,
+    JointNamesError,
+    MessageTextError,
+    ParameterError,
+    PoseError,
+    RequestRefusedError,
+    ServiceUnavailableError,
+    TrajectoryError,
+    UnknownTypeError,
+)
+from ir_values.settings import Setting, check_settings, describe, setting, settings_table
 
 __all__ = [
     "JOINT_NAMES",
@@ -73,13 +73,13 @@ __all__ = [
     "IkSolution",
     "IntArray",
     "InvalidValueError",
+    "IrError",
     "JointNamesError",
     "JointTrajectory",
     "MessageTextError",
     "Mode",
     "ModeRow",
     "MovementKind",
-    "MsgsError",
     "OperatingMode",
     "PairKind",
     "ParameterError",

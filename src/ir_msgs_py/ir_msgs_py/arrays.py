@@ -1,10 +1,5 @@
-"""The array types of the project, declared once: float64, int64 and bool. Shapes stand in
-docstrings.
-"""
+"""Forwards to ir_values.arrays until every package imports that."""
 
-import numpy as np
-import numpy.typing as npt
+from ir_values.arrays import BoolArray, FloatArray, IntArray
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
+__all__ = ["BoolArray", "FloatArray", "IntArray"]

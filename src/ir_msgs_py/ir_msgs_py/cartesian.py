@@ -10,9 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.checks import finite, one_of, read_only, set_field
-from ir_msgs_py.errors import InvalidValueError
+from ir_values.arrays import FloatArray, finite, one_of, read_only, set_field
+from ir_values.errors import InvalidValueError
 
 LINE = "line"
 CIRCLE = "circle"

@@ -13,10 +13,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.checks import at_least, finite, read_only, set_field
-from ir_msgs_py.errors import InvalidValueError
-from ir_msgs_py.settings import check_settings, setting
+from ir_values.arrays import FloatArray, at_least, finite, read_only, set_field
+from ir_values.errors import InvalidValueError
+from ir_values.settings import check_settings, setting
 
 
 class Mode(IntEnum):

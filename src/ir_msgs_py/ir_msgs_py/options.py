@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ir_msgs_py.checks import at_least, finite, in_fraction, one_of, set_field
-from ir_msgs_py.errors import InvalidValueError
+from ir_values.arrays import at_least, finite, in_fraction, one_of, set_field
+from ir_values.errors import InvalidValueError
 
 OBJECTIVES = ("movement_cost", "time", "energy", "time_and_energy")
 TIMINGS = ("synchronous", "asynchronous")

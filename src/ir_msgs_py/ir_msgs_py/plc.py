@@ -12,8 +12,8 @@ from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from typing import Any
 
-from ir_msgs_py.checks import one_of
-from ir_msgs_py.errors import InvalidValueError
+from ir_values.arrays import one_of
+from ir_values.errors import InvalidValueError
 
 
 class OperatingMode(IntEnum):

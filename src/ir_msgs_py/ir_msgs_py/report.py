@@ -11,11 +11,10 @@ from enum import StrEnum
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.checks import at_least, finite, not_nan, one_of, read_only, set_field
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.modes import modes_of
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_values.arrays import FloatArray, at_least, finite, not_nan, one_of, read_only, set_field
+from ir_values.errors import InvalidValueError
 
 
 class PairKind(StrEnum):

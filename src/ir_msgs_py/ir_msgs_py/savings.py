@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.checks import read_only, set_field
 from ir_msgs_py.report import PlannedMovement, TrajectoryReport
+from ir_values.arrays import FloatArray, read_only, set_field
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.report import PlanningStage
+from ir_values.arrays import FloatArray, IntArray
 
 LOG: Final = "log: "  # how the names of such stages begin
 _MM = 1e3

@@ -17,9 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ir_msgs_py.arrays import FloatArray, IntArray
-from ir_msgs_py.checks import set_field
-from ir_msgs_py.errors import JointNamesError, TrajectoryError
+from ir_values.arrays import FloatArray, IntArray, set_field
+from ir_values.errors import JointNamesError, TrajectoryError
 
 # Hermite polynomials between trajectory points. A quintic segment reproduces a cubic one exactly,
 # so planners of splines send one point per knot.

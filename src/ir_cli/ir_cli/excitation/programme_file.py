@@ -13,8 +13,8 @@ from ir_cli.excitation.programme import MODES, Programme, Step
 from ir_cli.offline.trace_file import read_trace, write_trace
 from ir_description import Cell, DescriptionError, DescriptionFileError, load_cell
 from ir_description.files import read_regular_file
-from ir_description.files.items import Item, read_items
 from ir_msgs_py.errors import InvalidValueError
+from ir_values.yaml_items import Item, read_items
 
 FORMAT = "ir_programme/1"
 FILE = "programme.yaml"

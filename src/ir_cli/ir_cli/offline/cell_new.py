@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ir_description import CellFileError, RobotModel, UnknownNameError, is_path, robot_named
-from ir_description.files.file_access import inside
+from ir_values.files import inside
 
 from ..errors import CommandError, InputError
 from ..suggestions import unknown_name

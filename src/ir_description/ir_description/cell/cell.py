@@ -12,7 +12,6 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from ir_description.arrays import frozen, frozen_pose
 from ir_description.cell.equipment import (
     AllowedContact,
     CellPath,
@@ -24,13 +23,12 @@ from ir_description.cell.equipment import (
     zone_around,
 )
 from ir_description.cell.program import POSTURES, CellSignal, PartPlaces, ProgramStep
-from ir_description.errors import UnknownNameError
 from ir_description.poses import composed, inverse
 from ir_description.robot import Load, RobotModel, total_mass
 from ir_description.shapes import Body, Capsule, floor_body
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import CartesianPath
-from ir_msgs_py.errors import InvalidValueError
+from ir_values.arrays import FloatArray, frozen, frozen_pose
+from ir_values.errors import InvalidValueError, UnknownNameError
 
 BODIES_MAX = 10_000
 """Most bodies a cell may have."""

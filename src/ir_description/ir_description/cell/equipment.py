@@ -9,14 +9,12 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from ir_description.arrays import frozen, frozen_pose, in_range
-from ir_description.errors import UnknownNameError
 from ir_description.poses import composed, pose_of
 from ir_description.robot import Load
 from ir_description.shapes import SIZE_MAX, Body
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import CartesianPath
-from ir_msgs_py.errors import InvalidValueError
+from ir_values.arrays import FloatArray, frozen, frozen_pose, in_range
+from ir_values.errors import InvalidValueError, UnknownNameError
 
 ZoneKind = Literal["OPEN", "SEMI_CLOSED", "CLOSED"]
 ZONE_KINDS: tuple[ZoneKind, ...] = get_args(ZoneKind)

@@ -13,11 +13,11 @@ from itertools import product
 
 import numpy as np
 
-from ir_description.arrays import transformed
 from ir_description.cell.cell import Cell
 from ir_description.cell.equipment import Equipment, EquipmentState
+from ir_description.poses import transformed
 from ir_description.shapes import Body
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 _CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
 

@@ -10,11 +10,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from ir_description.arrays import in_range
-from ir_description.errors import UnknownNameError
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.modes import REST_MODES
 from ir_msgs_py.plc import Signal
+from ir_values.arrays import in_range
+from ir_values.errors import InvalidValueError, UnknownNameError
 
 StepKind = Literal["STATION", "POSTURE", "PATH", "PAUSE"]
 POSTURES = ("home", "park")

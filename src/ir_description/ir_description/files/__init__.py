@@ -2,8 +2,6 @@
 
 from ir_description.files.cell_reader import cell_errors, read_cell
 from ir_description.files.cell_writer import cell_hash, cell_to_yaml
-from ir_description.files.file_access import is_path, is_utf16, read_regular_file, text_of
-from ir_description.files.plain_yaml import plain_yaml
 from ir_description.files.power_file import (
     bundled_controller,
     bundled_controllers,
@@ -21,6 +19,8 @@ from ir_description.files.robot_file import (
 )
 from ir_description.files.subject_lines import subject_line
 from ir_description.files.urdf import robot_urdf
+from ir_values.files import is_path, is_utf16, read_regular_file, text_of
+from ir_values.yaml_tree import plain_yaml
 
 __all__ = [
     "bundled_controller",

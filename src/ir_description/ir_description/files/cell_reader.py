@@ -33,8 +33,6 @@ from ir_description.cell import (
     check_switch,
     shape_register,
 )
-from ir_description.errors import CellFileError, RobotFileError, UnknownNameError
-from ir_description.files.all_errors import document_errors
 from ir_description.files.equipment_reader import (
     BodyReader,
     read_equipment,
@@ -42,9 +40,6 @@ from ir_description.files.equipment_reader import (
     read_pose,
     read_tool,
 )
-from ir_description.files.file_access import inside, is_path
-from ir_description.files.hints import other_angle_unit
-from ir_description.files.items import Item, Table, read_items
 from ir_description.files.program_reader import (
     PATHS_MAX,
     read_paths,
@@ -54,8 +49,11 @@ from ir_description.files.program_reader import (
 )
 from ir_description.files.robot_file import read_robot, robot_of
 from ir_description.robot import Load, RobotModel
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import InvalidValueError
+from ir_values.arrays import FloatArray
+from ir_values.errors import CellFileError, InvalidValueError, RobotFileError, UnknownNameError
+from ir_values.files import inside, is_path
+from ir_values.yaml_errors import document_errors
+from ir_values.yaml_items import Item, Table, read_items
 
 FORMAT = "ir_cell/1"
 RobotSource = Callable[[str], RobotModel]
@@ -292,7 +290,7 @@ class _CellReader:
             try:
                 check_posture(self._robot, posture, name)
             except InvalidValueError as error:
-                meant = other_angle_unit(key, values, self._robot)
+                meant = _other_angle_unit(key, values, self._robot)
                 raise InvalidValueError(f"{error}{meant}") from error
         return posture
 
@@ -321,3 +319,18 @@ def _pose(item: Item | None) -> FloatArray:
 def _body_names(equipment: tuple[Equipment, ...], parts: tuple[Part, ...]) -> set[str]:
     machines = {body.name for machine in equipment for body in machine.bodies}
     return machines | {body.name for part in parts for body in part.bodies} | {"floor"}
+
+
+def _other_angle_unit(key: str, values: FloatArray, robot: RobotModel) -> str:
+    """Whether joint values (n,) beyond the limits are meant in the other unit than that of
+    `key`.
+    """
+    degrees = key.endswith("_deg")
+    meant = values if degrees else np.radians(values)
+    if not ((meant >= robot.position_min) & (meant <= robot.position_max)).all():
+        return ""
+    name = key.removesuffix("_deg")
+    return (
+        f"; {key} is in {'degrees' if degrees else 'radians'}, write "
+        f"{name if degrees else f'{name}_deg'}?"
+    )

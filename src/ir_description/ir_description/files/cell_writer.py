@@ -26,8 +26,8 @@ from ir_description.files.program_reader import path_lines
 from ir_description.poses import abc_from_rotation, rotation_from_abc
 from ir_description.robot import Load
 from ir_description.shapes import Body, Capsule
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.plc import Signal
+from ir_values.arrays import FloatArray
 
 _DIGITS = 10
 _IDENTITY = np.eye(4)

@@ -20,8 +20,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from ir_description.files.mesh import HULL_VERTICES_MAX, open_edges
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
-from ir_msgs_py.errors import InvalidValueError
+from ir_values.arrays import BoolArray, FloatArray, IntArray
+from ir_values.errors import InvalidValueError
 
 # How far convex pieces stick out of the solid that they stand for: a bound, not a sample.
 # A triangle of a piece's surface is at most as far from the solid as its centre is, and its own

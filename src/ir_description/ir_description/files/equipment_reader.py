@@ -10,7 +10,6 @@ from typing import TypeVar
 
 import numpy as np
 
-from ir_description.arrays import solid_box_inertia
 from ir_description.cell import (
     APPROACH_MAX,
     BODIES_MAX,
@@ -32,7 +31,6 @@ from ir_description.cell import (
     station_at,
     zone_around,
 )
-from ir_description.files.items import Item, Table
 from ir_description.files.mesh import (
     CELL_TRIANGLES_MAX,
     CORNERS_MAX,
@@ -52,8 +50,9 @@ from ir_description.poses import (
 )
 from ir_description.robot import MASS_MAX, Load
 from ir_description.shapes import KINDS, SIZE_MAX, Body, Capsule
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import InvalidValueError
+from ir_values.arrays import FloatArray, solid_box_inertia
+from ir_values.errors import InvalidValueError
+from ir_values.yaml_items import Item, Table
 
 # Poses and bodies.
 

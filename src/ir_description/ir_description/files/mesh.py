@@ -8,11 +8,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from ir_description.arrays import frozen
-from ir_description.errors import shown
-from ir_description.files.file_access import read_regular_file
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import InvalidValueError
+from ir_values.arrays import FloatArray, frozen
+from ir_values.errors import InvalidValueError, shown
+from ir_values.files import read_regular_file
 
 BYTES_MAX = 20_000_000
 TRIANGLES_MAX = 200_000

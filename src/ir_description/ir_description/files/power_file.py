@@ -9,10 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ir_description.errors import RobotFileError, UnknownNameError
-from ir_description.files.file_access import inside, is_path, read_regular_file, text_of
-from ir_description.files.items import Item, Table, read_items
-from ir_description.files.yaml_tree import Node, Scalar, parse_yaml
 from ir_description.robot import (
     USUAL_LINK,
     ControllerMode,
@@ -25,8 +21,11 @@ from ir_description.robot import (
     parameter_unit,
     without_table,
 )
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import InvalidValueError
+from ir_values.arrays import FloatArray
+from ir_values.errors import InvalidValueError, RobotFileError, UnknownNameError
+from ir_values.files import inside, is_path, read_regular_file, text_of
+from ir_values.yaml_items import Item, Table, read_items
+from ir_values.yaml_tree import Node, Scalar, parse_yaml
 
 # The confidence mark of each figure of a robot or power file, by its place.
 

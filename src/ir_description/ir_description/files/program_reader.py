@@ -17,11 +17,8 @@ from ir_description.cell import (
     Task,
     check_posture,
 )
-from ir_description.errors import CellFileError
 from ir_description.files.equipment_reader import read_contact, read_pose
-from ir_description.files.items import Item, Table, read_items
 from ir_description.robot import RobotModel
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import (
     KINDS,
     LINE,
@@ -31,6 +28,9 @@ from ir_msgs_py.cartesian import (
     CartesianSegment,
 )
 from ir_msgs_py.plc import Signal
+from ir_values.arrays import FloatArray
+from ir_values.errors import CellFileError
+from ir_values.yaml_items import Item, Table, read_items
 
 _COMMON = ("wait_for", "set_signals")
 _STEP_KEYS = (

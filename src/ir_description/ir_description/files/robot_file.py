@@ -11,17 +11,16 @@ from pathlib import Path
 
 import numpy as np
 
-from ir_description.errors import RobotFileError
-from ir_description.files.all_errors import document_errors
-from ir_description.files.file_access import read_regular_file, text_of
-from ir_description.files.items import Item, Table, read_items
 from ir_description.files.power_file import controller_document, figure, marks_of, read_controller
-from ir_description.files.yaml_tree import Entry, Node, yaml_text
 from ir_description.poses import rotation_from_abc
 from ir_description.robot import Counterbalance, RobotModel, without_table
 from ir_description.shapes import Capsule
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import InvalidValueError
+from ir_values.arrays import FloatArray
+from ir_values.errors import InvalidValueError, RobotFileError
+from ir_values.files import read_regular_file, text_of
+from ir_values.yaml_errors import document_errors
+from ir_values.yaml_items import Item, Table, read_items
+from ir_values.yaml_tree import Entry, Node, yaml_text
 
 FORMAT = "ir_description/robot/1"
 BIG = 1e12

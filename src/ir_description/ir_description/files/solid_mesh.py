@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 
-from ir_description.errors import shown
 from ir_description.files.convex_pieces import (
     CONCAVITY,
     MARGINS,
@@ -28,8 +27,6 @@ from ir_description.files.convex_pieces import (
     contains,
     convex_pieces,
 )
-from ir_description.files.file_access import read_regular_file
-from ir_description.files.items import Table
 from ir_description.files.mesh import (
     BYTES_MAX,
     CELL_TRIANGLES_MAX,
@@ -37,8 +34,10 @@ from ir_description.files.mesh import (
     mesh_path,
     triangles_from_stl,
 )
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import InvalidValueError
+from ir_values.arrays import FloatArray
+from ir_values.errors import InvalidValueError, shown
+from ir_values.files import read_regular_file
+from ir_values.yaml_items import Table
 
 SUFFIXES = (".stl", ".obj", ".glb", ".gltf")
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "inch": 0.0254}

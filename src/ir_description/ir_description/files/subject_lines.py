@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from ir_description.errors import CellFileError
-from ir_description.files.yaml_tree import Node, Scalar, parse_yaml
+from ir_values.errors import CellFileError
+from ir_values.yaml_tree import Node, Scalar, parse_yaml
 
 _STEP = re.compile(r"step (\d+)$")
 _KEYS = ("program", "base", "tcp", "home_deg", "home", "park_deg", "park")

@@ -19,8 +19,8 @@ import numpy as np
 from ir_description.poses import abc_from_rotation
 from ir_description.robot import Load, RobotModel
 from ir_description.shapes import Capsule
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import WORLD_FRAME
+from ir_values.arrays import FloatArray
 
 FRAME_MASS = 1e-9
 """Mass [kg] of a link that is only a frame: some simulators take a missing mass for 1 kg."""

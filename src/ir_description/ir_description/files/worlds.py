@@ -15,14 +15,13 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from ir_description.cell import Cell, Equipment, NameRegister
-from ir_description.errors import shown
-from ir_description.files.file_access import read_regular_file
 from ir_description.files.mesh import is_closed
 from ir_description.files.solid_mesh import PIECES, piece_names, pieces_of, read_solid
 from ir_description.poses import abc_from_rotation, composed, pose_of, rotation_from_abc
 from ir_description.shapes import Body
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import InvalidValueError
+from ir_values.arrays import FloatArray
+from ir_values.errors import InvalidValueError, shown
+from ir_values.files import read_regular_file
 
 BYTES_MAX = 8_000_000
 BODIES_MAX = 10_000

@@ -7,9 +7,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from ir_description.arrays import in_range
-from ir_description.errors import UnknownNameError
-from ir_msgs_py.errors import InvalidValueError
+from ir_values.arrays import in_range
+from ir_values.errors import InvalidValueError, UnknownNameError
 
 
 @dataclass(frozen=True)

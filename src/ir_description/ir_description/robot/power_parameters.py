@@ -13,12 +13,10 @@ from functools import cached_property
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from ir_description.arrays import frozen
-from ir_description.errors import UnknownNameError
 from ir_description.robot.power import PowerData
 from ir_description.robot.robot import Load, RobotModel
-from ir_msgs_py.arrays import BoolArray, FloatArray
-from ir_msgs_py.errors import InvalidValueError
+from ir_values.arrays import BoolArray, FloatArray, frozen
+from ir_values.errors import InvalidValueError, UnknownNameError
 
 # Draws of a normal distribution that physics cuts off: correlations hold at the bounds too.
 #

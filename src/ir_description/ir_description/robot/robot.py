@@ -11,12 +11,12 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ir_description.arrays import frozen, frozen_inertia, frozen_pose, in_range, transformed
+from ir_description.poses import transformed
 from ir_description.robot.power import PowerData, without_table
 from ir_description.shapes import Capsule
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.names import WORLD_FRAME
+from ir_values.arrays import FloatArray, frozen, frozen_inertia, frozen_pose, in_range
+from ir_values.errors import InvalidValueError
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,8 +26,6 @@ from rclpy.task import Future
 from ir_msgs.action import ExecuteTrajectory, Plan, RunProgram
 from ir_msgs.srv import GetTrajectory, OptimizeTrajectory, PlanRegionalMovement, SetCell
 from ir_msgs_py import names
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import CallTimedOutError, RequestRefusedError, ServiceUnavailableError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement, PlanningInfo, TrajectoryReport
 from ir_msgs_py.ros.conversions import (
@@ -51,6 +49,8 @@ from ir_msgs_py.ros.topics import ACTION_SERVICES, SERVICE
 from ir_msgs_py.savings import ProgramPoint, ProgramSavings
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_values.arrays import FloatArray
+from ir_values.errors import CallTimedOutError, RequestRefusedError, ServiceUnavailableError
 
 _DEPTH = 100
 _OWN = "ir_msgs/"

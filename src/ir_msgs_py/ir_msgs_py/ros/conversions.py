@@ -18,12 +18,17 @@ from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from ir_msgs.msg import Status as StatusMsg
-from ir_msgs_py.arrays import FloatArray, IntArray
-from ir_msgs_py.checks import one_line, read_only
-from ir_msgs_py.errors import InvalidValueError, JointNamesError, PoseError, TrajectoryError
 from ir_msgs_py.names import WORLD_FRAME
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_values.arrays import FloatArray, IntArray, read_only
+from ir_values.errors import (
+    InvalidValueError,
+    JointNamesError,
+    PoseError,
+    TrajectoryError,
+    one_line,
+)
 
 NS_PER_S = 1_000_000_000
 

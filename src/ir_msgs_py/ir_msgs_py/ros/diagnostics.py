@@ -12,8 +12,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 from ir_msgs_py import names
-from ir_msgs_py.checks import one_line
 from ir_msgs_py.names import diagnostic_name
+from ir_values.errors import one_line
 
 OK, WARN, ERROR = (
     int(level[0]) for level in (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR)

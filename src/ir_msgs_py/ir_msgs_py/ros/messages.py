@@ -22,7 +22,7 @@ from rosidl_parser.definition import (
     NamespacedType,
 )
 
-from ir_msgs_py.errors import MessageTextError, UnknownTypeError
+from ir_values.errors import MessageTextError, UnknownTypeError
 
 _KINDS = ("msg", "srv", "action")
 

@@ -19,7 +19,7 @@ import sys
 from collections.abc import Mapping, MutableMapping
 from importlib.resources import files
 
-from ir_msgs_py.errors import ParameterError
+from ir_values.errors import ParameterError
 
 VARIABLE = "IR_NETWORK"
 CHOICES = ("loopback", "secure", "insecure")

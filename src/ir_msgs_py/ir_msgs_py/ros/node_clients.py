@@ -23,7 +23,6 @@ from ir_msgs.srv import GetProgram, GetTrajectory, QueryModes
 from ir_msgs.srv import SetLoad as SetLoadSrv
 from ir_msgs.srv import SetPlcInput as SetPlcInputSrv
 from ir_msgs_py.announcements import ControllerTimers
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.modes import OFF_THE_NETWORK, Mode, PowerMode
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.conversions import status_from_msg, trajectory_from_msg, trajectory_to_msg
@@ -33,6 +32,7 @@ from ir_msgs_py.ros.topics import ACTION_SERVICES, LATCHED, SERVICE, LatestMessa
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_values.errors import InvalidValueError
 
 _UNSEEN = 1.5
 """s without a look at the meter: nodes look once a second at least, so that this process was

@@ -26,11 +26,10 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
-from ir_msgs_py.checks import one_line
-from ir_msgs_py.errors import ParameterError
 from ir_msgs_py.ros.network import apply_network
 from ir_msgs_py.ros.rclpy_inside import UNREADABLE_ARGUMENTS, heed_times_only, survive_clients
 from ir_msgs_py.ros.spinning import LOOK, Spinning
+from ir_values.errors import ParameterError, one_line
 
 N = TypeVar("N", bound=Node)
 FAILURES_MAX = 50

@@ -23,10 +23,9 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ir_msgs_py.checks import one_line
-from ir_msgs_py.errors import MsgsError, ParameterError
 from ir_msgs_py.ros.serving import ANY
-from ir_msgs_py.settings import Setting, changed, tree
+from ir_values.errors import IrError, ParameterError, one_line
+from ir_values.settings import Setting, changed, tree
 
 PACKAGE = "rcl_interfaces"
 Callback = Callable[[Any, Any], Any]
@@ -160,7 +159,7 @@ class Parameters(Generic[T]):
         try:
             self._check(changes.items())
             changed(self._value, changes)
-        except (MsgsError, ValueError) as error:
+        except (IrError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 

@@ -24,7 +24,6 @@ from ir_msgs.msg import Saving as SavingMsg
 from ir_msgs.msg import ServiceCandidate as ServiceCandidateMsg
 from ir_msgs.msg import TrajectoryReport as TrajectoryReportMsg
 from ir_msgs_py.announcements import Contact, MachineState
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import (
     DistancePair,
@@ -49,6 +48,7 @@ from ir_msgs_py.ros.conversions import (
     trajectory_to_msg,
 )
 from ir_msgs_py.savings import ProgramPoint, ProgramSavings, Saving
+from ir_values.errors import InvalidValueError
 
 _REPORT_NUMBERS = (
     "duration",

@@ -18,7 +18,6 @@ from ir_msgs.msg import PowerState as PowerStateMsg
 from ir_msgs.msg import ProgramState as ProgramStateMsg
 from ir_msgs.msg import Signal as SignalMsg
 from ir_msgs_py.announcements import CarriedLoad, CellState, ControllerTimers, ProgramState
-from ir_msgs_py.errors import InvalidValueError, ParameterError
 from ir_msgs_py.modes import (
     AXES,
     METER,
@@ -39,6 +38,7 @@ from ir_msgs_py.ros.conversions import (
     time_to_msg,
 )
 from ir_msgs_py.ros.plan_conversions import planned_movement_from_msg, planned_movement_to_msg
+from ir_values.errors import InvalidValueError, ParameterError
 
 _POWER_MODE = tuple(field.name for field in fields(PowerMode))
 _INPUTS = tuple(field.name for field in fields(PlcInputs))

@@ -14,7 +14,6 @@ import yaml
 
 from ir_description import DescriptionFileError, InvalidValueError, PowerData, RobotModel, is_path
 from ir_description.files import read_regular_file
-from ir_description.files.items import Item, read_items
 from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.plant.plant_parameters import (
@@ -26,6 +25,7 @@ from ir_sim_driver.plant.plant_parameters import (
     StandingWatts,
     nominal_plant,
 )
+from ir_values.yaml_items import Item, read_items
 
 # Typical plants: figures drawn by seed, spread as far as the data's marks of confidence say.
 #

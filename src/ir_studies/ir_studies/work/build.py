@@ -22,7 +22,7 @@ from ir_description import load_robot
 from ir_kernels import Chain, DynamicsModel, compiled
 
 PACKAGES = (
-    "ir_description", "ir_kernels", "ir_krl", "ir_msgs_py", "ir_planner", "ir_recorder", "ir_sim_driver",  # noqa: E501
+    "ir_description", "ir_kernels", "ir_krl", "ir_msgs_py", "ir_planner", "ir_recorder", "ir_sim_driver", "ir_values",  # noqa: E501
     "ir_studies",
 )  # fmt: skip
 _WITH_OMPL = "arena"  # the kind of study that asks OMPL's planners

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 _CUTS = (0.2, 0.35, 0.5, 0.65, 0.8)  # of the length
 _WORTH = 0.85  # of the volume: below it two capsules are worth their pairs

@@ -11,15 +11,15 @@ from importlib.resources import files
 
 import numpy as np
 
-from ir_description.errors import RobotFileError
-from ir_description.files.items import Item, Table, read_items
 from ir_description.files.making.urdf_arm import AXES, UrdfArm
 from ir_description.files.power_file import figure
 from ir_description.files.robot_file import FORMAT
-from ir_description.files.yaml_tree import Node, yaml_text
 from ir_description.poses import abc_from_rotation
 from ir_description.shapes import Capsule
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
+from ir_values.errors import RobotFileError
+from ir_values.yaml_items import Item, Table, read_items
+from ir_values.yaml_tree import Node, yaml_text
 
 # The sheet of drive figures beside a URDF: what a URDF does not say, each known, or estimated and
 # marked so. The estimates are the proportions of the KR 210 R2700 extra, whose drives are known:

@@ -12,11 +12,11 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from ir_description.errors import RobotFileError, listed, shown
 from ir_description.files.robot_file import inertia_matrix
 from ir_description.poses import rotation_from_abc
 from ir_description.robot import TOOL0
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
+from ir_values.errors import RobotFileError, listed, shown
 
 # The part of URDF that says how an arm is built: links with masses and shapes, joints with limits.
 

@@ -10,11 +10,13 @@ import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TypeAlias
+from pathlib import Path
+from typing import Any, TypeAlias
 
 import yaml
 
-from ir_description.errors import DescriptionFileError, shown
+from ir_values.errors import DescriptionFileError, shown
+from ir_values.files import read_regular_file
 
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
@@ -222,3 +224,17 @@ def _flow(node: Node) -> str:
     if isinstance(content, list):
         return f"[{', '.join(map(_flow, content))}]"
     return f"{{{', '.join(f'{key}: {_flow(entry.node)}' for key, entry in content.items())}}}"
+
+
+BYTES_MAX = 100_000
+"""Size of a settings file."""
+
+
+def plain_yaml(path: Path) -> Any:
+    """What the only document of a file holds. DescriptionFileError with path and line."""
+    text = read_regular_file(path, BYTES_MAX).decode("utf-8", "replace")
+    parse_yaml(text, str(path), DescriptionFileError)
+    try:
+        return yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError) as error:  # ValueError: 2026-99-99 as a date
+        raise DescriptionFileError(str(path), 0, " ".join(str(error).split())[:200]) from error

@@ -15,17 +15,41 @@ from typing import NoReturn
 
 import numpy as np
 
-from ir_description.errors import DescriptionFileError, UnknownNameError, listed, shown
-from ir_description.files.hints import decimal_comma, in_thousandths
-from ir_description.files.yaml_tree import Node, Scalar, parse_yaml
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import InvalidValueError
+from ir_values.arrays import FloatArray
+from ir_values.errors import (
+    DescriptionFileError,
+    InvalidValueError,
+    UnknownNameError,
+    listed,
+    shown,
+)
+from ir_values.yaml_tree import Node, Scalar, parse_yaml
 
 NAME_LENGTH = 64
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.\-]*")
 _INTEGER = re.compile(r"[-+]?(0x[0-9A-Fa-f]{1,8}|[0-9]{1,18})")
 _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]{1,3})?")
 _NOT_FINITE = re.compile(r"[-+]?\.?(nan|inf|infinity)", re.IGNORECASE)
+
+
+_THOUSANDTHS = {"m": ("lengths", "mm"), "kg": ("masses", "g")}
+
+
+def in_thousandths(value: float, low: float, high: float, unit: str) -> str:
+    """Whether a value out of bounds is in mm or g: "; lengths are in m, is it 1.2?", "" where it is
+    not.
+    """
+    meant = value / 1000.0
+    if unit not in _THOUSANDTHS or value == 0.0 or not low <= meant <= high:
+        return ""
+    return (
+        f"; {_THOUSANDTHS[unit][0]} are in {unit}: {meant:g} for {value:g} {_THOUSANDTHS[unit][1]}?"
+    )
+
+
+def decimal_comma(key: str) -> str:
+    """What an unknown key of digits comes from."""
+    return "; a decimal comma? decimals have a point" if key.isdigit() else ""
 
 
 def read_items(text: str, source: str, error: type[DescriptionFileError]) -> Item:

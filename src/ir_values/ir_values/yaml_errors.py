@@ -11,9 +11,9 @@ import re
 from collections.abc import Callable, Iterator
 from typing import TypeVar
 
-from ir_description.errors import DescriptionFileError
-from ir_description.files.items import Item
-from ir_description.files.yaml_tree import Node, Scalar, parse_yaml
+from ir_values.errors import DescriptionFileError
+from ir_values.yaml_items import Item
+from ir_values.yaml_tree import Node, Scalar, parse_yaml
 
 ERRORS_MAX = 100
 """Errors of one file; after so many the rest is not looked for."""
