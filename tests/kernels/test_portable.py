@@ -113,6 +113,12 @@ def test_singular_values_and_least_squares_are_those_of_numpy() -> None:
     assert wide.shape == (9, 1)
 
 
+def test_a_symmetric_matrix_has_a_root() -> None:
+    A = rng.uniform(-1.0, 1.0, (5, 3))
+    root = portable.symmetric_root(A @ A.T)
+    assert np.abs(root @ root.T - A @ A.T).max() < 1e-14
+
+
 def test_a_banded_matrix_is_solved_and_one_that_is_not_positive_definite_refused() -> None:
     bands = np.vstack([np.full(30, 0.1), np.full(30, 0.3), np.full(30, 2.0)])
     right = rng.uniform(-1.0, 1.0, (30, 4))

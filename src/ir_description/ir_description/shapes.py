@@ -90,7 +90,9 @@ class Body:
         else:
             axis = np.abs(R[:, 2])
             side = (
-                np.sqrt(np.maximum(0.0, 1.0 - axis**2)) if self.kind == "cylinder" else np.ones(3)
+                np.sqrt(np.maximum(0.0, 1.0 - axis * axis))
+                if self.kind == "cylinder"
+                else np.ones(3)
             )
             reach = axis * self.size[1] / 2.0 + side * self.size[0]
         return centre - reach, centre + reach

@@ -234,19 +234,23 @@ inline double without_turns(double x) {
   return static_cast<double>(std::fmod(static_cast<long double>(x), turn));
 }
 
-// Of `n` angles; lanes that are out of reach of the reduction lose their whole turns first.
+// Lanes that are out of reach of the reduction lose their whole turns first.
+template <class V> __attribute__((noinline, cold)) void sincos_far(int n, const V* x, V* s, V* c) {
+  for (int i = 0; i < n; ++i) {
+    V near = x[i];
+    for (int k = 0; k < Lanes<V>::width; ++k)
+      if (!(std::fabs(near[k]) <= reducible<V>)) near[k] = static_cast<Scalar<V>>(without_turns(near[k]));
+    sincos_reducible(near, s[i], c[i]);
+  }
+}
+
+// Of `n` angles.
 template <int known_n = 0, class V> IR_INLINE void sincos(int n, const V* x, V* s, V* c) {
   if (known_n) n = known_n;
   V squares{};
   for (int i = 0; i < n; ++i) squares += x[i] * x[i];
-  const bool far = any(squares > reducible<V> * reducible<V>);
-  for (int i = 0; i < n; ++i) {
-    V near = x[i];
-    if (__builtin_expect(far, 0))
-      for (int k = 0; k < Lanes<V>::width; ++k)
-        if (!(std::fabs(near[k]) <= reducible<V>)) near[k] = static_cast<Scalar<V>>(without_turns(near[k]));
-    sincos_reducible(near, s[i], c[i]);
-  }
+  if (__builtin_expect(any(squares > reducible<V> * reducible<V>), 0)) return sincos_far(n, x, s, c);
+  for (int i = 0; i < n; ++i) sincos_reducible(x[i], s[i], c[i]);
 }
 
 }  // namespace ir

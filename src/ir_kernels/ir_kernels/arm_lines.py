@@ -74,7 +74,7 @@ def _feet(
     """Nearest points of the lines a + s u and b + t v; a and b where these are parallel."""
     normal = np.cross(u, v)
     square = float(portable.matmul(normal, normal))
-    if square < PARALLEL**2:
+    if square < PARALLEL * PARALLEL:
         return a, b
     s = portable.matmul(np.cross(b - a, v), normal) / square
     t = portable.matmul(np.cross(b - a, u), normal) / square

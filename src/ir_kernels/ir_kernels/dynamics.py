@@ -148,7 +148,7 @@ class DynamicsModel:
         d = self.data
         inverter = d.inverter_loss / np.abs(d.gear_ratio)
         by_torque = torque * (inverter + d.gear_loss * np.abs(speed))
-        return np.asarray(d.iron_loss * speed**2 + by_torque + d.idle_loss)
+        return np.asarray(d.iron_loss * (speed * speed) + by_torque + d.idle_loss)
 
     def drive_power(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> FloatArray:
         """Power (N, n) W each axis takes from the DC bus along a motion: `axis_power` of

@@ -97,8 +97,9 @@ def solve(matrices: FloatArray, right: FloatArray) -> FloatArray:
     outer = np.broadcast_shapes(matrices.shape[:-2], columns.shape[:-2])
     left = np.broadcast_to(matrices, (*outer, *matrices.shape[-2:]))
     columns = np.broadcast_to(columns, (*outer, *columns.shape[-2:]))
+    count = int(np.prod(outer))
     found = _CORE.solve(
-        left.reshape(-1, *left.shape[-2:]), columns.reshape(-1, *columns.shape[-2:])
+        left.reshape(count, *left.shape[-2:]), columns.reshape(count, *columns.shape[-2:])
     )
     if found is None:
         raise np.linalg.LinAlgError("Singular matrix")
@@ -117,6 +118,17 @@ def singular_values(matrix: FloatArray) -> FloatArray:
         values = np.linalg.svd(matrix, compute_uv=False)
         return np.append(values, np.zeros(matrix.shape[1] - len(values)))
     return cast(FloatArray, _CORE.svd(matrix)[1])
+
+
+def symmetric_root(matrix: FloatArray) -> FloatArray:
+    """R (n, n) with R R^T = M for a symmetric M whose eigenvalues are not negative; columns in the
+    order of rising eigenvalues.
+    """
+    if _CORE is None:
+        values, vectors = np.linalg.eigh(matrix)
+        return cast(FloatArray, vectors * np.sqrt(np.maximum(values, 0.0)))
+    _, values, v = _CORE.svd(matrix)
+    return np.ascontiguousarray((v * np.sqrt(values))[:, np.argsort(values, kind="stable")])
 
 
 def least_squares(matrix: FloatArray, right: FloatArray) -> FloatArray:

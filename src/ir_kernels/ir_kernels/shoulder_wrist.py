@@ -143,7 +143,7 @@ def _unit_roots(A: FloatArray, a: FloatArray, det: FloatArray) -> FloatArray:
     sizes = (p * p).sum(axis=1)
     square = np.stack([sizes[:, 0] - sizes[:, 1], 2.0 * (p[:, :, 0] * p[:, :, 1]).sum(axis=1)], 1)
     mixed = 2.0 * (p * a[:, :, None]).sum(axis=1)
-    middle = 2.0 * sizes.sum(axis=1) + (a * a).sum(axis=1) - det**2
+    middle = 2.0 * sizes.sum(axis=1) + (a * a).sum(axis=1) - det * det
     centre = np.stack([middle, np.zeros_like(middle)], axis=1)
     conjugate = np.array([1.0, -1.0])
     rows = np.stack([square, mixed, centre, mixed * conjugate, square * conjugate], axis=1)

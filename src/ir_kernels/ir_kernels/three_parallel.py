@@ -114,7 +114,7 @@ class ThreeParallelIk:
         upper_x, upper_y, a = planar(o[2] - o[1])
         fore_x, fore_y, b = planar(o[3] - o[2])
         aim_x, aim_y, distance = planar(target)
-        cosine = (distance**2 - a**2 - b**2) / (2.0 * a * b)
+        cosine = (distance * distance - a * a - b * b) / (2.0 * a * b)
         bend = portable.arccos(np.clip(cosine, -1.0, 1.0)) * (-1.0 if other else 1.0)
         opening = (upper_x * fore_y - upper_y * fore_x, upper_x * fore_x + upper_y * fore_y)
         turn = bend - portable.arctan2(*opening)

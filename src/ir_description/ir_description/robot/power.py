@@ -59,7 +59,11 @@ class DcLink:
     @property
     def capacity_energy(self) -> float:
         """Energy [J] the capacitors take between the rectified mains and the brake chopper."""
-        return 0.5 * self.capacitance * (self.chopper_on**2 - self.voltage**2)
+        return (
+            0.5
+            * self.capacitance
+            * (self.chopper_on * self.chopper_on - self.voltage * self.voltage)
+        )
 
 
 @dataclass(frozen=True)

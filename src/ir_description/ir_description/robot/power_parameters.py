@@ -400,7 +400,7 @@ def prior(robot: RobotModel, power: PowerData, marks: Marks) -> PowerParameters:
         joints=joints,
         modes=modes,
         mean=mean,
-        covariance=np.diag(deviation**2),
+        covariance=np.diag(deviation * deviation),
         sources=tuple(f"data {mark}" if mark else "assumed" for mark in known),
     )
 

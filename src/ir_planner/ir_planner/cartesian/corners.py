@@ -95,7 +95,7 @@ def _left_by(before: Part, after: Part, radius: float) -> tuple[float, float]:
         after.turning.at(np.maximum(u, 0.0)),
     )
     bends = max(before.places.curvature, after.places.curvature) + joint_bend(before, after, radius)
-    between = bends * (u[1] - u[0]) ** 2 / 8.0
+    between = bends * np.square(u[1] - u[0]) / 8.0
     return _largest(place - exact) + between, _turn(asked, turned)
 
 

@@ -49,7 +49,7 @@ def with_speed(
     a1 = a[:, None]
     j1 = j[:, None]
     qd = first * v1
-    qdd = second * v1**2 + first * a1
+    qdd = second * (v1 * v1) + first * a1
     qddd = third * portable.power(v1, 3) + 3.0 * second * v1 * a1 + first * j1
     return Driven(t, s, v, q, qd, qdd, qddd)
 

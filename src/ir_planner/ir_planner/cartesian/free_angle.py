@@ -142,7 +142,7 @@ def _rates(chain: Chain, scene: PlanningScene) -> tuple[FloatArray, FloatArray]:
 
 def _cost(chain: Chain, scene: PlanningScene) -> float:
     moves, bends = _rates(chain, scene)
-    return float((moves**2).sum() + (bends**2).sum())
+    return float((moves * moves).sum() + (bends * bends).sum())
 
 
 def _step(problem: _Problem, control: FloatArray, chain: Chain) -> FloatArray:

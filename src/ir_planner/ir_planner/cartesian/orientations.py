@@ -54,7 +54,7 @@ class Evenly:
     def rates(self) -> "Rates":
         """How fast it turns."""
         rate = float(portable.norm(self.turn)) / self.length
-        return Rates(rate, rate**2)
+        return Rates(rate, rate * rate)
 
 
 class ThroughPoses:
@@ -78,17 +78,17 @@ class ThroughPoses:
         cubic, square, line = self._spline.cubics[:3]
         h = np.diff(self._spline.x)[:, None]
         second = [2.0 * square, 2.0 * square + 6.0 * cubic * h]
-        first = [line, line + 2.0 * square * h + 3.0 * cubic * h**2]
+        first = [line, line + 2.0 * square * h + 3.0 * cubic * (h * h)]
         bulge = h[:, 0] ** 2 / 8.0 * np.linalg.norm(6.0 * cubic, axis=1)
         rate = np.max([np.linalg.norm(one, axis=1) for one in first], axis=0) + bulge
         bend = np.max([np.linalg.norm(one, axis=1) for one in second], axis=0)
-        return Rates(float(rate.max()), float((bend + 1.5 * rate**2).max()))
+        return Rates(float(rate.max()), float((bend + 1.5 * (rate * rate)).max()))
 
 
 def rates_of(angle: BSpline) -> Rates:
     """Of turning about one axis by a spline, by the hulls of its derivatives' control points."""
     first, second = (float(np.abs(angle.derivative(nu).c).max()) for nu in (1, 2))
-    return Rates(first, second + first**2)
+    return Rates(first, second + first * first)
 
 
 def turn_between(first: FloatArray, second: FloatArray) -> float:

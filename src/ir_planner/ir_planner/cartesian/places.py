@@ -133,7 +133,7 @@ def arc_through(
     normal = np.cross(a, b)
     size = float(portable.matmul(normal, normal))
     nearest = min(float(portable.matmul(a, a)), float(portable.matmul(b, b)))
-    if nearest < STRAIGHT**2 or size < (STRAIGHT * float(portable.norm(b))) ** 2:
+    if nearest < STRAIGHT * STRAIGHT or size < np.square(STRAIGHT * portable.norm(b)):
         return None
     centre = start + np.cross(
         float(portable.matmul(a, a)) * b - float(portable.matmul(b, b)) * a, normal
@@ -179,7 +179,7 @@ class Through:
         least = np.minimum(speed[1:], speed[:-1]) - 0.5 * bent * np.diff(u)
         if least.min() <= 0.0:
             return np.inf
-        return float((bent / least**2).max())
+        return float((bent / (least * least)).max())
 
     def at(self, s: FloatArray) -> FloatArray:
         """Places (M, 3) m at s (M,)."""

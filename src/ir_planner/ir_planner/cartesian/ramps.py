@@ -90,10 +90,10 @@ def _ramps_use(
     x = np.linspace(0.0, 1.0, PER_RAMP)
     T = durations[:, None]
     rise = last - first
-    s = curve.begin + begin[:, None] + T * x * (first + rise * x**2 * (1.0 - 0.5 * x))
-    v = np.broadcast_to(first + rise * x**2 * (3.0 - 2.0 * x), s.shape)
+    s = curve.begin + begin[:, None] + T * x * (first + rise * (x * x) * (1.0 - 0.5 * x))
+    v = np.broadcast_to(first + rise * (x * x) * (3.0 - 2.0 * x), s.shape)
     a = rise / T * 6.0 * x * (1.0 - x)
-    j = rise / T**2 * (6.0 - 12.0 * x)
+    j = rise / (T * T) * (6.0 - 12.0 * x)
     none = np.zeros(s.size)
     places = s.ravel()
     even = np.full(s.size, max(first, last))

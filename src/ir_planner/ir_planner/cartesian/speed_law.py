@@ -68,7 +68,7 @@ class SpeedLaw:
         x = np.clip((t - self.times[k]) / T, 0.0, 1.0)
         s = self.places[k] + T * x * (v + dv * x * x * (1.0 - 0.5 * x))
         speed = v + dv * x * x * (3.0 - 2.0 * x)
-        return s, speed, dv / T * 6.0 * x * (1.0 - x), dv / T**2 * (6.0 - 12.0 * x)
+        return s, speed, dv / T * 6.0 * x * (1.0 - x), dv / (T * T) * (6.0 - 12.0 * x)
 
 
 def law_of(spans: tuple[Span, ...], ramps: FloatArray) -> SpeedLaw:

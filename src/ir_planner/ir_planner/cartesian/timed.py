@@ -68,16 +68,16 @@ class TimedStroke:
         if self.slowness is not None and self._longer is not None:
             t = self._longer(tau) - self._longer(0.0)
             g = 1.0 / self.slowness(tau)
-            g1 = -self.slowness(tau, nu=1) * g**2  # by tau
-            g2 = -self.slowness(tau, nu=2) * g**2 + 2.0 * self.slowness(
+            g1 = -self.slowness(tau, nu=1) * (g * g)  # by tau
+            g2 = -self.slowness(tau, nu=2) * (g * g) + 2.0 * self.slowness(
                 tau, nu=1
             ) ** 2 * portable.power(g, 3)
             first = g
             second = g * g1
-            third = g * g1**2 + g**2 * g2
+            third = g * (g1 * g1) + (g * g) * g2
             v, a, j = (
                 v * first,
-                a * first**2 + v * second,
+                a * (first * first) + v * second,
                 j * portable.power(first, 3) + 3.0 * a * first * second + v * third,
             )
         return driven(self.curve, t, self.curve.begin + s, v, a, j)

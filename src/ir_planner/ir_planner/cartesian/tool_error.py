@@ -124,12 +124,12 @@ class _Stroke:
         first, second = self.path.turns(u)
         h = np.diff(u)
         if self.angle is None:
-            return np.asarray(h**2 / 8.0 * second)
+            return np.asarray((h * h) / 8.0 * second)
         rates = self.angle.rates
         bends = self.path.bends(u)
         second = second + rates.second + rates.first * bends + 2.0 * first * rates.first
         kinks = 0.0 if self.angle.smooth else rates.first * h / 2.0
-        return np.asarray(h**2 / 8.0 * second + kinks)
+        return np.asarray((h * h) / 8.0 * second + kinks)
 
     def _off(self, tau: FloatArray, velocity: FloatArray, sags: FloatArray) -> float:
         """The share that velocity (M, 3) m/s at tau (M,) s is off the speed where that is to be

@@ -54,7 +54,7 @@ def tool_motion(trajectory: JointTrajectory, scene: PlanningScene) -> ToolMotion
 
     return ToolMotion(
         trajectory.times,
-        outermost(a + v**2),
+        outermost(a + v * v),
         outermost(j + 3.0 * a * v + portable.power(v, 3)),
         np.asarray(a[:, -1] + v[:, -1] ** 2),
     )

@@ -57,7 +57,9 @@ def energy_and_slope(at: Sampled, scene: PlanningScene) -> tuple[float, FloatArr
     energy = _drawn(bus, at.dt) / efficiency + scene.base_watts * at.span
     price = _price(power, bus, scene) * (at.dt / efficiency)
     slope = _axis_slope(_States(at.motion, torque, price), scene)
-    slope[scene.parameters.index("rectifier_efficiency")] = -_drawn(bus, at.dt) / efficiency**2
+    slope[scene.parameters.index("rectifier_efficiency")] = -_drawn(bus, at.dt) / (
+        efficiency * efficiency
+    )
     return energy, slope + standing_slope(at.span, scene)
 
 
@@ -82,7 +84,7 @@ def holding_slope(q: FloatArray, scene: PlanningScene) -> FloatArray:
     efficiency = scene.drives.rectifier_efficiency
     slope = _axis_slope(_States(motion, torque, np.full((1, len(q)), 1.0 / efficiency)), scene)
     drawn = float(scene.dynamics.axis_power(rest, torque).sum())
-    slope[scene.parameters.index("rectifier_efficiency")] = -drawn / efficiency**2
+    slope[scene.parameters.index("rectifier_efficiency")] = -drawn / (efficiency * efficiency)
     return slope + standing_slope(1.0, scene)
 
 
@@ -130,14 +132,14 @@ def _axis_slope(at: _States, scene: PlanningScene) -> FloatArray:
     ratio = np.abs(d.gear_ratio)
     sign = np.sign(at.torque)
     losses = d.inverter_loss / ratio + d.gear_loss * speed
-    of_torque = at.price * (qd + 2.0 * d.copper_loss / ratio**2 * at.torque + sign * losses)
+    of_torque = at.price * (qd + 2.0 * d.copper_loss / (ratio * ratio) * at.torque + sign * losses)
     direction = np.sign(qd)
     slope = np.zeros(len(parameters.names))
     axes = {
         "viscous": of_torque * qd,
         "coulomb": of_torque * direction,
-        "copper": at.price * (size / ratio) ** 2,
-        "iron": at.price * speed**2,
+        "copper": at.price * np.square(size / ratio),
+        "iron": at.price * (speed * speed),
         "inverter": at.price * size / ratio,
         "gear": at.price * size * speed,
     }

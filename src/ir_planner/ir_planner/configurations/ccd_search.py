@@ -153,7 +153,7 @@ class _Descent:
         """k1, k2, k3 (P,) of eq. (3), from the moment M = w_p Pt Pc^T + w_o sum ut_j uc_j^T."""
         current = tcp[:, :3, 3] - o
         target = self.pose[:3, 3] - o
-        wo = ROTATION_LENGTH**2 / 2.0
+        wo = (ROTATION_LENGTH * ROTATION_LENGTH) / 2.0
         M = target[:, :, None] * current[:, None, :] + wo * (
             portable.matmul(self.pose[:3, :3], tcp[:, :3, :3].transpose(0, 2, 1))
         )
@@ -219,8 +219,8 @@ class _Descent:
         tcp = self.scene.chain.tcp_poses(q)
         step = tcp[:, :3, 3] - self.pose[:3, 3]
         turn = tcp[:, :3, :3] - self.pose[:3, :3]
-        wo = ROTATION_LENGTH**2 / 2.0
-        return np.asarray((step**2).sum(axis=1) + wo * (turn**2).sum(axis=(1, 2)))
+        wo = (ROTATION_LENGTH * ROTATION_LENGTH) / 2.0
+        return np.asarray((step * step).sum(axis=1) + wo * (turn * turn).sum(axis=(1, 2)))
 
     def _reject(self, starts: IntArray, pairs: IntArray, what: str) -> None:
         """Count starts (K,) out, each by the pair (K,) that was too near; -1: not converged, by no

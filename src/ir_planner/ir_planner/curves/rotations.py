@@ -24,7 +24,7 @@ def rotation_of(vectors: FloatArray) -> FloatArray:
     small = angle < _SMALL
     safe = np.where(small, 1.0, angle)
     half = np.where(
-        small, 0.5 - square / 48.0 + square**2 / 3840.0, portable.sin(0.5 * safe) / safe
+        small, 0.5 - square / 48.0 + (square * square) / 3840.0, portable.sin(0.5 * safe) / safe
     )
     x, y, z = np.moveaxis(v * half[..., None], -1, 0)
     w = np.asarray(portable.cos(0.5 * angle))
@@ -44,7 +44,7 @@ def rotation_vector(rotations: FloatArray) -> FloatArray:
     small = angle < _SMALL
     factor = np.where(
         small,
-        2.0 + angle**2 / 12.0 + 7.0 * angle**2 * angle**2 / 2880.0,
+        2.0 + (angle * angle) / 12.0 + 7.0 * (angle * angle) * (angle * angle) / 2880.0,
         angle / np.where(small, 1.0, sine),
     )
     return np.asarray(q[..., :3] * factor[..., None])
@@ -93,7 +93,7 @@ class RotationSpline:
         start = velocity[:-1]
         end = _inverse_times(turn, velocity[1:])
         cubic = (h * (start + end) - 2.0 * turn) / portable.power(h, 3)
-        square = (3.0 * turn - h * (2.0 * start + end)) / h**2
+        square = (3.0 * turn - h * (2.0 * start + end)) / (h * h)
         self.cubics = np.stack([cubic, square, start, np.zeros_like(turn)])
 
     def __call__(self, at: FloatArray) -> FloatArray:
@@ -179,11 +179,15 @@ def _curved(v: FloatArray, rate: FloatArray) -> FloatArray:
     sin = portable.sin(safe)
     cos = portable.cos(safe)
     # derivatives, over the angle, of (1 - cos) / angle^2 and of `third`
-    first = np.where(small, -1.0 / 12.0, (safe * sin - 2.0 * (1.0 - cos)) / (safe**2 * safe**2))
-    second = np.where(
-        small, -1.0 / 60.0, (3.0 * sin - 2.0 * safe - safe * cos) / (safe**2 * safe**2 * safe)
+    first = np.where(
+        small, -1.0 / 12.0, (safe * sin - 2.0 * (1.0 - cos)) / ((safe * safe) * (safe * safe))
     )
-    third = np.where(small, 1.0 / 6.0 - square / 120.0, (safe - sin) / (safe**2 * safe))
+    second = np.where(
+        small,
+        -1.0 / 60.0,
+        (3.0 * sin - 2.0 * safe - safe * cos) / ((safe * safe) * (safe * safe) * safe),
+    )
+    third = np.where(small, 1.0 / 6.0 - square / 120.0, (safe - sin) / ((safe * safe) * safe))
     along = (v * rate).sum(axis=1)
     across = np.cross(v, rate)
     return np.asarray(

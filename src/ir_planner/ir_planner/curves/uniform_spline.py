@@ -86,7 +86,7 @@ class UniformSpline:
         q = (c[:-2] + 4.0 * c[1:-1] + c[2:]) / 6.0
         q[0] = c[0]
         q[-1] = c[-1]
-        return q, (c[2:] - c[:-2]) / (2.0 * h), (c[:-2] - 2.0 * c[1:-1] + c[2:]) / h**2
+        return q, (c[2:] - c[:-2]) / (2.0 * h), (c[:-2] - 2.0 * c[1:-1] + c[2:]) / (h * h)
 
     def samples(self, per_interval: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         """q, qd, qdd (S * per_interval, n) at evenly spaced instants, the beginnings of the

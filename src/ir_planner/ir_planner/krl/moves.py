@@ -53,7 +53,7 @@ class Move:
         sd = sd[:, None]
         sdd = sdd[:, None]
         qd = first * sd
-        qdd = second * sd**2 + first * sdd
+        qdd = second * (sd * sd) + first * sdd
         return q, qd, qdd, third * portable.power(sd, 3) + 3.0 * second * sd * sdd
 
 
@@ -75,7 +75,9 @@ def move(
     slower = 1.0
     for _ in range(_ROUNDS):
         v, a, j = bounds
-        made = Move(curve, free_law((v / slower, a / slower**2, j / (slower**2 * slower))))
+        made = Move(
+            curve, free_law((v / slower, a / (slower * slower), j / ((slower * slower) * slower)))
+        )
         needed = max(_excess(made, limits, scene), least / max(made.law.total * GRID_S, GRID_S))
         if needed <= 1.0 + 1e-9:
             return made
@@ -108,8 +110,14 @@ def _law_bounds(curve: Curve, speeds: Speeds, limits: MotionLimits) -> tuple[flo
     ):
         if size > STILL:
             v = min(v, speed * speeds.override / size)
-            a = min(a, acceleration * speeds.override**2 / size)
-            j = min(j, acceleration * speeds.override**2 * speeds.override / (size * RAMP))
+            a = min(a, acceleration * (speeds.override * speeds.override) / size)
+            j = min(
+                j,
+                acceleration
+                * (speeds.override * speeds.override)
+                * speeds.override
+                / (size * RAMP),
+            )
     return min(v, _HUGE), min(a, _HUGE), min(j, _HUGE)
 
 

@@ -141,11 +141,11 @@ def _basis(at: FloatArray, count: int) -> FloatArray:
     """Weights (P, count) of the control points where `at` (P,) knots have gone by."""
     k = np.clip(np.floor(at).astype(int), 0, count - 4)
     u = at - k
-    cube = u**2 * u
+    cube = (u * u) * u
     weights = (
         (1 - u) ** 2 * (1 - u),
-        3 * cube - 6 * u**2 + 4,
-        -3 * cube + 3 * u**2 + 3 * u + 1,
+        3 * cube - 6 * (u * u) + 4,
+        -3 * cube + 3 * (u * u) + 3 * u + 1,
         cube,
     )
     rows = np.zeros((len(at), count))
@@ -161,9 +161,9 @@ def _values(control: FloatArray, at: FloatArray) -> tuple[FloatArray, FloatArray
     c = [control[k + i] for i in range(4)]
     slope = (
         -((1 - u) ** 2) * c[0]
-        + (3 * u**2 - 4 * u) * c[1]
-        + (-3 * u**2 + 2 * u + 1) * c[2]
-        + u**2 * c[3]
+        + (3 * (u * u) - 4 * u) * c[1]
+        + (-3 * (u * u) + 2 * u + 1) * c[2]
+        + (u * u) * c[3]
     ) / 2.0
     return portable.matmul(_basis(at, len(control)), control), slope
 

@@ -46,7 +46,9 @@ def least_seconds(distance: FloatArray, limits: MotionLimits) -> FloatArray:
     acceleration = limits.acceleration
     ramps = 2.0 * np.sqrt(distance / acceleration)
     cruise = distance / speed + speed / acceleration
-    return np.asarray(np.where(distance >= speed**2 / acceleration, cruise, ramps).max(axis=-1))
+    return np.asarray(
+        np.where(distance >= (speed * speed) / acceleration, cruise, ramps).max(axis=-1)
+    )
 
 
 def least_cost(
@@ -59,7 +61,7 @@ def least_cost(
     rise = potential_energy(second, scene)[None] - potential_energy(first, scene)[:, None]
     work = rise + portable.matmul(distance, robot.friction_coulomb)
     viscous = portable.matmul(
-        distance**2, robot.friction_viscous
+        distance * distance, robot.friction_viscous
     )  # J s: joules at an even speed, times the duration
     with np.errstate(divide="ignore", invalid="ignore"):
         best = np.sqrt(rates.joule * viscous / rates.second) if rates.second > 0.0 else np.inf

@@ -49,9 +49,9 @@ class MotionLimits:
         """
         return MotionLimits(
             self.velocity * share,
-            self.acceleration * share**2,
+            self.acceleration * (share * share),
             self.jerk * portable.power(share, 3),
-            self.torque_share * share**2,
+            self.torque_share * (share * share),
             self.torque_reserve,
         )
 

@@ -271,7 +271,7 @@ class _Breeder:
         blend = self.blend[sample]  # (N, V)
         q = self.fixed[sample] + (portable.matmul(blend[:, None, :], vias))[:, 0]
         gradient = self.space.scene.collision.gradients(q, pair)
-        size = np.maximum((gradient**2).sum(axis=1) * (blend**2).sum(axis=1), 1e-3)
+        size = np.maximum((gradient * gradient).sum(axis=1) * (blend * blend).sum(axis=1), 1e-3)
         lack = np.clip(people.shortfall[rows], 0.0, 1.0) * self.rng.uniform(1.0, 2.0, len(rows))
         step: FloatArray = (lack / size)[:, None, None] * blend[:, :, None] * gradient[:, None, :]
         return np.clip(step, -1.0, 1.0)

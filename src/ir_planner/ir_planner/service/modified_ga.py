@@ -31,7 +31,7 @@ _ROTATION_LENGTH = (
     0.5  # m/rad, lambda of eq. (2): how much a turn of the tool weighs against its travel
 )
 _WEIGHTED = np.array([1.0, 1.0, 1.0, *[_ROTATION_LENGTH] * 3])[:, None]
-_DAMPED = _DAMPING**2 * np.eye(6)
+_DAMPED = (_DAMPING * _DAMPING) * np.eye(6)
 # the spread shrinks at most to this share in one generation, so that one step can't end it
 _SHARPEST = 0.25
 _WIDEST = 1.3  # and grows at most so, where D was lost

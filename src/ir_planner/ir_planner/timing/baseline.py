@@ -85,7 +85,7 @@ def _quickest(ends: FloatArray, limits: MotionLimits, context: Context) -> Joint
         # torque is about a constant and a part that falls with the square of the factor; its
         # envelope has kinks, so that every second time the middle is taken
         share = 0.5 if k % 2 else (1.0 - within) / (beyond - within)
-        squares = 1.0 / slow**2 + share * (1.0 / fast**2 - 1.0 / slow**2)
+        squares = 1.0 / (slow * slow) + share * (1.0 / (fast * fast) - 1.0 / (slow * slow))
         factor = float(1.0 / np.sqrt(squares)) * _BELOW
         use = use_at(factor)
         if use <= 1.0:

@@ -97,7 +97,7 @@ def stretched(trajectory: JointTrajectory, factor: float) -> JointTrajectory:
         whole,
         trajectory.positions,
         None if velocities is None else velocities / exact,
-        None if accelerations is None else accelerations / exact**2,
+        None if accelerations is None else accelerations / (exact * exact),
     )
 
 

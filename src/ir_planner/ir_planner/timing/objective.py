@@ -186,7 +186,9 @@ def stretched_costs(
     viscous = drives.viscous * motion.qd
     dry = drives.coulomb * np.sign(motion.qd)
     whole = scene.dynamics.inverse_dynamics(motion.q, motion.qd, motion.qdd)
-    torque = (whole - holding - viscous - dry) / slower**2 + viscous / slower + (holding + dry)
+    torque = (
+        (whole - holding - viscous - dry) / (slower * slower) + viscous / slower + (holding + dry)
+    )
     shape = (len(factors) * count, -1)
     axes = scene.dynamics.axis_power(speed.reshape(shape), torque.reshape(shape))
     joules = _drawn(axes.reshape(len(factors), count, -1), factors * span / count, scene)

@@ -78,8 +78,8 @@ def _knots(points: FloatArray, span: FloatArray) -> tuple[FloatArray, FloatArray
     upper[-1] = 0.0
     qdd = np.zeros_like(q)
     qdd[1:-1] = dgtsv(lower, diagonal, upper, 6.0 * np.diff(slope, axis=0))[3]
-    q[1] += h[0] ** 2 * qdd[1] / 6.0
-    q[-2] += h[-1] ** 2 * qdd[-2] / 6.0
+    q[1] += np.square(h[0]) * qdd[1] / 6.0
+    q[-2] += np.square(h[-1]) * qdd[-2] / 6.0
     qd = np.zeros_like(q)
     qd[1:-1] = (np.diff(q, axis=0) / h - h * (2.0 * qdd[:-1] + qdd[1:]) / 6.0)[1:]
     return q, qd, qdd

@@ -40,7 +40,7 @@ def _ramp(
     speed: FloatArray, acceleration: FloatArray, jerk: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Durations (jerk phase, constant acceleration) (K,) s of a ramp from rest to `speed`."""
-    full = speed * jerk >= acceleration**2
+    full = speed * jerk >= acceleration * acceleration
     phase = np.where(full, acceleration / jerk, np.sqrt(speed / jerk))
     constant = np.where(full, speed / acceleration - acceleration / jerk, 0.0)
     return phase, np.maximum(constant, 0.0)
@@ -67,7 +67,7 @@ def _ramp_distance(
     speed: FloatArray, acceleration: FloatArray, jerk: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Distance (K,) of a ramp between rest and `speed`, and its derivative by the speed."""
-    full = speed * jerk >= acceleration**2
+    full = speed * jerk >= acceleration * acceleration
     root = np.sqrt(speed / jerk)
     distance = np.where(
         full, 0.5 * speed * (speed / acceleration + acceleration / jerk), speed * root
