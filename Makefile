@@ -1,7 +1,7 @@
 # `make help` lists the targets. Everything runs in .venv, which the first target makes; results go to out/.
 SHELL := /bin/sh
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-tests demo test test-long check sanitize bench bench-long compare docs clean
+.PHONY: help setup setup-tests demo test test-long check sanitize processors bench bench-long compare docs clean
 # A sourced ROS 2 would put its own packages, of another Python, in front of the environment's.
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH ROS_DISTRO
 
@@ -38,12 +38,17 @@ test: setup-tests ## every test that takes seconds to a few minutes
 test-long: setup-tests ## every test, also those that run for minutes; then with the oldest versions
 	@$(PYTEST) --ignore tests/system $(ARGS) || [ $$? -eq 5 ]
 	@$(SYSTEM_TESTS) $(ARGS) || [ $$? -eq 5 ]
+	@[ -n '$(ARGS)' ] || PYTHON=$(CURDIR)/$(BIN)/python src/ir_kernels/sanitize.sh
+	@[ -n '$(ARGS)' ] || $(BIN)/python tools/processors.py --tests
 	@[ -n '$(ARGS)' ] || $(BIN)/python tools/oldest_versions.py
 
 check: setup-tests ## ruff and mypy --strict
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
+
+processors: setup-tests ## are answers the same bytes on other processors? ARGS='--tests' also runs tests as they would
+	@$(BIN)/python tools/processors.py $(ARGS)
 
 sanitize: setup-tests ## the compiled core under the address and undefined-behaviour sanitizers
 	@PYTHON=$(CURDIR)/$(BIN)/python src/ir_kernels/sanitize.sh $(ARGS)
