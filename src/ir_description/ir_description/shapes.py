@@ -12,6 +12,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from ir_description.poses import composed, pose_of, transformed
+from ir_kernels import portable
 from ir_values.arrays import FloatArray, frozen, frozen_pose, in_range
 from ir_values.errors import InvalidValueError
 
@@ -81,10 +82,10 @@ class Body:
         if self.kind == "plane":
             return np.full(3, -np.inf), np.full(3, np.inf)
         if self.kind == "mesh":
-            points = self.vertices @ R.T + centre
+            points = portable.matmul(self.vertices, R.T) + centre
             return points.min(axis=0), points.max(axis=0)
         if self.kind == "box":
-            reach = np.abs(R) @ (self.size / 2.0)
+            reach = portable.matmul(np.abs(R), self.size / 2.0)
         elif self.kind == "sphere":
             reach = np.full(3, self.size[0])
         else:
@@ -146,18 +147,18 @@ def point_distance(body: Body, point: FloatArray) -> float:
     """Return the distance [m] of a point (3,) in the body's owner frame to its surface, negative
     inside.
     """
-    p = body.pose[:3, :3].T @ (point - body.pose[:3, 3])
+    p = portable.matmul(body.pose[:3, :3].T, point - body.pose[:3, 3])
     if body.kind == "plane":
         return float(p[2])
     if body.kind == "sphere":
-        return float(np.linalg.norm(p) - body.size[0])
+        return float(portable.norm(p) - body.size[0])
     if body.kind == "capsule":
         on_axis = np.clip(p[2], -body.size[1] / 2.0, body.size[1] / 2.0)
-        return float(np.linalg.norm(p - (0.0, 0.0, on_axis)) - body.size[0])
+        return float(portable.norm(p - (0.0, 0.0, on_axis)) - body.size[0])
     if body.kind == "box":
         return _outside_or_depth(np.abs(p) - body.size / 2.0)
     if body.kind == "cylinder":
-        radial = np.hypot(p[0], p[1]) - body.size[0]
+        radial = portable.hypot(p[0], p[1]) - body.size[0]
         axial = abs(p[2]) - body.size[1] / 2.0
         return _outside_or_depth(np.array([radial, axial]))
     return _hull_distance(body.vertices, p)
@@ -180,7 +181,7 @@ def capsule_distance(body: Body, capsule: Capsule) -> float:
 
 
 def _outside_or_depth(excess: FloatArray) -> float:
-    outside = float(np.linalg.norm(np.maximum(excess, 0.0)))
+    outside = float(portable.norm(np.maximum(excess, 0.0)))
     return outside if outside > 0.0 else float(excess.max())
 
 
@@ -190,13 +191,13 @@ def _hull_distance(vertices: FloatArray, point: FloatArray) -> float:
     from scipy.spatial import ConvexHull
 
     facets = ConvexHull(vertices).equations
-    depth = float((facets[:, :3] @ point + facets[:, 3]).max())
+    depth = float((portable.matmul(facets[:, :3], point) + facets[:, 3]).max())
     if depth <= 0.0:
         return depth
     weight = 1e4  # makes the shares of the vertices sum to one
     rows = np.vstack([(vertices - point).T, np.full(len(vertices), weight)])
     shares, _ = nnls(rows, np.array([0.0, 0.0, 0.0, weight]))
-    return float(np.linalg.norm(vertices.T @ shares / shares.sum() - point))
+    return float(portable.norm(portable.matmul(vertices.T, shares) / shares.sum() - point))
 
 
 # Which boxes along the axes overlap: by their order along x, so that few of many pairs are looked

@@ -12,6 +12,7 @@ import numpy as np
 from ir_description.poses import composed, pose_of
 from ir_description.robot import Load
 from ir_description.shapes import SIZE_MAX, Body
+from ir_kernels import portable
 from ir_msgs_py.cartesian import CartesianPath
 from ir_values.arrays import FloatArray, frozen, frozen_pose, in_range
 from ir_values.errors import InvalidValueError, UnknownNameError
@@ -327,7 +328,10 @@ class CellPath:
     def moved(self, by: FloatArray) -> CellPath:
         """The path where its machine has been moved by a transform (4, 4) of the world."""
         segments = tuple(
-            replace(segment, poses=tuple(by @ pose for pose in segment.poses))
+            replace(segment, poses=tuple(portable.matmul(by, pose) for pose in segment.poses))
             for segment in self.path.segments
         )
-        return replace(self, path=replace(self.path, start=by @ self.path.start, segments=segments))
+        return replace(
+            self,
+            path=replace(self.path, start=portable.matmul(by, self.path.start), segments=segments),
+        )

@@ -34,6 +34,7 @@ from ir_description.files.mesh import (
     mesh_path,
     triangles_from_stl,
 )
+from ir_kernels import portable
 from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError, shown
 from ir_values.files import read_regular_file
@@ -145,7 +146,7 @@ def _triangles_from_gltf(content: bytes, buffers: dict[str, bytes], suffix: str)
         raise InvalidValueError(f"the glTF can't be read: {shown(str(error), 120)}") from error
     if not triangles:
         raise InvalidValueError("the glTF has no triangles")
-    turned: FloatArray = np.concatenate(triangles) @ _Y_UP.T
+    turned: FloatArray = portable.matmul(np.concatenate(triangles), _Y_UP.T)
     return turned
 
 

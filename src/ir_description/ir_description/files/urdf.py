@@ -19,6 +19,7 @@ import numpy as np
 from ir_description.poses import abc_from_rotation
 from ir_description.robot import Load, RobotModel
 from ir_description.shapes import Capsule
+from ir_kernels import portable
 from ir_msgs_py.names import WORLD_FRAME
 from ir_values.arrays import FloatArray
 
@@ -101,7 +102,7 @@ def _link(
 
 def _capsule(link: Xml.Element, kind: str, capsule: Capsule, material: str) -> None:
     axis = capsule.p1 - capsule.p0
-    length = float(np.linalg.norm(axis))
+    length = float(portable.norm(axis))
     ends = (capsule.p0, capsule.p1) if length > 0.0 else (capsule.p0,)
     for i, centre in enumerate(ends):
         geometry = _shape(link, kind, f"{capsule.name}_end_{i}", centre, (0.0, 0.0, 0.0), material)

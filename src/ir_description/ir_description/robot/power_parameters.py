@@ -15,6 +15,7 @@ from scipy.special import ndtr, ndtri
 
 from ir_description.robot.power import PowerData
 from ir_description.robot.robot import Load, RobotModel
+from ir_kernels import portable
 from ir_values.arrays import BoolArray, FloatArray, frozen
 from ir_values.errors import InvalidValueError, UnknownNameError
 
@@ -66,13 +67,13 @@ def _bounded(
 ) -> FloatArray:
     """Draws (count, B) about 0 with covariance (B, B) between the bounds (B,)."""
     size = len(matrix)
-    precision = np.linalg.inv(matrix)
+    precision = portable.inv(matrix)
     deviation = 1.0 / np.sqrt(np.diag(precision))
     alone = np.array_equal(matrix, np.diag(np.diag(matrix)))
     drawn = np.clip(np.zeros((count, size)), least, most)
     for _ in range(1 if alone else _SWEEPS):
         for j in range(size):
-            middle = drawn[:, j] - drawn @ precision[:, j] * deviation[j] ** 2
+            middle = drawn[:, j] - portable.matmul(drawn, precision[:, j]) * np.square(deviation[j])
             first = ndtr((least[j] - middle) / deviation[j])
             last = ndtr((most[j] - middle) / deviation[j])
             share = first + (last - first) * generator.random(count)
@@ -87,10 +88,10 @@ def _following(
     """Draws (count, F) of those that are not near a bound, given the others (count, B)."""
     own = matrix[np.ix_(~near, ~near)]
     across = matrix[np.ix_(~near, near)]
-    gain = np.linalg.solve(matrix[np.ix_(near, near)], across.T).T if near.any() else across
-    values, vectors = np.linalg.eigh(own - gain @ across.T)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    return np.asarray(given @ gain.T + generator.standard_normal((len(given), len(own))) @ root.T)
+    gain = portable.solve(matrix[np.ix_(near, near)], across.T).T if near.any() else across
+    root = portable.symmetric_root(own - portable.matmul(gain, across.T))
+    noise = generator.standard_normal((len(given), len(own)))
+    return portable.matmul(given, gain.T) + portable.matmul(noise, root.T)
 
 
 AXIS_UNITS = {

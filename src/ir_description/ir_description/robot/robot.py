@@ -14,6 +14,7 @@ import numpy as np
 from ir_description.poses import transformed
 from ir_description.robot.power import PowerData, without_table
 from ir_description.shapes import Capsule
+from ir_kernels import portable
 from ir_msgs_py.names import WORLD_FRAME
 from ir_values.arrays import FloatArray, frozen, frozen_inertia, frozen_pose, in_range
 from ir_values.errors import InvalidValueError
@@ -265,7 +266,7 @@ class Load:
         """
         pose = frozen_pose(pose, "pose")
         R = pose[:3, :3]
-        inertia = R @ self.inertia @ R.T
+        inertia = portable.matmul(R, self.inertia, R.T)
         return replace(
             self,
             com=transformed(pose, self.com),
@@ -315,7 +316,7 @@ def moving_frames(robot: RobotModel, link_poses: FloatArray) -> tuple[FramePose,
     """Frames of the joints, from the poses (n+1, 4, 4) of the links in any one frame."""
     names = robot.link_names
     return tuple(
-        FramePose(names[i], names[i + 1], np.linalg.solve(link_poses[i], link_poses[i + 1]))
+        FramePose(names[i], names[i + 1], portable.solve(link_poses[i], link_poses[i + 1]))
         for i in range(robot.n)
     )
 

@@ -16,7 +16,7 @@ from ir_kernels.reference.vectors import Number
 from ir_msgs_py.arrays import FloatArray
 
 OUTWARD = 4.5e-16
-TINY = 1e-300
+TINY = 1e-140
 
 
 @dataclass(frozen=True, eq=False)
