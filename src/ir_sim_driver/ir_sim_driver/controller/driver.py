@@ -17,15 +17,15 @@ from ir_msgs_py.modes import Mode, PowerMode
 from ir_msgs_py.plc import OperatingMode, PlcInputs
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.access import Access, CellSide, PlcSide
-from ir_sim_driver.controller.goals import Goals
+from ir_sim_driver.controller.goals import NO_GOAL, Goals, refused
 from ir_sim_driver.controller.outputs import Entry, Frame, Frames, Joints, report
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.controller.surroundings import PlannedCell
-from ir_sim_driver.errors import BackendError, RequestRefusedError
+from ir_sim_driver.errors import BackendError, RequestRefusedError, TrajectoryRefusedError
 from ir_sim_driver.motion import ExecutionSettings, Following, Outcome, TrajectoryGoal
 from ir_sim_driver.notices import Level, Notice
 from ir_sim_driver.plant import Carried, Plant
-from ir_sim_driver.plc import STOP_BIT
+from ir_sim_driver.plc import END_REST, STOP_BIT
 
 
 def take_offered_cell(simulation: Simulation) -> None:
@@ -134,12 +134,28 @@ class Driver:
     # -- movements
     # ------------------------------------------------------------------------------------------
 
-    def submit(
-        self, points: int, read: Callable[[], TrajectoryGoal], ended: Callable[[Outcome], None]
-    ) -> int:
-        """Check a goal beside everything else and start it; returns its ticket. See
-        `Goals.submit`.
+    def admit(self, points: int, size: int = 0) -> int:
+        """Ticket for a goal of so many points and bytes, before it is converted. Raises
+        TrajectoryRefusedError.
         """
+        return self._goals.admit(points, size)
+
+    def submit(
+        self,
+        points: int,
+        read: Callable[[], TrajectoryGoal],
+        ended: Callable[[Outcome], None],
+        ticket: int = 0,
+    ) -> int:
+        """Check a goal beside everything else and start it; returns its ticket.
+
+        ticket: of `admit`, 0 where it has not been admitted yet. See `Goals.submit`.
+        """
+        try:
+            ticket = ticket or self.admit(points)
+        except TrajectoryRefusedError as error:
+            ended(refused(str(error), error.code))
+            return NO_GOAL
 
         def here() -> TrajectoryGoal:
             goal = read()
@@ -147,7 +163,8 @@ class Driver:
             self._simulation.cell_watch.wait_for(goal.states)
             return goal
 
-        return self._goals.submit(points, here, ended)
+        self._goals.submit(ticket, here, ended)
+        return ticket
 
     def cancel(self, ticket: int) -> None:
         """Stop a goal along its path, also one that is still being checked."""
@@ -155,11 +172,14 @@ class Driver:
             self._goals.cancel(ticket)
 
     def abandon(self, ticket: int, sentence: str) -> None:
-        """Stop a goal along its path, if it runs, because its sender has gone."""
+        """Stop a goal along its path, or don't start it, because its sender has gone."""
         with self._lock:
+            ended = self._goals.forget(ticket)
             if self._goals.runs(ticket):
                 self._simulation.notices.add(Level.WARN, sentence)
                 self._simulation.abort(f"{sentence}; stopped on the path")
+        if ended is not None:
+            ended(refused(f"{sentence}; it has not been started"))
 
     def abort(self, sentence: str) -> None:
         """Stop whatever runs along its path, with this warning."""
@@ -189,6 +209,11 @@ class Driver:
         """Ignore HIB from now on and leave hibernation out of pauses, with this reason."""
         with self._lock:
             self._simulation.plc.no_hibernation = reason
+
+    @property
+    def stop_number(self) -> int:
+        """Number of the last stop, 0 before the first."""
+        return self._simulation.stop_number
 
     @property
     def stamp_ns(self) -> int:
@@ -222,6 +247,11 @@ class Driver:
         """
         with self._access.online(asleep_too=name == STOP_BIT and level) as simulation:
             plc = simulation.plc
+            if name == END_REST:
+                if level:
+                    plc.check_owner(writer)
+                    simulation.control.end_rest()
+                return plc.raw, ""
             try:
                 plc.raw.with_bit(name, level)
             except MsgsError as error:

@@ -16,37 +16,48 @@ from ir_sim_driver.power import PAUSE_MAX, Demand, PowerModes, best_route, mode_
 
 
 class Latches:
-    """drives_off: it came and no drives_on since. recover, restart, wake: waiting to be acted
-    upon.
+    """drives_off: it came and no drives_on since. recover, restart, wake: waiting to be acted upon.
+    end_rest: number of the stop after which a program asked to open the brakes again, None: no
+    program has.
     """
 
     def __init__(self) -> None:
         self.drives_off = self.recover = self.restart = self.wake = False
-        self._confirmed = False
+        self.end_rest: int | None = None
 
-    def react(self, plc: Plc) -> bool:
-        """Take the edges of this step; returns whether motors are asked for."""
+    def react(self, plc: Plc, mode: Mode) -> bool:
+        """Take the edges of this step in `mode`; whether motors are asked for."""
         if plc.levels.drives_off:
             self.drives_off = True
-        asked = plc.drives_on and not plc.levels.drives_off
-        if asked:
-            self.drives_off = False
-            if self._confirmed and not plc.pressed:
-                plc.reset_stop()
-                self.recover = True
-        if plc.confirm and not plc.pressed:
-            self._confirmed = True
-        self.restart = self.restart or plc.restart
-        return asked
+        awake = mode not in OFF_THE_NETWORK
+        if plc.confirm and awake:
+            plc.stop.acknowledge(plc.rose("conf_mess"))
+        if not plc.drives_on or plc.levels.drives_off:
+            return False
+        self.drives_off = False
+        if awake and plc.stop.switch_on(plc.rose("drives_on")):
+            self.recover = mode is Mode.EMERGENCY_STOP
+        return True
 
-    def mode_changed(self, before: Mode, now: Mode) -> None:
+    def rest_ended(self, plc: Plc) -> bool:
+        """Whether the program's wish to leave its rest counts now; a stop makes it void."""
+        if self.end_rest is None or plc.levels.drives_off or plc.raw.drives_off:
+            return False
+        counts = self.end_rest == plc.stop.number and not plc.stop.stopped
+        self.end_rest = None
+        if counts:
+            self.drives_off = False
+        return counts
+
+    def mode_changed(self, plc: Plc, before: Mode, now: Mode) -> None:
         """Forget what the change of the power mode has done or made void."""
         if Mode.EMERGENCY_STOP in (before, now):
-            self.recover = self._confirmed = False
+            self.recover = False
         if before is Mode.FROM_HIBERNATION:
             self.restart = False
         if now in OFF_THE_NETWORK:
             self.restart = self.drives_off = False
+            plc.stop.leave_network()
 
 
 # PROFIenergy's commands on the running controller: start a pause, end it, ask for the modes.
@@ -197,7 +208,7 @@ class ModeControl:
 
     def react_to_plc(self) -> str:
         """Take what is new from the PLC; why a movement stops therefore, "" when it goes on."""
-        if self.latches.react(self._plc):
+        if self.latches.react(self._plc, self.modes.mode):
             self.pauses.wants_motors = True
         if self._plc.operating_mode is self._operating_mode:
             return ""
@@ -225,6 +236,8 @@ class ModeControl:
         if self.modes.motors_on:
             self.pauses.wants_motors = False
         latches = self.latches
+        if latches.rest_ended(self._plc):
+            self.pauses.wants_motors = True
         before = self.modes.mode
         if emergency:
             latches.recover = False
@@ -250,11 +263,28 @@ class ModeControl:
         self._mode_changed(before, now)
         return before, now
 
+    def end_rest(self) -> None:
+        """A program leaves the rest that drives_off began; void while a stop is latched, and never
+        a part of a recovery. Raises RequestRefusedError.
+        """
+        if self._plc.stop.stopped:
+            raise RequestRefusedError(
+                StatusCode.INVALID_ROBOT_STATE,
+                f"stop {self._plc.stop.number} is latched: a person has to recover first",
+            )
+        self.latches.end_rest = self._plc.stop.number
+
+    def stop_came(self) -> None:
+        """A stop with a new number: nothing of before it is asked for any more."""
+        self.pauses.wants_motors = False
+        self.latches.end_rest = None
+        self.latches.recover = False
+
     def refusal(self) -> str:
         """Why no movement may start now, "" when it may."""
         mode = self.modes.mode
         plc = self._plc
-        if mode is Mode.EMERGENCY_STOP or plc.stopped:
+        if mode is Mode.EMERGENCY_STOP or plc.stop.stopped:
             return "emergency stop: release it and recover first"
         if mode not in DRIVES_ON:
             return f"drives not powered ({mode.name})"
@@ -278,7 +308,7 @@ class ModeControl:
             ab=mode in (Mode.BUS_POWER_OFF, Mode.TO_HIBERNATION),
             bbs=mode in (*READY, Mode.STAND_ON_BRAKES) and not self.latches.drives_off,
             drives_ready=self.modes.motors_on,
-            alarm_stop=not plc.stopped and mode is not Mode.EMERGENCY_STOP,
+            alarm_stop=not plc.stop.stopped and mode is not Mode.EMERGENCY_STOP,
             in_home=in_home,
             moving=mode is Mode.MOVING,
             operating_mode=plc.operating_mode,
@@ -294,7 +324,7 @@ class ModeControl:
         return asked
 
     def _mode_changed(self, before: Mode, now: Mode) -> None:
-        self.latches.mode_changed(before, now)
+        self.latches.mode_changed(self._plc, before, now)
         if now is Mode.EMERGENCY_STOP:
             self.pauses.wants_motors = False
         elif before is Mode.FROM_HIBERNATION:

@@ -171,7 +171,7 @@ class Safety:
         """Whether an emergency stop or a fault is latched: nothing moves until somebody
         recovers.
         """
-        return self._plc.stopped or bool(self.fault)
+        return self._plc.stop.stopped
 
     @property
     def broken(self) -> bool:
@@ -216,7 +216,7 @@ class Safety:
         """Unlatch all where the robot is now. Raises RequestRefusedError while the button is
         pressed.
         """
-        if self._plc.pressed:
+        if self._plc.stop.pressed:
             raise RequestRefusedError(
                 StatusCode.INVALID_ROBOT_STATE,
                 "the emergency stop is still pressed: release it first",
@@ -230,7 +230,7 @@ class Safety:
         self._broken = False
         self._powered = False
         self._supervision.recovered(q)
-        self._plc.reset_stop()
+        self._plc.stop.recover()
 
     def _deviation(self, motors_on: bool) -> float:
         """How far the tool is from its command [m]; behind closed brakes, from where they
@@ -247,5 +247,6 @@ class Safety:
     def _stop_for(self, fault: Fault) -> None:
         """STOP 0: the brakes close at once, and stay so until somebody recovers."""
         self.fault = fault.sentence
+        self._plc.stop.fault(self._plc.order)
         self._notices.add(Level.ERROR, f"{fault.sentence}; stopped by the brakes until recovered")
         self._executor.drop(fault.sentence, fault.code)

@@ -196,6 +196,7 @@ class Simulation:
             cell, load, self.tool, backend, self.notices, settings.dt, lambda: self.time
         )
         self._outcomes = Outcomes(self.executor, self.mains, self.cell_watch, self.load_checks)
+        self._stop_seen = 0  # number of the stop that was acted upon
 
     @property
     def time(self) -> float:
@@ -220,6 +221,11 @@ class Simulation:
         return self.safety.stopped
 
     @property
+    def stop_number(self) -> int:
+        """Number of the last stop, 0 before the first; nothing of before it moves any more."""
+        return self.plc.stop.number
+
+    @property
     def fault(self) -> str:
         """Why the robot is stopped, "" when it is not or by the emergency stop."""
         return self.safety.fault
@@ -241,7 +247,12 @@ class Simulation:
         TrajectoryRefusedError.
         """
         goal = vetted.goal
-        refusal = self._refusal() or self.surroundings.refusal(goal, self.load)
+        refusal = self.refusal() or self.surroundings.refusal(goal, self.load)
+        if not refusal and goal.after_stop not in (None, self.stop_number):
+            refusal = (
+                f"stop {self.stop_number} came after stop {goal.after_stop}, which the sender "
+                "knows: send it again if it still holds"
+            )
         if refusal := refusal or self.cell_watch.refusal(goal, vetted.keep.scene):
             raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, refusal)
         now = self.executor.motion()
@@ -367,6 +378,9 @@ class Simulation:
     def _change_mode(self, dt: float) -> None:
         executor = self.executor
         control = self.control
+        if self._stop_seen != self.plc.stop.number:
+            self._stop_seen = self.plc.stop.number
+            control.stop_came()
         active = executor.active
         if active:
             sentence = control.interruption()
@@ -381,6 +395,8 @@ class Simulation:
         )
         if changed is not None:
             self._mode_changed(*changed)
+        if executor.active and self.stopped:  # in a mode that goes on to its end
+            executor.drop(self.fault or "emergency stop")
 
     def _move(self) -> None:
         backend = self.backend
@@ -415,7 +431,7 @@ class Simulation:
         if now is not Mode.MOVING and before is not Mode.MOVING:
             self.notices.add(Level.OK, f"{before.name} -> {now.name}")
 
-    def _refusal(self) -> str:
+    def refusal(self) -> str:
         """Why no movement may start now, "" when it may."""
         if self.fault:
             return f"stopped by a fault, recover first: {self.fault}"

@@ -48,7 +48,8 @@ class TrajectoryGoal:
     number of multi-dof points. cell_hash, load: the cell and the load that it was planned with, "":
     not compared. station: whose contacts are allowed, "": none. states: of machines that it relies
     on ("lathe=door_open").
-    allow_collision: start it although it is known to collide.
+    allow_collision: start it although it is known to collide. after_stop: number of the last stop
+    that the sender knows; a later one makes the goal void. None: not compared.
     """
 
     trajectory: JointTrajectory
@@ -64,6 +65,7 @@ class TrajectoryGoal:
     station: str = ""
     states: tuple[str, ...] = ()
     allow_collision: bool = False
+    after_stop: int | None = None
 
 
 @dataclass(frozen=True)
@@ -206,6 +208,14 @@ class ExecutionSettings:
     )
     max_points: int = setting(
         20_000, "Longest trajectory, in points.", minimum=1, maximum=1_000_000
+    )
+    goal_memory: float = setting(
+        64.0,
+        "Memory of all trajectories that wait to be checked; what comes beyond is refused before "
+        "it is converted.",
+        unit="MB",
+        minimum=1.0,
+        maximum=4096.0,
     )
     max_duration: float = setting(3600.0, "Longest trajectory.", unit="s", minimum=1.0, maximum=1e5)
     max_delay: float = setting(

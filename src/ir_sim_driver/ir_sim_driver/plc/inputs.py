@@ -14,6 +14,7 @@ from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.notices import Level, Notices
 from ir_sim_driver.plc.modbus import ModbusTcp
 from ir_sim_driver.plc.port import STOP_BIT, Link
+from ir_sim_driver.plc.stop import StopMachine
 from ir_sim_driver.plc.wake_on_lan import WakeOnLan
 
 # Links that there are: a new one is a module and a line here.
@@ -105,12 +106,18 @@ class PlcSettings:
         check_settings(self)
 
 
+def _stop_first(bit: str) -> bool:
+    """Sort key: whatever else a message says, its emergency stop comes first."""
+    return bit != STOP_BIT
+
+
 class Plc:
     """Levels in, requests out; `step` lets time pass.
 
     levels: what counts now (debounced, without stuck bits). rest: BUS_POWER_OFF, HIBERNATION or
     None.
-    stopped: the emergency stop was pressed, however shortly, and nobody has reset it since.
+    stop: the state machine of stops; a press is latched there when it is written, however short.
+    order: of the last message; levels that it raised have this order.
     drives_on, confirm, restart: rising edges seen in this step. no_hibernation: why HIB is ignored,
     "" where it counts.
     """
@@ -124,7 +131,11 @@ class Plc:
         self.levels = PlcInputs(operating_mode=mode)
         self.operating_mode = mode
         self.rest: Mode | None = None
-        self.stopped = False
+        self.stop = StopMachine()
+        self.order = 0
+        self._rose: dict[str, int] = {}
+        self._fell = 0  # order of the message that let go of the emergency stop
+        self._up = 0.0  # s since then
         self.no_hibernation = ""
         self.drives_on = self.confirm = self.restart = False
         self._ages: dict[str, float] = {}
@@ -142,8 +153,10 @@ class Plc:
         """
         pressed = levels.get(STOP_BIT, False)
         self._guard(writer, pressed, alone=pressed and len(levels) == 1)
-        for bit, level in levels.items():
-            self.set_bit(bit, level)
+        self._greeted = True
+        self.order += 1
+        for bit in sorted(levels, key=_stop_first):
+            self._set(bit, levels[bit])
 
     def write_all(self, writer: str, inputs: PlcInputs) -> None:
         """Set all levels in the name of a writer. Raises as `write`."""
@@ -154,6 +167,10 @@ class Plc:
         """Turn the mode switch in the name of a writer. Raises RequestRefusedError."""
         self._guard(writer)
         self.set_operating_mode(mode)
+
+    def check_owner(self, writer: str) -> None:
+        """Raise RequestRefusedError where the inputs belong to another writer."""
+        self._guard(writer)
 
     def _guard(self, writer: str, pressed: bool = False, *, alone: bool = False) -> None:
         """Raise what a writer may not do; pressing the emergency stop anybody may."""
@@ -174,7 +191,8 @@ class Plc:
             stuck = frozenset(bit for bit in POWER_BITS if getattr(inputs, bit))
             self._stick(stuck, Level.WARN, "at the start")
         self._greeted = True
-        for bit in BITS:
+        self.order += 1
+        for bit in sorted(BITS, key=_stop_first):
             self._set(bit, getattr(inputs, bit))
         if inputs.operating_mode is not OperatingMode.UNCHANGED:
             self.set_operating_mode(inputs.operating_mode)
@@ -182,6 +200,7 @@ class Plc:
     def set_bit(self, bit: str, level: bool) -> None:
         """Set one level, the others stay; `bit` is one of BITS."""
         self._greeted = True
+        self.order += 1
         self._set(bit, level)
 
     def remark(self, bit: str, pause_active: bool = False) -> str:
@@ -230,6 +249,8 @@ class Plc:
             self._warn_at = inf
             self._notices.add(Level.WARN, self._warning)
         self.drives_on = self.confirm = self.restart = False
+        if self.stop.pressed:
+            self._let_go(dt)
         if self._ages:
             self._debounce(dt)
         if self.levels is self._judged[0] and pause_active is self._judged[1]:
@@ -238,21 +259,29 @@ class Plc:
         self._judge(pause_active)
         return True
 
-    @property
-    def pressed(self) -> bool:
-        """Whether the emergency stop is pressed now, or was within the debounce."""
-        return self.raw.emergency_stop or self.levels.emergency_stop
+    def rose(self, bit: str) -> int:
+        """Order of the message in which this level rose last, 0 before the first."""
+        return self._rose.get(bit, 0)
 
-    def reset_stop(self) -> None:
-        """Unlatch the emergency stop; only while it is not pressed."""
-        self.stopped = self.pressed
+    def _let_go(self, dt: float) -> None:
+        """Count a released emergency stop once it has been up for the debounce."""
+        if self.raw.emergency_stop:
+            return
+        self._up += dt
+        if self._up >= self._settings.debounce - 1e-9:
+            self.stop.release(self._fell)
 
     def _set(self, bit: str, level: bool) -> None:
-        if bit == STOP_BIT and level:
-            self.stopped = True
         if level == getattr(self.raw, bit):
             return
         self.raw = self.raw.with_bit(bit, level)
+        if bit == STOP_BIT and level:
+            self.stop.press(self.order)
+        elif bit == STOP_BIT:
+            self._fell = self.order
+            self._up = 0.0
+        elif level:
+            self._rose[bit] = self.order
         if not level and bit in self._stuck:
             self._stuck -= {bit}
             return
