@@ -57,7 +57,8 @@ class GoalQueue:
     def admit(self, points: int, size: int, number: int, settings: ExecutionSettings) -> int:
         """Ticket of a goal of so many points and bytes, sent after stop `number`.
 
-        It is called before the goal is converted. Raises TrajectoryRefusedError: too many points, goals or bytes.
+        It is called before the goal is converted. Raises TrajectoryRefusedError: too many points,
+        goals or bytes.
         """
         limit = settings.max_points
         budget = settings.goal_memory

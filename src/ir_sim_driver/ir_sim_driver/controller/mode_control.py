@@ -205,6 +205,7 @@ class ModeControl:
         self.latches = Latches()
         self._operating_mode = plc.operating_mode
         self._demand = Demand()
+        self._stop_seen = plc.stop.number
 
     def react_to_plc(self) -> str:
         """Take what is new from the PLC; why a movement stops therefore, "" when it goes on."""
@@ -233,6 +234,9 @@ class ModeControl:
         motion: a movement waits or runs. standing: the robot does not move. emergency: stop at
         once.
         """
+        if self._stop_seen != self._plc.stop.number:
+            self._stop_seen = self._plc.stop.number
+            self._forget_requests()
         if self.modes.motors_on:
             self.pauses.wants_motors = False
         latches = self.latches
@@ -274,8 +278,8 @@ class ModeControl:
             )
         self.latches.end_rest = self._plc.stop.number
 
-    def stop_came(self) -> None:
-        """A stop with a new number: nothing of before it is asked for any more."""
+    def _forget_requests(self) -> None:
+        """A stop has a new number: nothing of before it is asked for any more."""
         self.pauses.wants_motors = False
         self.latches.end_rest = None
         self.latches.recover = False

@@ -196,7 +196,6 @@ class Simulation:
             cell, load, self.tool, backend, self.notices, settings.dt, lambda: self.time
         )
         self._outcomes = Outcomes(self.executor, self.mains, self.cell_watch, self.load_checks)
-        self._stop_seen = 0  # number of the stop that was acted upon
 
     @property
     def time(self) -> float:
@@ -378,9 +377,6 @@ class Simulation:
     def _change_mode(self, dt: float) -> None:
         executor = self.executor
         control = self.control
-        if self._stop_seen != self.plc.stop.number:
-            self._stop_seen = self.plc.stop.number
-            control.stop_came()
         active = executor.active
         if active:
             sentence = control.interruption()

@@ -111,6 +111,9 @@ def _stop_first(bit: str) -> bool:
     return bit != STOP_BIT
 
 
+_WRITTEN = tuple(sorted(BITS, key=_stop_first))
+
+
 class Plc:
     """Levels in, requests out; `step` lets time pass.
 
@@ -192,7 +195,7 @@ class Plc:
             self._stick(stuck, Level.WARN, "at the start")
         self._greeted = True
         self.order += 1
-        for bit in sorted(BITS, key=_stop_first):
+        for bit in _WRITTEN:
             self._set(bit, getattr(inputs, bit))
         if inputs.operating_mode is not OperatingMode.UNCHANGED:
             self.set_operating_mode(inputs.operating_mode)

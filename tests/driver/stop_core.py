@@ -1,0 +1,156 @@
+"""The controller core that stops and starts, without physics: PLC inputs, power modes, goals.
+
+Everything that decides is the driver's own; the robot is a flag that says which goal would move it.
+"""
+
+from __future__ import annotations
+
+import copy
+from contextlib import suppress
+from typing import Any
+
+from ir_msgs_py.modes import OFF_THE_NETWORK, Mode
+from ir_msgs_py.transitions import TransitionTimes
+from ir_sim_driver.controller.goals import GoalQueue
+from ir_sim_driver.controller.mode_control import ModeControl
+from ir_sim_driver.controller.settings import SimulationSettings
+from ir_sim_driver.errors import RequestRefusedError, TrajectoryRefusedError
+from ir_sim_driver.motion import ExecutionSettings
+from ir_sim_driver.plc import TOPIC, Plc, PlcSettings
+
+EXECUTION = ExecutionSettings()
+SETTINGS = SimulationSettings(transitions=TransitionTimes(), plc=PlcSettings(startup_window=0.0))
+
+
+class Silent:
+    """Notices that nobody reads."""
+
+    def add(self, *words: object) -> None:
+        """Nothing."""
+
+
+class Core:
+    """The core with a robot; moving: stop number of the goal that moves it, None: it stands."""
+
+    def __init__(self) -> None:
+        self.plc = Plc(SETTINGS.plc, Silent())  # type: ignore[arg-type]
+        self.control = ModeControl(SETTINGS, self.plc, lambda mode: 100.0, {})
+        self.queue = GoalQueue()
+        self.moving: int | None = None
+        self.recovered = 0  # times
+
+    def clone(self) -> Core:
+        """The same state again."""
+        new = copy.copy(self)
+        new.plc = plc = copy.copy(self.plc)
+        plc.stop = copy.copy(plc.stop)
+        plc._ages = dict(plc._ages)
+        plc._rose = dict(plc._rose)
+        new.control = control = copy.copy(self.control)
+        control._plc = plc
+        control.modes = copy.copy(control.modes)
+        control.latches = copy.copy(control.latches)
+        control.pauses = copy.copy(control.pauses)
+        control.pauses._modes = control.modes
+        control.pauses._plc = plc
+        new.queue = copy.copy(self.queue)
+        new.queue._waiting = {k: copy.copy(each) for k, each in self.queue._waiting.items()}
+        return new
+
+    @property
+    def mode(self) -> Mode:
+        return self.control.modes.mode
+
+    @property
+    def on_the_network(self) -> bool:
+        return self.mode not in OFF_THE_NETWORK
+
+    def write(self, levels: dict[str, bool]) -> None:
+        """One message of the PLC."""
+        self.plc.write(TOPIC, levels)
+        self.heed()
+
+    def heed(self) -> None:
+        """What the driver does before it answers a writer."""
+        if self.plc.stop.stopped:
+            self._change_mode(0.0)
+
+    def fault(self) -> None:
+        """The supervision stops the robot."""
+        self.plc.stop.fault(self.plc.order)
+        self.heed()
+
+    def recover(self) -> None:
+        """The service."""
+        if self.on_the_network and self.plc.stop.recover():
+            self.control.latches.recover = self.mode is Mode.EMERGENCY_STOP
+
+    def step(self, dt: float) -> bool:
+        """Time passes; whether the controller has been woken."""
+        before = self.mode
+        if self.plc.step(dt, self.control.pauses.active) and self.control.react_to_plc():
+            self.moving = None
+        self._change_mode(dt)
+        return before is Mode.FROM_HIBERNATION and self.mode is not before
+
+    def _change_mode(self, dt: float) -> None:
+        if self.moving is not None and self.control.interruption():
+            self.moving = None
+        moves = self.moving is not None
+        stopped = self.plc.stop.stopped
+        self.control.step(dt, motion=moves, standing=not moves or stopped, emergency=stopped)
+        if stopped:
+            self.moving = None
+            self.queue.end_before(self.plc.stop.number)
+
+    def send(self, client: str) -> int:
+        """A goal of a client arrives; its ticket, 0 where it is refused."""
+        if self.plc.stop.stopped:
+            return 0
+        try:
+            ticket = self.queue.admit(1, 0, self.plc.stop.number, EXECUTION)
+        except TrajectoryRefusedError:
+            return 0
+        self.queue.submit(ticket, lambda outcome: None)
+        return ticket
+
+    def checked(self, ticket: int) -> bool:
+        """The check of a goal ends well; whether it starts."""
+        if ticket not in self.queue:
+            return False
+        try:
+            self.queue.take(ticket, self.plc.stop.number)
+        except TrajectoryRefusedError:
+            return False
+        return self.start(self.plc.stop.number)
+
+    def start(self, after_stop: int) -> bool:
+        """A goal of a sender that knows stop `after_stop` starts if it may."""
+        if self.control.refusal() or after_stop != self.plc.stop.number:
+            return False
+        self.moving = self.plc.stop.number
+        return True
+
+    def end_rest(self) -> None:
+        """The program runner leaves a rest on brakes."""
+        if self.on_the_network:
+            with suppress(RequestRefusedError):
+                self.control.end_rest()
+
+    def key(self) -> tuple[Any, ...]:
+        """All that decides what may happen next, without what only counts."""
+        plc, control, stop = self.plc, self.control, self.plc.stop
+        number = stop.number
+        latches, pauses, modes = control.latches, control.pauses, control.modes
+        conf, drives = plc.rose("conf_mess"), plc.rose("drives_on")
+        ages = tuple(sorted((bit, round(age, 3)) for bit, age in plc._ages.items()))
+        return (
+            stop.state, plc.raw, plc.levels, plc.rest, plc._stuck, ages, round(plc._up, 3) < 0.02,
+            conf > stop._since, drives > stop._acknowledged, plc._fell >= conf,
+            conf < drives, plc.operating_mode, modes.mode, modes.source,
+            round(min(modes.elapsed, 200.0), 2), modes._wake,
+            latches.drives_off, latches.recover, latches.restart, latches.wake,
+            latches.end_rest == number if latches.end_rest is not None else None,
+            pauses.wants_motors, pauses._route, control._stop_seen == number,
+            self.moving == number if self.moving is not None else None,
+        )  # fmt: skip

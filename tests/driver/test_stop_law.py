@@ -1,0 +1,408 @@
+"""The law of stops: the table of docs/driver.md, walked and drawn against a second machine."""
+
+from __future__ import annotations
+
+import random
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ir_msgs_py.modes import READY, Mode
+from ir_sim_driver.plc import StopState
+
+sys.path.insert(0, str(Path(__file__).parent))  # benchmarks/hostile.py reads this file too
+from stop_core import Core
+from stop_reference import Reference
+
+BITS = ("emergency_stop", "conf_mess", "drives_on", "drives_off", "ab", "hib")
+MILLISECOND = 0.001
+
+
+class Pair:
+    """The core and the reference, told the same."""
+
+    def __init__(self) -> None:
+        self.core = Core()
+        self.reference = Reference()
+
+    def clone(self) -> Pair:
+        new = object.__new__(Pair)
+        new.core = self.core.clone()
+        new.reference = reference = object.__new__(Reference)
+        reference.__dict__.update(self.reference.__dict__)
+        reference.signals = {name: _same(each) for name, each in self.reference.signals.items()}
+        return new
+
+    def write(self, levels: dict[str, bool]) -> None:
+        self.core.write(levels)
+        self.reference.write(levels)
+
+    def fault(self) -> None:
+        self.core.fault()
+        self.reference.fault()
+
+    def recover(self) -> None:
+        if self.core.on_the_network:
+            self.core.recover()
+            self.reference.recover()
+
+    def wait(self, milliseconds: int) -> None:
+        for _ in range(milliseconds):
+            there = self.core.on_the_network
+            woken = self.core.step(MILLISECOND)
+            self.reference.tick(there)
+            self._network(there, woken)
+
+    def leap(self, seconds: float) -> None:
+        """Long enough for all that is under way to count; levels have counted before."""
+        there = self.core.on_the_network
+        woken = self.core.step(seconds)
+        self.reference.now += round(seconds * 1e3)
+        self.reference.tick(there)
+        self._network(there, woken)
+
+    def _network(self, there: bool, woken: bool) -> None:
+        if there and not self.core.on_the_network:
+            self.reference.left_network()
+        if woken:
+            self.reference.woken()
+
+    def difference(self) -> str:
+        stop = self.core.plc.stop
+        mine = (stop.state.value, stop.number)
+        other = (self.reference.state, self.reference.number)
+        if mine != other:
+            return f"the driver is {mine}, the table says {other}"
+        if stop.stopped and self.core.moving is not None:
+            return f"a goal runs in {stop.state.value}"
+        if self.core.moving is not None and self.core.moving != stop.number:
+            return "a goal of before the stop runs"
+        return ""
+
+
+def _same(signal: Any) -> Any:
+    new = object.__new__(type(signal))
+    new.__dict__.update(signal.__dict__)
+    return new
+
+
+def drawn(steps: int, seed: int) -> str:
+    """A random sequence of a PLC, of its person and of time; the first difference, "": none."""
+    generator = random.Random(seed)
+    pair = Pair()
+    ticket = 0
+
+    def write() -> None:
+        bits = generator.sample(BITS, generator.choice((1, 1, 1, 2, 3)))
+        pair.write({bit: generator.random() < 0.5 for bit in bits})
+
+    def send() -> None:
+        nonlocal ticket
+        ticket = pair.core.send("a") or ticket
+
+    def wake() -> None:
+        pair.core.control.latches.wake = pair.core.mode is Mode.HIBERNATION
+
+    def leap() -> None:
+        pair.wait(21)
+        pair.leap(generator.choice((0.5, 1.0, 3.0, 25.0, 130.0)))
+
+    actions = (write, pair.fault, pair.recover, send, pair.core.end_rest, wake, leap)
+    weights = (70, 3, 5, 6, 3, 7, 5)
+    for step in range(steps):
+        generator.choices(actions, weights)[0]()
+        pair.wait(generator.choice((0, 1, 5, 19, 20, 21, 40)))
+        if generator.random() < 0.06:
+            pair.core.checked(ticket)
+        difference = pair.difference()
+        if difference:
+            return f"seed {seed}, step {step}: {difference}"
+    return ""
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_random_sequences_of_a_plc_are_what_the_table_says(seed: int) -> None:
+    assert drawn(200, seed) == ""
+
+
+# -- all interleavings
+
+
+@dataclass
+class World:
+    """Core and reference with two clients, a runner, and what was sent before the last stop."""
+
+    pair: Pair
+    tickets: tuple[int, int] = (0, 0)
+    program: int | None = None  # number of the stop that the running program knows
+
+    def clone(self) -> World:
+        return World(self.pair.clone(), self.tickets, self.program)
+
+    def key(self) -> tuple[Any, ...]:
+        core = self.pair.core
+        number = core.plc.stop.number
+        waiting = sorted(
+            core.queue._waiting[t].number == number if t in core.queue else 2 for t in self.tickets
+        )
+        program = None if self.program is None else self.program == number
+        return (*core.key(), tuple(waiting), program)
+
+
+Event = Callable[[World], str]
+
+
+def _toggle(bit: str) -> Event:
+    def event(world: World) -> str:
+        raw = world.pair.core.plc.raw
+        world.pair.write({bit: not getattr(raw, bit)})
+        return ""
+
+    return event
+
+
+def _send(client: int) -> Event:
+    def event(world: World) -> str:
+        ticket = world.pair.core.send(str(client))
+        if ticket:
+            first, second = world.tickets
+            world.tickets = (ticket, second) if client == 0 else (first, ticket)
+        return ""
+
+    return event
+
+
+def _checked(client: int) -> Event:
+    def event(world: World) -> str:
+        core = world.pair.core
+        ticket = world.tickets[client]
+        sent = core.queue._waiting[ticket].number if ticket in core.queue else -1
+        if core.checked(ticket) and sent != world.pair.reference.number:
+            return "a goal that was sent before a stop moves the robot after it"
+        return ""
+
+    return event
+
+
+def _program_starts(world: World) -> str:
+    if not world.pair.core.plc.stop.stopped:
+        world.program = world.pair.core.plc.stop.number
+    return ""
+
+
+def _program_drives(world: World) -> str:
+    if world.program is None:
+        return ""
+    if world.pair.core.start(world.program) and world.program != world.pair.reference.number:
+        return "a program drives on after a stop"
+    return ""
+
+
+def _program_ends_rest(world: World) -> str:
+    before = world.pair.core.plc.stop.state
+    if world.program is not None:
+        world.pair.core.end_rest()
+    recovered = before is not StopState.RUN and not world.pair.core.plc.stop.stopped
+    return "a program recovers" if recovered else ""
+
+
+def _short(world: World) -> str:
+    world.pair.wait(21)
+    return ""
+
+
+def _long(world: World) -> str:
+    world.pair.wait(21)
+    world.pair.leap(130.0)
+    return ""
+
+
+def _plain(what: Callable[[World], None]) -> Event:
+    def event(world: World) -> str:
+        what(world)
+        return ""
+
+    return event
+
+
+def _wake(world: World) -> None:
+    if world.pair.core.mode is Mode.HIBERNATION:
+        world.pair.core.control.latches.wake = True
+
+
+EVENTS: dict[str, Event] = {
+    **{bit: _toggle(bit) for bit in BITS},
+    "client a sends": _send(0),
+    "client b sends": _send(1),
+    "goal a is checked": _checked(0),
+    "goal b is checked": _checked(1),
+    "program starts": _program_starts,
+    "program drives": _program_drives,
+    "program ends its rest": _program_ends_rest,
+    "fault": _plain(lambda world: world.pair.fault()),
+    "recover": _plain(lambda world: world.pair.recover()),
+    "wake": _plain(_wake),
+    "21 ms": _short,
+    "130 s": _long,
+}
+
+
+def settled(*levels: dict[str, bool]) -> World:
+    """A world in the mode that these levels lead to."""
+    world = World(Pair())
+    for each in levels:
+        world.pair.write(each)
+        _short(world)
+        world.pair.leap(1.0)
+    return world
+
+
+STARTS: dict[str, Callable[[], World]] = {
+    "on motors": lambda: settled(),
+    "on brakes": lambda: _after(settled({"drives_off": True}), "130 s"),
+    "bus power off": lambda: _after(settled({"ab": True}), "130 s"),
+    "on the way to bus power off": lambda: settled({"ab": True}),
+    "on the way from it": lambda: _after(settled({"ab": True}), "130 s", "ab", "21 ms"),
+    "on the way to hibernation": lambda: settled({"hib": True}),
+    "hibernating": lambda: _after(settled({"hib": True}), "130 s"),
+    "waking": lambda: _after(settled({"hib": True}), "130 s", "130 s", "wake", "21 ms"),
+    "stopped": lambda: _after(settled(), "emergency_stop", "21 ms"),
+}
+
+
+def _after(world: World, *events: str) -> World:
+    for name in events:
+        assert EVENTS[name](world) == ""
+    return world
+
+
+def walked(start: str, depth: int, most: int = 10**9) -> tuple[int, int, list[str]]:
+    """All interleavings of EVENTS to this depth, each state once: states, steps, what is wrong."""
+    first = STARTS[start]()
+    seen = {first.key()}
+    front: list[tuple[World, tuple[str, ...]]] = [(first, ())]
+    wrong: list[str] = []
+    steps = 0
+    for level in range(depth):
+        behind: list[tuple[World, tuple[str, ...]]] = []
+        for world, path in front:
+            for name, event in EVENTS.items():
+                after = world.clone()
+                steps += 1
+                found = event(after) or after.pair.difference() or _moves_by_itself(world, after)
+                if found:
+                    wrong.append(f"{start}: {', '.join((*path, name))}: {found}")
+                    continue
+                key = after.key()
+                if key not in seen:
+                    seen.add(key)
+                    if level + 1 < depth:
+                        behind.append((after, (*path, name)))
+            if len(seen) > most:
+                return len(seen), steps, wrong
+        front = behind
+    return len(seen), steps, wrong
+
+
+def _moves_by_itself(before: World, after: World) -> str:
+    """A stop that is over with the motors on again, without what the table asks for."""
+    core = after.pair.core
+    stopped = core.plc.stop.stopped
+    on = core.mode in READY
+    return "motors are on while a stop is latched" if stopped and on else ""
+
+
+@pytest.mark.parametrize("start", STARTS)
+def test_no_interleaving_moves_the_robot_without_a_recovery(start: str) -> None:
+    states, _, wrong = walked(start, 4)
+    assert states > 100
+    assert wrong == []
+
+
+# -- what happened
+
+
+def acknowledged(*before: dict[str, bool]) -> Pair:
+    """conf_mess at some time before, then these messages, one every 25 ms."""
+    pair = Pair()
+    for levels in ({"conf_mess": True}, {"conf_mess": False}, *before):
+        pair.write(levels)
+        pair.wait(25)
+    return pair
+
+
+@pytest.mark.parametrize("bit", ["ab", "hib"])
+def test_an_old_acknowledgement_and_a_pulse_of_drives_on_recover_nothing(bit: str) -> None:
+    pair = acknowledged({bit: True})
+    pair.leap(3.1 if bit == "ab" else 59.0)
+    for levels in (
+        {"emergency_stop": True},
+        {"emergency_stop": False},
+        {"drives_on": True},
+        {"drives_on": False},
+        {bit: False},
+    ):
+        pair.write(levels)
+        pair.wait(25)
+    pair.core.control.latches.wake = True
+    for _ in range(3):
+        pair.leap(130.0)
+        pair.core.control.latches.wake = pair.core.mode is Mode.HIBERNATION
+    assert pair.core.plc.stop.stopped
+    assert pair.core.mode is Mode.EMERGENCY_STOP
+    assert not pair.core.start(pair.core.plc.stop.number)
+
+
+def test_levels_of_one_message_don_t_follow_each_other() -> None:
+    pair = Pair()
+    pair.write({"emergency_stop": True})
+    pair.wait(25)
+    pair.write({"emergency_stop": False, "conf_mess": True, "drives_on": True})
+    pair.wait(100)
+    assert pair.core.plc.stop.state is StopState.RELEASED
+
+
+def test_a_program_s_wish_to_leave_its_rest_never_recovers() -> None:
+    pair = Pair()
+    for levels in (
+        {"drives_off": True},
+        {"emergency_stop": True},
+        {"emergency_stop": False},
+        {"conf_mess": True},
+        {"drives_off": False},
+    ):
+        pair.write(levels)
+        pair.wait(25)
+    pair.core.end_rest()
+    pair.wait(1000)
+    assert pair.core.plc.stop.state is StopState.ACKNOWLEDGED
+    assert pair.core.mode is Mode.EMERGENCY_STOP
+
+
+def test_a_wish_to_leave_a_rest_is_void_after_a_stop() -> None:
+    pair = Pair()
+    pair.write({"drives_off": True})
+    pair.wait(25)
+    pair.core.end_rest()  # waits for drives_off to be 0
+    for levels in ({"emergency_stop": True}, {"emergency_stop": False}, {"drives_off": False}):
+        pair.write(levels)
+        pair.wait(25)
+    pair.recover()
+    pair.wait(50)
+    assert pair.core.control.latches.drives_off
+
+
+def test_drives_on_in_the_message_of_its_acknowledgement_recovers_nothing() -> None:
+    pair = Pair()
+    for levels in (
+        {"emergency_stop": True},
+        {"emergency_stop": False},
+        {"conf_mess": True, "drives_on": True},
+    ):
+        pair.write(levels)
+        pair.wait(25)
+    assert pair.core.plc.stop.state is StopState.ACKNOWLEDGED
