@@ -22,6 +22,9 @@ EXECUTION = ExecutionSettings()
 SETTINGS = SimulationSettings(transitions=TransitionTimes(), plc=PlcSettings(startup_window=0.0))
 
 
+QUARTER = 0.25  # s: no time of a mode ends within a quarter, nor do eight waits of 21 ms reach one
+
+
 class Silent:
     """Notices that nobody reads."""
 
@@ -148,7 +151,7 @@ class Core:
             stop.state, plc.raw, plc.levels, plc.rest, plc._stuck, ages, round(plc._up, 3) < 0.02,
             conf > stop._since, drives > stop._acknowledged, plc._fell >= conf,
             conf < drives, plc.operating_mode, modes.mode, modes.source,
-            round(min(modes.elapsed, 200.0), 2), modes._wake,
+            min(int(modes.elapsed / QUARTER), 800), modes._wake,
             latches.drives_off, latches.recover, latches.restart, latches.wake,
             latches.end_rest == number if latches.end_rest is not None else None,
             pauses.wants_motors, pauses._route, control._stop_seen == number,

@@ -14,6 +14,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
+from std_msgs.msg import UInt64
 
 from ir_msgs.action import ExecuteTrajectory, RunProgram
 from ir_msgs.msg import PowerState, ProgramState, Status
@@ -28,6 +29,7 @@ from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.plan_conversions import planned_movement_to_msg
 from ir_msgs_py.ros.power_conversions import power_mode_to_msg
+from ir_msgs_py.ros.topics import LATCHED
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -56,6 +58,8 @@ class FakeDriver(Node):
         self.answer = ExecuteTrajectory.Result()
         self.meter = self.create_publisher(PowerState, "~/power_state", 100)
         self.timer = self.create_timer(0.01, self.read_meter)
+        self.stops = self.create_publisher(UInt64, "~/stop_number", LATCHED)
+        self.stops.publish(UInt64(data=0))
         self.create_service(SetPlcInput, "~/set_plc_input", self.set_plc_input)
         self.create_service(SetLoad, "~/set_load", self.set_load)
         self.create_service(QueryModes, "~/query_modes", self.query_modes)
@@ -82,7 +86,7 @@ class FakeDriver(Node):
                 self.mode = REST[request.name]
             elif request.name == "ab":
                 self.mode = Mode.STAND_ON_MOTORS
-        elif request.name == "drives_on" and request.value:
+        elif request.name == "end_rest" and request.value:
             self.mode = Mode.STAND_ON_MOTORS
         response.status = OK
         return response
@@ -334,6 +338,29 @@ def test_a_step_waits_for_the_signal_of_a_machine_and_sets_its_own(cell, wait_fo
     message = wait_for(lambda: cell.set_by_program)[0]
     assert (message.name, message.value) == ("start", True)
     assert message.stamp.sec > 0
+
+
+def test_a_stop_while_a_program_waits_for_a_signal_ends_it_though_somebody_has_recovered(
+    cell, wait_for
+):
+    with cell.running([move(), move(wait_for=("door=1",)), move()], wait_for) as ended:
+        wait_for(lambda: cell.states and cell.driver.log.count("drive") == 1)
+        wait_for(lambda: "0 ended" in cell.events())
+        cell.driver.stops.publish(UInt64(data=1))  # pressed, released and recovered from
+        wait_for(lambda: "1 failed" in cell.events())
+        cell.machines.publish(SignalMsg(name="door", value=True))
+    assert cell.driver.log.count("drive") == 1
+    assert "stop 1" in ended[0].status.message
+
+
+def test_a_stop_in_a_pause_on_brakes_ends_the_program_and_asks_for_no_motors(cell, wait_for):
+    with cell.running([pause(60.0, "STAND_ON_BRAKES"), move()], wait_for) as ended:
+        wait_for(lambda: "drives_off=1" in cell.driver.log)
+        cell.driver.stops.publish(UInt64(data=1))
+        wait_for(lambda: "0 failed" in cell.events())
+    assert "drives_off=0" in cell.driver.log
+    assert not {"drives_on=1", "end_rest=1", "drive"} & set(cell.driver.log)
+    assert "stop 1" in ended[0].status.message
 
 
 def test_the_soft_plc_answers_for_a_machine(ros_context, ros_executor, wait_for):

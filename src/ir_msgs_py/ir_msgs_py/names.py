@@ -76,6 +76,7 @@ POWER_STATE: Final = f"{SIM_DRIVER}/power_state"
 CONTROLLER_TIMERS: Final = f"{SIM_DRIVER}/controller_timers"
 CARRIED_LOAD: Final = f"{SIM_DRIVER}/carried_load"
 PLANT: Final = f"{SIM_DRIVER}/plant"
+STOP_NUMBER: Final = f"{SIM_DRIVER}/stop_number"
 LOAD_CHECK: Final = f"{SIM_DRIVER}/load_check"
 CONTROLLER_STATE: Final = f"{SIM_DRIVER}/controller_state"
 ROBOT_MARKERS: Final = f"{SIM_DRIVER}/robot_markers"
@@ -102,6 +103,10 @@ RUN_STUDY: Final = f"{STUDIES}/run_study"
 LOAD_SEPARATOR: Final = "+"
 NO_LOAD: Final = "none"
 
+STOPS_STATE: Final = "driver/stops"
+"""Of a goal's `states`: "driver/stops=2" relies on no stop after the second."""
+END_REST: Final = "end_rest"
+"""Name in SetPlcInput of a program's request to leave the rest that drives_off began."""
 
 # Senders on the topics that all cells share: the namespace is a part of the name, so that two cells
 # in one graph are kept apart. Namespaces are absolute: "/" or "/cell_1".

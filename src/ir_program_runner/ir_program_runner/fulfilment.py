@@ -30,6 +30,10 @@ class DriverPort(Protocol):
         """Energy at the mains by the meter's last reading [J]."""
 
     @property
+    def stops(self) -> int | None:
+        """Number of the driver's last stop, None where it is not known."""
+
+    @property
     def silent(self) -> bool:
         """Whether no reading of the meter has come for too long."""
 
@@ -53,9 +57,11 @@ class DriverPort(Protocol):
         load: str,
         station: str,
         states: Sequence[str],
+        after_stop: int | None,
     ) -> Status:
         """Execute a trajectory that was planned in a cell and with a load; stop along the path when
-        `stop` is true. station: whose contacts are allowed; states: of machines that it relies on.
+        `stop` is true. station: whose contacts are allowed; states: of machines that it relies on;
+        after_stop: the last stop that the program knows.
         """
 
 
@@ -82,11 +88,16 @@ class Ports:
 
 
 class Fulfilment:
-    """One run of a program; `run` returns how it ended."""
+    """One run of a program; `run` returns how it ended.
+
+    A stop of the driver ends the program, also one that was recovered from meanwhile: a person who
+    has recovered starts it again. What takes bits back is still sent.
+    """
 
     def __init__(self, ports: Ports) -> None:
         self._ports = ports
         self._thrown = False
+        self._after_stop = ports.driver.stops
 
     async def run(self, program: Program) -> ProgramResult:
         """Drive the generator; a cancel is thrown into it once, at a request that takes time."""
@@ -111,11 +122,24 @@ class Fulfilment:
     def _stop(self) -> bool:
         return self._ports.canceled() and not self._thrown
 
+    def _stopped(self) -> bool:
+        """Whether the driver has been stopped since the program began."""
+        return self._ports.driver.stops != self._after_stop
+
+    def _stop_status(self) -> Status:
+        sentence = (
+            f"stop {self._ports.driver.stops} of the driver ended the program: recover, then start "
+            "it again"
+        )
+        return Status(StatusCode.INVALID_ROBOT_STATE, sentence)
+
     async def _outcome(self, request: ask.Request) -> ask.Outcome:
         ports = self._ports
         modes: tuple[PowerMode, ...] = ()
         if isinstance(request, ask.INTERRUPTIBLE) and self._stop():
             status = Status(StatusCode.PREEMPTED)
+        elif self._stopped() and _acts(request):
+            status = self._stop_status()
         elif isinstance(request, ask.AskModes):
             status, modes = await ports.driver.query_modes()
         else:
@@ -141,7 +165,7 @@ class Fulfilment:
                 return await ports.driver.set_plc_input(name, value)
             case ask.Drive(trajectory, cell_hash, load, station, states):
                 return await ports.driver.drive(
-                    trajectory, self._stop, cell_hash, load, station, states
+                    trajectory, self._stop, cell_hash, load, station, states, self._after_stop
                 )
             case ask.WaitForSignals(signals, timeout):
                 return await self._wait(lambda: ports.machines.holds(signals), timeout)
@@ -159,12 +183,15 @@ class Fulfilment:
         def over() -> bool:
             return (
                 self._stop()
+                or self._stopped()
                 or ports.driver.silent
                 or bool(ports.fault())
                 or ports.now() >= deadline
             )
 
         await ports.until(lambda: condition() or over())
+        if self._stopped():
+            return self._stop_status()
         if condition():
             return Status.success()
         if self._stop():
@@ -176,3 +203,10 @@ class Fulfilment:
             if ports.driver.silent
             else Status(StatusCode.TIMED_OUT, f"not within {timeout:g} s")
         )
+
+
+def _acts(request: ask.Request) -> bool:
+    """Whether a request would move something on, or wait for it; a bit that is cleared does not."""
+    if isinstance(request, ask.SetPlcInput):
+        return request.value
+    return isinstance(request, (*ask.INTERRUPTIBLE, ask.SetLoad, ask.SetSignal))

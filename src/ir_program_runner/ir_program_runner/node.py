@@ -169,9 +169,7 @@ class ProgramRunnerNode(Node):
             status, movements = await self._fetch(goal.request)
             # a driver or a /clock that has just been started gets the time to be discovered
             patience = self._settings.links.value.response_timeout
-            await self._waiting.until(
-                lambda: not self._driver.silent and self._now() > 0.0, patience
-            )
+            await self._waiting.until(self._driver_is_known, patience)
             progress.started = self._now()
             self._jump = ""
             energy = self._driver.energy
@@ -185,6 +183,10 @@ class ProgramRunnerNode(Node):
         finally:
             self._progress = None
         return self._end(goal, result, self._now() - progress.started, self._driver.energy - energy)
+
+    def _driver_is_known(self) -> bool:
+        """Whether the meter and the number of the last stop have been heard, and time passes."""
+        return not self._driver.silent and self._driver.stops is not None and self._now() > 0.0
 
     async def _run_steps(self, goal: ServerGoalHandle, program: Program) -> ProgramResult:
         feedback = self.create_timer(_FEEDBACK_PERIOD, lambda: self._publish_feedback(goal))

@@ -13,7 +13,7 @@ import numpy as np
 from ir_msgs_py.announcements import Event
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.modes import READY, RESTS, Mode, PowerMode, TransitionTimes, modes_of
-from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
+from ir_msgs_py.names import END_REST, LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
@@ -153,7 +153,6 @@ _LATE = 0.1  # s; a shorter delay is not reported: readings and answers take as 
 # whichever is larger: readings come every 10 ms, answers take as long
 _SHARE = 0.05
 _JOULES = 100.0
-_PULSE = 0.1  # s: a level has to stay 20 ms to count
 _BIT = {row.mode: row.bit or "drives_off" for row in RESTS}
 
 
@@ -247,9 +246,7 @@ class Pause:
         if before in _BIT:
             outcome = need((yield SetPlcInput(_BIT[before], False)))
         if before is Mode.STAND_ON_BRAKES:  # takes the latched drives_off back
-            outcome = need((yield SetPlcInput("drives_on", True)))
-            need((yield WaitUntil(outcome.now + _PULSE)))
-            outcome = need((yield SetPlcInput("drives_on", False)))
+            outcome = need((yield SetPlcInput(END_REST, True)))
         return outcome
 
     def _wake(self, end: float, times: PowerMode) -> Requests:
@@ -262,7 +259,7 @@ class Pause:
         else:
             outcome = need((yield SetPlcInput(_BIT[self._mode], False)))
         if self._mode is Mode.STAND_ON_BRAKES:
-            outcome = need((yield SetPlcInput("drives_on", True)))
+            outcome = need((yield SetPlcInput(END_REST, True)))
         outcome = yield WaitForMode(READY, max(0.0, limit - outcome.now))
         if outcome.status.code == StatusCode.TIMED_OUT:
             found = "not known" if outcome.mode is None else outcome.mode.name
@@ -274,8 +271,6 @@ class Pause:
         ready = need(outcome)
         if self._mode is Mode.HIBERNATION:
             need((yield SetPlcInput(_BIT[self._mode], False)))
-        elif self._mode is Mode.STAND_ON_BRAKES:
-            need((yield SetPlcInput("drives_on", False)))
         return ready
 
     def _wake_by_packets(self, outcome: Outcome, limit: float) -> Requests:
@@ -319,9 +314,9 @@ class Pause:
         for mode in reversed(self._modes[: self._modes.index(self._mode) + 1]):
             yield SetPlcInput(_BIT[mode], False)
         if self._modes[0] is Mode.STAND_ON_BRAKES:
-            yield SetPlcInput("drives_on", True)
-            yield WaitForMode(READY, self._settings.ready_timeout)
-            yield SetPlcInput("drives_on", False)
+            outcome = yield SetPlcInput(END_REST, True)
+            if outcome.status.ok:  # not while a stop is latched
+                yield WaitForMode(READY, self._settings.ready_timeout)
 
 
 # One step: wait for its signals, carry its load, move or pause, attach or detach, set its

@@ -128,9 +128,8 @@ def tour(
 
 def motors_on(client: Client, watch: PowerWatch) -> None:
     """Release the brakes: they close by themselves after a while, as during planning."""
-    set_bit(client, "drives_on", True)
+    set_bit(client, END_REST, True)
     watch.wait_for_mode(PowerMode.STAND_ON_MOTORS)
-    set_bit(client, "drives_on", False)
 
 
 def set_bit(client: Client, name: str, value: bool) -> PlcInputs:

@@ -15,6 +15,7 @@ from typing import Any
 from rclpy.action import ActionClient
 from rclpy.node import Node
 from rclpy.task import Future
+from std_msgs.msg import UInt64
 
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import ControllerTimers as ControllerTimersMsg
@@ -24,6 +25,7 @@ from ir_msgs.srv import SetLoad as SetLoadSrv
 from ir_msgs.srv import SetPlcInput as SetPlcInputSrv
 from ir_msgs_py.announcements import ControllerTimers
 from ir_msgs_py.modes import OFF_THE_NETWORK, Mode, PowerMode
+from ir_msgs_py.names import STOPS_STATE
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.conversions import status_from_msg, trajectory_from_msg, trajectory_to_msg
 from ir_msgs_py.ros.plan_conversions import planned_movement_from_msg
@@ -47,7 +49,8 @@ class DriverClient:
     meter the driver counts as gone. cancel_timeout: to stop along the path. The meter is read when
     something is asked
     of it: a node that waits for nothing is not woken a hundred times a second.
-    timers: those of the controller, None before they came.
+    timers: those of the controller, None before they came. stops: number of the last stop, None
+    before it came.
     """
 
     def __init__(
@@ -79,6 +82,8 @@ class DriverClient:
         node.create_subscription(
             ControllerTimersMsg, f"{name}/controller_timers", self._read_timers, LATCHED
         )
+        self.stops: int | None = None
+        node.create_subscription(UInt64, f"{name}/stop_number", self._read_stops, LATCHED)
 
     @property
     def mode(self) -> Mode | None:
@@ -139,6 +144,7 @@ class DriverClient:
         load: str = "",
         station: str = "",
         states: Sequence[str] = (),
+        after_stop: int | None = None,
     ) -> Status:
         """Execute a trajectory; `stop` is looked at all the time, and when it is true the goal is
         canceled.
@@ -147,8 +153,11 @@ class DriverClient:
         The
         duration is not limited: speed scaling may prolong or hold a movement. cell_hash, load: what
         it was planned with, "": the driver doesn't compare. station: whose contacts are allowed;
-        states: of machines that the movement relies on.
+        states: of machines that the movement relies on; after_stop: the last stop that the caller
+        knows, the driver refuses the movement after a later one.
         """
+        if after_stop is not None:
+            states = (*states, f"{STOPS_STATE}={after_stop}")
         if not await self._waiting.until(self._execute.server_is_ready, self._response_timeout):
             return _timed_out(
                 f"no node offers {self.name}/execute_trajectory", self._response_timeout
@@ -195,6 +204,10 @@ class DriverClient:
         return Status(
             StatusCode.PREEMPTED, result.result().result.error_string or "stopped along the path"
         )
+
+    def _read_stops(self, message: UInt64) -> None:
+        self.stops = int(message.data)
+        self._waiting.look()
 
     def _read_timers(self, message: ControllerTimersMsg) -> None:
         with contextlib.suppress(

@@ -14,6 +14,7 @@ from ir_msgs_py.announcements import ControllerTimers
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.modes import Mode, PowerMode
+from ir_msgs_py.names import END_REST
 from ir_msgs_py.plc import OperatingMode, PlcInputs
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.access import Access, CellSide, PlcSide
@@ -25,7 +26,7 @@ from ir_sim_driver.errors import BackendError, RequestRefusedError, TrajectoryRe
 from ir_sim_driver.motion import ExecutionSettings, Following, Outcome, TrajectoryGoal
 from ir_sim_driver.notices import Level, Notice
 from ir_sim_driver.plant import Carried, Plant
-from ir_sim_driver.plc import END_REST, STOP_BIT
+from ir_sim_driver.plc import STOP_BIT
 
 
 def take_offered_cell(simulation: Simulation) -> None:

@@ -43,7 +43,7 @@ class Frame:
     """What is published at the stamp of `joints`; None: nothing of it now.
 
     load: what is carried. inputs: the levels that count, when they have changed, whoever set them.
-    load_check: of a movement that has ended.
+    load_check: of a movement that has ended. stop_number: of the last stop.
     """
 
     joints: Joints
@@ -53,6 +53,7 @@ class Frame:
     outputs: PlcOutputs | None
     inputs: PlcInputs | None = None
     load_check: LoadFinding | None = None
+    stop_number: int = 0
 
 
 class Frames:
@@ -83,7 +84,9 @@ class Frames:
             if present != self._outputs:
                 self._outputs = outputs = present
         if joints.q is None:
-            return Frame(joints, simulation.load, power, None, outputs)
+            return Frame(
+                joints, simulation.load, power, None, outputs, stop_number=simulation.stop_number
+            )
         if simulation.steps % CONTROLLER_PERIOD < self._steps:
             following = simulation.executor.following(backend.q, backend.qd)
         levels = simulation.plc.levels
@@ -91,7 +94,8 @@ class Frames:
         self._inputs = inputs or self._inputs
         finding = simulation.load_checks.take()
         load = simulation.load
-        return Frame(joints, load, power, following, outputs, inputs, finding)
+        number = simulation.stop_number
+        return Frame(joints, load, power, following, outputs, inputs, finding, number)
 
     def _power(self, stamp_ns: int) -> PowerState:
         simulation = self._simulation

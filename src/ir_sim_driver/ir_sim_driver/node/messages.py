@@ -8,6 +8,7 @@ from typing import Any
 from ir_description import RobotModel
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import JointNamesError, TrajectoryError
+from ir_msgs_py.names import STOPS_STATE
 from ir_msgs_py.ros.conversions import (
     duration_to_msg,
     float_array,
@@ -22,6 +23,7 @@ from ir_sim_driver.load_check import LoadFinding
 from ir_sim_driver.motion import ErrorCode, Following, JointTolerance, TrajectoryGoal
 
 _NS = 1e-9
+_DIGITS = 20
 _LABEL_MAX = 64  # four times a trajectory id; a longer one would be published 50 times a second
 
 
@@ -47,6 +49,7 @@ def goal_from_action(goal: Any, max_points: int) -> TrajectoryGoal:
         )
     plain = goal_from_trajectory(goal.trajectory, max_points)
     wait = goal.goal_time_tolerance
+    states, after_stop = _states(goal)
     return TrajectoryGoal(
         plain.trajectory,
         plain.stamp_ns,
@@ -57,9 +60,27 @@ def goal_from_action(goal: Any, max_points: int) -> TrajectoryGoal:
         cell_hash=str(getattr(goal, "cell_hash", "")),
         load=str(getattr(goal, "load", "")),
         station=str(getattr(goal, "station", "")),
-        states=tuple(str(state) for state in getattr(goal, "states", ())),
+        states=states,
+        after_stop=after_stop,
         allow_collision=bool(getattr(goal, "allow_collision", False)),
     )
+
+
+def _states(goal: Any) -> tuple[tuple[str, ...], int | None]:
+    """States of machines that a goal relies on, and the last stop that its sender knows."""
+    machines = []
+    after_stop = None
+    for state in map(str, getattr(goal, "states", ())):
+        name, _, value = state.partition("=")
+        if name != STOPS_STATE:
+            machines.append(state)
+        elif value.isascii() and value.isdigit() and len(value) < _DIGITS:
+            after_stop = int(value)
+        else:
+            raise TrajectoryRefusedError(
+                ErrorCode.INVALID_GOAL, f"{STOPS_STATE} is {value[:20]!a}: it must be a number"
+            )
+    return tuple(machines), after_stop
 
 
 def _label(text: str) -> str:

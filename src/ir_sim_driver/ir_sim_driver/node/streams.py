@@ -11,6 +11,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
+from std_msgs.msg import UInt64
 
 from ir_msgs.msg import ControllerState, LoadCheck, PlcInputs, PlcOutputs, PowerState
 from ir_msgs_py import names
@@ -44,6 +45,8 @@ class Streams:
             ControllerState, names.CONTROLLER_STATE, _STREAM
         )
         self._load_checks = node.create_publisher(LoadCheck, names.LOAD_CHECK, LATCHED)
+        self._stop_numbers = node.create_publisher(UInt64, names.STOP_NUMBER, LATCHED)
+        self._stop_number = -1
         self._outputs = node.create_publisher(PlcOutputs, names.PLC_OUTPUTS, LATCHED)
         self._in_force = node.create_publisher(PlcInputs, names.PLC_INPUTS_IN_FORCE, LATCHED)
         self._joint_state = JointState(name=list(joint_names))
@@ -70,6 +73,9 @@ class Streams:
     def publish(self, frame: Frame) -> None:
         """Publish what the frame holds beside its joints."""
         stamp_ns = frame.joints.stamp_ns
+        if frame.stop_number != self._stop_number:
+            self._stop_number = frame.stop_number
+            self._stop_numbers.publish(UInt64(data=frame.stop_number))
         if frame.power is not None:
             self._power_states.publish(power_state_to_msg(frame.power))
         if frame.following is not None:

@@ -13,13 +13,12 @@ from ir_sim_driver.plc.inputs import (
     PlcSettings,
     Watchdog,
 )
-from ir_sim_driver.plc.port import END_REST, STOP_BIT, Controller, Link, OpenLink, Readout
+from ir_sim_driver.plc.port import STOP_BIT, Controller, Link, OpenLink, Readout
 from ir_sim_driver.plc.stop import StopMachine, StopState
 from ir_sim_driver.plc.wake_on_lan import WakeOnLan
 
 __all__ = [
     "BITS",
-    "END_REST",
     "LINKS",
     "POWER_BITS",
     "SERVICE",

@@ -15,8 +15,6 @@ from ir_msgs_py.plc import OperatingMode, PlcInputs, PlcOutputs
 
 STOP_BIT = "emergency_stop"
 """The input that anybody may press, in every mode."""
-END_REST = "end_rest"
-"""Not a level: a program's request to leave the rest that drives_off began, see docs/driver.md."""
 
 
 @dataclass(frozen=True)
