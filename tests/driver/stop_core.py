@@ -9,8 +9,7 @@ import copy
 from contextlib import suppress
 from typing import Any
 
-from ir_msgs_py.modes import OFF_THE_NETWORK, Mode
-from ir_msgs_py.transitions import TransitionTimes
+from ir_msgs_py.modes import OFF_THE_NETWORK, Mode, TransitionTimes
 from ir_sim_driver.controller.goals import GoalQueue
 from ir_sim_driver.controller.mode_control import ModeControl
 from ir_sim_driver.controller.settings import SimulationSettings

@@ -52,7 +52,9 @@ class Reference:
         self.number = 0
         self.now = self.messages = 0
         self.barrier = self.acknowledged = 0
-        self.signals = {name: Signal() for name in ("emergency_stop", "conf_mess", "drives_on")}
+        self.signals = {
+            name: Signal() for name in ("emergency_stop", "conf_mess", "drives_on", "drives_off")
+        }
         self.let_go: int | None = None
 
     def _happens(self, event: str) -> str:
@@ -103,11 +105,13 @@ class Reference:
             self.let_go = None
             if self._happens("release"):
                 self.barrier = max(self.barrier, stop.message)
+        self.signals["drives_off"].settle(self.now)
         confirmed = self.signals["conf_mess"].settle(self.now)
         switched = self.signals["drives_on"].settle(self.now)
         conf = self.signals["conf_mess"].message
         drives = self.signals["drives_on"].message
         if confirmed and on_the_network and conf > self.barrier and self._happens("conf_mess"):
             self.acknowledged = conf
-        if switched and on_the_network and drives > self.acknowledged:
+        off = self.signals["drives_off"].counted
+        if switched and not off and on_the_network and drives > self.acknowledged:
             self._happens("drives_on")

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from typing import Any
 
 import pytest
 from rclpy.action import ActionClient
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 from trajectory_msgs.msg import JointTrajectoryPoint, MultiDOFJointTrajectoryPoint
 
 from ir_msgs.action import ExecuteTrajectory
+from ir_msgs.msg import JointTolerance
 from ir_msgs_py.ros.topics import ACTION_SERVICES
 from ir_sim_driver.node import SimDriver, node
 from ir_sim_driver.node import trajectory_actions as bounded_goals
@@ -25,24 +29,31 @@ def goal(points: int, multi_dof: int = 0) -> ExecuteTrajectory.Goal:
     return sent
 
 
-def taken(sent: ExecuteTrajectory.Goal, most: int) -> tuple[Any, int]:
-    """A request as the server converts it, and how many points it left out."""
+def taken(sent: ExecuteTrajectory.Goal, most: int) -> tuple[Any, str, list[tuple[int, int]]]:
+    """A request as the server converts it, why it is refused, and what was asked: points, bytes."""
     from rclpy.impl.implementation_singleton import rclpy_implementation
-    from rclpy.serialization import serialize_message
 
     kind = ExecuteTrajectory.Impl.SendGoalService.Request
-    counted = bounded_goals._CountedRequest(kind, lambda: most)
+    asked: list[tuple[int, int]] = []
+
+    def admit(points: int, size: int) -> bounded_goals.Admission:
+        asked.append((points, size))
+        if points > most:
+            return bounded_goals.Admission(refusal=f"{points} points")
+        return bounded_goals.Admission(7)
+
+    counted = bounded_goals._CountedRequest(kind, admit, lambda goal_id: False)
     request = kind(goal=sent)
     request.goal_id.uuid[:] = range(16)
-    return rclpy_implementation.rclpy_deserialize(
-        serialize_message(request), counted.as_class
-    ), counted.left_out
+    made = rclpy_implementation.rclpy_deserialize(serialize_message(request), counted.as_class)
+    return made, counted.admission.refusal, asked
 
 
 def test_a_goal_within_the_bound_is_whole() -> None:
-    request, left_out = taken(goal(MOST, 1), MOST)
-    assert left_out == 0
-    assert request.goal == goal(MOST, 1)
+    request, refusal, asked = taken(goal(MOST), MOST)
+    assert refusal == ""
+    assert asked == [(MOST, MOST * 6 * 8)]
+    assert request.goal == goal(MOST)
     assert list(request.goal_id.uuid) == list(range(16))
 
 
@@ -51,11 +62,45 @@ def test_a_goal_within_the_bound_is_whole() -> None:
 )
 def test_beyond_it_all_but_the_points_are_there(points: int, multi_dof: int) -> None:
     for _ in range(3):  # the points are freed, too
-        request, left_out = taken(goal(points, multi_dof), MOST)
-    assert left_out == max(points, multi_dof)
+        request, refusal, _ = taken(goal(points, multi_dof), MOST)
+    assert f"{multi_dof or points} points" in refusal
     assert not request.goal.trajectory.points
     assert not request.goal.multi_dof_trajectory.points
     assert request.goal == goal(0)
+
+
+def test_other_threads_run_while_a_long_goal_is_converted() -> None:
+    """A press of the emergency stop does not wait for the 0.2 s that 20,000 points take."""
+    message = goal(20_000).trajectory
+    data = serialize_message(message)
+    looks: list[float] = []
+    ended = threading.Event()
+
+    def look() -> None:
+        while not ended.is_set():
+            looks.append(time.monotonic())
+            time.sleep(0.0005)
+
+    reader = bounded_goals.TrajectoryReader()
+    other = threading.Thread(target=look)
+    other.start()
+    began = time.monotonic()
+    read = reader.read(data)
+    seconds = time.monotonic() - began
+    ended.set()
+    other.join()
+    within = [each for each in looks if began <= each <= began + seconds]
+    assert read == message
+    assert len(within) > 10  # in one piece: 1 or 2
+
+
+@pytest.mark.parametrize("name", ["path_tolerance", "goal_tolerance"])
+def test_a_goal_of_many_tolerances_is_refused_before_they_are_converted(name: str) -> None:
+    sent = goal(2)
+    setattr(sent, name, [JointTolerance(name="joint_a1")] * 5000)
+    request, refusal, _ = taken(sent, MOST)
+    assert "5000" in refusal
+    assert not getattr(request.goal, name)
 
 
 def test_the_driver_refuses_it_with_the_count_and_forgets_it_soon(

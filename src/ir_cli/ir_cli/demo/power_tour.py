@@ -128,7 +128,7 @@ def tour(
 
 def motors_on(client: Client, watch: PowerWatch) -> None:
     """Release the brakes: they close by themselves after a while, as during planning."""
-    set_bit(client, END_REST, True)
+    set_bit(client, names.END_REST, True)
     watch.wait_for_mode(PowerMode.STAND_ON_MOTORS)
 
 

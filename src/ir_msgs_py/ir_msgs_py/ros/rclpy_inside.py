@@ -132,6 +132,13 @@ def take_message(subscription: Any) -> tuple[Any, dict[str, int]] | None:
     return taken
 
 
+def take_bytes(subscription: Any) -> tuple[bytes, dict[str, int]] | None:
+    """As `take_message`, without making an object of the message."""
+    with subscription.handle:
+        taken = subscription.handle.take_message(subscription.msg_type, True)
+    return None if taken is None else (bytes(taken[0]), taken[1])
+
+
 def can_take_requests(service: Any) -> bool:
     """Whether `take_request` works; otherwise the executor has to call the service's handler."""
     return part(part(service, "handle"), "service_take_request") is not None

@@ -4,7 +4,7 @@ it.
 
 from ir_sim_driver.controller.driver import Bodies, Driver, Snapshot
 from ir_sim_driver.controller.goal_checks import VettedGoal
-from ir_sim_driver.controller.goals import NO_GOAL
+from ir_sim_driver.controller.goals import NO_GOAL, refused
 from ir_sim_driver.controller.outputs import Entry, Frame, Joints, report
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
 from ir_sim_driver.controller.simulation import Simulation, make_simulation
@@ -26,5 +26,6 @@ __all__ = [
     "SupervisionSettings",
     "VettedGoal",
     "make_simulation",
+    "refused",
     "report",
 ]

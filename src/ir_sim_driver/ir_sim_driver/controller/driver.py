@@ -279,9 +279,19 @@ class Driver:
         with self._access.online() as simulation:
             return simulation.pauses.query_modes(), simulation.modes.mode
 
-    def recover(self) -> str:
-        """Leave the emergency stop; a remark."""
+    def recover(self, came_ns: int = 0) -> str:
+        """Leave the emergency stop; a remark.
+
+        came_ns: when the request came [ns of the host's clock], 0: now. One that came before the
+        last stop, and waited, is refused.
+        """
         with self._access.online() as simulation:
+            stop = simulation.plc.stop
+            if 0 < came_ns < stop.wall_ns:
+                raise RequestRefusedError(
+                    StatusCode.INVALID_ROBOT_STATE,
+                    f"recover came before stop {stop.number}: ask again",
+                )
             return simulation.recover()
 
     def set_load(self, load: Callable[[Cell], Carried]) -> Carried:

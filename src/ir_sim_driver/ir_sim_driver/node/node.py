@@ -28,15 +28,25 @@ from ir_msgs_py.ros.node_process import run_node
 from ir_msgs_py.ros.serving import BoundedService
 from ir_msgs_py.ros.topics import ACTION_SERVICES
 from ir_sim_driver.controller import Driver, Joints, Simulation, make_simulation
-from ir_sim_driver.errors import DriverError, LinkError, PlantStoppedError
+from ir_sim_driver.errors import (
+    DriverError,
+    LinkError,
+    PlantStoppedError,
+    TrajectoryRefusedError,
+)
 from ir_sim_driver.node.announcements import Announcements
-from ir_sim_driver.node.command_topics import PlcTopic, TrajectoryTopic
+from ir_sim_driver.node.command_topics import (
+    CommandThread,
+    PlcTopic,
+    PolledService,
+    TrajectoryTopic,
+)
 from ir_sim_driver.node.messages import condition_of, hardware_id
 from ir_sim_driver.node.parameters import DriverParameters
 from ir_sim_driver.node.real_time import FOREIGN, OWN, SYSTEM, GridThread, ScaledClock
 from ir_sim_driver.node.services import Services
 from ir_sim_driver.node.streams import Streams
-from ir_sim_driver.node.trajectory_actions import BoundedActionServer, Executions
+from ir_sim_driver.node.trajectory_actions import Admission, BoundedActionServer, Executions
 from ir_sim_driver.node.visualization import open_transforms, robot_markers
 from ir_sim_driver.notices import Level, Notice, shortened
 from ir_sim_driver.plc import Link, OpenLink, WakeOnLan
@@ -71,6 +81,7 @@ _DIAGNOSTICS_PERIOD = 1.0
 _TRANSFORMS_PERIOD = 0.02
 _LINES_MAX = 20  # of the log per second: who toggles a bit all day must not fill a disk
 _RESULT_KEPT = 60  # s that the result of a goal can be asked for; each takes memory
+_GRAPH_PERIOD = 0.2  # s between two looks who is there: each takes a millisecond
 _LAST_WORDS = 1.0  # s for the answers to goals when the plant has stopped
 REFUSALS = (DriverError, DescriptionError, MsgsError)
 _LOOK = 1.0  # s between two looks whether the plant runs: each delays its thread
@@ -102,6 +113,7 @@ class SimDriver(Node):
         self._hardware = hardware_id(simulation.robot)
         self._joints: Joints | None = None
         self._last_words = 0.0
+        self._subscribers: dict[str, tuple[float, tuple[bytes, ...]]] = {}
         self._open_topics()
         self._open_requests()
         self._links = open_links(self._configuration.links, self._driver)
@@ -115,6 +127,7 @@ class SimDriver(Node):
         """Stop the plant, then the rest. Raises PlantStoppedError when the plant had ended
         before.
         """
+        self._presses.close()
         self._plant.close()
         for link in self._links.values():
             link.close()
@@ -131,7 +144,6 @@ class SimDriver(Node):
         self._markers = self.create_publisher(MarkerArray, names.ROBOT_MARKERS, 1)
         self._diagnostics = Diagnostics(self)
         self._trajectory_topic = TrajectoryTopic(self, self._driver)
-        self._plc_topic = PlcTopic(self, self._driver)
         self.create_subscription(
             Float64,
             names.SPEED_SCALING,
@@ -152,11 +164,15 @@ class SimDriver(Node):
                 self._serve_action(FollowJointTrajectory, names.FOLLOW_JOINT_TRAJECTORY)
             )
         answers = Services(self._driver, self.get_name(), self._announcements.look)
-        BoundedService(self, SetPlcInput, names.SET_PLC_INPUT, answers.set_plc_input)
+        self._presses = CommandThread(
+            PlcTopic(self, self._driver).poll,
+            PolledService(self, SetPlcInput, names.SET_PLC_INPUT, answers.set_plc_input).poll,
+            PolledService(self, Recover, names.RECOVER, answers.recover).poll,
+        )
+        self._presses.start()
         BoundedService(self, StartPause, names.START_PAUSE, answers.start_pause)
         BoundedService(self, EndPause, names.END_PAUSE, answers.end_pause)
         BoundedService(self, QueryModes, names.QUERY_MODES, answers.query_modes)
-        BoundedService(self, Recover, names.RECOVER, answers.recover)
         BoundedService(self, SetLoad, names.SET_LOAD, answers.set_load)
 
     def _serve_action(self, action_type: Any, name: str) -> BoundedActionServer:
@@ -173,14 +189,21 @@ class SimDriver(Node):
             action_type,
             name,
             executions.execute,
-            most=lambda: self._driver.max_points,
+            admit=self._admit,
             cancel_callback=cancel,
             result_timeout=_RESULT_KEPT,
             **ACTION_SERVICES,
         )
-        executions.points_of = server.points_of
+        executions.admission_of = server.admission_of
         executions.client_of = server.client_of
         return server
+
+    def _admit(self, points: int, size: int) -> Admission:
+        """Ask the driver for a goal of so many points and bytes."""
+        try:
+            return Admission(self._driver.admit(points, size))
+        except TrajectoryRefusedError as error:
+            return Admission(refusal=str(error))
 
     # what executions borrow
 
@@ -194,8 +217,14 @@ class SimDriver(Node):
             self.executor.wake()
 
     def subscribers(self, topic: str) -> Sequence[bytes]:
-        """Identities of the subscriptions to a topic in the graph."""
-        return [bytes(each.endpoint_gid) for each in self.get_subscriptions_info_by_topic(topic)]
+        """Identities of the subscriptions to a topic in the graph, of the last _GRAPH_PERIOD."""
+        now = time.monotonic()
+        seen, there = self._subscribers.get(topic, (-_GRAPH_PERIOD, ()))
+        if now - seen >= _GRAPH_PERIOD:
+            found = self.get_subscriptions_info_by_topic(topic)
+            there = tuple(bytes(each.endpoint_gid) for each in found)
+            self._subscribers[topic] = now, there
+        return there
 
     def every(self, seconds: float, callback: Callable[[], None]) -> Callable[[], None]:
         """Call back again and again until the returned function is called."""

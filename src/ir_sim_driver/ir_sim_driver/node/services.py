@@ -31,7 +31,7 @@ class Services:
         self._source = source
         self._load_changed = load_changed
 
-    def set_plc_input(self, request: Any, response: Any) -> Any:
+    def set_plc_input(self, request: Any, response: Any, came_ns: int = 0) -> Any:
         """Set one bit, or the mode switch by the name of its position; the remark: why it won't
         count.
         """
@@ -75,9 +75,9 @@ class Services:
 
         return self._answer(response, work)
 
-    def recover(self, request: Any, response: Any) -> Any:
-        """Leave the emergency stop."""
-        return self._answer(response, self._driver.recover)
+    def recover(self, request: Any, response: Any, came_ns: int = 0) -> Any:
+        """Leave the emergency stop; came_ns: when the request came [ns of the host's clock]."""
+        return self._answer(response, lambda: self._driver.recover(came_ns))
 
     def set_load(self, request: Any, response: Any) -> Any:
         """Carry named loads, or one from numbers."""

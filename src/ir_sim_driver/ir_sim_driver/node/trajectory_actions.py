@@ -5,16 +5,20 @@ from __future__ import annotations
 import ctypes
 import time
 from collections.abc import Awaitable, Callable, Sequence
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from rclpy.serialization import deserialize_message
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from ir_msgs.msg import LoadCheck
 from ir_msgs_py.checks import one_line
 from ir_msgs_py.ros.plan_conversions import contact_to_msg
 from ir_msgs_py.ros.rclpy_inside import part, participant_of
 from ir_msgs_py.ros.serving import RecordedActionServer
-from ir_sim_driver.controller import Driver
+from ir_sim_driver.controller import Driver, refused
 from ir_sim_driver.load_check import LoadFinding
-from ir_sim_driver.motion import ErrorCode, Outcome
+from ir_sim_driver.motion import ErrorCode, Outcome, TrajectoryGoal
 from ir_sim_driver.node.messages import fill_load_check, fill_points, goal_from_action
 
 
@@ -46,12 +50,16 @@ class ClientWatch:
 # Goals that are counted before Python objects are made of them.
 #
 # rclpy converts a request while it holds the interpreter, some 10 us for each point: the plant's
-# thread would wait a second for a goal of 100,000 points that is refused anyway. rclpy asks the
-# message's class for the function that converts it; here it gets one that looks at the C message
-# first, and leaves out the points where they are more than may be.
+# thread, and a press of the emergency stop, would wait 0.2 s for a goal of 20,000 points, and a
+# second for one of 100,000 that is refused anyway. rclpy asks the message's class for the
+# function that converts it; here it gets one that looks at the C message first, leaves out the
+# points of what is refused, and converts the others one by one, so that other threads run in
+# between.
 
 _CLIENTS_KEPT = 1000
-_Convert = ctypes.PYFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p)
+_NAMES_MAX = 100  # joints, tolerances and states of a goal: a robot has ten
+_AT_ONCE = 50  # points that are converted without a pause for other threads, half a millisecond
+_Convert = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p)
 _api = ctypes.pythonapi
 _api.PyCapsule_GetName.restype = ctypes.c_char_p
 _api.PyCapsule_GetName.argtypes = [ctypes.py_object]
@@ -85,64 +93,170 @@ class _GoalRequest(ctypes.Structure):
         ("goal_id", ctypes.c_uint8 * 16),
         ("trajectory", _Trajectory),
         ("multi_dof", _Trajectory),
+        ("path_tolerance", _Sequence),
+        ("goal_tolerance", _Sequence),
     )
 
 
-class _CountedRequest:
-    """Looks like the class `request` to rclpy, and leaves points out where there are more than
-    most().
+class _Point(ctypes.Structure):
+    """A JointTrajectoryPoint."""
 
-    left_out: points of the request that was converted last, 0 where it is whole. Where the class
-    has no such function, it is the class itself: the driver then counts what was converted.
+    _fields_ = (
+        ("positions", _Sequence),
+        ("velocities", _Sequence),
+        ("accelerations", _Sequence),
+        ("effort", _Sequence),
+        ("time_from_start", ctypes.c_int32 * 2),
+    )
+
+
+_WORDS = ctypes.sizeof(_Point) // 8  # of a point; every third of the first twelve is a size
+
+
+def _converter(kind: Any) -> Callable[[int], Any] | None:
+    """The function that makes an object of a C message of this class; None where it has none."""
+    if part(kind, "_CONVERT_TO_PY") is None:
+        kind.__import_type_support__()
+    capsule = part(kind, "_CONVERT_TO_PY")
+    if capsule is None:
+        return None
+    return _Convert(_api.PyCapsule_GetPointer(capsule, _api.PyCapsule_GetName(capsule)))
+
+
+def _bytes_of(points: _Sequence) -> int:
+    """Bytes of the numbers in a C sequence of points, which need not be six each."""
+    if not points.size:
+        return 0
+    words = (ctypes.c_uint64 * (_WORDS * points.size)).from_address(points.data)
+    table = np.frombuffer(words, np.uint64).reshape(points.size, _WORDS)
+    return 8 * int(table[:, 1:12:3].sum())
+
+
+def _converted(
+    convert: Callable[[int], Any], message: int, points: _Sequence
+) -> tuple[Any, list[Any]]:
+    """The message without its points, and the points, made one by one."""
+    size = points.size
+    points.size = 0
+    whole = convert(message)
+    points.size = size
+    one = _converter(JointTrajectoryPoint)
+    assert one is not None  # its trajectory has one
+    made = []
+    for k in range(size):
+        made.append(one(points.data + k * ctypes.sizeof(_Point)))
+        if k % _AT_ONCE == _AT_ONCE - 1:
+            time.sleep(0)  # lets another thread run
+    return whole, made
+
+
+class Admission(NamedTuple):
+    """What the driver says of a goal before it is converted: its ticket, or why it is refused."""
+
+    ticket: int = 0
+    refusal: str = ""
+
+
+Admit = Callable[[int, int], Admission]
+
+
+class _CountedRequest:
+    """Looks like the class `request` to rclpy; admit: from points and bytes.
+
+    admission: of the request that was converted last. Where it is refused its points are left out.
+    known: whether there is a goal of this id already, which rclpy refuses. Where the class has no
+    function that converts it, it is the class itself: the driver then counts what was converted.
     """
 
-    def __init__(self, request: Any, most: Callable[[], int]) -> None:
+    def __init__(self, request: Any, admit: Admit, known: Callable[[bytes], bool]) -> None:
         kind = type(request)
-        self.left_out = 0
+        convert = _converter(kind)
+        self.admission = Admission()
         self.as_class: Any = request
-        if part(kind, "_CONVERT_TO_PY") is None:
-            kind.__import_type_support__()
-        capsule = part(kind, "_CONVERT_TO_PY")
-        if capsule is None:
+        if convert is None:
             return
-        address = _api.PyCapsule_GetPointer(capsule, _api.PyCapsule_GetName(capsule))
-        convert = _Convert(address)
 
-        def counted(message: int) -> int | None:
+        def counted(message: int) -> Any:
             head = _GoalRequest.from_address(message)
-            points = max(head.trajectory.points.size, head.multi_dof.points.size)
-            self.left_out = points if points > most() else 0
-            if self.left_out:  # what is there is freed by its capacity, whatever its size
-                head.trajectory.points.size = head.multi_dof.points.size = 0
-            return convert(message)  # type: ignore[no-any-return]
+            points = head.trajectory.points
+            self.admission = Admission()
+            if not known(bytes(head.goal_id)):
+                self.admission = _judged(head, admit)
+            if not self.admission.ticket:
+                _emptied(head)  # what is there is freed by its capacity, whatever its size
+                return convert(message)
+            whole, made = _converted(convert, message, points)
+            whole.goal.trajectory._points = made
+            return whole
 
         self._kept = _Convert(counted)
-        pointer = ctypes.cast(self._kept, ctypes.c_void_p)
-        own = {
-            "_TYPE_SUPPORT": kind._TYPE_SUPPORT,
-            "_CREATE_ROS_MESSAGE": kind._CREATE_ROS_MESSAGE,
-            "_DESTROY_ROS_MESSAGE": kind._DESTROY_ROS_MESSAGE,
-            "_CONVERT_TO_PY": _api.PyCapsule_New(pointer, None, None),
-        }
-        self.as_class = type("CountedRequest", (), own)()
+        self.as_class = _lookalike(kind, self._kept)
+
+
+def _judged(head: _GoalRequest, admit: Admit) -> Admission:
+    """What becomes of a goal by its counts alone."""
+    trajectory = head.trajectory
+    multi_dof = head.multi_dof
+    if multi_dof.points.size or multi_dof.joint_names.size:
+        return Admission(
+            refusal=f"multi_dof_trajectory has {multi_dof.points.size} points: it must be empty, "
+            "the robot has joints only"
+        )
+    counts = {
+        "joint names": trajectory.joint_names.size,
+        "path tolerances": head.path_tolerance.size,
+        "goal tolerances": head.goal_tolerance.size,
+    }
+    for name, count in counts.items():
+        if count > _NAMES_MAX:
+            return Admission(refusal=f"the goal has {count} {name}: at most {_NAMES_MAX}")
+    points = trajectory.points
+    return admit(points.size, _bytes_of(points))
+
+
+def _emptied(head: _GoalRequest) -> None:
+    """Leave out the points, and what else is too long."""
+    head.trajectory.points.size = head.multi_dof.points.size = 0
+    for each in (
+        head.trajectory.joint_names,
+        head.multi_dof.joint_names,
+        head.path_tolerance,
+        head.goal_tolerance,
+    ):
+        each.size = each.size if each.size <= _NAMES_MAX else 0
+
+
+def _lookalike(kind: Any, convert: Any) -> Any:
+    """A class that rclpy takes for `kind`, whose messages `convert` makes."""
+    pointer = ctypes.cast(convert, ctypes.c_void_p)
+    own = {
+        "_TYPE_SUPPORT": kind._TYPE_SUPPORT,
+        "_CREATE_ROS_MESSAGE": kind._CREATE_ROS_MESSAGE,
+        "_DESTROY_ROS_MESSAGE": kind._DESTROY_ROS_MESSAGE,
+        "_CONVERT_TO_PY": _api.PyCapsule_New(pointer, None, None),
+    }
+    return type("Lookalike", (), own)()
 
 
 class BoundedActionServer(RecordedActionServer):
-    """An action server of goals that begin with a trajectory; most: points that are converted at
-    most.
+    """An action server of goals that begin with a trajectory; admit: asked before a goal is
+    converted.
     """
 
-    def __init__(
-        self, node: Any, action_type: Any, *arguments: Any, most: Callable[[], int], **options: Any
-    ):
-        self._counted = _CountedRequest(action_type.Impl.SendGoalService.Request, most)
-        self._points: dict[bytes, int] = {}
+    def __init__(self, node: Any, action_type: Any, *arguments: Any, admit: Admit, **options: Any):
+        self._admissions: dict[bytes, Admission] = {}
         self._clients: dict[bytes, bytes] = {}
+        self._counted = _CountedRequest(
+            action_type.Impl.SendGoalService.Request, admit, self._is_known
+        )
         super().__init__(node, action_type, *arguments, **options)
 
-    def points_of(self, goal_id: bytes) -> int:
-        """How many points a goal had that were left out; 0 for one that is whole. Asked once."""
-        return self._points.pop(goal_id, 0)
+    def _is_known(self, goal_id: bytes) -> bool:
+        return goal_id in self._admissions or goal_id in (part(self, "_goal_handles") or ())
+
+    def admission_of(self, goal_id: bytes) -> Admission:
+        """Ticket or refusal of a goal. Asked once."""
+        return self._admissions.pop(goal_id, Admission())
 
     def client_of(self, goal_id: bytes) -> bytes:
         """Participant of who has sent a goal; b"" where it is not known. Asked once."""
@@ -153,13 +267,36 @@ class BoundedActionServer(RecordedActionServer):
         return self._counted.as_class
 
     def goal_came(self, request_id: Any, request: Any) -> None:
-        """Note who has sent the goal, and how many points were left out."""
+        """Note who has sent the goal, and what the driver said of it."""
         key = bytes(request.goal_id.uuid)
         while len(self._clients) >= _CLIENTS_KEPT:  # of goals that rclpy has not accepted
             del self._clients[next(iter(self._clients))]
         self._clients[key] = participant_of(request_id)
-        if self._counted.left_out:
-            self._points[key] = self._counted.left_out
+        if self._counted.admission != Admission():
+            self._admissions[key] = self._counted.admission
+
+
+class TrajectoryReader:
+    """Reads JointTrajectories from bytes, point by point, so that other threads run in between."""
+
+    def __init__(self) -> None:
+        convert = _converter(JointTrajectory)
+        self._class: Any = JointTrajectory
+        if convert is None:
+            return
+
+        def parted(message: int) -> Any:
+            points = _Trajectory.from_address(message).points
+            whole, made = _converted(convert, message, points)
+            whole._points = made
+            return whole
+
+        self._kept = _Convert(parted)
+        self._class = _lookalike(JointTrajectory, self._kept)
+
+    def read(self, data: bytes) -> Any:
+        """The message. Raises what rclpy raises for bytes that are none."""
+        return deserialize_message(data, self._class)
 
 
 # Execution of goals: given to the driver, followed with feedback, canceled, answered.
@@ -204,7 +341,7 @@ class Executions:
         self._client_timeout = client_timeout
         self._tickets: dict[bytes, int] = {}
         self._canceled: set[bytes] = set()
-        self.points_of: Callable[[bytes], int] = lambda goal_id: 0  # that the server has left out
+        self.admission_of: Callable[[bytes], Admission] = lambda goal_id: Admission()
         self.client_of: Callable[[bytes], bytes] = lambda goal_id: b""  # its participant
 
     async def execute(self, handle: Any) -> Any:
@@ -218,12 +355,21 @@ class Executions:
             done.set_result(outcome)
             self._node.wake()
 
-        points = self.points_of(key) or len(request.trajectory.points)
-        ticket = self._driver.submit(points, lambda: goal_from_action(request, limit), ended)
+        def read() -> TrajectoryGoal:
+            goal = goal_from_action(request, limit)
+            request.trajectory.points = []  # the arrays of the goal are all that is needed
+            return goal
+
+        admission = self.admission_of(key)
+        client = self.client_of(key)
+        if admission.refusal:
+            return self._result(handle, refused(admission.refusal))
+        points = len(request.trajectory.points)
+        ticket = self._driver.submit(points, read, ended, admission.ticket)
         self._tickets[key] = ticket
         if key in self._canceled:  # before it was submitted
             self._driver.cancel(ticket)
-        watch = ClientWatch(self._client_timeout, self.client_of(key))
+        watch = ClientWatch(self._client_timeout, client)
 
         def report() -> None:
             self._publish_feedback(handle, ticket)
@@ -236,7 +382,7 @@ class Executions:
         end_feedback()
         self._tickets.pop(key, None)
         self._canceled.discard(key)
-        request.trajectory.points = []  # the action keeps the request as long as the result
+        request.trajectory.points = []  # of a goal that was not read; rclpy keeps it for a minute
         return self._result(handle, outcome)
 
     def cancel(self, handle: Any) -> None:

@@ -9,6 +9,7 @@ only for a stop that came before it: levels of one message rise together, none f
 
 from __future__ import annotations
 
+import time
 from enum import Enum
 
 
@@ -41,12 +42,13 @@ _PUSHED = (StopState.PRESSED, StopState.PRESSED_FAULT)
 class StopMachine:
     """state: where it is. number: of the last stop, 0 before the first.
 
-    Orders grow with every message that is written; `since` is that of the last stop or release.
+    wall_ns: time of that stop on the host's clock. Orders grow with every message that is written.
     """
 
     def __init__(self) -> None:
         self.state = StopState.RUN
         self.number = 0
+        self.wall_ns = 0
         self._since = 0
         self._acknowledged = 0
 
@@ -67,16 +69,19 @@ class StopMachine:
 
     def press(self, order: int) -> None:
         """The button goes down, in whatever mode or transition."""
-        self.number += 1
-        self._since = order
+        self._count(order)
         self.state = _PRESS.get(self.state, StopState.PRESSED)
 
     def fault(self, order: int) -> None:
         """The supervision, the physics or a contact stops the robot."""
         if not self.faulty:
-            self.number += 1
-            self._since = order
+            self._count(order)
             self.state = _FAULT.get(self.state, StopState.FAULT)
+
+    def _count(self, order: int) -> None:
+        self.number += 1
+        self.wall_ns = time.time_ns()
+        self._since = order  # of the last stop or release
 
     def release(self, order: int) -> None:
         """The button is up, and has been for the debounce; order: of the level that let go."""
