@@ -155,7 +155,7 @@ def test_a_goal_that_is_cancelled_before_it_begins_is_cancelled() -> None:
     """A thread may take the cancel before the goal's own coroutine runs."""
     cancelled: list[int] = []
     driver = SimpleNamespace(
-        max_points=10, submit=lambda points, read, ended: 7, cancel=cancelled.append
+        max_points=10, submit=lambda points, read, ended, ticket: 7, cancel=cancelled.append
     )
     node = SimpleNamespace(
         future=lambda: asyncio.Future(loop=loop), every=lambda seconds, call: lambda: None
