@@ -125,7 +125,7 @@ def test_a_study_is_made_with_progress_and_its_files_lie_below_the_output(
 @pytest.mark.parametrize(
     ("fields", "said"),
     [
-        ({"kind": "teleport"}, "kind 'teleport' is unknown: known are layout"),
+        ({"kind": "teleport"}, "kind 'teleport' is unknown; known are layout"),
         ({"kind": ""}, ""),
         ({"settings": ""}, "expected keys and values with format: ir_layout/1"),
         ({"settings": "{["}, "is no YAML"),

@@ -42,23 +42,29 @@ def test_the_example_is_read_and_names_every_key(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ("", "format: ir_arena/1"),
+        ("", "the file is empty"),
         ("- 1\n", "format: ir_arena/1"),
         ("format: ir_cell/1\ncells: [open]\n", "format: ir_arena/1"),
-        ("{[", "is no YAML"),
+        ("{[", "is not YAML"),
         (HEAD, "cells are missing"),
-        (HEAD + "cells: [open]\nseeds: 2\nseeds: 3\n", "seeds stands twice"),
+        (
+            HEAD + "cells: [open]\nseeds: 2\nseeds: 3\n",
+            "'seeds' stands here twice, first in",
+        ),
         (HEAD + "cells: []\n", "cells is empty"),
         (HEAD + "cells: open\n", "cells is 'open': it must be a list of names"),
         (HEAD + "cells: [oven]\n", "oven"),
         (HEAD + "cells: [open, open]\n", "names one twice"),
         (HEAD + "cells: [cell.yaml, ./cell.yaml]\n", "cells names one twice"),
-        (HEAD + "cells: [open]\nplaners: [sbl]\n", "planers is unknown: known are cells, planners"),
+        (
+            HEAD + "cells: [open]\nplaners: [sbl]\n",
+            "'planers' is unknown; known are cells, planners",
+        ),
         (
             HEAD + "cells: [open]\nplanners: [teleport]\n",
-            "'teleport' is unknown: known are portfolio, direct",
+            "'teleport' is unknown; known are portfolio, direct",
         ),
-        (HEAD + "cells: [open]\ntasks: [a->b]\n", "'a->b' is unknown: known are home->p1"),
+        (HEAD + "cells: [open]\ntasks: [a->b]\n", "'a->b' is unknown; known are home->p1"),
         (HEAD + "cells: [open]\nloads: [anvil]\n", "anvil"),
         (HEAD + "cells: [open]\ntimings: [slow]\n", "known are synchronous, asynchronous"),
         (
@@ -83,7 +89,7 @@ def test_the_example_is_read_and_names_every_key(tmp_path: Path) -> None:
             HEAD + "cells: [open]\nsafety_distance: 2\n",
             "safety_distance is 2: it must be a number in 0 .. 1",
         ),
-        (HEAD + "cells: [open]\n? [a]\n: 1\n", "is no YAML"),
+        (HEAD + "cells: [open]\n? [a]\n: 1\n", "a key must be a word"),
     ],
 )
 def test_what_makes_no_sense_is_refused(tmp_path: Path, content: str, said: str) -> None:

@@ -17,6 +17,7 @@ from ir_studies.arena.settings import arena_settings
 from ir_studies.errors import SettingsError
 from ir_studies.work import Means, Placed, beside, read_text
 from ir_studies.work.settings_file import kind_of
+from ir_values.errors import unknown_name
 
 
 @dataclass(frozen=True)
@@ -102,5 +103,5 @@ def study_of(content: str, kind: str = "", placed: Placed = str) -> Study:
     """The study that a text asks for. kind: which it must be, "": what its format says."""
     kind = kind or kind_of(content)
     if kind not in KINDS:
-        raise SettingsError(f"kind {kind!r:.60} is unknown: known are {', '.join(KINDS)}")
+        raise SettingsError(unknown_name("kind", kind, KINDS))
     return Study(kind, KINDS[kind].read(content, placed))

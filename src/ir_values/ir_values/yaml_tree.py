@@ -229,12 +229,46 @@ def _flow(node: Node) -> str:
 BYTES_MAX = 100_000
 """Size of a settings file."""
 
+_DIGITS_MAX = 1_000
+"""Characters of a number: few enough for a message, more than any float has."""
+_DIGITS = re.compile(r"[-+.0-9][0-9a-fA-FxX_.:+\-]*")
+
 
 def plain_yaml(path: Path) -> Any:
     """What the only document of a file holds. DescriptionFileError with path and line."""
     text = read_regular_file(path, BYTES_MAX).decode("utf-8", "replace")
-    parse_yaml(text, str(path), DescriptionFileError)
+    return plain_values(text, str(path))
+
+
+def plain_values(text: str, source: str, limits: Limits | None = None) -> Any:
+    """The only document of a text as plain values: mappings, lists, numbers, texts, dates.
+
+    DescriptionFileError with source and line for what `parse_yaml` refuses, and for numbers that
+    are too long to be printed.
+    """
+    for line, length in _long_numbers(parse_yaml(text, source, DescriptionFileError, limits)):
+        raise DescriptionFileError(
+            source, line, f"a number has {length} characters, must have at most {_DIGITS_MAX}"
+        )
     try:
         return yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError) as error:  # ValueError: 2026-99-99 as a date
-        raise DescriptionFileError(str(path), 0, " ".join(str(error).split())[:200]) from error
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
+        # ValueError: 2026-99-99 as a date; OverflowError: 1:1:...:1.5, which YAML counts by sixties
+        said = " ".join(str(error).split())[:200]
+        raise DescriptionFileError(source, 0, f"this is not YAML: {said}") from error
+
+
+def _long_numbers(node: Node) -> Iterator[tuple[int, int]]:
+    """Line and length of numbers that are too long."""
+    content = node.content
+    if isinstance(content, Scalar):
+        if content.plain and len(content.text) > _DIGITS_MAX and _DIGITS.fullmatch(content.text):
+            yield node.line, len(content.text)
+    elif isinstance(content, list):
+        for each in content:
+            yield from _long_numbers(each)
+    else:
+        for key, entry in content.items():
+            if len(key) > _DIGITS_MAX and _DIGITS.fullmatch(key):
+                yield entry.line, len(key)
+            yield from _long_numbers(entry.node)

@@ -9,12 +9,11 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
-import yaml
-
 from ir_studies.errors import SettingsError
+from ir_values.errors import DescriptionFileError, unknown_name
+from ir_values.yaml_tree import Limits, plain_values
 
 MOST_CHARACTERS = 1_000_000  # of a settings file
-_MOST_DIGITS = 1_000  # of a number: few enough for a message, more than any float has
 Bounds: TypeAlias = "tuple[str, float, float]"
 """A key, its least and its largest value."""
 Placed = Callable[[str], str]
@@ -58,7 +57,7 @@ def settings_values(content: str, format_name: str, known: Collection[str]) -> d
         if key == "format":
             continue
         if key not in known:
-            raise SettingsError(f"{key!s:.60} is unknown: known are {', '.join(known)}")
+            raise SettingsError(unknown_name("key", str(key), known))
         values[key] = tuple(value) if isinstance(value, list) else value
     return values
 
@@ -73,14 +72,11 @@ def kind_of(content: str) -> str:
 
 def _mapping(content: str) -> dict[Any, Any] | None:
     """What a text holds; None where it is no mapping."""
-    if len(content) > MOST_CHARACTERS:
-        raise SettingsError(f"settings have {len(content)} characters: at most {MOST_CHARACTERS}")
     try:
-        read = yaml.load(content, Loader=_PlainLoader)
-    except (yaml.YAMLError, RecursionError, ValueError, OverflowError) as error:
-        # ValueError: 2026-99-99 as a date; OverflowError: 1:1:...:1.5, which YAML counts by sixties
-        said = " ".join(str(error).split())
-        raise SettingsError(f"this is no YAML: {said:.300}") from error
+        read = plain_values(content, "", Limits(characters=MOST_CHARACTERS))
+    except DescriptionFileError as error:
+        place = f"line {error.line}: " if error.line else ""
+        raise SettingsError(f"{place}{error.sentence}") from error
     return read if isinstance(read, dict) else None
 
 
@@ -103,8 +99,7 @@ def checked_known(key: str, names: Iterable[object], known: Collection[str]) -> 
     """SettingsError where a name is none of those that are known."""
     for name in names:
         if name not in known:
-            said = ", ".join(dict.fromkeys(known))
-            raise SettingsError(f"{key}: {name!r:.60} is unknown: known are {said}")
+            raise SettingsError(unknown_name(f"{key}:", name, dict.fromkeys(known)))
 
 
 def _within(value: float, low: float, high: float) -> bool:
@@ -113,46 +108,3 @@ def _within(value: float, low: float, high: float) -> bool:
         if isinstance(value, int)
         else math.isfinite(value) and low <= value <= high
     )
-
-
-class _PlainLoader(yaml.SafeLoader):
-    """Without aliases, a few lines of which could stand for gigabytes, and without keys that stand
-    twice.
-    """
-
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        if self.check_event(yaml.AliasEvent):
-            event = self.peek_event()  # type: ignore[no-untyped-call]
-            raise yaml.MarkedYAMLError(
-                problem="aliases are not read", problem_mark=event.start_mark
-            )
-        return super().compose_node(parent, index)
-
-    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
-        keys: set[str] = set()
-        for key, _ in node.value:
-            if isinstance(key, yaml.ScalarNode) and key.value in keys:
-                said = f"{key.value:.60} stands twice"
-                raise yaml.MarkedYAMLError(problem=said, problem_mark=key.start_mark)
-            keys.add(str(key.value))
-        return super().construct_mapping(node, deep)
-
-    def whole(self, node: Any) -> int:
-        """A whole number that can be printed."""
-        _check_length(node)
-        return int(self.construct_yaml_int(node))
-
-    def real(self, node: Any) -> float:
-        """A float of a text that is read at once."""
-        _check_length(node)
-        return float(self.construct_yaml_float(node))
-
-
-def _check_length(node: Any) -> None:
-    if len(node.value) > _MOST_DIGITS:
-        said = f"a number of {len(node.value)} characters: at most {_MOST_DIGITS}"
-        raise yaml.MarkedYAMLError(problem=said, problem_mark=node.start_mark)
-
-
-_PlainLoader.add_constructor("tag:yaml.org,2002:int", _PlainLoader.whole)
-_PlainLoader.add_constructor("tag:yaml.org,2002:float", _PlainLoader.real)
