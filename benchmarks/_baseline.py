@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 from _drives import Drives
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 TORQUE_SHARE = 0.98  # the planner's, of what its reserve leaves
 _SLOWER = 1.002  # step of the uniform slow-down

@@ -17,11 +17,11 @@ from _results import Claim, at_least, at_most, line_of
 
 from ir_description import Body, Cell, Equipment, Zone, cell_to_yaml, load_cell
 from ir_kernels.search import BidirectionalTree
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_planner.planner import Planner
 from ir_planner.request.goals import Goal
 from ir_planner.scene.planning_scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 BOXES = 1000
 # m: around the base, above the floor, and what stays empty

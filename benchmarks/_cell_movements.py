@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_description import Cell
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner, PlannerSettings
 from ir_planner.request import Goal
+from ir_values.arrays import FloatArray
 
 SHARE_OF_ENDS = 0.8  # of the clearance at start and goal, where that is less than S_m
 S_M = 0.02  # m

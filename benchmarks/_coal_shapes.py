@@ -7,7 +7,7 @@ from typing import Any
 import coal
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 
 def along_z(p0: FloatArray, p1: FloatArray) -> FloatArray:

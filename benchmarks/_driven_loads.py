@@ -9,7 +9,6 @@ from collections.abc import Callable
 import numpy as np
 
 from ir_description import Cell
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver import (
     LoadCheckSettings,
@@ -21,6 +20,7 @@ from ir_sim_driver import (
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import TrajectoryGoal
 from ir_sim_driver.plant import Carried
+from ir_values.arrays import FloatArray
 
 SLOWER = (
     1.0,

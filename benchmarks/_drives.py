@@ -11,9 +11,9 @@ import numpy as np
 import pinocchio
 from _pinocchio_arm import pinocchio_arm
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 STEP_S = 1e-3
 

@@ -17,9 +17,9 @@ import casadi as ca
 import numpy as np
 
 from ir_kernels.reference.dynamics import counterbalance_torque, rigid_body_torque
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 MESH = 60  # intervals
 SMOOTHING = 0.01  # rad/s

@@ -28,7 +28,7 @@ from ir_kernels import (
     dc_bus,
     motion_extrema,
 )
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 SAMPLES = 4096
 PINOCCHIO_SAMPLES = 512

@@ -21,7 +21,7 @@ from _results import Claim, at_least, at_most
 
 from ir_description import Cell, load_cell
 from ir_kernels import FREE, UNDECIDED, Chain, CollisionModel
-from ir_msgs_py.arrays import BoolArray, FloatArray
+from ir_values.arrays import BoolArray, FloatArray
 
 SAMPLES = 4000  # configurations per batch: a hundred edges
 # rad, m, m

@@ -17,7 +17,7 @@ from _coal_shapes import along_z, solid
 
 from ir_description import Cell, robot_urdf
 from ir_kernels import CollisionModel
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 
 def _se3(pose: FloatArray) -> Any:

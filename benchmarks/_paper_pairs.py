@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
@@ -17,6 +16,7 @@ from ir_planner.checks import movement_energy
 from ir_planner.request import Context, Work
 from ir_planner.scene import PlanningScene
 from ir_planner.timing import baseline
+from ir_values.arrays import FloatArray
 
 CELL = "open"
 AROUND = 0.03  # m that the straight movement keeps

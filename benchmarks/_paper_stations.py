@@ -12,9 +12,9 @@ from _service_stations import S_M, SHARE_OF_BEST, margin_at
 from _variants import variant
 
 from ir_description import Station, load_cell
-from ir_msgs_py.arrays import FloatArray
 from ir_planner.configurations import free_configurations
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 Key = tuple[int, str, str, int]  # seed, cell, station, draw
 CELLS = ("cnc_door", "deep_box", "demo", "table_columns", "open")

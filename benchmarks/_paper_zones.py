@@ -14,7 +14,7 @@ from _regional_tasks import scene_of_cell
 from ir_description import Body, Cell, Equipment, Zone, load_cell
 from ir_description.cell.equipment import ZoneKind
 from ir_description.poses import pose_of
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 KINDS = ("OPEN", "SEMI_CLOSED", "CLOSED")
 MOST = 100

@@ -10,7 +10,7 @@ import pinocchio
 
 from ir_description import RobotModel
 from ir_kernels.dynamics_data import STANDARD_GRAVITY
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 
 def pinocchio_arm(

@@ -15,8 +15,8 @@ import numpy as np
 from _regional_tasks import Task
 from ompl import base, geometric, util
 
-from ir_msgs_py.arrays import FloatArray
 from ir_planner.scene.planning_scene import PROOF_TOLERANCE
+from ir_values.arrays import FloatArray
 
 PLANNERS = {"RRTConnect": geometric.RRTConnect, "BKPIECE1": geometric.BKPIECE1}
 RESOLUTION = 0.01  # rad of the fastest joint between two states that are checked

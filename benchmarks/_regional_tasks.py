@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from ir_description import Cell, load_cell, load_power_data
-from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks.energy import STEP_S, movement_energy
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
+from ir_values.arrays import FloatArray
 
 CELLS = ("open", "table_columns", "cnc_door", "deep_box")
 S_M = 0.02  # m

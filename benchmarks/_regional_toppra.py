@@ -22,9 +22,9 @@ from toppra.algorithm import TOPPRA
 from toppra.constraint import LinearConstraint
 from toppra.constraint.linear_constraint import canlinear_colloc_to_interpolate
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import Samples
 from ir_planner.scene.planning_scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 GRID = 120  # intervals of a path
 ITERATIONS = 5

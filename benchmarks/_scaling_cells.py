@@ -9,8 +9,8 @@ import numpy as np
 from ir_description import AllowedContact, Body, Cell, Equipment, Zone, load_cell
 from ir_description.cell import station_at
 from ir_description.poses import pose_of
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_values.arrays import FloatArray
 
 # m: beyond the arm, so that every size has the same free paths
 NEAREST = 3.4

@@ -18,12 +18,12 @@ from _truth_section import Asked, Found
 from scipy.spatial.transform import Rotation
 
 from ir_description import Body, load_cell
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver import make_simulation
 from ir_sim_driver.controller import Simulation
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import ErrorCode, Outcome, TrajectoryGoal
+from ir_values.arrays import FloatArray
 
 TITLE = "contact with machines, floor and parts"
 TOUCHING = 100

@@ -14,9 +14,9 @@ from _results import at_most
 from _truth_section import Asked, Found
 
 from ir_description import Load, RobotModel, load_cell
-from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver import TrajectoryGoal, make_simulation
 from ir_sim_driver.plant import PyBulletBackend
+from ir_values.arrays import FloatArray
 
 TITLE = "torques against Pinocchio, PyBullet's steps against an integration of its own"
 CELL = "open"

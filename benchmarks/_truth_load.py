@@ -29,9 +29,9 @@ from ir_description import (
     robot_marks,
 )
 from ir_kernels.dynamics import DynamicsModel
-from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.load_check import Declared, LoadFinding, Motion, Uncertainty, weighed
 from ir_sim_driver.plant import Carried, Plant, nominal_plant, typical_plant
+from ir_values.arrays import FloatArray
 
 TITLE = "a load that is not the declared one"
 PAYLOAD = 155.0

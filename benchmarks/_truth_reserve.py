@@ -16,9 +16,9 @@ from _results import Claim, at_most
 from _truth_section import Asked, Found
 
 from ir_description import PowerParameters, load_power_data, load_power_parameters
-from ir_msgs_py.arrays import FloatArray
 from ir_planner import PlannerSettings
 from ir_planner.scene import Drives, scene_with, torque_use
+from ir_values.arrays import FloatArray
 
 TITLE = "torque that is left to the feedback"
 TRACKING = 0.02  # of the envelope: what the feedback itself needs

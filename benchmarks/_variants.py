@@ -18,7 +18,7 @@ from _regional_tasks import scene_of_cell
 
 from ir_description import Cell, Equipment, Station, Task, cell_to_yaml, load_cell
 from ir_description.poses import composed
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 TURN = np.radians(40.0)  # at most
 # standard deviations: m, rad about the vertical axis

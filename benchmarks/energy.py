@@ -27,12 +27,12 @@ from _baseline import baseline, fastest_baseline
 from _drives import Drives
 from _results import Claim, at_least, at_most, command_line, finish, line_of
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Goal, Planner
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 FACTORS = (1.2, 1.5)
 CEILING = 120.0  # s: work ends a request, never the clock

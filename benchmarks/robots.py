@@ -32,9 +32,9 @@ from ir_cli.main import main as ir
 from ir_description import Cell, RobotModel, load_cell, load_robot, robot_named, robot_urdf
 from ir_description.files.making import TEMPLATE
 from ir_kernels import Chain, InverseKinematics, SphericalWristIk, inverse_kinematics
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Goal, Planner, parse_goal
+from ir_values.arrays import FloatArray
 
 CELLS = ("open", "kr300_pallets", "kr6_bench", "ur10e_bench")
 POSES = 10_000

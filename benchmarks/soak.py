@@ -39,10 +39,10 @@ from ir_msgs.srv import (
     StopRecording,
 )
 from ir_msgs_py import names
-from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.ros.client import Client
+from ir_values.errors import IrError
 
 NODES = ("ir_planner", "ir_sim_driver", "ir_program_runner", "ir_recorder")
 STATIONS = (("p1", "p2"), ("p1b", "conv"), ("cab", "p1"))
@@ -99,7 +99,7 @@ class Shift:
     def _try(self, act: Any) -> None:
         try:
             act()
-        except MsgsError:
+        except IrError:
             self.refused += 1
 
     def _program(self, client: Client, cycle: int) -> None:

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from ir_msgs_py.options import PlanOptions
-from ir_msgs_py.settings import describe
 from ir_planner import CancelledError, Planner, RequestError
 from ir_planner.configurations import free_configurations
 from ir_planner.request import Context, Journal, Work
 from ir_planner.service import EXIT_SEARCHES, Exit, ExitSearch, ExitsFound
+from ir_values.settings import describe
 
 SEED = 7
 WORK = 60_000

@@ -14,9 +14,9 @@ import pytest
 
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode, PlcInputs, PlcOutputs
-from ir_msgs_py.settings import describe
 from ir_sim_driver.errors import LinkError
 from ir_sim_driver.plc import LINKS, WRITERS, Link, OpenLink, Readout
+from ir_values.settings import describe
 
 LOOPBACK = "127.0.0.1"
 GARBAGE = 200  # packets

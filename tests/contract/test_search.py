@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from ir_kernels.collision import FREE
-from ir_msgs_py.settings import describe
 from ir_planner import CancelledError, Goal, Planner, PlannerSettings, PlanOptions, RequestError
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.scene import PlanningScene, path_cost
 from ir_planner.search import SEARCHES, Ends, Found, Search, repeatable
+from ir_values.settings import describe
 
 SEED = 7
 WORK = 60_000

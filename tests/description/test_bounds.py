@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ir_description.shapes import overlapping
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 # few different corners, so that boxes touch, coincide and stand for points; a plane has no bounds
 CORNERS = st.sampled_from([-np.inf, -1.0, 0.0, 0.25, 0.5, 1.0, np.inf])

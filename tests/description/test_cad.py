@@ -25,8 +25,8 @@ from ir_description.files.convex_pieces import ConvexPieces, contains, protrusio
 from ir_description.files.mesh import is_closed
 from ir_description.files.solid_mesh import pieces_of, triangles_from_obj
 from ir_description.shapes import point_distance
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import InvalidValueError
+from ir_values.arrays import FloatArray
+from ir_values.errors import InvalidValueError
 
 PROFILE = np.array([(0, 0), (1, 0), (1, 0.2), (0.2, 0.2), (0.2, 0.8), (1, 0.8), (1, 1), (0, 1)])
 FACES = [

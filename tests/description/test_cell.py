@@ -24,8 +24,7 @@ from ir_description.cell import zone_around
 from ir_description.poses import composed, inverse, pose_of, rotation_from_abc
 from ir_description.shapes import BodyKind, capsule_distance
 from ir_kernels import Chain, CollisionModel
-from ir_msgs_py.arrays import FloatArray
-from ir_values.arrays import solid_box_inertia
+from ir_values.arrays import FloatArray, solid_box_inertia
 
 
 @pytest.fixture

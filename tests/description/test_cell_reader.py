@@ -45,8 +45,7 @@ from ir_description.poses import (
     rotation_from_quaternion,
 )
 from ir_description.shapes import KINDS
-from ir_msgs_py.arrays import FloatArray
-from ir_values.arrays import solid_box_inertia
+from ir_values.arrays import FloatArray, solid_box_inertia
 
 ROBOT = load_robot()
 ROTATION_TOLERANCE = 1e-14  # a few roundings of a product of three matrices

@@ -24,8 +24,8 @@ from ir_description import (
 )
 from ir_description.poses import composed, pose_of
 from ir_kernels import Chain, CollisionModel, SphericalWristIk
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.plc import PLC_INPUT_NAMES, PlcOutputs
+from ir_values.arrays import FloatArray
 
 PARK_CLEARANCE = 0.0982
 CLEARANCE = {  # m, at the configurations of the tasks; published with the cells to 0.1 mm

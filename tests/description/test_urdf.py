@@ -21,8 +21,7 @@ from ir_description import (
     moving_frames,
     robot_urdf,
 )
-from ir_msgs_py.arrays import FloatArray
-from ir_values.arrays import solid_box_inertia
+from ir_values.arrays import FloatArray, solid_box_inertia
 
 pybullet = pytest.importorskip("pybullet")
 

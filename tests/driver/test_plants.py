@@ -13,7 +13,6 @@ from ir_sim_driver.controller.outputs import report
 from ir_sim_driver.controller.simulation import make_simulation
 from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.plant import (
-    PlantFileError,
     nominal_plant,
     plant_from_yaml,
     plant_hash,
@@ -23,6 +22,7 @@ from ir_sim_driver.plant import (
 )
 from ir_sim_driver.plant.drivetrain import Gears
 from ir_sim_driver.plant.plants import CUT, SPREAD
+from ir_values.errors import DescriptionFileError
 
 HEAD = "format: ir_sim_driver/plant/1\nname: mine\nrobot: kr210_r2700_extra\n"
 
@@ -127,7 +127,7 @@ def test_what_a_file_leaves_out_is_nominal(cell, data, tmp_path):
 def test_a_file_without_sense_is_refused_with_its_place(cell, data, tmp_path, text, said):
     file = tmp_path / "wrong.yaml"
     file.write_text(HEAD + text + "\n")
-    with pytest.raises(PlantFileError) as refused:
+    with pytest.raises(DescriptionFileError) as refused:
         plant_named(str(file), cell.robot, data)
     assert said in str(refused.value)
     assert str(file) in str(refused.value)
@@ -139,7 +139,7 @@ def test_a_file_without_sense_is_refused_with_its_place(cell, data, tmp_path, te
 def test_nothing_of_a_file_that_is_no_plant_is_quoted(cell, data, tmp_path, content):
     file = tmp_path / "shadow.yaml"
     file.write_bytes(content)
-    with pytest.raises(PlantFileError, match="this is no plant file") as refused:
+    with pytest.raises(DescriptionFileError, match="this is no plant file") as refused:
         plant_named(str(file), cell.robot, data)
     said = str(refused.value).replace(str(file), "")
     assert not any(word in said for word in ("root", "20228", "secret", "xff", "{b"))

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_msgs_py.errors import TrajectoryError
 from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.goal import ErrorCode, ExecutionSettings, JointTolerance
+from ir_values.errors import TrajectoryError
 
 INVALID = ErrorCode.INVALID_GOAL
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ir_kernels import Chain, CollisionModel
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ir_kernels import DynamicsModel, Gradients
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 
 @dataclass(frozen=True)

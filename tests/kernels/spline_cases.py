@@ -9,7 +9,7 @@ from robots import RobotLiteral, kr210, random_chain, tool_155
 from scipy.interpolate import BSpline
 
 from ir_kernels import Chain, CollisionModel, DynamicsModel, SplineCost, SplineTerms
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 FEW = ("l3b", "l6", "t_bar", "t_part")  # capsules that a quick scene has
 

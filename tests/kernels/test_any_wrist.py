@@ -17,7 +17,7 @@ from ir_kernels import (
     ThreeParallelIk,
     inverse_kinematics,
 )
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 EXACT = 1e-8  # m and entries of rotations
 NEAR = 1e-5  # rad: a configuration near a singularity is known to half the digits

@@ -11,7 +11,7 @@ from robots import kr210, random_chain, random_rotation
 from ir_kernels import CcdSettings, Chain, InputError, ccd
 from ir_kernels.reference import ccd as reference
 from ir_kernels.reference.chain import axes
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 TOOL = np.eye(4)
 TOOL[:3, 3] = [0.42, 0.0, 0.0]

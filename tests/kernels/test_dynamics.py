@@ -19,7 +19,7 @@ from robots import (
 
 from ir_kernels import Chain, DynamicsModel, InputError
 from ir_kernels.reference import dynamics as reference
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 HOME = np.radians([[0.0, -90.0, 90.0, 0.0, 0.0, 0.0]])
 AGREEMENT = 1e-9  # relative to the largest torque of the batch: sums of a few hundred roundings

@@ -9,7 +9,7 @@ import pytest
 from robots import RobotLiteral, kr210, random_rotation
 
 from ir_kernels import Chain, InputError, SphericalWristIk
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 EXACT = 1e-9  # m and entries of rotations
 

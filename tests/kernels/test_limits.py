@@ -12,7 +12,7 @@ from ir_kernels import DynamicsModel, InputError, motion_extrema, polynomial_ext
 from ir_kernels.reference.interval import Dual, interval, power, sine_cosine
 from ir_kernels.reference.limits import derivative, evaluate
 from ir_kernels.torque_bounds import EXCEEDS, UNDECIDED, WITHIN
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 GOAL = np.radians([60.0, -60.0, 70.0, 40.0, -50.0, 0.0])

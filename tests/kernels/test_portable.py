@@ -12,7 +12,7 @@ import pytest
 from scipy.interpolate import make_interp_spline
 
 from ir_kernels import compiled, portable
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 ULPS = 4.0  # units in the last place: NumPy's own may be one or two off
 

@@ -10,7 +10,7 @@ from robots import kr210, tool_155
 
 from ir_kernels import DynamicsModel, InputError
 from ir_kernels.reference.limits import derivative, evaluate
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 SHARP = 0.01  # of the power: what pieces of 2 ms may be too large by
 PER_PIECE = 21

@@ -31,7 +31,7 @@ from ir_kernels import (
     drive_energy,
 )
 from ir_kernels.power import REGENERATIONS, Regeneration
-from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_values.arrays import FloatArray, IntArray
 
 FREE: dict[str, Any] = {
     "penalty": 0.0,

@@ -35,7 +35,7 @@ from ir_kernels import (
     SplineDescent,
     compiled,
 )
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 BLOCK = (box("block", (1.9, 0.35, 1.1), (0.3, 0.3, 2.2)),)  # obstructs `swing`
 

@@ -11,7 +11,7 @@ from spline_cases import WORKING, kr210_cost
 
 from ir_kernels import CubicPath, InputError, SplineStarts, polynomial_samples
 from ir_kernels.spline import SplineCost
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 STARTS = SplineStarts(spacing=0.1, slower=1.3, fewest=8, most=12)
 EVALUATIONS = 6

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ir_msgs_py.checks import one_line
 from ir_msgs_py.ros.conversions import status_to_msg
 from ir_msgs_py.status import Status, StatusCode
+from ir_values.errors import one_line
 
 
 @given(st.text(max_size=300), st.integers(min_value=10, max_value=200))

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ir_msgs_py.announcements import Contact, MachineState
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.ros.plan_conversions import (
     contact_from_msg,
@@ -16,6 +15,7 @@ from ir_msgs_py.ros.plan_conversions import (
     machine_states_from_msg,
     machine_states_to_msg,
 )
+from ir_values.errors import InvalidValueError
 
 PAIR = DistancePair("environment", "t_bar", "table", -0.01, np.zeros(3), np.ones(3))
 positive = st.floats(0.0, 1e6)

@@ -17,7 +17,6 @@ from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
 
 from ir_msgs_py import announcements, modes, options, plc, report
-from ir_msgs_py.errors import InvalidValueError, JointNamesError, PoseError, TrajectoryError
 from ir_msgs_py.modes import REST_MODES, Mode, TransitionTimes
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.report import IkSolution, ServiceCandidate
@@ -25,6 +24,7 @@ from ir_msgs_py.ros import conversions, plan_conversions, power_conversions
 from ir_msgs_py.savings import ProgramPoint, ProgramSavings, Saving
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_values.errors import InvalidValueError, JointNamesError, PoseError, TrajectoryError
 
 numbers = st.floats(-1e6, 1e6)
 lengths = st.floats(0.0, 1e6)

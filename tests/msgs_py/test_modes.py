@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import pytest
 
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.modes import (
     DRIVES_ON,
     MODES,
@@ -16,6 +15,7 @@ from ir_msgs_py.modes import (
     checked_mode,
 )
 from ir_msgs_py.plc import PLC_INPUT_NAMES
+from ir_values.errors import InvalidValueError
 
 
 def test_the_table_goes_from_shallow_to_deep() -> None:

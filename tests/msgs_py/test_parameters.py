@@ -13,9 +13,9 @@ from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ir_msgs_py.errors import ParameterError
 from ir_msgs_py.ros.parameters import Parameters
-from ir_msgs_py.settings import setting
+from ir_values.errors import ParameterError
+from ir_values.settings import setting
 
 
 @dataclass(frozen=True)

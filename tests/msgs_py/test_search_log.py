@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.search_log import (
     ConfigurationLog,
     CorrectionLog,
@@ -19,6 +18,7 @@ from ir_msgs_py.search_log import (
     log_of,
     stage_of,
 )
+from ir_values.arrays import FloatArray
 
 HALF_MM = 0.5e-3 + 1e-12
 numbers = st.floats(0.0, 1e4)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import pytest
 
-from ir_msgs_py.errors import ParameterError
-from ir_msgs_py.settings import check_settings, describe, setting, settings_table
+from ir_values.errors import ParameterError
+from ir_values.settings import check_settings, describe, setting, settings_table
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ir_msgs_py.errors import JointNamesError, TrajectoryError
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_values.errors import JointNamesError, TrajectoryError
 
 # float64 rounding of polynomials of degree 5 with values of order 1 and segments over 0.1 s
 ROUNDING = 1e-9

@@ -7,9 +7,9 @@ import pytest
 
 from ir_msgs_py import announcements as program
 from ir_msgs_py import modes, plc, report
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import Status, StatusCode
+from ir_values.errors import InvalidValueError
 
 NAN = float("nan")
 

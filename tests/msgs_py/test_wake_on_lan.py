@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.plc import mac_bytes, magic_packet, wakes
+from ir_values.errors import InvalidValueError
 
 MAC = "02:00:00:C4:02:10"
 

@@ -10,7 +10,6 @@ import yaml
 
 from ir_msgs.msg import PlanOptions, PowerState, Status, TrajectoryReport
 from ir_msgs.srv import CheckState, EvaluateTrajectory, PlanTrajectory, SetCell, SetLoad
-from ir_msgs_py.errors import MessageTextError, UnknownTypeError
 from ir_msgs_py.ros.messages import (
     interface_type,
     message_from_yaml,
@@ -18,6 +17,7 @@ from ir_msgs_py.ros.messages import (
     owner_of,
     type_name,
 )
+from ir_values.errors import InvalidValueError, UnknownTypeError
 
 SRV_FOLDER = Path(__file__).parents[2] / "ros_ws/src/ir_msgs/srv"
 
@@ -80,7 +80,7 @@ def test_a_scalar_is_taken_by_the_type_of_its_field():
     ],
 )
 def test_text_that_is_not_the_message_is_named(message_type, text, sentence):
-    with pytest.raises(MessageTextError, match=re.escape(sentence)):
+    with pytest.raises(InvalidValueError, match=re.escape(sentence)):
         message_from_yaml(message_type, text)
 
 
@@ -144,7 +144,7 @@ def test_types_are_found_by_the_names_that_people_type():
 def test_a_field_that_stands_twice_is_refused_by_its_name(
     message_type: type, text: str, sentence: str
 ) -> None:
-    with pytest.raises(MessageTextError) as refused:
+    with pytest.raises(InvalidValueError) as refused:
         message_from_yaml(message_type, text)
     assert str(refused.value) == sentence
 

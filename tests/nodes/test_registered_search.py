@@ -16,11 +16,11 @@ from sensor_msgs.msg import JointState
 
 from ir_msgs.msg import PlanOptions, Status
 from ir_msgs.srv import PlanRegionalMovement
-from ir_msgs_py.settings import setting, settings_table
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.search import SEARCHES, Ends, Found
 from ir_planner.settings import PlannerSettings
+from ir_values.settings import setting, settings_table
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 

@@ -16,7 +16,6 @@ import pytest
 import yaml
 
 from ir_msgs_py import names
-from ir_msgs_py.settings import describe
 from ir_planner.settings import PlannerSettings
 from ir_program_runner.settings import LinkSettings, ProgramSettings
 from ir_recorder.recording.settings import RecorderSettings
@@ -24,6 +23,7 @@ from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.motion.goal import ExecutionSettings
 from ir_sim_driver.node.parameters import NodeSettings
 from ir_sim_driver.plc import LINKS
+from ir_values.settings import describe
 
 ROOT = Path(__file__).resolve().parents[2]
 BRINGUP = ROOT / "ros_ws" / "src" / "ir_bringup"

@@ -12,7 +12,6 @@ import pytest
 from rclpy.node import Node
 
 from ir_msgs_py.ros.parameters import Parameters
-from ir_msgs_py.settings import setting
 from ir_planner import PlannerSettings
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
@@ -20,6 +19,7 @@ from ir_planner.search import SEARCHES, Ends, Found
 from ir_program_runner.parameters import declare_parameters
 from ir_recorder.node.recorder import declared_settings
 from ir_sim_driver.node.parameters import DriverParameters
+from ir_values.settings import setting
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "parameters.md"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from rclpy.node import Node
 
 from ir_msgs_py.modes import PREFIX, TransitionTimes
-from ir_msgs_py.settings import describe
 from ir_program_runner.parameters import declare_parameters
+from ir_values.settings import describe
 
 
 def test_the_runner_has_them_as_parameters_under_these_names(ros_node: Node) -> None:

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from ir_msgs.srv import CheckState
-from ir_msgs_py.errors import MessageTextError
 from ir_msgs_py.ros.messages import message_from_yaml
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
+from ir_values.errors import InvalidValueError
 
 
 @pytest.fixture(scope="module")
@@ -66,5 +66,7 @@ def test_none_and_too_many_states_are_refused(planner: Planner, count: int) -> N
 
 
 def test_a_text_with_a_nul_is_refused_before_ros_cuts_it() -> None:
-    with pytest.raises(MessageTextError, match=r"station is .* must not contain the character NUL"):
+    with pytest.raises(
+        InvalidValueError, match=r"station is .* must not contain the character NUL"
+    ):
         message_from_yaml(CheckState.Request, '{station: "lathe_work\\0"}')

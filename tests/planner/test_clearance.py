@@ -11,11 +11,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.clearance import clearance_profile
 from ir_planner.checks.evaluation import evaluate_trajectory
 from ir_planner.scene.planning_scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # the shapes of a scene in Coal
 

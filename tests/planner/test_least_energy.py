@@ -13,7 +13,6 @@ import pytest
 from asking import planned
 
 from ir_description import Cell, load_power_data
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_planner.checks import movement_energy
@@ -23,6 +22,7 @@ from ir_planner.regional import MovementPlan
 from ir_planner.request import Work
 from ir_planner.scene import PlanningScene
 from ir_planner.timing import stretched
+from ir_values.arrays import FloatArray
 
 SceneOf = Callable[[str], PlanningScene]
 CLEAR = 0.05  # m: of both ends

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from ir_msgs_py.settings import settings_table
 from ir_recorder import Analysis, analyse
 from ir_recorder.errors import CostsError
 from ir_recorder.report.costs import (
@@ -18,6 +17,7 @@ from ir_recorder.report.costs import (
     lever_section,
     read_costs,
 )
+from ir_values.settings import settings_table
 
 GIVEN = """format: ir_costs/1
 price: 0.5

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from ir_msgs_py.settings import describe, settings_table
 from ir_recorder import Tolerances
 from ir_recorder.recording.settings import RecorderSettings
+from ir_values.settings import describe, settings_table
 
 PAGE = (Path(__file__).parents[2] / "docs" / "recording.md").read_text(encoding="utf-8")
 SNIPPETS = re.findall(r"```python\n(.*?)```", PAGE, re.S)

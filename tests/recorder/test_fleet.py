@@ -14,7 +14,6 @@ import pytest
 from pyarrow import parquet
 
 from ir_cli.main import main
-from ir_msgs_py.file_roots import FileRoots
 from ir_recorder import Analysis
 from ir_recorder.report.costs import Costs
 from ir_recorder.report.fleet import (
@@ -31,6 +30,7 @@ from ir_recorder.report.fleet import (
     write_fleet_table,
     yearly_of,
 )
+from ir_values.files import FileRoots
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ir_description import Capsule, load_robot
-from ir_msgs_py.arrays import FloatArray
 from ir_recorder.report.shapes import Mesh, Part, lathe, robot_parts
+from ir_values.arrays import FloatArray
 
 RIM = 0.13  # m: ends of beams, the counterbalance's pivot aside
 ROBOT = load_robot()

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_program_runner.errors import ProgramError
 from ir_program_runner.program import check_program, check_request, load_after
+from ir_values.errors import InvalidValueError
 
 
 def move(start=0.0, end=0.0, **fields):

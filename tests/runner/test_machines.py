@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import pytest
 
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.plc import Signal
 from ir_program_runner.machines import MOST_SIGNALS, Machines
+from ir_values.errors import InvalidValueError
 
 
 @dataclass(frozen=True)

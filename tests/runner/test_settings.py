@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from ir_msgs_py.errors import ParameterError
 from ir_program_runner.settings import LinkSettings, ProgramSettings
+from ir_values.errors import ParameterError
 
 
 def test_settings_name_what_is_wrong():

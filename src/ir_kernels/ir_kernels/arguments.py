@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ir_kernels import compiled
 from ir_kernels.errors import InputError
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 FLOAT64 = np.dtype(np.float64)
 

@@ -13,7 +13,7 @@ from ir_kernels import portable
 from ir_kernels.chain import Chain
 from ir_kernels.errors import InputError
 from ir_kernels.reference.chain import axis_rotation
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 MEETING = 1e-9  # m: axes 5 and 6 that come so near meet
 PARALLEL = 1e-9  # of |z2 x z3|

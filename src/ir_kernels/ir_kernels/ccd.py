@@ -12,7 +12,7 @@ from ir_kernels.arguments import checked
 from ir_kernels.chain import Chain
 from ir_kernels.errors import InputError
 from ir_kernels.reference import ccd as reference
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
+from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ir_kernels import compiled, data, portable
 from ir_kernels.data import ChainLike
 from ir_kernels.errors import InputError
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 AXIS_TOLERANCE = 1e-6
 

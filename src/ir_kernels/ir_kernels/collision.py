@@ -17,7 +17,7 @@ from ir_kernels.data import BodyLike, CapsuleLike
 from ir_kernels.errors import InputError
 from ir_kernels.geometry import Geometry, Pair, geometry
 from ir_kernels.verdicts import COLLIDES, FREE, UNDECIDED
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
+from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 __all__ = [
     "COLLIDES",

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ir_kernels import arguments, portable
 from ir_kernels.errors import InputError
-from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_values.arrays import FloatArray, IntArray
 
 T = TypeVar("T", bound=np.generic)
 

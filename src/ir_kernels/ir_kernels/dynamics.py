@@ -21,7 +21,7 @@ from ir_kernels.reference import power_bounds as power_reference
 from ir_kernels.reference import torque_bounds as bounds_reference
 from ir_kernels.robot_like import LoadLike, RobotLike
 from ir_kernels.torque_bounds import TorqueBounds, torque_bounds
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 MAX_TERMS = 8  # of a polynomial segment
 

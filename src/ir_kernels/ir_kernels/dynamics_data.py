@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ir_kernels import portable
 from ir_kernels.errors import InputError
 from ir_kernels.robot_like import CounterbalanceLike, LoadLike, RobotLike
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
 FURTHER_LOSSES = (

@@ -13,7 +13,7 @@ from ir_kernels.chain import Chain
 from ir_kernels.data import BodyLike, CapsuleLike
 from ir_kernels.errors import InputError
 from ir_kernels.scene import Scene, scene
-from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_values.arrays import FloatArray, IntArray
 
 ENVIRONMENT = "ENVIRONMENT"
 SELF = "SELF"

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ir_kernels import data
 from ir_kernels.errors import InputError
 from ir_kernels.reference.inverse_kinematics import LIMIT_TOLERANCE
-from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_values.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from ir_kernels import compiled, data
 from ir_kernels.arguments import checked
 from ir_kernels.errors import InputError
 from ir_kernels.reference import limits as reference
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 COMPILED_TERMS = 16  # of a polynomial, beyond them the reference works
 

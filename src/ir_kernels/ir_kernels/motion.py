@@ -8,7 +8,7 @@ from ir_kernels.arguments import checked
 from ir_kernels.errors import InputError
 from ir_kernels.limits import segments
 from ir_kernels.reference.limits import derivative
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 Motion = tuple[FloatArray, FloatArray, FloatArray]  # q, qd, qdd, each (M, n)
 

@@ -7,7 +7,7 @@ import numpy as np
 from ir_kernels import portable
 from ir_kernels.chain import Chain
 from ir_kernels.ik_set import Found
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 _STEPS = 3  # doubling the digits each: 1e-5 rad of a near-tangent to rounding
 _EXACT = 1e-13  # m and rad: what rounding leaves

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ir_kernels import compiled
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline

@@ -16,7 +16,7 @@ from ir_kernels import compiled, portable
 from ir_kernels.arguments import checked, finite
 from ir_kernels.errors import InputError
 from ir_kernels.reference import power as reference
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 Regeneration = Literal["shared", "none", "fed_back"]
 REGENERATIONS: tuple[Regeneration, ...] = ("shared", "none", "fed_back")

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from ir_kernels.data import ChainLike
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 
 class CounterbalanceLike(Protocol):

@@ -11,7 +11,7 @@ import numpy as np
 from ir_kernels import data
 from ir_kernels.data import BodyLike
 from ir_kernels.errors import InputError
-from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_values.arrays import FloatArray, IntArray
 
 KINDS = ("box", "cylinder", "sphere", "capsule", "plane", "mesh")
 SIZES = {"box": 3, "cylinder": 2, "sphere": 1, "capsule": 2, "plane": 0, "mesh": 0}

@@ -15,7 +15,7 @@ from ir_kernels import compiled
 from ir_kernels.arguments import checked
 from ir_kernels.collision import CollisionModel
 from ir_kernels.errors import InputError
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 
 class BidirectionalTree:

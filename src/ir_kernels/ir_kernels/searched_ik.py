@@ -20,7 +20,7 @@ from ir_kernels.ik_set import Found, IkSet, limits, with_turns
 from ir_kernels.polish import newton
 from ir_kernels.shoulder_wrist import shoulder_and_wrist
 from ir_kernels.three_parallel import angle_about, displacements, wrist_and_sum
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
+from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 # values of q4: half a degree; a pair of solutions nearer than that is found by Newton's steps
 GRID = 720

@@ -18,7 +18,7 @@ import numpy as np
 
 from ir_kernels import portable
 from ir_kernels.arm_lines import ArmLines
-from ir_msgs_py.arrays import BoolArray, FloatArray
+from ir_values.arrays import BoolArray, FloatArray
 
 TOUCH = 1e-9  # of a cosine beyond 1: still a solution, that of a tangent
 NEAR_UNIT = 1e-5  # of the length of exp(i q1): two roots at a tangent are known to half the digits

@@ -29,7 +29,7 @@ from ir_kernels.errors import InputError
 from ir_kernels.reference.spline_profile import descend_profile
 from ir_kernels.reference.spline_starts import descend_along
 from ir_kernels.spline_terms import SplineTerms, checked_terms
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 RowArray = NDArray[np.int32]
 SAME_CHAIN = (

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from ir_kernels import arguments, data
 from ir_kernels.errors import InputError
 from ir_kernels.power import REGENERATIONS, Regeneration
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 NOT_NEGATIVE = (
     "energy_value",

@@ -17,7 +17,7 @@ from ir_kernels.errors import InputError
 from ir_kernels.ik_set import Found, IkSet, limits, with_turns
 from ir_kernels.polish import polished
 from ir_kernels.shoulder_wrist import shoulder_and_wrist
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
+from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 STRETCHED = 1e-9  # m: how far out of reach still counts as stretched
 FREE = np.linspace(-np.pi, np.pi, 25)  # rad: of a free q6, the nearest to 0 first

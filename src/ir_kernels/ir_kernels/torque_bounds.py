@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 WITHIN = np.uint8(0)
 EXCEEDS = np.uint8(1)

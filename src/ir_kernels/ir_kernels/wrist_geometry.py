@@ -15,7 +15,7 @@ import numpy as np
 from ir_kernels import portable
 from ir_kernels.chain import Chain
 from ir_kernels.errors import InputError
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 POINT_TOLERANCE = 1e-9  # m: by how much axes 4, 5, 6 may miss each other
 ANGLE_TOLERANCE = 1e-9  # of the scalar products that have to vanish

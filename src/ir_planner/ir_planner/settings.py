@@ -7,13 +7,13 @@ from typing import cast
 
 from ir_description import load_power_parameters
 from ir_kernels.power import Regeneration
-from ir_msgs_py.file_roots import FileRoots
 from ir_msgs_py.modes import TransitionTimes
-from ir_msgs_py.settings import check_settings, setting, stage
 from ir_planner.configurations import InteractionSettings
 from ir_planner.scene import Drives
 from ir_planner.search import Search, registered
 from ir_planner.service import ModifiedGa
+from ir_values.files import FileRoots
+from ir_values.settings import check_settings, setting, stage
 
 
 @dataclass(frozen=True)

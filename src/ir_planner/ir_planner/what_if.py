@@ -21,11 +21,11 @@ import numpy as np
 
 from ir_description import Cell, InvalidValueError, Load, cell_from_yaml, cell_to_yaml, load_cell
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.planner import Planner
+from ir_values.arrays import FloatArray
 
 ROWS_MAX = 10_000
 J_PER_KWH = 3.6e6

@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Protocol
 
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.plc import Signal
+from ir_values.errors import InvalidValueError
 
 MOST_SIGNALS = 10_000  # a cell has tens; who invents names must not fill the memory
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ir_msgs_py.plc import CONTROLLER_MAC, WAKE_PORT, mac_bytes
-from ir_msgs_py.settings import check_settings, setting
+from ir_values.settings import check_settings, setting
 
 _HOUR = 3600.0
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from ir_msgs_py.file_roots import ENVIRONMENT
+from ir_values.files import ENVIRONMENT
 
 
 def add_roots(parser: argparse.ArgumentParser) -> None:

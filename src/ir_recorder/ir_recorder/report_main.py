@@ -10,8 +10,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ir_description import DescriptionError, PowerParameters, load_power_parameters
-from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.file_roots import FileRoots
 from ir_recorder.analysis import Analysis, analyse, findings
 from ir_recorder.analysis.meter import with_meter
 from ir_recorder.arguments import add_roots
@@ -27,6 +25,8 @@ from ir_recorder.report.costs import read_costs
 from ir_recorder.report.picture import write_picture
 from ir_recorder.report.step_table import write_table
 from ir_recorder.traces import read_mapping
+from ir_values.errors import IrError
+from ir_values.files import FileRoots
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -140,6 +140,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add_arguments(parser)
     try:
         return run(parser.parse_args(arguments))
-    except (RecorderError, MsgsError) as error:
+    except (RecorderError, IrError) as error:
         sys.stderr.write(f"ir-report: {error}\n")
         return 1

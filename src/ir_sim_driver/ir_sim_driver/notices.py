@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from enum import IntEnum
 from typing import NamedTuple
 
-from ir_msgs_py.checks import one_line
+from ir_values.errors import one_line
 
 
 class Level(IntEnum):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ir_msgs_py.settings import check_settings, setting
+from ir_values.settings import check_settings, setting
 
 
 @dataclass(frozen=True)

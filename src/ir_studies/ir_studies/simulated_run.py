@@ -10,12 +10,12 @@ from typing import Protocol
 import numpy as np
 
 from ir_description import Cell
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.traces import Trace
 from ir_sim_driver import DriverError, ErrorCode, TrajectoryGoal, carried, make_simulation
 from ir_studies.errors import DrivingError
+from ir_values.arrays import FloatArray
 
 READING = 0.01  # s between readings of positions and meter
 _LATEST = 2.0  # times of a movement's duration until it must have ended

@@ -14,7 +14,6 @@
     │       └── RobotFileError
     ├── FileRefusedError                   a file outside of the allowed folders, or of another kind
     ├── UnknownTypeError                   no such message, service or action type
-    ├── MessageTextError (ValueError)      YAML text that is not the message it is said to be
     ├── ParameterError (ValueError)        a setting out of range, or one without a description
     └── ClientError
         ├── ServiceUnavailableError        no node offers it
@@ -59,10 +58,6 @@ class PoseError(InvalidValueError):
     def __init__(self, sentence: str, code: int) -> None:
         super().__init__(sentence)
         self.code = code
-
-
-class MessageTextError(IrError, ValueError):
-    """YAML text that does not describe the message it is meant for."""
 
 
 class FileRefusedError(IrError):

@@ -12,7 +12,7 @@ import numpy as np
 
 from ir_kernels import portable
 from ir_kernels.reference.chain import axes, axis_rotation, jacobian, link_poses
-from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_values.arrays import FloatArray, IntArray
 
 DAMPING_START = 1e-4
 DAMPING_DOWN = 0.1

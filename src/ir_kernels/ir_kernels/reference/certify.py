@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ir_kernels.geometry import Geometry
 from ir_kernels.reference import chain, collision
 from ir_kernels.verdicts import COLLIDES, FREE, UNDECIDED
-from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_values.arrays import FloatArray, IntArray
 
 MARGIN = 1e-9  # [m] more than double precision loses on lengths of some ten metres
 RESOLUTION = 1e-6  # [m] an interval whose bodies move less than this isn't halved any more

@@ -5,7 +5,7 @@ transforms.
 import numpy as np
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 
 def axis_rotation(axis: FloatArray, angle: FloatArray) -> FloatArray:

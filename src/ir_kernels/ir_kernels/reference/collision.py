@@ -7,7 +7,7 @@ import numpy as np
 from ir_kernels.geometry import Geometry
 from ir_kernels.reference import chain
 from ir_kernels.reference.segments import Witness, segment_body, segment_segment
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
+from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 
 def poses(model: Geometry, q: FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 MEMORY = 16  # pairs of steps and changes of the gradient
 PATIENCE = 10  # iterations that have to gain something together

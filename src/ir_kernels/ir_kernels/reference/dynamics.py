@@ -26,7 +26,7 @@ from ir_kernels.reference.vectors import (
     transpose,
     vector,
 )
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 
 def _outward(

@@ -13,7 +13,7 @@ from ir_kernels.dynamics_data import DynamicsData
 from ir_kernels.reference import dynamics
 from ir_kernels.reference.interval import Dual, Interval, intersect, interval, power, sine_cosine
 from ir_kernels.reference.vectors import Number
-from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_values.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_kernels.reference.vectors import Number
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 OUTWARD = 4.5e-16
 TINY = 1e-140

@@ -11,7 +11,7 @@ import numpy as np
 
 from ir_kernels.reference.chain import axis_rotation
 from ir_kernels.wrist_geometry import WristGeometry
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
+from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 REACH_TOLERANCE = 1e-10  # m: how far out of reach still counts as stretched
 LIMIT_TOLERANCE = 1e-10  # rad: how far beyond a limit still counts as on it

@@ -7,7 +7,7 @@ end is taken: a superfluous candidate harms no extreme, and a double root is suc
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 ITERATIONS = 80  # of bisection at most; Newton ends after a handful
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ir_kernels.geometry import Geometry
 from ir_kernels.reference import certify, collision
 from ir_kernels.verdicts import FREE
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
+from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 NearestPairs = tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray]
 Verdicts = tuple[NDArray[np.uint8], FloatArray, FloatArray, IntArray]

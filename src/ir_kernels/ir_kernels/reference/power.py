@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 
 def dc_bus(

@@ -6,7 +6,7 @@ from ir_kernels.dynamics_data import DynamicsData
 from ir_kernels.reference.enclosures import enclosure, pieces_of
 from ir_kernels.reference.interval import OUTWARD, Dual, Interval, intersect, interval
 from ir_kernels.reference.vectors import Number
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 
 def power_bounds(

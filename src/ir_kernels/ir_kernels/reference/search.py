@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ir_kernels.verdicts import FREE
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 BATCH = 16  # targets of a round, and configurations looked at for the price of an edge
 JOINED = 8  # new nodes of a round that are joined, the nearest to the other tree

@@ -15,7 +15,7 @@ import numpy as np
 from ir_kernels.reference import solids
 from ir_kernels.reference.solids import Depth, unit
 from ir_kernels.scene import KINDS, Hull
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 BISECTIONS = 60
 TOUCH = 1e-12  # [m] below this distance a segment counts as crossing the solid

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ir_kernels.scene import Hull
-from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_values.arrays import FloatArray, IntArray
 
 RIM_SAMPLES = 256
 GOLDEN_STEPS = 60

@@ -16,7 +16,7 @@ from ir_kernels.geometry import Geometry
 from ir_kernels.reference import collision, dynamics
 from ir_kernels.reference.descent import bending_metric, descend
 from ir_kernels.spline_terms import SplineTerms
-from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_values.arrays import FloatArray, IntArray
 
 SAMPLES = 2  # per interval
 STILL = 0.01  # [rad/s] friction and |qd| are smoothed below

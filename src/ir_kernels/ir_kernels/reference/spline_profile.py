@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ir_kernels.reference.descent import descend
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 BENDING = 0.03  # weight of the jerk of s in the metric
 # of s, and of the duration's logarithm

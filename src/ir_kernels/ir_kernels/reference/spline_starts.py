@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from ir_kernels.spline_terms import SplineTerms
-from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_values.arrays import FloatArray, IntArray
 
 
 def fewest_seconds(path: FloatArray, velocity: FloatArray, acceleration: FloatArray) -> float:

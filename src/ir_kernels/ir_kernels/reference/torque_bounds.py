@@ -10,7 +10,7 @@ from ir_kernels.dynamics_data import DynamicsData
 from ir_kernels.reference import dynamics
 from ir_kernels.reference.enclosures import Pieces, enclosure, pieces_of
 from ir_kernels.reference.limits import derivative, evaluate
-from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_values.arrays import FloatArray, IntArray
 
 FIRST_PIECE = 0.05  # s, longest piece to begin with
 FEWEST_PIECES = 8  # of a segment to begin with

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 Number = Any
 Vector = tuple[Number, Number, Number]

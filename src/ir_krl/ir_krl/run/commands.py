@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from ir_krl.errors import Place
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 Kind = Literal["ptp", "lin", "circ", "spl"]
 

@@ -22,7 +22,7 @@ from rosidl_parser.definition import (
     NamespacedType,
 )
 
-from ir_values.errors import MessageTextError, UnknownTypeError
+from ir_values.errors import InvalidValueError, UnknownTypeError
 
 _KINDS = ("msg", "srv", "action")
 
@@ -78,7 +78,7 @@ class _Text(yaml.BaseLoader):
                 where = (
                     f"line {seen[name]} and line {line}" if seen[name] != line else f"line {line}"
                 )
-                raise MessageTextError(f'field "{name[:60]}" stands twice, in {where}')
+                raise InvalidValueError(f'field "{name[:60]}" stands twice, in {where}')
             seen[name] = line
         return super().construct_mapping(node, deep)
 
@@ -86,13 +86,13 @@ class _Text(yaml.BaseLoader):
 def message_from_yaml(message_type: Any, text: str) -> Any:
     """Message of this type; missing fields keep their defaults, "" is the default message.
 
-    Raises MessageTextError naming the field: unknown (lists the known ones), of a wrong kind, out
+    Raises InvalidValueError naming the field: unknown (lists the known ones), of a wrong kind, out
     of range or there twice.
     """
     try:
         content = yaml.load(text, Loader=_Text)
     except yaml.YAMLError as error:
-        raise MessageTextError(f"the text is not YAML: {' '.join(str(error).split())}") from error
+        raise InvalidValueError(f"the text is not YAML: {' '.join(str(error).split())}") from error
     message = message_type()
     if content not in (None, ""):
         _fill(message, content, "")
@@ -119,14 +119,14 @@ def _fill(message: Any, content: Any, where: str) -> None:
     names = list(message.get_fields_and_field_types())
     if not isinstance(content, Mapping):
         place = where or "the message"
-        raise MessageTextError(
+        raise InvalidValueError(
             f"{place} is {_short(content)}: it must be fields, of {', '.join(names) or 'none'}"
         )
     types = dict(zip(names, message.SLOT_TYPES, strict=True))
     for name, value in content.items():
         path = f"{where}.{name}" if where else str(name)
         if name not in types:
-            raise MessageTextError(
+            raise InvalidValueError(
                 f'unknown field "{path[:80]}": known are {", ".join(names) or "none"}'
             )
         setattr(message, name, _value(types[name], value, path))
@@ -137,20 +137,20 @@ def _value(kind: Any, value: Any, path: str) -> Any:
         try:
             message = interface_type("/".join(kind.namespaced_name()), "msg")()
         except UnknownTypeError as error:
-            raise MessageTextError(f"{path}: {error}") from error
+            raise InvalidValueError(f"{path}: {error}") from error
         _fill(message, value if value != "" else {}, path)
         return message
     if isinstance(kind, AbstractNestedType):
         if not isinstance(value, list):
-            raise MessageTextError(f"{path} is {_short(value)}: it must be a list")
+            raise InvalidValueError(f"{path} is {_short(value)}: it must be a list")
         if isinstance(kind, Array) and len(value) != kind.size:
-            raise MessageTextError(f"{path} has {len(value)} elements: it must have {kind.size}")
+            raise InvalidValueError(f"{path} has {len(value)} elements: it must have {kind.size}")
         return [_value(kind.value_type, element, f"{path}[{i}]") for i, element in enumerate(value)]
     if not isinstance(value, str):
-        raise MessageTextError(f"{path} is {_short(value)}: it must be a single value")
+        raise InvalidValueError(f"{path} is {_short(value)}: it must be a single value")
     if isinstance(kind, (AbstractString, AbstractWString)):
         if "\0" in value:  # ROS would cut the text there without a word
-            raise MessageTextError(
+            raise InvalidValueError(
                 f"{path} is {value[:40]!a}: it must not contain the character NUL"
             )
         return value
@@ -161,17 +161,17 @@ def _scalar(kind: BasicType, text: str, path: str) -> Any:
     name = kind.typename
     if name == "boolean":
         if text.lower() not in _TRUE | _FALSE:
-            raise MessageTextError(f'{path} is "{text[:40]}": it must be true or false')
+            raise InvalidValueError(f'{path} is "{text[:40]}": it must be true or false')
         return text.lower() in _TRUE
     try:
         if name in ("float", "double", "long double"):
             return float(text.replace(".inf", "inf").replace(".nan", "nan").replace(".NaN", "nan"))
         number = int(text) if text.lstrip("+-").isdigit() else int(text, 0)
     except ValueError as error:
-        raise MessageTextError(f'{path} is "{text[:40]}": it must be a {name}') from error
+        raise InvalidValueError(f'{path} is "{text[:40]}": it must be a {name}') from error
     low, high = _integer_range(name)
     if not low <= number <= high:
-        raise MessageTextError(f"{path} is {text[:40]}: it must be in {low} .. {high}")
+        raise InvalidValueError(f"{path} is {text[:40]}: it must be in {low} .. {high}")
     return bytes([number]) if name == "octet" else number
 
 

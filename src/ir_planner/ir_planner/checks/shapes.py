@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_description import Body, Cell
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.clearance import ClearanceProfile
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 Colour = tuple[float, float, float, float]
 BODY: Colour = (0.55, 0.58, 0.62, 1.0)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.interpolate import PPoly
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 
 @dataclass(frozen=True)

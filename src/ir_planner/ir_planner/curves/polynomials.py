@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ir_kernels import Extrema, polynomial_extrema, polynomial_samples, portable
-from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.trajectory import JointTrajectory, Samples
+from ir_values.arrays import BoolArray, FloatArray
 
 _NOTHING = (
     1e-9  # rad: what higher powers may add to a cubic, as a point per knot of a spline rounds them

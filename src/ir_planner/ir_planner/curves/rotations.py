@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 _SMALL = 1e-2  # rad: below, series to the fourth power are exact to rounding
 _ITERATIONS = 10

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_values.arrays import FloatArray
 
 
 def at_shares(path: FloatArray, shares: FloatArray) -> FloatArray:

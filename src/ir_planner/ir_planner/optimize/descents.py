@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import UniformSpline, along_motion, along_path, evenly_spaced, fewest_seconds
 from ir_planner.optimize.refinement import (
@@ -18,6 +17,7 @@ from ir_planner.optimize.refinement import (
 from ir_planner.request import Context
 from ir_planner.scene import PlanningScene
 from ir_planner.timing import Movement
+from ir_values.arrays import FloatArray
 
 _FEW = (
     12,

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ir_kernels import CubicPath, portable
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import UniformSpline
+from ir_values.arrays import FloatArray
 
 _PLACES = 2000  # of the path, between which it is interpolated
 _STANDING = 0.001  # share of the mean speed by which places part where the given motion stands

@@ -15,7 +15,6 @@ import numpy as np
 from scipy.ndimage import convolve1d, maximum_filter1d
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import UniformSpline
 from ir_planner.optimize.fixed_path import FixedPath, never_back
@@ -24,6 +23,7 @@ from ir_planner.optimize.spline_cost import slowed_to_limits, spline_cost
 from ir_planner.request import Context
 from ir_planner.scene import MotionLimits, PlanningScene, lasting_longer, torque_use
 from ir_planner.timing import Movement, objective_weights, within_torque
+from ir_values.arrays import FloatArray
 
 _SPARSE = 40  # places of the path for the weight of an objective
 _GAIN = 1e-5  # share of the value that ten steps must gain together

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_kernels import SplineStarts
-from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.curves import UniformSpline, along_path
 from ir_planner.errors import TimingError
@@ -33,6 +32,7 @@ from ir_planner.optimize.refinement import (
 )
 from ir_planner.search import COARSE, apart, fewest_corners, first_different
 from ir_planner.timing import Movement, straight_steps
+from ir_values.arrays import FloatArray
 
 # Estimates, in a few per cent of the work of the certified answer: a first look at all paths says
 # which is the cheapest, and that one descends further on a spline with twice the knots. Their cost

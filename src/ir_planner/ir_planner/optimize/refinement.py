@@ -17,7 +17,6 @@ import numpy as np
 
 from ir_kernels import SplineCost
 from ir_kernels.spline import RowArray
-from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import Violation
 from ir_planner.curves import UniformSpline, along_motion, along_path, fewest_seconds
@@ -36,6 +35,7 @@ from ir_planner.timing import (
     straight_steps,
     within_torque,
 )
+from ir_values.arrays import BoolArray, FloatArray
 
 # The stages of a descent lead from a coarse spline and a smooth cost to a fine spline and the exact
 # bus.

@@ -6,11 +6,11 @@ While a spline is optimised, a limit is a penalty; what is sent is slowed until 
 import numpy as np
 
 from ir_kernels import SplineCost, SplineTerms
-from ir_msgs_py.arrays import FloatArray
 from ir_planner.curves import UniformSpline
 from ir_planner.request import Context
 from ir_planner.scene import MotionLimits, PlanningScene, lasting_longer, torque_use
 from ir_planner.timing import ObjectiveWeights
+from ir_values.arrays import FloatArray
 
 _MARGIN = 1e-3  # m of clearance beyond S_m that the descent asks for
 _SCALE = 1e-2  # m that lack count like a limit used twice

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_msgs_py.arrays import BoolArray, FloatArray
+from ir_values.arrays import BoolArray, FloatArray
 
 LEAVE = "leave"
 ACROSS = "across"

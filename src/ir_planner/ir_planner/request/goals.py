@@ -13,9 +13,9 @@ import numpy as np
 
 from ir_description import Cell
 from ir_description.poses import rotation_from_abc
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError, UnknownNameError
+from ir_values.arrays import FloatArray
 
 POSTURES = ("home", "park")
 _POSE_KEYS = ("X", "Y", "Z", "A", "B", "C")

@@ -8,10 +8,10 @@ are checked with the plain safety distance.
 import numpy as np
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import motion_at
 from ir_planner.scene.planning_scene import PlanningScene
+from ir_values.arrays import BoolArray, FloatArray
 
 _SAMPLES = 400
 # 2^30 parts of the time between two samples

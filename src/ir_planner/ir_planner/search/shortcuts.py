@@ -8,9 +8,9 @@ from.
 import numpy as np
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.scene import movement_cost, path_cost
+from ir_values.arrays import FloatArray
 
 _POINTS = 16
 _PULLS = (1.0, 0.6, 0.3, 0.12)

@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_kernels.search import BidirectionalTree
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.settings import check_settings, setting
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.search.port import Ends, Found
+from ir_values.arrays import FloatArray
+from ir_values.settings import check_settings, setting
 
 _SLICE = 256  # edges between two looks at the clock, about 2 ms
 _LEAST_SCALE = 0.1  # of the first joint: the wrist still counts where it carries nothing

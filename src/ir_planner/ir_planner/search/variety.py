@@ -16,9 +16,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_planner.curves import at_shares, evenly_spaced
 from ir_planner.scene import path_cost
+from ir_values.arrays import FloatArray
 
 T = TypeVar("T")
 NEAREST_GOALS = (

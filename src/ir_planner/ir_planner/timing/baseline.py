@@ -7,7 +7,6 @@ the default portfolio is compared with it.
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.request import Context
 from ir_planner.scene import STILL, MotionLimits
@@ -16,6 +15,7 @@ from ir_planner.timing.movement import Movement, within_torque
 from ir_planner.timing.objective import DURATION_SLACK, at_best_duration, least_stretched_cost
 from ir_planner.timing.ptp import free_law, path_limits, torque_per_segment
 from ir_planner.timing.time_law import StepLaws
+from ir_values.arrays import FloatArray
 
 _ROUNDS = 25  # gravity doesn't fall with speed: a load near the envelope takes several
 _BELOW = 1.0005  # a little slower than asked for, so that few rounds end it

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.timing.time_law import GRID_NS, StepLaws
+from ir_values.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import (
@@ -29,6 +28,7 @@ from ir_planner.request import Context
 from ir_planner.scene import MotionLimits
 from ir_planner.timing.blending import stretched
 from ir_planner.timing.objective import coarse_cost, coarse_energy_cost, request_cost
+from ir_values.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

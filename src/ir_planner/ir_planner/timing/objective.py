@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_kernels import dc_bus, portable
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import StatusCode
@@ -21,6 +20,7 @@ from ir_planner.errors import RequestError
 from ir_planner.request import DURATION_MAX, Context
 from ir_planner.scene import PlanningScene, path_cost
 from ir_planner.timing.blending import stretched
+from ir_values.arrays import FloatArray
 
 _FACTORS = np.array([1.0, 1.04, 1.1, 1.18, 1.3, 1.5, 1.8, 2.2])
 _SLOWER = np.array(

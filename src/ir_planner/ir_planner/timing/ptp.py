@@ -10,7 +10,6 @@ shortest wins.
 
 import numpy as np
 
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.errors import TimingError
 from ir_planner.scene import STILL, Dynamics, MotionLimits, torque_use
@@ -26,6 +25,7 @@ from ir_planner.timing.time_law import (
     level_laws,
     phase_steps,
 )
+from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 _SPEEDS = np.array([1.0, 0.93, 0.86, 0.78, 0.7, 0.6, 0.5, 0.4, 0.28, 0.15])
 _REFINED = np.array([-0.045, -0.03, -0.015, 0.0, 0.015, 0.03, 0.045])

@@ -11,7 +11,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import SLACK, Violation, clearance_violation
@@ -23,6 +22,7 @@ from ir_planner.timing.movement import Movement, within_torque
 from ir_planner.timing.objective import at_best_duration, coarse_energy_cost
 from ir_planner.timing.ptp import fastest, fastest_law, torque_per_segment
 from ir_planner.timing.time_law import GRID_S, Law, LawLimits, StepLaws, TimeLaw, phase_steps
+from ir_values.arrays import FloatArray
 
 # Asynchronous PTP: every joint takes its own time and stops when it has arrived. Where all of the
 # fastest laws together ask too much of some joint's torque, single joints keep to the synchronous

@@ -17,7 +17,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_values.arrays import FloatArray, IntArray
 
 GRID_S = 1e-3
 GRID_NS = 1_000_000

@@ -21,7 +21,6 @@ from ir_description import (
 )
 from ir_description.robot import DATA_SHEET, DcLink
 from ir_kernels import KernelError
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.modes import deepest
 from ir_msgs_py.names import JOINT_NAMES
 from ir_recorder.analysis.clearance import StepClearance, step_clearances
@@ -53,6 +52,7 @@ from ir_recorder.analysis.results import (
 from ir_recorder.analysis.steps import ExecutedStep, executed_steps
 from ir_recorder.format import contents
 from ir_recorder.reading.recording import Recording
+from ir_values.errors import InvalidValueError
 
 # The program as a whole: movements, pauses and waiting, planned and measured, and the cycle
 # unshortened.

@@ -10,10 +10,10 @@ from enum import StrEnum
 import numpy as np
 
 from ir_msgs_py.report import PlannedMovement
-from ir_msgs_py.settings import check_settings, setting
 from ir_recorder.analysis.resting_power import Plateau
 from ir_recorder.analysis.results import Analysis, StepResult
 from ir_recorder.analysis.steps import UNSEEN, ExecutedStep
+from ir_values.settings import check_settings, setting
 
 # How far measured may be from planned, with the reason of each bound.
 

@@ -14,12 +14,12 @@ import numpy as np
 
 from ir_description import Cell, PartPlaces
 from ir_kernels import Chain, CollisionModel
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR
 from ir_msgs_py.report import PlannedMovement
 from ir_recorder.analysis.loads import held_part, normal
 from ir_recorder.analysis.steps import ExecutedStep
 from ir_recorder.reading.recording import JointSeries
+from ir_values.arrays import FloatArray
 
 # s between samples of the profile: 4 cm of tool path. Near its minimum all joint states count
 COARSE = 0.02

@@ -9,10 +9,10 @@ import numpy as np
 
 from ir_description import Cell
 from ir_kernels import DynamicsModel
-from ir_msgs_py.arrays import FloatArray
 from ir_recorder.analysis.loads import carried
 from ir_recorder.analysis.results import NAN, Analysis, StepResult
 from ir_recorder.reading.recording import JointSeries
+from ir_values.arrays import FloatArray
 
 # Where the joules of a run go: from the mains to controller, tool, axes, brake resistor; what
 # comes back.

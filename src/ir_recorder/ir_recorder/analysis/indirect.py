@@ -9,7 +9,6 @@ import numpy as np
 
 from ir_description import IDLE, Load, PowerParameters, RobotModel
 from ir_description.robot import DcLink
-from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_recorder.analysis.intervals import Mean, mean_of, spread_of
 from ir_recorder.analysis.results import Analysis
 from ir_recorder.errors import RecorderError
@@ -18,6 +17,7 @@ from ir_recorder.measure.power_model import PowerModel, bus_flow
 from ir_recorder.measure.samples import samples_of
 from ir_recorder.reading.recording import JointSeries
 from ir_recorder.traces.trace import Trace
+from ir_values.arrays import BoolArray, FloatArray
 
 # Indirect measurement (section VI of the paper): mains energy rebuilt from what the robot did.
 #

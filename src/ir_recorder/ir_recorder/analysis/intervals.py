@@ -19,7 +19,7 @@ from functools import cache
 import numpy as np
 from scipy.special import bdtr, stdtr, stdtrit
 
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 LEVEL = 0.90  # of all intervals
 ALIKE = 1e-7  # of shares and of values in percent: below, two figures differ by rounding

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from ir_description.robot import DcLink
-from ir_msgs_py.arrays import FloatArray
 from ir_recorder.errors import TraceError
 from ir_recorder.reading.recording import PowerSeries, Recording
 from ir_recorder.traces import Trace, TraceMapping, clock_offset, mean_power, read_traces
+from ir_values.arrays import FloatArray
 
 # Joules between two times, read off the mains meter.
 #

@@ -21,13 +21,13 @@ from ir_description import (
 from ir_description.files import power_from_yaml
 from ir_description.robot import DcLink
 from ir_kernels import DynamicsModel
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.format import contents
 from ir_recorder.measure import PowerModel, Samples, planned_samples, standing_sample
 from ir_recorder.reading.recording import Recording
+from ir_values.arrays import FloatArray
+from ir_values.errors import InvalidValueError
 
 # The figures of controller and DC link that a recording was made with, not those of this
 # installation.

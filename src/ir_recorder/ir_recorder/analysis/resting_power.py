@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_description import Cell, Load, PowerData, data_sheet_of
-from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.modes import REST_MODES, Mode
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_recorder.analysis.loads import LoadTimeline, carried
 from ir_recorder.analysis.meter import Meter
 from ir_recorder.analysis.predicted_power import MOTORS, Predictor, resting_watts
 from ir_recorder.reading.recording import PowerSeries, Recording
+from ir_values.arrays import BoolArray, FloatArray
 
 AT_HOME = 0.005  # rad: gravity torque changes by less than 0.1 % within it
 STILL = 0.002  # rad/s: less than the slowest planned motion, more than the noise of a held joint

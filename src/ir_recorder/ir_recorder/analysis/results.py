@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_description import Cell
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.report import MovementKind
 from ir_msgs_py.savings import ProgramSavings
@@ -18,6 +17,7 @@ from ir_recorder.analysis.loads import LoadTimeline
 from ir_recorder.analysis.resting_power import Plateau
 from ir_recorder.analysis.steps import ExecutedStep
 from ir_recorder.reading.recording import JointSeries, PowerSeries, Recording
+from ir_values.arrays import FloatArray
 
 # Whether /joint_states lies on a grid without gaps. While the controller hibernates there are none
 # to come.

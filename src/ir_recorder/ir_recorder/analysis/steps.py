@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_recorder.reading.recording import ControllerSeries, ProgramEvent, Recording
+from ir_values.arrays import FloatArray
 
 STARTED = "started"
 OPEN = "open"  # no end was recorded

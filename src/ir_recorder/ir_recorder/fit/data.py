@@ -9,8 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from ir_description import Cell, DescriptionError, Load, PowerParameters, RobotModel, cell_from_yaml
-from ir_msgs_py.arrays import BoolArray, FloatArray
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_recorder.analysis.loads import LoadTimeline, carried, load_timeline, normal
 from ir_recorder.errors import FitError
@@ -21,6 +19,8 @@ from ir_recorder.reading.recording import Recording
 from ir_recorder.traces import Trace, TraceMapping, clock_offset, read_traces
 from ir_recorder.traces.reader import recorded_traces
 from ir_recorder.traces.trace import LOAD
+from ir_values.arrays import BoolArray, FloatArray
+from ir_values.errors import InvalidValueError
 
 # The cell of a recording: its robot, its mounting and what may be held.
 

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from ir_description import PowerParameters, physical_bounds
-from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_recorder.errors import FitError
 from ir_recorder.fit.data import check_determined, check_explained
 from ir_recorder.measure import PowerModel, Samples, movements
+from ir_values.arrays import BoolArray, FloatArray
 
 # What a fit needs of matrices and residuals: windows, correlation, inverses.
 

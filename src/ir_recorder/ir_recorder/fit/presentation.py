@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from ir_description import PowerParameters, parameter_unit
-from ir_msgs_py.file_roots import ANYWHERE
 from ir_recorder.errors import FitError
 from ir_recorder.fit.estimate import Fit, FittedMovement
 from ir_recorder.report.files import write_output
 from ir_recorder.report.picture import PICTURE_START
+from ir_values.files import ANYWHERE
 
 # A fit in words: what the data determined, what they did not, and how well it then agrees.
 

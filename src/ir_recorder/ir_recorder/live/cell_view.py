@@ -16,14 +16,14 @@ import numpy as np
 
 from ir_description import Cell, DescriptionError, PartPlaces, cell_from_yaml, cell_in
 from ir_kernels import Chain, CollisionModel
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.checks import one_line
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.analysis.clearance import allowed_pairs, collision_model, pair_name, places_after
 from ir_recorder.reading.recording import TextEvent
 from ir_recorder.report.cell_scene import cell_scene, door_bodies, matrix, part_meshes
 from ir_recorder.report.series import Json, floats
+from ir_values.arrays import FloatArray
+from ir_values.errors import one_line
 
 PATH_POINTS = 200  # of a planned path: a corner every 2 cm of a long movement
 MOST_STEPS = 2_000

@@ -33,7 +33,6 @@ from ir_msgs.msg import (
 )
 from ir_msgs.srv import GetTrajectory, SetPlcInput
 from ir_msgs_py import names, plc
-from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.conversions import status_from_msg, trajectory_from_msg
 from ir_msgs_py.ros.diagnostics import OK, Condition, Diagnostics
@@ -45,6 +44,7 @@ from ir_recorder.live.server import Command, Commands, LiveServer
 from ir_recorder.live.stream import Stream, levels, machines, number, power_values, states_of, text
 from ir_recorder.reading.messages import contact_sentence, movement_from
 from ir_recorder.report.series import Json
+from ir_values.errors import IrError
 
 PERIOD = 0.05  # s: a person sees no more pictures a second
 STALE = 1.0  # s: a meter that says nothing for so long isn't there; it speaks 100 times a second
@@ -201,7 +201,7 @@ class LiveNode(Node):
     def _take_path(self, message: Any) -> None:
         try:
             self._heard = replace(self._heard, path=trajectory_from_msg(message))
-        except MsgsError:
+        except IrError:
             return  # a stranger's: there is no path to show
 
     def _steps(self, messages: Sequence[Any]) -> dict[str, Json]:
@@ -209,7 +209,7 @@ class LiveNode(Node):
         for message in messages:
             try:
                 movement = movement_from(message.movement)
-            except MsgsError:
+            except IrError:
                 continue
             running = message.event == STARTED
             if running and message.index == 0:

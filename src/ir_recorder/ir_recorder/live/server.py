@@ -26,11 +26,11 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, NamedTuple
 
-from ir_msgs_py.checks import one_line
 from ir_msgs_py.plc import PlcInputs
 from ir_recorder.errors import LiveError
 from ir_recorder.live.stream import Stream
 from ir_recorder.report.page import asset
+from ir_values.errors import one_line
 
 # Who is answered: browsers on this machine that look at this page, and none that another page
 # sent.

@@ -15,10 +15,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
-from ir_msgs_py.checks import one_line
 from ir_msgs_py.plc import OperatingMode, PlcInputs, PlcOutputs
 from ir_recorder.analysis.results import mode_name
 from ir_recorder.report.series import Json
+from ir_values.errors import one_line
 
 SECONDS_KEPT = 120.0
 MOST_KEPT = 2_400

@@ -9,7 +9,7 @@ from importlib.util import find_spec
 import numpy as np
 
 from ir_description import Load, RobotModel
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 # Torques of a moving arm, one rigid body after another: what each of them asks of every joint
 # before it.

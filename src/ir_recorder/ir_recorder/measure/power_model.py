@@ -10,10 +10,10 @@ import numpy as np
 
 from ir_description import IDLE, PowerParameters, RobotModel
 from ir_description.robot import DcLink
-from ir_msgs_py.arrays import FloatArray
 from ir_recorder.errors import FitError
 from ir_recorder.measure.arm import ArmTorques, arm_torques
 from ir_recorder.measure.samples import Samples
+from ir_values.arrays import FloatArray
 
 # The DC link as a tank of joules: a rectifier that only fills, a chopper that takes what is too
 # much.

@@ -9,11 +9,11 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from ir_description import Load
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_msgs_py.modes import REST_MODES, Mode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.errors import FitError
 from ir_recorder.traces.trace import GAP_FACTOR, MODE, Trace, mean_power, resampled
+from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 # What a robot did, sample by sample on one grid: motion, mode, load and, where there is a meter,
 # watts.

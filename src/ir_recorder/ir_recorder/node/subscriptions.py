@@ -19,12 +19,12 @@ from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from ir_msgs_py import names
-from ir_msgs_py.errors import UnknownTypeError
 from ir_msgs_py.names import owns_diagnostic, owns_logger, owns_node
 from ir_msgs_py.ros.messages import interface_type
 from ir_msgs_py.ros.topics import PolledGroup
 from ir_recorder.errors import SchemaError
 from ir_recorder.format.qos import QosOffer, request_for
+from ir_values.errors import UnknownTypeError
 
 _LATCHED = DurabilityPolicy.TRANSIENT_LOCAL
 

@@ -26,8 +26,6 @@ from rosgraph_msgs.msg import Clock
 
 from ir_msgs.srv import ControlPlayback
 from ir_msgs_py import names
-from ir_msgs_py.errors import MsgsError, UnknownTypeError
-from ir_msgs_py.file_roots import FileRoots
 from ir_msgs_py.ros.messages import interface_type
 from ir_msgs_py.ros.node_process import CommandLineError, own_words, run_node
 from ir_msgs_py.ros.serving import BoundedService, answered
@@ -38,6 +36,8 @@ from ir_recorder.format.qos import offers_from_yaml
 from ir_recorder.format.schemas import SchemaLibrary
 from ir_recorder.play.playback import DueMessage, Player, Playhead, PlaySettings, is_command
 from ir_recorder.reading.mcap_file import RawChannel, RawRecording, read_raw
+from ir_values.errors import IrError, UnknownTypeError
+from ir_values.files import FileRoots
 
 # Keys of a terminal that control playback: space pauses, arrows seek and change the rate.
 
@@ -275,7 +275,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options = play_parser().parse_args(own_words("ir-play", everything))
         settings = PlaySettings(options.rate, options.loop, tuple(options.topics))
         recording = read_raw(options.file, FileRoots.of(options.roots))
-    except (CommandLineError, RecorderError, MsgsError) as error:
+    except (CommandLineError, RecorderError, IrError) as error:
         sys.stderr.write(f"ir-play: {error}\n")
         return 1
     for problem in recording.problems:

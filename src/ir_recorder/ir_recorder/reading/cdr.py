@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_recorder.errors import ReadError
 from ir_recorder.format.schemas import TEXTS, Field, definitions_of, short_name
+from ir_values.arrays import FloatArray, IntArray
 
 _DTYPES = {"bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1"} | {
     f"{kind}{bits}": f"<{kind[0]}{bits // 8}"

@@ -14,14 +14,13 @@ from mcap.records import Attachment, Channel, Chunk, Footer, McapRecord, Message
 from mcap.stream_reader import StreamReader
 
 from ir_msgs_py import names
-from ir_msgs_py.arrays import IntArray
-from ir_msgs_py.checks import one_line
-from ir_msgs_py.errors import FileRefusedError
-from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_recorder.errors import ReadError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import part_path, repeated_messages
 from ir_recorder.reading.limits import ChunkReader, ReadLimits, TooLargeError
+from ir_values.arrays import IntArray
+from ir_values.errors import FileRefusedError, one_line
+from ir_values.files import ANYWHERE, FileRoots
 
 # A recording as bytes by topic, with its attachments and facts.
 

@@ -11,11 +11,11 @@ import numpy as np
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import DistancePair, PlannedMovement, TrajectoryReport
 from ir_msgs_py.savings import ProgramSavings, Saving
 from ir_recorder.format.schemas import definitions_of
 from ir_recorder.reading.mcap_file import RawChannel
+from ir_values.arrays import FloatArray
 
 
 def decoder_of(channel: RawChannel) -> Callable[[bytes], Any] | None:

@@ -13,8 +13,6 @@ from pathlib import Path
 import numpy as np
 
 from ir_msgs_py import names
-from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_msgs_py.savings import ProgramPoint
 from ir_msgs_py.search_log import CorrectionLog, SearchLog, log_of
@@ -24,6 +22,8 @@ from ir_recorder.reading.cdr import Columns
 from ir_recorder.reading.mcap_file import RawChannel, chosen_namespace, read_raw
 from ir_recorder.reading.messages import decoder_of
 from ir_recorder.reading.recording import ProgramEvent, Recording
+from ir_values.errors import IrError
+from ir_values.files import ANYWHERE, FileRoots
 
 # The Pareto front of a program, from the planner's answers that a recording holds; read without
 # ROS.
@@ -155,7 +155,7 @@ def _steps_of(answer: bytes, definition: str) -> tuple[PlannedMovement, ...]:
             break
         try:
             steps.append(_step(columns, f"movements[{k}]", seconds))
-        except MsgsError:
+        except IrError:
             return ()
     return tuple(steps)
 

@@ -12,10 +12,6 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ir_msgs_py import names
-from ir_msgs_py.arrays import FloatArray, IntArray
-from ir_msgs_py.checks import one_line
-from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_msgs_py.names import owns_diagnostic, owns_logger
 from ir_msgs_py.plc import PlcInputs, PlcOutputs
 from ir_recorder.errors import ReadError
@@ -37,6 +33,9 @@ from ir_recorder.reading.recording import (
     TextEvent,
     TopicSummary,
 )
+from ir_values.arrays import FloatArray, IntArray
+from ir_values.errors import IrError, one_line
+from ir_values.files import ANYWHERE, FileRoots
 
 # What happens around the robot, as events: the states of machines, and what the robot touches.
 
@@ -234,7 +233,7 @@ class _Reader:
         for time, message in self._messages(names.PROGRAM_STATE, needed=True):
             try:
                 movement = movement_from(message.movement)
-            except MsgsError as error:
+            except IrError as error:
                 broken += 1
                 if broken == 1:
                     self._problems.append(

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.search_log import SearchLog
 from ir_recorder.format import contents
+from ir_values.arrays import FloatArray, IntArray
 
 
 class _ReadOnlyArrays:

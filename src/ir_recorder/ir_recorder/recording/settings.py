@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ir_msgs_py.file_roots import FileRoots
-from ir_msgs_py.settings import check_settings, setting
 from ir_recorder.errors import RecorderError
 from ir_recorder.format.contents import Split
+from ir_values.files import FileRoots
+from ir_values.settings import check_settings, setting
 
 
 @dataclass(frozen=True)

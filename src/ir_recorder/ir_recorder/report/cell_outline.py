@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_description import Body, Cell
-from ir_msgs_py.arrays import FloatArray
 from ir_recorder.report.number_text import text
 from ir_recorder.report.shapes import body_mesh
+from ir_values.arrays import FloatArray
 
 WIDTH = 560.0
 HEIGHT = 360.0

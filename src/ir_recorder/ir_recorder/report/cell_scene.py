@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ir_description import Body, Cell, Equipment, machine_in
-from ir_msgs_py.arrays import FloatArray
 from ir_recorder.reading.recording import TextEvent
 from ir_recorder.report.series import Json, indices, quantised
 from ir_recorder.report.shapes import Mesh, body_mesh, capsule_mesh, robot_parts
+from ir_values.arrays import FloatArray
 
 # The cell as it stands, for the picture in 3D: triangles and poses of robot, loads, machines and
 # parts.

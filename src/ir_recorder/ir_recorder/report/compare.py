@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_msgs_py.savings import ProgramSavings
 from ir_recorder.analysis import Analysis, Finding, summary
 from ir_recorder.analysis.flows import energy_flows
@@ -26,6 +25,7 @@ from ir_recorder.report.number_text import DASH, joules, millimetres, percent, s
 from ir_recorder.report.page import PAGE_START, asset
 from ir_recorder.report.series import Curves, Json, packed
 from ir_recorder.report.tables import table
+from ir_values.files import ANYWHERE, FileRoots
 
 MOST = 12  # recordings on one page: more columns than that are not read
 SCRIPTS = ("charts.js", "axes.js", "export.js", "compare.js")

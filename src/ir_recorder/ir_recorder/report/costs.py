@@ -9,11 +9,8 @@ from pathlib import Path
 
 from ir_description import DescriptionFileError
 from ir_description.files import plain_yaml
-from ir_msgs_py.errors import InvalidValueError, MsgsError
-from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import Saving
-from ir_msgs_py.settings import Setting, check_settings, describe, setting
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.flows import levers
 from ir_recorder.analysis.results import Share
@@ -28,6 +25,9 @@ from ir_recorder.report.number_text import (
     text,
 )
 from ir_recorder.report.tables import table
+from ir_values.errors import InvalidValueError, IrError
+from ir_values.files import ANYWHERE, FileRoots
+from ir_values.settings import Setting, check_settings, describe, setting
 
 # What joules cost: price, currency, shifts and the grid's CO2, from a file or as assumed.
 #
@@ -105,7 +105,7 @@ def read_costs(path: str | Path, roots: FileRoots = ANYWHERE) -> Costs:
         tree = plain_yaml(roots.inside(path))
     except DescriptionFileError as error:
         raise CostsError(str(error)) from error
-    except (MsgsError, OSError) as error:
+    except (IrError, OSError) as error:
         raise CostsError(f"{path}: {error}") from error
     if not isinstance(tree, dict) or tree.get("format") != FORMAT:
         raise CostsError(f"{path}: is no file of costs, which begins with format: {FORMAT}")
@@ -114,7 +114,7 @@ def read_costs(path: str | Path, roots: FileRoots = ANYWHERE) -> Costs:
         values[key] = _checked(f"{path}: {key[:40]}", key, value)
     try:
         return replace(Costs(), **values, given=tuple(values))
-    except MsgsError as error:
+    except IrError as error:
         raise CostsError(f"{path}: {error}") from error
 
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.clearance import StepClearance
 from ir_recorder.analysis.results import mode_name
@@ -23,6 +22,7 @@ from ir_recorder.report.motion_scene import (
 )
 from ir_recorder.report.number_text import mode_words
 from ir_recorder.report.series import Json, axis_curves, envelope, floats, machine_lanes
+from ir_values.arrays import FloatArray
 
 MOST_POINTS = 24_000  # of the power curve: 4 minutes as they were read
 _BITS = {

@@ -9,8 +9,6 @@ from functools import partial
 from hashlib import sha256
 from pathlib import Path
 
-from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_recorder.analysis import Analysis, analyse
 from ir_recorder.analysis.flows import levers
 from ir_recorder.analysis.results import Share
@@ -24,6 +22,8 @@ from ir_recorder.report.number_text import joules, kilowatt_hours, number, secon
 from ir_recorder.report.page import PAGE_START, asset
 from ir_recorder.report.step_table import TableValue, write_columns
 from ir_recorder.report.tables import table
+from ir_values.errors import IrError
+from ir_values.files import ANYWHERE, FileRoots
 
 # Which files a fleet is made of: recordings of folders, whose robot each one is of, none of them
 # twice.
@@ -53,7 +53,7 @@ def recordings_below(
     for path in map(Path, paths):
         try:
             inside = roots.inside(path)
-        except MsgsError as error:
+        except IrError as error:
             said(f"{path}: left out: {error}")
             continue
         inner = sorted(inside.rglob("*.mcap")) if inside.is_dir() else [inside]
@@ -167,7 +167,7 @@ def read_members(
             if is_further_part(file.path, recording.fact(contents.PART)):
                 continue
             found = member_of(analyse(recording), file.robot, partial(_say, left_out, file.path))
-        except (RecorderError, MsgsError, OSError) as error:
+        except (RecorderError, IrError, OSError) as error:
             left_out(f"{file.path}: left out: {error}")
             continue
         if found is not None:

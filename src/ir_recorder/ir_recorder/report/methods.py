@@ -8,11 +8,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ir_description import Cell
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.search_log import ConfigurationLog, CorrectionLog, Counts, SearchLog, WithdrawalLog
 from ir_recorder.analysis import Analysis
 from ir_recorder.report.cell_outline import HEIGHT, WIDTH, View, drawing
 from ir_recorder.report.number_text import percent, text
+from ir_values.arrays import FloatArray
 
 # Counted things as people read them.
 

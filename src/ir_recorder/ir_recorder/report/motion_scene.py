@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ir_description import Cell, PartPlaces, data_sheet_of
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_msgs_py.savings import Side
 from ir_msgs_py.trajectory import JointTrajectory
@@ -19,6 +18,7 @@ from ir_recorder.measure import PowerModel, planned_samples
 from ir_recorder.reading.recording import TextEvent
 from ir_recorder.report.cell_scene import cell_scene, door_bodies, matrix, part_meshes
 from ir_recorder.report.series import Curves, Json, floats, indices, packed, quantised
+from ir_values.arrays import FloatArray
 
 # The cell and its motion for the picture in 3D: the joint values 50 times a second, parts, loads,
 # pairs.

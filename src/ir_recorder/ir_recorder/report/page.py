@@ -9,7 +9,6 @@ from importlib.resources import files
 from pathlib import Path
 
 from ir_description import load_power_data
-from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_msgs_py.savings import ProgramPoint
 from ir_recorder.analysis import Analysis, Finding, Tolerances
 from ir_recorder.analysis.indirect import agreement
@@ -33,6 +32,7 @@ from ir_recorder.report.tables import (
     step_table,
     warning_table,
 )
+from ir_values.files import ANYWHERE, FileRoots
 
 # Charts and tables that the page shows of an analysis: a new one is a function, and a line here.
 #

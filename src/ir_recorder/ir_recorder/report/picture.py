@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ir_kernels import Chain
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.results import mode_name
 from ir_recorder.errors import RecorderError
@@ -21,6 +19,8 @@ from ir_recorder.report.files import write_output
 from ir_recorder.report.number_text import joules, mode_words
 from ir_recorder.report.series import envelope
 from ir_recorder.report.tables import savings_lines
+from ir_values.arrays import FloatArray
+from ir_values.files import ANYWHERE, FileRoots
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

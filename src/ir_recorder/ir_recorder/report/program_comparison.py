@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ir_description import Cell
-from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_msgs_py.savings import BeforeAfter, Change, Side
 from ir_recorder.report.cell_scene import cell_scene
 from ir_recorder.report.charts import Point, front_chart
@@ -30,6 +29,7 @@ from ir_recorder.report.number_text import (
 from ir_recorder.report.page import PAGE_START, asset
 from ir_recorder.report.step_table import TableValue, write_columns
 from ir_recorder.report.tables import table
+from ir_values.files import ANYWHERE, FileRoots
 
 # Joules of a cycle as those of a shift and a year, and as money and CO2, bounds included.
 

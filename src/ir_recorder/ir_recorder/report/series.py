@@ -11,9 +11,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ir_msgs_py.arrays import FloatArray
 from ir_recorder.analysis import Analysis
 from ir_recorder.reading.recording import Recording, TextEvent
+from ir_values.arrays import FloatArray
 
 # Series small enough for a page: envelopes of long ones, and numbers packed into base64.
 

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from ir_description import Body, Capsule, RobotModel
-from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_values.arrays import FloatArray, IntArray
 
 # Triangles of bodies and capsules for the picture, with normals.
 

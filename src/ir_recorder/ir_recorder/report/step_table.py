@@ -12,10 +12,10 @@ from collections.abc import Mapping, Sequence
 from io import BytesIO, StringIO
 from pathlib import Path
 
-from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_recorder.analysis import Analysis, StepResult
 from ir_recorder.errors import PathError, RecorderError
 from ir_recorder.report.files import write_output
+from ir_values.files import ANYWHERE, FileRoots
 
 TableValue = str | float | int
 _TEXTS = ("recording", "origin", "plant", "label", "kind", "mode", "load", "outcome")

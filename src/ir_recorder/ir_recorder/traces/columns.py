@@ -12,9 +12,9 @@ from typing import Any
 
 from ir_description import DescriptionFileError
 from ir_description.files import plain_yaml
-from ir_msgs_py.errors import InvalidValueError
 from ir_recorder.errors import TraceError
 from ir_recorder.traces.trace import TIME
+from ir_values.errors import InvalidValueError
 
 # Headings of columns as people write them: "power [kW]", "time_ms", "joint_a1 (deg)"; all become
 # SI.

@@ -10,7 +10,6 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.names import JOINT_NAMES
 from ir_recorder.errors import TraceError
@@ -29,6 +28,7 @@ from ir_recorder.traces.trace import (
     VELOCITY,
     Trace,
 )
+from ir_values.arrays import FloatArray
 
 # Traces of a recording: the joints' and the meter's, each with its own instants.
 

@@ -16,10 +16,10 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_recorder.errors import TraceError
 from ir_recorder.traces.columns import TraceMapping, Wanted, chosen
 from ir_recorder.traces.trace import LOAD, MODE, TIME, Trace
+from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 # Files of measurements as a user names them: regular ones of a bounded size.
 

@@ -9,8 +9,8 @@ from types import MappingProxyType
 import numpy as np
 from scipy.signal import correlate
 
-from ir_msgs_py.arrays import FloatArray
 from ir_recorder.errors import TraceError
+from ir_values.arrays import FloatArray
 
 # Measured data on one clock: columns of numbers and of words over strictly increasing seconds, in
 # SI.

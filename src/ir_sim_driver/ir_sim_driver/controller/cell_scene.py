@@ -15,9 +15,9 @@ from ir_description import AllowedContact, Body, Capsule, Cell, Equipment, cell_
 from ir_kernels.chain import Chain
 from ir_kernels.collision import CollisionModel
 from ir_msgs_py.announcements import MachineState
-from ir_msgs_py.arrays import BoolArray, FloatArray
-from ir_msgs_py.errors import InvalidValueError
 from ir_sim_driver.plant import Carried
+from ir_values.arrays import BoolArray, FloatArray
+from ir_values.errors import InvalidValueError
 
 # Machine states, switched by signals; a change takes its time.
 #

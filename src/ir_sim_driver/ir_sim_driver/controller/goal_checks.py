@@ -11,8 +11,6 @@ import numpy as np
 from ir_description import RobotModel
 from ir_kernels.collision import COLLIDES, FREE
 from ir_kernels.dynamics import DynamicsModel
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import InvalidValueError
 from ir_sim_driver.controller.cell_scene import ContactScene, Keep, Piece
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import (
@@ -26,6 +24,8 @@ from ir_sim_driver.motion import (
     check_trajectory,
     checked_route,
 )
+from ir_values.arrays import FloatArray
+from ir_values.errors import InvalidValueError
 
 # Collisions along a path: proved for every instant, not sampled.
 

@@ -8,13 +8,13 @@ from typing import cast
 from ir_kernels.power import REGENERATIONS, Regeneration
 from ir_msgs_py.modes import REST_MODES, Mode, TransitionTimes
 from ir_msgs_py.plc import OperatingMode
-from ir_msgs_py.settings import check_settings, setting
 from ir_sim_driver.controller.supervision import SupervisionSettings
 from ir_sim_driver.load_check import LoadCheckSettings
 from ir_sim_driver.motion import ExecutionSettings
 from ir_sim_driver.plant import ControlSettings
 from ir_sim_driver.plc import PlcSettings
 from ir_sim_driver.power import IdleTimes
+from ir_values.settings import check_settings, setting
 
 DT = 0.001
 """Step of plant and controller [s]."""

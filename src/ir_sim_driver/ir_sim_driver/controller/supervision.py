@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ir_description import RobotModel
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.settings import check_settings, setting
 from ir_sim_driver.motion import ErrorCode
 from ir_sim_driver.plant import Backend
+from ir_values.arrays import FloatArray
+from ir_values.settings import check_settings, setting
 
 PERIOD = 4  # steps: as safety controllers do, which look every 4 to 12 ms
 _WINDOW = 5  # looks: acceleration is the mean over 20 ms, as speeds of single steps carry noise

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_description import DATA_SHEET, Cell, Load, data_sheet_of, load_power_parameters
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.settings import check_settings, setting
 from ir_sim_driver.load_check.estimate import Declared, LoadFinding, Motion, Uncertainty, weighed
 from ir_sim_driver.notices import Level, Notices
 from ir_sim_driver.plant import Backend, Carried
+from ir_values.arrays import FloatArray
+from ir_values.settings import check_settings, setting
 
 # Settings.
 

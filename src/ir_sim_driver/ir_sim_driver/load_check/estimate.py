@@ -10,8 +10,8 @@ import numpy as np
 
 from ir_description import RELATIVE_DEVIATION, Load, PowerParameters, RobotModel
 from ir_kernels.dynamics import DynamicsModel
-from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.plant import Carried
+from ir_values.arrays import FloatArray
 
 # Uncertainty of the torques along a movement, parameter by parameter.
 #

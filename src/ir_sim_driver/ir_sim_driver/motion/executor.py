@@ -14,7 +14,6 @@ import numpy as np
 
 from ir_description import RobotModel
 from ir_kernels.dynamics import DynamicsModel
-from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.motion.goal import (
     ErrorCode,
     ExecutionSettings,
@@ -26,6 +25,7 @@ from ir_sim_driver.motion.path import Motion, Path
 from ir_sim_driver.motion.tool_point import EXACT_FROM, ToolPoint
 from ir_sim_driver.motion.trajectory_checks import Route
 from ir_sim_driver.plant import Backend
+from ir_values.arrays import FloatArray
 
 # Commands of the steps ahead: while path time passes evenly, many cost what one does.
 

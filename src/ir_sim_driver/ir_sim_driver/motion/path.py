@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 _DERIVATIVE = np.arange(6.0)
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from ir_description import RobotModel
 from ir_kernels.chain import Chain
-from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.motion.path import Path
+from ir_values.arrays import FloatArray
 
 # Deviation of the tool: a cheap bound first, the exact distance when it matters.
 

@@ -12,12 +12,12 @@ import numpy as np
 from ir_description import RobotModel
 from ir_kernels import Extrema, polynomial_extrema
 from ir_kernels.dynamics import DynamicsModel
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
-from ir_msgs_py.errors import JointNamesError
 from ir_msgs_py.trajectory import NS_PER_S, JointTrajectory
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.goal import ErrorCode, ExecutionSettings, JointTolerance, TrajectoryGoal
 from ir_sim_driver.motion.path import Motion, Path, quintic
+from ir_values.arrays import BoolArray, FloatArray, IntArray
+from ir_values.errors import JointNamesError
 
 # Trajectories of positions alone: their corners are rounded, so that velocity never jumps.
 #

@@ -25,13 +25,13 @@ from ir_msgs.msg import ControllerTimers as ControllerTimersMsg
 from ir_msgs.msg import MachineStates as MachineStatesMsg
 from ir_msgs_py import names
 from ir_msgs_py.announcements import CarriedLoad
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.ros.plan_conversions import contact_to_msg, machine_states_to_msg
 from ir_msgs_py.ros.power_conversions import carried_load_to_msg, controller_timers_to_msg
 from ir_msgs_py.ros.serving import ANY, unexpected
 from ir_msgs_py.ros.topics import LATCHED, CommandTopic
 from ir_sim_driver.controller import Driver, PlannedCell
 from ir_sim_driver.plant import Carried, plant_to_yaml
+from ir_values.arrays import FloatArray
 
 _CONTACTS = QoSProfile(depth=100)
 

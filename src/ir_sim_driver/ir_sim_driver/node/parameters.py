@@ -9,7 +9,6 @@ from rclpy.node import Node
 
 from ir_msgs_py.modes import PREFIX, TransitionTimes
 from ir_msgs_py.ros.parameters import Parameters
-from ir_msgs_py.settings import check_settings, setting
 from ir_sim_driver.controller import ControllerSettings, SimulationSettings, SupervisionSettings
 from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.load_check import LoadCheckSettings
@@ -17,6 +16,7 @@ from ir_sim_driver.motion import ExecutionSettings
 from ir_sim_driver.plant import BACKENDS, TYPICAL, ControlSettings
 from ir_sim_driver.plc import LINKS, Link, PlcSettings, WakeOnLan
 from ir_sim_driver.power import IdleTimes
+from ir_values.settings import check_settings, setting
 
 
 @dataclass(frozen=True)

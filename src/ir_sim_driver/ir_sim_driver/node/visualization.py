@@ -13,9 +13,9 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from ir_description import Capsule, FramePose
 from ir_msgs_py import names
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.ros.conversions import point_to_msg, pose_to_msg, time_to_msg
 from ir_sim_driver.controller import Bodies, Driver
+from ir_values.arrays import FloatArray
 
 # The robot's capsules as bodies to draw: a cylinder and two balls each, in the world.
 

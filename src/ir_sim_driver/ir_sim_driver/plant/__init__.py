@@ -11,7 +11,6 @@ from ir_sim_driver.plant.plant_parameters import NOMINAL, Plant, nominal_plant, 
 from ir_sim_driver.plant.plants import (
     IDEAL,
     TYPICAL,
-    PlantFileError,
     ideal_plant,
     plant_from_yaml,
     plant_hash,
@@ -22,6 +21,7 @@ from ir_sim_driver.plant.plants import (
 )
 from ir_sim_driver.plant.power_meter import BasePower, MeterReading, PowerMeter
 from ir_sim_driver.plant.pybullet_backend import PyBulletBackend
+from ir_values.errors import DescriptionFileError
 
 __all__ = [
     "BACKENDS",
@@ -34,10 +34,10 @@ __all__ = [
     "BasePower",
     "Carried",
     "ControlSettings",
+    "DescriptionFileError",
     "IdealBackend",
     "MeterReading",
     "Plant",
-    "PlantFileError",
     "PowerMeter",
     "PyBulletBackend",
     "Work",

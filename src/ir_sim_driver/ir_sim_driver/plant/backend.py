@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 from ir_description import Load
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 STANDING = 1e-3
 """Speed [rad/s] below which a joint stands."""

@@ -22,9 +22,9 @@ import numpy as np
 
 from ir_description import Load, RobotModel
 from ir_kernels.dynamics import DynamicsModel
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.settings import check_settings, setting
 from ir_sim_driver.plant.drivetrain import SMOOTHING, Drivetrain
+from ir_values.arrays import FloatArray
+from ir_values.settings import check_settings, setting
 
 _TURN = 2.0 * np.pi
 _STEEP = 1.0 / SMOOTHING

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ir_description import RobotModel
-from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.plant.backend import Work
 from ir_sim_driver.plant.plant_parameters import REFERENCE_TEMPERATURE, DriveFigures, GearFigures
+from ir_values.arrays import FloatArray
 
 # Power of an axis from the DC link: torque times speed, and the losses of motor and inverter.
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from ir_description import Load, RobotModel
 from ir_kernels.dynamics import DynamicsModel
-from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.plant.backend import STANDING, Work
+from ir_values.arrays import FloatArray
 
 BRAKE_FACTOR = 2.0
 """Deceleration of the mechanical brakes over the joint's acceleration limit."""

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_description import Cell, Load, RobotModel
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.errors import RequestRefusedError
+from ir_values.arrays import FloatArray
 
 # Load diagram: moment and inertia of a load, bounded by the robot's own drives.
 #

@@ -14,8 +14,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ir_description import InvalidValueError, PowerData, RobotModel
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import MODES, Mode
+from ir_values.arrays import FloatArray
 
 NOMINAL = "nominal"
 VOLTAGE_SHARE = 0.9

@@ -14,7 +14,6 @@ import yaml
 
 from ir_description import DescriptionFileError, InvalidValueError, PowerData, RobotModel, is_path
 from ir_description.files import read_regular_file
-from ir_msgs_py.arrays import FloatArray
 from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.plant.plant_parameters import (
     NOMINAL,
@@ -25,6 +24,7 @@ from ir_sim_driver.plant.plant_parameters import (
     StandingWatts,
     nominal_plant,
 )
+from ir_values.arrays import FloatArray
 from ir_values.yaml_items import Item, read_items
 
 # Typical plants: figures drawn by seed, spread as far as the data's marks of confidence say.
@@ -247,31 +247,29 @@ _WATTS = ("controller_w", "drives_w", "tool_factor")
 _ROBOT = ("links", "reflected_inertia_kgm2", "charge_pressure_pa")
 
 
-class PlantFileError(DescriptionFileError):
-    """A plant file that can't be read: path, line, and what is wrong."""
-
-
 def read_plant(path: str, robot: RobotModel, data: PowerData) -> Plant:
-    """The plant of a file for this robot. Raises PlantFileError, which quotes nothing of other
-    files.
+    """The plant of a file for this robot. Raises DescriptionFileError, which quotes nothing of
+    other files.
     """
     try:
         text = read_regular_file(Path(path), BYTES_MAX).decode("utf-8")
     except InvalidValueError as error:
-        raise PlantFileError(path, 0, str(error)) from error
+        raise DescriptionFileError(path, 0, str(error)) from error
     except UnicodeDecodeError as error:
-        raise PlantFileError(path, 0, "this is no plant file: it is no text in UTF-8") from error
+        raise DescriptionFileError(
+            path, 0, "this is no plant file: it is no text in UTF-8"
+        ) from error
     if not _FORMAT.search(text):
-        raise PlantFileError(path, 0, f"this is no plant file: it has no format: {FORMAT}")
+        raise DescriptionFileError(path, 0, f"this is no plant file: it has no format: {FORMAT}")
     return plant_from_yaml(text, robot, data, path)
 
 
 def plant_from_yaml(text: str, robot: RobotModel, data: PowerData, source: str = "<text>") -> Plant:
     """The plant of a text; what it leaves out is that of the nominal plant. Raises
-    PlantFileError.
+    DescriptionFileError.
     """
     nominal = nominal_plant(robot, data)
-    root = read_items(text, source, PlantFileError)
+    root = read_items(text, source, DescriptionFileError)
     top = root.table(("format", "name", "robot"), (*_ROBOT, "drives", "gears", "dc_link", "watts"))
     top["format"].choice((FORMAT,))
     top["robot"].choice((robot.name,))
@@ -396,7 +394,7 @@ _TYPICAL = re.compile(rf"{TYPICAL}(?::([0-9]{{1,18}}))?")
 
 def plant_named(text: str, robot: RobotModel, data: PowerData) -> Plant:
     """The plant that a text names; `typical` is `typical:0`. Raises SettingsError,
-    PlantFileError.
+    DescriptionFileError.
     """
     if text == NOMINAL:
         return nominal_plant(robot, data)

@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ir_kernels.power import Regeneration
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import Mode
 from ir_sim_driver.plant.backend import Work
 from ir_sim_driver.plant.drivetrain import DriveLosses
 from ir_sim_driver.plant.plant_parameters import LinkFigures, Plant, StandingWatts
+from ir_values.arrays import FloatArray
 
 # Base load: controller by mode, drives that are switched on, tool.
 

@@ -12,10 +12,10 @@ from enum import IntEnum
 from typing import ClassVar, Protocol, TypeVar
 
 from ir_msgs_py.plc import OperatingMode
-from ir_msgs_py.settings import check_settings, setting
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.errors import DriverError, LinkError, ModbusRefusedError, RequestRefusedError
 from ir_sim_driver.plc.port import STOP_BIT, Controller, OpenLink, Readout
+from ir_values.settings import check_settings, setting
 
 # Requests in bytes, answered from tables: the part of the protocol that knows no network.
 #

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ir_msgs_py.plc import CONTROLLER_MAC, WAKE_PORT, mac_bytes, wakes
-from ir_msgs_py.settings import check_settings, setting
 from ir_sim_driver.errors import LinkError
 from ir_sim_driver.plc.port import Controller, OpenLink
+from ir_values.settings import check_settings, setting
 
 _PACKET_MAX = 2048  # bytes; longer datagrams are cut, and then wake nobody
 _POLL = 0.2  # s between two looks at whether the listener was closed

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from ir_msgs_py.modes import DRIVES_ON, READY, RESTS, ROW, Mode, ModeRow, TransitionTimes
-from ir_msgs_py.settings import check_settings, setting
 from ir_sim_driver.errors import SettingsError
+from ir_values.settings import check_settings, setting
 
 # Times of every rest by its mode, and the controller's own timers.
 
