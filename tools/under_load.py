@@ -23,7 +23,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-TESTS = ("tests/nodes", "tests/system")
+TESTS = ("-m", "not long", "tests/nodes", "tests/system")
 OUTPUT = ROOT / "out" / "under_load"
 _BUSY = """
 import os, sys
