@@ -15,12 +15,14 @@ from __future__ import annotations
 import argparse
 import os
 import re
+import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import IO
 
 ROOT = Path(__file__).resolve().parent.parent
 TESTS = ("-m", "not long", "tests/nodes", "tests/system")
@@ -50,6 +52,18 @@ def load(processes: int) -> Iterator[None]:
             process.wait()
 
 
+def run_to_the_end(command: list[str], output: IO[str]) -> int:
+    """Run a command in a process group of its own, which ends with it; its exit code."""
+    process = subprocess.Popen(
+        command, cwd=ROOT, stdout=output, stderr=subprocess.STDOUT, start_new_session=True
+    )
+    try:
+        return process.wait()
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+
+
 def counts_of(output: str) -> dict[str, int]:
     """Counts of pytest's summary line ("3 failed, 12 passed, 1 rerun in 9.1s")."""
     summaries = [line for line in output.splitlines() if re.search(r" in \d+(\.\d+)?s\b", line)]
@@ -68,6 +82,7 @@ def main() -> int:
     command = [sys.executable, "-m", "pytest", "-q", "-rfE", *(chosen or TESTS)]
     OUTPUT.mkdir(parents=True, exist_ok=True)
     failures = 0
+    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
     print(f"{' '.join(command[1:])}, beside {given.busy} busy processes on {os.cpu_count()} cores")
     print("run  passed  failed  errors  reruns  skipped  seconds   load", flush=True)
     with load(given.busy):
@@ -75,9 +90,7 @@ def main() -> int:
             begun = time.monotonic()
             log = OUTPUT / f"run_{k:03d}.log"
             with log.open("w", encoding="utf-8") as output:
-                code = subprocess.run(
-                    command, cwd=ROOT, stdout=output, stderr=subprocess.STDOUT
-                ).returncode
+                code = run_to_the_end(command, output)
             seconds = time.monotonic() - begun
             said = log.read_text(encoding="utf-8", errors="replace")
             passed, failed, errors, reruns, skipped = counts_of(said).values()
