@@ -1,15 +1,13 @@
 # `make help` lists the targets. Everything runs in .venv, which the first target makes; results go to out/.
 SHELL := /bin/sh
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-tests demo test test-long check sanitize processors bench bench-long compare docs clean
+.PHONY: help setup setup-tests demo test test-long test-versions check sanitize processors bench bench-long compare docs clean
 # A sourced ROS 2 would put its own packages, of another Python, in front of the environment's.
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH ROS_DISTRO
 
 BIN := .venv/bin
-CORES := $(shell nproc 2>/dev/null || echo 2)
-PYTEST := $(BIN)/python -m pytest -n $(CORES) --dist worksteal
-# Real nodes in real time: alone on the machine, as a robot's controller would be.
-SYSTEM_TESTS := $(BIN)/python -m pytest tests/system
+# Both parts of the tests, whichever fails, and one summary.
+TESTS := $(BIN)/python tools/run_tests.py
 # make demo ARGS='--cell my_cell.yaml'; make test ARGS='-k energy'; make bench ARGS='--seeds 3'
 ARGS ?=
 # make compare BEFORE=../checkout_of_another_commit, with its core built
@@ -30,17 +28,18 @@ setup-tests:      ## the same, and what checks, tests and benchmarks need
 demo: setup       ## plan, drive, record and explain the demonstration cell
 	@$(BIN)/ir demo $(ARGS)
 
-# Exit code 5 is pytest's "no test collected": ARGS may choose tests of one part only.
-test: setup-tests ## every test that takes seconds to a few minutes
-	@$(PYTEST) --ignore tests/system -m 'not long' $(ARGS) || [ $$? -eq 5 ]
-	@$(SYSTEM_TESTS) -m 'not long' $(ARGS) || [ $$? -eq 5 ]
+test: setup-tests ## every test that takes seconds to a few minutes; about 8 minutes on two quiet cores
+	@$(TESTS) -m 'not long' $(ARGS)
 
-test-long: setup-tests ## every test, also those that run for minutes; then with the oldest versions
-	@$(PYTEST) --ignore tests/system $(ARGS) || [ $$? -eq 5 ]
-	@$(SYSTEM_TESTS) $(ARGS) || [ $$? -eq 5 ]
+test-long: setup-tests ## every test, also those that run for minutes; then sanitizers, processors and versions
+	@$(TESTS) $(ARGS)
 	@[ -n '$(ARGS)' ] || PYTHON=$(CURDIR)/$(BIN)/python src/ir_kernels/sanitize.sh
 	@[ -n '$(ARGS)' ] || $(BIN)/python tools/processors.py --tests
-	@[ -n '$(ARGS)' ] || $(BIN)/python tools/oldest_versions.py
+	@[ -n '$(ARGS)' ] || $(MAKE) --no-print-directory test-versions
+
+test-versions: setup-tests ## the tests with the oldest versions, and with the newest on Python 3.12 and 3.13
+	@$(BIN)/python tools/oldest_versions.py $(ARGS)
+	@$(BIN)/python tools/oldest_versions.py --newest --python 3.12 --python 3.13 $(ARGS)
 
 check: setup-tests ## ruff and mypy --strict
 	@$(BIN)/ruff check .

@@ -79,19 +79,20 @@ def test_docker_installs_what_the_constraints_pin() -> None:
 
 def test_the_oldest_versions_replace_those_of_the_constraints(oldest: ModuleType) -> None:
     versions = {name: version for name, version in TABLE["oldest"].items() if name != "python"}
-    changed = oldest.requirements(versions)
+    changed = oldest.requirements(versions, set(oldest.LEFT_OUT))
     lines = changed["requirements/constraints.txt"].splitlines()
     for name, version in versions.items():
         pins = [line for line in lines if re.match(rf"{re.escape(name)}==", line, re.IGNORECASE)]
         assert pins == [f"{name}=={version}"]
-    assert "pybullet" not in changed["requirements/run.txt"]
+    assert "pybullet" in changed["requirements/run.txt"]
+    assert "ompl" not in changed["requirements/dev.txt"]
     assert "numpy" in changed["requirements/run.txt"]
 
 
 def test_the_oldest_versions_are_tested_with_the_core_the_planner_and_its_node(
     oldest: ModuleType,
 ) -> None:
-    files = oldest.tests(ROOT)
+    files = oldest.tests(ROOT, oldest.PEERS)
     for name in (
         "kernels/test_certify",
         "planner/test_program",
@@ -105,9 +106,9 @@ def test_the_oldest_versions_are_tested_with_the_core_the_planner_and_its_node(
         assert path in files
 
 
-def test_test_long_runs_them() -> None:
-    rule = re.search(
-        r"^test-long:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M
-    )
-    assert rule is not None
-    assert "tools/oldest_versions.py" in rule[1]
+def test_other_versions_are_tested_by_one_command_and_by_test_long() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    rules = dict(re.findall(r"^([a-z-]+):.*\n((?:\t.*\n)+)", makefile, re.M))
+    assert "test-versions" in rules["test-long"]
+    asked = re.findall(r"--python (\S+)", rules["test-versions"])
+    assert asked == [each for each in TABLE["python"] if each != TABLE["python"][0]]

@@ -1,0 +1,167 @@
+"""Run the tests in two parts side by side, and close with one summary of both.
+
+    python tools/run_tests.py [what pytest takes]
+
+The tests of tests/system start the nodes as processes and mostly wait for a robot that moves in
+real time: they run in one process beside all others, which share the cores. What they print comes
+when the others have ended. Both parts run to their end whatever fails. Paths and options are
+pytest's (`tests/planner -n0`, `-k energy`); a part whose paths are not asked for is left out.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from xml.etree import ElementTree
+
+ROOT = Path(__file__).resolve().parent.parent
+OUTPUT = ROOT / "out" / "tests"
+SYSTEM = "tests/system"
+MINUTES = 8  # on two quiet cores
+WITH_VALUE = ("-k", "-m", "-n", "-p", "-W", "-o", "-c", "--dist", "--deselect", "--ignore")
+NOTHING_COLLECTED = 5  # pytest's exit code: the words may choose tests of one part only
+
+
+@dataclass(frozen=True)
+class Part:
+    """Tests that one call of pytest runs."""
+
+    name: str
+    words: tuple[str, ...]
+
+    @property
+    def results(self) -> Path:
+        """The file of their results."""
+        return OUTPUT / f"{self.name}.xml"
+
+    def command(self) -> list[str]:
+        """The call of pytest."""
+        return [sys.executable, "-m", "pytest", f"--junitxml={self.results}", *self.words]
+
+
+def parts(words: list[str], cores: int) -> list[Part]:
+    """The parts that these words of pytest ask for."""
+    paths = paths_of(words)
+    options = [word for word in words if word not in paths]
+    system = [path for path in paths if SYSTEM in path]
+    others = [path for path in paths if SYSTEM not in path]
+    found = []
+    if others or not paths:
+        shared = ("-n", str(cores), "--dist", "worksteal", "--ignore", SYSTEM)
+        found.append(Part("others", (*shared, *options, *others)))
+    if system or not paths:
+        found.append(Part("system", (*without_workers(options), *(system or [SYSTEM]))))
+    return found
+
+
+def paths_of(words: list[str]) -> list[str]:
+    """The words that are files or folders of tests, or a test in a file."""
+    return [
+        word
+        for before, word in pairwise(["", *words])
+        if before not in WITH_VALUE
+        and not word.startswith("-")
+        and (ROOT / word.partition("::")[0]).exists()
+    ]
+
+
+def without_workers(options: list[str]) -> list[str]:
+    """Options without those of pytest-xdist."""
+    kept: list[str] = []
+    skip = False
+    for option in options:
+        if not skip and not re.match(r"-n\d*$|-n=|--numprocesses|--dist", option):
+            kept.append(option)
+        skip = option in ("-n", "--dist", "--numprocesses") and not skip
+    return kept
+
+
+def run(chosen: list[Part]) -> dict[str, int]:
+    """Run the parts side by side, and print what the later ones said after the first.
+
+    Exit codes by name.
+    """
+    first, *behind = chosen
+    logs = {
+        part.name: (OUTPUT / f"{part.name}.log").open("w+", errors="replace") for part in behind
+    }
+    started = {
+        part.name: subprocess.Popen(
+            part.command(), cwd=ROOT, stdout=logs[part.name], stderr=subprocess.STDOUT
+        )
+        for part in behind
+    }
+    try:
+        codes = {first.name: subprocess.run(first.command(), cwd=ROOT).returncode}
+        for name, process in started.items():
+            codes[name] = process.wait()
+            logs[name].seek(0)
+            print(logs[name].read(), flush=True)
+    finally:
+        for process in started.values():
+            process.terminate()
+        for log in logs.values():
+            log.close()
+    return codes
+
+
+def outcome(chosen: list[Part]) -> tuple[dict[str, int], list[str]]:
+    """Counts of both parts, and the names of tests that failed."""
+    counts = dict.fromkeys(("failed", "passed", "skipped", "error"), 0)
+    failed = []
+    for part in chosen:
+        if not part.results.exists():
+            continue
+        for case in ElementTree.parse(part.results).iter("testcase"):
+            kinds = {child.tag for child in case}
+            kind = (
+                "error" if "error" in kinds
+                else "failed" if "failure" in kinds
+                else "skipped" if "skipped" in kinds
+                else "passed"
+            )  # fmt: skip
+            counts[kind] += 1
+            if kind in ("failed", "error"):
+                name = f"{case.get('classname', '').replace('.', '/')}.py::{case.get('name')}"
+                failed.append(f"{kind.upper()} {name}")
+    return counts, failed
+
+
+def summary(counts: dict[str, int], seconds: float) -> str:
+    """The line that pytest closes with, of both parts."""
+    said = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
+    minutes, rest = divmod(round(seconds), 60)
+    return f" {said or 'no tests ran'} in {seconds:.2f}s ({minutes} min {rest} s) ".center(80, "=")
+
+
+def main() -> int:
+    """Run what is asked for; 1 where any part failed."""
+    words = sys.argv[1:]
+    OUTPUT.mkdir(parents=True, exist_ok=True)
+    cores = os.cpu_count() or 2
+    chosen = parts(words, cores)
+    for part in chosen:
+        part.results.unlink(missing_ok=True)
+    if not paths_of(words) and "-k" not in words:
+        sentence = f"about {MINUTES} minutes on two quiet cores; here are {cores}"
+        print(f"{' and '.join(part.name for part in chosen)}: {sentence}", flush=True)
+    begun = time.monotonic()
+    codes = run(chosen)
+    counts, failed = outcome(chosen)
+    for line in failed:
+        print(line)
+    bad = {name: code for name, code in codes.items() if code not in (0, NOTHING_COLLECTED)}
+    for name, code in bad.items():
+        print(f"pytest of the part '{name}' ended with {code}")
+    print(summary(counts, time.monotonic() - begun))
+    return int(bool(bad))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
