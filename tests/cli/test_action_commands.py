@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from rclpy.action import ActionServer, CancelResponse
+from rclpy.action import CancelResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
@@ -16,6 +16,7 @@ from rclpy.node import Node
 
 from ir_cli.main import main
 from ir_msgs.action import RunProgram
+from ir_msgs_py.ros.rclpy_inside import PatientActionServer
 from ir_msgs_py.ros.testing import WaitFor
 
 ACTION = "/machine/run"
@@ -28,7 +29,7 @@ class Machine:
         self.node = Node("machine", context=context)
         self.running = threading.Event()
         self.ended = threading.Event()
-        self.server = ActionServer(
+        self.server = PatientActionServer(
             self.node,
             RunProgram,
             ACTION,

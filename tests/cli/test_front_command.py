@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rclpy.action import ActionServer
 from rclpy.action.server import ServerGoalHandle
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -18,6 +17,7 @@ from ir_cli.main import main
 from ir_msgs.action import Plan
 from ir_msgs.msg import ProgramPoint, ProgramSavings, Saving
 from ir_msgs_py import names
+from ir_msgs_py.ros.rclpy_inside import PatientActionServer
 
 
 class Planner:
@@ -26,7 +26,7 @@ class Planner:
     def __init__(self, context: Context) -> None:
         self.asked: list[Any] = []
         self.node = Node("planner", context=context)
-        self.server = ActionServer(self.node, Plan, f"/{names.PLAN}", self.run)
+        self.server = PatientActionServer(self.node, Plan, f"/{names.PLAN}", self.run)
 
     def run(self, goal: ServerGoalHandle) -> Any:
         self.asked.append(goal.request)

@@ -6,7 +6,7 @@ import threading
 
 import numpy as np
 import pytest
-from rclpy.action import ActionServer, CancelResponse
+from rclpy.action import CancelResponse
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 
@@ -19,6 +19,7 @@ from ir_msgs_py.ros import client as client_module
 from ir_msgs_py.ros import client as goals
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.ros.rclpy_inside import PatientActionServer
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.trajectory import JointTrajectory
 
@@ -34,14 +35,16 @@ class FakeCell(Node):
         self.canceled = threading.Event()
         self.create_service(SetCell, "ir_planner/set_cell", self.set_cell)
         self.create_service(GetTrajectory, "ir_planner/get_trajectory", self.get_trajectory)
-        self.runner = ActionServer(
+        self.runner = PatientActionServer(
             self,
             RunProgram,
             "ir_program_runner/run_program",
             self.run_program,
             cancel_callback=self.cancel,
         )
-        ActionServer(self, ExecuteTrajectory, "ir_sim_driver/execute_trajectory", self.execute)
+        PatientActionServer(
+            self, ExecuteTrajectory, "ir_sim_driver/execute_trajectory", self.execute
+        )
         kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.create_publisher(PowerState, "meter", kept).publish(PowerState(power=420.0))
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rclpy.action import ActionClient, ActionServer, CancelResponse
+from rclpy.action import ActionClient, CancelResponse
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
@@ -29,6 +29,7 @@ from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.plan_conversions import planned_movement_to_msg
 from ir_msgs_py.ros.power_conversions import power_mode_to_msg
+from ir_msgs_py.ros.rclpy_inside import PatientActionServer
 from ir_msgs_py.ros.topics import LATCHED
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import StatusCode
@@ -40,6 +41,7 @@ MAC = "02:00:00:00:00:01"
 TRAJECTORY = JointTrajectory(JOINT_NAMES, [0, 10**7], np.zeros((2, 6)))
 LONG = JointTrajectory(JOINT_NAMES, [0, 60 * 10**9], np.zeros((2, 6)))
 SILENCE = 3.0  # s; a busy machine keeps the meter's node waiting for one
+PATIENT = {"silence_timeout": 30.0, "response_timeout": 30.0, "cancel_timeout": 30.0}
 OK = Status(code=1)
 REST = {"ab": Mode.BUS_POWER_OFF, "hib": Mode.HIBERNATION, "drives_off": Mode.STAND_ON_BRAKES}
 
@@ -63,7 +65,7 @@ class FakeDriver(Node):
         self.create_service(SetPlcInput, "~/set_plc_input", self.set_plc_input)
         self.create_service(SetLoad, "~/set_load", self.set_load)
         self.create_service(QueryModes, "~/query_modes", self.query_modes)
-        self.server = ActionServer(
+        self.server = PatientActionServer(
             self,
             ExecuteTrajectory,
             "~/execute_trajectory",
@@ -171,7 +173,7 @@ class Cell:
     def __init__(self, context, executor, machines=None, **overrides):
         self.executor = executor
         self.driver = executor.add_node(FakeDriver(context))
-        values = {"mac": MAC, "wake_repeat": 30.0, "silence_timeout": 30.0, **overrides}
+        values = {"mac": MAC, "wake_repeat": 30.0, **PATIENT, **overrides}
         parameters = [Parameter(name, value=value) for name, value in values.items()]
         self.runner = executor.add_node(
             ProgramRunnerNode(
@@ -195,7 +197,7 @@ class Cell:
         self.machines = self.test.create_publisher(SignalMsg, "ir_program_runner/signals", 100)
         self.sender = ActionClient(self.test, RunProgram, "ir_program_runner/run_program")
 
-    def run(self, movements=(), program_id="", feedback=None, timeout=60.0):
+    def run(self, movements=(), program_id="", feedback=None, timeout=120.0):
         goal = RunProgram.Goal(
             program_id=program_id, movements=[planned_movement_to_msg(each) for each in movements]
         )

@@ -50,7 +50,10 @@ def client(ros_context, ros_executor):
         def send(packet, address, port):
             send_packet(packet, address, driver.port_of("wake_on_lan"))
 
-        runner = ProgramRunnerNode(send, context=ros_context)
+        patient = {"silence_timeout": 30.0, "response_timeout": 30.0, "cancel_timeout": 30.0}
+        runner = ProgramRunnerNode(
+            send, context=ros_context, parameter_overrides=parameters(patient)
+        )
         ros_executor.add_node(runner)
         with Client(context=ros_context, timeout=60.0) as client:
             yield client

@@ -74,24 +74,6 @@ def _warn(sentence: str) -> None:
     get_logger("ir_msgs_py").warning(sentence, throttle_duration_sec=_SAID_AGAIN)
 
 
-def survive_clients(node: Node) -> None:
-    """Let no client of the node's plain services end its executor by going away.
-
-    rclpy sends their responses unguarded: parameters, the description of types.
-    """
-    for service in node.services:
-        plain = part(service, "send_response")
-        if plain is None or hasattr(service, "survives"):
-            continue
-
-        def answer(response: Any, header: Any, plain: Callable[..., object] = plain) -> None:
-            send_to_whoever_is_left(lambda: plain(response, header))
-
-        with suppress(AttributeError):  # a service that takes no attributes is left as it is
-            service.send_response = answer
-            service.survives = True
-
-
 def heed_times_only(node: Node) -> None:
     """Let the node ignore times before 1970 on /clock, whenever it begins to listen to one.
 
@@ -229,6 +211,26 @@ class PatientSender:
             self._patient = False
         if failure is not None:
             raise failure
+
+
+def survive_clients(node: Node) -> None:
+    """Let no client of the node's plain services end its executor by going away, and answer those
+    that are discovered late.
+
+    rclpy sends the responses of its own services once and unguarded: of parameters, of types.
+    """
+    for service in node.services:
+        plain = part(service, "send_response")
+        if plain is None or hasattr(service, "survives"):
+            continue
+        sender = PatientSender(plain)
+
+        def answer(response: Any, header: Any, sender: PatientSender = sender) -> None:
+            send_to_whoever_is_left(lambda: sender.send(response, header))
+
+        with suppress(AttributeError):  # a service that takes no attributes is left as it is
+            service.send_response = answer
+            service.survives = True
 
 
 def _patient(plain: type) -> type:
