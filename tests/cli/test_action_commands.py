@@ -17,7 +17,7 @@ from rclpy.node import Node
 from ir_cli.main import main
 from ir_msgs.action import RunProgram
 from ir_msgs_py.ros.rclpy_inside import PatientActionServer
-from ir_msgs_py.ros.testing import WaitFor
+from ir_msgs_py.ros.testing import PATIENCE, WaitFor
 
 ACTION = "/machine/run"
 
@@ -103,12 +103,12 @@ def test_another_process_cancels_what_runs(
         arguments.values = ["{program_id: long}"]
         arguments.full = False
         arguments.feedback = False
-        arguments.timeout = 60.0
+        arguments.timeout = PATIENCE
         codes.append(run_send_goal(arguments))
 
     sender = threading.Thread(target=send)
     sender.start()
-    assert machine.running.wait(60.0)
+    assert machine.running.wait(PATIENCE)
     assert main(["cancel", ACTION]) == 0
     sender.join(60.0)
     assert codes == [1]

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from ir_cli.main import main
+from ir_msgs_py.ros.testing import PATIENCE
 
 IR = [sys.executable, "-m", "ir_cli.main"]
 
@@ -22,7 +23,7 @@ def ir(
         stdout=stdout,
         stderr=subprocess.PIPE,
         text=True,
-        timeout=180.0,
+        timeout=PATIENCE,
         check=False,
         env={**os.environ, **environment},
     )

@@ -23,6 +23,7 @@ from ir_cli.node_settings import parameters_of
 from ir_cli.nodes import cell_nodes
 from ir_cli.ports import TCP, UDP, PortClaims, free_port, is_free
 from ir_cli.up_command import choose_ports
+from ir_msgs_py.ros.testing import PATIENCE
 
 WAITING = """
 import os, signal, threading
@@ -58,7 +59,7 @@ def test_nodes_end_with_the_process_that_started_them(
         wait_for(lambda: pid.exists() and pid.read_text(), what="the node starts")
         os.kill(int(pid.read_text()), 0)
         parent.send_signal(number)
-        assert parent.wait(60.0) == -number
+        assert parent.wait(PATIENCE) == -number
         wait_for(lambda: end.exists() and end.read_text() == "finished", what="the node finishes")
     finally:
         parent.kill()

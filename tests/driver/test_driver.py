@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from ir_msgs_py.modes import Mode
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_sim_driver.controller.driver import Driver
 from ir_sim_driver.controller.goals import NO_GOAL, QUEUE_MAX
 from ir_sim_driver.controller.settings import ControllerSettings
@@ -108,7 +109,7 @@ def test_a_goal_that_is_cancelled_while_it_is_checked_ends_as_cancelled(
     outcomes = []
 
     def slow():
-        release.wait(60.0)
+        release.wait(PATIENCE)
         return TrajectoryGoal(plan(60.0, home, home + 0.1))
 
     ticket = driver.submit(2, slow, outcomes.append)
@@ -133,7 +134,7 @@ def test_what_a_goal_is_refused_for_reaches_its_sender(driver):
         done.set()
 
     driver.submit(2, refuse, ended)
-    assert done.wait(60.0)
+    assert done.wait(PATIENCE)
     assert (heard[0].goal_id, heard[0].code, heard[0].sentence) == (
         NO_GOAL,
         ErrorCode.INVALID_JOINTS,
@@ -146,7 +147,7 @@ def test_a_flood_of_goals_is_bounded(driver):
     answers = []
 
     def slow():
-        release.wait(60.0)
+        release.wait(PATIENCE)
         raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, "late")
 
     for _ in range(QUEUE_MAX + 20):
@@ -169,11 +170,11 @@ def test_a_check_does_not_hold_up_the_plant(driver):
 
     def slow():
         blocking.set()
-        release.wait(60.0)
+        release.wait(PATIENCE)
         raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, "late")
 
     driver.submit(2, slow, lambda outcome: None)
-    assert blocking.wait(60.0)
+    assert blocking.wait(PATIENCE)
     assert len(frames(driver, 100)) == 100
     release.set()
 

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from pymodbus.client import ModbusTcpClient
 
 from ir_msgs_py.modes import Mode, TransitionTimes
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_sim_driver.controller.driver import Driver
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import LinkError, TrajectoryRefusedError
@@ -45,7 +46,7 @@ def serve():
     def serve_one(simulation, **limits):
         driver = Driver(simulation)
         server = opened_on(driver, **limits)
-        client = ModbusTcpClient("127.0.0.1", port=server.port, timeout=60)
+        client = ModbusTcpClient("127.0.0.1", port=server.port, timeout=PATIENCE)
         assert client.connect()
         opened.append((client, server, driver))
         return driver, client, server.port
@@ -141,7 +142,7 @@ def test_addresses_that_aren_t_there_are_exception_02(make, serve, request_, cod
 def exchange(port, pdu, length=None):
     """Send a raw request and return the PDU of the answer, b"" when there is none within 60 s."""
     frame = struct.pack(">HHHB", 7, 0, (len(pdu) + 1) if length is None else length, 1) + pdu
-    with socket.create_connection(("127.0.0.1", port), timeout=60.0) as link:
+    with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as link:
         link.sendall(frame)
         try:
             return link.recv(300)[7:]
@@ -254,7 +255,7 @@ def survive(endangered, frames, framed):
     driver.plc.wake()
     # what is no Modbus ends its connection
     with (
-        socket.create_connection(("127.0.0.1", port), timeout=60.0) as link,
+        socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as link,
         contextlib.suppress(ConnectionError),
     ):
         for body in frames:

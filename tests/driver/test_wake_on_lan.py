@@ -11,6 +11,7 @@ import pytest
 
 from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.plc import magic_packet, send_packet, wakes
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_sim_driver.errors import LinkError
 from ir_sim_driver.plc import Controller, WakeOnLan
 from ir_sim_driver.plc.modbus import ModbusTcp
@@ -63,7 +64,7 @@ def test_the_listener_hears_its_own_packet_among_others():
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             for packet in (b"", b"x" * 2000, magic_packet("02:00:00:c4:02:11"), PACKET):
                 sender.sendto(packet, ("127.0.0.1", listener.port))
-        assert woken.acquire(timeout=60.0)
+        assert woken.acquire(timeout=PATIENCE)
         assert not woken.acquire(blocking=False)
         with pytest.raises(OSError, match="in use"):
             WakeListener("127.0.0.1", listener.port, MAC, woken.release)

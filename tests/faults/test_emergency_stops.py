@@ -14,6 +14,7 @@ from pymodbus.client import ModbusTcpClient
 
 from ir_msgs_py.modes import OFF_THE_NETWORK, Mode, TransitionTimes
 from ir_msgs_py.plc import PlcInputs
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver import (
     Driver,
@@ -220,7 +221,7 @@ def test_a_modbus_client_that_writes_1_and_0_while_asleep_is_answered_and_latche
 ) -> None:
     cell.bring_into(Mode.HIBERNATION)
     server = ModbusTcp(modbus=True, modbus_port=0).open(cell.driver.plc)
-    client = ModbusTcpClient("127.0.0.1", port=server.port, timeout=60)
+    client = ModbusTcpClient("127.0.0.1", port=server.port, timeout=PATIENCE)
     try:
         assert client.connect()
         assert not client.write_coil(COILS.index("emergency_stop"), True).isError()

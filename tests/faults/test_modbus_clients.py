@@ -14,6 +14,7 @@ import pytest
 from pymodbus.client import ModbusTcpClient
 
 from ir_msgs_py.plc import OperatingMode
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_sim_driver import Driver, make_simulation
 from ir_sim_driver.plc import OpenLink
 from ir_sim_driver.plc.modbus import (
@@ -67,7 +68,7 @@ def received(link: socket.socket, count: int) -> bytes:
 
 
 def is_served(port: int) -> bool:
-    with socket.create_connection(("127.0.0.1", port), timeout=60.0) as link:
+    with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as link:
         link.sendall(frame(READ_ALL_COILS))
         try:
             return len(received(link, 11)) == 11
@@ -76,7 +77,7 @@ def is_served(port: int) -> bool:
 
 
 def connected(port: int) -> socket.socket:
-    return socket.create_connection(("127.0.0.1", port), timeout=60.0)
+    return socket.create_connection(("127.0.0.1", port), timeout=PATIENCE)
 
 
 def test_a_hundred_silent_clients_leave_a_place_and_no_line_in_the_log(
@@ -163,7 +164,7 @@ def test_several_registers_are_written_together_or_not_at_all(
 ) -> None:
     """No step of the plant sees the half: the mode switch at T1 would stop a movement."""
     seen: list[OperatingMode] = []
-    client = ModbusTcpClient("127.0.0.1", port=open_port(), timeout=60)
+    client = ModbusTcpClient("127.0.0.1", port=open_port(), timeout=PATIENCE)
     assert client.connect()
     ended = threading.Event()
 

@@ -20,6 +20,7 @@ from ir_msgs_py.ros import client as goals
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.rclpy_inside import PatientActionServer
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.trajectory import JointTrajectory
 
@@ -92,7 +93,7 @@ def cell(ros_context, ros_executor):
 @pytest.fixture
 def client(cell, ros_context, monkeypatch):
     monkeypatch.setattr(client_module, "_CANCEL_GRACE", 60.0)  # s: a busy machine
-    with Client(context=ros_context, timeout=60.0) as client:
+    with Client(context=ros_context, timeout=PATIENCE) as client:
         yield client
 
 
@@ -102,7 +103,7 @@ class TestOnAContextOfItsOwn:
         return "LOCALHOST"  # two contexts are two participants: without discovery they never meet
 
     def test_the_cell_is_found(self, cell, ros_domain_id):
-        with Client(domain_id=ros_domain_id, timeout=60.0) as client:
+        with Client(domain_id=ros_domain_id, timeout=PATIENCE) as client:
             assert client.set_cell("demo") == ("lathe", "table")
 
 
@@ -133,7 +134,7 @@ def test_a_service_that_does_not_answer_is_named(client, cell, ros_executor):
     heard = threading.Event()
 
     def stay_silent(request, response):
-        heard.wait(60.0)
+        heard.wait(PATIENCE)
         return response
 
     ros_executor.run(lambda: cell.create_service(SetCell, "silent", stay_silent))

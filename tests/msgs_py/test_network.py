@@ -11,6 +11,7 @@ import pytest
 
 from ir_msgs_py.errors import ParameterError
 from ir_msgs_py.ros.network import CHOICES, apply_network, network_variables
+from ir_msgs_py.ros.testing import PATIENCE
 
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 PEERS = "ROS_STATIC_PEERS"
@@ -106,7 +107,7 @@ def test_a_node_started_without_any_preparation_listens_on_loopback_only(
     script = tmp_path / "node.py"
     script.write_text(NODE, encoding="utf-8")
     run = subprocess.run(
-        [sys.executable, str(script)], capture_output=True, text=True, timeout=180, check=True
+        [sys.executable, str(script)], capture_output=True, text=True, timeout=PATIENCE, check=True
     )
     sockets = re.findall(r"socket (\S+) ([0-9A-F]+):([0-9A-F]+)", run.stdout)
     assert "done" in run.stdout, run.stderr

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from ir_msgs_py.ros.testing import PATIENCE
+
 SCRIPT = Path(__file__).parent / "two_hosts.sh"
 NODE = """
 import sys
@@ -65,7 +67,7 @@ def from_the_other_host(folder: Path, network: str) -> str:
     environment = {**os.environ, "IR_NETWORK": network, "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
     environment.pop("FASTRTPS_DEFAULT_PROFILES_FILE", None)
     run = subprocess.run(
-        command, capture_output=True, text=True, timeout=300, check=False, env=environment
+        command, capture_output=True, text=True, timeout=PATIENCE, check=False, env=environment
     )
     assert "found:" in run.stdout, run.stderr
     return run.stdout

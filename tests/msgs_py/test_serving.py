@@ -17,6 +17,7 @@ from ir_msgs.srv import SetPlcInput
 from ir_msgs_py.ros.rclpy_inside import SENDS, UNDISCOVERED, PatientSender
 from ir_msgs_py.ros.serving import BoundedService, RecordedActionServer
 from ir_msgs_py.ros.spinning import BackgroundExecutor
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.topics import SERVICE
 from ir_msgs_py.status import StatusCode
 
@@ -35,7 +36,7 @@ def test_every_request_of_a_burst_is_answered_in_its_order_or_refused(
     def handler(request: Any, response: Any) -> Any:
         if request.name == "0":
             held.set()
-            go_on.wait(60.0)
+            go_on.wait(PATIENCE)
         seen.append(request.name)
         response.status.code = StatusCode.SUCCESS
         return response

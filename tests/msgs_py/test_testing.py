@@ -9,6 +9,7 @@ from rclpy.node import Node
 from std_msgs.msg import Float64
 
 from ir_msgs_py.ros.spinning import BackgroundExecutor
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.waiting import Waiting
 
 
@@ -37,7 +38,7 @@ def test_what_a_callback_raises_is_raised_where_somebody_waits(ros_context):
 
     timer = node.create_timer(0.001, fail)
     with pytest.raises(ValueError, match="a mistake in a callback"):
-        executor.wait_until(lambda: False, timeout=60.0)
+        executor.wait_until(lambda: False, timeout=PATIENCE)
     assert executor.run(lambda: 42) == 42
     executor.close()
 

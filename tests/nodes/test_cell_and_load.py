@@ -29,6 +29,7 @@ from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import time_from_msg, trajectory_from_msg
 from ir_msgs_py.ros.plan_conversions import report_from_msg
 from ir_msgs_py.ros.spinning import BackgroundExecutor
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.topics import COMMANDS, LATCHED
 from ir_planner.node.node import PlannerNode
 from ir_sim_driver.controller import surroundings
@@ -60,7 +61,7 @@ def make_driver(ros_context: Any, ros_executor: Any) -> Callable[..., SimDriver]
 
 @pytest.fixture
 def client(ros_context: Any) -> Any:
-    with Client(context=ros_context, timeout=60.0) as opened:
+    with Client(context=ros_context, timeout=PATIENCE) as opened:
         yield opened
 
 
@@ -101,7 +102,7 @@ def test_of_a_flood_of_cells_the_newest_is_read_and_none_waits(
 
     def slow(text: str) -> Any:
         read.append(text)
-        go_on.wait(60.0)
+        go_on.wait(PATIENCE)
         raise MemoryError(text)
 
     driver = make_driver()

@@ -16,6 +16,7 @@ from ir_msgs.srv import QueryModes, SetPlcInput, StartPause
 from ir_msgs_py import names
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.diagnostics import OK, Condition, Diagnostics
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_sim_driver.node import SimDriver
 
 QUICK = {
@@ -62,7 +63,7 @@ def test_a_driver_that_nothing_can_wake_refuses_to_hibernate(
         10,
     )
     start_driver("cell_2", taken_port)
-    with Client("cell_2", context=ros_context, timeout=60.0) as client:
+    with Client("cell_2", context=ros_context, timeout=PATIENCE) as client:
         answer = client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="hib", value=True))
         assert "HIB is 1 but ignored: nothing could wake the controller" in answer.status.message
         assert str(taken_port) in answer.status.message
@@ -81,7 +82,7 @@ def test_a_driver_that_nothing_can_wake_refuses_to_hibernate(
 
 def test_a_driver_that_can_be_woken_hibernates(start_driver, ros_context, wait_for):
     start_driver("cell_1", 0)
-    with Client("cell_1", context=ros_context, timeout=60.0) as client:
+    with Client("cell_1", context=ros_context, timeout=PATIENCE) as client:
         answer = client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="hib", value=True))
         assert answer.status.message == ""
         wait_for(

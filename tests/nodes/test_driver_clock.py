@@ -20,6 +20,7 @@ from ir_msgs_py import names
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.node_process import heed_times_only
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.node import SimDriver
 
@@ -108,7 +109,7 @@ def driver(ros_context, ros_executor):
 
 @pytest.fixture
 def client(ros_context, driver):
-    with Client(context=ros_context, timeout=60.0) as client:
+    with Client(context=ros_context, timeout=PATIENCE) as client:
         yield client
 
 
@@ -162,7 +163,7 @@ def test_a_frozen_clock_freezes_the_plant_and_nothing_is_skipped_after(
     clock.run_at(1.0)
     wait_for(lambda: len(stamps) > count + 100)
     assert set(gaps(stamps)) == {PERIOD}
-    assert client.execute(movement(), timeout=120.0).energy > 0.0
+    assert client.execute(movement(), timeout=PATIENCE).energy > 0.0
 
 
 @pytest.mark.parametrize(("jump", "where"), [(-20, "back"), (100, "ahead")])
@@ -179,10 +180,10 @@ def test_a_jump_aborts_the_goal_with_its_reason_and_the_grid_starts_anew(
             clock.leap(jump)
 
     goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(-0.3, 60.0)))
-    result = client.send_goal(names.EXECUTE_TRAJECTORY, goal, feedback=leap, timeout=120.0)
+    result = client.send_goal(names.EXECUTE_TRAJECTORY, goal, feedback=leap, timeout=PATIENCE)
     assert result.error_code == ExecuteTrajectory.Result.INVALID_GOAL
     assert f"the clock jumped {where}" in result.error_string
-    assert client.send_goal(names.EXECUTE_TRAJECTORY, lead_in(), timeout=120.0).error_code == 0
+    assert client.send_goal(names.EXECUTE_TRAJECTORY, lead_in(), timeout=PATIENCE).error_code == 0
     assert all(stamp % PERIOD == 0 for stamp in stamps)
     assert sum(gap != PERIOD for gap in gaps(stamps)) == 1
 
@@ -209,7 +210,7 @@ def test_a_hundred_times_faster_stamps_stay_on_the_grid_and_go_forward(
     clock.run_at(1.0)
     assert min(gaps(stamps)) >= PERIOD
     assert all(stamp % PERIOD == 0 for stamp in stamps)
-    assert client.send_goal(names.EXECUTE_TRAJECTORY, lead_in(), timeout=120.0).error_code == 0
+    assert client.send_goal(names.EXECUTE_TRAJECTORY, lead_in(), timeout=PATIENCE).error_code == 0
 
 
 def test_the_clock_is_not_changed_while_the_robot_moves(client, driver, clock, stamps, wait_for):
@@ -225,7 +226,9 @@ def test_the_clock_is_not_changed_while_the_robot_moves(client, driver, clock, s
     clock.run_at(0.2)  # a busy machine must not reach the end before the feedback comes
     goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(movement(0.1, 1.0)))
     assert (
-        client.send_goal(names.EXECUTE_TRAJECTORY, goal, feedback=change, timeout=120.0).error_code
+        client.send_goal(
+            names.EXECUTE_TRAJECTORY, goal, feedback=change, timeout=PATIENCE
+        ).error_code
         == 0
     )
     assert not answers[0].successful

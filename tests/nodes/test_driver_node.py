@@ -24,6 +24,7 @@ from ir_msgs_py.errors import RequestRefusedError
 from ir_msgs_py.plc import magic_packet
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.controller.mains import Mains
 from ir_sim_driver.node import SimDriver, streams
@@ -60,7 +61,7 @@ def make_driver(ros_context, ros_executor):
 
 @pytest.fixture
 def cell_client(ros_context):
-    with Client(context=ros_context, timeout=60.0) as client:
+    with Client(context=ros_context, timeout=PATIENCE) as client:
         yield client
 
 
@@ -144,7 +145,7 @@ def test_a_trajectory_is_executed_to_its_end(make_driver, cell_client, listen, w
     states = listen(names.JOINT_STATES, JointState)
     feedback = []
     trajectory = movement()
-    execution = cell_client.execute(trajectory, feedback=feedback.append, timeout=120.0)
+    execution = cell_client.execute(trajectory, feedback=feedback.append, timeout=PATIENCE)
     assert execution.max_tool_deviation < 0.001
     assert execution.energy > 0.0
     wait_for(
@@ -155,7 +156,7 @@ def test_a_trajectory_is_executed_to_its_end(make_driver, cell_client, listen, w
 def test_a_bad_trajectory_is_aborted_with_a_sentence(make_driver, cell_client):
     make_driver()
     with pytest.raises(RequestRefusedError, match=r"velocity|needs") as refusal:
-        cell_client.execute(movement(step=1.0, duration=0.1), timeout=120.0)
+        cell_client.execute(movement(step=1.0, duration=0.1), timeout=PATIENCE)
     assert refusal.value.code == ExecuteTrajectory.Result.INVALID_GOAL
 
 
@@ -168,7 +169,7 @@ def test_bus_power_off_by_bits_and_back(make_driver, cell_client, listen, wait_f
     wait_for(lambda: power and power[-1].mode == PowerMode.BUS_POWER_OFF)
     wait_for(lambda: outputs and outputs[-1].ab)
     with pytest.raises(RequestRefusedError, match="BUS_POWER_OFF"):
-        cell_client.execute(movement(), timeout=120.0)
+        cell_client.execute(movement(), timeout=PATIENCE)
     cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="ab", value=False))
     wait_for(lambda: power[-1].mode == PowerMode.STAND_ON_MOTORS)
 
@@ -196,7 +197,7 @@ def test_levels_in_force_are_published_whoever_sets_them(
     assert in_force[0].operating_mode == PlcInputs.EXT
     cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="ab", value=True))
     wait_for(lambda: in_force[-1].ab)
-    with ModbusTcpClient("127.0.0.1", port=driver.port_of("modbus"), timeout=60) as plc:
+    with ModbusTcpClient("127.0.0.1", port=driver.port_of("modbus"), timeout=PATIENCE) as plc:
         plc.write_coil(COILS.index("emergency_stop"), True)
         wait_for(lambda: in_force[-1].emergency_stop)
     assert in_force[-1].ab
@@ -249,7 +250,7 @@ def test_only_wake_on_lan_ends_hibernation(make_driver, cell_client, listen, wai
     with pytest.raises(RequestRefusedError, match="Wake-on-LAN"):
         cell_client.ask(names.QUERY_MODES, QueryModes.Request())
     with pytest.raises(RequestRefusedError, match="HIBERNATION"):
-        cell_client.execute(movement(), timeout=120.0)
+        cell_client.execute(movement(), timeout=PATIENCE)
     wait_for(lambda: len(power) > asleep_from + 20)
     # what was sent before may arrive late; the stamp says when it was sent, the meter looks every
     # 10 ms
@@ -308,7 +309,7 @@ def test_emergency_stop_aborts_and_recover_does_not_resume(
             button.call_async(SetPlcInput.Request(name="emergency_stop", value=True))
 
     with pytest.raises(RequestRefusedError, match="emergency stop"):
-        cell_client.execute(movement(-0.3, 60.0), feedback=watch, timeout=120.0)
+        cell_client.execute(movement(-0.3, 60.0), feedback=watch, timeout=PATIENCE)
     wait_for(lambda: power[-1].mode == PowerMode.EMERGENCY_STOP)
     with pytest.raises(RequestRefusedError, match="release"):
         cell_client.ask(names.RECOVER, Recover.Request())
@@ -326,7 +327,7 @@ def test_emergency_stop_aborts_and_recover_does_not_resume(
 def test_a_plc_reaches_the_node_by_modbus(make_driver, listen, wait_for):
     driver = make_driver(modbus=True, modbus_port=0)
     power = listen(names.POWER_STATE, PowerState)
-    with ModbusTcpClient("127.0.0.1", port=driver.port_of("modbus"), timeout=60) as plc:
+    with ModbusTcpClient("127.0.0.1", port=driver.port_of("modbus"), timeout=PATIENCE) as plc:
         plc.write_coil(COILS.index("ab"), True)
         wait_for(lambda: power and power[-1].mode == PowerMode.BUS_POWER_OFF)
         assert plc.read_input_registers(0, count=1).registers == [PowerMode.BUS_POWER_OFF]

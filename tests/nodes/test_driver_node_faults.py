@@ -22,6 +22,7 @@ from ir_msgs_py import names
 from ir_msgs_py.errors import RequestRefusedError
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.node import SimDriver, node
 
@@ -48,7 +49,7 @@ def driver(ros_context, ros_executor):
 
 @pytest.fixture
 def client(ros_context, driver):
-    with Client(context=ros_context, timeout=60.0) as client:
+    with Client(context=ros_context, timeout=PATIENCE) as client:
         yield client
 
 
@@ -156,10 +157,10 @@ def test_a_spoilt_goal_is_aborted_with_code_and_sentence(client, spoil, code, wo
         point.positions, point.velocities = list(point.positions), list(point.velocities)
         point.accelerations = list(point.accelerations)
     spoil(goal)
-    result = client.send_goal(names.EXECUTE_TRAJECTORY, goal, timeout=120.0)
+    result = client.send_goal(names.EXECUTE_TRAJECTORY, goal, timeout=PATIENCE)
     assert result.error_code == code
     assert word in result.error_string
-    assert client.execute(movement(), timeout=120.0).energy > 0.0  # and the next one runs
+    assert client.execute(movement(), timeout=PATIENCE).energy > 0.0  # and the next one runs
 
 
 def test_a_bad_trajectory_on_the_topic_is_reported_in_diagnostics(client, ros_node, wait_for):
@@ -186,7 +187,7 @@ def test_a_huge_trajectory_on_the_topic_is_refused_by_its_bytes(client, ros_node
         return any("bytes: at most" in status.message for msg in received for status in msg.status)
 
     wait_for(reported)
-    assert client.execute(movement(), timeout=120.0).energy > 0.0
+    assert client.execute(movement(), timeout=PATIENCE).energy > 0.0
 
 
 def test_a_trajectory_on_the_topic_runs_and_overrides_the_action(client, ros_node, wait_for):
@@ -207,7 +208,7 @@ def test_a_trajectory_on_the_topic_runs_and_overrides_the_action(client, ros_nod
             publisher.publish(trajectory_to_msg(override))
 
     with pytest.raises(RequestRefusedError, match="preempted"):
-        client.execute(movement(0.2, 60.0), feedback=send_once, timeout=120.0)
+        client.execute(movement(0.2, 60.0), feedback=send_once, timeout=PATIENCE)
     wait_for(lambda: np.allclose(states[-1].position, target, atol=1e-6))
 
 
@@ -265,7 +266,7 @@ def test_any_speed_scaling_is_survived(client, ros_node, wait_for, factor):
     publisher = ros_node.create_publisher(Float64, names.SPEED_SCALING, 10)
     wait_for(lambda: publisher.get_subscription_count() > 0)
     publisher.publish(Float64(data=factor))
-    assert client.execute(movement(), timeout=120.0).energy > 0.0
+    assert client.execute(movement(), timeout=PATIENCE).energy > 0.0
 
 
 def test_an_unknown_bit_lists_the_known_and_an_unknown_mode_changes_nothing(
@@ -275,7 +276,7 @@ def test_an_unknown_bit_lists_the_known_and_an_unknown_mode_changes_nothing(
         client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="turbo", value=True))
     publisher = ros_node.create_publisher(PlcInputs, names.PLC_INPUTS, LATCHED)
     publisher.publish(PlcInputs(operating_mode=77))
-    assert client.execute(movement(), timeout=120.0).energy > 0.0
+    assert client.execute(movement(), timeout=PATIENCE).energy > 0.0
 
 
 @pytest.mark.parametrize("pause", [float("nan"), -1.0, 0.0])

@@ -17,6 +17,7 @@ from rclpy.parameter import Parameter
 
 from ir_msgs.msg import PowerState
 from ir_msgs_py import names
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_sim_driver.node import SimDriver
 from ir_sim_driver.node.node import REFUSALS
 
@@ -37,7 +38,7 @@ def command(**parameters):
 )
 def test_a_parameter_that_makes_no_sense_ends_the_process_with_a_sentence(parameters, sentence):
     answer = subprocess.run(
-        command(**parameters), capture_output=True, text=True, timeout=180, check=False
+        command(**parameters), capture_output=True, text=True, timeout=PATIENCE, check=False
     )
     assert answer.returncode == 1
     assert sentence in answer.stderr
@@ -88,7 +89,7 @@ def test_signals_end_it_cleanly_also_two(signals, wait_for):
         wait_for(power)
         for number in signals:
             process.send_signal(number)
-        assert process.wait(60.0) == 0
+        assert process.wait(PATIENCE) == 0
         assert process.stderr is not None
         assert "Traceback" not in process.stderr.read()
     finally:
@@ -116,7 +117,7 @@ sys.exit(main())
 
 def test_a_plant_that_fails_ends_the_process_with_a_sentence_and_a_code():
     words = [sys.executable, "-c", FAILING, *command()[3:]]
-    ended = subprocess.run(words, capture_output=True, text=True, timeout=180.0)
+    ended = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE)
     assert ended.returncode == 1
     assert "the plant has stopped: SystemError('no such body')" in ended.stderr
     assert "Traceback" not in ended.stderr

@@ -13,6 +13,7 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 
 from ir_msgs_py import names
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_sim_driver.node import SimDriver
 
 COUNT = 1_500
@@ -70,7 +71,7 @@ def starve(listener, published, wait_for):
             if time.monotonic() - begin > LONGEST or missed > MOST:
                 return ""
             said = listener.stdout.readline()
-            assert listener.wait(60.0) == 0
+            assert listener.wait(PATIENCE) == 0
             return said
         finally:
             listener.kill()

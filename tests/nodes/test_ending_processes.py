@@ -14,6 +14,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 
 from ir_msgs_py import names
+from ir_msgs_py.ros.testing import PATIENCE
 
 MODULES = {
     names.PLANNER: ["ir_planner.node"],
@@ -85,7 +86,7 @@ def test_a_node_that_is_asked_to_end_ends_well(
         wait_for(lambda: name in watcher.get_node_names())
         for number in signals:
             process.send_signal(number)
-        assert process.wait(60.0) == 0
+        assert process.wait(PATIENCE) == 0
         assert process.stderr is not None
         assert "Traceback" not in process.stderr.read()
     finally:

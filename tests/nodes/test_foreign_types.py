@@ -20,6 +20,7 @@ from ir_msgs_py import names
 from ir_msgs_py.errors import CallTimedOutError, ServiceUnavailableError
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.spinning import BackgroundExecutor
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.node import SimDriver
 
@@ -55,7 +56,7 @@ def test_a_foreign_type_is_named_where_our_node_is_missing_and_ignored_where_it_
     ros_context: Any, ros_executor: Any, wait_for: Any
 ) -> None:
     name = f"/{names.QUERY_MODES}"
-    with Client(context=ros_context, timeout=60.0) as client:
+    with Client(context=ros_context, timeout=PATIENCE) as client:
         topic = f"/{names.POWER_STATE}"
         wait_for(lambda: name in client.graph.services(), what="the foreign service is seen")
         wait_for(lambda: topic in client.graph.topics(), what="the foreign topic is seen")
@@ -70,9 +71,9 @@ def test_a_foreign_type_is_named_where_our_node_is_missing_and_ignored_where_it_
         values = {"cell": "open", "backend": "ideal", "wake_port": 0}
         overrides = [Parameter(key, value=value) for key, value in values.items()]
         ros_executor.add_node(SimDriver(context=ros_context, parameter_overrides=overrides))
-        answer = client.ask(names.QUERY_MODES, QueryModes.Request(), timeout=60.0)
+        answer = client.ask(names.QUERY_MODES, QueryModes.Request(), timeout=PATIENCE)
         assert answer.status.code == StatusCode.SUCCESS
-        assert client.next_message(names.POWER_STATE, PowerState, timeout=60.0).energy > 0.0
+        assert client.next_message(names.POWER_STATE, PowerState, timeout=PATIENCE).energy > 0.0
         wait_for(
             lambda: client.graph.services()[name] == "ir_msgs/srv/QueryModes",
             what="its type counts",

@@ -22,6 +22,7 @@ from sensor_msgs.msg import JointState
 from ir_description import cell_to_yaml, load_cell
 from ir_msgs.msg import CellState, Contact, MachineStates, PowerState, ProgramState
 from ir_msgs_py.ros.spinning import BackgroundExecutor
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_recorder.live import server as commands
 from ir_recorder.live.node import LiveNode
 from ir_sim_driver.node import SimDriver
@@ -38,7 +39,7 @@ class Browser:
         self._token = token
         self.state: dict[str, Any] = {}
         self.records: list[dict[str, Any]] = []
-        connection = HTTPConnection("127.0.0.1", port, timeout=60.0)
+        connection = HTTPConnection("127.0.0.1", port, timeout=PATIENCE)
         connection.request("GET", "/events")
         self._answer = connection.getresponse()
         threading.Thread(target=self._read, daemon=True).start()
@@ -55,14 +56,14 @@ class Browser:
                     self.records.append(record)
 
     def press(self, name: str, value: bool) -> dict[str, Any]:
-        connection = HTTPConnection("127.0.0.1", self._port, timeout=60.0)
+        connection = HTTPConnection("127.0.0.1", self._port, timeout=PATIENCE)
         headers = {"X-Live-Token": self._token, "Content-Type": "application/json"}
         connection.request("POST", "/press", json.dumps({"name": name, "value": value}), headers)
         answer: dict[str, Any] = json.loads(connection.getresponse().read())
         return answer
 
     def scene(self) -> Any:
-        connection = HTTPConnection("127.0.0.1", self._port, timeout=60.0)
+        connection = HTTPConnection("127.0.0.1", self._port, timeout=PATIENCE)
         connection.request("GET", "/scene")
         return json.loads(connection.getresponse().read())
 
@@ -186,6 +187,6 @@ def test_the_command_prints_its_address_and_ends_well_while_somebody_watches(
     browser = Browser(int(host), token)
     wait_for(lambda: browser.state)
     command.send_signal(signal.SIGINT)
-    _, errors = command.communicate(timeout=60.0)
+    _, errors = command.communicate(timeout=PATIENCE)
     assert command.returncode == 0
     assert errors == ""

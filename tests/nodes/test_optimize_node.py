@@ -17,6 +17,7 @@ from ir_msgs_py.names import JOINT_NAMES, OPTIMIZE_TRAJECTORY, PLANNED_TRAJECTOR
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_from_msg
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.node.node import PlannerNode
@@ -28,7 +29,7 @@ LITTLE = PlanOptions(planning_time=60.0, max_iterations=60_000)
 
 @pytest.fixture
 def client(planner_node: PlannerNode, ros_context: Any) -> Iterator[Client]:
-    with Client(context=ros_context, timeout=60.0) as client:
+    with Client(context=ros_context, timeout=PATIENCE) as client:
         yield client
 
 

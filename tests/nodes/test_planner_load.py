@@ -18,6 +18,7 @@ from ir_description import Cell
 from ir_msgs.action import Plan
 from ir_msgs.msg import PlanOptions, Status
 from ir_msgs.srv import CheckState, SetCell
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.topics import ACTION_SERVICES, REQUESTS_WAITING, SERVICE
 from ir_planner.node import node as planner_module
 from ir_planner.node.node import PlannerNode
@@ -140,7 +141,7 @@ def test_a_large_cell_holds_up_no_quick_request(
 
     def held_up(text: str, name: str) -> Cell:
         cell = read(text, name)
-        go_on.wait(60.0)
+        go_on.wait(PATIENCE)
         return cell
 
     planner_node.planner._current._read = held_up

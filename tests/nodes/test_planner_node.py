@@ -38,6 +38,7 @@ from ir_msgs.srv import (
 )
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.ros.conversions import trajectory_from_msg
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_planner.node.node import PlannerNode
 
 HOME = [0.0, -1.5707963267948966, 1.5707963267948966, 0.0, 0.0, 0.0]
@@ -330,7 +331,7 @@ def test_a_cancelled_plan_stops_and_quick_services_answer_meanwhile(
 
     def slow(*args: Any, **asked: Any) -> Any:
         entered.set()
-        release.wait(60.0)
+        release.wait(PATIENCE)
         return plan(*args, **asked)
 
     vars(planner_node.planner)["plan_program"] = slow

@@ -27,6 +27,7 @@ from std_msgs.msg import Float64, String
 
 from ir_msgs.msg import PowerState
 from ir_msgs.srv import GetCell, StartRecording, StopRecording
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.status import StatusCode
 from ir_recorder.errors import PathError, ReadError, WriteError
 from ir_recorder.node.recorder import COMMAND_NODE, POLL_PERIOD, RecorderNode
@@ -392,7 +393,7 @@ def test_ir_record_finishes_its_file_on_signals(number: int, tmp_path: Path, wai
         wait_for(lambda: (path.exists() and path.stat().st_size) or process.poll() is not None)
         process.send_signal(number)
         process.send_signal(number)  # a nervous second one
-        _, said = process.communicate(timeout=60.0)
+        _, said = process.communicate(timeout=PATIENCE)
     finally:
         process.kill()
     assert process.returncode == 0, said
@@ -446,7 +447,7 @@ def test_ir_record_ends_with_1_when_the_disk_is_full(
         assert offered
         assert "/ir_record/start" not in offered
         wait_for(lambda: publisher.publish(String(data=text)) or process.poll() is not None)
-        _, errors = process.communicate(timeout=60.0)
+        _, errors = process.communicate(timeout=PATIENCE)
     finally:
         process.kill()
         node.destroy_node()

@@ -14,6 +14,7 @@ from std_msgs.msg import String
 from ir_msgs.msg import Status
 from ir_msgs_py import names
 from ir_msgs_py.ros.messages import interface_type, message_from_yaml
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_recorder.node.recorder import RecorderNode
 from ir_recorder.play.node import PlayNode
 from ir_recorder.play.playback import PlaySettings
@@ -135,7 +136,7 @@ def test_the_examples_are_answered_as_they_should(
 def test_the_example_of_a_program_is_answered_as_it_should(call: Any) -> None:
     service, type_text, text = example(PROGRAM)
     assert (service, text) == ("/ir_planner/plan_program", "{}")
-    status = call(interface_type(type_text, "srv"), "plan_program", timeout=300.0).status
+    status = call(interface_type(type_text, "srv"), "plan_program", timeout=PATIENCE).status
     code, word = EXPECTED[PROGRAM]
     assert status.code == code
     assert word in status.message

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_recorder.errors import LiveError
 from ir_recorder.live.server import (
     BITS,
@@ -45,7 +46,7 @@ class Cell:
         """An answer; headers by name with _ for -, None for those that a browser sends by
         itself.
         """
-        connection = HTTPConnection("127.0.0.1", self.server.port, timeout=60.0)
+        connection = HTTPConnection("127.0.0.1", self.server.port, timeout=PATIENCE)
         named = {name.replace("_", "-"): value for name, value in headers.items()}
         connection.request(method, path, body, named)
         return connection.getresponse()
@@ -221,7 +222,9 @@ def test_words_that_are_no_http_end_their_connection_only(cell: Cell) -> None:
         b"\r\n" * 10,
         b"G" * 70_000 + b"\r\n",
     ):
-        with socket.create_connection(("127.0.0.1", cell.server.port), timeout=60.0) as connection:
+        with socket.create_connection(
+            ("127.0.0.1", cell.server.port), timeout=PATIENCE
+        ) as connection:
             connection.sendall(words)
             connection.shutdown(socket.SHUT_WR)
             try:

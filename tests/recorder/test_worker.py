@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_recorder.errors import WriteError
 from ir_recorder.reading.mcap_file import read_raw
 from ir_recorder.recording.session import RecordingSession
@@ -60,7 +61,7 @@ class SlowSession(RecordingSession):
     may = threading.Event()
 
     def message(self, *arguments: Any) -> None:
-        self.may.wait(60.0)
+        self.may.wait(PATIENCE)
         super().message(*arguments)
 
 

@@ -30,6 +30,7 @@ from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.plan_conversions import planned_movement_to_msg
 from ir_msgs_py.ros.power_conversions import power_mode_to_msg
 from ir_msgs_py.ros.rclpy_inside import PatientActionServer
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.topics import LATCHED
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import StatusCode
@@ -182,7 +183,7 @@ class Cell:
         )
         self.planner = executor.add_node(FakePlanner(context))
         self.test = executor.add_node(Node("test", context=context))
-        self.client = Client(context=context, timeout=60.0)
+        self.client = Client(context=context, timeout=PATIENCE)
         self.states = []
         self.set_by_program = []
         kept = QoSProfile(
@@ -197,7 +198,7 @@ class Cell:
         self.machines = self.test.create_publisher(SignalMsg, "ir_program_runner/signals", 100)
         self.sender = ActionClient(self.test, RunProgram, "ir_program_runner/run_program")
 
-    def run(self, movements=(), program_id="", feedback=None, timeout=120.0):
+    def run(self, movements=(), program_id="", feedback=None, timeout=PATIENCE):
         goal = RunProgram.Goal(
             program_id=program_id, movements=[planned_movement_to_msg(each) for each in movements]
         )

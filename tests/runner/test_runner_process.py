@@ -10,6 +10,8 @@ import sys
 
 import pytest
 
+from ir_msgs_py.ros.testing import PATIENCE
+
 NODE = [sys.executable, "-m", "ir_program_runner.node"]
 
 
@@ -27,7 +29,7 @@ def test_a_node_that_is_asked_to_end_exits_with_zero(
         assert any(moment in line for line in process.stderr)
         process.send_signal(signal_number)
         process.stderr.read()
-        assert process.wait(60.0) == 0
+        assert process.wait(PATIENCE) == 0
     finally:
         process.kill()
         process.stderr.close()
@@ -44,7 +46,7 @@ def test_a_node_that_is_asked_to_end_exits_with_zero(
 def test_a_bad_parameter_is_named_and_the_exit_code_is_not_zero(parameter, sentence, monkeypatch):
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
     ended = subprocess.run(
-        [*NODE, "--ros-args", "-p", parameter], capture_output=True, text=True, timeout=180.0
+        [*NODE, "--ros-args", "-p", parameter], capture_output=True, text=True, timeout=PATIENCE
     )
     assert ended.returncode == 1
     assert ended.stderr.startswith("ir_program_runner: ")

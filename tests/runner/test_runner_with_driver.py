@@ -18,6 +18,7 @@ from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.plan_conversions import planned_movement_to_msg
 from ir_msgs_py.ros.spinning import BackgroundExecutor
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_program_runner.node import ProgramRunnerNode
@@ -55,7 +56,7 @@ def client(ros_context, ros_executor):
             send, context=ros_context, parameter_overrides=parameters(patient)
         )
         ros_executor.add_node(runner)
-        with Client(context=ros_context, timeout=60.0) as client:
+        with Client(context=ros_context, timeout=PATIENCE) as client:
             yield client
 
 
@@ -77,7 +78,7 @@ def test_a_program_with_every_power_mode_runs_on_the_driver(client):
         move(there, here),
     ]
     goal = RunProgram.Goal(movements=[planned_movement_to_msg(step) for step in program])
-    result = client.send_goal("/ir_program_runner/run_program", goal, timeout=120.0)
+    result = client.send_goal("/ir_program_runner/run_program", goal, timeout=PATIENCE)
     assert result.status.code == StatusCode.SUCCESS, result.status.message
     assert result.executed == len(program)
     assert result.energy > 0.0

@@ -24,6 +24,7 @@ from ir_msgs.srv import CheckState, StartRecording, StopRecording
 from ir_msgs_py import names
 from ir_msgs_py.names import NODES
 from ir_msgs_py.ros.client import Client
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_recorder import read_recording
 from ir_recorder.reading.mcap_file import RawRecording, read_raw
 
@@ -120,7 +121,7 @@ def test_two_cells_in_one_domain_keep_to_themselves(
             client.close()
     for process in processes:
         process.send_signal(signal.SIGINT)
-        said, _ = process.communicate(timeout=60.0)
+        said, _ = process.communicate(timeout=PATIENCE)
         assert process.returncode == 130, said
     assert "is taken" in said, "the second cell has a Wake-on-LAN port of its own"
     assert ids["left"] != ids["right"]

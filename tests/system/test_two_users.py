@@ -18,6 +18,8 @@ from typing import Any
 
 import pytest
 
+from ir_msgs_py.ros.testing import PATIENCE
+
 pytestmark = pytest.mark.long
 
 USERS = (65534, 65533)
@@ -92,6 +94,6 @@ def test_each_user_reaches_the_own_robot_and_both_go_on(users: Any, wait_for: An
         assert process.poll() is None
     for _, process in users:
         process.terminate()
-        said, _ = process.communicate(timeout=60.0)
+        said, _ = process.communicate(timeout=PATIENCE)
         assert process.returncode == 0, said
         assert "Traceback" not in said
