@@ -16,7 +16,6 @@ from ir_msgs.srv import GetTrajectory, SetCell
 from ir_msgs_py.errors import CallTimedOutError, RequestRefusedError, ServiceUnavailableError
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.ros import client as client_module
-from ir_msgs_py.ros import client as goals
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.rclpy_inside import PatientActionServer
@@ -159,7 +158,7 @@ def test_a_goal_that_takes_too_long_is_canceled(client, cell):
 
 
 def test_a_goal_whose_node_dies_is_given_up(client, cell, ros_executor, monkeypatch):
-    monkeypatch.setattr(goals, "GONE", 0.1)
+    monkeypatch.setattr(client_module, "GONE", 0.1)
     with pytest.raises(
         ServiceUnavailableError, match=r"that ran ir_program_runner/run_program has gone"
     ):

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from ir_msgs.msg import PowerState
-from ir_msgs_py.ros import node_clients as driver
+from ir_msgs_py.ros import node_clients
 from ir_msgs_py.ros.topics import Received
 from ir_msgs_py.ros.waiting import Waiting
 
@@ -19,8 +19,10 @@ class Link:
     def __init__(self, node: Any, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now = 100.0
         self.reading = False
-        monkeypatch.setattr(driver, "time", SimpleNamespace(monotonic=lambda: self.now))
-        self.driver = driver.Driver(node, Waiting(node), "ir_sim_driver", silence_timeout=2.0)
+        monkeypatch.setattr(node_clients, "time", SimpleNamespace(monotonic=lambda: self.now))
+        self.driver = node_clients.DriverClient(
+            node, Waiting(node), "ir_sim_driver", silence_timeout=2.0
+        )
         meter = SimpleNamespace(take=lambda: Received(PowerState(), 0.0) if self.reading else None)
         monkeypatch.setattr(self.driver, "_meter", meter)
 
