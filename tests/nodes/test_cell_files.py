@@ -36,15 +36,22 @@ def test_a_file_below_the_roots_is_read(root: Path, call: Callable[..., Any]) ->
     assert answer.cell_name == "open"
 
 
-@pytest.mark.parametrize(
-    "path",
-    ["../secret.yaml", "link.yaml", "fifo.yaml", "../../../../../../etc/shadow", ".", "none.yaml"],
+REFUSED = (
+    "../secret.yaml",
+    "link.yaml",
+    "fifo.yaml",
+    "../../../../../../etc/shadow",
+    ".",
+    "none.yaml",
 )
+
+
 def test_other_files_are_refused_without_their_content(
-    root: Path, call: Callable[..., Any], path: str
+    root: Path, call: Callable[..., Any]
 ) -> None:
-    answer = call(SetCell, "set_cell", cell_file=str(root / path))
-    assert answer.status.code != Status.SUCCESS
-    assert SECRET[:6] not in answer.status.message.replace(str(root), "")
-    assert answer.status.message.isprintable()
-    assert call(GetCell, "get_cell").status.code == Status.SUCCESS  # the cell of before stays
+    for path in REFUSED:
+        answer = call(SetCell, "set_cell", cell_file=str(root / path))
+        assert answer.status.code != Status.SUCCESS, path
+        assert SECRET[:6] not in answer.status.message.replace(str(root), ""), path
+        assert answer.status.message.isprintable(), path
+        assert call(GetCell, "get_cell").status.code == Status.SUCCESS, "the cell of before stays"

@@ -32,7 +32,7 @@ def command(**parameters):
 @pytest.mark.parametrize(
     ("parameters", "sentence"),
     [
-        ({"cell": "nowhere"}, "known are"),
+        pytest.param({"cell": "nowhere"}, "known are", marks=pytest.mark.long),
         ({"plc.owner": r'"\e[2Jme"'}, 'owner is "\\x1b[2Jme": known are any'),
     ],
 )
@@ -53,6 +53,7 @@ def test_a_parameter_that_makes_no_sense_ends_the_process_with_a_sentence(parame
         ("joint_state_rate", 300, "must divide 1000 Hz"),
         ("backend", "ode", "known are pybullet, ideal"),
         ("load", "anvil", "anvil"),
+        ("cell", "nowhere", "known are"),
     ],
 )
 def test_a_parameter_that_makes_no_sense_is_a_refusal_of_the_node(
@@ -66,7 +67,12 @@ def test_a_parameter_that_makes_no_sense_is_a_refusal_of_the_node(
 
 
 @pytest.mark.parametrize(
-    "signals", [[signal.SIGINT], [signal.SIGTERM, signal.SIGTERM], [signal.SIGINT, signal.SIGTERM]]
+    "signals",
+    [
+        [signal.SIGINT, signal.SIGTERM],
+        pytest.param([signal.SIGINT], marks=pytest.mark.long),
+        pytest.param([signal.SIGTERM, signal.SIGTERM], marks=pytest.mark.long),
+    ],
 )
 def test_signals_end_it_cleanly_also_two(signals, wait_for):
     """Wait for its meter, then signal: exit code 0."""

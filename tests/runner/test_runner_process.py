@@ -16,8 +16,15 @@ NODE = [sys.executable, "-m", "ir_program_runner.node"]
 
 
 # at its first line in the log the node is only half made
-@pytest.mark.parametrize("moment", ["ready to run programs", "ir_program_runner"])
-@pytest.mark.parametrize("signal_number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    ("signal_number", "moment"),
+    [
+        (signal.SIGINT, "ready to run programs"),
+        (signal.SIGTERM, "ir_program_runner"),
+        pytest.param(signal.SIGTERM, "ready to run programs", marks=pytest.mark.long),
+        pytest.param(signal.SIGINT, "ir_program_runner", marks=pytest.mark.long),
+    ],
+)
 def test_a_node_that_is_asked_to_end_exits_with_zero(
     signal_number, moment, ros_domain_id, monkeypatch
 ):
@@ -38,9 +45,9 @@ def test_a_node_that_is_asked_to_end_exits_with_zero(
 @pytest.mark.parametrize(
     ("parameter", "sentence"),
     [
-        ("wake_port:=99999", "wake_port must be 1 .. 65535"),
+        pytest.param("wake_port:=99999", "wake_port must be 1 .. 65535", marks=pytest.mark.long),
         ("mac:=nonsense", "mac is 'nonsense': it must be six hex bytes"),
-        ("cell:=atlantis", "atlantis"),
+        pytest.param("cell:=atlantis", "atlantis", marks=pytest.mark.long),
     ],
 )
 def test_a_bad_parameter_is_named_and_the_exit_code_is_not_zero(parameter, sentence, monkeypatch):
