@@ -19,7 +19,6 @@ from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import PlcInputs, PowerMode, PowerState
 from ir_msgs.srv import QueryModes, SetPlcInput
 from ir_msgs_py.ros.spinning import BackgroundExecutor
-from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.topics import ACTION_SERVICES, REQUESTS_WAITING, SERVICE
 from ir_sim_driver.node import SimDriver
 from ir_sim_driver.node.command_topics import PlcTopic
@@ -77,13 +76,6 @@ def test_a_press_does_not_come_behind_old_levels_nor_with_a_mode_that_is_none(
             )
         )
         wait_for(publisher.get_subscription_count, what="the driver listens")
-
-        def busy() -> None:
-            held.set()
-            go_on.wait(PATIENCE)
-
-        server._executor.create_task(busy)
-        wait_for(held.is_set, what="the node is busy")
         messages = [RELEASED] * 300 + [PRESSED] + [RELEASED] * 100
         ros_executor.run(lambda: [publisher.publish(each) for each in messages])
         ros_executor.run(
