@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from robots import kr210, tool_155
 
 from ir_kernels import DynamicsModel, InputError, motion_extrema, polynomial_extrema
+from ir_kernels.dynamics import EXCEEDS, UNDECIDED, WITHIN
 from ir_kernels.reference.interval import Dual, interval, power, sine_cosine
 from ir_kernels.reference.limits import derivative, evaluate
-from ir_kernels.torque_bounds import EXCEEDS, UNDECIDED, WITHIN
 from ir_values.arrays import FloatArray
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])

@@ -14,6 +14,9 @@ from ir_planner import Planner, ProgramPlan, RequestError
 
 WORK = (100, 2_000, 16_000, 64_000)  # max_iterations: too little, cut, and with all of it
 SAME = 1e-9  # of the cost: rounding of sums
+# of a duration: descents end where ten steps gain less than 1e-4, and programs with other
+# configurations at their stations are different descents
+SETTLED = 2e-4
 
 
 @cache
@@ -128,7 +131,7 @@ def no_slower_with_own_laws(cell: str, seed: int) -> None:
     ]
     assert all(isinstance(plan, ProgramPlan) for plan in plans)
     common, own = (plan for plan in plans if isinstance(plan, ProgramPlan))
-    assert own.report.duration <= common.report.duration + SAME
+    assert own.report.duration <= common.report.duration * (1.0 + SETTLED)
     assert own.info.timing == "asynchronous" or own.program_id == common.program_id
 
 

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
-from ir_kernels.reference.spline_profile import ProfileCost
+from ir_kernels.reference.descent import ProfileCost
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.energy import movement_energy

@@ -14,16 +14,20 @@ from ir_kernels.collision import (
     MinDistance,
     Witnesses,
 )
-from ir_kernels.dynamics import DynamicsModel, Gradients
+from ir_kernels.dynamics import EXCEEDS, WITHIN, DynamicsModel, Gradients, TorqueBounds
 from ir_kernels.errors import InputError, KernelError
 from ir_kernels.geometry import ENVIRONMENT, SELF, Pair
 from ir_kernels.ik_set import IkSet, InverseKinematics
-from ir_kernels.inverse_kinematics import inverse_kinematics
-from ir_kernels.limits import Extrema, MotionExtrema, motion_extrema, polynomial_extrema
-from ir_kernels.motion import polynomial_samples
+from ir_kernels.inverse_kinematics import SearchedIk, ThreeParallelIk, inverse_kinematics
+from ir_kernels.limits import (
+    Extrema,
+    MotionExtrema,
+    motion_extrema,
+    polynomial_extrema,
+    polynomial_samples,
+)
 from ir_kernels.power import DcBus, DcBusParameters, DriveEnergy, dc_bus, drive_energy
 from ir_kernels.search import BidirectionalTree
-from ir_kernels.searched_ik import SearchedIk
 from ir_kernels.spherical_wrist import SphericalWristIk
 from ir_kernels.spline import (
     CubicPath,
@@ -34,8 +38,6 @@ from ir_kernels.spline import (
     SplineValue,
 )
 from ir_kernels.spline_terms import SplineTerms
-from ir_kernels.three_parallel import ThreeParallelIk
-from ir_kernels.torque_bounds import EXCEEDS, WITHIN, TorqueBounds
 
 __all__ = [
     "COLLIDES",

@@ -15,8 +15,7 @@ from ir_kernels import compiled, data
 from ir_kernels.chain import Chain
 from ir_kernels.data import BodyLike, CapsuleLike
 from ir_kernels.errors import InputError
-from ir_kernels.geometry import Geometry, Pair, geometry
-from ir_kernels.verdicts import COLLIDES, FREE, UNDECIDED
+from ir_kernels.geometry import COLLIDES, FREE, UNDECIDED, Geometry, Pair, geometry
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 __all__ = [

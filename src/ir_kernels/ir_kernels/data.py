@@ -69,7 +69,7 @@ class BodyLike(Protocol):
 
     @property
     def kind(self) -> str:
-        """One of ir_kernels.scene.KINDS."""
+        """One of ir_kernels.geometry.KINDS."""
 
     @property
     def pose(self) -> FloatArray:

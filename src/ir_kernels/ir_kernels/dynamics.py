@@ -8,20 +8,88 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ir_kernels import compiled
 from ir_kernels.arguments import finite, same_length, shaped
-from ir_kernels.dynamics_data import FURTHER_LOSSES, STANDARD_GRAVITY, dynamics_data
+from ir_kernels.dynamics_data import (
+    FURTHER_LOSSES,
+    STANDARD_GRAVITY,
+    LoadLike,
+    RobotLike,
+    dynamics_data,
+)
 from ir_kernels.errors import InputError
 from ir_kernels.limits import segments
-from ir_kernels.power_bounds import PowerBounds, power_bounds
 from ir_kernels.reference import dynamics as reference
-from ir_kernels.reference import power_bounds as power_reference
-from ir_kernels.reference import torque_bounds as bounds_reference
-from ir_kernels.robot_like import LoadLike, RobotLike
-from ir_kernels.torque_bounds import TorqueBounds, torque_bounds
+from ir_kernels.reference import enclosures as bounds_reference
+from ir_kernels.reference import enclosures as power_reference
 from ir_values.arrays import FloatArray
+
+# What the axes take from the DC bus at most, between samples too.
+
+
+@dataclass(frozen=True)
+class PowerBounds:
+    """Of consecutive pieces of a trajectory: seconds (K,) that they last. In each the sum of the
+    axes' powers is at every instant at most net (K,) W, the sum of those that take power at most
+    taken (K,) W; rounding and Coulomb friction of either sign where a joint turns are included.
+    """
+
+    seconds: FloatArray
+    net: FloatArray
+    taken: FloatArray
+
+
+def power_bounds(seconds: FloatArray, net: FloatArray, taken: FloatArray) -> PowerBounds:
+    """The bounds, read-only; arrays (K,)."""
+    for array in (seconds, net, taken):
+        array.setflags(write=False)
+    return PowerBounds(seconds, net, taken)
+
+
+# What a proof of the torque limits says: per joint an upper bound of |tau| / limit over all
+# times.
+
+WITHIN = np.uint8(0)
+EXCEEDS = np.uint8(1)
+UNDECIDED = np.uint8(2)
+
+
+@dataclass(frozen=True)
+class TorqueBounds:
+    """Enclosure of max over time of |tau(t)| / limit(qd(t)), per joint (n,).
+
+    upper: never exceeded, rounding included. sampled: reached, at `time` s from the start of the
+    trajectory; so sampled <= true maximum <= upper. verdict: WITHIN (upper <= 1: proved), EXCEEDS
+    (sampled > 1), else UNDECIDED, which counts as not allowed. intervals: examined, the work. Where
+    a moving joint's velocity may vanish, Coulomb friction of either sign counts (a speed below 1e-9
+    rad/s is rest); a joint that rests through a segment has none.
+    """
+
+    upper: FloatArray
+    sampled: FloatArray
+    time: FloatArray
+    verdict: NDArray[np.uint8]
+    intervals: int
+
+    @property
+    def within(self) -> bool:
+        """Whether the limits of all joints are proved."""
+        return bool((self.verdict == WITHIN).all())
+
+
+def torque_bounds(
+    upper: FloatArray, sampled: FloatArray, time: FloatArray, intervals: int
+) -> TorqueBounds:
+    """The verdicts that follow from the bounds: upper, sampled (n,), time (n,) [s]."""
+    verdict = np.where(upper <= 1.0, WITHIN, np.where(sampled > 1.0, EXCEEDS, UNDECIDED)).astype(
+        np.uint8
+    )
+    for array in (upper, sampled, time, verdict):
+        array.setflags(write=False)
+    return TorqueBounds(upper, sampled, time, verdict, int(intervals))
+
 
 MAX_TERMS = 8  # of a polynomial segment
 

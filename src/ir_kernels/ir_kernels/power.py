@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from ir_kernels import compiled, portable
 from ir_kernels.arguments import checked, finite
 from ir_kernels.errors import InputError
-from ir_kernels.reference import power as reference
+from ir_kernels.reference import dynamics as reference
 from ir_values.arrays import FloatArray
 
 Regeneration = Literal["shared", "none", "fed_back"]

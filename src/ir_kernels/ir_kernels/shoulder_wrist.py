@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ir_kernels import portable
-from ir_kernels.arm_lines import ArmLines
+from ir_kernels.wrist_geometry import ArmLines
 from ir_values.arrays import BoolArray, FloatArray
 
 TOUCH = 1e-9  # of a cosine beyond 1: still a solution, that of a tangent

@@ -26,8 +26,7 @@ from ir_kernels import arguments, compiled, data
 from ir_kernels.collision import CollisionModel, core_of
 from ir_kernels.dynamics import DynamicsModel
 from ir_kernels.errors import InputError
-from ir_kernels.reference.spline_profile import descend_profile
-from ir_kernels.reference.spline_starts import descend_along
+from ir_kernels.reference.descent import descend_along, descend_profile
 from ir_kernels.spline_terms import SplineTerms, checked_terms
 from ir_values.arrays import FloatArray
 

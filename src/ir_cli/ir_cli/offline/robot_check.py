@@ -19,7 +19,7 @@ from ir_kernels import (
     ThreeParallelIk,
     inverse_kinematics,
 )
-from ir_kernels.arm_lines import arm_lines
+from ir_kernels.wrist_geometry import arm_lines
 from ir_msgs_py.arrays import FloatArray
 
 MARGIN = 0.02  # m, the default of a request

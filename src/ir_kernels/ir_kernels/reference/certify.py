@@ -15,9 +15,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ir_kernels.geometry import Geometry
+from ir_kernels.geometry import COLLIDES, FREE, UNDECIDED, Geometry
 from ir_kernels.reference import chain, collision
-from ir_kernels.verdicts import COLLIDES, FREE, UNDECIDED
 from ir_values.arrays import FloatArray, IntArray
 
 MARGIN = 1e-9  # [m] more than double precision loses on lengths of some ten metres

@@ -7,10 +7,12 @@ function has kinks.
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from ir_values.arrays import FloatArray
+from ir_kernels.spline_terms import SplineTerms
+from ir_values.arrays import FloatArray, IntArray
 
 MEMORY = 16  # pairs of steps and changes of the gradient
 PATIENCE = 10  # iterations that have to gain something together
@@ -130,3 +132,146 @@ def descend(
         if len(history) > PATIENCE and history[-1 - PATIENCE] - value < tolerance * abs(value):
             break
     return x, value, used
+
+
+# The descent on the speed profile along a fixed path: the oracle of the compiled one.
+#
+# A spline passes p(s) at its inner knots; s and the logarithm of the duration change, each in its
+# scale.
+
+BENDING = 0.03  # weight of the jerk of s in the metric
+# of s, and of the duration's logarithm
+SCALE = 0.03
+TIME = 0.1
+
+
+def along(breaks: FloatArray, cubics: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """p (C, n) and its derivative at s (C,)."""
+    k = np.clip(np.searchsorted(breaks, s, side="right") - 1, 0, cubics.shape[1] - 1)
+    u = (s - breaks[k])[:, None]
+    a, b, c, d = cubics[:, k]
+    return a + u * (b + u * (c + u * d)), b + u * (2.0 * c + 3.0 * u * d)
+
+
+class ProfileCost:
+    """Cost of the splines that pass a path (breaks, cubics) at s (C,) + SCALE x at their inner
+    knots, of `duration` s times exp(TIME x), by a core's `value`.
+    """
+
+    def __init__(
+        self,
+        core: Any,
+        path: tuple[FloatArray, FloatArray],
+        s: FloatArray,
+        duration: float,
+        fixed: bool,
+    ) -> None:
+        count = len(s)
+        self.core = core
+        self.path = path
+        self.s = s
+        self.duration = duration
+        self.fixed = fixed
+        self.knots = 4.0 * np.eye(count) + np.eye(count, k=1) + np.eye(count, k=-1)
+        self.ends = along(*path, np.array([0.0, 1.0]))[0]
+
+    def at(self, x: FloatArray) -> tuple[FloatArray, float]:
+        """s (C,) and duration [s] at x (C + 1,)."""
+        return np.clip(self.s + SCALE * x[:-1], 0.0, 1.0), self.duration * float(
+            np.exp(TIME * x[-1])
+        )
+
+    def value(self, x: FloatArray) -> tuple[float, FloatArray]:
+        """Cost and its gradient (C + 1,)."""
+        (s, duration), ends = self.at(x), self.ends
+        q, slope = along(*self.path, s)
+        right = 6.0 * q
+        right[0] -= ends[0]
+        right[-1] -= ends[1]
+        inner = np.linalg.solve(self.knots, right)
+        interval = duration / (len(s) + 3)
+        control = np.concatenate(
+            [np.repeat(ends[:1], 3, axis=0), inner, np.repeat(ends[1:], 3, axis=0)]
+        )
+        row = np.zeros(len(s) + 3, np.int32)
+        cost, gradient, of_interval, _ = self.core.value(control, row, interval)
+        by_s = 6.0 * SCALE * (np.linalg.solve(self.knots, gradient[3:-3]) * slope).sum(axis=1)
+        return cost, np.append(by_s, 0.0 if self.fixed else TIME * of_interval * interval)
+
+
+def descend_profile(
+    core: Any,
+    path: tuple[FloatArray, FloatArray],
+    s: FloatArray,
+    duration: float,
+    fixed: bool,
+    most: int,
+    tolerance: float,
+) -> tuple[FloatArray, float, float, int]:
+    """New s (C,), duration, value, evaluations, by a core's `value`; path: breaks and cubics."""
+    cost = ProfileCost(core, path, s, duration, fixed)
+    third = np.diff(np.eye(len(s)), 3, axis=0)
+    metric = np.eye(len(s)) + BENDING * (len(s) + 3) ** 3 * third.T @ third
+
+    def solve(v: FloatArray) -> FloatArray:
+        return np.append(np.linalg.solve(metric, v[:-1]), v[-1])
+
+    x, value, used = descend(np.zeros(len(s) + 1), cost.value, solve, most, tolerance)
+    return *cost.at(x), value, used
+
+
+# Splines from rest to rest along given points, and descents that start from them.
+
+
+def fewest_seconds(path: FloatArray, velocity: FloatArray, acceleration: FloatArray) -> float:
+    """A guess that is seldom too long: a path (M, n) at full speed, or from rest to rest as its
+    longest joint.
+    """
+    steps = np.abs(np.diff(path, axis=0))
+    at_speed = float((steps / velocity).max(axis=1).sum())
+    return max(at_speed, 2.0 * float(np.sqrt((steps.sum(axis=0) / acceleration).max())))
+
+
+def spline_along(
+    path: FloatArray,
+    velocity: FloatArray,
+    acceleration: FloatArray,
+    settings: tuple[float, float, float, int, int],
+) -> tuple[FloatArray, float]:
+    """Control points (K, n) and interval along a path (M, n), by its length and slowly at both
+    ends;
+    settings: spacing, slower, duration, fewest, most.
+    """
+    spacing, slower, duration, fewest, most = settings
+    least = fewest_seconds(path, velocity, acceleration)
+    count = int(np.clip(np.ceil(least / spacing), fewest, most))
+    share = np.arange(1, count + 1) / (count + 1)
+    passed = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    at = share * share * (3.0 - 2.0 * share) * passed[-1]
+    inner = np.stack([np.interp(at, passed, joint) for joint in path.T], axis=1)
+    control = np.concatenate(
+        [np.repeat(path[:1], 3, axis=0), inner, np.repeat(path[-1:], 3, axis=0)]
+    )
+    return control, (duration or slower * least) / (count + 3)
+
+
+def descend_along(
+    core: Any,
+    terms: SplineTerms,
+    points: FloatArray,
+    counts: IntArray,
+    settings: tuple[float, float, float, int, int],
+    evaluations: int,
+    tolerance: float,
+) -> list[tuple[FloatArray, float, float, int]]:
+    """What a core's `descend` returns, from starts along paths: points (P, n) one path after the
+    other, counts (L,) of them.
+    """
+    found = []
+    for path in np.split(points, np.cumsum(counts)[:-1]):
+        control, interval = spline_along(path, terms.velocity, terms.acceleration, settings)
+        row = np.zeros(len(control) - 3, np.int32)
+        fixed = settings[2] > 0.0
+        control, *ended = core.descend(control, row, interval, fixed, evaluations, tolerance)
+        found.append((np.clip(control, terms.low, terms.high), *ended))
+    return found

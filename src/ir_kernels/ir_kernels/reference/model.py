@@ -5,9 +5,8 @@ that are checked in, tuples of arrays out.
 import numpy as np
 from numpy.typing import NDArray
 
-from ir_kernels.geometry import Geometry
+from ir_kernels.geometry import FREE, Geometry
 from ir_kernels.reference import certify, collision
-from ir_kernels.verdicts import FREE
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 NearestPairs = tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray]

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ir_kernels.verdicts import FREE
+from ir_kernels.geometry import FREE
 from ir_values.arrays import FloatArray
 
 BATCH = 16  # targets of a round, and configurations looked at for the price of an edge

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ir_kernels.geometry import KINDS, Hull
 from ir_kernels.reference import solids
 from ir_kernels.reference.solids import Depth, unit
-from ir_kernels.scene import KINDS, Hull
 from ir_values.arrays import FloatArray
 
 BISECTIONS = 60

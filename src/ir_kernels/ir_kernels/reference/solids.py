@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ir_kernels.scene import Hull
+from ir_kernels.geometry import Hull
 from ir_values.arrays import FloatArray, IntArray
 
 RIM_SAMPLES = 256
