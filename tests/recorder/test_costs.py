@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from ir_recorder import Analysis, analyse
-from ir_recorder.errors import CostsError
+from ir_recorder.errors import RecorderError
 from ir_recorder.report.costs import (
     NAMES,
     Costs,
@@ -70,7 +70,7 @@ def test_a_file_says_what_a_joule_costs(tmp_path: Path) -> None:
 def test_a_file_that_makes_no_sense_is_a_sentence(tmp_path: Path, text: str, words: str) -> None:
     path = tmp_path / "costs.yaml"
     path.write_text(text)
-    with pytest.raises(CostsError, match=words):
+    with pytest.raises(RecorderError, match=words):
         read_costs(path)
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from ir_recorder import analyse, findings, read_recording
 from ir_recorder.analysis.meter import METER, SHARE, with_meter
-from ir_recorder.errors import TraceError
+from ir_recorder.errors import RecorderError
 from ir_recorder.report import report_html
 from ir_recorder.traces import TraceMapping
 
@@ -57,11 +57,11 @@ def test_what_a_meter_does_not_cover_keeps_the_recorded_watts(
     early = recording.power.time < recording.power.time[0] + 3.9
     assert np.array_equal(power.power[early], recording.power.power[early])
     assert power.energy[-1] > recording.power.energy[-1]
-    with pytest.raises(TraceError, match="covers none of the recording"):
+    with pytest.raises(RecorderError, match="covers none of the recording"):
         with_meter(recording, file, TraceMapping(clock_offset=1e6))
 
 
 def test_a_file_without_power_is_refused(demo_file: Path, tmp_path: Path) -> None:
     (tmp_path / "none.csv").write_text("time,load\n0.0,none\n1.0,none\n")
-    with pytest.raises(TraceError, match="neither power nor energy"):
+    with pytest.raises(RecorderError, match="neither power nor energy"):
         with_meter(read_recording(demo_file), tmp_path / "none.csv", TraceMapping(clock_offset=0.0))

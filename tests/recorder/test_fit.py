@@ -23,7 +23,7 @@ from ir_description import (
     load_power_parameters,
     physical_bounds,
 )
-from ir_recorder.errors import FitError
+from ir_recorder.errors import RecorderError
 from ir_recorder.fit import Fit, Source, fit, fit_data, sentences
 from ir_recorder.fit.data import check_range, check_readings
 from ir_recorder.fit.estimate import by_window
@@ -148,7 +148,8 @@ def test_a_meter_that_reads_too_seldom_is_refused_with_its_interval() -> None:
     time = np.arange(0.0, 60.0, 1.0)
     check_readings(Trace("meter.csv", 0.1 * time, {"power": 500.0 + time}))
     with pytest.raises(
-        FitError, match=r"meter\.csv: a reading of power every 1 s, a fit needs one every 0\.25 s"
+        RecorderError,
+        match=r"meter\.csv: a reading of power every 1 s, a fit needs one every 0\.25 s",
     ):
         check_readings(Trace("meter.csv", time, {"power": 500.0 + time}))
 
@@ -168,7 +169,7 @@ def test_data_without_motion_say_so_and_data_that_determine_nothing_are_refused(
     assert any("nothing moves" in sentence for sentence in sentences(found))
     one = metered(still.part(still.time[-1500], still.time[-1000]), PRIOR.drawn(6), 6)
     with pytest.raises(
-        FitError, match=r"none of the \d+ power parameters.* moves in 0\.0 of 5\.0 s"
+        RecorderError, match=r"none of the \d+ power parameters.* moves in 0\.0 of 5\.0 s"
     ):
         fit(one, MODEL, PRIOR)
 
@@ -207,7 +208,7 @@ def test_a_small_programme_ends_in_no_local_minimum(seed: int, count: int) -> No
 
 def test_too_little_data_are_refused() -> None:
     samples = programme(1, 1, 0)
-    with pytest.raises(FitError, match=r"at least 5\.0 s are needed"):
+    with pytest.raises(RecorderError, match=r"at least 5\.0 s are needed"):
         fit(samples, MODEL, PRIOR)
 
 
@@ -215,7 +216,7 @@ def test_too_little_data_are_refused() -> None:
 def test_a_meter_that_no_parameters_explain_is_refused(factor: float) -> None:
     """A meter that stands, Wh or kW for J and W, a current transformer that is turned round."""
     samples = metered(programme(4, 4, 0), PRIOR.drawn(4), 4)
-    with pytest.raises(FitError, match="no parameters explain the meter"):
+    with pytest.raises(RecorderError, match="no parameters explain the meter"):
         fit(replace(samples, watts=factor * samples.watts), MODEL, PRIOR)
 
 
@@ -223,7 +224,8 @@ def test_degrees_without_their_unit_and_other_robots_are_refused() -> None:
     q = programme(4, 2, 0).q
     check_range("run.csv", CELL.robot, q)
     with pytest.raises(
-        FitError, match=r"run\.csv: joint_a. is .* rad, .* reaches .*_deg; or is it another robot"
+        RecorderError,
+        match=r"run\.csv: joint_a. is .* rad, .* reaches .*_deg; or is it another robot",
     ):
         check_range("run.csv", CELL.robot, np.degrees(q))
 
@@ -258,5 +260,7 @@ def test_a_meter_with_a_clock_of_its_own_is_fitted_from_csv(
 def test_what_is_held_all_the_time_is_refused_where_the_cell_does_not_have_it(
     load: str, name: str
 ) -> None:
-    with pytest.raises(FitError, match=f"^load '{name}' is unknown, known are gear, gripper, none"):
+    with pytest.raises(
+        RecorderError, match=f"^load '{name}' is unknown, known are gear, gripper, none"
+    ):
         fit_data(Source(Path("joints.csv"), cell=CELL, load=load), PRIOR)

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from pyarrow import parquet
 
 from ir_recorder.analysis import Analysis
-from ir_recorder.errors import RecorderError, TraceError
+from ir_recorder.errors import RecorderError
 from ir_recorder.report.step_table import write_columns, write_table
 from ir_recorder.traces import Trace, read_mapping, read_traces
 
@@ -62,7 +62,7 @@ def test_without_pyarrow_both_directions_say_what_to_install(
 ) -> None:
     path = stored(tmp_path, {"time": [0.0, 1.0], "power": [1.0, 2.0]})
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(TraceError, match="pip install pyarrow"):
+    with pytest.raises(RecorderError, match="pip install pyarrow"):
         read_traces(path)
     with pytest.raises(RecorderError, match="pip install pyarrow"):
         write_columns({"a": [1.0]}, tmp_path / "new.parquet", b"PAR1")
@@ -140,7 +140,7 @@ def test_what_makes_no_sense_is_named(
     columns: dict[str, Any], sentence: str, tmp_path: Path
 ) -> None:
     path = stored(tmp_path, columns)
-    with pytest.raises(TraceError) as refused:
+    with pytest.raises(RecorderError) as refused:
         read(path)
     assert str(path) in str(refused.value)
     assert sentence in str(refused.value)
@@ -162,7 +162,7 @@ def test_a_fifo_and_a_folder_are_refused_at_once(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "fifo.parquet")
     (tmp_path / "folder.parquet").mkdir()
     for name in ("fifo.parquet", "folder.parquet"):
-        with pytest.raises(TraceError, match="is not a regular file"):
+        with pytest.raises(RecorderError, match="is not a regular file"):
             read_traces(tmp_path / name)
 
 
@@ -182,7 +182,7 @@ def test_damaged_files_are_read_or_refused(
     path.write_bytes(content[: len(content) - cut % 40])
     try:
         trace = read(path)
-    except TraceError as error:
+    except RecorderError as error:
         named = str(path) in str(error)
         increasing = True
     else:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_recorder.errors import TraceError
+from ir_recorder.errors import RecorderError
 from ir_recorder.traces import clock_offset, mean_power, read_mapping, read_traces, resampled
 from ir_recorder.traces.trace import RATE
 
@@ -98,7 +98,7 @@ def test_a_mapping_names_columns_units_and_the_clock(tmp_path: Path) -> None:
 def test_what_makes_no_sense_is_named_with_its_line(
     content: str | bytes, sentence: str, tmp_path: Path
 ) -> None:
-    with pytest.raises(TraceError) as caught:
+    with pytest.raises(RecorderError) as caught:
         read_traces(written(tmp_path, content), joint_names=JOINTS)[0].joints(JOINTS)
     assert sentence in str(caught.value)
 
@@ -165,7 +165,7 @@ def test_every_writing_of_the_same_numbers_is_read_alike(
     ],
 )
 def test_a_broken_mapping_is_named(content: str, sentence: str, tmp_path: Path) -> None:
-    with pytest.raises(TraceError) as caught:
+    with pytest.raises(RecorderError) as caught:
         read_mapping(written(tmp_path, content, "map.yaml"))
     assert sentence in str(caught.value)
 
@@ -177,7 +177,7 @@ def test_any_bytes_are_read_or_refused_with_a_sentence(
     path = written(tmp_path_factory.mktemp("any"), b"time,power\n0,1\n" + content)
     try:
         (trace,) = read_traces(path)
-    except TraceError as error:
+    except RecorderError as error:
         named = str(path) in str(error)
         increasing = True
     else:
@@ -188,9 +188,9 @@ def test_any_bytes_are_read_or_refused_with_a_sentence(
 
 
 def test_a_file_of_another_kind_and_parquet_without_pyarrow(tmp_path: Path) -> None:
-    with pytest.raises(TraceError, match="traces are read from"):
+    with pytest.raises(RecorderError, match="traces are read from"):
         read_traces(written(tmp_path, "x", "t.doc"))
-    with pytest.raises(TraceError, match=r"pip install pyarrow|Parquet"):
+    with pytest.raises(RecorderError, match=r"pip install pyarrow|Parquet"):
         read_traces(written(tmp_path, "x", "t.parquet"))
 
 
@@ -236,5 +236,5 @@ def test_the_offset_of_a_clock_is_found_within_a_sample(offset: float, rate: flo
 def test_powers_of_two_runs_are_not_aligned() -> None:
     rng = np.random.default_rng(2)
     time = np.arange(0.0, 30.0, 0.01)
-    with pytest.raises(TraceError, match="give clock_offset"):
+    with pytest.raises(RecorderError, match="give clock_offset"):
         clock_offset(time, rng.normal(size=len(time)), time, rng.normal(size=len(time)))

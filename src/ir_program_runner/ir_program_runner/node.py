@@ -20,7 +20,6 @@ from ir_msgs.msg import ProgramState as ProgramStateMsg
 from ir_msgs.msg import Signal as SignalMsg
 from ir_msgs_py import names
 from ir_msgs_py.announcements import Event, ProgramState
-from ir_msgs_py.errors import InvalidValueError, ParameterError
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import Signal, magic_packet, send_packet
 from ir_msgs_py.report import PlannedMovement
@@ -48,6 +47,7 @@ from ir_program_runner.program import (
 )
 from ir_program_runner.requests import Announce
 from ir_program_runner.settings import LinkSettings
+from ir_values.errors import InvalidValueError, ParameterError
 
 # Diagnostics: a silent driver, or a program that failed, is a warning.
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_msgs_py.announcements import Event
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.modes import READY, RESTS, Mode, PowerMode, TransitionTimes, modes_of
 from ir_msgs_py.names import END_REST, LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.plc import Signal
@@ -36,6 +35,7 @@ from ir_program_runner.requests import (
     need,
 )
 from ir_program_runner.settings import ProgramSettings
+from ir_values.errors import InvalidValueError
 
 # Checks of a whole program before its first movement: what can't end well must not start.
 

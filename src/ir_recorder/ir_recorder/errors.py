@@ -10,10 +10,7 @@
     ├── TopicsError      names of topics that are none, or too many
     ├── NothingRecordedError   a recording was asked to end, and none is in progress
     ├── ReadError        not a recording at all, or nothing in it that could be read
-    ├── TraceError       measured data that make no sense, with the line and the column
-    ├── CostsError       a file of prices that makes no sense, with the key
-    ├── LiveError        the live view can't be served
-    └── FitError         data that a fit can't use
+    └── LiveError        the live view can't be served
 """
 
 
@@ -47,18 +44,6 @@ class NothingRecordedError(RecorderError):
 
 class ReadError(RecorderError):
     """A file that isn't a recording, or holds nothing readable."""
-
-
-class TraceError(RecorderError):
-    """Measured data that make no sense; the sentence names the file, the line and the column."""
-
-
-class CostsError(RecorderError):
-    """Prices and shifts that make no sense; the sentence names the file and the key."""
-
-
-class FitError(RecorderError):
-    """Data that no parameter can be fitted to."""
 
 
 class LiveError(RecorderError):

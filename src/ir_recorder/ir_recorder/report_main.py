@@ -13,7 +13,7 @@ from ir_description import DescriptionError, PowerParameters, load_power_paramet
 from ir_recorder.analysis import Analysis, analyse, findings
 from ir_recorder.analysis.meter import with_meter
 from ir_recorder.arguments import add_roots
-from ir_recorder.errors import FitError, ReadError, RecorderError
+from ir_recorder.errors import ReadError, RecorderError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import is_further_part
 from ir_recorder.reading.planner_answers import recorded_front
@@ -129,7 +129,7 @@ def _parameters(path: str) -> PowerParameters | None:
     try:
         return load_power_parameters(path) if path else None
     except DescriptionError as error:
-        raise FitError(str(error)) from error
+        raise RecorderError(str(error)) from error
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

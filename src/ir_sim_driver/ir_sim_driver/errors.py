@@ -4,7 +4,6 @@ DriverError
 ├── SettingsError (ValueError)        a setting out of its range
 ├── TrajectoryRefusedError            not executed; code of control_msgs/FollowJointTrajectory
 ├── RequestRefusedError               a request that cannot be met; code of
-moveit_msgs/MoveItErrorCodes ├── PlantStoppedError                 nobody steps the simulation any
 more: the process ends ├── LinkError                         a link to the PLC that cannot be opened
 ├── ModbusRefusedError                a request that an exception code of Modbus answers
 └── BackendError                      the physics gave up: not installed, disconnected or diverged
@@ -45,10 +44,6 @@ class RequestRefusedError(DriverError):
     def __reduce__(self) -> tuple[type[RequestRefusedError], tuple[StatusCode, str]]:
         """It passes from one process to another with its code."""
         return type(self), (self.code, str(self))
-
-
-class PlantStoppedError(DriverError):
-    """Nobody steps the simulation any more."""
 
 
 class LinkError(DriverError):

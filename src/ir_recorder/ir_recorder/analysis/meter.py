@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ir_description.robot import DcLink
-from ir_recorder.errors import TraceError
+from ir_recorder.errors import RecorderError
 from ir_recorder.reading.recording import PowerSeries, Recording
 from ir_recorder.traces import Trace, TraceMapping, clock_offset, mean_power, read_traces
 from ir_values.arrays import FloatArray
@@ -118,22 +118,24 @@ def with_meter(
     """The recording with the joules and watts of a meter's file, at its own readings.
 
     What the meter doesn't cover keeps the recorded figures. The facts name the file, the offset of
-    its clock, and its joules over the recorded ones. TraceError where the file has no power, the
+    its clock, and its joules over the recorded ones. RecorderError where the file has no power, the
     recording no meter, or the clocks' offset can't be found.
     """
     power = recording.power
     if power is None or len(power.time) < 2:
-        raise TraceError(f"{recording.path} has no readings that a meter could be laid onto")
+        raise RecorderError(f"{recording.path} has no readings that a meter could be laid onto")
     mapping = mapping or TraceMapping()
     trace = read_traces(path, mapping, joint_names=())[0]
     joules = trace.joules()
     if joules is None:
-        raise TraceError(f"{trace.source}: has neither power nor energy")
+        raise RecorderError(f"{trace.source}: has neither power nor energy")
     place = _place(power, trace, joules, mapping)
     watts = mean_power(trace.time + place.offset, joules, power.time)
     covered = np.isfinite(watts)
     if not covered.any():
-        raise TraceError(f"{trace.source}: covers none of the recording's {recording.duration:g} s")
+        raise RecorderError(
+            f"{trace.source}: covers none of the recording's {recording.duration:g} s"
+        )
     steps = np.diff(power.time)
     recorded = power.power[1:]
     share = float((watts[covered] @ steps[covered]) / (recorded[covered] @ steps[covered]))

@@ -11,7 +11,7 @@ import numpy as np
 from ir_description import Cell, DescriptionError, Load, PowerParameters, RobotModel, cell_from_yaml
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_recorder.analysis.loads import LoadTimeline, carried, load_timeline, normal
-from ir_recorder.errors import FitError
+from ir_recorder.errors import RecorderError
 from ir_recorder.measure import PowerModel, Samples, samples_of
 from ir_recorder.measure.samples import LoadRuns
 from ir_recorder.reading.reader import read_recording
@@ -26,15 +26,17 @@ from ir_values.errors import InvalidValueError
 
 
 def attached_cell(recording: Recording | None) -> Cell:
-    """The cell that a recording carries; FitError where there is none."""
+    """The cell that a recording carries; RecorderError where there is none."""
     if recording is None:
-        raise FitError("the file carries no cell: name one with --cell")
+        raise RecorderError("the file carries no cell: name one with --cell")
     if not recording.cell_yaml:
-        raise FitError(f"{recording.path}: no cell is attached: name one with --cell")
+        raise RecorderError(f"{recording.path}: no cell is attached: name one with --cell")
     try:
         return cell_from_yaml(recording.cell_yaml, "the attached cell")
     except (DescriptionError, InvalidValueError, RecursionError) as error:
-        raise FitError(f"{recording.path}: the attached cell can't be read: {error}") from error
+        raise RecorderError(
+            f"{recording.path}: the attached cell can't be read: {error}"
+        ) from error
 
 
 # Data that no parameters explain are refused: units that are not what they are taken for, another
@@ -47,8 +49,8 @@ _SELDOM = 0.25  # s: within it an axis is accelerated and braked again
 
 
 def check_explained(measured: FloatArray, fitted: FloatArray, moving: BoolArray) -> None:
-    """FitError where the fitted power (W,) [W] stays so far from the measured that the data can't
-    be those of the model.
+    """RecorderError where the fitted power (W,) [W] stays so far from the measured that the data
+    can't be those of the model.
     """
     for rows, what in ((~moving, "at rest"), (moving, "in motion")):
         if np.count_nonzero(rows) < _FEWEST:
@@ -56,7 +58,7 @@ def check_explained(measured: FloatArray, fitted: FloatArray, moving: BoolArray)
         mean = float(measured[rows].mean())
         off = float(np.sqrt(np.mean((measured - fitted)[rows] ** 2)))
         if off > MOST_UNEXPLAINED * max(mean, 0.0):
-            raise FitError(
+            raise RecorderError(
                 f"no parameters explain the meter: {what} it shows {mean:.0f} W in the mean, the "
                 f"fit is off by {off:.0f} W (rms). Are the units of power and energy those of "
                 "the headings, modes and loads those that were driven, and is it this robot?"
@@ -64,14 +66,14 @@ def check_explained(measured: FloatArray, fitted: FloatArray, moving: BoolArray)
 
 
 def check_determined(determined: BoolArray, moving: BoolArray, window: float) -> None:
-    """FitError where the data determine no parameter (P,); moving (W,): in which windows of
+    """RecorderError where the data determine no parameter (P,); moving (W,): in which windows of
     `window` s.
     """
     if determined.any():
         return
     seconds = window * len(moving)
     moved = window * np.count_nonzero(moving)
-    raise FitError(
+    raise RecorderError(
         f"the data determine none of the {len(determined)} power parameters, so there is nothing "
         f"to write: the robot moves in {moved:.1f} of {seconds:.1f} s with watts. Drive several "
         "axes at several speeds and stay in the power modes; ir energy excite plans such "
@@ -80,22 +82,22 @@ def check_determined(determined: BoolArray, moving: BoolArray, window: float) ->
 
 
 def check_readings(meter: Trace) -> None:
-    """FitError where a meter reads so seldom that movements vanish between its readings."""
+    """RecorderError where a meter reads so seldom that movements vanish between its readings."""
     if meter.period > _SELDOM:
-        raise FitError(
+        raise RecorderError(
             f"{meter.source}: a reading of power every {meter.period:.3g} s, a fit needs one every "
             f"{_SELDOM:g} s at least, better every 0.1 s or less"
         )
 
 
 def check_range(source: str, robot: RobotModel, q: FloatArray) -> None:
-    """FitError where positions (N, n) [rad] lie beyond what the robot can reach."""
+    """RecorderError where positions (N, n) [rad] lie beyond what the robot can reach."""
     beyond = np.fmax(robot.position_min - q, q - robot.position_max)
     worst = np.nanmax(beyond, axis=0, initial=-np.inf)
     j = int(worst.argmax())
     if worst[j] > _BEYOND:
         value = float(q[np.nanargmax(beyond[:, j]), j])
-        raise FitError(
+        raise RecorderError(
             f"{source}: {robot.joint_names[j]} is {value:.3g} rad, {robot.name} reaches "
             f"{robot.position_min[j]:.3g} to {robot.position_max[j]:.3g} rad. Degrees need a "
             f"heading that says so: {robot.joint_names[j]}_deg; or is it another robot?"
@@ -133,7 +135,7 @@ class Source:
 
 
 def fit_data(source: Source, prior: PowerParameters) -> FitData:
-    """Read all of a source and lay it on one grid; ReadError, TraceError or FitError as a
+    """Read all of a source and lay it on one grid; ReadError, RecorderError or RecorderError as a
     sentence.
     """
     recording = read_recording(source.motion) if source.motion.suffix.lower() == ".mcap" else None
@@ -158,13 +160,13 @@ def fit_data(source: Source, prior: PowerParameters) -> FitData:
         mapping = source.meter_mapping or TraceMapping()
         outer = _metered(read_traces(source.meter, mapping, cell.robot.joint_names))
         if outer is None:
-            raise FitError(f"{source.meter}: there is neither a column power nor energy")
+            raise RecorderError(f"{source.meter}: there is neither a column power nor energy")
         if np.isnan(mapping.clock_offset):
             outer, note = _aligned(joints, meter, outer, prior, model, runs)
             notes.append(note)
         meter = outer
     if meter is None:
-        raise FitError(
+        raise RecorderError(
             f"{source.motion}: there is neither a column power nor energy; name the meter's file"
         )
     check_readings(meter)
@@ -174,8 +176,8 @@ def fit_data(source: Source, prior: PowerParameters) -> FitData:
 
 
 def _written_loads(cell: Cell, trace: Trace) -> list[tuple[float, float, tuple[Load, ...]]]:
-    """Runs of the words of a column `load`; none where there is no such column. FitError for what
-    the cell does not have.
+    """Runs of the words of a column `load`; none where there is no such column. RecorderError for
+    what the cell does not have.
     """
     words = trace.texts.get(LOAD, ())
     for word in dict.fromkeys(words):
@@ -188,7 +190,7 @@ def _check_load(cell: Cell, text: str, where: str = "") -> None:
     """Refuse a load text that names what is neither the cell's tool nor one of its parts."""
     known = {NO_LOAD, *(load.name for load in cell.loads("")), *(part.name for part in cell.parts)}
     if strange := set(normal(text).split(LOAD_SEPARATOR)) - known:
-        raise FitError(
+        raise RecorderError(
             f"{where}load {min(strange)[:40]!r} is unknown, known are {', '.join(sorted(known))}"
         )
 
@@ -210,7 +212,7 @@ def _with(traces: Sequence[Trace], names: Sequence[str]) -> Trace:
         if trace.joints(names) is not None:
             return trace
     known = ", ".join(traces[0].columns)[:200]
-    raise FitError(f"{traces[0].source}: there is no column {names[0]}, there is: {known}")
+    raise RecorderError(f"{traces[0].source}: there is no column {names[0]}, there is: {known}")
 
 
 def _metered(traces: Sequence[Trace]) -> Trace | None:

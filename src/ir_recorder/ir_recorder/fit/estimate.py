@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from ir_description import PowerParameters, physical_bounds
-from ir_recorder.errors import FitError
+from ir_recorder.errors import RecorderError
 from ir_recorder.fit.data import check_determined, check_explained
 from ir_recorder.measure import PowerModel, Samples, movements
 from ir_values.arrays import BoolArray, FloatArray
@@ -213,7 +213,7 @@ class Fit:
 
 
 def fit(samples: Samples, model: PowerModel, prior: PowerParameters, name: str = "fit") -> Fit:
-    """Fit the parameters of `model` to the watts of the samples. FitError where they hold too
+    """Fit the parameters of `model` to the watts of the samples. RecorderError where they hold too
     little.
     """
     return _Estimate(samples, model, prior).result(name)
@@ -224,7 +224,7 @@ class _Estimate:
         usable = samples.known & np.isfinite(samples.watts)
         self._windows = np.flatnonzero(by_window(usable.astype(float)) > 1.0 - 1e-9)
         if len(self._windows) < _SHORTEST:
-            raise FitError(
+            raise RecorderError(
                 f"{len(self._windows) * WINDOW * samples.step:.1f} s have watts, motion, mode "
                 f"and load at once, at least {_SHORTEST * WINDOW * samples.step:.1f} s are needed"
             )
@@ -237,7 +237,7 @@ class _Estimate:
         self._low, self._high = physical_bounds(prior.names)
         values, vectors = np.linalg.eigh(scaled(prior))
         if values.min() <= 1e-9:
-            raise FitError("the covariance of the prior is singular")
+            raise RecorderError("the covariance of the prior is singular")
         self._pull = (vectors / np.sqrt(values)).T / safe(
             prior.deviation
         )  # (P, P): whitens the parameters

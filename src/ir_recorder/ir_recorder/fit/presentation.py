@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ir_description import PowerParameters, parameter_unit
-from ir_recorder.errors import FitError
+from ir_recorder.errors import RecorderError
 from ir_recorder.fit.estimate import Fit, FittedMovement
 from ir_recorder.report.files import write_output
 from ir_recorder.report.picture import PICTURE_START
@@ -83,13 +83,13 @@ _AFTER = "#5b8def"
 
 
 def write_fit_picture(found: Fit, prior: PowerParameters, path: Path) -> Path:
-    """Write the picture as PNG and return its absolute path; FitError where matplotlib isn't
+    """Write the picture as PNG and return its absolute path; RecorderError where matplotlib isn't
     installed.
     """
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
-        raise FitError("a picture needs matplotlib: pip install matplotlib") from error
+        raise RecorderError("a picture needs matplotlib: pip install matplotlib") from error
     figure = Figure(figsize=(10.0, 9.5), dpi=110, layout="constrained", facecolor="white")
     powers, residuals, parameters = figure.subplots(3, 1, height_ratios=(1.0, 0.8, 1.2))
     _powers(powers, found)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ir_description import IDLE, PowerParameters, RobotModel
 from ir_description.robot import DcLink
-from ir_recorder.errors import FitError
+from ir_recorder.errors import RecorderError
 from ir_recorder.measure.arm import ArmTorques, arm_torques
 from ir_recorder.measure.samples import Samples
 from ir_values.arrays import FloatArray
@@ -158,7 +158,9 @@ class PowerModel:
         bodies: Callable[..., ArmTorques] = arm_torques,
     ) -> None:
         if layout.robot != robot.name or layout.joints != robot.joint_names:
-            raise FitError(f"power parameters are of {layout.robot}, the robot is {robot.name}")
+            raise RecorderError(
+                f"power parameters are of {layout.robot}, the robot is {robot.name}"
+            )
         self._robot = robot
         self._link = link
         self._pose = base_pose

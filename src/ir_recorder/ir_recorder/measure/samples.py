@@ -11,7 +11,7 @@ import numpy as np
 from ir_description import Load
 from ir_msgs_py.modes import REST_MODES, Mode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_recorder.errors import FitError
+from ir_recorder.errors import RecorderError
 from ir_recorder.traces.trace import GAP_FACTOR, MODE, Trace, mean_power, resampled
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
@@ -156,11 +156,11 @@ def samples_of(
     step: float = STEP,
 ) -> Samples:
     """Samples over the time of both traces. `modes`: names in their order; without a column of
-    modes the motors count as on. FitError where there is nothing to sample.
+    modes the motors count as on. RecorderError where there is nothing to sample.
     """
     positions = joints.joints(joint_names)
     if positions is None:
-        raise FitError(
+        raise RecorderError(
             f"{joints.source}: there is no column {joint_names[0]}: positions are needed"
         )
     first = joints.time[0]
@@ -170,7 +170,7 @@ def samples_of(
         last = min(last, meter.time[-1])
     count = int((last - first) / step)
     if not 2 <= count <= MOST_SAMPLES:
-        raise FitError(
+        raise RecorderError(
             f"{joints.source}: {max(last - first, 0.0):g} s of positions and power together, "
             f"must be {2 * step:g} to {MOST_SAMPLES * step:g} s"
         )
@@ -223,7 +223,7 @@ def _motion(joints: Trace, positions: FloatArray, middles: FloatArray) -> FloatA
     step = max(joints.period, _FASTEST)
     grid = np.arange(joints.time[0], joints.time[-1], step)
     if len(grid) > 5 * MOST_SAMPLES:
-        raise FitError(
+        raise RecorderError(
             f"{joints.source}: {len(grid)} positions, at most {5 * MOST_SAMPLES} are used"
         )
     found = resampled(joints.time, positions, grid, GAP_FACTOR * joints.period)
@@ -241,7 +241,7 @@ def _motion(joints: Trace, positions: FloatArray, middles: FloatArray) -> FloatA
 def _held(values: FloatArray, lost: BoolArray) -> FloatArray:
     """What is lost replaced by the row before; by the first known one at the start."""
     if lost.all():
-        raise FitError("no position is known")
+        raise RecorderError("no position is known")
     rows = np.maximum.accumulate(np.where(lost, 0, np.arange(len(values))))
     return np.asarray(values[np.where(lost[rows], int(np.argmax(~lost)), rows)])
 
@@ -279,7 +279,7 @@ def _modes(trace: Trace, modes: Sequence[str], middles: FloatArray) -> tuple[Int
         (word for word in words if word not in known and not word.startswith("mode ")), ""
     )
     if strange:
-        raise FitError(
+        raise RecorderError(
             f"{trace.source}: mode {strange[:40]!r} is unknown, known are {', '.join(modes)}"
         )
     number = np.array([places.get(word, UNKNOWN) for word in words])

@@ -14,7 +14,7 @@ from ir_msgs_py.savings import Saving
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.flows import levers
 from ir_recorder.analysis.results import Share
-from ir_recorder.errors import CostsError
+from ir_recorder.errors import RecorderError
 from ir_recorder.report.number_text import (
     DASH,
     joules,
@@ -100,39 +100,39 @@ _WORDS = ("currency",)
 
 
 def read_costs(path: str | Path, roots: FileRoots = ANYWHERE) -> Costs:
-    """The costs of a file below `roots`; CostsError with the key that is wrong."""
+    """The costs of a file below `roots`; RecorderError with the key that is wrong."""
     try:
         tree = plain_yaml(roots.inside(path))
     except DescriptionFileError as error:
-        raise CostsError(str(error)) from error
+        raise RecorderError(str(error)) from error
     except (IrError, OSError) as error:
-        raise CostsError(f"{path}: {error}") from error
+        raise RecorderError(f"{path}: {error}") from error
     if not isinstance(tree, dict) or tree.get("format") != FORMAT:
-        raise CostsError(f"{path}: is no file of costs, which begins with format: {FORMAT}")
+        raise RecorderError(f"{path}: is no file of costs, which begins with format: {FORMAT}")
     values = {str(key): value for key, value in tree.items() if key != "format"}
     for key, value in values.items():
         values[key] = _checked(f"{path}: {key[:40]}", key, value)
     try:
         return replace(Costs(), **values, given=tuple(values))
     except IrError as error:
-        raise CostsError(f"{path}: {error}") from error
+        raise RecorderError(f"{path}: {error}") from error
 
 
 def _checked(where: str, key: str, value: object) -> float | str:
     if key not in NAMES:
-        raise CostsError(f"{where} is unknown, known are {', '.join(NAMES)}")
+        raise RecorderError(f"{where} is unknown, known are {', '.join(NAMES)}")
     if key in _WORDS:
         if (
             not isinstance(value, str)
             or not 0 < len(value.strip()) <= _CURRENCY_MAX
             or not value.isprintable()
         ):
-            raise CostsError(
+            raise RecorderError(
                 f"{where} must be a text of at most {_CURRENCY_MAX} characters in one line"
             )
         return value
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise CostsError(f"{where} is {str(value)[:40]!r}, it must be a number")
+        raise RecorderError(f"{where} is {str(value)[:40]!r}, it must be a number")
     return float(value)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from ir_description import DescriptionFileError
 from ir_description.files import plain_yaml
-from ir_recorder.errors import TraceError
+from ir_recorder.errors import RecorderError
 from ir_recorder.traces.trace import TIME
 from ir_values.errors import InvalidValueError
 
@@ -51,10 +51,12 @@ _ENDING = re.compile(r"^(?P<name>.+)_(?P<unit>[a-zA-Z]+)$")
 
 
 def factor(unit: str, where: str) -> float:
-    """What a value in this unit is multiplied by; TraceError names the known units."""
+    """What a value in this unit is multiplied by; RecorderError names the known units."""
     known = FACTORS.get(unit.strip().lower().replace("²", "^2").replace("s2", "s^2"))
     if known is None:
-        raise TraceError(f"{where}: unit {unit[:20]!r} is unknown, known are {', '.join(FACTORS)}")
+        raise RecorderError(
+            f"{where}: unit {unit[:20]!r} is unknown, known are {', '.join(FACTORS)}"
+        )
     return known
 
 
@@ -104,21 +106,21 @@ class TraceMapping:
 
 
 def read_mapping(path: Path) -> TraceMapping:
-    """The mapping of a file; TraceError with the key that is wrong."""
+    """The mapping of a file; RecorderError with the key that is wrong."""
     try:
         tree = plain_yaml(path)
     except DescriptionFileError as error:
-        raise TraceError(str(error)) from error
+        raise RecorderError(str(error)) from error
     except InvalidValueError as error:
-        raise TraceError(f"{path}: {error}") from error
+        raise RecorderError(f"{path}: {error}") from error
     if not isinstance(tree, dict) or tree.get("format") != FORMAT:
-        raise TraceError(f"{path}: is no mapping of a trace, which begins with format: {FORMAT}")
+        raise RecorderError(f"{path}: is no mapping of a trace, which begins with format: {FORMAT}")
     unknown = [str(key)[:40] for key in tree if key not in _KEYS]
     if unknown:
-        raise TraceError(f"{path}: key {unknown[0]!r} is unknown, known are {', '.join(_KEYS)}")
+        raise RecorderError(f"{path}: key {unknown[0]!r} is unknown, known are {', '.join(_KEYS)}")
     meaning = tree.get("power_is", "mean")
     if meaning not in ("mean", "sample"):
-        raise TraceError(f"{path}: power_is is {str(meaning)[:40]!r}, it must be mean or sample")
+        raise RecorderError(f"{path}: power_is is {str(meaning)[:40]!r}, it must be mean or sample")
     return TraceMapping(
         _columns(path, tree.get("columns")), _offset(path, tree), meaning == "sample"
     )
@@ -126,7 +128,7 @@ def read_mapping(path: Path) -> TraceMapping:
 
 def _columns(path: Path, tree: Any) -> Mapping[str, Column]:
     if not isinstance(tree, dict) or "time" not in tree:
-        raise TraceError(f"{path}: columns must name at least time")
+        raise RecorderError(f"{path}: columns must name at least time")
     return MappingProxyType(
         {str(name): _column(f"{path}: {name}", each) for name, each in tree.items()}
     )
@@ -136,14 +138,14 @@ def _column(where: str, tree: Any) -> Column:
     if isinstance(tree, str):
         return Column(tree)
     if not isinstance(tree, dict) or not set(tree) <= {"column", "unit"} or "column" not in tree:
-        raise TraceError(f"{where[:200]}: must be {{column: heading, unit: unit}}")
+        raise RecorderError(f"{where[:200]}: must be {{column: heading, unit: unit}}")
     return Column(str(tree["column"]), factor(str(tree["unit"]), where) if "unit" in tree else 1.0)
 
 
 def _offset(path: Path, tree: Mapping[str, Any]) -> float:
     offset = tree.get("clock_offset", math.nan)
     if isinstance(offset, bool) or not isinstance(offset, int | float) or math.isinf(offset):
-        raise TraceError(
+        raise RecorderError(
             f"{path}: clock_offset is {str(offset)[:40]!r}, it must be a number of seconds"
         )
     return float(offset)
@@ -158,27 +160,27 @@ Wanted = Callable[[str], bool]
 def chosen(
     headings: Sequence[str], where: str, wanted: Wanted, mapping: TraceMapping
 ) -> dict[str, tuple[int, float]]:
-    """Place and factor to SI of each column by its name; TraceError without a time, or with two of
-    a name.
+    """Place and factor to SI of each column by its name; RecorderError without a time, or with two
+    of a name.
     """
     places: dict[str, tuple[int, float]] = {}
     for name, column in mapping.columns.items():
         if column.heading not in headings:
-            raise TraceError(
+            raise RecorderError(
                 f"{where}: there is no column {column.heading[:80]!r}, {_known(headings)}"
             )
         if headings.count(column.heading) > 1:
-            raise TraceError(f"{where}: column {column.heading[:80]} is there twice")
+            raise RecorderError(f"{where}: column {column.heading[:80]} is there twice")
         places[name] = headings.index(column.heading), column.factor
     for k, heading in enumerate([] if mapping.columns else headings):
         name, scale = _named(heading, where, wanted)
         if not wanted(name):
             continue
         if name in places:
-            raise TraceError(f"{where}: column {name} is there twice")
+            raise RecorderError(f"{where}: column {name} is there twice")
         places[name] = k, scale
     if TIME not in places:
-        raise TraceError(f"{where}: there is no column time, {_known(headings)}")
+        raise RecorderError(f"{where}: there is no column time, {_known(headings)}")
     return places
 
 

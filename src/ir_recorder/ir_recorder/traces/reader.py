@@ -12,7 +12,7 @@ import numpy as np
 
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.names import JOINT_NAMES
-from ir_recorder.errors import TraceError
+from ir_recorder.errors import RecorderError
 from ir_recorder.reading.reader import read_recording
 from ir_recorder.reading.recording import JointSeries, PowerSeries, Recording
 from ir_recorder.traces.columns import TraceMapping, Wanted
@@ -36,7 +36,7 @@ _NUMBERS = frozenset(int(mode) for mode in Mode)
 
 
 def recorded_traces(recording: Recording) -> tuple[Trace, ...]:
-    """The joints' trace and the meter's, as far as they were recorded; TraceError where neither
+    """The joints' trace and the meter's, as far as they were recorded; RecorderError where neither
     was.
     """
     found = []
@@ -46,7 +46,7 @@ def recorded_traces(recording: Recording) -> tuple[Trace, ...]:
         found.append(power_trace(recording.power, f"{recording.path} meter"))
     if not found:
         why = "; ".join(recording.problems) or "neither joint states nor the meter are in it"
-        raise TraceError(f"{recording.path}: {why[:500]}")
+        raise RecorderError(f"{recording.path}: {why[:500]}")
     return tuple(found)
 
 
@@ -101,8 +101,8 @@ def read_traces(
     recording.
 
     Without a mapping the columns that are read are `time`, `power`, `energy`, `mode`, `load`, and
-    for each joint its name and `_velocity`, `_acceleration`, `_effort`. TraceError or ReadError as
-    a sentence.
+    for each joint its name and `_velocity`, `_acceleration`, `_effort`. RecorderError or ReadError
+    as a sentence.
     """
     path = Path(path)
     mapping = mapping or TraceMapping()
@@ -114,7 +114,7 @@ def read_traces(
         return (_shifted(read_parquet(path, wanted, mapping), mapping),)
     if ending == ".mcap":
         return tuple(_shifted(trace, mapping) for trace in recorded_traces(read_recording(path)))
-    raise TraceError(f"{path}: traces are read from .csv, .parquet and .mcap")
+    raise RecorderError(f"{path}: traces are read from .csv, .parquet and .mcap")
 
 
 def column_names(joint_names: Sequence[str]) -> frozenset[str]:
@@ -123,7 +123,7 @@ def column_names(joint_names: Sequence[str]) -> frozenset[str]:
 
 
 def _wanted(path: Path, joint_names: Sequence[str]) -> Wanted:
-    """Whether a column is read. TraceError for a joint that the robot doesn't have, by its
+    """Whether a column is read. RecorderError for a joint that the robot doesn't have, by its
     number.
     """
     known = column_names(joint_names)
@@ -134,7 +134,7 @@ def _wanted(path: Path, joint_names: Sequence[str]) -> Wanted:
             return True
         if name[-1:].isdecimal() and name.rstrip(_DIGITS) in stems:
             there = ", ".join(joint_names)
-            raise TraceError(f"{path}: {name[:40]} is no joint of the robot, which has {there}")
+            raise RecorderError(f"{path}: {name[:40]} is no joint of the robot, which has {there}")
         return False
 
     return wanted

@@ -16,7 +16,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from ir_recorder.errors import TraceError
+from ir_recorder.errors import RecorderError
 from ir_recorder.traces.columns import TraceMapping, Wanted, chosen
 from ir_recorder.traces.trace import LOAD, MODE, TIME, Trace
 from ir_values.arrays import BoolArray, FloatArray, IntArray
@@ -28,20 +28,20 @@ BYTES_MAX = 500_000_000
 
 def opened(path: Path) -> int:
     """A descriptor of a file of at most BYTES_MAX; never waits on a FIFO or a device. Raises
-    TraceError.
+    RecorderError.
     """
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise TraceError(f"{path}: can't be opened: {reason}") from error
+        raise RecorderError(f"{path}: can't be opened: {reason}") from error
     status = os.fstat(descriptor)
     fault = "is not a regular file" if not stat.S_ISREG(status.st_mode) else ""
     if not fault and status.st_size > BYTES_MAX:
         fault = f"has {status.st_size} bytes, at most {BYTES_MAX} are read"
     if fault:
         os.close(descriptor)
-        raise TraceError(f"{path}: {fault}")
+        raise RecorderError(f"{path}: {fault}")
     return descriptor
 
 
@@ -60,12 +60,12 @@ WORDS = (MODE, LOAD)  # columns of words
 
 
 def read_csv(path: Path, wanted: Wanted, mapping: TraceMapping) -> Trace:
-    """The trace of a CSV file; TraceError with the line and the column that is wrong."""
+    """The trace of a CSV file; RecorderError with the line and the column that is wrong."""
     with _lines(path) as file:
         try:
             return _Reader(path, file, wanted, mapping, _cut(file)).trace()
         except csv.Error as error:
-            raise TraceError(f"{path}: {error}") from error
+            raise RecorderError(f"{path}: {error}") from error
 
 
 def _lines(path: Path) -> TextIO:
@@ -112,10 +112,10 @@ class _Reader:
             self._begin += 1
             if "\0" in line:
                 fault = "has zero bytes: it is no text in UTF-8, nor in UTF-16 with its mark"
-                raise TraceError(f"{self._path}:{self._begin}: {fault}; save it as CSV UTF-8")
+                raise RecorderError(f"{self._path}:{self._begin}: {fault}; save it as CSV UTF-8")
             if line.strip() and not line.startswith("#"):
                 return line
-        raise TraceError(f"{self._path}: has 0 points, a trace has at least 2")
+        raise RecorderError(f"{self._path}: has 0 points, a trace has at least 2")
 
     def trace(self) -> Trace:
         """All rows."""
@@ -141,7 +141,9 @@ class _Reader:
             line = line + len(block)
             size = size + blocks[-1].size
             if size > VALUES_MAX:
-                raise TraceError(f"{self._path}:{line}: more than {VALUES_MAX} values, the limit")
+                raise RecorderError(
+                    f"{self._path}:{line}: more than {VALUES_MAX} values, the limit"
+                )
         values = np.concatenate(blocks) if blocks else np.empty((0, len(numbers)))
         columns = {name: np.ascontiguousarray(values[:, k]) for k, name in enumerate(numbers)}
         spoken = {name: tuple(each) for name, each in texts.items()}
@@ -188,7 +190,7 @@ class _Reader:
         values = np.empty((len(rows), len(names)))
         for k, (line, row) in enumerate(rows):
             if len(row) != len(self._headings):
-                raise TraceError(
+                raise RecorderError(
                     f"{self._path}:{line}: has {len(row)} values, "
                     f"the header names {len(self._headings)} columns"
                 )
@@ -206,7 +208,9 @@ class _Reader:
             if value - value != 0.0 and (
                 value == value or name == TIME
             ):  # inf; nan is a missing value
-                raise TraceError(f"{self._path}:{line}: {name} is {text[:40]!a}, it must be finite")
+                raise RecorderError(
+                    f"{self._path}:{line}: {name} is {text[:40]!a}, it must be finite"
+                )
         return value
 
     def _unusual(self, text: str, name: str, line: int) -> float:
@@ -219,14 +223,14 @@ class _Reader:
                 return datetime.fromisoformat(text).timestamp()
         except ValueError:
             pass
-        raise TraceError(f"{self._path}:{line}: {name} is {text[:40]!a}, it must be a number")
+        raise RecorderError(f"{self._path}:{line}: {name} is {text[:40]!a}, it must be a number")
 
     def _check_time(self, time: FloatArray, lines: Sequence[IntArray]) -> None:
         back = np.flatnonzero(np.diff(time) <= 0.0)
         if len(back):
             k = int(back[0]) + 1
             line = np.concatenate(lines)[k]
-            raise TraceError(
+            raise RecorderError(
                 f"{self._path}:{line}: time is {time[k]:.12g} s, it must increase: the row "
                 f"before has {time[k - 1]:.12g} s"
             )
@@ -247,13 +251,13 @@ def _once(values: FloatArray, spoken: Mapping[str, Sequence[str]]) -> BoolArray:
 
 
 def read_parquet(path: Path, wanted: Wanted, mapping: TraceMapping) -> Trace:
-    """The trace of a Parquet file; TraceError where pyarrow isn't installed or a column makes no
+    """The trace of a Parquet file; RecorderError where pyarrow isn't installed or a column makes no
     sense.
     """
     try:
         from pyarrow import ArrowException, parquet
     except ImportError as error:
-        raise TraceError(f"{path}: Parquet needs pyarrow: pip install pyarrow") from error
+        raise RecorderError(f"{path}: Parquet needs pyarrow: pip install pyarrow") from error
     try:
         with os.fdopen(opened(path), "rb") as stream:
             file = parquet.ParquetFile(stream)
@@ -261,10 +265,10 @@ def read_parquet(path: Path, wanted: Wanted, mapping: TraceMapping) -> Trace:
                 [str(name) for name in file.schema_arrow.names], str(path), wanted, mapping
             )
             if file.metadata.num_rows * len(places) > VALUES_MAX:
-                raise TraceError(f"{path}: more than {VALUES_MAX} values, the limit")
+                raise RecorderError(f"{path}: more than {VALUES_MAX} values, the limit")
             table = _read(file, [place for place, _ in places.values()])
     except (ArrowException, OSError) as error:
-        raise TraceError(f"{path}: {error}") from error
+        raise RecorderError(f"{path}: {error}") from error
     columns = dict[str, FloatArray]()
     texts = dict[str, tuple[str, ...]]()
     for (name, (_, scale)), column in zip(places.items(), table, strict=True):
@@ -293,7 +297,7 @@ def _numeric(types: Any) -> tuple[Callable[[Any], bool], ...]:
 
 
 def _numbers(path: Path, column: Any, name: str) -> FloatArray:
-    """Values (N,), NaN where a cell is empty; times may be dates. TraceError for what is no
+    """Values (N,), NaN where a cell is empty; times may be dates. RecorderError for what is no
     number.
     """
     from pyarrow import ArrowException, types
@@ -305,11 +309,11 @@ def _numbers(path: Path, column: Any, name: str) -> FloatArray:
         try:
             numbers = np.array(column.cast("float64").to_numpy(), np.float64)
         except ArrowException as error:
-            raise TraceError(f"{path}: column {name}: {error}") from error
+            raise RecorderError(f"{path}: column {name}: {error}") from error
     else:
-        raise TraceError(f"{path}: column {name} is of {column.type}, it must be of numbers")
+        raise RecorderError(f"{path}: column {name} is of {column.type}, it must be of numbers")
     wrong = np.flatnonzero(~np.isfinite(numbers) if name == TIME else np.isinf(numbers))
     if len(wrong):
         row = int(wrong[0])
-        raise TraceError(f"{path}: row {row + 1}: {name} is {numbers[row]:g}, it must be finite")
+        raise RecorderError(f"{path}: row {row + 1}: {name} is {numbers[row]:g}, it must be finite")
     return numbers

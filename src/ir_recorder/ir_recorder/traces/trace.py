@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 from scipy.signal import correlate
 
-from ir_recorder.errors import TraceError
+from ir_recorder.errors import RecorderError
 from ir_values.arrays import FloatArray
 
 # Measured data on one clock: columns of numbers and of words over strictly increasing seconds, in
@@ -45,11 +45,13 @@ class Trace:
 
     def __post_init__(self) -> None:
         if len(self.time) < 2:
-            raise TraceError(f"{self.source}: has {len(self.time)} points, a trace has at least 2")
+            raise RecorderError(
+                f"{self.source}: has {len(self.time)} points, a trace has at least 2"
+            )
         back = np.flatnonzero(np.diff(self.time) <= 0.0)
         if len(back):
             k = int(back[0])
-            raise TraceError(
+            raise RecorderError(
                 f"{self.source}: time {self.time[k + 1]:g} s follows {self.time[k]:g} s"
             )
         self.time.setflags(write=False)
@@ -65,7 +67,7 @@ class Trace:
         """Columns (N, n) of all joints with an ending ("", "_velocity", ...); None where none has
         it.
 
-        TraceError where some have it and others have not.
+        RecorderError where some have it and others have not.
         """
         wanted = [f"{name}{ending}" for name in names]
         missing = [name for name in wanted if name not in self.columns]
@@ -73,7 +75,9 @@ class Trace:
             return None
         if missing:
             known = ", ".join(self.columns)[:200]
-            raise TraceError(f"{self.source}: there is no column {missing[0]}, there is: {known}")
+            raise RecorderError(
+                f"{self.source}: there is no column {missing[0]}, there is: {known}"
+            )
         return np.column_stack([self.columns[name] for name in wanted])
 
     def gaps(self) -> tuple[tuple[float, float], ...]:
@@ -113,7 +117,7 @@ def _filled(values: FloatArray) -> FloatArray:
     """Missing values replaced by the one before; by the first one at the start."""
     known = np.isfinite(values)
     if not known.any():
-        raise TraceError("a column of the meter holds no value at all")
+        raise RecorderError("a column of the meter holds no value at all")
     rows = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
     return np.where(rows < 0, values[np.argmax(known)], values[np.maximum(rows, 0)])
 
@@ -180,8 +184,8 @@ def clock_offset(
 
     By the normalised cross-correlation of both at 100 Hz, between samples by a parabola through its
     peak.
-    TraceError where no offset stands out: the signals are too short, too flat, or not of the same
-    run.
+    RecorderError where no offset stands out: the signals are too short, too flat, or not of the
+    same run.
     """
     first = _regular(time, watts)
     second = _regular(other_time, other_watts)
@@ -194,7 +198,7 @@ def clock_offset(
     peak = int(np.argmax(score))
     best = float(score[peak])
     if not best >= LEAST_CORRELATION:
-        raise TraceError(
+        raise RecorderError(
             f"the clocks' offset can't be found: the powers agree by {best:.2f} at best, at least "
             f"{LEAST_CORRELATION} is needed; give clock_offset"
         )
@@ -206,7 +210,7 @@ def _regular(time: FloatArray, values: FloatArray) -> FloatArray:
     span = float(time[-1] - time[0])
     count = int(span * RATE) + 1
     if not 3 <= count <= MOST_SAMPLES:
-        raise TraceError(f"the clocks' offset can't be found in {span:g} s of data")
+        raise RecorderError(f"the clocks' offset can't be found in {span:g} s of data")
     return np.asarray(np.interp(time[0] + np.arange(count) / RATE, time, values))
 
 

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import Mode, PowerState
 from ir_msgs_py.plc import PlcInputs, PlcOutputs
 from ir_sim_driver.controller.simulation import Simulation
@@ -15,6 +14,7 @@ from ir_sim_driver.load_check import LoadFinding
 from ir_sim_driver.motion import Following
 from ir_sim_driver.notices import Level
 from ir_sim_driver.plant import Carried
+from ir_values.arrays import FloatArray
 
 # Frames: joints every tick; power, controller state and PLC levels when due.
 #

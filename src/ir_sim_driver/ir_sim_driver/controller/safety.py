@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 
 from ir_description import RobotModel
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.controller.supervision import Command, Fault, Supervision
@@ -17,6 +16,7 @@ from ir_sim_driver.motion import ErrorCode, Executor, Path, ToolPoint
 from ir_sim_driver.notices import Level, Notices
 from ir_sim_driver.plant import Backend
 from ir_sim_driver.plc import Plc
+from ir_values.arrays import FloatArray
 
 # Excursion: how far the tool leaves its path while the brakes stop the robot.
 

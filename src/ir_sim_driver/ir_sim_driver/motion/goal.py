@@ -9,10 +9,10 @@ from enum import IntEnum
 import numpy as np
 
 from ir_msgs_py.announcements import Contact
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.settings import check_settings, setting
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.load_check import LoadFinding
+from ir_values.arrays import FloatArray
+from ir_values.settings import check_settings, setting
 
 # Goals and outcomes; codes of control_msgs/FollowJointTrajectory.
 

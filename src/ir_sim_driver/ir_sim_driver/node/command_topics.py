@@ -16,7 +16,6 @@ from trajectory_msgs.msg import JointTrajectory
 
 from ir_msgs.msg import PlcInputs
 from ir_msgs_py import names
-from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.plc import PlcInputs as Levels
 from ir_msgs_py.ros.conversions import status_to_msg
 from ir_msgs_py.ros.messages import type_name
@@ -37,6 +36,7 @@ from ir_sim_driver.motion import ErrorCode, Outcome, TrajectoryGoal
 from ir_sim_driver.node.messages import goal_from_trajectory
 from ir_sim_driver.node.trajectory_actions import TrajectoryReader
 from ir_sim_driver.plc import STOP_BIT, TOPIC
+from ir_values.errors import IrError
 
 # PLC inputs and recovery.
 #
@@ -145,7 +145,7 @@ class PlcTopic:
         msg = deserialize_message(data, PlcInputs)
         try:
             levels = plc_inputs_from_msg(msg)
-        except (MsgsError, ValueError) as error:
+        except (IrError, ValueError) as error:
             self._driver.warn(f"plc_inputs ignored: {error}")
             if msg.emergency_stop:
                 self._write(lambda: self._driver.plc.write_inputs(TOPIC, {STOP_BIT: True}))
@@ -157,7 +157,7 @@ class PlcTopic:
     def _write(self, write: Callable[[], None]) -> None:
         try:
             write()
-        except (MsgsError, DriverError) as error:
+        except (IrError, DriverError) as error:
             self._driver.warn(f"plc_inputs ignored: {error}")
 
 

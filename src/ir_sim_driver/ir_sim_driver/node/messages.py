@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from ir_description import RobotModel
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import JointNamesError, TrajectoryError
 from ir_msgs_py.names import STOPS_STATE
 from ir_msgs_py.ros.conversions import (
     duration_to_msg,
@@ -21,6 +19,8 @@ from ir_sim_driver.controller import Entry
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.load_check import LoadFinding
 from ir_sim_driver.motion import ErrorCode, Following, JointTolerance, TrajectoryGoal
+from ir_values.arrays import FloatArray
+from ir_values.errors import JointNamesError, TrajectoryError
 
 _NS = 1e-9
 _DIGITS = 20

@@ -22,18 +22,12 @@ from ir_description import DescriptionError
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, StartPause
 from ir_msgs_py import names
-from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.ros.diagnostics import Diagnostics
 from ir_msgs_py.ros.node_process import run_node
 from ir_msgs_py.ros.serving import BoundedService
 from ir_msgs_py.ros.topics import ACTION_SERVICES
 from ir_sim_driver.controller import Driver, Joints, Simulation, make_simulation
-from ir_sim_driver.errors import (
-    DriverError,
-    LinkError,
-    PlantStoppedError,
-    TrajectoryRefusedError,
-)
+from ir_sim_driver.errors import DriverError, LinkError, TrajectoryRefusedError
 from ir_sim_driver.node.announcements import Announcements
 from ir_sim_driver.node.command_topics import (
     CommandThread,
@@ -50,6 +44,7 @@ from ir_sim_driver.node.trajectory_actions import Admission, BoundedActionServer
 from ir_sim_driver.node.visualization import open_transforms, robot_markers
 from ir_sim_driver.notices import Level, Notice, shortened
 from ir_sim_driver.plc import Link, OpenLink, WakeOnLan
+from ir_values.errors import IrError
 
 # Links to the PLC; a controller that nothing can wake does not hibernate.
 
@@ -83,7 +78,7 @@ _LINES_MAX = 20  # of the log per second: who toggles a bit all day must not fil
 _RESULT_KEPT = 60  # s that the result of a goal can be asked for; each takes memory
 _GRAPH_PERIOD = 0.2  # s between two looks who is there: each takes a millisecond
 _LAST_WORDS = 1.0  # s for the answers to goals when the plant has stopped
-REFUSALS = (DriverError, DescriptionError, MsgsError)
+REFUSALS = (DriverError, DescriptionError, IrError)
 _LOOK = 1.0  # s between two looks whether the plant runs: each delays its thread
 _SWITCH_INTERVAL = 0.0005  # s; the plant's thread must not wait 5 ms for another thread's Python
 
@@ -91,7 +86,7 @@ _SWITCH_INTERVAL = 0.0005  # s; the plant's thread must not wait 5 ms for anothe
 class SimDriver(Node):
     """Node around a Driver. simulation: another core than the one the parameters describe.
 
-    Raises DriverError, DescriptionError or MsgsError when a parameter makes no sense.
+    Raises DriverError, DescriptionError or IrError when a parameter makes no sense.
     """
 
     def __init__(self, simulation: Simulation | None = None, **node_options: Any) -> None:
@@ -124,7 +119,7 @@ class SimDriver(Node):
         return self._links[link].port if link in self._links else 0
 
     def destroy_node(self) -> None:
-        """Stop the plant, then the rest. Raises PlantStoppedError when the plant had ended
+        """Stop the plant, then the rest. Raises DriverError when the plant had ended
         before.
         """
         self._presses.close()
@@ -137,7 +132,7 @@ class SimDriver(Node):
             action.destroy()
         super().destroy_node()
         if self._driver.failure:
-            raise PlantStoppedError(self._driver.failure)
+            raise DriverError(self._driver.failure)
 
     def _open_topics(self) -> None:
         self._streams = Streams(self, self._driver.joint_names)

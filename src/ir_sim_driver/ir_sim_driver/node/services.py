@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from ir_description import Cell
-from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.ros.power_conversions import plc_inputs_to_msg, power_mode_to_msg
 from ir_msgs_py.ros.serving import answered
 from ir_msgs_py.status import Status, StatusCode
@@ -19,6 +18,7 @@ from ir_sim_driver.controller import Driver
 from ir_sim_driver.errors import DriverError, RequestRefusedError
 from ir_sim_driver.plant import CUSTOM, Carried, carried, custom_load
 from ir_sim_driver.plc import SERVICE
+from ir_values.errors import IrError
 
 
 class Services:
@@ -115,6 +115,6 @@ class Services:
 def _known(error: Exception) -> Status | None:
     if isinstance(error, RequestRefusedError):
         return Status(error.code, str(error))
-    if isinstance(error, (MsgsError, DriverError)):
+    if isinstance(error, (IrError, DriverError)):
         return Status(StatusCode.FAILURE, str(error))
     return None

@@ -12,7 +12,6 @@ from rclpy.serialization import deserialize_message
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from ir_msgs.msg import LoadCheck
-from ir_msgs_py.checks import one_line
 from ir_msgs_py.ros.plan_conversions import contact_to_msg
 from ir_msgs_py.ros.rclpy_inside import part, participant_of
 from ir_msgs_py.ros.serving import RecordedActionServer
@@ -20,6 +19,7 @@ from ir_sim_driver.controller import Driver, refused
 from ir_sim_driver.load_check import LoadFinding
 from ir_sim_driver.motion import ErrorCode, Outcome, TrajectoryGoal
 from ir_sim_driver.node.messages import fill_load_check, fill_points, goal_from_action
+from ir_values.errors import one_line
 
 
 class ClientWatch:

@@ -8,7 +8,6 @@ from math import inf
 
 from ir_msgs_py.modes import REST_OF_BIT, ROW, Mode
 from ir_msgs_py.plc import PLC_INPUT_NAMES, OperatingMode, PlcInputs
-from ir_msgs_py.settings import check_settings, setting
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.notices import Level, Notices
@@ -16,6 +15,7 @@ from ir_sim_driver.plc.modbus import ModbusTcp
 from ir_sim_driver.plc.port import STOP_BIT, Link
 from ir_sim_driver.plc.stop import StopMachine
 from ir_sim_driver.plc.wake_on_lan import WakeOnLan
+from ir_values.settings import check_settings, setting
 
 # Links that there are: a new one is a module and a line here.
 
