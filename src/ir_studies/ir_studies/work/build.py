@@ -1,9 +1,9 @@
-"""What the bits of a result depend on beside its job: versions, sources, and how a processor adds
-up.
+"""The fingerprint of what the bits of a result depend on beside its job: versions, sources, and
+arithmetic.
 
-Equal versions are not enough: NumPy and OpenBLAS choose their loops by the processor, and a sum in
-another order has other last bits. So a few numbers are computed, and what came out is compared bit
-by bit.
+Every x86-64 processor has the same arithmetic (law 26); another architecture, compiler or the NumPy
+reference may have another. So a few numbers are computed with the functions that decide answers,
+and the result is compared bit by bit.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 import scipy
 
 from ir_description import load_robot
-from ir_kernels import Chain, DynamicsModel, compiled
+from ir_kernels import Chain, DynamicsModel, compiled, portable
 
 PACKAGES = (
     "ir_description", "ir_kernels", "ir_krl", "ir_msgs_py", "ir_planner", "ir_recorder", "ir_sim_driver", "ir_values",  # noqa: E501
@@ -38,10 +38,11 @@ def computed_with(kind: str) -> str:
     versions = (
         f"python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}"
     )
+    kernels = "reference" if compiled.NAME == "reference" else "compiled"
     if kind == _WITH_OMPL:
         versions += f", ompl {_version('ompl')}"
     return (
-        f"{versions}, kernels {compiled.NAME}, {platform.machine()}, sources {sources()}, "
+        f"{versions}, kernels {kernels}, {platform.machine()}, sources {sources()}, "
         f"arithmetic {arithmetic()}"
     )
 
@@ -59,21 +60,29 @@ def sources() -> str:
 
 
 def arithmetic() -> str:
-    """Digest of numbers that another processor, BLAS or compiler may compute otherwise in the last
+    """Digest of numbers that another architecture or compiler may compute otherwise in the last
     bit.
     """
     x = np.linspace(-3.0, 3.0, _N * _N)
-    A = np.sin(np.add.outer(np.arange(_N), np.arange(_N) ** 2.0))
+    A = portable.sin(np.add.outer(np.arange(_N), np.square(np.arange(_N, dtype=float))))
     regular = A + _N * np.eye(_N)
     robot = load_robot()
-    q = np.stack([np.sin(np.arange(_N) + joint) for joint in range(len(robot.joint_names))], axis=1)
+    joints = np.arange(len(robot.joint_names))
+    q = np.ascontiguousarray(portable.sin(np.add.outer(np.arange(_N), joints)))
+    poses = Chain(robot).tcp_poses(q)
+    torques = DynamicsModel(robot).inverse_dynamics(q, 2.0 * q, q[::-1].copy())
     computed = [
-        np.sin(x), np.cos(x), np.exp(x), np.log1p(np.abs(x)), np.tanh(x), np.arctan2(x, x[::-1]),
-        np.abs(x) ** 1.7, np.cumsum(x), np.array(x.sum()), np.array(x @ x), A @ A, A @ x[:_N],
-        np.linalg.norm(A, axis=1),
-        np.linalg.solve(regular, x[:_N]), np.linalg.svd(A, compute_uv=False), scipy.linalg.eigvalsh(A + A.T),  # noqa: E501
-        Chain(robot).tcp_poses(q), DynamicsModel(robot).inverse_dynamics(q, 2.0 * q, q[::-1].copy()),  # noqa: E501
-    ]  # fmt: skip
+        *(portable.sin(x), portable.cos(x), portable.exp(x), portable.log(np.abs(x))),
+        *(portable.arctan2(x, x[::-1]), portable.power(np.abs(x), 1.7)),
+        *(
+            np.cumsum(x),
+            np.array(x.sum()),
+            np.linalg.norm(A, axis=1),
+            np.einsum("ij,j->i", A, A[0]),
+        ),
+        *(portable.matmul(A, A), portable.solve(regular, x[:_N]), portable.singular_values(A)),
+        *(poses, torques),
+    ]
     return sha256(b"".join(each.tobytes() for each in computed)).hexdigest()[:_CHARACTERS]
 
 
