@@ -14,6 +14,7 @@ from rcl_interfaces.srv import ListParameters
 from rclpy.action import ActionClient, CancelResponse
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.qos import QoSProfile
+from rclpy.serialization import deserialize_message
 from rclpy.task import Future
 from std_msgs.msg import Int32
 
@@ -24,6 +25,8 @@ from ir_msgs_py.ros.serving import BoundedService, RecordedActionServer
 from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.ros.topics import CommandTopic, LatestMessage, PolledTopic
 from ir_msgs_py.status import StatusCode
+from ir_recorder.format.qos import QosOffer
+from ir_recorder.node.subscriptions import Listener
 
 RESPONSES = ("send_goal_response", "send_cancel_response", "send_result_response")
 
@@ -242,3 +245,25 @@ def test_without_insides_topics_are_heard(
     for number in (1, 2, 3):
         ros_executor.run(lambda number=number: publisher.publish(Int32(data=number)))
     wait_for(look, what="every message is there")
+
+
+def test_without_insides_the_recorder_hears_the_bytes(
+    plain_rclpy: None, ros_executor: Any, ros_node: Any, wait_for: Any
+) -> None:
+    publisher = ros_executor.run(
+        lambda: ros_node.create_publisher(Int32, "/numbers", QoSProfile(depth=10))
+    )
+    listener = ros_executor.run(lambda: Listener(ros_node, 10))
+    ros_executor.run(lambda: listener.open("/numbers", "std_msgs/msg/Int32", [QosOffer()]))
+    wait_for(publisher.get_subscription_count, what="it listens")
+    heard: list[int] = []
+
+    def look() -> bool:
+        arrived = ros_executor.run(listener.take)
+        heard.extend(deserialize_message(each.data, Int32).data for each in arrived)
+        return heard == [1, 2, 3]
+
+    for number in (1, 2, 3):
+        ros_executor.run(lambda number=number: publisher.publish(Int32(data=number)))
+    wait_for(look, what="every message is there")
+    ros_executor.run(listener.close)

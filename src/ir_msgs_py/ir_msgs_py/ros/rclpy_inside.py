@@ -106,10 +106,13 @@ def can_take_messages(subscription: Any) -> bool:
 
 
 def take_message(subscription: Any) -> tuple[Any, dict[str, int]] | None:
-    """The next message of a subscription that no executor waits for, with its times [ns]."""
+    """The next message of a subscription that no executor waits for, with its times [ns].
+
+    Its bytes, where the subscription is a raw one.
+    """
     with subscription.handle:
         taken: tuple[Any, dict[str, int]] | None = subscription.handle.take_message(
-            subscription.msg_type, False
+            subscription.msg_type, subscription.raw
         )
     return taken
 

@@ -4,8 +4,10 @@ for every message.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from operator import attrgetter
 from typing import Any
 
@@ -21,6 +23,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from ir_msgs_py import names
 from ir_msgs_py.names import owns_diagnostic, owns_logger, owns_node
 from ir_msgs_py.ros.messages import interface_type
+from ir_msgs_py.ros.rclpy_inside import can_take_messages, take_message
 from ir_msgs_py.ros.topics import PolledGroup
 from ir_recorder.errors import SchemaError
 from ir_recorder.format.qos import QosOffer, request_for
@@ -75,9 +78,9 @@ class Listener:
         self._depth = depth
         self._group = PolledGroup()
         self._subscriptions: dict[str, Subscription] = {}
-        self._numbers: dict[
-            str, int | None
-        ] = {}  # of the last message; None where publishers mix theirs
+        self._next: dict[str, Callable[[], tuple[Any, dict[str, int]] | None]] = {}
+        # of the last message; None where publishers mix theirs
+        self._numbers: dict[str, int | None] = {}
         self.lost = 0
 
     def __contains__(self, topic: str) -> bool:
@@ -105,15 +108,26 @@ class Listener:
             else ReliabilityPolicy.BEST_EFFORT,
             durability=_LATCHED if request.transient_local else DurabilityPolicy.VOLATILE,
         )
-        subscription = self._node.create_subscription(
+        came: deque[tuple[bytes, dict[str, int]]] = deque(maxlen=self._depth)
+
+        def keep(data: bytes, info: dict[str, int]) -> None:
+            came.append((data, info))
+
+        subscribe = partial(
+            self._node.create_subscription,
             _message_type(type_name),
             topic,
-            _unused,
+            keep,
             profile,
             raw=True,
-            callback_group=self._group,
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
+        subscription = subscribe(callback_group=self._group)
+        self._next[topic] = partial(take_message, subscription)
+        if not can_take_messages(subscription):  # then rclpy calls back with what comes
+            self._node.destroy_subscription(subscription)
+            subscription = subscribe()
+            self._next[topic] = lambda: came.popleft() if came else None
         self._subscriptions[topic] = subscription
         self._numbers[topic] = 0 if len(offers) == 1 else None
 
@@ -121,16 +135,15 @@ class Listener:
         """All that has arrived since the last time, in the order of arrival."""
         clock = self._node.get_clock()
         arrived = []
-        for topic, subscription in self._subscriptions.items():
-            with subscription.handle:
-                for _ in range(self._depth):
-                    taken = subscription.handle.take_message(subscription.msg_type, True)
-                    if taken is None:
-                        break
-                    data, info = taken
-                    received = info["received_timestamp"] if not clock.ros_time_is_active else 0
-                    self._count(topic, info["publication_sequence_number"])
-                    arrived.append(Arrival(received or clock.now().nanoseconds, topic, data))
+        for topic, take in self._next.items():
+            for _ in range(self._depth):
+                taken = take()
+                if taken is None:
+                    break
+                data, info = taken
+                received = info["received_timestamp"] if not clock.ros_time_is_active else 0
+                self._count(topic, info["publication_sequence_number"])
+                arrived.append(Arrival(received or clock.now().nanoseconds, topic, data))
         return sorted(arrived, key=attrgetter("time"))
 
     def close(self) -> None:
@@ -138,6 +151,7 @@ class Listener:
         for subscription in self._subscriptions.values():
             self._node.destroy_subscription(subscription)
         self._subscriptions.clear()
+        self._next.clear()
         self._group = PolledGroup()  # a group keeps a reference to whatever it ever had
 
     def _count(self, topic: str, number: int | None) -> None:
@@ -149,10 +163,6 @@ class Listener:
             if 0 < last < number:
                 self.lost += number - last - 1
             self._numbers[topic] = number
-
-
-def _unused(data: bytes) -> None:
-    """Messages are taken by `Listener.take`."""
 
 
 def _offer(publisher: TopicEndpointInfo) -> QosOffer:
