@@ -14,7 +14,7 @@ import pytest
 from ir_description import Body, cell_hash, load_cell
 from ir_sim_driver.controller import Driver, PlannedCell, surroundings
 from ir_sim_driver.controller.driver import take_offered_cell
-from ir_sim_driver.errors import TrajectoryRefusedError
+from ir_sim_driver.errors import RequestRefusedError, TrajectoryRefusedError
 from ir_sim_driver.motion.goal import ErrorCode, Outcome, TrajectoryGoal
 from ir_sim_driver.node.announcements import announced
 from ir_sim_driver.plant import carried, custom_load
@@ -174,3 +174,96 @@ def test_the_announced_load_is_one_rigid_body():
     together = sum(about_origin(each.mass, each.com, each.inertia) for each in load.loads)
     np.testing.assert_allclose(about_origin(one.mass, one.center_of_mass, one.inertia), together)
     assert announced(carried(DEMO, "none")).mass == 0.0
+
+
+def same_name(**other):
+    """A robot under the driver's name with other data."""
+    return replace(DEMO, robot=replace(DEMO.robot, **other))
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        same_name(capsules=DEMO.robot.capsules[:1], self_pairs=(), load_self_capsules=()),
+        same_name(velocity_max=DEMO.robot.velocity_max * 1.000001),
+    ],
+    ids=["one capsule", "a little faster"],
+)
+def test_a_robot_is_compared_by_its_content(make, other):
+    driver = Driver(make())
+    driver.offer_cell(planned(other))
+    for stamp in (2_000_000, 4_000_000):
+        driver.tick(stamp)
+    driver.close()
+    assert driver._simulation.cell is not other
+    assert any("data differ" in notice.sentence for notice in driver.snapshot(0.0).notices)
+
+
+def test_a_cell_without_bodies_is_a_cell(make, plan):
+    simulation = make(load="none")
+    bare = replace(
+        OPEN, equipment=(), parts=(), stations=(), program=(), floor=False, tool=None, paths=()
+    )
+    driver = Driver(simulation)
+    driver.offer_cell(planned(bare))
+    for k in range(1, 200):
+        driver.tick(k * 2_000_000)
+    driver.close()
+    assert driver.failure == ""
+    assert simulation.cell is bare
+
+
+def test_whatever_fails_while_a_cell_is_tried_leaves_the_old_one(make, monkeypatch):
+    simulation = make()
+    driver = Driver(simulation)
+    monkeypatch.setattr(
+        "ir_sim_driver.controller.driver.ContactScene.of",
+        lambda *given: (_ for _ in ()).throw(IndexError("no such capsule")),
+    )
+    before = simulation.cell
+    driver.offer_cell(planned(DEMO))
+    monkeypatch.undo()
+    driver.tick(2_000_000)
+    driver.close()
+    assert simulation.cell is before
+    assert any("no such capsule" in notice.sentence for notice in driver.snapshot(0.0).notices)
+
+
+def test_whatever_fails_while_a_cell_is_taken_leaves_the_old_one(make, monkeypatch):
+    simulation = make()
+    driver = Driver(simulation)
+    before = simulation.cell
+    hashed = simulation.surroundings.hash
+    driver.offer_cell(planned(DEMO))
+    stand_in = simulation.cell_watch.stand_in
+
+    def fails(cell, load):
+        if cell.name == DEMO.name:
+            raise ZeroDivisionError
+        stand_in(cell, load)
+
+    monkeypatch.setattr(simulation.cell_watch, "stand_in", fails)
+    driver.tick(2_000_000)
+    driver.tick(4_000_000)
+    driver.close()
+    assert driver.failure == ""
+    assert simulation.cell is before
+    assert simulation.surroundings.hash == hashed
+
+
+def test_whatever_fails_while_a_load_is_taken_leaves_the_old_one(make, monkeypatch):
+    simulation = make(load="none")
+    before = simulation.load
+    carry = simulation.cell_watch.carry
+
+    def fails(load):
+        if load is not before:
+            raise ValueError("no place for it")
+        carry(load)
+
+    monkeypatch.setattr(simulation.cell_watch, "carry", fails)
+    driver = Driver(simulation)
+    with pytest.raises(RequestRefusedError, match="no place for it"):
+        driver.set_load(lambda cell: carried(cell, "none"))
+    driver.close()
+    assert simulation.load is before

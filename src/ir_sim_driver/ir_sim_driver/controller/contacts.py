@@ -220,7 +220,7 @@ class ContactWatch:
                 z = group.look(scene.model, step, q, qd)
                 if z >= 0:
                     return self._touched(scene, z, step, backend, dynamics)
-        self.due = min(group.due for group in self._groups)
+        self.due = min((group.due for group in self._groups), default=step + LONGEST)
         return None
 
     def _touched(

@@ -9,7 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from ir_description import Capsule, Cell, FramePose, fixed_frames, moving_frames, robot_urdf
+from ir_kernels.chain import Chain
+from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.announcements import ControllerTimers
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import MsgsError
@@ -18,6 +22,8 @@ from ir_msgs_py.names import END_REST
 from ir_msgs_py.plc import OperatingMode, PlcInputs
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.access import Access, CellSide, PlcSide
+from ir_sim_driver.controller.cell_scene import ContactScene, Machines, Parts
+from ir_sim_driver.controller.contacts import ContactWatch
 from ir_sim_driver.controller.goals import NO_GOAL, Goals, refused
 from ir_sim_driver.controller.outputs import Entry, Frame, Frames, Joints, report
 from ir_sim_driver.controller.simulation import Simulation
@@ -29,9 +35,31 @@ from ir_sim_driver.plant import Carried, Plant
 from ir_sim_driver.plc import STOP_BIT
 
 
+def try_cell(simulation: Simulation, cell: Cell) -> str:
+    """Why the robot can't stand in a cell, "" where it can. It may run beside `step`.
+
+    All that depends on the cell is made once, and thrown away.
+    """
+    robot = simulation.robot
+    try:
+        load, _ = simulation.surroundings.load_in(cell, simulation.load)
+        chain = Chain(robot, cell.base_pose, cell.tcp)
+        dynamics = DynamicsModel(robot, load.loads, cell.base_pose)
+        scene = ContactScene.of(cell, chain, load, Machines(cell), Parts(cell, load))
+        watch = ContactWatch(robot.acceleration_max, simulation.settings.dt)
+        watch.watch(scene, simulation.backend.q, "", True)
+        watch.look(0, simulation.backend, dynamics)
+        np.abs(simulation.backend.q - cell.machine_home).max()
+        robot_urdf(cell.robot, load.loads, cell.tcp, cell.base_pose)
+        fixed_frames(cell.robot, load.loads, cell.tcp, cell.base_pose)
+    except Exception as error:  # whatever it is: an offered cell must not end the driver
+        return f"the robot can't stand in it: {error!r}"
+    return ""
+
+
 def take_offered_cell(simulation: Simulation) -> None:
     """Take the cell that is offered, if any and if the robot stands: tcp, postures, and the load as
-    the cell describes it.
+    the cell describes it. Where that fails, the robot stands in the old one.
     """
     surroundings = simulation.surroundings
     if surroundings.offered is None or not simulation.stands:
@@ -39,21 +67,48 @@ def take_offered_cell(simulation: Simulation) -> None:
     planned = surroundings.take()
     if planned is None:
         return
-    simulation.cell = cell = planned.cell
+    old = simulation.cell
+    carried_before = simulation.load
+    try:
+        _stand_in(simulation, planned.cell)
+    except Exception as error:  # whatever it is: it was tried, but the robot has moved since
+        _back_to(simulation, old, carried_before)
+        simulation.notices.add(
+            Level.ERROR,
+            f"cell {planned.cell.name!r} is not taken, the old one stays: {error!r}",
+        )
+        return
+    surroundings.settle(planned)
+    hashed = f"hash {surroundings.hash}"
+    simulation.notices.add(
+        Level.OK, f"the robot stands in cell {planned.cell.name!r} now, {hashed}"
+    )
+
+
+def _stand_in(simulation: Simulation, cell: Cell) -> None:
+    """Make everything that depends on the cell anew."""
     notices = simulation.notices
+    simulation.cell = cell
     simulation.tool.stand_at(cell.base_pose, cell.tcp)
-    load, warning = surroundings.load_in(cell, simulation.load)
+    load, warning = simulation.surroundings.load_in(cell, simulation.load)
     if warning:
         notices.add(Level.WARN, warning)
     try:
         simulation.set_load(load)
-    except BackendError as error:
+    except (BackendError, RequestRefusedError) as error:
         notices.add(
             Level.ERROR, f"load {load.text!r} of cell {cell.name!r} can't be carried: {error}"
         )
     simulation.cell_watch.stand_in(cell, simulation.load)
-    surroundings.settle(planned)
-    notices.add(Level.OK, f"the robot stands in cell {cell.name!r} now, hash {surroundings.hash}")
+
+
+def _back_to(simulation: Simulation, cell: Cell, load: Carried) -> None:
+    """Stand in the old cell again, with what was carried there."""
+    simulation.cell = cell
+    simulation.tool.stand_at(cell.base_pose, cell.tcp)
+    simulation.cell_watch.stand_in(cell, load)
+    if simulation.load is not load:
+        simulation.set_load(load)
 
 
 @dataclass(frozen=True)
@@ -305,9 +360,12 @@ class Driver:
         """Stand in this cell as soon as the robot stands; a cell that can't be its own becomes a
         warning.
         """
+        failing = try_cell(self._simulation, planned.cell)  # beside the plant: it may take 0.2 s
         with self._lock:
-            reason = self._simulation.surroundings.offer(planned)
-            if reason:
+            reason = self._simulation.surroundings.refusal_of(planned.cell) or failing
+            if not reason:
+                self._simulation.surroundings.offered = planned
+            else:
                 self._simulation.notices.add(
                     Level.WARN, f"cell {planned.cell.name!r} of the planner is not taken: {reason}"
                 )

@@ -23,7 +23,12 @@ from ir_sim_driver.controller.safety import Safety
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.controller.supervision import PERIOD
 from ir_sim_driver.controller.surroundings import Surroundings
-from ir_sim_driver.errors import BackendError, RequestRefusedError, TrajectoryRefusedError
+from ir_sim_driver.errors import (
+    BackendError,
+    DriverError,
+    RequestRefusedError,
+    TrajectoryRefusedError,
+)
 from ir_sim_driver.load_check import LoadChecks
 from ir_sim_driver.motion import (
     ErrorCode,
@@ -299,10 +304,15 @@ class Simulation:
         before = self.load
         try:
             self._carry(load)
-        except BackendError:
+            self.cell_watch.carry(load)
+        except Exception as error:  # whatever it is: the old load stays
             self._carry(before)
-            raise
-        self.cell_watch.carry(load)
+            self.cell_watch.carry(before)
+            if isinstance(error, DriverError):
+                raise
+            raise RequestRefusedError(
+                StatusCode.INVALID_ROBOT_STATE, f"load {load.text!r} can't be carried: {error!r}"
+            ) from error
 
     def set_execution(self, settings: ExecutionSettings) -> None:
         """Use other bounds of trajectories from the next goal on."""

@@ -6,7 +6,10 @@ What was planned in another cell, or with another load, is refused with both nam
 
 from __future__ import annotations
 
+import hashlib
 import threading
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +21,7 @@ from ir_sim_driver.motion import TrajectoryGoal
 from ir_sim_driver.plant import CUSTOM, Carried, carried
 
 PATIENCE = 1.0  # s: a trajectory may be faster than the cell that it was planned in
+_LENGTH = 16  # digits of a hash
 _SAME = 1e-9  # of a rotation's entries
 
 
@@ -28,11 +32,42 @@ class PlannedCell(NamedTuple):
     hash: str
 
 
+def digest(value: object) -> str:
+    """Hash of all that a description holds, by content."""
+    text = hashlib.sha256()
+    for part in _content(value):
+        text.update(part)
+    return text.hexdigest()[:_LENGTH]
+
+
+def _content(value: object) -> Iterator[bytes]:
+    """Everything in a value of dataclasses, arrays, collections and plain values, in order."""
+    if isinstance(value, np.ndarray):
+        yield f"{value.dtype}{value.shape}".encode()
+        yield np.ascontiguousarray(value).tobytes()
+    elif is_dataclass(value) and not isinstance(value, type):
+        yield type(value).__name__.encode()
+        for each in fields(value):
+            yield each.name.encode()
+            yield from _content(getattr(value, each.name))
+    elif isinstance(value, Mapping):
+        for key in sorted(value, key=str):
+            yield repr(key).encode()
+            yield from _content(value[key])
+    elif isinstance(value, (tuple, list)):
+        yield str(len(value)).encode()
+        for item in value:
+            yield from _content(item)
+    else:
+        yield repr(value).encode()
+
+
 class Surroundings:
     """cell: the one that counts. `offered`: one that counts as soon as the robot stands."""
 
     def __init__(self, cell: Cell) -> None:
         self.cell = cell
+        self._robot = digest(cell.robot)
         self._hash = ""
         self.offered: PlannedCell | None = None
         self._changed = threading.Condition()
@@ -45,7 +80,7 @@ class Surroundings:
 
     def offer(self, planned: PlannedCell) -> str:
         """Take a cell as soon as the robot stands; why not, "" when it will be taken."""
-        reason = self._unlike(planned.cell)
+        reason = self.refusal_of(planned.cell)
         if not reason:
             self.offered = planned
         return reason
@@ -102,10 +137,15 @@ class Surroundings:
         except RequestRefusedError as error:
             return load, f"load {load.text!r} is kept as it is in cell {cell.name!r}: {error}"
 
-    def _unlike(self, cell: Cell) -> str:
+    def refusal_of(self, cell: Cell) -> str:
         """Why a cell can't be this robot's, "" when it can."""
         if cell.robot.name != self.cell.robot.name:
             return f"its robot is {cell.robot.name!r}, the driver's is {self.cell.robot.name!r}"
+        if cell.robot is not self.cell.robot and digest(cell.robot) != self._robot:
+            return (
+                f"its robot is called {cell.robot.name!r} as the driver's, but its data differ: "
+                f"hash {digest(cell.robot)}, the driver's is {self._robot}"
+            )
         turned = np.abs(cell.base_pose[:3, :3] - self.cell.base_pose[:3, :3]).max()
         return "" if turned < _SAME else "its robot stands at another inclination or heading"
 
