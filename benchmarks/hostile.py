@@ -16,8 +16,10 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import resource
+import sys
 import time
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -95,6 +97,48 @@ def deviation_row(cases: int, seed: int) -> dict[str, Any]:
     return {"case": "deviations", "seed": seed, "cases": cases, "large": large, "wrong": len(wrong)}
 
 
+def law() -> ModuleType:
+    """The walk and the sequences of tests/driver/test_stop_law.py."""
+    name = "test_stop_law"
+    spec = importlib.util.spec_from_file_location(name, FAULTS.parent / "driver" / f"{name}.py")
+    if spec is None or spec.loader is None:
+        raise FileNotFoundError(f"{name}.py is not in {FAULTS.parent / 'driver'}")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # its dataclasses look themselves up
+    spec.loader.exec_module(module)
+    return module
+
+
+def sequence_row(count: int, steps: int) -> dict[str, Any]:
+    """Random sequences of a PLC, and how many differ from the table of docs/driver.md."""
+    drawn = law().drawn
+    wrong = [
+        found for seed in range(FIRST_SEED, FIRST_SEED + count) if (found := drawn(steps, seed))
+    ]
+    for found in wrong[:3]:
+        print(found)
+    return {"case": "sequences", "cases": count, "steps": steps, "differ": len(wrong)}
+
+
+def walk_rows(depth: int) -> Iterator[dict[str, Any]]:
+    """All interleavings of PLC, two clients, program and modes to this depth, from each mode."""
+    module = law()
+    for start in module.STARTS:
+        began = time.process_time()
+        states, steps, wrong = module.walked(start, depth)
+        for found in wrong[:3]:
+            print(found)
+        yield {
+            "case": "interleavings",
+            "start": start,
+            "depth": depth,
+            "states": states,
+            "steps": steps,
+            "wrong": len(wrong),
+            "seconds": time.process_time() - began,
+        }
+
+
 def driving_row(seconds: float) -> dict[str, Any]:
     """Simulated driving without a pause, stepped: memory of this process after a tenth and at the
     end.
@@ -138,10 +182,19 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
             (float(row[f"{key}_after"] - row[f"{key}_before"]) for row in of_case), default=0.0
         )
 
+    depth = min((row["depth"] for row in rows if row["case"] == "interleavings"), default=0)
     return [
         at_least("goals that were accepted and judged", total("goals", "accepted"), "", 10),
         at_most("goals beyond a limit", total("goals", "beyond"), "", 0),
         at_most("emergency stops lost", total("stops", "lost"), "", 0),
+        at_least("sequences of a PLC", total("sequences", "cases"), "", 2_000),
+        at_most(
+            "sequences that differ from the table of stops", total("sequences", "differ"), "", 0
+        ),
+        at_least("depth of all interleavings", depth, "", 8),
+        at_most(
+            "interleavings that break the law of stops", total("interleavings", "wrong"), "", 0
+        ),
         at_least("loads carried", total("loads", "carried"), "", 10),
         at_most("loads that made the physics fail", total("loads", "failed"), "", 0),
         at_most("laws broken by requests of every kind", total("fuzz", "broken"), "", 0),
@@ -177,6 +230,9 @@ def main() -> None:
     for seed in range(FIRST_SEED, FIRST_SEED + (1 if given.quick else given.seeds)):
         for make, count in zip(makers, counts, strict=True):
             show(make(count, seed))
+    show(sequence_row(50, 200) if given.quick else sequence_row(2_000, 200))
+    for row in walk_rows(4 if given.quick else 8):
+        show(row)
     for row in attack(200, 12) if given.quick else attack(5_000, 334):
         show(row)
     finish(given.json, rows, claims_of(rows))

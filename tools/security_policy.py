@@ -64,7 +64,7 @@ DRIVER = Rights(
     publish=(
         *(names.JOINT_STATES, names.ROBOT_DESCRIPTION, names.TF, names.TF_STATIC, "/clock"),
         *(names.POWER_STATE, names.CONTROLLER_STATE, names.CONTROLLER_TIMERS, names.CARRIED_LOAD),
-        *(names.PLC_OUTPUTS, names.PLC_INPUTS_IN_FORCE, names.ROBOT_MARKERS),
+        *(names.PLC_OUTPUTS, names.PLC_INPUTS_IN_FORCE, names.ROBOT_MARKERS, names.STOP_NUMBER),
         *(names.PLANT, names.LOAD_CHECK, names.CONTACTS, names.MACHINE_STATES),
     ),
     subscribe=(
