@@ -25,6 +25,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+from _hostile_floods import floods
 from _hostile_node import attack
 from _results import Claim, add_ending, at_least, at_most, finish, line_of
 
@@ -183,6 +184,15 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
         )
 
     depth = min((row["depth"] for row in rows if row["case"] == "interleavings"), default=0)
+    latest = max((row["p99.9_ms"] for row in rows if row["case"] == "press"), default=0.0)
+    kept = max(
+        (
+            100.0 * row["rss_mb_after"] / row["rss_mb_before"]
+            for row in rows
+            if row["case"] == "flood"
+        ),
+        default=0.0,
+    )
     return [
         at_least("goals that were accepted and judged", total("goals", "accepted"), "", 10),
         at_most("goals beyond a limit", total("goals", "beyond"), "", 0),
@@ -195,6 +205,9 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
         at_most(
             "interleavings that break the law of stops", total("interleavings", "wrong"), "", 0
         ),
+        at_most("presses under floods lost", total("press", "lost"), "", 0),
+        at_most("presses under floods, p99.9", latest, "ms", 50.0),
+        at_most("memory after a flood, of before", kept, "%", 120.0),
         at_least("loads carried", total("loads", "carried"), "", 10),
         at_most("loads that made the physics fail", total("loads", "failed"), "", 0),
         at_most("laws broken by requests of every kind", total("fuzz", "broken"), "", 0),
@@ -234,6 +247,8 @@ def main() -> None:
     for row in walk_rows(4 if given.quick else 8):
         show(row)
     for row in attack(200, 12) if given.quick else attack(5_000, 334):
+        show(row)
+    for row in floods(20) if given.quick else floods(1_000):
         show(row)
     finish(given.json, rows, claims_of(rows))
 
