@@ -79,7 +79,7 @@ DRIVER = Rights(
 )
 RUNNER = Rights(
     publish=(names.SIGNALS, names.MACHINE_SIGNALS, names.PROGRAM_STATE),
-    subscribe=(names.SIGNALS, names.POWER_STATE, names.CONTROLLER_TIMERS),
+    subscribe=(names.SIGNALS, names.POWER_STATE, names.CONTROLLER_TIMERS, names.STOP_NUMBER),
     request=(
         *(
             names.GET_PROGRAM,

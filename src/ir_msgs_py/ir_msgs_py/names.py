@@ -103,8 +103,8 @@ RUN_STUDY: Final = f"{STUDIES}/run_study"
 LOAD_SEPARATOR: Final = "+"
 NO_LOAD: Final = "none"
 
-STOPS_STATE: Final = "driver/stops"
-"""Of a goal's `states`: "driver/stops=2" relies on no stop after the second."""
+STOPS_STATE: Final = "driver.stops"
+"""Of a goal's `states`: "driver.stops=2" relies on no stop after the second."""
 END_REST: Final = "end_rest"
 """Name in SetPlcInput of a program's request to leave the rest that drives_off began."""
 
