@@ -12,7 +12,7 @@ from typing import Any
 
 from _results import Claim, at_least, line_of
 
-from ir_cli.offline.today_trace import today_of_trace
+from ir_cli.trace_programs import today_of_trace
 from ir_krl import follow, parse
 from ir_msgs_py.report import MovementKind
 from ir_msgs_py.savings import BeforeAfter

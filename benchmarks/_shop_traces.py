@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from _results import Claim, at_least, at_most, line_of
 
-from ir_cli.offline.measured import measured
+from ir_cli.smoothing import measured
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory

@@ -22,7 +22,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_recorder.analysis.intervals import alike, mean_of
 from ir_studies import Means, study_of
 from ir_studies.statistics import EXAMPLE, StatisticsSettings, run_statistics
-from ir_studies.statistics.figures import Comparison
+from ir_studies.statistics.findings import Comparison
 from ir_studies.statistics.runs import Finished
 from ir_studies.statistics.settings import DRAWN
 from ir_studies.work.results import NAME

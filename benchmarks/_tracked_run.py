@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_cli.excitation.programme import Step
+from ir_cli.excitation_programme import ProgrammeStep
 from ir_description import Cell, Load
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.arrays import FloatArray
@@ -101,7 +101,7 @@ class TrackedRun:
         still = np.zeros((count, len(self.command)))
         self._pass(_Stretch(still + self.command, still, still, self._load, mode))
 
-    def follow(self, step: Step, loads: Sequence[Load]) -> None:
+    def follow(self, step: ProgrammeStep, loads: Sequence[Load]) -> None:
         """One step of a programme of excitation."""
         self.hold(step.load, loads)
         if step.trajectory is not None:

@@ -21,8 +21,8 @@ from _results import Claim, at_least, at_most
 from _tracked_run import TrackedRun
 from _truth_section import Asked, Found
 
-from ir_cli.excitation.programme import Asked as Excitation
-from ir_cli.excitation.programme import Programme, plan_programme
+from ir_cli.excitation_programme import ExcitationRequest as Excitation
+from ir_cli.excitation_programme import Programme, plan_programme
 from ir_description import (
     Cell,
     Load,

@@ -44,7 +44,7 @@ from ir_planner.planner import Planner
 from ir_planner.request.goals import Goal
 from ir_planner.search import SEARCHES, repeatable
 from ir_studies.arena import PORTFOLIO
-from ir_studies.arena.table import TIMES
+from ir_studies.arena.figures import TIMES
 from ir_studies.work.results import NAME
 
 CELLS = ("open",)

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from ir_cli.node_settings import FIXED, NODES
+from ir_cli.ros.node_parameters import FIXED, NODE_SETTINGS
 from ir_msgs_py.settings import settings_table
 from ir_planner.search import registered
 
@@ -32,7 +32,7 @@ def searches() -> str:
 
 def table(node: str) -> Iterator[str]:
     """Lines of the table of a node's parameters."""
-    for k, (prefix, make) in enumerate(NODES[node]):
+    for k, (prefix, make) in enumerate(NODE_SETTINGS[node]):
         lines = settings_table(make(), prefix.removeprefix(FIXED)).splitlines()
         yield from () if k else lines[:2]
         for line in lines[2:]:
@@ -47,7 +47,7 @@ def page() -> str:
         "An empty `planner_id` is the portfolio; a name selects one search.\n",
         searches(),
     ]
-    for node in NODES:
+    for node in NODE_SETTINGS:
         parts += [f"## {node}\n", "\n".join(table(node)) + "\n"]
     return "\n".join(parts)
 

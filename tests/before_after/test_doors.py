@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ir_cli.offline.recorded_doors import RecordedDoors
+from ir_cli.trace_programs import RecordedDoors
 from ir_description import ProgramStep, Signal, load_cell
 from ir_msgs_py.names import NO_LOAD
 from ir_planner import Planner, PlanOptions, Stretch, Today, parse_goal

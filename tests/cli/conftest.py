@@ -16,4 +16,4 @@ def no_plan_is_cut(monkeypatch: pytest.MonkeyPatch) -> None:
     """Offline commands plan as long as it takes: what their clock cuts on a busy machine is another
     plan.
     """
-    monkeypatch.setattr("ir_cli.offline.asking.time", SimpleNamespace(monotonic=lambda: 0.0))
+    monkeypatch.setattr("ir_cli.planning.time", SimpleNamespace(monotonic=lambda: 0.0))

@@ -96,7 +96,7 @@ def test_another_process_cancels_what_runs(
 
     def send() -> None:
         # signals belong to the main thread: the goal is sent below main()
-        from ir_cli.action_commands import run_send_goal
+        from ir_cli.ros.graph import run_send_goal
 
         arguments = type("Arguments", (), {})()
         arguments.action = ACTION

@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 
 from ir_cli.errors import InputError
-from ir_cli.offline.arena_command import add_commands, asked
+from ir_cli.studies import add_arena, asked
 from ir_studies.arena import EXAMPLE, read_settings
 
 
 def parsed(*words: str) -> argparse.Namespace:
     parser = argparse.ArgumentParser()
-    add_commands(parser.add_subparsers())
+    add_arena(parser.add_subparsers())
     return parser.parse_args(["arena", *words])
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from ir_cli.main import main
-from ir_cli.offline.output import kilowatt_hours
+from ir_cli.output import kilowatt_hours
 from ir_description import bundled_cells, cell_to_yaml, load_cell
 
 

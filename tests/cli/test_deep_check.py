@@ -17,7 +17,7 @@ from generated_cells import Document, broken_documents, cell_of, pasted
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from ir_cli.deep.check import mended_cell, suggestions_of
+from ir_cli.cell_mending import mended_cell, suggestions_of
 from ir_cli.main import main
 from ir_description import Cell, cell_to_yaml, load_cell
 from ir_msgs_py.options import PlanOptions

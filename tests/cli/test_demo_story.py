@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from ir_cli.demo.story import LONGEST_PAUSE, Demonstration
 from ir_cli.errors import DemonstrationError
-from ir_cli.terminal import Progress
+from ir_cli.output import Progress
+from ir_cli.ros.demo import LONGEST_PAUSE, Demonstration
 from ir_description import load_cell
 from ir_msgs_py.errors import RequestRefusedError
 

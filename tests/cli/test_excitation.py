@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 import yaml
 
-from ir_cli.excitation.choice import Design
-from ir_cli.excitation.pool import straight
+from ir_cli.excitation_programme import Design, straight
 from ir_cli.main import main
-from ir_cli.offline.asking import planner_of
-from ir_cli.offline.trace_file import read_trace
+from ir_cli.planning import planner_of
+from ir_cli.traces import read_trace
 from ir_description import data_sheet, load_power_data
 from ir_recorder.measure import PowerModel
 
@@ -66,7 +65,7 @@ def test_the_choice_prefers_what_the_prior_does_not_know() -> None:
     home = np.array(cell.machine_home)
     before = design.identified()
     assert before.found == ()
-    from ir_cli.excitation.pool import Excursion
+    from ir_cli.excitation_programme import Excursion
 
     def excursion(axis: int) -> Excursion:
         there = home + 0.8 * np.eye(6)[axis]

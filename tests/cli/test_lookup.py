@@ -8,9 +8,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from ir_cli import lookup
 from ir_cli.errors import CommandError
-from ir_cli.lookup import (
+from ir_cli.ros import graph as lookup
+from ir_cli.ros.domain import claim
+from ir_cli.ros.graph import (
     DISCOVERY_SECONDS,
     SETTLED_SECONDS,
     START_SECONDS,
@@ -18,7 +19,6 @@ from ir_cli.lookup import (
     settled,
     type_of,
 )
-from ir_cli.only_one import claim
 
 
 @pytest.fixture

@@ -10,12 +10,10 @@ import pytest
 
 from ir_cli.errors import InputError
 from ir_cli.main import main
-from ir_cli.offline.measured import measured
-from ir_cli.offline.measured_options import between
-from ir_cli.offline.output import ProgressLine
-from ir_cli.offline.rows_of_robot import counted_turns
-from ir_cli.offline.today_trace import stretches_of
-from ir_cli.offline.trace_file import Rows, read_motion, write_trace
+from ir_cli.output import ProgressLine
+from ir_cli.smoothing import measured
+from ir_cli.trace_programs import stretches_of
+from ir_cli.traces import Rows, between, counted_turns, read_motion, write_trace
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner, PlanOptions, parse_goal

@@ -134,7 +134,7 @@ def test_a_trace_of_positions_alone_in_degrees_costs_nearly_the_same(
     sampled = tmp_path / "sampled.csv"
     planned = answered(capsys, "move", "open", "home", "park", "--trajectory", str(trace))
     rows = list(csv.DictReader(trace.open()))
-    from ir_cli.offline.trace_file import read_trace
+    from ir_cli.traces import read_trace
 
     robot = load_cell("open").robot
     trajectory = read_trace(trace, robot.joint_names)

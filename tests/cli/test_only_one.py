@@ -7,7 +7,7 @@ import os
 import pytest
 
 from ir_cli.errors import CommandError
-from ir_cli.only_one import claim, claimed
+from ir_cli.ros.domain import claim, claimed
 
 
 def test_a_claim_is_refused_while_another_holds_it_and_free_after() -> None:

@@ -12,8 +12,8 @@ from typing import Any, cast
 
 import pytest
 
-from ir_cli.demo.power_tour import PowerWatch
 from ir_cli.errors import DemonstrationError
+from ir_cli.ros.power_tour import PowerWatch
 from ir_msgs.msg import PowerMode, PowerState
 from ir_msgs_py.ros.client import Client
 

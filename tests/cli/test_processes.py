@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from ir_cli.errors import ProcessError
-from ir_cli.processes import NodeCommand, NodeProcesses
+from ir_cli.ros.processes import NodeCommand, NodeProcesses
 
 
 def write_module(folder: Path, name: str, body: str) -> dict[str, str]:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ir_cli.main import main
-from ir_cli.offline.robot_check import remarks_on
+from ir_cli.robots import remarks_on
 from ir_description import load_cell, load_robot, robot_named, robot_urdf
 from ir_kernels import Chain, DynamicsModel
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ir_cli.suggestions import nearest, unknown_name
+from ir_cli.errors import nearest, unknown_name
 
 KNOWN = [
     "/ir_planner/get_cell",

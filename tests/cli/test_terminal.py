@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 
-from ir_cli.terminal import Progress, table
+from ir_cli.output import Progress, table
 
 
 def test_columns_line_up_first_to_the_left_the_rest_to_the_right() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ir_cli.offline.studying import TimeLeft
+from ir_cli.studies import TimeLeft
 
 
 def test_the_time_left_follows_from_jobs_of_this_phase_and_this_run() -> None:

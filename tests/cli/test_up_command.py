@@ -15,14 +15,13 @@ from typing import Any
 import pytest
 from rclpy.node import Node
 
-from ir_cli import alone
 from ir_cli.errors import CommandError
 from ir_cli.main import main
-from ir_cli.node_parameters import given_parameters
-from ir_cli.node_settings import parameters_of
-from ir_cli.nodes import cell_nodes
 from ir_cli.ports import TCP, UDP, PortClaims, free_port, is_free
-from ir_cli.up_command import choose_ports
+from ir_cli.ros import domain as alone
+from ir_cli.ros.node_parameters import given_parameters, parameters_of
+from ir_cli.ros.processes import cell_nodes
+from ir_cli.ros.up import choose_ports
 from ir_msgs_py.ros.testing import PATIENCE
 
 WAITING = """
@@ -38,7 +37,7 @@ Path({end!r}).write_text("finished")
 PARENT = """
 import signal, sys
 from pathlib import Path
-from ir_cli.processes import NodeCommand, NodeProcesses
+from ir_cli.ros.processes import NodeCommand, NodeProcesses
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whoever runs the tests may ignore it, as nohup does
 with NodeProcesses(Path(sys.argv[1]), {"PYTHONPATH": sys.argv[2]}) as nodes:
     nodes.start([NodeCommand("waiting")])

@@ -20,12 +20,12 @@ import pytest
 from websockets.exceptions import InvalidStatus
 
 from ir_cli.main import main
-from ir_cli.view import loopback
-from ir_cli.view.inbox import Inbox
-from ir_cli.view.loopback import closed, opened
-from ir_cli.view.named import names_in
+from ir_cli.view import server as loopback
+from ir_cli.view.background import Inbox
+from ir_cli.view.cell_file import STILL, Watched
+from ir_cli.view.clearance import names_in
+from ir_cli.view.server import closed, opened
 from ir_cli.view.session import Session
-from ir_cli.view.watched import STILL, Watched
 from ir_description import load_cell
 
 PATIENCE = 60.0  # s: a busy machine

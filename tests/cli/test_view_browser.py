@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ir_cli.view.camera import look_at
+from ir_cli.view.drawing import look_at
 from ir_description import Cell, load_cell
 from ir_msgs_py.arrays import FloatArray
 

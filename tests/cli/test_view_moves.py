@@ -10,10 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_cli.main import _parser
-from ir_cli.view.moved import Target, cell_with, edited, pose_in, snippet, targets
-from ir_cli.view.poses import meant
-from ir_cli.view.saving import SavingError, save
-from ir_cli.view.watched import Watched
+from ir_cli.view.cell_file import SavingError, Watched, save
+from ir_cli.view.moves import Target, cell_with, edited, meant, pose_in, snippet, targets
 from ir_description import Cell, cell_from_yaml, cell_to_yaml, load_cell
 from ir_description.poses import pose_of, rotation_from_abc
 

@@ -23,8 +23,7 @@ from rclpy._rclpy_pybind11 import NodeNameNonExistentError
 from rclpy.action.graph import get_action_server_names_and_types_by_node
 from rclpy.parameter import Parameter
 
-from ir_cli.nodes import cell_nodes
-from ir_cli.processes import NodeProcesses
+from ir_cli.ros.processes import NodeProcesses, cell_nodes
 from ir_msgs.msg import Status
 from ir_msgs_py.errors import CallTimedOutError
 from ir_msgs_py.names import NODES

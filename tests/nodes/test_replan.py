@@ -14,9 +14,14 @@ from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
-from ir_cli.replan.again import Replanned, Verdict, replan
-from ir_cli.replan.command import all_equal, sentence_of
-from ir_cli.replan.recorded import RecordedPlanner
+from ir_cli.ros.replan import (
+    Comparison,
+    RecordedPlanner,
+    Replanned,
+    all_equal,
+    planned_again,
+    sentence_of,
+)
 from ir_msgs.msg import PlanOptions, RecordedCall
 from ir_msgs.srv import (
     OptimizeTrajectory,
@@ -101,14 +106,16 @@ def recording(
 def test_all_requests_are_planned_again_with_equal_ids_and_a_difference_is_named(
     recording: RawRecording,
 ) -> None:
-    found = list(replan(RecordedPlanner(recording)))
+    found = list(planned_again(RecordedPlanner(recording)))
     assert [each.sentence for each in found] == [""] * 4
     assert all_equal(found)
     assert all(each.ids >= 1 for each in found)
     assert "4 of 4 requests planned again with equal ids" in sentence_of(found, [])
 
-    other = list(replan(RecordedPlanner(with_answers(recording, trajectory_id="0123456789abcdef"))))
-    assert other[0].verdict is Verdict.DIFFERENT
+    other = list(
+        planned_again(RecordedPlanner(with_answers(recording, trajectory_id="0123456789abcdef")))
+    )
+    assert other[0].verdict is Comparison.DIFFERENT
     assert other[0].sentence.startswith("trajectory_id was 0123456789abcdef, is ")
     assert not all_equal(other)
 
@@ -135,7 +142,7 @@ def with_answers(recording: RawRecording, trajectory_id: str) -> RawRecording:
 
 
 def test_answers_that_cannot_be_the_same_are_not_compared() -> None:
-    found = [Replanned("/ir_planner/plan", 0, Verdict.NOT_COMPARED, "it was cancelled")]
+    found = [Replanned("/ir_planner/plan", 0, Comparison.NOT_COMPARED, "it was cancelled")]
     assert not all_equal(found)
     assert "1 not compared" in sentence_of(found, [])
     assert sentence_of(found, ["numpy 1.0 there, 2.0 here"]).endswith("numpy 1.0 there, 2.0 here")

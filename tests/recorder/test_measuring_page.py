@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from ir_cli.main import main
-from ir_cli.offline.trace_file import read_trace
+from ir_cli.traces import read_trace
 from ir_description import data_sheet, load_cell, load_power_data, load_power_parameters
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.trajectory import JointTrajectory

@@ -8,10 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ir_studies.arena.entries import Entry
 from ir_studies.arena.figures import (
     Compared,
+    Run,
+    asked_alike,
     blocked_and_free,
+    columns,
     compared,
     cost_over_time,
     energy_and_time,
@@ -20,8 +22,7 @@ from ir_studies.arena.figures import (
 )
 from ir_studies.arena.page import verdict
 from ir_studies.arena.runs import Finished
-from ir_studies.arena.settings import ArenaSettings
-from ir_studies.arena.table import Run, asked_alike, columns
+from ir_studies.arena.settings import ArenaSettings, Entry
 
 
 def run(planner: str, task: str, cost: float, first: float, final: float) -> Run:

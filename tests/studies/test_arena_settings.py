@@ -16,8 +16,7 @@ from ir_planner.request import checked_options
 from ir_planner.search.with_ompl import host
 from ir_studies import SettingsError
 from ir_studies.arena import EXAMPLE, PORTFOLIO, ArenaSettings, read_settings
-from ir_studies.arena.entries import entries
-from ir_studies.arena.tasks import tasks_of
+from ir_studies.arena.settings import entries, tasks_of
 
 HEAD = "format: ir_arena/1\n"
 

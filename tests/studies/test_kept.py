@@ -13,7 +13,7 @@ import pytest
 
 from ir_studies import StoppedError
 from ir_studies.work import Job, Row, Task
-from ir_studies.work.kept import IDLE_S, Kept, Stopped
+from ir_studies.work.cluster import IDLE_S, Kept, Stopped
 from ir_studies.work.pool import Pool
 
 WORKER = """

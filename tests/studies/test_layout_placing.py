@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_description import Cell, InvalidValueError, cell_from_yaml, cell_to_yaml, load_cell
-from ir_studies.layout.freedom import Placing, Variable
-from ir_studies.layout.overlap import deeper, overlaps, separable
+from ir_studies.layout.placement import Placing, Variable, deeper, overlaps, separable
 
 DEMO = load_cell("demo")
 METRES = st.floats(-2.0, 2.0)

@@ -118,7 +118,7 @@ def test_a_key_is_not_compared_with_all_others(monkeypatch: pytest.MonkeyPatch) 
     for room in ("composer", "resolver"):
         monkeypatch.setattr(f"yaml.{room}.ScalarNode", Node)
     monkeypatch.setattr(Compared, "times", 0)
-    with pytest.raises(SettingsError, match="k0 is unknown"):
+    with pytest.raises(SettingsError, match="key 'k0' is unknown"):
         study_of(HEAD + "".join(f"k{number}: 1\n" for number in range(keys)))
     assert 0 < Compared.times < 10 * keys
 

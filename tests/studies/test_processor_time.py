@@ -18,8 +18,7 @@ from ir_msgs_py.status import StatusCode
 from ir_planner import Goal, Planner, RequestError
 from ir_planner.search.with_ompl import charge_to, missing
 from ir_studies.arena import ArenaSettings, Entry
-from ir_studies.arena.maker import maker, warm_up
-from ir_studies.arena.processor_time import charged, excuse, others_time, processor_time
+from ir_studies.arena.one_run import charged, excuse, maker, others_time, processor_time, warm_up
 
 ENTRY = Entry("rrt_connect", "open", "home->p1", 0, "", "synchronous")
 
@@ -89,7 +88,7 @@ def test_what_ompls_processes_need_to_start_is_measured_and_counts_for_nobody(
 ) -> None:
     settings = ArenaSettings(cells=("open",), planners=("rrt_connect",))
     excused: list[float] = []
-    monkeypatch.setattr("ir_studies.arena.maker.excuse", excused.append)
+    monkeypatch.setattr("ir_studies.arena.one_run.excuse", excused.append)
     try:
         start = maker(asdict(settings))({**asdict(ENTRY)})["start_s"]
         assert excused == [0.0, start]
@@ -119,6 +118,6 @@ def test_starting_is_measured_where_an_end_of_a_task_is_near_something(
         raise RequestError(StatusCode.FAILURE, "seen")
 
     monkeypatch.setattr(planner, "plan_regional", refuse)
-    monkeypatch.setattr("ir_studies.arena.maker.planner_of", lambda cell: planner)
+    monkeypatch.setattr("ir_studies.arena.one_run.planner_of", lambda cell: planner)
     assert warm_up(ArenaSettings(cells=("open",), planners=("portfolio", "sbl"))) == 0.0
     assert [one.safety_distance for one in asked] == [0.0, 0.0]

@@ -13,12 +13,12 @@ import pytest
 from ir_description import Task, cell_to_yaml, load_cell
 from ir_studies import FolderError, Means, WorkerError, run_arena
 from ir_studies.arena import ArenaSettings
-from ir_studies.arena.maker import maker as arena_maker
-from ir_studies.statistics.maker import maker as statistics_maker
-from ir_studies.work import build
-from ir_studies.work.read_files import digest_of_tasks, refuse_others, task_digests
+from ir_studies.arena.one_run import maker as arena_maker
+from ir_studies.statistics.movements import maker as statistics_maker
+from ir_studies.work import fingerprint
+from ir_studies.work.results import digest_of_tasks, refuse_others, task_digests
 
-PROBE = "from ir_studies.work.build import arithmetic; print(arithmetic())"
+PROBE = "from ir_studies.work.fingerprint import arithmetic; print(arithmetic())"
 
 
 def test_a_task_with_another_goal_is_refused_and_a_new_one_is_taken(
@@ -63,14 +63,14 @@ def test_sources_count_by_their_names_and_their_content(
     folder.mkdir()
     (folder / "__init__.py").touch()
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr(build, "PACKAGES", ("ir_of_a_test",))
-    found = [build.sources()]
+    monkeypatch.setattr(fingerprint, "PACKAGES", ("ir_of_a_test",))
+    found = [fingerprint.sources()]
     for name, text in (("a.py", "1"), ("a.py", "2"), ("b.yaml", "2")):
         (folder / name).write_text(text)
-        found.append(build.sources())
+        found.append(fingerprint.sources())
     assert len(set(found)) == 4
     (folder / "notes.txt").write_text("what no result depends on")
-    assert build.sources() == found[-1]
+    assert fingerprint.sources() == found[-1]
 
 
 def test_an_old_processor_has_the_same_arithmetic() -> None:
@@ -82,4 +82,4 @@ def test_an_old_processor_has_the_same_arithmetic() -> None:
         return done.stdout.decode().strip()
 
     older = said(OPENBLAS_CORETYPE="Nehalem", NPY_DISABLE_CPU_FEATURES="X86_V4")
-    assert older == build.arithmetic()
+    assert older == fingerprint.arithmetic()

@@ -18,12 +18,10 @@ from ir_cli.main import main
 from ir_planner import Planner
 from ir_recorder.analysis.intervals import mean_of
 from ir_studies import FolderError, Means, SettingsError, read_study, study_of
-from ir_studies.statistics.figures import findings_of
-from ir_studies.statistics.maker import maker
-from ir_studies.statistics.outputs import columns, page_html
-from ir_studies.statistics.places import NEAREST, pair_of, places_of
+from ir_studies.statistics.findings import findings_of
+from ir_studies.statistics.movements import NEAREST, maker, pair_of, places_of
+from ir_studies.statistics.outputs import columns, page_html, summary_of
 from ir_studies.statistics.settings import EXAMPLE, StatisticsSettings, statistics_settings
-from ir_studies.statistics.verdict import sentences
 
 ASKED = StatisticsSettings("open")
 shares = st.floats(-0.5, 0.5).map(lambda x: round(x, 4))
@@ -114,10 +112,9 @@ def test_answers_that_are_the_synchronous_one_are_counted_apart() -> None:
     found = findings_of(rows)
     assert (found.pairs, found.solved, found.same, found.driven) == (4, 3, 1, 5)
     assert {each.count for each in found.comparisons if each.name == "duration"} == {2}
-    said = sentences(found, ASKED)
-    assert "1 of them the asynchronous answer is the synchronous one" in said[0]
-    assert "1 pair without both movements" in said[1]
-    assert "over all 3 pairs, where the same answer counts as 0, -10.00 %" in " ".join(said)
+    said = summary_of(found, ASKED)
+    assert "     1  same answer in both\n     2  compared" in said
+    assert "left out: 1 pairs without both movements" in said
 
 
 def test_what_the_interval_holds_is_counted() -> None:
@@ -129,9 +126,9 @@ def test_nothing_solved_is_said_and_breaks_nothing() -> None:
     rows: list[dict[str, Any]] = [{"outcome": "cut", "message": "no answer"}, {}]
     found = findings_of(rows)
     assert found.solved == 0
-    assert sentences(found, ASKED)[0].startswith("0 of 2 pairs")
+    assert summary_of(found, ASKED).startswith("     2  pairs asked\n     0  with both timings")
     assert [(each.count, each.example) for each in found.failures] == [(2, "no answer")]
-    assert "0 of 2 pairs" in page_html(found, StatisticsSettings("open"))
+    assert "no answer" in page_html(found, StatisticsSettings("open"))
     assert columns(rows)["message"][0] == "no answer"
 
 
@@ -246,9 +243,6 @@ def test_a_cell_without_places_is_a_sentence(tmp_path: Path) -> None:
     asked = StatisticsSettings(str(cell))
     make = maker({"cell": str(cell)})
     rows = [make({"number": number}) for number in range(2)]
-    said = " ".join(sentences(findings_of(rows), asked))
-    assert (
-        "2 pairs without both movements, since the cell empty has no two places that keep 2 mm"
-        in said
-    )
-    assert said.endswith("Nothing follows from that.")
+    said = summary_of(findings_of(rows), asked)
+    assert "2 pairs without both movements: the cell empty has no two places that keep 2 mm" in said
+    assert "90 % interval" not in said

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ir_studies.statistics.dots import dots
-from ir_studies.statistics.figures import Comparison, compared
+from ir_studies.statistics.findings import Comparison, compared
 
 
 def of(shares: list[float], name: str = "energy") -> Comparison:

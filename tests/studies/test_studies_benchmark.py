@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from ir_recorder.analysis.intervals import Mean
 from ir_studies.layout.search import BATCH
-from ir_studies.statistics.figures import findings_of
+from ir_studies.statistics.findings import findings_of
 from ir_studies.statistics.runs import Finished
 from ir_studies.statistics.settings import StatisticsSettings
 

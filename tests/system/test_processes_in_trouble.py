@@ -16,8 +16,7 @@ from builtin_interfaces.msg import Time
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
-from ir_cli.nodes import cell_nodes
-from ir_cli.processes import NodeProcesses
+from ir_cli.ros.processes import NodeProcesses, cell_nodes
 from ir_msgs.srv import CheckState, QueryModes, SetCell, StartRecording
 from ir_msgs_py import names
 from ir_msgs_py.errors import CallTimedOutError, ServiceUnavailableError

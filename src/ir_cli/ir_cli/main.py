@@ -9,39 +9,38 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from .errors import CommandError
-from .suggestions import unknown_name
+from ir_cli.errors import CommandError, unknown_name
 
 COMMAND_MODULES = {
-    "demo": "ir_cli.demo.command",
-    "up": "ir_cli.up_command",
-    "call": "ir_cli.graph_commands",
-    "echo": "ir_cli.graph_commands",
-    "list": "ir_cli.graph_commands",
-    "send_goal": "ir_cli.action_commands",
-    "cancel": "ir_cli.action_commands",
-    "front": "ir_cli.front_command",
-    "live": "ir_cli.live_command",
-    "report": "ir_cli.report_command",
-    "fleet": "ir_cli.fleet_command",
-    "replan": "ir_cli.replan.command",
-    "plan": "ir_cli.offline.plan_command",
-    "move": "ir_cli.offline.move_command",
-    "path": "ir_cli.offline.path_command",
-    "ik": "ir_cli.offline.state_commands",
-    "check": "ir_cli.offline.state_commands",
-    "standby": "ir_cli.offline.standby_command",
-    "evaluate": "ir_cli.offline.evaluate_command",
-    "optimize": "ir_cli.offline.optimize_command",
-    "energy": "ir_cli.offline.energy_command",
-    "krl": "ir_cli.offline.krl_command",
-    "arena": "ir_cli.offline.arena_command",
-    "study": "ir_cli.offline.study_command",
-    "compare": "ir_cli.offline.compare_command",
-    "cell": "ir_cli.offline.cell_commands",
+    "demo": "ir_cli.ros.demo",
+    "up": "ir_cli.ros.up",
+    "call": "ir_cli.ros.graph",
+    "echo": "ir_cli.ros.graph",
+    "list": "ir_cli.ros.graph",
+    "send_goal": "ir_cli.ros.graph",
+    "cancel": "ir_cli.ros.graph",
+    "front": "ir_cli.ros.front",
+    "live": "ir_cli.ros.live",
+    "report": "ir_cli.reports",
+    "fleet": "ir_cli.reports",
+    "replan": "ir_cli.ros.replan",
+    "plan": "ir_cli.plan",
+    "move": "ir_cli.ask",
+    "path": "ir_cli.ask",
+    "ik": "ir_cli.ask",
+    "check": "ir_cli.ask",
+    "standby": "ir_cli.ask",
+    "evaluate": "ir_cli.trace_commands",
+    "optimize": "ir_cli.trace_commands",
+    "energy": "ir_cli.energy",
+    "krl": "ir_cli.krl",
+    "arena": "ir_cli.studies",
+    "study": "ir_cli.studies",
+    "compare": "ir_cli.compare",
+    "cell": "ir_cli.cells",
     "view": "ir_cli.view.command",
-    "robot": "ir_cli.offline.robot_commands",
-    "completion": "ir_cli.completion_command",
+    "robot": "ir_cli.robots",
+    "completion": "ir_cli.completion",
 }
 """Only the module that is needed is imported: `ir cell check` does not wait for rclpy."""
 
@@ -123,7 +122,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         if chosen not in WITHOUT_ROS:
-            from .environment import apply, ros_defaults
+            from ir_cli.ros.domain import apply, ros_defaults
 
             apply(ros_defaults())
         code: int = parsed.run(parsed)

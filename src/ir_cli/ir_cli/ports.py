@@ -1,4 +1,4 @@
-"""Ports on this host: is one free, and which one is."""
+"""Free ports of this host, and claims on them."""
 
 from __future__ import annotations
 

@@ -26,15 +26,23 @@ from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.file_roots import FileRoots
 from ir_msgs_py.ros.diagnostics import OK, Condition, Diagnostics
 from ir_msgs_py.ros.node_process import run_node
+from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.ros.serving import RecordedActionServer, answered
 from ir_msgs_py.ros.topics import ACTION_SERVICES
 from ir_msgs_py.status import Status, StatusCode
 from ir_recorder.errors import RecorderError
 from ir_studies.errors import SettingsError, StoppedError, StudyError
-from ir_studies.parameters import declared_settings
 from ir_studies.settings import StudiesSettings
 from ir_studies.studies import Answer, study_of
 from ir_studies.work import Means
+
+
+def declared_settings(node: Node) -> StudiesSettings:
+    """Declares a parameter per setting, fixed at the start, and returns their values;
+    ParameterError for a bad one.
+    """
+    return Parameters(node, StudiesSettings).value
+
 
 _FEEDBACK_S = 0.2  # a person reads no faster
 _ROWS = 1000  # of the table in the result

@@ -1,3 +1,1 @@
-"""`ir view`: a cell in a browser, from its file: looked at, moved about, checked and planned
-again.
-"""
+"""`ir view`: a cell file in a browser, checked and planned again whenever it changes."""

@@ -7,9 +7,8 @@ import math
 import sys
 import time
 
-from ..offline.asking import add_cell
-from .key import address, new_token
-from .loopback import HOST, PORT, check_installed, closed, opened
+from ir_cli.planning import add_cell
+from ir_cli.view.server import HOST, PORT, address, check_installed, closed, new_token, opened
 
 HELP = "look at a cell in a browser, move it about, plan it; needs no ROS"
 
@@ -32,10 +31,8 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(arguments: argparse.Namespace) -> int:
     """Serve the page until SIGINT, SIGTERM or the end of the given time."""
     check_installed()
-    from .session import (
-        Session,
-    )  # planner and report, after the command line was found to make sense
-    from .watched import Watched
+    from ir_cli.view.cell_file import Watched
+    from ir_cli.view.session import Session
 
     watched = Watched(arguments.cell)
     token = new_token()

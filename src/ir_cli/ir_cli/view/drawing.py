@@ -1,5 +1,4 @@
-"""A cell in viser's scene: robot, loads, machines with their zones and stations, parts, a planned
-path.
+"""A cell in viser's scene: robot, loads, machines with zones and stations, parts, a path.
 
 The triangles are those of the report. A machine is a frame with all that belongs to it below, so
 that moving it moves one frame.
@@ -11,30 +10,122 @@ from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
 
+from ir_cli.view.moves import placed
+from ir_cli.view.playback import PlayedMotion
 from ir_description import Body, Cell, PartPlaces
 from ir_kernels import Chain
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR
 from ir_recorder.report.shapes import Mesh, body_mesh, capsule_mesh, robot_parts
 
-from .colours import (
-    APPROACH,
-    BODIES,
-    CAPSULE,
-    HIGHLIGHT,
-    KINDS,
-    LYING,
-    NEAR,
-    REACH,
-    TOO_NEAR,
-    ZONE,
-    Colour,
-    by_power,
-)  # fmt: skip
-from .motion import Motion
-from .poses import placed
-from .reach import reach_lines
+Colour = tuple[int, int, int]
+KINDS: dict[str, Colour] = {
+    "base": (70, 74, 80),
+    "link": (235, 120, 40),
+    "joint": (60, 64, 70),
+    "tool": (120, 130, 140),
+    "part": (40, 150, 140),
+}
+BODIES: tuple[Colour, ...] = (
+    (150, 170, 190),
+    (175, 165, 145),
+    (150, 180, 155),
+    (180, 155, 175),
+    (165, 165, 165),
+)
+LYING: Colour = (40, 150, 140)
+CAPSULE: Colour = (90, 140, 220)
+HIGHLIGHT: Colour = (225, 30, 40)
+ZONE: Colour = (200, 150, 30)
+APPROACH: Colour = (60, 60, 200)
+REACH: Colour = (120, 120, 120)
+NEAR: Colour = (30, 150, 70)
+TOO_NEAR: Colour = (225, 30, 40)
+SCALE = np.array(
+    [(48, 70, 170), (40, 150, 190), (60, 180, 90), (230, 200, 50), (220, 60, 40)], dtype=np.float64
+)
+"""From the least power to the most."""
+
+
+def by_power(watts: FloatArray) -> NDArray[np.uint8]:
+    """Colours (N, 3) of watts (N,), from the least of them to the most."""
+    low = float(watts.min())
+    high = float(watts.max())
+    share = (watts - low) / max(high - low, 1e-9)
+    steps = np.linspace(0.0, 1.0, len(SCALE))
+    return np.stack([np.interp(share, steps, SCALE[:, k]) for k in range(3)], axis=1).astype(
+        np.uint8
+    )
+
+
+# The outline of what the tool reaches.
+
+POSTURES = 20_000
+"""Drawn within the joint limits; more widen the outline by less than a centimetre."""
+MERIDIANS = 8
+_RING = 72
+
+
+def reach_lines(cell: Cell) -> FloatArray:
+    """Pieces (M, 2, 3) [m] in the base's frame: the convex outline in planes through axis 1, and
+    its widest circle. Every place of the tcp of the drawn postures lies within; not every place
+    within is reached.
+    """
+    robot = cell.robot
+    q = np.random.default_rng(0).uniform(
+        robot.position_min, robot.position_max, (POSTURES, robot.n)
+    )
+    places = Chain(robot, np.eye(4), cell.tcp).tcp_poses(q)[:, :3, 3] - robot.joint_origin[0][:3, 3]
+    radius = np.hypot(places[:, 0], places[:, 1])
+    both = np.concatenate([np.stack([s * radius, places[:, 2]], axis=1) for s in (1.0, -1.0)])
+    outline = both[ConvexHull(both).vertices]
+    closed = np.concatenate([outline, outline[:1]])
+    lines = []
+    for angle in np.arange(MERIDIANS // 2) * 2.0 * np.pi / MERIDIANS:
+        direction = np.array([np.cos(angle), np.sin(angle), 0.0])
+        points = closed[:, :1] * direction + closed[:, 1:] * np.array([0.0, 0.0, 1.0])
+        lines.append(np.stack([points[:-1], points[1:]], axis=1))
+    widest = outline[int(np.argmax(outline[:, 0]))]
+    turn = np.linspace(0.0, 2.0 * np.pi, _RING + 1)
+    ring = np.stack(
+        [widest[0] * np.cos(turn), widest[0] * np.sin(turn), np.full(_RING + 1, widest[1])], 1
+    )
+    lines.append(np.stack([ring[:-1], ring[1:]], axis=1))
+    return np.concatenate(lines) + robot.joint_origin[0][:3, 3]
+
+
+# The first view of a browser.
+
+DIRECTION = np.array([0.72, -0.78, 0.55])
+"""Of the eye from the middle of the cell."""
+DISTANCE = 0.95
+"""Of the eye, per diagonal of the cell."""
+LEAST = 2.0  # m: of a diagonal, for a robot alone
+
+
+def look_at(server: Any, cell: Cell) -> None:
+    """The first view of browsers that open from now on; those that look already keep theirs."""
+    base = cell.base_pose[:3, 3]
+    points = [base, base + np.array([0.0, 0.0, 1.5])]
+    bodies = [
+        body
+        for machine in cell.equipment
+        for body in machine.world_bodies()
+        if body.kind != "plane"
+    ]
+    points += [corner for body in bodies for corner in body.bounds()]
+    low = np.min(points, axis=0)
+    high = np.max(points, axis=0)
+    middle = (low + high) / 2.0
+    size = max(float(np.linalg.norm(high - low)), LEAST)
+    server.initial_camera.look_at = middle
+    server.initial_camera.position = middle + DISTANCE * size * DIRECTION / np.linalg.norm(
+        DIRECTION
+    )
+
 
 MOST_BODIES = 600
 """Up to so many bodies stand for themselves; more are drawn as one per machine, and can't be
@@ -267,7 +358,7 @@ class Drawing:
         self._lines("/nearest", line, TOO_NEAR if near else NEAR, 4.0)
         self._scene.add_label("/nearest_text", text, position=(point_a + point_b) / 2.0)
 
-    def path(self, motion: Motion | None) -> None:
+    def path(self, motion: PlayedMotion | None) -> None:
         """Draws the tool's path, coloured by power; None: nothing."""
         at = np.zeros(0, dtype=int) if motion is None else motion.segments()
         if motion is None or not len(at):

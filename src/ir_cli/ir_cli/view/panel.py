@@ -1,4 +1,4 @@
-"""The panel beside the picture: what is known in words, and what a person can move, play and plan.
+"""Panel beside the picture: figures in words, and controls to move, play and plan.
 
 Every text is escaped: names, paths and sentences come from files.
 """
@@ -12,11 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from ir_cli.view.clearance import StationAccess
+from ir_cli.view.drawing import SCALE
+from ir_cli.view.playback import PlayedMotion
 from ir_description import RobotModel, Station
-
-from .colours import SCALE
-from .judged import Judged
-from .motion import Motion
 
 Post = Callable[[str, Callable[[], None]], None]
 NOBODY = "nothing"
@@ -129,7 +128,7 @@ def plain(text: str) -> str:
     return escape(text)
 
 
-def stations_html(found: Sequence[Judged], complete: bool) -> str:
+def stations_html(found: Sequence[StationAccess], complete: bool) -> str:
     """One line per station and load: how many configurations are free, or why none is."""
     lines = []
     for each in found:
@@ -142,7 +141,7 @@ def stations_html(found: Sequence[Judged], complete: bool) -> str:
     return box(lines or ["no stations"])
 
 
-def legend_html(motion: Motion) -> str:
+def legend_html(motion: PlayedMotion) -> str:
     """The colours of the path with the watts that they mean."""
     stops = ",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in SCALE)
     low = motion.watts.min() / 1e3

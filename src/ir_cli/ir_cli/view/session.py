@@ -1,29 +1,131 @@
-"""One look at a cell: what is shown, what was dragged, what is planned. One thread runs all of
-it.
-"""
+"""Session of `ir view`: picture, panel, dragged machines and plans, all in one thread."""
 
 from __future__ import annotations
 
 import time
+from contextlib import AbstractContextManager
 from typing import Any
 
 import numpy as np
 
-from ir_description import Cell, DescriptionError, cell_to_yaml
+from ir_cli.station_access import MARGIN
+from ir_cli.view.background import QUIET, Inbox, Listener, Planned, PlanWorker, ViewRequest
+from ir_cli.view.cell_file import SavingError, Watched, save
+from ir_cli.view.clearance import Nearest, NearestPairs, StationAccess, names_in
+from ir_cli.view.drawing import Drawing, look_at
+from ir_cli.view.moves import Dragging, Target, cell_with, snippet, targets
+from ir_cli.view.panel import (
+    NOBODY,
+    SPEEDS,
+    Actions,
+    Panel,
+    bad,
+    box,
+    legend_html,
+    plain,
+    stations_html,
+)
+from ir_cli.view.playback import Playback
+from ir_description import Cell, DescriptionError, PartPlaces, cell_to_yaml
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
+from ir_msgs_py.report import PlannedMovement
 
-from .camera import look_at
-from .dragging import Dragging
-from .inbox import Inbox
-from .judged import Judged
-from .moved import Target, cell_with, snippet, targets
-from .panel import NOBODY, SPEEDS, Actions, Panel, bad, box, legend_html, plain, stations_html
-from .planned import QUIET, Asked, Listener, Planned, Worker
-from .playback import Playback
-from .saving import SavingError, save
-from .stage import Stage
-from .watched import Watched
+# The picture: the cell, the robot with what it holds, and in red what is wrong.
+
+
+class Stage:
+    """A cell as it is shown, its robot at q (n,).
+
+    found, failure and errors say what is wrong with it, note what happened last.
+    """
+
+    def __init__(self, server: Any, cell: Cell, source: str, q: FloatArray) -> None:
+        self._server = server
+        self._source = source
+        self._pairs = NearestPairs()
+        self.cell = cell
+        self._now = cell
+        self.q = q
+        self.held = cell.tool.name if cell.tool is not None else ""
+        self.places = cell.parts_at_start()
+        self.near: Nearest | None = None
+        self.found: tuple[StationAccess, ...] = ()
+        self.errors: tuple[str, ...] = ()
+        self.failure = self.note = ""
+        self.drawing = Drawing(server.scene, cell)
+        self.drawing.lie(self.places, self.held)
+
+    def together(self) -> AbstractContextManager[None]:
+        """What is changed inside the block is seen at once."""
+        context: AbstractContextManager[None] = self._server.atomic()
+        return context
+
+    def move(self, cell: Cell) -> None:
+        """Another version of the same cell: machines and stations stand elsewhere."""
+        self.cell = self._now = cell
+        self.drawing.move(cell)
+        self.drawing.states(cell)
+        self.drawing.lie(self.places, self.held)
+        self.drawing.path(None)
+
+    def hold(self, load: str, places: PartPlaces, cell: Cell | None = None) -> None:
+        """What the robot holds, where the parts lie, and the cell with its machines in other
+        states.
+        """
+        now = cell or self.cell
+        if now is not self._now:
+            self._now = now
+            self.drawing.states(now)
+        if (load, places) != (self.held, self.places):
+            self.held = load
+            self.places = places
+            self.drawing.lie(places, load)
+
+    def stand(self, q: FloatArray, movement: PlannedMovement | None = None) -> None:
+        """Put the robot at q (n,), on its course in a movement or by hand."""
+        self.q = q
+        self.drawing.stand(q)
+        self.near = near = self._pairs.at(self._now, q, self.held, self.places, movement)
+        if near is not None:
+            self.drawing.nearest(near.point_a, near.point_b, near.text, near.distance < MARGIN)
+        self.blame()
+
+    def blame(self) -> None:
+        """Show in red what is too near or obstructs."""
+        names = set(names_in(f"{self.failure} {' '.join(self.errors)}", self.cell))
+        names.update(name for each in self.found if not each.free for name in each.pair)
+        if self.near is not None and self.near.distance < MARGIN:
+            names.update(self.near.names)
+        self.drawing.highlight(names)
+
+    def lines(self) -> str:
+        """The state of the file, the nearest pair, and what happened last, as HTML."""
+        lines = [f"{plain(self.cell.name)}, {plain(self._source)}"]
+        if self.errors:
+            lines.append(bad("the file can't be read; the last cell that could be read is shown:"))
+            lines += map(plain, self.errors)
+        if self.near is not None:
+            words = bad if self.near.distance < MARGIN else plain
+            lines.append(words(f"nearest {self.near.text}"))
+        if self.note:
+            lines.append(plain(self.note))
+        return box(lines)
+
+    def configuration(self, name: str) -> FloatArray | None:
+        """Joint values (n,) of a posture, or of the best configuration at a station with what is
+        held there; None, and a note, where there is none.
+        """
+        if name in ("home", "park"):
+            return np.array(self.cell.posture(name))
+        found = [each for each in self.found if each.station == name]
+        chosen = next((each for each in found if each.free), found[0] if found else None)
+        if chosen is None or chosen.q is None:
+            self.note = chosen.sentence if chosen is not None else f"{name} is being checked"
+            return None
+        self.hold(chosen.load, self.places)
+        return chosen.q
+
 
 TICK = 0.04
 """Seconds between two pictures of a playback."""
@@ -41,7 +143,9 @@ class Session:
         self._watched = watched
         self._stations = stations
         self._inbox = Inbox()
-        self._worker = Worker(self._inbox, Listener(self._checked, self._progress, self._planned))
+        self._worker = PlanWorker(
+            self._inbox, Listener(self._checked, self._progress, self._planned)
+        )
         self._number = 0
         self._playback = Playback()
         self._slid = 0.0
@@ -239,7 +343,7 @@ class Session:
         self._playback = Playback()
         self._panel.working(True)
         self._panel.plan_text.content = box(["planning …"])
-        self._worker.ask(Asked(self._number, self._stage.cell, first, self._stations, quiet))
+        self._worker.ask(ViewRequest(self._number, self._stage.cell, first, self._stations, quiet))
 
     def _cancel(self) -> None:
         self._worker.cancel()
@@ -247,7 +351,7 @@ class Session:
         self._panel.working(False)
         self._panel.plan_text.content = box(["planning was cancelled"])
 
-    def _checked(self, number: int, found: tuple[Judged, ...], complete: bool) -> None:
+    def _checked(self, number: int, found: tuple[StationAccess, ...], complete: bool) -> None:
         if number == self._number:
             self._stage.found = found
             self._stage.blame()

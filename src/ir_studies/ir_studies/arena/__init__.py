@@ -1,11 +1,11 @@
 """The arena: planners against each other over cells, tasks, seeds, payloads and timings."""
 
-from ir_studies.arena.entries import Entry
 from ir_studies.arena.runs import Finished, run_arena
 from ir_studies.arena.settings import (
     EXAMPLE,
     PORTFOLIO,
     ArenaSettings,
+    Entry,
     arena_settings,
     read_settings,
 )

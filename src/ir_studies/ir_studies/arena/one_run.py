@@ -1,15 +1,17 @@
-"""One run: a planner is asked for one task, with other seeds until its seconds are over; the best
-counts.
+"""One run of an arena: a planner is asked for one task, with further seeds until its seconds end.
 
-All are treated alike: what a planner finds is simplified, optimised, timed and proved by the same
-code. Who answers quickly is asked more often, who can use more work for a better answer gets it.
-Seconds are those of processors, also where another process answers.
+The cheapest answer counts. Seconds are processor time.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -18,10 +20,60 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlanningInfo, TrajectoryReport
 from ir_planner import Goal, MovementPlan, Planner, PlannerError
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
-from ir_studies.arena.entries import Entry
-from ir_studies.arena.settings import PORTFOLIO, ArenaSettings
-from ir_studies.arena.tasks import tasks_of
+from ir_planner.search.with_ompl import charge_to
+from ir_studies.arena.settings import PORTFOLIO, ArenaSettings, Entry, read_by, tasks_of
 from ir_studies.work import Row
+from ir_studies.work.results import refuse_others
+
+# Processor time of this process and of those in which OMPL answers it, without what it takes to
+# start them: on a machine that others use too, seconds of the wall say who had to wait.
+# A process that is forked for each request is how OMPL is made repeatable here, not what its
+# planners need.
+
+_SCHEDULED = 2  # Linux: the clock of a process counts what its threads ran
+_running: dict[int, float] = {}  # s that each had run when it was last looked at
+_ended = 0.0
+_start = 0.0  # s of each process that count for nobody
+
+
+def processor_time() -> float:
+    """Seconds that this process has run, and those in which OMPL has answered it or does so now;
+    for who asks from one thread.
+    """
+    return time.process_time() + others_time()
+
+
+def others_time() -> float:
+    """Of the same, the seconds of other processes alone."""
+    return _ended + sum(map(_used, tuple(_running)))
+
+
+def excuse(seconds: float) -> None:
+    """From now on so many seconds of each process that is charged count for nobody."""
+    global _start
+    _start = seconds
+
+
+@contextmanager
+def charged(process: int) -> Iterator[None]:
+    """Count a process for as long as this lasts."""
+    global _ended
+    _running[process] = 0.0
+    try:
+        yield
+    finally:
+        _ended += _used(process)
+        del _running[process]
+
+
+def _used(process: int) -> float:
+    """Seconds that a process has run since it was started up; where it is gone, when it was last
+    seen.
+    """
+    with suppress(OSError):
+        _running[process] = max(time.clock_gettime((~process << 3) | _SCHEDULED) - _start, 0.0)
+    return _running[process]
+
 
 SEEDS = 100_000  # between the first requests of two seeds
 _SHARE_OF_ENDS = (
@@ -153,3 +205,68 @@ def first_feasible(info: PlanningInfo) -> float:
         if stage.note.startswith(_FIRST):
             return passed
     return math.nan
+
+
+# Cells, models and OMPL are loaded before the first run is timed.
+
+_STARTS = 2  # looks at what it takes to start a process of OMPL, after the first, which loads it
+
+
+def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
+    """Rows of entries, with everything loaded that is loaded once; `read` of the settings: what
+    must be the same here. WorkerError where it is not.
+    """
+    read: dict[str, Any] = {  # JSON knows no tuples
+        key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()
+    }
+    given = read.pop("read", {})
+    arena = ArenaSettings(**read)
+    refuse_others(given, read_by(arena.cells) if given else {})
+    charge_to(charged)
+    excuse(0.0)
+    warm_up(arena)
+    few = replace(arena, cells=arena.cells[:1], loads=arena.loads[:1], tasks=())
+    start = min(warm_up(few) for _ in range(_STARTS))
+    excuse(start)
+
+    def row_of(words: Mapping[str, Any]) -> Row:
+        entry = Entry(**words)
+        return {**one_run(entry, arena, planner_of(entry.cell), processor_time), "start_s": start}
+
+    return row_of
+
+
+def warm_up(settings: ArenaSettings) -> float:
+    """What is loaded once is loaded before anything is timed: cells, models with every load, OMPL.
+    The least that a process of OMPL ran [s] for a question with next to nothing to check: what it
+    takes to start one.
+    """
+    least = math.inf
+    for cell in settings.cells:
+        planner = planner_of(cell)
+        start, there = next(iter(tasks_of(planner.cell).values()))
+        goal = Goal(configuration=start + 1e-3 * (there - start))
+        for load in settings.loads:
+            for name in settings.planners:
+                planner_id = "" if name == PORTFOLIO else name
+                options = PlanOptions(
+                    planner_id=planner_id,
+                    max_iterations=10,
+                    planning_time=120.0,
+                    safety_distance=0.0,  # an end of a task may be near something
+                    load=load,
+                )
+                begin = others_time()
+                with suppress(PlannerError):
+                    planner.plan_regional(start, goal, options)
+                if others_time() > begin:
+                    least = min(least, others_time() - begin)
+    return least if math.isfinite(least) else 0.0
+
+
+@cache
+def planner_of(cell: str) -> Planner:
+    """One planner per cell."""
+    planner = Planner(processor_time)
+    planner.set_cell("", cell)
+    return planner

@@ -1,6 +1,4 @@
-"""Runs as a database of Planner Arena: tables and views as OMPL's ompl_benchmark_statistics.py has
-them.
-"""
+"""Files of an arena: table, page, and a database of Planner Arena as OMPL's scripts write it."""
 
 from __future__ import annotations
 
@@ -13,9 +11,13 @@ from contextlib import closing, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
-from ir_studies.arena.settings import ArenaSettings
-from ir_studies.arena.table import Run
-from ir_studies.errors import FolderError
+from ir_msgs_py.file_roots import ANYWHERE
+from ir_recorder.report.files import write_output
+from ir_recorder.report.step_table import PARQUET_START, write_columns
+from ir_studies.arena.figures import Run, columns
+from ir_studies.arena.page import write_page
+from ir_studies.arena.settings import FORMAT, ArenaSettings, read_settings, settings_text
+from ir_studies.errors import FolderError, SettingsError
 
 _TABLES = """
 CREATE TABLE experiments (id INTEGER PRIMARY KEY AUTOINCREMENT, name VARCHAR(512), totaltime REAL,
@@ -114,3 +116,35 @@ def _insert(database: sqlite3.Connection, run: Run, experiment: int, planner: in
         "INSERT OR REPLACE INTO progress VALUES (?, ?, ?)",
         [(key, at, cost) for at, cost in run.progress],
     )
+
+
+_CSV_START = b"planner,"
+
+
+def write_outputs(
+    runs: Sequence[Run], settings: ArenaSettings, folder: Path, missing: int = 0, *, parquet: bool
+) -> tuple[Path, ...]:
+    """Write table.csv, table.parquet where that is asked for, arena.db and index.html. missing:
+    runs that were not made yet.
+
+    Raises RecorderError for files that can't be written, or replaced.
+    """
+    table = columns(runs)
+    written = [write_columns(table, folder / "table.csv", _CSV_START, ANYWHERE)]
+    if parquet:
+        written.append(write_columns(table, folder / "table.parquet", PARQUET_START, ANYWHERE))
+    written.append(write_database(runs, settings, folder / "arena.db").absolute())
+    written.append(write_page(runs, settings, folder / "index.html", missing))
+    return tuple(written)
+
+
+def write_settings(settings: ArenaSettings, folder: Path) -> Path:
+    """Write settings.yaml, with which the same arena is run again; one that says the same stays as
+    it is. RecorderError for a file that can't be written, or is something else.
+    """
+    path = folder / "settings.yaml"
+    with suppress(SettingsError):
+        if read_settings(path) == settings:
+            return path.absolute()
+    content = settings_text(settings, folder.absolute())
+    return write_output(path, content.encode(), f"format: {FORMAT}".encode(), ANYWHERE)

@@ -1,6 +1,4 @@
-"""The whole arena: what is not yet in the folder is run, then table, database and page are written;
-also when it is stopped, of what is there.
-"""
+"""An arena from its settings to its files; interrupted, it goes on where it ended."""
 
 from __future__ import annotations
 
@@ -11,12 +9,9 @@ from dataclasses import asdict, dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from ir_studies.arena.entries import Entry, entries
-from ir_studies.arena.figures import blocked_and_free, figures
-from ir_studies.arena.outputs import write_outputs, write_settings
-from ir_studies.arena.settings import ArenaSettings
-from ir_studies.arena.table import Run, asked_alike
-from ir_studies.arena.tasks import read_by
+from ir_studies.arena.figures import Run, asked_alike, blocked_and_free, figures
+from ir_studies.arena.planner_arena import write_outputs, write_settings
+from ir_studies.arena.settings import ArenaSettings, Entry, entries, read_by
 from ir_studies.errors import StoppedError, StudyError, WorkerError
 from ir_studies.work import Means, Results, Task
 

@@ -1,25 +1,26 @@
-"""What an arena compares, from a YAML file; whatever makes no sense is refused before anything is
-planned.
-"""
+"""Settings of an arena from a YAML file, and the runs that follow from them."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
-from ir_description import DescriptionError, is_path, load_cell, load_power_data
+from ir_description import Cell, DescriptionError, cell_hash, is_path, load_cell, load_power_data
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import TIMINGS
 from ir_planner import PlannerError
 from ir_planner.scene import scene_with
 from ir_planner.search import SEARCHES
 from ir_planner.search.with_ompl import missing, needs_ompl
-from ir_studies.arena.tasks import tasks_of
 from ir_studies.errors import SettingsError
 from ir_studies.work import (
+    Job,
     Placed,
     beside,
     checked_known,
@@ -27,6 +28,35 @@ from ir_studies.work import (
     read_text,
     settings_values,
 )
+from ir_studies.work.results import task_digests
+
+# Tasks of a cell, there and back.
+
+
+def tasks_of(cell: Cell) -> Mapping[str, tuple[FloatArray, FloatArray]]:
+    """Ends (n,) of every task, there and back: home->p1 and p1->home, or where the cell has another
+    task of that name, home->p1 back.
+    """
+    found: dict[str, tuple[FloatArray, FloatArray]] = {}
+    named = {task.name for task in cell.tasks}
+    for task in cell.tasks:
+        start = np.array(task.start)
+        goal = np.array(task.goal)
+        first, _, last = task.name.partition("->")
+        back = f"{last}->{first}"
+        found[task.name] = start, goal
+        found[back if last and back not in named else f"{task.name} back"] = goal, start
+    return found
+
+
+def read_by(names: Iterable[str]) -> dict[str, str]:
+    """Digests of the cells, and of their tasks."""
+    found: dict[str, str] = {}
+    for name in names:
+        cell = load_cell(name)
+        found |= {name: cell_hash(cell), **task_digests(name, cell)}
+    return found
+
 
 FORMAT = "ir_arena/1"
 PORTFOLIO = "portfolio"
@@ -171,3 +201,64 @@ def _check_names(key: str, names: Any, *, may_be_empty: bool) -> None:
         raise SettingsError(f"{key} is empty")
     if len(set(names)) < len(names):
         raise SettingsError(f"{key} names one twice")
+
+
+# Runs: every planner on every task with every seed, in an order that treats all alike.
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One run: a planner, a task of a cell as start->goal, a seed, what is attached, and the
+    timing.
+    """
+
+    planner: str
+    cell: str
+    task: str
+    seed: int
+    load: str
+    timing: str
+
+    @property
+    def key(self) -> str:
+        """What it is known by in the results."""
+        return "|".join(str(value) for value in asdict(self).values())
+
+    @property
+    def job(self) -> Job:
+        """What a worker is given of it."""
+        return Job(self.key, asdict(self))
+
+    @property
+    def question(self) -> tuple[str, str, str, str]:
+        """What all planners and seeds are asked alike."""
+        return self.cell, self.task, self.load, self.timing
+
+
+def entries(settings: ArenaSettings) -> list[Entry]:
+    """All runs; planners change fastest and seeds slowest, so that what is there early is a fair
+    part.
+    """
+    tasks = {cell: _chosen(cell, settings.tasks) for cell in settings.cells}
+    count = settings.seeds * sum(map(len, tasks.values()))
+    count *= len(settings.loads) * len(settings.timings) * len(settings.planners)
+    if count > MOST_RUNS:
+        days = count * settings.seconds / 86_400.0
+        raise SettingsError(
+            f"these are {count} runs, {days:.1f} days of one core: at most {MOST_RUNS} are made"
+        )
+    return list(_entries(settings, tasks))
+
+
+def _chosen(cell: str, names: tuple[str, ...]) -> list[str]:
+    return [name for name in tasks_of(load_cell(cell)) if not names or name in names]
+
+
+def _entries(settings: ArenaSettings, tasks: Mapping[str, list[str]]) -> Iterator[Entry]:
+    for seed in range(settings.seeds):
+        for cell, names in tasks.items():
+            for task in names:
+                for load in settings.loads:
+                    for timing in settings.timings:
+                        for planner in settings.planners:
+                            yield Entry(planner, cell, task, seed, load, timing)

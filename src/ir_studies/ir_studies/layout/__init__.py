@@ -1,7 +1,12 @@
-"""Where robot, machines, posture and tool should stand for least energy, and what is impossible."""
+"""Layout study: where robot, machines, posture and tool stand for least energy."""
 
-from ir_studies.layout.example import EXAMPLE
-from ir_studies.layout.settings import Condition, LayoutSettings, layout_settings, read_layout
+from ir_studies.layout.settings import (
+    EXAMPLE,
+    Condition,
+    LayoutSettings,
+    layout_settings,
+    read_layout,
+)
 from ir_studies.layout.study import Layouts, run_layout
 
 __all__ = [

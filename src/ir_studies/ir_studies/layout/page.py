@@ -1,6 +1,4 @@
-"""The page of a layout study: one HTML file with what follows, a map of energy over placement,
-reasons.
-"""
+"""Page and files of a layout study: map of energy over placement, reasons, best cell files."""
 
 from __future__ import annotations
 
@@ -9,27 +7,144 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
-from ir_description import Cell
+from ir_description import Cell, cell_to_yaml
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.file_roots import ANYWHERE
 from ir_planner.checks import Interval
 from ir_recorder.report.files import write_output
 from ir_recorder.report.number_text import DASH, joules, millimetres, percent, text
 from ir_recorder.report.page import PAGE_START
+from ir_recorder.report.shapes import body_mesh, capsule_mesh
+from ir_recorder.report.step_table import write_columns
 from ir_recorder.report.tables import table
-from ir_studies.layout.finals import Final
-from ir_studies.layout.freedom import Variable
-from ir_studies.layout.placement import Known
-from ir_studies.layout.plan_view import Mark, PlanView, colour, estimates, legend, mark, shown_range
+from ir_studies.layout.placement import Known, Variable
 from ir_studies.layout.search import GIVEN
-from ir_studies.layout.settings import LayoutSettings
-from ir_studies.layout.summary import cost_words, ends, of_condition, sentences
+from ir_studies.layout.settings import Condition, LayoutSettings
+from ir_studies.layout.summary import Final, cost_words, ends, of_condition, sentences
 from ir_studies.page import page
+
+# The cell from above, with a dot at every place, coloured by its cost.
+
+WIDTH = 520.0  # of a drawing; its height follows
+_MARGIN = 12.0
+_TALLEST = 1.5  # height of a drawing in widths
+_AROUND = 0.6  # of the extent of all places that is shown around them
+_LEAST_M = 0.3  # m, at least
+Mark: TypeAlias = "tuple[FloatArray, str, str, str]"
+"""A place (2,) m, its kind, its colour, its words."""
+_COLOURS = ("#1a7f5a", "#5aa02c", "#b5a900", "#e08a00", "#d1495b")  # from least cost to most
+
+
+def colour(cost: float, low: float, high: float) -> str:
+    """Of a cost between the least and the most that are shown; "" where it isn't known."""
+    if not math.isfinite(cost):
+        return ""
+    share = (cost - low) / (high - low) if high > low else 0.0
+    return _COLOURS[int(np.clip(share * len(_COLOURS), 0, len(_COLOURS) - 1))]
+
+
+def estimates(known: Sequence[Known]) -> list[float]:
+    """Costs of placements; of those that were looked at only, what coarse movements cost, with the
+    median of what plans cost above them. Inf where a placement is impossible, NaN where nothing was
+    planned.
+    """
+    above = [one.cost - one.coarse for one in known if math.isfinite(one.cost)]
+    more = float(np.median(above)) if above else math.nan
+    return [one.coarse + more if math.isnan(one.cost) else one.cost for one in known]
+
+
+def shown_range(known: Sequence[Known]) -> tuple[float, float]:
+    """Least cost, and the one that nine of ten placements stay below; NaN where none was
+    planned.
+    """
+    costs = [cost for cost in estimates(known) if math.isfinite(cost)]
+    return (min(costs), float(np.quantile(costs, 0.9))) if costs else (math.nan, math.nan)
+
+
+def legend(low: float, high: float) -> str:
+    """What the colours mean."""
+    steps = np.linspace(low, high, len(_COLOURS) + 1)
+    keys = (
+        f'<span><span class="key" style="background:{one}"></span>{text(joules(float(at)))} '
+        "…</span>"
+        for one, at in zip(_COLOURS, steps, strict=False)
+        if math.isfinite(low)
+    )
+    rest = ("○ looked at only: estimated", "× impossible", "◆ as given", "★ best_1.yaml")
+    return f'<p class="key-row">{"".join(keys)}{"".join(f"<span>{one}</span>" for one in rest)}</p>'
+
+
+class PlanView:
+    """Draws places (2,) m of the world; given and best: the cell as it is and as it should be, as
+    far as it lies around places (N, 2), which all are in sight. across: m from edge to edge.
+    """
+
+    def __init__(self, given: Cell, best: Cell | None, places: FloatArray) -> None:
+        self._outlines = [("was", one) for one in outlines(given)]
+        self._outlines += [("best", one) for one in (outlines(best) if best is not None else ())]
+        around = max(_AROUND * float(np.ptp(places, axis=0).max()), _LEAST_M)
+        self._low = places.min(axis=0) - around
+        high = places.max(axis=0) + around
+        self.across, up = (float(one) for one in high - self._low)
+        self._scale = (WIDTH - 2 * _MARGIN) / max(self.across, up / _TALLEST)
+        self._height = self._scale * up + 2 * _MARGIN
+
+    def drawn(self, name: str, marks: Sequence[Mark]) -> str:
+        """SVG with marks: place (2,), kind (dot, open, cross, given, best), colour, words."""
+        shapes = [
+            f'<polygon class="{kind}" '
+            f'points="{" ".join(f"{x:.1f},{y:.1f}" for x, y in self._at(points))}"/>'
+            for kind, points in self._outlines
+        ]
+        shapes += [mark(*self._at(place[None])[0], *rest) for place, *rest in marks]
+        return (
+            f'<svg class="plan" viewBox="0 0 {WIDTH:g} {self._height:.0f}" role="img" '
+            f'aria-label="{text(name)}">{"".join(shapes)}</svg>'
+        )
+
+    def _at(self, points: FloatArray) -> FloatArray:
+        flat = (points - self._low) * self._scale + _MARGIN
+        return np.stack([flat[:, 0], self._height - flat[:, 1]], axis=1)
+
+
+def mark(x: float, y: float, kind: str, fill: str, words: str) -> str:
+    """A mark at a place of the drawing, with words that a pointer shows."""
+    title = f"<title>{text(words)}</title>"
+    if kind == "cross":
+        return f'<path class="cross" d="M{x - 2:.1f} {y - 2:.1f}l4 4m0 -4l-4 4">{title}</path>'
+    if kind == "given":
+        return f'<path class="given" d="M{x:.1f} {y - 7:.1f}l7 7l-7 7l-7 -7z">{title}</path>'
+    if kind == "best":
+        return f'<text class="star" x="{x:.1f}" y="{y + 6:.1f}">★{title}</text>'
+    style = f'style="{"fill" if kind == "dot" else "stroke"}:{fill}"'
+    return f'<circle class="{kind}" cx="{x:.1f}" cy="{y:.1f}" r="3" {style}>{title}</circle>'
+
+
+def outlines(cell: Cell) -> Iterator[FloatArray]:
+    """Outlines (V, 2) of machines' bodies and of the robot's base from above."""
+    base = [capsule for capsule in cell.robot.capsules if capsule.link == 0]
+    solids = [
+        (body_mesh(body), body.pose)
+        for machine in cell.equipment
+        for body in machine.world_bodies()
+    ]
+    solids += [(capsule_mesh(capsule), cell.base_pose) for capsule in base]
+    for mesh, pose in solids:
+        if mesh is None:
+            continue
+        flat = (mesh.points @ pose[:3, :3].T + pose[:3, 3])[:, :2]
+        try:
+            yield flat[ConvexHull(flat).vertices]
+        except QhullError:  # a body without extent from above
+            continue
+
 
 # width, height and room for numbers
 _CHART = 340.0
@@ -216,3 +331,108 @@ def _impossible(known: Sequence[Known]) -> str:
 def _without_numbers(sentence: str) -> str:
     """Sentences that differ by numbers alone count as one."""
     return re.sub(r"-?\d+\.\d+|-?\b\d+\b(?! %)", "…", sentence)[:_SENTENCE]
+
+
+# Files: the table, the best placements as cell files, the page.
+
+_TABLE_START = b"placement,"
+_CELL_START = b"format: ir_cell/1"
+NUMBERS = (
+    "cost_j", "energy_j", "energy_low_j", "energy_high_j", "duration_s", "moving_j", "moving_s", "drives_j",  # noqa: E501
+    "clearance_m",
+)  # fmt: skip
+_BEST_HEADS = (
+    "rank,placement,condition,energy_j,low_j,high_j,spread_j,duration_s,moving_j,"
+    "saved_j,saved_low_j,saved_high_j"
+)
+Value: TypeAlias = "str | float | int"
+
+
+def write_outputs(
+    known: Sequence[Known],
+    finals: Sequence[Sequence[Final]],
+    settings: LayoutSettings,
+    given: Cell,
+    folder: Path,
+) -> tuple[tuple[Path, ...], str]:
+    """Write table.csv, best_1.yaml and so on, index.html; the files, and the best as CSV. given:
+    the cell as it was when the study began.
+
+    Raises RecorderError for files that can't be written, or replaced.
+    """
+    rows = [_row(k, one, c, settings) for k, one in enumerate(known) for c in settings.conditions]
+    columns = {name: [row[name] for row in rows] for name in rows[0]}
+    written = [write_columns(columns, folder / "table.csv", _TABLE_START, ANYWHERE)]
+    others = [own for own in finals if not own[0].is_given]
+    for rank, own in enumerate(others, start=1):
+        cell = settings.placing.cell(given, own[0].placement.values)
+        content = cell_to_yaml(replace(cell, name=f"{cell.name}_best_{rank}")).encode()
+        written.append(write_output(folder / f"best_{rank}.yaml", content, _CELL_START, ANYWHERE))
+    _remove_best(folder, given.name, len(others))
+    written.append(write_page(known, finals, settings, given, folder / "index.html"))
+    return tuple(written), best_table(finals)
+
+
+def _remove_best(folder: Path, name: str, kept: int) -> None:
+    """Remove the best of a study in this folder that kept more; other cells stay."""
+    for path in folder.glob("best_*.yaml"):
+        rank = path.stem.removeprefix("best_")
+        if rank.isdecimal() and int(rank) > kept and _named(path, f"{name}_best_{rank}"):
+            path.unlink()
+
+
+def _named(path: Path, name: str) -> bool:
+    """Whether a file is a cell of that name, as it was written here."""
+    if path.is_symlink() or not path.is_file():
+        return False
+    content = path.read_bytes()
+    return content.startswith(_CELL_START) and f"name: {name}".encode() in content.splitlines()
+
+
+def _row(k: int, known: Known, condition: Condition, settings: LayoutSettings) -> dict[str, Value]:
+    plan = known.plans.get(condition, {})
+    kind, sentence = known.reason
+    state = "impossible" if known.cost == math.inf else "planned" if known.planned else "looked at"
+    return {
+        "placement": k,
+        **{
+            variable.name: known.placement.values.get(variable.name, 0.0)
+            for variable in settings.variables
+        },
+        "condition": condition.text,
+        "state": state,
+        "reason": kind,
+        "sentence": sentence,
+        "coarse_j": known.coarse if math.isfinite(known.coarse) else math.nan,
+        **{name: float(plan.get(name, math.nan)) for name in NUMBERS},
+        "program_id": str(plan.get("program_id", "")),
+    }
+
+
+def best_table(finals: Sequence[Sequence[Final]]) -> str:
+    """CSV: the given placement and the best by condition, with their error bars."""
+    given, _ = ends(finals)
+    lines = [_BEST_HEADS]
+    rank = 0
+    for own in finals:
+        rank += not own[0].is_given
+        for one in own:
+            if not one.solved:
+                continue
+            within = one.interval
+            figures = [
+                one.mean(),
+                within.low,
+                within.high,
+                one.spread(),
+                one.mean("duration_s"),
+                one.mean("moving_j"),
+            ]
+            if given is not None:
+                less, saved = one.saving(of_condition(given, one))
+                figures += [less, saved.low, saved.high]
+            else:
+                figures += [math.nan] * 3
+            texts = (str(rank if not one.is_given else 0), one.placement.key, one.condition.text)
+            lines.append(",".join([*texts, *(f"{value:.3f}" for value in figures)]))
+    return "\n".join(lines) + "\n"

@@ -1,4 +1,4 @@
-"""The whole layout study: search, error bars of the best, and what is left behind in the folder."""
+"""A layout study from its settings to its files: search, error bars of the best, page."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from hashlib import sha256
 from pathlib import Path
 
 from ir_description import cell_to_yaml, load_cell
-from ir_studies.layout.finals import Final, final_jobs, finals
-from ir_studies.layout.outputs import write_outputs
+from ir_studies.layout.page import write_outputs
 from ir_studies.layout.placement import Known
 from ir_studies.layout.search import Search
 from ir_studies.layout.settings import LayoutSettings
-from ir_studies.layout.summary import sentences
+from ir_studies.layout.summary import Final, final_jobs, finals, sentences
 from ir_studies.work import Job, Means, Results, Task
 
 

@@ -1,5 +1,6 @@
-"""Statistics of section VI of the paper: time and energy of movements between random places of a
-cell, with synchronous and asynchronous joints, predicted, measured directly and measured
+"""Statistics of section VI of the paper over random movements of a cell.
+
+Time and energy with synchronous and asynchronous joints; predicted, measured directly and measured
 indirectly.
 """
 

@@ -1,4 +1,4 @@
-"""A drawing of comparisons: a line for each, a dot per pair, a bar for the mean's interval."""
+"""Drawing of paired comparisons: a dot per pair, a bar for the interval of the mean."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from ir_recorder.report.charts import tick_step
 from ir_recorder.report.number_text import text
-from ir_studies.statistics.figures import Comparison
+from ir_studies.statistics.findings import Comparison
 
 WIDTH = 720.0
 LINE = 34.0

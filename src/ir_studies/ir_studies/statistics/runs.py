@@ -1,4 +1,4 @@
-"""The whole statistics: what is not yet in the folder is planned and driven, then summed up."""
+"""The statistics from their settings to their files; interrupted, they go on where they ended."""
 
 from __future__ import annotations
 
@@ -6,12 +6,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from ir_msgs_py.options import TIMINGS
-from ir_studies.statistics.figures import Findings, findings_of
-from ir_studies.statistics.outputs import summed_up, write_outputs
-from ir_studies.statistics.places import read_by
+from ir_studies.statistics.findings import Findings, findings_of, solved
+from ir_studies.statistics.movements import read_by
+from ir_studies.statistics.outputs import summary_of, summed_up, write_outputs
 from ir_studies.statistics.settings import StatisticsSettings
-from ir_studies.statistics.sides import solved
-from ir_studies.statistics.verdict import sentences
 from ir_studies.work import Job, Means, Results, Row, Task
 
 
@@ -26,8 +24,8 @@ class Finished:
 
     @property
     def summary(self) -> str:
-        """What follows, and what does not."""
-        return " ".join(sentences(self.findings, self.settings))
+        """Counts, the table of comparisons with intervals, and notes, as text."""
+        return summary_of(self.findings, self.settings)
 
     @property
     def summed_up(self) -> str:

@@ -1,4 +1,4 @@
-"""What the statistics are taken over, from a YAML file."""
+"""Settings of the statistics from a YAML file."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""What all studies share: jobs made by worker processes, results in a growing file, settings
-files.
-"""
+"""Work of all studies: jobs in worker processes, results in a growing file, settings files."""
 
 from ir_studies.work.job import Job, Row, Task
 from ir_studies.work.means import MOST_WORKERS, Means

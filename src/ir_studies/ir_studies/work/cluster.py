@@ -1,7 +1,7 @@
-"""Jobs made by a Dask cluster: each of its threads has a worker process of this project.
+"""Jobs on a Dask cluster: each of its threads has a worker process of this project.
 
-So what hangs there is cut and what dies is tried once more by the same code as on one machine; a
-worker of the cluster that dies is Dask's own business, which gives its job to another.
+A hanging job is cut and a dead process tried once more by the same code as on one machine; a worker
+of the cluster that dies is Dask's own business, which gives its job to another.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from importlib import import_module
 from itertools import islice
 from queue import Empty, Queue
@@ -22,10 +22,104 @@ from typing import Any
 from uuid import uuid4
 
 from ir_studies.errors import StoppedError, StudyError, WorkerError
-from ir_studies.work.build import computed_with
+from ir_studies.work.fingerprint import computed_with
 from ir_studies.work.job import Job, Row, Task
-from ir_studies.work.kept import Kept, Stopped
 from ir_studies.work.pool import Pool
+
+# In a worker of the cluster: the processes that make its jobs, one for each thread and study. A
+# pool is touched by the thread that uses it only; others ask it to stop. A process ends with its
+# study, and where no job came for a while: a study that was killed says no goodbye.
+
+IDLE_S = 120.0
+Stopped = Callable[[], bool]
+_Key = tuple[int, str]  # thread, study
+
+
+@dataclass(eq=False)
+class _Used:
+    pool: Pool
+    stop: threading.Event
+    busy: bool = False
+    waiting: threading.Timer | None = field(default=None, repr=False)
+
+
+class Kept:
+    """idle [s]: after so long without a job the process of a thread ends."""
+
+    def __init__(self, idle: float = IDLE_S) -> None:
+        self._idle = idle
+        self._lock = threading.Lock()
+        self._used: dict[_Key, _Used] = {}
+        self._ended: set[str] = set()
+
+    def __len__(self) -> int:
+        return len(self._used)
+
+    def row(self, study: str, make: Callable[[Stopped], Pool], job: Job) -> Row:
+        """The row of a job, made by the process that this thread has for a study. StoppedError
+        where that ended, also meanwhile; make: a new pool of one process, which asks whether it is
+        to stop.
+        """
+        own = threading.get_ident(), study
+        used = self._taken(own, make)
+        try:
+            [(_, row)] = used.pool.rows([job])
+        except BaseException:
+            used.stop.set()  # what failed is not kept
+            raise
+        finally:
+            self._put_back(own, used)
+        return row
+
+    def end(self, study: str) -> None:
+        """End the processes of a study; its thread ends one that makes a job just now."""
+        with self._lock:
+            self._ended.add(study)
+            for _, used in self._of(study):
+                used.stop.set()
+            idle = [(own, used) for own, used in self._of(study) if not used.busy]
+            for own, _ in idle:
+                del self._used[own]
+        for _, used in idle:
+            used.pool.close()
+
+    def _of(self, study: str) -> list[tuple[_Key, _Used]]:
+        return [(own, used) for own, used in self._used.items() if own[1] == study]
+
+    def _taken(self, own: _Key, make: Callable[[Stopped], Pool]) -> _Used:
+        with self._lock:
+            if own[1] in self._ended:
+                raise StoppedError("the study has ended")
+            used = self._used.get(own)
+            if used is None:
+                stop = threading.Event()
+                used = self._used[own] = _Used(make(stop.is_set), stop)
+            if used.waiting is not None:
+                used.waiting.cancel()
+            used.busy = True
+            used.waiting = None
+            return used
+
+    def _put_back(self, own: _Key, used: _Used) -> None:
+        with self._lock:
+            used.busy = False
+            ends = used.stop.is_set()
+            if ends:
+                del self._used[own]
+            else:
+                used.waiting = threading.Timer(self._idle, self._end_idle, (own, used))
+                used.waiting.daemon = True
+                used.waiting.start()
+        if ends:
+            used.pool.close()
+
+    def _end_idle(self, own: _Key, used: _Used) -> None:
+        with self._lock:
+            if self._used.get(own) is not used or used.waiting is not threading.current_thread():
+                return  # a job came meanwhile
+            del self._used[own]
+        used.pool.close()
+
 
 _CONNECT_S = 20.0
 _LOOK_S = 0.2  # between two looks whether somebody asks to stop

@@ -1,4 +1,4 @@
-"""A job: the smallest piece of a study, made in one process; its row is all that is known of it."""
+"""Jobs: the smallest pieces of a study, each made in one process; its row is the result."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""A process that ends when the one that started it has ended, also while it hangs in compiled code.
+"""Lifeline of a worker process: it ends with its starter, also while it hangs in compiled code.
 
 The starter holds the writing end of a pipe and never writes. When it ends, however it does, the
-kernel sends SIGIO to the process that holds the other end; nobody handles that, so it ends at once.
+kernel sends SIGIO to the process that holds the other end; nothing handles that, so it ends.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a study is made with: worker processes of this machine, or those of a Dask cluster."""
+"""Means of a study: worker processes of this machine or a Dask cluster, progress, a stop."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Means:
     def makers(self, task: Task) -> AbstractContextManager[Makers]:
         """Processes that make the jobs of a task; they end with the context."""
         if self.scheduler:
-            from ir_studies.work.cluster import Cluster  # Dask is an extra
+            from ir_studies.work.cluster import Cluster
 
             return Cluster(task, self.scheduler, self.stopped)
         count = self.workers or min(len(os.sched_getaffinity(0)), MOST_WORKERS)

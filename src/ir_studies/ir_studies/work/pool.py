@@ -1,6 +1,4 @@
-"""Worker processes for jobs: what hangs is cut, what dies is tried once more, Ctrl-C ends them
-all.
-"""
+"""Pool of worker processes: a hanging job is cut, a dead process tried once more."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""Settings of a study from YAML: known keys, values in their ranges, or a sentence that says which
-not.
-"""
+"""Settings files of studies: YAML with known keys and values in their ranges."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""The process that makes jobs: what they have in common in, then a line of JSON for each, one row
-out.
-"""
+"""Worker process: the task in one line of JSON, then a job per line in, a row per line out."""
 
 from __future__ import annotations
 
@@ -19,9 +17,9 @@ from ir_studies.work.lifeline import tie
 
 READY = {"ready": True}
 MAKERS = {
-    "arena": "ir_studies.arena.maker",
-    "layout": "ir_studies.layout.maker",
-    "statistics": "ir_studies.statistics.maker",
+    "arena": "ir_studies.arena.one_run",
+    "layout": "ir_studies.layout.search",
+    "statistics": "ir_studies.statistics.movements",
 }
 """Modules by kind of study; each has `maker(settings)`, which loads what is loaded once and returns
 what makes a row from the words of a job.

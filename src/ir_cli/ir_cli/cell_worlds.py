@@ -1,0 +1,205 @@
+"""`ir cell import` and `export`: meshes from CAD, worlds of simulators, glTF."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import struct
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ir_cli.errors import InputError
+from ir_cli.output import print_json
+from ir_cli.planning import add_cell, sentences
+from ir_description import Cell, Equipment, InvalidValueError, cell_to_yaml, load_cell, robot_named
+from ir_description.cell import shape_register, zone_around
+from ir_description.files.solid_mesh import PIECES, PIECES_MAX, UNITS, SolidReader, pieces_of
+from ir_description.files.worlds import WRITERS, read_world
+from ir_recorder.report.shapes import body_mesh
+
+_Z_UP = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+"""Column by column: glTF's y axis points up, the cell's z."""
+_FLOAT = 5126
+_UINT = 5125
+_JSON = 0x4E4F534A
+_BIN = 0x004E4942
+_MAGIC = 0x46546C67
+_VERSION = 2
+
+
+def cell_glb(cell: Cell) -> bytes:
+    """One node per machine, and one below it per body that is there in its state; planes are left
+    out.
+    """
+    nodes: list[dict[str, Any]] = [{"name": cell.name, "matrix": _Z_UP, "children": []}]
+    meshes: list[dict[str, Any]] = []
+    views: list[dict[str, Any]] = []
+    accessors: list[dict[str, Any]] = []
+    binary = bytearray()
+    for machine in cell.equipment:
+        owner = {
+            "name": machine.name,
+            "matrix": machine.pose.T.ravel().tolist(),
+            "children": list[int](),
+        }
+        nodes[0]["children"].append(len(nodes))
+        nodes.append(owner)
+        for body in machine.present_bodies():
+            mesh = body_mesh(body)
+            if mesh is None:
+                continue
+            points = mesh.points.astype("<f4")
+            corners = mesh.triangles.astype("<u4").ravel()
+            for values, kind, shape in ((points, _FLOAT, "VEC3"), (corners, _UINT, "SCALAR")):
+                bounds = {"min": points.min(axis=0).tolist(), "max": points.max(axis=0).tolist()}
+                entry = {
+                    "bufferView": len(views),
+                    "componentType": kind,
+                    "count": len(values),
+                    "type": shape,
+                }
+                accessors.append({**entry, **(bounds if shape == "VEC3" else {})})
+                views.append({"buffer": 0, "byteOffset": len(binary), "byteLength": values.nbytes})
+                binary += values.tobytes()
+            last = len(accessors) - 1
+            meshes.append({"primitives": [{"attributes": {"POSITION": last - 1}, "indices": last}]})
+            owner["children"].append(len(nodes))  # type: ignore[attr-defined]
+            pose = body.pose.T.ravel().tolist()
+            nodes.append({"name": body.name, "matrix": pose, "mesh": len(meshes) - 1})
+    for node in nodes:
+        if not node.get("children", True):
+            del node["children"]
+    document: dict[str, Any] = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}]}
+    document["nodes"] = nodes
+    if meshes:
+        document |= {"meshes": meshes, "accessors": accessors, "bufferViews": views}
+        document["buffers"] = [{"byteLength": len(binary)}]
+    return _container(json.dumps(document, separators=(",", ":")).encode(), bytes(binary))
+
+
+def _container(text: bytes, binary: bytes) -> bytes:
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<II", len(text), _JSON) + text
+    if binary:
+        chunks += (
+            struct.pack("<II", len(binary), _BIN) + binary
+        )  # of four-byte numbers: padded already
+    return struct.pack("<III", _MAGIC, _VERSION, 12 + len(chunks)) + chunks
+
+
+WORLDS = (".sdf", ".world", ".urdf")
+
+
+def add_export(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add cell export."""
+    command = verbs.add_parser("export", help="the machines of a cell as SDF, URDF or glTF")
+    add_cell(command)
+    command.add_argument("file", metavar="FILE", help="world.sdf, world.urdf or world.glb")
+    command.set_defaults(run=run_export)
+
+
+def run_export(arguments: argparse.Namespace) -> int:
+    """Write the world; files that are there are not overwritten."""
+    path = Path(arguments.file)
+    form = path.suffix.lower().removeprefix(".")
+    if form not in (*WRITERS, "glb"):
+        raise InputError(f"{path.name[:60]!a} must end with .sdf, .urdf or .glb")
+    with sentences():
+        cell = load_cell(arguments.cell)
+    if form == "glb":
+        with path.open("xb") as binary:
+            binary.write(cell_glb(cell))
+        sys.stdout.write(f"{path}\n")
+        return 0
+    text, files = WRITERS[form](cell)
+    for name, content in ((path.name, text), *files.items()):
+        with (path.parent / name).open("x", encoding="utf-8") as file:
+            file.write(content)
+    sys.stdout.write(f"{path} and {len(files)} meshes\n")
+    return 0
+
+
+def run_world(path: Path, robot_name: str) -> int:
+    """Print a cell with the machines of a world; what was left out on stderr."""
+    with sentences():
+        robot = robot_named(robot_name)
+        world = read_world(path, shape_register(robot))
+        try:
+            cell = Cell(
+                name=world.name,
+                robot=robot,
+                base_pose=np.eye(4),
+                tool=None,
+                tcp=np.eye(4),
+                parts=(),
+                equipment=tuple(
+                    Equipment(each.name, each.pose, each.bodies, zone_around("OPEN", each.bodies))
+                    for each in world.machines
+                ),
+                stations=(),
+                signals=(),
+                park=robot.machine_home,
+                machine_home=robot.machine_home,
+                program=(),
+            )
+        except InvalidValueError as error:
+            raise InputError(f"{path.name}: {error}") from error
+    sys.stdout.write(cell_to_yaml(cell))
+    for each in world.left_out:
+        sys.stderr.write(f"ir: left out: {each}\n")
+    return 0
+
+
+_NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
+
+
+def add_import(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add cell import."""
+    command = verbs.add_parser(
+        "import", help="a mesh from CAD as a line to paste, or a world as a cell"
+    )
+    command.add_argument(
+        "file", metavar="FILE", help="a mesh: .stl, .obj, .glb, .gltf; a world: .sdf, .urdf"
+    )
+    command.add_argument("--unit", choices=tuple(UNITS), help="of a mesh; never guessed")
+    command.add_argument(
+        "--pieces", type=_pieces, default=PIECES, help=f"at most so many ({PIECES})"
+    )
+    command.add_argument(
+        "--robot", default="kr210_r2700_extra", metavar="ROBOT", help="of a world's cell"
+    )
+    command.add_argument("--json", action="store_true", help="print the answer as JSON")
+    command.set_defaults(run=run_import)
+
+
+def run_import(arguments: argparse.Namespace) -> int:
+    """Divide the mesh and print its line, or print the cell of a world."""
+    path = Path(arguments.file)
+    if path.suffix.lower() in WORLDS:
+        return run_world(path, arguments.robot)
+    if arguments.unit is None:
+        raise InputError(f"say the unit of {path.name[:60]!a}: --unit {' or '.join(UNITS)}")
+    with sentences():
+        triangles = SolidReader(path.parent).triangles(path.name, arguments.unit)
+        found = pieces_of(triangles, arguments.pieces)
+    name = _NO_NAME.sub("_", path.stem).strip("_-0123456789")[:60] or "mesh"
+    pieces = "" if arguments.pieces == PIECES else f", pieces: {arguments.pieces}"
+    line = f"- {{name: {name}, mesh: {path.name}, unit: {arguments.unit}{pieces}}}"
+    if arguments.json:
+        measures = {"margin": found.margin, "protrusion": found.protrusion, "volume": found.volume}
+        print_json(
+            {"line": line, "pieces": len(found.vertices), **measures, "of_pieces": found.of_pieces}
+        )
+    else:
+        sys.stdout.write(f"{line}\n# {found.sentence}\n")
+    return 0
+
+
+def _pieces(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and 1 <= int(text) <= PIECES_MAX):
+        raise argparse.ArgumentTypeError(f"{text[:60]!r} must be a whole number 1 .. {PIECES_MAX}")
+    return int(text)

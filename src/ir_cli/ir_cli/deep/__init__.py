@@ -1,3 +1,0 @@
-"""`ir cell check`: what a robot can do at the stations of a cell, and what to write into the file
-instead.
-"""

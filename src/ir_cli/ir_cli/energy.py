@@ -1,0 +1,265 @@
+"""`ir energy`: direct against indirect measurement, parameters fitted to a meter, movements that
+identify them, and a simulated plant that drives these.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+from ir_cli.errors import InputError
+from ir_cli.output import (
+    Columns,
+    Row,
+    add_formats,
+    number,
+    print_csv,
+    print_json,
+    print_table,
+    text,
+)
+from ir_cli.planning import add_cell, planner_of, sentences
+from ir_description import load_cell, load_power_parameters, power_parameters_to_yaml
+from ir_msgs_py.file_roots import ANYWHERE
+from ir_recorder import analyse, read_recording
+from ir_recorder.analysis.indirect import agreement
+from ir_recorder.fit import Source, fit, fit_data, parameter_rows, write_fit_picture
+from ir_recorder.fit import sentences as fit_sentences
+from ir_recorder.report.files import write_output
+from ir_recorder.traces import read_mapping
+
+COMPARED: Columns = {
+    "movement": ("movement", text),
+    "seconds": ("s", number(2)),
+    "direct": ("meter J", number(0)),
+    "indirect": ("from positions J", number(0)),
+    "difference": ("difference %", number(1, 100.0)),
+    "from_torques": ("from torques J", number(0)),
+    "second_opinion": ("by Pinocchio J", number(0)),
+}
+FITTED: Columns = {
+    "parameter": ("parameter", text),
+    "before": ("before", number(4)),
+    "before_deviation": ("±", number(4)),
+    "value": ("fitted", number(4)),
+    "deviation": ("±", number(4)),
+    "unit": ("", text),
+    "determined": ("determined", lambda own: "yes" if own else "no"),
+}
+PARAMETERS_START = b"format: ir_description/power_parameters/"
+
+
+def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add energy compare, fit, excite and drive."""
+    energy = commands.add_parser(
+        "energy",
+        help="compare measurements, fit power parameters, plan what identifies them; needs no ROS",
+    )
+    verbs = energy.add_subparsers(dest="verb", required=True)
+    compare = verbs.add_parser(
+        "compare", help="the meter beside the energy from positions, by movement"
+    )
+    compare.add_argument("recording", type=Path, metavar="RECORDING", help="a recording (.mcap)")
+    add_formats(compare)
+    compare.set_defaults(run=run_compare)
+    _add_fit(verbs)
+    _add_excite(verbs)
+    drive = verbs.add_parser("drive", help="drive such a programme on a simulated plant")
+    drive.add_argument("folder", type=Path, metavar="FOLDER", help="what ir energy excite wrote")
+    drive.add_argument(
+        "--plant", default="typical", help="nominal, typical:SEED or a file (typical)"
+    )
+    drive.add_argument("--output", type=Path, metavar="CSV", help="file to write (FOLDER/run.csv)")
+    drive.set_defaults(run=run_drive)
+
+
+def _add_fit(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    fitted = verbs.add_parser(
+        "fit", help="power parameters from a meter, with what is left uncertain"
+    )
+    fitted.add_argument(
+        "motion", type=Path, metavar="RECORDING", help="a recording, or CSV of the joints"
+    )
+    fitted.add_argument("--meter", type=Path, metavar="FILE", help="CSV of a power meter beside it")
+    fitted.add_argument(
+        "--mapping", type=Path, metavar="FILE", help="what the columns of the joints mean"
+    )
+    fitted.add_argument(
+        "--meter-mapping", type=Path, metavar="FILE", help="what those of the meter mean"
+    )
+    fitted.add_argument("--cell", default="", help="of the robot, where the recording carries none")
+    fitted.add_argument("--load", default="", help='what is held all the time: "gripper+part"')
+    fitted.add_argument(
+        "--prior", default="", metavar="FILE", help="parameters to begin with (data sheet)"
+    )
+    fitted.add_argument("--name", default="fit", help="of the parameters (fit)")
+    fitted.add_argument("--output", type=Path, default=Path("out/power.yaml"), help="file to write")
+    fitted.add_argument("--picture", type=Path, metavar="PNG", help="picture to write as well")
+    add_formats(fitted, comma=False)
+    fitted.set_defaults(run=run_fit)
+
+
+def _add_excite(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    excite = verbs.add_parser("excite", help="plan movements that identify power parameters")
+    add_cell(excite)
+    excite.add_argument(
+        "--seconds", type=float, default=180.0, help="s of excursions, at most (180)"
+    )
+    excite.add_argument(
+        "--postures", type=int, default=3, help="to start from, home among them (3)"
+    )
+    excite.add_argument("--hibernate", action="store_true", help="hibernate too; takes minutes")
+    excite.add_argument(
+        "--safety-distance", type=float, default=0.02, metavar="M", help="m to keep (0.02)"
+    )
+    excite.add_argument(
+        "--prior", default="", metavar="FILE", help="what is known already (data sheet)"
+    )
+    excite.add_argument("--seed", type=int, default=0)
+    excite.add_argument(
+        "--output", type=Path, default=Path("out/excitation"), help="folder to write"
+    )
+    add_formats(excite, comma=False)
+    excite.set_defaults(run=run_excite)
+
+
+def run_compare(arguments: argparse.Namespace) -> int:
+    """Print both measurements of every movement; exit code 1 where there is nothing to compare."""
+    analysis = analyse(read_recording(arguments.recording))
+    both = agreement(analysis)
+    rows: list[Row] = [
+        {
+            "movement": row.label,
+            "seconds": row.seconds,
+            "direct": row.direct,
+            "indirect": row.indirect,
+            "difference": row.difference,
+            "from_torques": row.from_torques,
+            "second_opinion": row.second_opinion,
+        }
+        for row in both.movements
+    ]
+    if arguments.json:
+        mean = both.difference
+        interval = {"mean": mean.value, "low": mean.low, "high": mean.high, "spread": both.spread}
+        source = analysis.recording.hardware
+        print_json(
+            {"source": source, "movements": rows, "difference": interval, "sentence": both.sentence}
+        )
+    elif arguments.csv:
+        print_csv(rows)
+    else:
+        sys.stdout.write(f"{analysis.recording.hardware or 'measured on an unknown robot'}\n")
+        print_table(rows, COMPARED)
+        sys.stdout.write(f"{both.sentence}\n")
+    return 0 if rows else 1
+
+
+def run_fit(arguments: argparse.Namespace) -> int:
+    """Fit, write the file and the picture, print what was found."""
+    with sentences():
+        prior = load_power_parameters(arguments.prior)
+        cell = load_cell(arguments.cell) if arguments.cell else None
+    motion = arguments.mapping
+    meter = arguments.meter_mapping
+    source = Source(
+        arguments.motion,
+        arguments.meter,
+        read_mapping(motion) if motion else None,
+        read_mapping(meter) if meter else None,
+        cell,
+        arguments.load,
+    )
+    data = fit_data(source, prior)
+    found = fit(data.samples, data.model, prior, arguments.name)
+    page = power_parameters_to_yaml(found.parameters, f"fit on {arguments.motion.name}")
+    arguments.output.parent.mkdir(parents=True, exist_ok=True)
+    written = [write_output(arguments.output, page.encode(), PARAMETERS_START, ANYWHERE)]
+    if arguments.picture:
+        written.append(write_fit_picture(found, prior, arguments.picture))
+    said = (*data.notes, *fit_sentences(found))
+    rows = parameter_rows(found, prior)
+    if arguments.json:
+        listed = [asdict(each) for each in found.movements]
+        print_json(
+            {
+                "parameters": rows,
+                "movements": listed,
+                "sentences": said,
+                "files": [str(path) for path in written],
+            }
+        )
+        return 0
+    print_table(rows, FITTED)
+    sys.stdout.write("".join(f"{sentence}\n" for sentence in said))
+    sys.stdout.write("".join(f"{path}\n" for path in written))
+    return 0
+
+
+def run_excite(arguments: argparse.Namespace) -> int:
+    """Plan the programme, write its folder, print what it identifies and what it does not."""
+    if not 1 <= arguments.postures <= 20:
+        raise InputError(f"--postures is {arguments.postures}, must be 1 to 20")
+    if not 0.0 < arguments.seconds <= 3600.0:
+        raise InputError(
+            f"--seconds is {arguments.seconds:.12g} s, must be above 0 and at most 3600 s"
+        )
+
+    from ir_cli.excitation_programme import (
+        ExcitationRequest,
+        advice,
+        plan_programme,
+        write_programme,
+    )
+
+    with sentences():
+        planner = planner_of(arguments.cell)
+        prior = load_power_parameters(arguments.prior)
+        asked = ExcitationRequest(
+            arguments.seconds,
+            arguments.postures,
+            arguments.safety_distance,
+            arguments.hibernate,
+            arguments.seed,
+        )
+        programme = plan_programme(planner, prior, asked)
+    path = write_programme(programme, arguments.output, arguments.cell)
+    known = programme.identified
+    said = advice(programme.identified.missing)
+    moved = sum(step.trajectory is not None for step in programme.steps)
+    if arguments.json:
+        figures = {"movements": moved, "seconds": programme.seconds, "file": str(path)}
+        print_json({**figures, "identified": known.found, "missing": known.missing, "advice": said})
+        return 0
+    lines = [
+        f"{moved} certified movements and {len(programme.steps) - moved} rests, "
+        f"{programme.seconds:.0f} s",
+        f"identified ({len(known.found)}): {', '.join(known.found)}",
+        f"not identified ({len(known.missing)}): {', '.join(known.missing) or 'nothing'}",
+        *(f"to add: {sentence}" for sentence in said),
+        str(path),
+    ]
+    sys.stdout.write("\n".join(lines) + "\n")
+    return 0
+
+
+def run_drive(arguments: argparse.Namespace) -> int:
+    """Drive a programme as fast as the plant can be stepped, write its readings, print where they
+    are.
+    """
+    from ir_cli.excitation_programme import read_programme
+    from ir_cli.traces import write_readings
+    from ir_studies.simulated_run import driven
+
+    cell, steps = read_programme(arguments.folder)
+    trace = driven(cell, arguments.plant, steps)
+    path = arguments.output or arguments.folder / "run.csv"
+    write_readings(path, trace)
+    joules = trace.columns["energy"][-1]
+    sys.stdout.write(
+        f"{len(steps)} steps in {trace.time[-1]:.0f} s, {joules / 1e3:.1f} kJ "
+        f"({trace.source})\n{path}\n"
+    )
+    return 0

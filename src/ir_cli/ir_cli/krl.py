@@ -1,0 +1,299 @@
+"""`ir krl`: what a KUKA program costs in a cell, and planned programs as KRL."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from ir_cli.errors import InputError
+from ir_cli.output import (
+    Columns,
+    ProgressLine,
+    Row,
+    add_formats,
+    number,
+    print_csv,
+    print_json,
+    print_table,
+    text,
+)
+from ir_cli.planning import (
+    FAILED,
+    add_cell,
+    add_margin,
+    add_options,
+    add_parameters,
+    check_stations,
+    configuration_of,
+    failed,
+    options_of,
+    planner_of,
+    sentences,
+)
+from ir_description import Cell
+from ir_description.files import is_utf16
+from ir_krl import Followed, follow, parse
+from ir_planner import (
+    EvaluatedProgram,
+    Planner,
+    PlanOptions,
+    evaluate_krl,
+    export_krl,
+    tool_in_flange,
+)
+
+BYTES_MAX = 4_000_000
+COLUMNS: Columns = {
+    "lines": ("line", text),
+    "from": ("from", text),
+    "to": ("to", text),
+    "seconds": ("s", number(2)),
+    "joules": ("J", number(0)),
+    "joules_low": ("from", number(0)),
+    "joules_high": ("to", number(0)),
+    "clearance": ("clearance mm", number(1, 1e3)),
+    "note": ("", text),
+}
+
+
+def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add krl import and krl export."""
+    krl = commands.add_parser(
+        "krl", help="KUKA programs: what one costs in a cell, and planned ones as KRL"
+    )
+    actions = krl.add_subparsers(dest="action", required=True, metavar="ACTION")
+    _add_import(actions)
+    _add_export(actions)
+
+
+def _add_import(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    read = actions.add_parser(
+        "import", help="drive a .src (with its .dat) as a KR C4 would, in a cell"
+    )
+    read.add_argument(
+        "files", nargs="+", type=Path, metavar="FILE", help=".src first, then .dat and subprograms"
+    )
+    read.add_argument("--cell", default="demo", help="name of a bundled cell, or a file (demo)")
+    add_followed(read)
+    read.add_argument(
+        "--compare", action="store_true", help="plan the same stations and show the difference"
+    )
+    add_margin(read)
+    add_parameters(read)
+    add_formats(read)
+    read.set_defaults(run=run_import)
+
+
+def add_followed(parser: argparse.ArgumentParser) -> None:
+    """What decides how a KRL program is followed."""
+    parser.add_argument(
+        "--routine", default="", metavar="NAME", help="of KRL: the first of the first file"
+    )
+    parser.add_argument(
+        "--input",
+        action="append",
+        default=[],
+        metavar="N=VALUE",
+        help="of KRL: what $IN[N] reads: 3=true; repeatable",
+    )
+    passes = "of KRL: of a LOOP without EXIT (1)"
+    parser.add_argument("--loop-passes", type=int, default=1, metavar="N", help=passes)
+
+
+def followed(files: Sequence[Path], cell: Cell, arguments: argparse.Namespace) -> Followed:
+    """The commands of the program in these files, as the options of `add_followed` say."""
+    return follow(
+        [parse(_text(path), path.name) for path in files],
+        cell.machine_home,
+        tool_in_flange(cell.tcp),
+        routine=arguments.routine,
+        inputs=_inputs(arguments.input),
+        loop_passes=arguments.loop_passes,
+    )
+
+
+def _add_export(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    write = actions.add_parser(
+        "export", help="plan a program and write it as .src and .dat, certified again"
+    )
+    add_cell(write)
+    write.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="FILE.src", help="the .dat is beside it"
+    )
+    write.add_argument(
+        "--stations", nargs="+", default=[], metavar="NAME", help="visit these instead"
+    )
+    write.add_argument(
+        "--cycle-time", type=float, default=0.0, metavar="S", help="for the cycle; 0: free (0)"
+    )
+    write.add_argument("--start", default="park", help="posture or joint values (park)")
+    add_options(write)
+    add_parameters(write)
+    write.set_defaults(run=run_export)
+
+
+def run_import(arguments: argparse.Namespace) -> int:
+    """Print what the program costs; exit code 1 where it violates a limit or the clearance."""
+    with sentences():
+        planner = planner_of(arguments.cell, arguments.power_parameters)
+        program = followed(arguments.files, planner.cell, arguments)
+        found = evaluate_krl(planner, program, arguments.safety_distance, arguments.load)
+    rows = rows_of(found)
+    compared = _compared(planner, found) if arguments.compare else {}
+    if arguments.json:
+        print_json(
+            {
+                **totals_of(found),
+                **compared,
+                "steps": rows,
+                "notes": [str(note) for note in found.notes],
+            }
+        )
+    elif arguments.csv:
+        print_csv(rows)
+    else:
+        print_table(rows, COLUMNS)
+        sys.stdout.write("\n".join([*_sentences(found), *_comparison(compared)]) + "\n")
+    return 0 if found.certified else FAILED
+
+
+def run_export(arguments: argparse.Namespace) -> int:
+    """Plan, write both files, say what it costs as the controller would drive it."""
+    source = arguments.output
+    if source.suffix.lower() != ".src":
+        raise InputError(f"{source.name} must end in .src")
+    data = source.with_suffix(".dat")
+    for path in (source, data):
+        if path.exists():
+            raise InputError(f"{path} is there already")
+    with sentences(), ProgressLine() as line:
+        planner = planner_of(arguments.cell, arguments.power_parameters)
+        stations = tuple(arguments.stations)
+        check_stations(stations, planner)
+        start = configuration_of(arguments.start, planner, arguments.safety_distance)
+        options = options_of(arguments)
+        plan = planner.plan_program(stations, arguments.cycle_time, options, start, line.show)
+        if not plan.status.ok:
+            return failed(plan.status.message)
+        written = export_krl(planner, plan.movements, source.stem, options)
+    source.write_text(written.source, encoding="utf-8")
+    data.write_text(written.data, encoding="utf-8")
+    planned = written.planned
+    driven = written.exported
+    sys.stdout.write(
+        f"{source} and {data.name}: {driven.duration:.2f} s, {driven.energy:.0f} J moving, at "
+        "least "
+        f"{1e3 * driven.min_clearance:.1f} mm clear as the controller drives it, certified\n"
+        f"planned: {planned.duration:.2f} s, {planned.energy:.0f} J; "
+        f"joints at most {written.deviation:.2g} rad apart\n"
+    )
+    return 0
+
+
+def rows_of(found: EvaluatedProgram) -> list[Row]:
+    """One row per step, SI units."""
+    return [
+        {
+            "lines": f"{one.step.places[0].line}"
+            + (f"-{one.step.places[-1].line}" if len(one.step.places) > 1 else ""),
+            "from": one.from_station,
+            "to": one.to_station if one.step.moves else "",
+            "seconds": one.report.duration,
+            "joules": one.report.energy,
+            "joules_low": one.report.energy_low,
+            "joules_high": one.report.energy_high,
+            "clearance": one.report.min_clearance if one.step.moves else None,
+            "certified": one.found.verification.certified if one.step.moves else None,
+            "note": _note(one.step.waits_for, one.found.verification.status.message),
+        }
+        for one in found.steps
+    ]
+
+
+def totals_of(found: EvaluatedProgram) -> Row:
+    """Figures of the whole program."""
+    return {
+        "name": found.name,
+        "seconds": found.report.duration,
+        "joules": found.report.energy,
+        "clearance": found.report.min_clearance,
+        "certified": found.certified,
+        "stations": list(found.stations),
+    }
+
+
+def _note(condition: str, violation: str) -> str:
+    return f"waits for {condition}" if condition else violation
+
+
+def _sentences(found: EvaluatedProgram) -> list[str]:
+    judged = "free of violations" if found.certified else "NOT certified: see above"
+    return [
+        f"{found.name}: {found.report.duration:.2f} s, {found.report.energy:.0f} J predicted, "
+        f"{judged}",
+        f"stations: {', '.join(found.stations) or 'none recognised'}",
+        *(f"note: {note}" for note in found.notes),
+    ]
+
+
+def _compared(planner: Planner, found: EvaluatedProgram) -> Row:
+    """The stations of the program as the planner visits them: free, and in the program's time."""
+    if any(step.step.process for step in found.steps):
+        raise InputError(
+            "the program works along paths of the tool, between an output's on and off, that a "
+            "visit of its stations would leave out: compare with `ir compare`"
+        )
+    if len(set(found.stations)) < 2:
+        known = found.stations[0] if found.stations else "none"
+        raise InputError(
+            f"stations recognised: {known}; --compare plans between at least two: `ir compare` "
+            "makes stations of the other stops"
+        )
+    start = found.steps[0].step.trajectory.positions[0]
+    answer: dict[str, object] = {}
+    for name, cycle_time in (("planned", 0.0), ("planned_in_time", found.report.duration)):
+        plan = planner.plan_program(found.stations, cycle_time, PlanOptions(), start)
+        answer[name] = (
+            {"seconds": plan.report.duration, "joules": plan.report.energy}
+            if plan.status.ok
+            else {"status": plan.status.message}
+        )
+    return answer
+
+
+def _comparison(compared: Row) -> list[str]:
+    names = {"planned": "planned freely", "planned_in_time": "planned in its time"}
+    return [
+        f"{names[name]}: {figures['seconds']:.2f} s, {figures['joules']:.0f} J"
+        if "seconds" in figures
+        else f"{names[name]}: {figures['status']}"
+        for name, figures in compared.items()
+    ]
+
+
+def _text(path: Path) -> str:
+    try:
+        if path.stat().st_size > BYTES_MAX:
+            raise InputError(
+                f"{path} has {path.stat().st_size} bytes: at most {BYTES_MAX} are read"
+            )
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}") from error
+    if is_utf16(content):
+        raise InputError(
+            f"{path}:1: the file is UTF-16 text, must be UTF-8: save it with that encoding"
+        )
+    return content.decode("utf-8", errors="replace")
+
+
+def _inputs(texts: list[str]) -> dict[int, bool]:
+    found = {}
+    for given in texts:
+        index, _, value = given.partition("=")
+        if not index.isdigit() or value.lower() not in ("true", "false", "1", "0"):
+            raise InputError(f"--input {given[:40]}: it is N=true or N=false")
+        found[int(index)] = value.lower() in ("true", "1")
+    return found

@@ -1,0 +1,161 @@
+"""Output of the commands: tables, JSON and CSV, and lines that show progress."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import math
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TextIO
+
+SHOWN_ELEMENTS = 128
+"""Longer arrays of a message end in "..." unless --full asks for all, as in ros2cli."""
+
+
+class Progress:
+    """Steps with their seconds; on a terminal the running step's line is kept up to date."""
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        self._stream = sys.stdout if stream is None else stream
+        self._live = self._stream.isatty()
+        self._began = time.monotonic()
+        self._title = ""
+
+    def begin(self, title: str) -> None:
+        """Start a step."""
+        self._title = title
+        self._began = time.monotonic()
+        self.update("")
+
+    def update(self, detail: str) -> None:
+        """Show how far the running step is; quiet where the output is not a terminal."""
+        if self._live:
+            self._stream.write(f"\r\x1b[2K  … {self._title} {detail}")
+            self._stream.flush()
+
+    def end(self, detail: str = "") -> None:
+        """Close the running step with what came out of it."""
+        seconds = time.monotonic() - self._began
+        start = "\r\x1b[2K" if self._live else ""
+        self._stream.write(
+            f"{start}  {seconds:6.1f} s  {self._title}{': ' if detail else ''}{detail}\n"
+        )
+        self._stream.flush()
+
+    def say(self, text: str) -> None:
+        """Write a line between steps."""
+        self._stream.write(text + "\n")
+        self._stream.flush()
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Text table: first column to the left, the others to the right."""
+    cells = [list(header), *[list(row) for row in rows]]
+    widths = [max(len(row[column]) for row in cells) for column in range(len(header))]
+    lines = [
+        "  ".join(
+            cell.ljust(width) if column == 0 else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        )
+        for row in cells
+    ]
+    lines.insert(1, "  ".join("-" * width for width in widths))
+    return "\n".join(lines)
+
+
+Row = Mapping[str, Any]
+Columns = Mapping[str, tuple[str, Callable[[Any], str]]]  # title and format by key
+NOTHING = "-"
+
+
+def add_formats(parser: argparse.ArgumentParser, comma: bool = True) -> None:
+    """--json, and --csv where the answer is a table."""
+    formats = parser.add_mutually_exclusive_group()
+    formats.add_argument("--json", action="store_true", help="print the answer as JSON")
+    if comma:
+        formats.add_argument("--csv", action="store_true", help="print the table as CSV, SI units")
+
+
+def print_json(answer: Mapping[str, Any]) -> None:
+    """One JSON document; what is not finite is null."""
+    sys.stdout.write(json.dumps(_plain(answer), indent=1, allow_nan=False) + "\n")
+
+
+def print_csv(rows: Sequence[Row]) -> None:
+    """Rows with the same keys."""
+    writer = csv.DictWriter(sys.stdout, list(rows[0]) if rows else [], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(_plain(dict(row)) for row in rows)
+
+
+def print_table(rows: Sequence[Row], columns: Columns) -> None:
+    """Rows as text."""
+    titles = [title for title, _ in columns.values()]
+    cells = [[shown(row[key]) for key, (_, shown) in columns.items()] for row in rows]
+    sys.stdout.write(table(titles, cells) + "\n")
+
+
+def number(digits: int, scale: float = 1.0) -> Callable[[Any], str]:
+    """A format of numbers; nothing where there is none."""
+
+    def shown(value: Any) -> str:
+        return (
+            NOTHING
+            if value is None or not math.isfinite(value)
+            else f"{round(scale * value, digits) + 0.0:.{digits}f}"
+        )
+
+    return shown
+
+
+def kilowatt_hours(value: Any) -> str:
+    """Energy [kWh] as it is paid for; Wh where kWh would be 0.00.."""
+    if value is None or not math.isfinite(value):
+        return NOTHING
+    return f"{value:.4f} kWh" if abs(value) >= 0.01 else f"{1e3 * value:.3g} Wh"
+
+
+def text(value: Any) -> str:
+    """A format of words."""
+    return str(value) or NOTHING
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _plain(each) for key, each in value.items()}
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    return value
+
+
+class ProgressLine:
+    """One line on stderr that is kept up to date, and gone at the end; quiet where nobody looks."""
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        self._stream = sys.stderr if stream is None else stream
+        self._live = self._stream.isatty()
+
+    def __enter__(self) -> ProgressLine:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._write("")
+
+    def show(self, phase: str, done: int, total: int, cost: float, left: str = "") -> None:
+        """Phase, steps done of all, cost of the best answer so far (0, inf: none yet), time left in
+        words.
+        """
+        best = f", best {cost:.0f}" if math.isfinite(cost) and cost > 0.0 else ""
+        self._write(f"… {phase} {done} of {total}{best}{left}")
+
+    def _write(self, line: str) -> None:
+        if self._live:
+            self._stream.write(f"\r\x1b[2K{line}")
+            self._stream.flush()

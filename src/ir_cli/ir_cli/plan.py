@@ -1,0 +1,221 @@
+"""`ir plan`: a cell's program as a table of seconds, joules and clearance."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from ir_cli.output import (
+    Columns,
+    ProgressLine,
+    Row,
+    add_formats,
+    kilowatt_hours,
+    number,
+    print_csv,
+    print_json,
+    print_table,
+    text,
+)
+from ir_cli.planning import (
+    add_cell,
+    add_options,
+    add_parameters,
+    check_stations,
+    configuration_of,
+    failed,
+    options_of,
+    planner_of,
+    predicted,
+    sentences,
+)
+from ir_msgs_py.file_roots import ANYWHERE, FileRoots
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.report import PlannedMovement
+from ir_planner import Planner, ProgramPlan, assumed_doors
+
+J_PER_KWH = 3.6e6
+HOW_TO_SAVE = (
+    "--saving holds it against a common program in equal time, which takes some seconds more"
+)
+COLUMNS: Columns = {
+    "step": ("step", text),
+    "kind": ("kind", text),
+    "from": ("from", text),
+    "to": ("to", text),
+    "seconds": ("s", number(2)),
+    "joules": ("J", number(0)),
+    "joules_low": ("from", number(0)),
+    "joules_high": ("to", number(0)),
+    "clearance": ("clearance mm", number(1, 1e3)),
+    "load": ("load", text),
+    "power_mode": ("mode", text),
+}
+
+
+def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add plan."""
+    plan = commands.add_parser(
+        "plan", help="plan a cell's program: seconds, joules, clearance; needs no ROS"
+    )
+    add_cell(plan)
+    plan.add_argument(
+        "--stations", nargs="+", default=[], metavar="NAME", help="visit these instead"
+    )
+    plan.add_argument(
+        "--cycle-time", type=float, default=0.0, metavar="S", help="for the cycle; 0: free (0)"
+    )
+    plan.add_argument("--start", default="park", help="posture or joint values (park)")
+    plan.add_argument(
+        "--saving",
+        action="store_true",
+        help="hold it against a common program in equal time as well",
+    )
+    words = (
+        "also write the plan as a recording, for ir report and ir replan (needs ROS's Python "
+        "packages)"
+    )
+    plan.add_argument("--record", default="", metavar="FILE.mcap", help=words)
+    words = (
+        "also write the report of the plan as a page; why, where it failed (needs these "
+        "packages, too)"
+    )
+    plan.add_argument("--html", default="", metavar="FILE.html", help=words)
+    add_options(plan)
+    add_parameters(plan)
+    add_formats(plan)
+    plan.set_defaults(run=run_plan)
+
+
+def run_plan(arguments: argparse.Namespace) -> int:
+    """Plan and print; exit code 1 where nothing is found."""
+    with sentences(), ProgressLine() as line:
+        planner = planner_of(arguments.cell, arguments.power_parameters)
+        stations = tuple(arguments.stations)
+        check_stations(stations, planner)
+        start = configuration_of(arguments.start, planner, arguments.safety_distance)
+        options = options_of(arguments)
+        plan = planner.plan_program(
+            stations, arguments.cycle_time, options, start, line.show, savings=arguments.saving
+        )
+    if arguments.html:
+        _page(arguments, plan, planner, options)
+    notes = assumed_doors(planner.cell)
+    said = "".join(f"\nnote: {note}" for note in notes)
+    if not plan.status.ok:
+        return failed(plan.status.message + said)
+    if arguments.record:
+        sys.stderr.write(f"ir: {_record(arguments.record, arguments, plan, planner, options)}\n")
+    rows = rows_of(plan.movements)
+    if arguments.json:
+        saving = asdict(plan.savings) if plan.savings.available else None
+        print_json({**totals_of(plan), "steps": rows, "saving": saving, "notes": notes})
+    elif arguments.csv:
+        print_csv(rows)
+    else:
+        print_table(rows, COLUMNS)
+        sys.stdout.write("\n".join(sentences_of(plan)) + f"{said}\n")
+    return 0
+
+
+def _record(
+    file: str,
+    arguments: argparse.Namespace,
+    plan: ProgramPlan,
+    planner: Planner,
+    options: PlanOptions,
+    roots: FileRoots | None = None,
+) -> Path:
+    """Write the recording below `roots`; only here ROS is imported."""
+    from ir_cli.ros.plan_recording import ProgramRequest, write_plan
+
+    stations = tuple(arguments.stations)
+    request = ProgramRequest(stations, arguments.cycle_time, options, arguments.saving)
+    return write_plan(file, plan, request, planner, roots)
+
+
+def _page(
+    arguments: argparse.Namespace, plan: ProgramPlan, planner: Planner, options: PlanOptions
+) -> None:
+    """Write the report of the plan; of one that failed with the sentence that says why."""
+    from ir_recorder.analysis import analyse, findings
+    from ir_recorder.reading import read_recording
+    from ir_recorder.report import write_report
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = str(Path(folder) / "plan.mcap")
+        recording = _record(file, arguments, plan, planner, options, ANYWHERE)
+        analysis = analyse(read_recording(recording))
+    moved = replace(
+        analysis.recording, planned=tuple(plan.movements)
+    )  # the file has no trajectories by step
+    problems = analysis.problems if plan.status.ok else (plan.status.message,)
+    analysis = replace(analysis, recording=moved, problems=problems)
+    sys.stderr.write(f"ir: {write_report(analysis, findings(analysis), arguments.html)}\n")
+
+
+def rows_of(movements: Sequence[PlannedMovement]) -> list[Row]:
+    """One row per step, SI units."""
+    return [
+        {
+            "step": k,
+            "kind": str(step.kind),
+            "from": step.from_station,
+            "to": step.to_station,
+            "seconds": step.duration,
+            "joules": step.report.energy,
+            "joules_low": step.report.energy_low,
+            "joules_high": step.report.energy_high,
+            "clearance": None if step.is_pause else step.report.min_clearance,
+            "certified": None if step.is_pause else step.report.certified,
+            "load": step.load,
+            "power_mode": (step.power_mode or "STAND_ON_MOTORS") if step.is_pause else "",
+        }
+        for k, step in enumerate(movements, start=1)
+    ]
+
+
+def totals_of(plan: ProgramPlan) -> Row:
+    """Figures of the whole program."""
+    pauses = [step for step in plan.movements if step.is_pause]
+    standing = sum(step.duration for step in pauses), sum(step.report.energy for step in pauses)
+    return {
+        "program_id": plan.program_id,
+        "seconds": plan.report.duration,
+        "joules": plan.report.energy,
+        "joules_low": plan.report.energy_low,
+        "joules_high": plan.report.energy_high,
+        "power_parameters": plan.report.power_parameters,
+        "torque_reserve": plan.report.torque_reserve,
+        "moving_seconds": plan.report.duration - standing[0],
+        "moving_joules": plan.report.energy - standing[1],
+        "clearance": plan.report.min_clearance,
+        "certified": plan.report.certified,
+        "planning_seconds": plan.info.planning_time,
+        "truncated": plan.info.truncated,
+    }
+
+
+def sentences_of(plan: ProgramPlan) -> list[str]:
+    """The totals for people, and what is saved."""
+    totals = totals_of(plan)
+    standing = totals["seconds"] - totals["moving_seconds"]
+    waiting = totals["joules"] - totals["moving_joules"]
+    energy = kilowatt_hours(totals["joules"] / J_PER_KWH)
+    proof = "free of collision and within all limits at every instant, proved"
+    lines = [
+        f"movements {totals['moving_seconds']:.2f} s {totals['moving_joules'] / 1e3:.2f} kJ, "
+        f"pauses {standing:.2f} s {waiting / 1e3:.2f} kJ",
+        f"cycle {totals['seconds']:.2f} s, {energy} from the mains, predicted: "
+        f"{predicted(plan.report)}; {proof if totals['certified'] else 'NOT certified'}",
+    ]
+    if plan.status.message:
+        lines.append(plan.status.message)
+    if totals["truncated"]:
+        lines.append("cut by --planning-time: more time may give a better program")
+    lines.append(f"saving: {plan.savings.sentence if plan.savings.available else HOW_TO_SAVE}")
+    return lines

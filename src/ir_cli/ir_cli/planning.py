@@ -1,0 +1,208 @@
+"""Planner, goals and options of the commands that plan without ROS.
+
+Exit codes: 0 an answer was found, 1 none was found, 2 the input makes no sense.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ir_cli.errors import CommandError, InputError, nearest, unknown_name
+from ir_cli.output import Row
+from ir_description import DescriptionError, UnknownNameError, load_cell
+from ir_krl import KrlError
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.errors import InvalidValueError
+from ir_msgs_py.options import OBJECTIVES, PlanOptions
+from ir_msgs_py.report import TrajectoryReport
+from ir_msgs_py.savings import one_sided
+from ir_planner import Goal, Planner, PlannerSettings, RequestError, parse_goal
+
+FAILED = 1
+CEILING = 600.0  # s: what is asked at a terminal ends with its work, or with Ctrl-C
+
+
+@contextmanager
+def sentences() -> Iterator[None]:
+    """Refusals of the description and the planner inside the block become an InputError."""
+    try:
+        yield
+    except (DescriptionError, InvalidValueError, KrlError, RequestError) as error:
+        raise InputError(str(error)) from error
+
+
+def planner_of(cell: str, power_parameters: str = "") -> Planner:
+    """A planner with a cell: the name of a bundled one, or a file; power_parameters: a file, or
+    "".
+    """
+    planner = Planner(time.monotonic, PlannerSettings(power_parameters=power_parameters))
+    try:
+        load_cell(cell)
+    except UnknownNameError as error:
+        beside = [
+            name for name in (f"{cell[:80]}.yaml", f"{cell[:80]}.yml") if Path(name).is_file()
+        ]
+        known = beside or error.known
+        raise InputError(unknown_name("cell", cell[:80], known, "ir cell list")) from error
+    planner.set_cell("", cell)
+    return planner
+
+
+def goal_of(text: str, planner: Planner) -> Goal:
+    """What a person types as a goal; a mistyped station is answered with the one that was meant."""
+    try:
+        return parse_goal(text, planner.cell)
+    except RequestError:
+        if nearest(text, _places(planner)):
+            check_stations([text], planner)
+        raise
+
+
+def check_stations(names: Iterable[str], planner: Planner) -> None:
+    """Raise InputError for a name that is no station, posture or path, with the one that was
+    meant.
+    """
+    known = [*_places(planner), *(path.name for path in planner.cell.paths)]
+    for name in names:
+        if name not in known:
+            listing = f"ir cell check {planner.cell.name}"
+            raise InputError(unknown_name("station", name[:80], known, listing))
+
+
+def _places(planner: Planner) -> list[str]:
+    return [*(station.name for station in planner.cell.stations), "home", "park"]
+
+
+def configuration_of(text: str, planner: Planner, margin: float, load: str = "") -> FloatArray:
+    """Joint values (n,) rad of a posture or of values in degrees; at a station or a pose, the free
+    configuration that is nearest to home.
+    """
+    goal = goal_of(text, planner)
+    if goal.configuration is not None:
+        return goal.configuration
+    answer = planner.compute_ik(goal, "analytic", margin, planner.cell.machine_home, load)
+    if not answer.solutions:
+        raise CommandError(answer.status.message)
+    return answer.solutions[0].q
+
+
+def add_cell(parser: argparse.ArgumentParser) -> None:
+    """The first argument of every command here."""
+    parser.add_argument(
+        "cell", metavar="CELL", help="a cell file, or the name of a bundled cell: demo"
+    )
+
+
+def add_parameters(parser: argparse.ArgumentParser) -> None:
+    """What joules follow from."""
+    words = "power parameters that joules follow from, as a fit writes them (the data sheet)"
+    parser.add_argument("--power-parameters", default="", metavar="FILE", help=words)
+
+
+def add_margin(parser: argparse.ArgumentParser) -> None:
+    """The safety distance, and what the robot holds."""
+    parser.add_argument(
+        "--safety-distance", type=float, default=0.02, metavar="M", help="m to keep (0.02)"
+    )
+    parser.add_argument(
+        "--load", default="", help='what is held: "gripper+part", "none" (the tool)'
+    )
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """What a planning request may choose."""
+    add_margin(parser)
+    parser.add_argument("--objective", choices=OBJECTIVES, default="time_and_energy")
+    parser.add_argument(
+        "--time-value", type=float, default=500.0, metavar="W", help="worth of a second (500)"
+    )
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--planning-time", type=float, default=CEILING, metavar="S", help="ceiling in s"
+    )
+
+
+def options_of(arguments: argparse.Namespace, duration: float = 0.0) -> PlanOptions:
+    """The options as they were typed."""
+    return PlanOptions(
+        seed=arguments.seed,
+        planning_time=arguments.planning_time,
+        safety_distance=arguments.safety_distance,
+        objective=arguments.objective,
+        time_value=arguments.time_value,
+        duration=duration,
+        load=arguments.load,
+    )
+
+
+def failed(sentence: str) -> int:
+    """Say why nothing was found; the exit code."""
+    sys.stderr.write(f"ir: {sentence}\n")
+    return FAILED
+
+
+def figures_of(report: TrajectoryReport) -> Row:
+    """What a trajectory costs and keeps, SI units."""
+    closest = report.closest
+    return {
+        "seconds": report.duration,
+        "joules": report.energy,
+        "joules_low": report.energy_low,
+        "joules_high": report.energy_high,
+        "power_parameters": report.power_parameters,
+        "torque_reserve": report.torque_reserve,
+        "base_joules": report.base_energy,
+        "dissipated_joules": report.burnt_energy,
+        "joint_joules": report.joint_energy,
+        "peak_watts": report.peak_power,
+        "clearance": report.min_clearance,
+        "closest": None if closest is None else [closest.body_a, closest.body_b],
+        "certified": report.certified,
+        "velocity_share": report.velocity_ratio,
+        "acceleration_share": report.acceleration_ratio,
+        "jerk_share": report.jerk_ratio,
+        "torque_share": report.torque_ratio,
+    }
+
+
+def predicted(report: TrajectoryReport) -> str:
+    """The interval of an energy, and what it follows from."""
+    low = report.energy_low
+    high = report.energy_high
+    within = (
+        f"{low:.0f} to {high:.0f} J" if high < 1e5 else f"{low / 1e3:.1f} to {high / 1e3:.1f} kJ"
+    )
+    why = one_sided(report.energy, low, high)
+    return f"90 % interval {within} by {report.power_parameters}{f', {why}' if why else ''}"
+
+
+def sentence_of(report: TrajectoryReport) -> str:
+    """The same for people."""
+    near = report.closest
+    pair = (
+        ""
+        if near is None
+        else f" between {near.body_a} and {near.body_b} at {report.closest_time:.2f} s"
+    )
+    used = max(
+        float(share.max(initial=0.0))
+        for share in (
+            report.velocity_ratio,
+            report.acceleration_ratio,
+            report.jerk_ratio,
+            report.torque_ratio,
+        )
+    )
+    return (
+        f"{report.duration:.3f} s, {report.energy:.0f} J from the mains, predicted "
+        f"({predicted(report)}), "
+        f"at most {report.peak_power / 1e3:.1f} kW\n"
+        f"clearance {report.min_clearance * 1e3:.1f} mm{pair}; uses {100.0 * used:.0f} % of a "
+        "limit; "
+        f"{'certified' if report.certified else 'NOT certified'}"
+    )

@@ -1,1 +1,0 @@
-"""Plans the requests of a recording once more, in this process, and compares the ids."""

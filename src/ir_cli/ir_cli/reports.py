@@ -1,0 +1,66 @@
+"""`ir report` and `ir fleet`: pages of recordings."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from ir_msgs_py.file_roots import FileRoots
+from ir_recorder.arguments import add_roots
+from ir_recorder.report.costs import Costs, read_costs
+from ir_recorder.report.fleet import read_members, write_fleet, write_fleet_table
+from ir_recorder.report_main import add_arguments, run
+
+_CLEAR = "\r\x1b[2K"
+
+
+def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add report and fleet."""
+    report = commands.add_parser(
+        "report", help="write the HTML report of a recording, or compare several"
+    )
+    add_arguments(report)
+    report.set_defaults(run=run)
+    add_fleet(commands)
+
+
+def add_fleet(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add fleet."""
+    fleet = commands.add_parser(
+        "fleet", help="recordings of many robots and shifts on one page, summed up"
+    )
+    words = "recordings (.mcap), or folders; a folder below one that is named is a robot"
+    fleet.add_argument("paths", nargs="+", metavar="PATH", help=words)
+    fleet.add_argument(
+        "-o", "--output", default="out/fleet.html", help="page to write (out/fleet.html)"
+    )
+    fleet.add_argument("--costs", default="", metavar="FILE", help="prices, shifts and CO2 (YAML)")
+    fleet.add_argument(
+        "--table", default="", metavar="FILE", help="figures as .csv or .parquet as well"
+    )
+    add_roots(fleet)
+    fleet.set_defaults(run=run_fleet)
+
+
+def run_fleet(arguments: argparse.Namespace) -> int:
+    """Write the page; files that can't be used are named and left out."""
+    roots = FileRoots.of(arguments.roots)
+    costs = read_costs(arguments.costs, roots) if arguments.costs else Costs()
+    left_out: list[str] = []
+    live = sys.stderr.isatty()
+
+    def show(path: str) -> None:
+        if live:
+            sys.stderr.write(f"{_CLEAR}… {path}")
+            sys.stderr.flush()
+
+    try:
+        members = read_members(arguments.paths, roots, left_out.append, show)
+    finally:
+        sys.stderr.write(
+            (_CLEAR if live else "") + "".join(f"{sentence}\n" for sentence in left_out)
+        )
+    sys.stdout.write(f"{write_fleet(members, arguments.output, left_out, costs, roots)}\n")
+    if arguments.table:
+        sys.stdout.write(f"{write_fleet_table(members, arguments.table, roots)}\n")
+    return 0

@@ -1,0 +1,1 @@
+"""Commands that need ROS: nodes of a cell, the graph, recordings planned again."""

@@ -1,0 +1,264 @@
+"""Access to stations: configurations that reach them, and the straight line out of each.
+
+`ir cell check` prints it; `--deep` adds every configuration with its line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ir_cli.output import Columns, Row, number, text
+from ir_description import AllowedContact, Cell, Station
+from ir_msgs_py.arrays import FloatArray
+from ir_planner.configurations import free_configurations, no_configuration
+from ir_planner.program.route import Route
+from ir_planner.program.steps import Scenes, placed_steps
+from ir_planner.scene import PlanningScene, tcp_inside
+from ir_planner.service import line_poses
+
+# Situations at a station, and the configurations that reach it.
+
+MARGIN = 0.02  # m, the default of a request
+_SAME = 1e-6  # rad
+
+
+@dataclass(frozen=True, eq=False)
+class Visit:
+    """A station with what is held there, where the parts lie and how the doors stand."""
+
+    station: Station
+    scene: PlanningScene
+
+    @property
+    def lying(self) -> str:
+        """Which parts lie where: "gear at pallet", "" for none."""
+        return ", ".join(
+            f"{part.name} at {part.station}" for part in self.scene.cell.parts if part.station
+        )
+
+
+def visits(cell: Cell) -> Iterator[Visit]:
+    """Every station as the program finds it when it arrives and when it leaves; as it is before the
+    program where that does not go. Each situation once.
+    """
+    scenes = Scenes(cell, cell.robot.controller)
+    route = Route.over(placed_steps(cell, cell.program, cell.parts_at_start()), scenes)
+    found: dict[str, list[PlanningScene]] = {station.name: [] for station in cell.stations}
+    for place in range(len(route)):
+        if route.at(place).step.kind == "STATION":
+            found[route.name(place)] += [route.arriving(place), route.leaving(place)]
+    start = scenes.of(cell.parts_at_start())
+    for name, situations in found.items():
+        once = {id(scene): scene for scene in situations or [start]}
+        yield from (Visit(cell.station(name), scene) for scene in once.values())
+
+
+def reaching(visit: Visit) -> FloatArray:
+    """Configurations (K, n) that reach a station, free or not, those that differ by whole turns
+    once: the one nearest to machine home.
+    """
+    home = visit.scene.cell.machine_home
+    q = visit.scene.inverse_kinematics.solve(np.asarray(visit.station.pose)[None]).q
+    kept: list[FloatArray] = []
+    for one in q[np.argsort(np.abs(q - home).sum(axis=1), kind="stable")]:
+        if all(np.abs(np.sin(0.5 * (one - other))).max() > _SAME for other in kept):
+            kept.append(one)
+    return np.array(kept).reshape(-1, len(home))
+
+
+def stations_of(cell: Cell) -> list[Row]:
+    """One row per situation at a station: configurations that reach it, how many of them keep 20 mm
+    (or what the station allows), the best clearance, and the obstructing pairs where none does.
+    """
+    return [_row(visit, cell) for visit in visits(cell)]
+
+
+def _row(visit: Visit, cell: Cell) -> Row:
+    station = visit.station
+    scene = visit.scene
+    threshold = scene.thresholds(MARGIN, station.name)
+    found = free_configurations(station.pose, scene, threshold, cell.machine_home)
+    none = (
+        "" if len(found.q) else no_configuration(station.pose, scene, found, station.name).message
+    )
+    clearances = scene.collision.min_distance(found.q, threshold).distance if len(found.q) else ()
+    return {
+        "station": station.name,
+        "load": scene.load_text,
+        "reached": found.reached,
+        "free": len(found.q),
+        "clearance": float(max(clearances)) if len(found.q) else None,
+        "obstacle": none,
+    }
+
+
+# The straight line out of a station, judged by distances.
+
+HAND = 5  # links from here on, tool and part may touch what they work at
+_SHARE = 0.5  # of the distance on the line: how near a contact may come
+_GRID = 1e-4  # m, to which it is rounded down
+_NOISE = 1e-6  # of it: processors give distances that differ in their last bits
+_JUMP = 0.35  # rad between points of a line: more is another branch
+
+
+@dataclass(frozen=True)
+class Near:
+    """A pair that is nearer than it may be: the distance [m] (negative: the depth), and how far out
+    [m].
+    """
+
+    body_a: str
+    body_b: str
+    distance: float
+    out: float
+
+    @property
+    def sentence(self) -> str:
+        """As a table shows it."""
+        where = f" after {1e3 * self.out:.0f} mm" if self.out > 0.0 else ""
+        if self.distance <= 0.0:
+            return f"{self.body_a} is {-1e3 * self.distance:.1f} mm inside {self.body_b}{where}"
+        return f"{self.body_a} is {1e3 * self.distance:.1f} mm from {self.body_b}{where}"
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """The line out of a station in one configuration q (n,); reach [m]: how far it can be followed.
+
+    near: pairs too near with what the station allows, the nearest first. mendable: contacts and a
+    zone would
+    make it free: these contacts, and a zone that holds the places (P, 3) [m] of the tcp in
+    `within`.
+    """
+
+    q: FloatArray
+    reach: float
+    whole: bool
+    near: tuple[Near, ...]
+    mendable: bool
+    contacts: tuple[AllowedContact, ...]
+    within: FloatArray
+
+    @property
+    def free(self) -> bool:
+        """Whether it can be driven as the cell is."""
+        return self.whole and not self.near
+
+    @property
+    def sentence(self) -> str:
+        """What is in the path."""
+        if self.near:
+            return self.near[0].sentence
+        return "" if self.whole else f"the joint limits end it after {1e3 * self.reach:.0f} mm"
+
+
+def lines_of(visit: Visit, approach: float) -> list[Line]:
+    """The line of every configuration that reaches the station, with an approach distance [m]."""
+    station = replace(visit.station, approach_distance=approach)
+    scene = visit.scene
+    poses = line_poses(station)
+    solved = scene.inverse_kinematics.solve(poses[1:]) if len(poses) > 1 else None
+    nexts = [] if solved is None else [solved.of_pose(k) for k in range(len(poses) - 1)]
+    return [_judged(_followed(q, nexts), len(poses), station, scene) for q in reaching(visit)]
+
+
+def _followed(q: FloatArray, nexts: Sequence[FloatArray]) -> FloatArray:
+    points = [q]
+    for candidates in nexts:
+        if not len(candidates):
+            break
+        jump = np.abs(candidates - points[-1]).max(axis=1)
+        if jump.min() > _JUMP:
+            break
+        points.append(candidates[int(np.argmin(jump))])
+    return np.array(points)
+
+
+def _judged(points: FloatArray, count: int, station: Station, scene: PlanningScene) -> Line:
+    """A line (L, n): contacts count where the tcp is in the zone, and never at the outer end."""
+    distance = scene.collision.distances(points)
+    tcp = scene.chain.tcp_poses(points)[:, :3, 3]
+    out = np.linalg.norm(tcp - tcp[0], axis=1)
+    whole = len(points) == count
+    kept = scene.thresholds(MARGIN, station.name)
+    last = np.arange(len(points)) == (count - 1 if count > 1 else -1)
+    plain = last | ~tcp_inside(points, scene, station.name, MARGIN)
+    violated = distance <= np.where(plain[:, None], MARGIN, kept)
+    pairs = np.flatnonzero(violated.any(axis=0))
+    found = []
+    for z in pairs:
+        k = int(np.flatnonzero(violated[:, z])[np.argmin(distance[violated[:, z], z])])
+        a = scene.collision.pairs[z].body_a
+        b = scene.collision.pairs[z].body_b
+        found.append(Near(a, b, float(distance[k, z]), float(out[k])))
+    least = distance.min(axis=0, initial=np.inf)
+    at_end = (distance[last] <= MARGIN).any(axis=0)
+    mendable = whole and all(
+        least[z] > 0.0 and not at_end[z] and _by_hand(int(z), scene) for z in pairs
+    )
+    contacts = tuple(_contact(int(z), float(least[z]), scene) for z in pairs if least[z] <= kept[z])
+    within = tcp[(distance <= MARGIN).any(axis=1) & ~last]
+    near = tuple(sorted(found, key=lambda each: each.distance))
+    return Line(points[0], float(out[-1]), whole, near, mendable, contacts, within)
+
+
+def _by_hand(z: int, scene: PlanningScene) -> bool:
+    """Whether a pair is one of the hand, or of what it holds, with a body."""
+    capsules = (*scene.cell.robot.capsules, *(c for load in scene.loads for c in load.capsules))
+    hand = {capsule.name for capsule in capsules if capsule.link >= HAND}
+    pair = scene.collision.pairs[z]
+    return pair.kind != "SELF" and pair.body_a in hand
+
+
+def _contact(z: int, distance: float, scene: PlanningScene) -> AllowedContact:
+    """What allows a pair to come to a distance [m]."""
+    pair = scene.collision.pairs[z]
+    least = float(np.floor(_SHARE * distance / _GRID + _NOISE) * _GRID)
+    return AllowedContact(pair.body_a, pair.body_b, round(max(least, 0.0), 6))
+
+
+CONFIGURATIONS: Columns = {
+    "station": ("station", text),
+    "held": ("held", text),
+    "lying": ("lying", text),
+    "joints_deg": ("configuration deg", text),
+    "clearance": ("clearance mm", number(1, 1e3)),
+    "at_station": ("at the station", text),
+    "line_out": ("line in and out", text),
+}
+
+
+def configurations_of(cell: Cell) -> list[Row]:
+    """One row for each configuration in each situation; one that says so where none reaches the
+    station.
+    """
+    return [row for visit in visits(cell) for row in _rows(visit)]
+
+
+def _rows(visit: Visit) -> Iterator[Row]:
+    distance = visit.station.approach_distance
+    there = lines_of(visit, 0.0)
+    out = lines_of(visit, distance)
+    situation = {"station": visit.station.name, "held": visit.scene.load_text, "lying": visit.lying}
+    if not there:
+        yield situation | {
+            "joints_deg": "",
+            "clearance": None,
+            "at_station": "not reached",
+            "line_out": "",
+        }
+    for here, line in zip(there, out, strict=True):
+        nearest = visit.scene.collision.min_distance(here.q[None]).distance[0]
+        yield situation | {
+            "joints_deg": " ".join(f"{round(angle):d}" for angle in np.degrees(here.q)),
+            "clearance": float(nearest),
+            "at_station": here.sentence or "free",
+            "line_out": _said(line) if distance > 0.0 else "no approach_distance",
+        }
+
+
+def _said(line: Line) -> str:
+    return line.sentence or f"free, {1e3 * line.reach:.0f} mm"

@@ -1,0 +1,196 @@
+"""Studies at the command line: `ir study layout`, `statistics` and `arena`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from typing import TypeVar
+
+from ir_cli.errors import InputError
+from ir_cli.output import ProgressLine, print_json
+from ir_studies import KINDS, Means, read_settings, read_study, run_arena
+from ir_studies.arena import EXAMPLE, ArenaSettings, arena_settings
+from ir_studies.work import MOST_WORKERS
+
+# Options and progress of all studies.
+
+Made = TypeVar("Made")
+
+
+class TimeLeft:
+    """How long the rest of a phase takes when it goes on as since its first job of this run."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._phase = ""
+        self._of = 0
+        self._first = 0
+        self._done = 0
+        self._begun = clock()
+
+    def words(self, phase: str, done: int, of: int) -> str:
+        """The time left, or nothing where it isn't known yet."""
+        now = self._clock()
+        if (phase, of) != (self._phase, self._of) or done < self._done:
+            self._phase = phase
+            self._of = of
+            self._first = done
+            self._begun = now
+        self._done = done
+        if done in (self._first, of):
+            return ""
+        return (
+            f", about {_rounded((now - self._begun) * (of - done) / (done - self._first))} "
+            "for the others"
+        )
+
+
+def _rounded(seconds: float) -> str:
+    """A duration as people say it."""
+    for unit, name in ((3600.0, "h"), (60.0, "min")):
+        if seconds >= 1.5 * unit:
+            return f"{seconds / unit:.0f} {name}"
+    return f"{max(seconds, 1.0):.0f} s"
+
+
+def add_study(parser: argparse.ArgumentParser, folder: str) -> None:
+    """SETTINGS.yaml, -o, --workers, --scheduler and --example."""
+    parser.add_argument("settings", nargs="?", metavar="SETTINGS.yaml", help="what is asked")
+    parser.add_argument(
+        "-o", "--output", default=folder, metavar="FOLDER", help=f"results ({folder})"
+    )
+    words = f"processes, 1 to {MOST_WORKERS} (as many as cores)"
+    parser.add_argument("--workers", type=int, default=0, metavar="N", help=words)
+    words = "of a Dask cluster that makes the jobs instead, as tcp://127.0.0.1:8786"
+    parser.add_argument("--scheduler", default="", metavar="ADDRESS", help=words)
+    parser.add_argument(
+        "--example", action="store_true", help="print a settings file with all keys, and end"
+    )
+
+
+def settings_of(arguments: argparse.Namespace, command: str) -> str:
+    """The settings file. InputError where none is named."""
+    if arguments.settings is None:
+        raise InputError(f"SETTINGS.yaml is missing: {command} --example prints one")
+    return str(arguments.settings)
+
+
+def studied(arguments: argparse.Namespace, make: Callable[[Means], Made]) -> Made:
+    """What `make` returns, with a line that says how far it is."""
+    made = [0, 0]
+    left = TimeLeft()
+    if not 0 <= arguments.workers <= MOST_WORKERS:
+        raise InputError(f"--workers is {arguments.workers}: it must be in 1 .. {MOST_WORKERS}")
+
+    def show(phase: str, done: int, of: int, best: str) -> None:
+        made[:] = done, of
+        line.show(f"{best}; {phase}" if best else phase, done, of, 0.0, left.words(phase, done, of))
+
+    try:
+        with ProgressLine() as line:
+            return make(Means(arguments.workers, arguments.scheduler, show))
+    except KeyboardInterrupt:
+        with suppress(BrokenPipeError):
+            done = f" after {made[0]} of {made[1]}" if made[1] else ""
+            sys.stderr.write(f"stopped{done}: the same command goes on from there\n")
+        raise
+
+
+# One command per kind.
+
+
+def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add study and arena."""
+    add_kinds(commands)
+    add_arena(commands)
+
+
+def add_kinds(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add study with a command per kind; the arena has a command of its own."""
+    about = "where things should stand, statistics: many plans of one cell; needs no ROS"
+    study = commands.add_parser("study", help=about)
+    kinds = study.add_subparsers(dest="kind", required=True, metavar="KIND")
+    for name, kind in KINDS.items():
+        if name == "arena":
+            continue
+        one = kinds.add_parser(
+            name,
+            help=kind.about,
+            description=f"{kind.about.capitalize()}. Makes what the folder has no result of; the "
+            "same command goes on after an interruption.",
+        )
+        add_study(one, f"out/{name}")
+        one.add_argument(
+            "--json", action="store_true", help="print summary, files and table as JSON"
+        )
+    study.set_defaults(run=run_study)
+
+
+def run_study(arguments: argparse.Namespace) -> int:
+    """Run, and print what follows and which files were written."""
+    kind = str(arguments.kind)
+    if arguments.example:
+        sys.stdout.write(KINDS[kind].example)
+        return 0
+    study = read_study(settings_of(arguments, f"ir study {kind}"))
+    if study.kind != kind:
+        raise InputError(f"these are settings of {study.kind}, not of {kind}")
+    answer = studied(arguments, lambda means: study.run(arguments.output, means))
+    if arguments.json:
+        files = [str(path) for path in answer.files]
+        print_json({"summary": answer.summary, "files": files, "table": answer.table})
+        return 0
+    sys.stdout.write(f"{answer.summary}\n")
+    sys.stdout.writelines(f"{path}\n" for path in answer.files)
+    return 0
+
+
+_FOLDER = "out/arena"
+_QUICK_FOLDER = "out/arena_quick"
+_QUICK_S = 0.2  # of processor per run: 550 runs of the example take two minutes on two cores
+
+
+def add_arena(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add arena."""
+    arena = commands.add_parser(
+        "arena",
+        help="planners against each other over cells, tasks and seeds; needs no ROS",
+        description="Runs what the folder has no result of; the same command goes on after an "
+        "interruption.",
+    )
+    add_study(arena, _FOLDER)
+    words = (
+        f"one seed and {_QUICK_S:g} s per run, in {_QUICK_FOLDER}; without SETTINGS.yaml "
+        "those of --example"
+    )
+    arena.add_argument("--quick", action="store_true", help=words)
+    arena.add_argument("--parquet", action="store_true", help="also table.parquet; needs pyarrow")
+    arena.set_defaults(run=run_arena_command)
+
+
+def run_arena_command(arguments: argparse.Namespace) -> int:
+    """Run, and print which files were written."""
+    if arguments.example:
+        sys.stdout.write(EXAMPLE)
+        return 0
+    settings, folder = asked(arguments)
+    finished = studied(
+        arguments, lambda means: run_arena(settings, folder, means, parquet=arguments.parquet)
+    )
+    sys.stdout.write(f"{finished.summary}\n")
+    sys.stdout.writelines(f"{path}\n" for path in finished.files)
+    return 0
+
+
+def asked(arguments: argparse.Namespace) -> tuple[ArenaSettings, str]:
+    """The settings, and the folder of the results."""
+    if not arguments.quick:
+        return read_settings(settings_of(arguments, "ir arena")), str(arguments.output)
+    named = arguments.settings is not None
+    settings = read_settings(arguments.settings) if named else arena_settings(EXAMPLE, str)
+    folder = _QUICK_FOLDER if arguments.output == _FOLDER else str(arguments.output)
+    return replace(settings, seeds=1, seconds=_QUICK_S), folder

@@ -1,0 +1,126 @@
+"""`ir evaluate` and `ir optimize`: a trace held against the limits, and made cheaper."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from ir_cli.output import ProgressLine, add_formats, print_json
+from ir_cli.planning import (
+    FAILED,
+    add_cell,
+    add_margin,
+    add_options,
+    add_parameters,
+    failed,
+    figures_of,
+    options_of,
+    planner_of,
+    sentence_of,
+    sentences,
+)
+from ir_cli.trace_programs import stretches_of
+from ir_cli.traces import add_measured, measured_figures, motion_of, write_trace
+
+
+def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add evaluate and optimize."""
+    add_evaluate(commands)
+    add_optimize(commands)
+
+
+def add_evaluate(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add evaluate."""
+    evaluate = commands.add_parser(
+        "evaluate", help="joules, limits and clearance of a trajectory in a file; needs no ROS"
+    )
+    add_cell(evaluate)
+    evaluate.add_argument(
+        "trace",
+        type=Path,
+        metavar="TRACE",
+        help="CSV with time and joints, Parquet, or a recording",
+    )
+    add_measured(evaluate)
+    evaluate.add_argument("--station", default="", help="whose allowed contacts hold in its zone")
+    add_margin(evaluate)
+    add_parameters(evaluate)
+    add_formats(evaluate, comma=False)
+    evaluate.set_defaults(run=run_evaluate)
+
+
+def run_evaluate(arguments: argparse.Namespace) -> int:
+    """Evaluate and print; exit code 1 where a limit or the clearance is violated."""
+    with sentences(), ProgressLine() as line:
+        planner = planner_of(arguments.cell, arguments.power_parameters)
+        margin = arguments.safety_distance
+        load = arguments.load
+        station = arguments.station
+        known, trajectory = motion_of(arguments, planner, line.show)
+        line.show("evaluate", 0, 1, 0.0)
+        found = planner.evaluate(trajectory, margin, load, station)
+    verification = found.verification
+    if arguments.json:
+        violations = [v for v in (verification.violation, *verification.others) if v is not None]
+        listed = [{"what": v.what, "seconds": v.time, "sentence": v.sentence} for v in violations]
+        print_json({**figures_of(found.report), **measured_figures(known), "violations": listed})
+    else:
+        sys.stdout.write(sentence_of(found.report) + "\n")
+        if known is not None:
+            sys.stdout.write("\n".join(known.sentences) + "\n")
+        if verification.violation is not None:
+            sys.stdout.write(f"violated: {verification.status.message}\n")
+    return 0 if verification.certified else FAILED
+
+
+def add_optimize(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add optimize."""
+    optimize = commands.add_parser(
+        "optimize", help="make the motion of a trace cheaper between its ends; needs no ROS"
+    )
+    add_cell(optimize)
+    optimize.add_argument(
+        "trace",
+        type=Path,
+        metavar="TRACE",
+        help="CSV with time and joints, Parquet, or a recording",
+    )
+    optimize.add_argument(
+        "--duration", type=float, default=0.0, metavar="S", help="s it takes; 0: the best (0)"
+    )
+    optimize.add_argument("--trajectory", type=Path, metavar="FILE", help="write its points as CSV")
+    add_measured(optimize)
+    add_options(optimize)
+    add_parameters(optimize)
+    add_formats(optimize, comma=False)
+    optimize.set_defaults(run=run_optimize)
+
+
+def run_optimize(arguments: argparse.Namespace) -> int:
+    """Optimise and print; exit code 1 where nothing is found."""
+    with sentences(), ProgressLine() as line:
+        planner = planner_of(arguments.cell, arguments.power_parameters)
+        known, motion = motion_of(arguments, planner, line.show)
+        moving = [one.trajectory for one in stretches_of(motion)[0] if one.trajectory is not None]
+        if known is not None and len(moving) == 1:
+            motion = moving[0]  # standstills around a measured movement are no part of it
+        line.show("optimise", 0, 1, 0.0)
+        found = planner.optimize_trajectory(motion, options_of(arguments, arguments.duration))
+    if known is not None and len(moving) > 1:
+        sys.stderr.write(
+            f"ir: {len(moving)} movements with stops between them are made one: ir compare keeps "
+            "the stops\n"
+        )
+    if found.trajectory is None:
+        return failed(found.status.message)
+    if arguments.trajectory:
+        write_trace(arguments.trajectory, found.trajectory)
+    if arguments.json:
+        before = {**figures_of(found.before), **measured_figures(known)}
+        print_json({"before": before, "after": figures_of(found.after)})
+        return 0
+    said = [f"before: {sentence_of(found.before)}"]
+    said += known.sentences if known is not None else ()
+    sys.stdout.write("\n".join([*said, f"after: {sentence_of(found.after)}"]) + "\n")
+    return 0

@@ -1,0 +1,228 @@
+"""Checks and plans of the viewed cell in a thread; a newer request ends the one under way."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+
+from ir_cli.plan import sentences_of
+from ir_cli.planning import CEILING
+from ir_cli.view.clearance import StationAccess, station_accesses
+from ir_cli.view.playback import PlayedMotion, motion_of
+from ir_description import Cell, DescriptionError
+from ir_kernels.errors import KernelError
+from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.report import PlannedMovement
+from ir_planner import CancelledError, Goal, Planner, PlannerError
+
+# The latest action of each kind counts: a quick hand drags a machine through a hundred places a
+# second, and only the last that waits is looked at.
+
+Action = Callable[[], None]
+
+
+class Inbox:
+    """Actions by key, filled by any thread, emptied by one."""
+
+    def __init__(self) -> None:
+        self._waiting: dict[str, Action] = {}
+        self._changed = threading.Condition()
+
+    def post(self, key: str, action: Action) -> None:
+        """Keep an action; one with the same key that still waits is dropped."""
+        with self._changed:
+            self._waiting.pop(key, None)
+            self._waiting[key] = action
+            self._changed.notify()
+
+    def take(self, patience: float) -> list[Action]:
+        """All that waits, in the order in which it came; after at most `patience` s none."""
+        with self._changed:
+            if not self._waiting:
+                self._changed.wait(patience)
+            actions = list(self._waiting.values())
+            self._waiting.clear()
+            return actions
+
+
+QUIET = 0.4
+"""Seconds without a change after which a cell is planned; its stations are checked at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class ViewRequest:
+    """A cell to check, those stations first, and to plan: `stations`, none: its program, or its
+    tasks.
+    """
+
+    number: int
+    cell: Cell
+    first: frozenset[str] = frozenset()
+    stations: tuple[str, ...] = ()
+    quiet: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """A plan as it is played (None: there is none), what is known about it, and why it was not
+    found.
+    """
+
+    motion: PlayedMotion | None
+    lines: tuple[str, ...] = ()
+    failure: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Listener:
+    """What is called, in the thread that empties the inbox, with the number of what was asked.
+
+    checked: the stations so far, and whether these are all; progress: phase, done, total.
+    """
+
+    checked: Callable[[int, tuple[StationAccess, ...], bool], None]
+    progress: Callable[[int, str, int, int], None]
+    planned: Callable[[int, Planned], None]
+
+
+class PlanWorker:
+    """Works on what was asked last, until it is closed."""
+
+    def __init__(self, inbox: Inbox, listener: Listener) -> None:
+        self._inbox = inbox
+        self._listener = listener
+        self._asked: ViewRequest | None = None
+        self._latest = 0
+        self._closed = False
+        self._changed = threading.Condition()
+        self._thread = threading.Thread(target=self._run, name="plan", daemon=True)
+        self._thread.start()
+
+    def ask(self, asked: ViewRequest) -> None:
+        """Work on this; what was under way ends."""
+        with self._changed:
+            self._asked = asked
+            self._latest = asked.number
+            self._changed.notify()
+
+    def cancel(self) -> None:
+        """End what is under way, without an answer."""
+        with self._changed:
+            self._asked = None
+            self._latest = 0
+            self._changed.notify()
+
+    def close(self, patience: float = 5.0) -> None:
+        """End the thread, at its next look at its work."""
+        with self._changed:
+            self._closed = True
+            self._asked = None
+            self._latest = 0
+            self._changed.notify()
+        self._thread.join(patience)
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._asked is not None or self._closed)
+                if self._closed:
+                    return
+                asked = self._asked
+                self._asked = None
+            assert asked is not None
+            try:
+                self._work(asked)
+            except CancelledError:
+                continue
+            except (DescriptionError, KernelError, MsgsError, PlannerError) as error:
+                self._post(
+                    "planned",
+                    self._listener.planned,
+                    asked.number,
+                    Planned(None, failure=str(error)),
+                )
+            except BaseException as error:
+                self._inbox.post("fault", partial(_raise, error))
+                return
+
+    def _work(self, asked: ViewRequest) -> None:
+        found: list[StationAccess] = []
+        for each in station_accesses(asked.cell, asked.first):
+            found.append(each)
+            self._post("checked", self._listener.checked, asked.number, tuple(found), False)
+            self._stop_if_old(asked)
+        self._post("checked", self._listener.checked, asked.number, tuple(found), True)
+        with self._changed:
+            self._changed.wait_for(lambda: self._latest != asked.number, asked.quiet)
+        self._stop_if_old(asked)
+        answer = self._plan(asked)
+        self._stop_if_old(asked)
+        self._post("planned", self._listener.planned, asked.number, answer)
+
+    def _plan(self, asked: ViewRequest) -> Planned:
+        cell = asked.cell
+        planner = Planner(time.monotonic, read_cell=lambda text, file: cell)
+        planner.set_cell("", cell.name)
+
+        def old() -> bool:
+            return self._latest != asked.number
+
+        def progress(phase: str, done: int, total: int, cost: float) -> None:
+            self._post("progress", self._listener.progress, asked.number, phase, done, total)
+
+        if cell.program or asked.stations:
+            options = PlanOptions(planning_time=CEILING)
+            plan = planner.plan_program(
+                asked.stations, 0.0, options, cell.posture("park"), progress, cancelled=old
+            )
+            if not plan.status.ok:
+                return Planned(None, failure=plan.status.message)
+            return Planned(
+                motion_of(plan.movements, cell, planner.scene), tuple(sentences_of(plan)[:2])
+            )
+        movements = []
+        failures = []
+        for each in _tasks(planner, progress, old):
+            if isinstance(each, str):
+                failures.append(each)
+            else:
+                movements.append(each)
+        return Planned(motion_of(movements, cell, planner.scene), (), "; ".join(failures))
+
+    def _stop_if_old(self, asked: ViewRequest) -> None:
+        if self._latest != asked.number:
+            raise CancelledError("another cell was asked for")
+
+    def _post(self, key: str, action: Callable[..., None], *values: object) -> None:
+        self._inbox.post(key, partial(action, *values))
+
+
+def _tasks(
+    planner: Planner, progress: Callable[[str, int, int, float], None], old: Callable[[], bool]
+) -> Iterator[PlannedMovement | str]:
+    """The cell's tasks one by one, or why one is not found."""
+    tasks = planner.cell.tasks
+    for done, task in enumerate(tasks):
+        progress("tasks", done, len(tasks), 0.0)
+        options = PlanOptions(planning_time=CEILING)
+        plan = planner.plan_regional(task.start, Goal(configuration=task.goal), options, old)
+        if plan.trajectory is None:
+            yield f"task {task.name}: {plan.status.message}"
+            continue
+        yield PlannedMovement(
+            kind="regional",
+            from_station=task.name,
+            trajectory_id=plan.trajectory.trajectory_id,
+            trajectory=plan.trajectory,
+            report=plan.report,
+            duration=plan.report.duration,
+            load=planner.scene().load_text,
+        )
+
+
+def _raise(error: BaseException) -> None:
+    raise error
