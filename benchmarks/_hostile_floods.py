@@ -89,9 +89,8 @@ def flooded(kind: str, processes: int) -> Iterator[None]:
             each.wait()
 
 
-def floods(presses: int, processes: int = 2) -> list[dict[str, Any]]:
+def floods(presses: int, processes: int = 2) -> Iterator[dict[str, Any]]:
     """Rows: latency of presses by each way under each flood [ms], and memory after it [MB]."""
-    rows: list[dict[str, Any]] = []
     with prey() as driver:
         numbers: list[tuple[float, int]] = []
         driver.client.subscribe(
@@ -102,13 +101,10 @@ def floods(presses: int, processes: int = 2) -> list[dict[str, Any]]:
             with flooded(kind, processes):
                 for way, press in _ways(driver):
                     late, lost = _timed(press, numbers, presses, answered=way != "topic")
-                    rows.append(_row(kind, way, late, lost))
+                    yield _row(kind, way, late, lost)
             time.sleep(SETTLE)
             after = driver.has()["rss_mb"]
-            rows.append(
-                {"case": "flood", "flood": kind, "rss_mb_before": before, "rss_mb_after": after}
-            )
-    return rows
+            yield {"case": "flood", "flood": kind, "rss_mb_before": before, "rss_mb_after": after}
 
 
 def _row(kind: str, way: str, late: list[float], lost: int) -> dict[str, Any]:
@@ -121,20 +117,21 @@ def _row(kind: str, way: str, late: list[float], lost: int) -> dict[str, Any]:
 def _ways(driver: Prey) -> Iterator[tuple[str, Way]]:
     """How the button is pressed and let go."""
     publisher = _publisher(driver.client)
-    modbus = socket.create_connection(("127.0.0.1", driver.port), timeout=60.0)
 
     def by_service(level: bool) -> None:
         request = SetPlcInput.Request(name="emergency_stop", value=level)
         driver.client.call(names.SET_PLC_INPUT, request)
 
-    def by_modbus(level: bool) -> None:
-        modbus.sendall(PRESS if level else RELEASE)
-        modbus.recv(64)
-
     yield "topic", lambda level: publisher.publish(_PRESSED if level else _RELEASED)
     yield "service", by_service
-    yield "modbus", by_modbus
-    modbus.close()
+    # opened now: the driver cuts a client that says nothing for a minute
+    with socket.create_connection(("127.0.0.1", driver.port), timeout=60.0) as modbus:
+
+        def by_modbus(level: bool) -> None:
+            modbus.sendall(PRESS if level else RELEASE)
+            modbus.recv(64)
+
+        yield "modbus", by_modbus
 
 
 def _timed(
