@@ -82,7 +82,7 @@ def main() -> int:
     command = [sys.executable, "-m", "pytest", "-q", "-rfE", *(chosen or TESTS)]
     OUTPUT.mkdir(parents=True, exist_ok=True)
     failures = 0
-    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     print(f"{' '.join(command[1:])}, beside {given.busy} busy processes on {os.cpu_count()} cores")
     print("run  passed  failed  errors  reruns  skipped  seconds   load", flush=True)
     with load(given.busy):
