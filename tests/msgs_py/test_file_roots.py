@@ -29,7 +29,7 @@ def test_links_and_dots_lead_nowhere_else(roots: FileRoots, tmp_path: Path) -> N
             roots.open_to_read(tmp_path / "in" / name)
         assert "root:x" not in str(refused.value)
         with pytest.raises(FileRefusedError, match="lies outside"):
-            roots.open_to_write(tmp_path / "in" / name, b"root")
+            roots.write(tmp_path / "in" / name, b"x", b"root")
     assert (tmp_path / "out" / "secret").read_text() == "root:x:0:0"
 
 
@@ -57,20 +57,18 @@ def test_fifos_folders_and_devices_are_refused_without_waiting(
         with pytest.raises(FileRefusedError, match="not a regular file"):
             allowed.open_to_read(path)
     with pytest.raises((FileRefusedError, IsADirectoryError)):
-        roots.open_to_write(tmp_path / "in", b"x")
+        roots.write(tmp_path / "in", b"", b"x")
 
 
 def test_only_a_known_kind_is_replaced(roots: FileRoots, tmp_path: Path) -> None:
     path = tmp_path / "in" / "a"
-    with roots.open_to_write(path) as stream:
-        stream.write(b"KIND one and more")
+    roots.write(path, b"KIND one and more")
     with pytest.raises(FileExistsError):
-        roots.open_to_write(path)
+        roots.write(path, b"KIND two")
     with pytest.raises(FileRefusedError, match="another kind"):
-        roots.open_to_write(path, b"OTHER")
+        roots.write(path, b"OTHER two", b"OTHER")
     assert path.read_bytes() == b"KIND one and more"
-    with roots.open_to_write(path, b"KIND") as stream:
-        stream.write(b"KIND two")
+    roots.write(path, b"KIND two", b"KIND")
     assert path.read_bytes() == b"KIND two"
 
 

@@ -345,6 +345,27 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(
     wait_for(lambda: node.failure)  # of this one too, or the end of the node would say it
 
 
+def test_a_recording_that_lost_its_file_says_so_and_goes_on_in_another(
+    recorder: RecorderNode, ros_node: Any, call: Any, wait_for: Any, tmp_path: Path
+) -> None:
+    latched = ros_node.create_publisher(String, "/robot_description", LATCHED)
+    latched.publish(String(data="<robot/>"))
+    start(call, tmp_path / "shift.mcap")
+    wait_for(lambda: recorder.messages)
+    (tmp_path / "shift.mcap").unlink()
+    wait_for(lambda: recorder.failure)
+    assert "deleted, moved or replaced" in recorder.failure
+    assert "shift_continued.mcap" in recorder.failure
+    wait_for(lambda: recorder.messages)  # what is latched comes again
+    answer = stop(call)
+    assert answer.status.code == StatusCode.FAILURE
+    assert answer.path == str(tmp_path / "shift_continued.mcap")
+    assert answer.messages > 0
+    assert read_raw(tmp_path / "shift_continued.mcap").problems == ()
+    assert start(call, tmp_path / "shift.mcap").status.code == StatusCode.SUCCESS
+    assert stop(call).status.code == StatusCode.SUCCESS
+
+
 def test_the_planners_cell_is_attached(
     recorder: RecorderNode, ros_node: Any, call: Any, wait_for: Any, tmp_path: Path
 ) -> None:

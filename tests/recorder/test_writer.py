@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
+import subprocess
+import sys
+import threading
 from pathlib import Path
-from typing import BinaryIO
 
 import pytest
 import yaml
@@ -17,8 +20,9 @@ from sensor_msgs.msg import JointState
 
 from ir_msgs_py.file_roots import FileRoots
 from ir_recorder.errors import PathError, WriteError
+from ir_recorder.format.schemas import SchemaLibrary
 from ir_recorder.reading.mcap_file import read_raw
-from ir_recorder.recording.writer import RecordingWriter
+from ir_recorder.recording.writer import RecordingWriter, messages_on_disk
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 
@@ -159,12 +163,126 @@ def test_paths_that_cannot_become_recordings_are_refused(name: str, sentence: st
 def test_a_full_disk_is_a_sentence_and_stays_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def full(self: FileRoots, path: Path, replaces: bytes | None = None) -> BinaryIO:
-        return open("/dev/full", "wb")
+    def full(descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(FileRoots, "open_to_write", full)
+    monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(WriteError, match=r"full\.mcap: No space left on device after 0 messages"):
         RecordingWriter(tmp_path / "full.mcap")
+
+
+def test_a_full_disk_leaves_the_recording_that_was_to_be_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "shift.mcap"
+    RecordingWriter(path).finish()
+    before = path.read_bytes()
+
+    def full(descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        with pytest.raises(WriteError, match="No space left"):
+            RecordingWriter(path, overwrite=True)
+    assert path.read_bytes() == before
+    assert [each.name for each in tmp_path.iterdir()] == ["shift.mcap"]
+    RecordingWriter(path, overwrite=True).finish()  # and nothing is locked
+
+
+@pytest.mark.parametrize("name", ["same", "relative", "symlink", "hard link", "folder link"])
+@pytest.mark.parametrize("first", ["new", "overwrite"])
+def test_a_second_writer_of_a_file_is_refused_by_whatever_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, first: str
+) -> None:
+    folder = tmp_path / "shift"
+    folder.mkdir()
+    path = folder / "a.mcap"
+    if first == "overwrite":
+        RecordingWriter(path).finish()
+    writer = RecordingWriter(path, overwrite=first == "overwrite")
+    other = tmp_path / "b.mcap"
+    if name == "relative":
+        monkeypatch.chdir(folder)
+        other = Path("..") / "shift" / "a.mcap"
+    elif name == "symlink":
+        other.symlink_to(path)
+    elif name == "hard link":
+        os.link(path, other)
+    elif name == "folder link":
+        (tmp_path / "link").symlink_to(folder)
+        other = tmp_path / "link" / "a.mcap"
+    else:
+        other = path
+    with pytest.raises(PathError, match="is being written by another recorder"):
+        RecordingWriter(other, overwrite=True)
+    code = (
+        "import sys; from ir_recorder.recording import RecordingWriter\n"
+        "RecordingWriter(sys.argv[1], overwrite=True)"
+    )
+    process = subprocess.run(
+        [sys.executable, "-c", code, str(other)], capture_output=True, text=True, check=False
+    )
+    assert "is being written by another recorder" in process.stderr
+    channel = writer.register("/joint_states", JOINT_STATE)
+    writer.write(channel, 0, b"\0\1\0\0")
+    assert writer.finish().messages == 1
+    RecordingWriter(other, overwrite=True).finish()
+
+
+@pytest.mark.parametrize("pairs", [20, pytest.param(200, marks=pytest.mark.long)])
+def test_of_a_pair_of_writers_one_is_refused_and_nothing_is_lost(
+    tmp_path: Path, pairs: int
+) -> None:
+    """Both begin at once, of one file with and without an older one: one writes and the other is
+    refused, and what SUCCESS counted is in the file.
+    """
+    written = refused = 0
+    schemas = SchemaLibrary()
+    for pair in range(pairs):
+        path = tmp_path / f"{pair}.mcap"
+        if pair % 2:
+            RecordingWriter(path).finish()
+        start = threading.Barrier(2)
+        done: list[int] = []
+
+        def record(
+            path: Path = path, start: threading.Barrier = start, done: list[int] = done
+        ) -> None:
+            start.wait()
+            try:
+                writer = RecordingWriter(path, schemas, overwrite=True)
+            except PathError:
+                done.append(-1)
+                start.wait()
+                return
+            channel = writer.register("/joint_states", JOINT_STATE)
+            for time in range(5):
+                writer.write(channel, time, b"\0\1\0\0")
+            start.wait()  # only now may the file be free
+            done.append(writer.finish().messages)
+
+        threads = [threading.Thread(target=record) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(timeout=30.0)
+        assert sorted(done) == [-1, 5]
+        refused += 1
+        written += messages_on_disk(path)
+    assert refused == pairs
+    assert written == 5 * pairs
+
+
+def test_what_the_disk_holds_decides_about_success(tmp_path: Path) -> None:
+    writer = RecordingWriter(tmp_path / "a.mcap")
+    channel = writer.register("/joint_states", JOINT_STATE)
+    writer.write(channel, 0, b"\0\1\0\0")
+    writer.flush()
+    with (tmp_path / "a.mcap").open("r+b") as other:  # one that takes no lock
+        other.truncate(10)
+    with pytest.raises(WriteError, match=r"can't be read back|no chunk stands at byte"):
+        writer.finish()
 
 
 @pytest.mark.parametrize("end", ["flush", "finish"])

@@ -20,6 +20,7 @@ from ir_description.cell import shape_register, zone_around
 from ir_description.files.solid_mesh import PIECES, PIECES_MAX, UNITS, SolidReader, pieces_of
 from ir_description.files.worlds import WRITERS, read_world
 from ir_recorder.report.shapes import body_mesh
+from ir_values.output_files import write_file
 
 _Z_UP = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
 """Column by column: glTF's y axis points up, the cell's z."""
@@ -111,14 +112,12 @@ def run_export(arguments: argparse.Namespace) -> int:
     with sentences():
         cell = load_cell(arguments.cell)
     if form == "glb":
-        with path.open("xb") as binary:
-            binary.write(cell_glb(cell))
+        write_file(path, cell_glb(cell), new=True)
         sys.stdout.write(f"{path}\n")
         return 0
     text, files = WRITERS[form](cell)
     for name, content in ((path.name, text), *files.items()):
-        with (path.parent / name).open("x", encoding="utf-8") as file:
-            file.write(content)
+        write_file(path.parent / name, content, new=True)
     sys.stdout.write(f"{path} and {len(files)} meshes\n")
     return 0
 

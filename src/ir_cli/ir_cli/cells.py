@@ -41,6 +41,7 @@ from ir_description import (
     robot_named,
 )
 from ir_values.files import inside
+from ir_values.output_files import write_file
 
 # A cell file to begin with, in the size of its robot.
 
@@ -90,8 +91,7 @@ def write_cell(path: Path, robot: str) -> None:
         raise InputError(f"{path}: the name of a cell file ends in .yaml")
     text = cell_text(path.stem, robot, _robot(path, robot))
     try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
+        write_file(path, text, new=True)
     except FileExistsError:
         raise CommandError(f"{path} is there already: another name, or remove it first") from None
     except OSError as error:

@@ -33,6 +33,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Goal, Planner
 from ir_recorder.measure import PowerModel, planned_samples
+from ir_values.output_files import write_file
 from ir_values.yaml_items import Item, read_items
 
 # The pool: certified excursions from several postures, out and back along straight joint
@@ -469,7 +470,7 @@ def write_programme(programme: Programme, folder: Path, cell: str) -> Path:
         rows.append(row)
     page = {"format": FORMAT, "cell": cell, "seconds": round(programme.seconds, 1), "steps": rows}
     path = folder / "programme.yaml"
-    path.write_text(yaml.safe_dump(page, sort_keys=False), encoding="utf-8")
+    write_file(path, yaml.safe_dump(page, sort_keys=False))
     return path
 
 

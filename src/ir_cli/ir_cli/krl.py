@@ -43,6 +43,7 @@ from ir_planner import (
     export_krl,
     tool_in_flange,
 )
+from ir_values.output_files import write_file
 
 BYTES_MAX = 4_000_000
 COLUMNS: Columns = {
@@ -178,8 +179,8 @@ def run_export(arguments: argparse.Namespace) -> int:
         if not plan.status.ok:
             return failed(plan.status.message)
         written = export_krl(planner, plan.movements, source.stem, options)
-    source.write_text(written.source, encoding="utf-8")
-    data.write_text(written.data, encoding="utf-8")
+    write_file(data, written.data, new=True)
+    write_file(source, written.source, new=True)
     planned = written.planned
     driven = written.exported
     sys.stdout.write(

@@ -27,6 +27,7 @@ from ir_description.files.making.urdf_arm import UrdfShape
 from ir_description.files.mesh import read_stl
 from ir_kernels import Chain, CollisionModel
 from ir_msgs_py.arrays import FloatArray
+from ir_values.output_files import write_file
 
 # Capsules from the collision shapes of the URDF, and the pairs of them that can touch.
 
@@ -179,8 +180,8 @@ def write_robot(urdf: Path, drives: Path, tip: str, packages: Path | None, out: 
     low, high = (np.radians(sheet.values[f"position_{end}_deg"].numbers) for end in ("min", "max"))
     pairs = touching_pairs(arm, shapes.capsules, low, high)
     try:
-        out.write_text(
-            robot_text(arm, sheet, shapes.capsules, pairs, _comments(urdf, drives, shapes)), "utf-8"
+        write_file(
+            out, robot_text(arm, sheet, shapes.capsules, pairs, _comments(urdf, drives, shapes))
         )
     except OSError as error:
         raise CommandError(f"{out} can't be written: {error.strerror}") from error

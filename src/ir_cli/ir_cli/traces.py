@@ -30,6 +30,7 @@ from ir_planner.program import Progress
 from ir_recorder.errors import RecorderError
 from ir_recorder.traces import Trace, TraceMapping, column_names, read_mapping, read_traces
 from ir_recorder.traces.trace import ACCELERATION, EFFORT, GAP_FACTOR, VELOCITY
+from ir_values.output_files import replacing_text
 
 ENDINGS = ("", VELOCITY, ACCELERATION)
 DAY = 86400.0  # s
@@ -49,7 +50,7 @@ def write_trace(path: Path, trajectory: JointTrajectory) -> None:
     header = ["time", *(f"{name}{ending}" for ending, _ in given for name in names)]
     rows = np.column_stack([trajectory.times, *(values for _, values in given)])
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with replacing_text(path) as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         writer.writerows([repr(value) for value in row] for row in rows.tolist())
@@ -61,7 +62,7 @@ def write_readings(path: Path, trace: Trace) -> None:
     numbers = zip(
         trace.time.tolist(), *(values.tolist() for values in trace.columns.values()), strict=True
     )
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with replacing_text(path) as file:
         file.write(f"# {trace.source}\n")
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["time", *trace.columns, *trace.texts])

@@ -4,7 +4,8 @@
 
     RecorderError
     ├── PathError        the file asked for can't be written there, or is taken
-    ├── WriteError       the disk refused while recording: full, read-only, gone
+    ├── WriteError       the disk refused while recording: full, read-only
+    │   └── LostFileError    the file was deleted or replaced, its disk unmounted
     ├── SchemaError      no definition of a message type is installed
     ├── SplitError       files so small that there would be thousands
     ├── TopicsError      names of topics that are none, or too many
@@ -24,6 +25,10 @@ class PathError(RecorderError):
 
 class WriteError(RecorderError):
     """The storage failed while a recording was written."""
+
+
+class LostFileError(WriteError):
+    """What is recorded has no file any more; another one can be begun."""
 
 
 class SchemaError(RecorderError):

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from ir_values.errors import DescriptionFileError, FileRefusedError, InvalidValueError, shown
+from ir_values.output_files import write_file
 
 _MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _HEAD = 64  # bytes, in which every second one is zero where Latin letters stand in UTF-16
@@ -99,7 +100,6 @@ def inside(folder: Path | None, name: str) -> Path:
 ENVIRONMENT = "IR_FILE_ROOTS"
 """Folders, separated as in PATH, for nodes and commands that are given none."""
 _SAFE = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
-_MODE = 0o666  # less what the umask takes
 
 
 @dataclass(frozen=True)
@@ -134,43 +134,39 @@ class FileRoots:
         """A regular file; FileRefusedError for another kind or place, OSError where it can't be
         opened.
         """
-        return os.fdopen(_opened(self.inside(path), os.O_RDONLY, path), "rb")
+        return os.fdopen(opened(self.inside(path), os.O_RDONLY, path), "rb")
 
-    def open_to_write(self, path: str | Path, replaces: bytes | None = None) -> BinaryIO:
-        """A new file, or one in place of a file that is empty or starts with the bytes `replaces`.
+    def write(self, path: str | Path, content: bytes, replaces: bytes | None = None) -> None:
+        """A new file, or one in place of a file that is empty or starts with the bytes `replaces`:
+        whole, or not at all.
 
         Raises FileExistsError where a file is there and `replaces` is None, FileRefusedError for a
-        file of
-        another kind or place: nothing of it is touched then.
+        file of another kind or place: nothing of it is touched then.
         """
         real = self.inside(path)
-        try:
-            return os.fdopen(
-                os.open(real, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _SAFE, _MODE), "wb"
-            )
-        except FileExistsError:
-            if replaces is None:
-                raise
-        stream = os.fdopen(_opened(real, os.O_RDWR, path), "r+b")
-        try:
-            start = stream.read(len(replaces))
-            if start not in (b"", replaces):
-                raise FileRefusedError(
-                    f"{_named(path)} is a file of another kind: it is not replaced"
-                )
-            stream.seek(0)
-            stream.truncate()
-        except BaseException:
-            stream.close()
-            raise
-        return stream
+        if replaces is not None:
+            try:
+                with os.fdopen(opened(real, os.O_RDWR, path), "rb") as stream:
+                    check_kind(stream.read(len(replaces)), replaces, path)
+            except FileNotFoundError:
+                replaces = None
+        write_file(real, content, new=replaces is None)
 
 
 ANYWHERE = FileRoots((Path("/"),))
 """For a script that chooses its files itself."""
 
 
-def _opened(real: Path, flags: int, path: str | Path) -> int:
+def check_kind(start: bytes, replaces: bytes, path: str | Path) -> None:
+    """FileRefusedError where a file's first bytes are those of another kind."""
+    if start not in (b"", replaces):
+        raise FileRefusedError(f"{_named(path)} is a file of another kind: it is not replaced")
+
+
+def opened(real: Path, flags: int, path: str | Path) -> int:
+    """The descriptor of a regular file by a path whose links are resolved; FileRefusedError for
+    another kind.
+    """
     descriptor = os.open(real, flags | _SAFE)
     if stat.S_ISREG(os.fstat(descriptor).st_mode):
         return descriptor

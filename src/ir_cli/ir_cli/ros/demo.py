@@ -47,6 +47,7 @@ from ir_recorder.report import write_report
 from ir_recorder.report.number_text import interval, number
 from ir_recorder.report.picture import write_picture
 from ir_recorder.report.tables import savings_lines
+from ir_values.output_files import write_file
 
 # Results by the recording: movements, checks, the report and the picture.
 
@@ -219,7 +220,7 @@ class Demonstration:
         self._out.mkdir(parents=True, exist_ok=True)
         recording = self._out / "demo.mcap"
         cell_file = self._out / "demo_cell.yaml"
-        cell_file.write_text(cell_to_yaml(self._cell))
+        write_file(cell_file, cell_to_yaml(self._cell))
         progress = self._progress
         what = f"cell {self._cell.name}, simulated plant {self._plant}"
         progress.say(f"Demonstration of {what}: real nodes over DDS, real time")

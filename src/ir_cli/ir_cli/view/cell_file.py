@@ -20,6 +20,7 @@ from ir_description import (
     is_path,
     load_cell,
 )
+from ir_values.output_files import write_file
 
 SUFFIXES = (".yaml", ".yml", ".stl", ".obj", ".glb", ".gltf", ".bin")
 MOST_FILES = 2_000
@@ -152,8 +153,7 @@ def _written(watched: Watched, text: str) -> Path:
     for number in range(1, MOST_COPIES):
         path = watched.folder / f"{stem}_moved{'' if number == 1 else f'_{number}'}.yaml"
         try:
-            with path.open("x", encoding="utf-8", newline="") as file:
-                file.write(text)
+            write_file(path, text, new=True)
         except FileExistsError:
             continue
         return path.resolve()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -26,6 +26,7 @@ from ir_msgs_py.ros.serving import BoundedService, answered
 from ir_msgs_py.status import Status, StatusCode
 from ir_recorder.arguments import record_parser
 from ir_recorder.errors import (
+    LostFileError,
     NothingRecordedError,
     PathError,
     RecorderError,
@@ -38,7 +39,13 @@ from ir_recorder.format.qos import QosOffer
 from ir_recorder.format.schemas import SchemaLibrary
 from ir_recorder.node.requests import CellRequest, ParameterRequests
 from ir_recorder.node.subscriptions import Listener, is_own
-from ir_recorder.recording.session import CellFiles, RecordingSession, check_free, files_of_cell
+from ir_recorder.recording.session import (
+    CellFiles,
+    RecordingSession,
+    check_free,
+    continued_path,
+    files_of_cell,
+)
 from ir_recorder.recording.settings import RecorderSettings
 from ir_recorder.recording.topics import TopicSelection, checked_topics, single_type
 from ir_recorder.recording.worker import Act, Message, RecordingWorker
@@ -62,7 +69,7 @@ class StartAndStop(Protocol):
 
     @property
     def failure(self) -> str:
-        """Why the last recording ended on its own, "" when it didn't."""
+        """Why the last recording ended on its own or lost its file, "" when it didn't."""
 
 
 class Services:
@@ -90,6 +97,7 @@ class Services:
     def _on_stop(self, request: Any, response: Any) -> Any:
         def stop() -> str:
             unmet = self._recorder.unmet
+            lost = self._recorder.failure
             summary = self._recorder.finish()
             if summary is None:
                 raise NothingRecordedError(self._recorder.failure or "nothing is being recorded")
@@ -98,10 +106,13 @@ class Services:
             response.messages = summary.messages
             response.seconds = summary.seconds
             response.dropped = summary.dropped
-            seconds = f"{summary.messages} messages over {summary.seconds:.1f} s"
+            held = f"{summary.messages} messages over {summary.seconds:.1f} s"
             if summary.dropped:
-                seconds += f", {summary.dropped} dropped: the disk was too slow"
-            return f"{seconds}{without_publisher(unmet, 'was seen')}"
+                held += f", {summary.dropped} dropped: the disk was too slow"
+            held += without_publisher(unmet, "was seen")
+            if lost:
+                raise LostFileError(f"{lost}: {held}")
+            return held
 
         return self._answer(response, stop)
 
@@ -174,6 +185,17 @@ COMMAND_NODE = "ir_record"  # beside the cell's own recorder
 POLL_PERIOD = 0.02  # s: 10 joint states at a time; waking for each takes a third of a core
 
 
+@dataclass(frozen=True)
+class _Asked:
+    """What a recording was started with, for another file of it."""
+
+    overwrite: bool
+    topics: tuple[str, ...]
+    files: CellFiles | None
+    roots: FileRoots
+    split: Split | None
+
+
 class RecorderNode(Node):
     """Records while a session is open; looks for new topics several times a second."""
 
@@ -188,6 +210,7 @@ class RecorderNode(Node):
         self._settings = settings or declared_settings(self)
         self._open_writer = writer
         self._recording: RecordingWorker | None = None
+        self._asked: _Asked | None = None
         self._schemas = SchemaLibrary()
         self._selection = TopicSelection()
         self._listener = Listener(self, self._settings.depth)
@@ -211,6 +234,11 @@ class RecorderNode(Node):
     def messages(self) -> int:
         """How many messages the running recording holds."""
         return self._recording.session.messages if self._recording is not None else 0
+
+    @property
+    def recording(self) -> bool:
+        """Whether a recording is in progress."""
+        return self._recording is not None
 
     @property
     def cell_attached(self) -> bool:
@@ -252,30 +280,36 @@ class RecorderNode(Node):
         wanted = checked_topics(topics) or self._settings.wanted_topics
         name = cell or self._settings.cell
         files = files_of_cell(name) if name else None
-        into = self._open(path, overwrite, roots or self._settings.file_roots, split)
-        self._selection = TopicSelection(wanted, self.get_namespace())
-        self._passed_over.clear()
-        self._listener.lost = 0
+        asked = _Asked(overwrite, wanted, files, roots or self._settings.file_roots, split)
+        into = self._open(path, asked)
         self._failure = ""
-        if files is not None:
-            self._attach(files)
-        self._cell.begin()
-        self._parameter_requests.begin()
-        self._discover()
+        self._listener.lost = 0
+        self._begin(asked)
         if self._failure:
             raise WriteError(self._failure)
         missing = without_publisher(self.unmet, "is seen yet")
         self.get_logger().info(one_line(f"recording into {into}{missing}"))
         return into
 
-    def _open(self, path: str, overwrite: bool, roots: FileRoots, split: Split | None) -> str:
-        def open_file(path: str | Path) -> RecordingWriter:
-            return self._open_writer(str(path), overwrite, roots)
+    def _begin(self, asked: _Asked) -> None:
+        """Fills a recording that was opened."""
+        self._asked = asked
+        self._selection = TopicSelection(asked.topics, self.get_namespace())
+        self._passed_over.clear()
+        if asked.files is not None:
+            self._attach(asked.files)
+        self._cell.begin()
+        self._parameter_requests.begin()
+        self._discover()
 
-        if split is not None and not overwrite:
-            check_free(path, split)
+    def _open(self, path: str, asked: _Asked) -> str:
+        def open_file(path: str | Path) -> RecordingWriter:
+            return self._open_writer(str(path), asked.overwrite, asked.roots)
+
+        if asked.split is not None and not asked.overwrite:
+            check_free(path, asked.split)
         facts = self._settings.named_facts
-        session = RecordingSession(open_file(path), facts, self._now(), split, open_file)
+        session = RecordingSession(open_file(path), facts, self._now(), asked.split, open_file)
         self._recording = RecordingWorker(session, self._settings.queue_megabytes * 1_000_000)
         return session.path
 
@@ -389,10 +423,24 @@ class RecorderNode(Node):
             self._abandon(error)
 
     def _abandon(self, error: WriteError) -> None:
-        self._failure = str(error)
+        """Ends the recording, and goes on in another file where its own was lost."""
+        lost = self._recording
+        sentence = str(error)
         self._recording = None
         self._listener.close()
-        self.get_logger().error(self._failure)
+        asked = self._asked
+        if isinstance(error, LostFileError) and lost is not None and asked is not None:
+            asked = replace(asked, overwrite=False)
+            try:
+                into = self._open(str(continued_path(Path(lost.session.path))), asked)
+            except RecorderError as further:
+                sentence += f"; no other file could be begun: {further}"
+            else:
+                sentence += f"; what follows is recorded into {into}"
+        self._failure = sentence
+        self.get_logger().error(sentence)
+        if self._recording is not None and asked is not None:
+            self._begin(asked)
 
     def _pass_over(self, topic: str, reason: str) -> None:
         self._passed_over.add(topic)
@@ -434,9 +482,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     def fails() -> bool:
         return bool(options.path) and any(node.failure for node in recorders)
 
+    def ended() -> bool:
+        return fails() and not any(node.recording for node in recorders)
+
     refusals = (RecorderError, MsgsError)
     code = run_node(
-        "ir-record", start, everything, refusals=refusals, goes_on=lambda node: not fails()
+        "ir-record", start, everything, refusals=refusals, goes_on=lambda node: not ended()
     )
     return 1 if fails() else code
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ir_description import DescriptionError, cell_from_yaml, cell_to_yaml, load_cell, robot_urdf
 from ir_msgs_py.errors import InvalidValueError
-from ir_recorder.errors import PathError
+from ir_recorder.errors import LostFileError, PathError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import Split, part_facts, part_path
 from ir_recorder.format.qos import QosOffer
@@ -25,6 +25,17 @@ def check_free(path: str | Path, split: Split) -> None:
     second = part_path(checked_path(path), 1)
     if split.wanted and second.exists():
         raise PathError(f"{second} is there already; choose another path or set overwrite")
+
+
+def continued_path(lost: Path) -> Path:
+    """The file in which a recording goes on that lost its own: shift_continued.mcap; PathError
+    where there are too many.
+    """
+    for number in range(1, 100):
+        name = f"{lost.stem}_continued{'' if number == 1 else f'_{number}'}{lost.suffix}"
+        if not lost.with_name(name).exists():
+            return lost.with_name(name)
+    raise PathError(f"{lost.with_name(name)} and all before are there already")
 
 
 class LatchedMessages:
@@ -188,6 +199,9 @@ class RecordingSession:
         """Closes the file with its indexes."""
         self._writer.finish()
         paths = tuple(part_path(self._first, part) for part in range(self._part + 1))
+        lost = [path.name for path in paths if not path.exists()]
+        if lost:
+            raise LostFileError(f"{self._first}: {', '.join(lost)} of it is gone")
         first, last = self._span
         return RecordingSummary(self._first, self._messages, (last - first) * 1e-9, paths)
 

@@ -10,22 +10,28 @@ from __future__ import annotations
 
 import errno
 import os
+import struct
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
 from ir_msgs_py.errors import FileRefusedError
-from ir_msgs_py.file_roots import ANYWHERE, FileRoots
-from ir_recorder.errors import PathError, WriteError
+from ir_recorder.errors import LostFileError, PathError, WriteError
 from ir_recorder.format.qos import QosOffer, offers_to_yaml
 from ir_recorder.format.schemas import SchemaLibrary
+from ir_values.files import ANYWHERE, FileRoots, check_kind, opened
+from ir_values.output_files import FileLock, beside, sync_folder
 
 CHUNK_SIZE = 256 * 1024  # bytes: about 1.5 s of a cell; what a power cut may cost
 REORDERED = 1_000_000_000  # ns: topics are polled every 20 ms; more is a clock that was set back
+_RECORD_HEAD = struct.Struct("<BQ")  # of MCAP: kind and length
 _PATH_MAX = 4000  # bytes; systems end at 4096
 _NAME_MAX = 200  # bytes of a file's name; file systems end at 255
 
@@ -59,8 +65,10 @@ class RecordingWriter:
     ) -> None:
         self.path = checked_path(path)
         self._schemas = schemas or SchemaLibrary()
-        self._file = _open(self.path, overwrite, roots)
-        self._writer = Writer(self._file, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)
+        self._file = RecordingFile(self.path, overwrite, roots)
+        self._writer = Writer(
+            self._file.stream, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD
+        )
         self._schema_ids: dict[str, int] = {}
         self._sequence: dict[int, int] = {}
         self._first: int | None = None
@@ -71,7 +79,7 @@ class RecordingWriter:
         self._finished = False
         with self._storage():
             self._writer.start(profile="ros2", library="ir_recorder")
-            self._file.flush()  # a full disk shows at once
+            self._file.settle()  # a full disk shows at once
 
     @property
     def messages(self) -> int:
@@ -81,7 +89,7 @@ class RecordingWriter:
     @property
     def size(self) -> int:
         """Bytes of the file, without the chunk that is being filled."""
-        return self._file.tell()
+        return self._file.stream.tell()
 
     def register(self, topic: str, type_name: str, offers: Sequence[QosOffer] = ()) -> int:
         """Opens a channel and returns its number; SchemaError when the type isn't installed."""
@@ -144,25 +152,29 @@ class RecordingWriter:
             self._check_there()
 
     def finish(self) -> RecordingSummary:
-        """Writes indexes and statistics and closes the file. A second call changes nothing."""
+        """Writes indexes and statistics, puts all on the disk, and closes the file.
+
+        The summary counts what the file says that it holds; WriteError where that is not what was
+        written. A second call changes nothing.
+        """
         if not self._finished:
             with self._storage():
                 self._writer.finish()  # type: ignore[no-untyped-call]
-                self._file.flush()
-                os.fsync(self._file.fileno())
+                self._file.settle()
                 self._check_there()
+                held = self._file.messages_on_disk()
+                if held != self._messages:
+                    raise OSError(errno.EIO, f"it holds {held} messages of {self._messages}")
                 self._file.close()
             self._finished = True
         first = self._last if self._first is None else self._first
         return RecordingSummary(self.path, self._messages, (self._last - first) * 1e-9)
 
     def _check_there(self) -> None:
-        """A file that was deleted takes whatever is written, and nobody will find it."""
-        try:
-            there = os.path.samestat(os.stat(self.path), os.fstat(self._file.fileno()))
-        except FileNotFoundError:
-            there = False
-        if not there:
+        """OSError for a file that was deleted or replaced: it takes whatever is written, and
+        is never found.
+        """
+        if not self._file.is_there():
             raise OSError(errno.ENOENT, "it was deleted, moved or replaced by another file")
 
     def _storage(self) -> _Storage:
@@ -172,7 +184,8 @@ class RecordingWriter:
 
     def fail(self, error: OSError) -> WriteError:
         """Closes the writer for good after the storage refused; gives the error to raise."""
-        self._failure = WriteError(
+        kind = WriteError if self._file.is_there() else LostFileError
+        self._failure = kind(
             f"{self.path}: {error.strerror or error} after {self._messages} messages; recording "
             "has ended"
         )
@@ -217,24 +230,136 @@ def checked_path(path: str | Path) -> Path:
         raise PathError(f"path {text[:80]!r}: {error}") from error
 
 
-def _open(path: Path, overwrite: bool, roots: FileRoots) -> BinaryIO:
-    """The file, below `roots`; with `overwrite` in place of a recording, never of anything else."""
+class RecordingFile:
+    """The file of a recording below `roots`, locked while it grows.
+
+    With `overwrite` it may take the place of a recording, never of anything else: it is written
+    beside, and `settle` moves it there. PathError when it can't be opened, or is being written.
+    """
+
+    def __init__(self, path: Path, overwrite: bool, roots: FileRoots) -> None:
+        self._beside = ""
+        self._replaced: BinaryIO | None = None
+        self._locks: list[FileLock] = []
+        try:
+            self._place = roots.inside(path)
+            if not self._place.parent.is_dir():
+                raise PathError(
+                    f"{path} can't be written: there is no directory {path.parent}; make it first"
+                )
+            self.stream = os.fdopen(self._opened(path, overwrite), "wb")
+        except FileRefusedError as error:
+            raise PathError(str(error)) from error
+        except FileExistsError as error:
+            raise PathError(
+                f"{path} is there already; choose another path or set overwrite"
+            ) from error
+        except BlockingIOError as error:
+            raise PathError(
+                f"{path} is being written by another recorder: stop that one, or choose another "
+                "path"
+            ) from error
+        except OSError as error:
+            raise PathError(f"{path} can't be written: {error.strerror}") from error
+
+    def _opened(self, path: Path, overwrite: bool) -> int:
+        """A descriptor of the file to write: a new one at its place, or beside an older one."""
+        while True:
+            try:
+                flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC | os.O_NOFOLLOW
+                return self._locked(os.open(self._place, flags, 0o666))
+            except FileExistsError:
+                if not overwrite:
+                    raise
+            try:
+                older = os.fdopen(opened(self._place, os.O_RDWR, path), "r+b")
+            except FileNotFoundError:
+                continue  # it went meanwhile
+            if self._may_replace(older, path):
+                break
+            older.close()
+        self._replaced = older
+        descriptor, self._beside = beside(self._place)
+        return self._locked(descriptor)
+
+    def _may_replace(self, older: BinaryIO, path: Path) -> bool:
+        """Locks an older recording; False where it isn't the one at that place any more."""
+        try:
+            check_kind(older.read(len(MCAP0_MAGIC)), MCAP0_MAGIC, path)
+            self._locked(older.fileno())
+        except BaseException:
+            older.close()
+            raise
+        if self.is_there(older.fileno()):
+            return True
+        self._locks.pop().release()
+        return False
+
+    def _locked(self, descriptor: int) -> int:
+        self._locks.append(FileLock(descriptor))
+        return descriptor
+
+    def is_there(self, descriptor: int | None = None) -> bool:
+        """Whether the place leads to the file (to that descriptor's) still."""
+        number = self.stream.fileno() if descriptor is None else descriptor
+        try:
+            return os.path.samestat(os.stat(self._place), os.fstat(number))
+        except (FileNotFoundError, NotADirectoryError):
+            return False
+
+    def settle(self) -> None:
+        """Puts what was written so far on the disk, and in place of the older recording."""
+        self.stream.flush()
+        os.fsync(self.stream.fileno())
+        if self._beside:
+            os.replace(self._beside, self._place)
+            self._beside = ""
+        sync_folder(self._place.parent)
+        if self._replaced is not None:
+            self._replaced.close()
+            self._replaced = None
+
+    def messages_on_disk(self) -> int:
+        """The number of messages that the file's statistics and its chunks' headers agree on;
+        OSError where it can't be read back.
+        """
+        return messages_on_disk(self._place)
+
+    def close(self) -> None:
+        """Closes it and gives up its lock; one that never settled is deleted."""
+        try:
+            self.stream.close()
+        finally:
+            if self._beside:
+                with suppress(OSError):
+                    os.unlink(self._beside)
+                self._beside = ""
+            if self._replaced is not None:
+                self._replaced.close()
+                self._replaced = None
+            for lock in self._locks:
+                lock.release()
+
+
+def messages_on_disk(path: Path) -> int:
+    """The number of messages of a finished recording; OSError where its chunks aren't those that
+    its indexes name.
+    """
     try:
-        roots.inside(path)
-    except FileRefusedError as error:
-        raise PathError(str(error)) from error
-    if not path.parent.is_dir():
-        raise PathError(
-            f"{path} can't be written: there is no directory {path.parent}; make it first"
-        )
-    try:
-        return roots.open_to_write(path, MCAP0_MAGIC if overwrite else None)
-    except FileRefusedError as error:
-        raise PathError(str(error)) from error
-    except FileExistsError as error:
-        raise PathError(f"{path} is there already; choose another path or set overwrite") from error
-    except OSError as error:
-        raise PathError(f"{path} can't be written: {error.strerror}") from error
+        with path.open("rb") as stream:
+            summary = make_reader(stream).get_summary()
+            for chunk in summary.chunk_indexes if summary else ():
+                stream.seek(chunk.chunk_start_offset)
+                kind, length = _RECORD_HEAD.unpack(stream.read(_RECORD_HEAD.size))
+                if kind != Opcode.CHUNK or length + _RECORD_HEAD.size != chunk.chunk_length:
+                    raise OSError(
+                        errno.EIO, f"no chunk stands at byte {chunk.chunk_start_offset} of it"
+                    )
+    except (McapError, ValueError, struct.error) as error:
+        raise OSError(errno.EIO, f"it can't be read back: {error}") from error
+    if summary is None or summary.statistics is None:
+        raise OSError(errno.EIO, "it can't be read back: it has no statistics")
+    return summary.statistics.message_count
 
 
 OpenWriter = Callable[[str, bool, FileRoots], RecordingWriter]

@@ -12,14 +12,13 @@ from ir_recorder.errors import PathError
 def write_output(path: str | Path, content: bytes, replaces: bytes, roots: FileRoots) -> Path:
     """Writes a file below `roots` and makes its folder; returns its absolute path.
 
-    A file that is there is replaced only where it starts with `replaces`. PathError when it can't
-    be written.
+    A file that is there is replaced only where it starts with `replaces`, whole or not at all.
+    PathError when it can't be written.
     """
     target = Path(path).absolute()
     try:
         roots.inside(target).parent.mkdir(parents=True, exist_ok=True)
-        with roots.open_to_write(target, replaces) as stream:
-            stream.write(content)
+        roots.write(target, content, replaces)
     except FileRefusedError as error:
         raise PathError(str(error)) from error
     except OSError as error:
