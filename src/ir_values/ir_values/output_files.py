@@ -9,7 +9,6 @@ from __future__ import annotations
 import errno
 import fcntl
 import os
-import secrets
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -80,7 +79,7 @@ def beside(place: Path) -> tuple[int, str]:
     """A new file in the folder of `place`, hidden, with the rights of a new file: its descriptor
     and name.
     """
-    name = str(place.with_name(f".{place.name[:100]}.{secrets.token_hex(6)}{_SUFFIX}"))
+    name = str(place.with_name(f".{place.name[:100]}.{os.urandom(6).hex()}{_SUFFIX}"))
     flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
     return os.open(name, flags, 0o666), name  # less what the umask takes
 
