@@ -74,8 +74,9 @@ class Columns:
         out = np.full(self.count if width is None else (self.count, width), np.nan)
         for rows, block, layout in self._groups:
             leaf = layout.leaves.get(path)
-            if leaf is None or not leaf.dtype:
+            if leaf is None:
                 continue
+            _check_kind(leaf, numeric=True)
             values = _values(block, leaf)
             if width is None:
                 out[rows] = values[:, 0] if leaf.count else np.nan
@@ -89,8 +90,12 @@ class Columns:
         out = np.zeros(self.count, dtype=np.int64)
         for rows, block, layout in self._groups:
             leaf = layout.leaves.get(path)
-            if leaf is not None and leaf.dtype and leaf.count:
-                out[rows] = _values(block, leaf)[:, 0]
+            if leaf is not None and leaf.count:
+                _check_kind(leaf, numeric=True)
+                values = _values(block, leaf)[:, 0]
+                if values.dtype.kind == "f":
+                    raise ReadError(f"its field {path} is {leaf.dtype}, must be whole numbers")
+                out[rows] = values
         return out
 
     def texts(self, path: str) -> list[str]:
@@ -98,16 +103,51 @@ class Columns:
         out = [""] * self.count
         for rows, block, layout in self._groups:
             leaf = layout.leaves.get(path)
-            if leaf is None or leaf.dtype:
+            if leaf is None:
                 continue
+            _check_kind(leaf, numeric=False)
             part = np.ascontiguousarray(block[:, leaf.offset : leaf.offset + leaf.count])
             for row, data in zip(rows, part, strict=True):
                 out[row] = data.tobytes().rstrip(b"\0").decode(errors="replace")
         return out
 
+    def require(self, *paths: str) -> None:
+        """ReadError where a message has no such field: its definition is another type's."""
+        for path in paths:
+            if any(path not in layout.leaves for _, _, layout in self._groups):
+                raise ReadError(f"its definition has no field {path}")
+
+    def lengths(self, path: str) -> set[int]:
+        """How many values a field has, over all messages."""
+        leaves = (layout.leaves.get(path) for _, _, layout in self._groups)
+        return {leaf.count if leaf is not None else 0 for leaf in leaves}
+
+    def is_constant(self, path: str) -> bool:
+        """Whether a field has the same bytes in all messages."""
+        first: bytes | None = None
+        for _, block, layout in self._groups:
+            leaf = layout.leaves.get(path)
+            if leaf is None:
+                return False
+            size = np.dtype(leaf.dtype or "u1").itemsize * leaf.count
+            part = block[:, leaf.offset : leaf.offset + size]
+            if not (part == part[0]).all():
+                return False
+            own = part[0].tobytes()
+            if first not in (None, own):
+                return False
+            first = own
+        return True
+
     def stamps(self, path: str = "header.stamp") -> IntArray:
         """A time field as (N,) nanoseconds."""
         return self.integers(f"{path}.sec") * 1_000_000_000 + self.integers(f"{path}.nanosec")
+
+
+def _check_kind(leaf: _Leaf, numeric: bool) -> None:
+    if bool(leaf.dtype) is not numeric:
+        found, wanted = ("numbers", "a text") if leaf.dtype else ("a text", "numbers")
+        raise ReadError(f"its field {leaf.path} is {found}, must be {wanted}")
 
 
 def _values(block: NDArray[np.uint8], leaf: _Leaf) -> NDArray[np.generic]:

@@ -8,7 +8,8 @@ from io import BytesIO
 
 import lz4.frame
 import zstandard
-from mcap.records import Chunk, McapRecord
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, McapRecord, Metadata, Schema
 from mcap.stream_reader import breakup_chunk
 
 from ir_recorder.errors import ReadError
@@ -16,7 +17,10 @@ from ir_recorder.errors import ReadError
 _STEP = 1 << 20  # bytes that are decompressed at a time
 _HEAD = 9  # bytes of a record's kind and length
 MOST_RECORDS = 500_000  # in one chunk; one of 4 MB of the smallest messages has 100,000
+MOST_CHANNELS = 10_000  # of a recording, and as many schemas; a cell has 50
+MOST_RECORD = 1 << 20  # bytes of a record but chunks, messages and attachments; a schema has 20 kB
 _OVERHEAD = 120  # bytes of memory that a message takes beside its own
+_MAP_FACTOR = 30  # bytes of memory for a byte of a record that holds maps of short texts
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,7 @@ class ChunkReader:
 
     def __init__(self, limits: ReadLimits) -> None:
         self._limits = limits
-        self._used = self._given = self._claimed = 0
+        self._used = self._given = self._claimed = self._channels = 0
 
     def records(self, chunk: Chunk) -> list[McapRecord]:
         """What is in the chunk; its check sum is compared."""
@@ -63,7 +67,26 @@ class ChunkReader:
         _check_number(data)
         records = breakup_chunk(replace(chunk, compression="", data=data), validate_crc=True)
         self.count(_OVERHEAD * len(records))
+        for record in records:
+            self.describe(record)
         return records
+
+    def describe(self, record: McapRecord) -> None:
+        """Counts what isn't a message: schemas, channels, and facts with their maps of texts."""
+        if isinstance(record, Channel):
+            self._channels += 1
+            size = sum(len(key) + len(value) for key, value in record.metadata.items())
+            self.count(_MAP_FACTOR * (size + len(record.topic) + 8 * len(record.metadata)))
+        elif isinstance(record, Schema):
+            self._channels += 1
+            self.count(2 * len(record.data))
+        elif isinstance(record, Metadata):
+            size = sum(len(key) + len(value) for key, value in record.metadata.items())
+            self.count(_MAP_FACTOR * (size + 8 * len(record.metadata)))
+        if self._channels > 2 * MOST_CHANNELS:
+            raise TooLargeError(
+                f"more than {MOST_CHANNELS:,} channels and their schemas: the rest is left out"
+            )
 
     def count(self, size: int) -> None:
         """Adds to the memory in use."""
@@ -79,12 +102,17 @@ class TooLargeError(ReadError):
 
 
 def _check_number(data: bytes) -> None:
-    """ReadError for a chunk of so many records that making them takes minutes and gigabytes."""
+    """ReadError for a chunk of so many records that making them takes minutes and gigabytes, or
+    with a record of maps and texts that is too long.
+    """
     at = 0
     for _ in range(MOST_RECORDS):
         if at + _HEAD > len(data):
             return
-        at += _HEAD + int.from_bytes(data[at + 1 : at + _HEAD], "little")
+        length = int.from_bytes(data[at + 1 : at + _HEAD], "little")
+        if data[at] != Opcode.MESSAGE and length > MOST_RECORD:
+            raise ReadError(f"it has a record of {_mib(length)} that is no message")
+        at += _HEAD + length
     raise ReadError(f"it has more than {MOST_RECORDS:,} records")
 
 

@@ -10,6 +10,7 @@ from typing import BinaryIO
 
 import numpy as np
 from mcap.exceptions import EndOfFile, InvalidMagic
+from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Footer, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 
@@ -17,7 +18,7 @@ from ir_msgs_py import names
 from ir_recorder.errors import ReadError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import part_path, repeated_messages
-from ir_recorder.reading.limits import ChunkReader, ReadLimits, TooLargeError
+from ir_recorder.reading.limits import MOST_RECORD, ChunkReader, ReadLimits, TooLargeError
 from ir_values.arrays import IntArray
 from ir_values.errors import FileRefusedError, one_line
 from ir_values.files import ANYWHERE, FileRoots
@@ -147,6 +148,20 @@ def _joined(channels: list[RawChannel]) -> tuple[RawChannel, ...]:
 LATEST = 2**63 - 1  # ns: the last time that an int64 holds
 
 
+_HEAD = 9  # bytes of a record's kind and length
+_INDEXES = frozenset(
+    (
+        Opcode.MESSAGE_INDEX,
+        Opcode.CHUNK_INDEX,
+        Opcode.ATTACHMENT_INDEX,
+        Opcode.METADATA_INDEX,
+        Opcode.STATISTICS,
+        Opcode.SUMMARY_OFFSET,
+    )
+)
+_LARGE = frozenset((Opcode.CHUNK, Opcode.MESSAGE, Opcode.ATTACHMENT))
+
+
 class _Collector:
     """Sorts records into channels; those of a lost chunk are missed by number only."""
 
@@ -245,9 +260,12 @@ def _collect(stream: BinaryIO, chunks: ChunkReader) -> _Collector:
     size = os.fstat(stream.fileno()).st_size  # no record is longer than its file
     records = StreamReader(stream, emit_chunks=True, record_size_limit=size).records
     while True:
-        offset = stream.tell()
         try:
+            offset = _skip_indexes(stream)
             record = next(records)
+        except ReadError as error:
+            found.problems.append(str(error))
+            return found
         except StopIteration:
             return found
         except InvalidMagic:
@@ -266,10 +284,36 @@ def _collect(stream: BinaryIO, chunks: ChunkReader) -> _Collector:
                 _open_chunk(record, offset, found, chunks)
             else:
                 chunks.count(_size(record))
+                chunks.describe(record)
                 found.add(record)
         except TooLargeError as error:
             found.problems.append(str(error))
             return found
+
+
+def _skip_indexes(stream: BinaryIO) -> int:
+    """Goes on to the next record that is read; its place [byte]. Indexes are for readers that
+    seek.
+
+    ReadError for a record of maps and texts that is too long to be one.
+    """
+    while True:
+        offset = stream.tell()
+        head = stream.read(_HEAD) if offset else b""
+        if len(head) < _HEAD:
+            stream.seek(offset)
+            return offset
+        length = int.from_bytes(head[1:], "little")
+        if head[0] in _INDEXES:
+            stream.seek(length, os.SEEK_CUR)
+            continue
+        if head[0] not in _LARGE and length > MOST_RECORD:
+            raise ReadError(
+                f"record at byte {offset} claims {length} bytes, at most {MOST_RECORD:,} are read "
+                "of its kind"
+            )
+        stream.seek(offset)
+        return offset
 
 
 def _size(record: McapRecord) -> int:

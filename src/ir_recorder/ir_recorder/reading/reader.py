@@ -58,6 +58,8 @@ def contacts(messages: Iterable[tuple[float, Any]]) -> Iterator[TextEvent]:
 _T = TypeVar("_T")
 _OF_A_RUN = (names.JOINT_STATES, names.POWER_STATE, names.CONTROLLER_STATE, names.PROGRAM_STATE)
 _CALLS = f"{names.PLANNER}/{names.CALLS}"
+# a message lacks a field, or has another kind of value in it
+_NO_SENSE = (AttributeError, TypeError, ValueError, OverflowError, IndexError, IrError)
 _WARN = 30  # rcl_interfaces/Log
 # action_msgs/GoalStatus
 _OUTCOMES = {
@@ -70,6 +72,42 @@ _OUTCOMES = {
 }
 _IN_BITS = tuple(bit.name for bit in fields(PlcInputs) if bit.type == "bool")
 _OUT_BITS = tuple(bit.name for bit in fields(PlcOutputs) if bit.type == "bool")
+
+
+TYPES = {
+    names.JOINT_STATES: "sensor_msgs/msg/JointState",
+    names.POWER_STATE: "ir_msgs/msg/PowerState",
+    names.CONTROLLER_STATE: "ir_msgs/msg/ControllerState",
+    names.PLC_INPUTS: "ir_msgs/msg/PlcInputs",
+    names.PLC_INPUTS_IN_FORCE: "ir_msgs/msg/PlcInputs",
+    names.PLC_OUTPUTS: "ir_msgs/msg/PlcOutputs",
+    names.PROGRAM_STATE: "ir_msgs/msg/ProgramState",
+    names.PROGRAM_SAVINGS: "ir_msgs/msg/ProgramSavings",
+    names.MACHINE_STATES: "ir_msgs/msg/MachineStates",
+    names.CONTACTS: "ir_msgs/msg/Contact",
+    names.SIGNALS: "ir_msgs/msg/Signal",
+    names.MACHINE_SIGNALS: "ir_msgs/msg/Signal",
+    names.ROBOT_DESCRIPTION: "std_msgs/msg/String",
+    names.PLANT: "std_msgs/msg/String",
+    names.DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
+    names.ROSOUT: "rcl_interfaces/msg/Log",
+    _CALLS: "ir_msgs/msg/RecordedCall",
+    **{
+        f"{action}/_action/status": "action_msgs/msg/GoalStatusArray"
+        for action in (names.PLAN, names.RUN_PROGRAM)
+    },
+}
+"""Types of the topics that are read; anything else on them is named and left out."""
+_STAMP = ("header.stamp.sec", "header.stamp.nanosec")
+REQUIRED = {
+    names.JOINT_STATES: (*_STAMP, "position", "velocity", "effort"),
+    names.POWER_STATE: (*_STAMP, "mode", "target_mode", "power", "energy", "joint_power"),
+    names.CONTROLLER_STATE: (*_STAMP, "trajectory_id", "path_time", "speed_scaling"),
+    names.PLC_INPUTS: ("ab", "hib", "emergency_stop"),
+    names.PLC_INPUTS_IN_FORCE: ("ab", "hib", "emergency_stop"),
+    names.PLC_OUTPUTS: (*_STAMP, "drives_ready"),
+}
+"""Fields that every version of a type has: a definition without them is another type's."""
 
 
 def read_recording(
@@ -122,20 +160,18 @@ class _Reader:
             events=tuple(self._events()),
             loads=tuple(self._loads()),
             signals=tuple(self._signals()),
-            machines=tuple(machine_states(self._messages(names.MACHINE_STATES))),
-            contacts=tuple(contacts(self._messages(names.CONTACTS))),
+            machines=tuple(self._machines()),
+            contacts=tuple(self._contacts()),
             warnings=tuple(self._warnings()),
             goals=tuple(self._goals()),
-            savings=tuple(
-                SavingsEvent(t, savings_from(m)) for t, m in self._messages(names.PROGRAM_SAVINGS)
-            ),
+            savings=tuple(self._savings()),
             hardware=self._hardware(),
             cell_yaml=self._attached(contents.CELL),
             urdf=self._attached(contents.URDF) or self._text(names.ROBOT_DESCRIPTION),
             power_yaml=self._attached(contents.POWER),
             plant_yaml=self._text(names.PLANT),
             facts=raw.facts,
-            problems=tuple(map(one_line, self._problems)),
+            problems=tuple(dict.fromkeys(map(one_line, self._problems))),
         )
         found = with_plans(found, self._channel(_CALLS))
         if found.joints is not None or found.power is not None or found.events:
@@ -146,8 +182,18 @@ class _Reader:
         return replace(found, planned=planned, problems=kept) if planned else found
 
     def _channel(self, name: str) -> RawChannel | None:
+        """The channel of a topic, where its messages are of the type that the topic has."""
         channel = self._raw.channel(name if name.startswith("/") else self._prefix + name)
-        return channel if channel is not None and channel.message_encoding == "cdr" else None
+        if channel is None or channel.message_encoding != "cdr":
+            return None
+        wanted = TYPES.get(name, channel.type)
+        if channel.type == wanted and channel.schema_encoding == "ros2msg":
+            return channel
+        what = channel.type if channel.type != wanted else f"{wanted} ({channel.schema_encoding})"
+        sentence = f"{channel.topic} is of type {what}, must be {wanted}: left out"
+        if sentence not in self._problems:
+            self._problems.append(sentence)
+        return None
 
     def _series(
         self, name: str, build: Callable[[Columns, RawChannel], _T], needed: bool = True
@@ -158,8 +204,10 @@ class _Reader:
                 self._problems.append(f"{self._prefix}{name} isn't in the recording")
             return None
         try:
-            return build(Columns(channel.messages, channel.type, channel.schema_text), channel)
-        except ReadError as error:
+            columns = Columns(channel.messages, channel.type, channel.schema_text)
+            columns.require(*(REQUIRED.get(name) or ()))
+            return build(columns, channel)
+        except (ReadError, IrError) as error:
             self._problems.append(f"{channel.topic} can't be read: {error}")
             return None
 
@@ -170,9 +218,15 @@ class _Reader:
         first = next(self._decoded(channel), None)
         if first is None:
             raise ReadError("no message can be decoded")
-        joint_names = tuple(first[1].name)
-        stamps = columns.stamps()
+        joint_names = tuple(map(str, first[1].name))
         n = len(joint_names)
+        if columns.lengths("position") != {n}:
+            raise ReadError(f"not every message has the {n} positions of the first")
+        if not all(columns.is_constant(f"name[{k}]") for k in range(n)):
+            raise ReadError("its messages name different joints, or in another order")
+        if not np.isfinite(columns.numbers("position", n)).all():
+            raise ReadError("a position is not a finite number")
+        stamps = columns.stamps()
         return JointSeries(
             joint_names,
             stamps,
@@ -229,72 +283,88 @@ class _Reader:
         return in_force or self._series(names.PLC_INPUTS, bits, needed=False)
 
     def _events(self) -> Iterator[ProgramEvent]:
-        broken = 0
-        for time, message in self._messages(names.PROGRAM_STATE, needed=True):
-            try:
-                movement = movement_from(message.movement)
-            except IrError as error:
-                broken += 1
-                if broken == 1:
-                    self._problems.append(
-                        f"a program event at {time:.2f} s makes no sense: {error}"
-                    )
-                continue
+        def of(time: float, message: Any) -> Iterator[ProgramEvent]:
             yield ProgramEvent(
                 self._stamp(message.header.stamp),
-                message.program_id,
+                str(message.program_id),
                 int(message.index),
                 int(message.total),
-                message.event,
-                movement,
-                message.note,
+                str(message.event),
+                movement_from(message.movement),
+                str(message.note),
             )
+
+        return self._values(names.PROGRAM_STATE, of, needed=True)
 
     def _loads(self) -> Iterator[TextEvent]:
         """The attached load by the driver's diagnostics: key "load"."""
-        for _, message in self._messages(names.DIAGNOSTICS):
+
+        def of(time: float, message: Any) -> Iterator[TextEvent]:
             for status in message.status:
                 if not self._of_driver(status.name):
                     continue
                 for pair in status.values:
                     if pair.key == "load":
-                        yield TextEvent(self._stamp(message.header.stamp), "load", pair.value)
+                        yield TextEvent(self._stamp(message.header.stamp), "load", str(pair.value))
+
+        return self._values(names.DIAGNOSTICS, of)
 
     def _signals(self) -> Iterator[TextEvent]:
+        def of(time: float, message: Any) -> Iterator[TextEvent]:
+            yield TextEvent(time, str(message.name), "1" if message.value else "0")
+
         for name in (names.SIGNALS, names.MACHINE_SIGNALS):
-            for time, message in self._messages(name):
-                yield TextEvent(time, message.name, "1" if message.value else "0")
+            yield from self._values(name, of)
 
     def _warnings(self) -> Iterator[TextEvent]:
-        for time, message in self._messages(names.ROSOUT):
+        def of(time: float, message: Any) -> Iterator[TextEvent]:
             if message.level >= _WARN and owns_logger(self._namespace, message.name):
-                yield TextEvent(time, message.name, message.msg)
-        for contact in contacts(self._messages(names.CONTACTS)):
+                yield TextEvent(time, str(message.name), str(message.msg))
+
+        yield from self._values(names.ROSOUT, of)
+        for contact in self._contacts():
             yield TextEvent(contact.time, names.SIM_DRIVER, contact.text)
+
+    def _contacts(self) -> Iterator[TextEvent]:
+        return self._values(names.CONTACTS, lambda time, message: contacts([(time, message)]))
+
+    def _machines(self) -> Iterator[TextEvent]:
+        return self._values(
+            names.MACHINE_STATES, lambda time, message: machine_states([(time, message)])
+        )
+
+    def _savings(self) -> Iterator[SavingsEvent]:
+        def of(time: float, message: Any) -> Iterator[SavingsEvent]:
+            yield SavingsEvent(time, savings_from(message))
+
+        return self._values(names.PROGRAM_SAVINGS, of)
 
     def _goals(self) -> Iterator[GoalEnd]:
         """How every goal of planner and runner ended, by the status of their actions."""
+
+        def of(time: float, message: Any) -> Iterator[tuple[bytes, int]]:
+            for goal in message.status_list:
+                yield bytes(goal.goal_info.goal_id.uuid), int(goal.status)
+
         for action in (names.PLAN, names.RUN_PROGRAM):
-            last: dict[bytes, int] = {}
-            for _, message in self._messages(f"{action}/_action/status"):
-                for goal in message.status_list:
-                    last[bytes(goal.goal_info.goal_id.uuid)] = int(goal.status)
+            last = dict(self._values(f"{action}/_action/status", of))
             for status in last.values():
                 yield GoalEnd(action, status, _OUTCOMES.get(status, f"status {status}"))
 
     def _hardware(self) -> str:
-        for _, message in self._messages(names.DIAGNOSTICS):
+        def of(time: float, message: Any) -> Iterator[str]:
             for status in message.status:
                 if self._of_driver(status.name) and status.hardware_id:
-                    return str(status.hardware_id)
-        return ""
+                    yield str(status.hardware_id)
+
+        return next(self._values(names.DIAGNOSTICS, of), "")
 
     def _of_driver(self, name: str) -> bool:
         return names.SIM_DRIVER in name and owns_diagnostic(self._namespace, name)
 
     def _text(self, name: str) -> str:
         """The first text of a topic."""
-        return next((str(message.data) for _, message in self._messages(name)), "")
+        return next(self._values(name, lambda time, message: (str(message.data),)), "")
 
     def _messages(self, name: str, needed: bool = False) -> Iterator[tuple[float, Any]]:
         channel = self._channel(name)
@@ -326,6 +396,23 @@ class _Reader:
             self._problems.append(
                 f"{channel.topic}: {failed} of {len(channel.messages)} messages can't be decoded"
             )
+
+    def _values(
+        self, name: str, convert: Callable[[float, Any], Iterable[_T]], needed: bool = False
+    ) -> Iterator[_T]:
+        """Values of a topic's messages; those that lack a field or make no sense are counted and
+        named.
+        """
+        failed = 0
+        why = ""
+        for time, message in self._messages(name, needed):
+            try:
+                yield from tuple(convert(time, message))
+            except _NO_SENSE as error:
+                failed += 1
+                why = why or f"at {time:.2f} s: {error}"
+        if failed:
+            self._problems.append(f"{name}: {failed} messages make no sense, the first {why}")
 
     def _stamp(self, stamp: Any) -> float:
         return float((stamp.sec * 1_000_000_000 + stamp.nanosec - self._start) * 1e-9)
