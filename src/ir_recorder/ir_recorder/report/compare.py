@@ -86,7 +86,7 @@ def _problems(analyses: Sequence[Analysis], names: Sequence[str]) -> str:
         items.append(
             "<li>These recordings are of different plants: not only the programs differ.</li>"
         )
-    return f'<div class="problems"><b>Mind</b><ul>{"".join(items)}</ul></div>' if items else ""
+    return f'<div class="problems"><b>Notes</b><ul>{"".join(items)}</ul></div>' if items else ""
 
 
 def _figures(compared: Sequence[Compared], names: Sequence[str], costs: Costs) -> str:

@@ -494,7 +494,7 @@ def _problems(left_out: Sequence[str]) -> str:
     if not left_out:
         return ""
     items = "".join(f"<li>{text(sentence)}</li>" for sentence in left_out)
-    return f'<div class="problems"><b>Mind</b><ul>{items}</ul></div>'
+    return f'<div class="problems"><b>Notes</b><ul>{items}</ul></div>'
 
 
 def _assumptions(costs: Costs) -> str:

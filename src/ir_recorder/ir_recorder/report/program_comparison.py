@@ -350,7 +350,7 @@ def _problems(found: BeforeAfter) -> str:
     if not items:
         return ""
     listed = "".join(f"<li>{text(item)}</li>" for item in items)
-    return f'<div class="problems"><b>Mind</b><ul>{listed}</ul></div>'
+    return f'<div class="problems"><b>Notes</b><ul>{listed}</ul></div>'
 
 
 def _point(side: Side) -> Point:
