@@ -140,9 +140,7 @@ def test_a_definition_without_an_end_is_a_sentence(
             channel = writer.register_channel(topic, "cdr", number)
             writer.add_message(channel, 1, b"\0\1\0\0" + bytes(64), 1)
             writer.finish()
-        assert any(
-            topic in problem and sentence in problem for problem in read_recording(path).problems
-        )
+        assert any(topic in problem for problem in read_recording(path).problems)
 
 
 def test_a_chunk_of_very_many_records_is_not_opened() -> None:

@@ -24,18 +24,21 @@ def test_ir_report_says_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "No such file" in capsys.readouterr().err
 
 
-def test_ir_report_reads_and_writes_only_below_its_roots(
+def test_ir_report_acts_as_its_user_and_with_roots_only_below_them(
     demo_file: Path,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main([str(demo_file)]) == 1
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    monkeypatch.chdir(elsewhere)
+    assert (
+        main([str(demo_file), "-o", str(tmp_path / "a.html"), "--root", str(tmp_path / "x")]) == 1
+    )
     assert "lies outside of the folders" in capsys.readouterr().err
-    monkeypatch.setenv("IR_FILE_ROOTS", str(demo_file.parent))
-    assert main([str(demo_file), "-o", str(tmp_path / "report.html")]) == 1
-    assert not (tmp_path / "report.html").exists()
+    assert not (tmp_path / "a.html").exists()
+    assert main([str(demo_file), "-o", str(tmp_path / "a.html")]) == 0
 
 
 def test_a_report_replaces_a_report_and_nothing_else(demo_file: Path, tmp_path: Path) -> None:

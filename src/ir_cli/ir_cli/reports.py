@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from ir_msgs_py.file_roots import FileRoots
-from ir_recorder.arguments import add_roots
+from ir_recorder.arguments import add_roots, roots_of
 from ir_recorder.report.costs import Costs, read_costs
 from ir_recorder.report.fleet import read_members, write_fleet, write_fleet_table
 from ir_recorder.report_main import add_arguments, run
@@ -44,7 +43,7 @@ def add_fleet(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
 
 def run_fleet(arguments: argparse.Namespace) -> int:
     """Write the page; files that can't be used are named and left out."""
-    roots = FileRoots.of(arguments.roots)
+    roots = roots_of(arguments.roots)
     costs = read_costs(arguments.costs, roots) if arguments.costs else Costs()
     left_out: list[str] = []
     live = sys.stderr.isatty()

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 
-from ir_values.files import ENVIRONMENT
+from ir_values.files import ANYWHERE, FileRoots
 
 
 def add_roots(parser: argparse.ArgumentParser) -> None:
     """Adds --root: the folders below which files are read and written."""
-    where = (
-        f"folder below which files may be (repeatable; else {ENVIRONMENT}, else the working folder)"
-    )
+    where = "folder below which files must be (repeatable; none: wherever you may read and write)"
     parser.add_argument(
         "--root", action="append", default=[], dest="roots", metavar="DIR", help=where
     )
+
+
+def roots_of(folders: Sequence[str]) -> FileRoots:
+    """Files that a local command may touch: its user's, anywhere; with --root below these
+    folders only. Roots by default are for nodes, whose requests come from elsewhere.
+    """
+    return FileRoots.of(folders) if folders else ANYWHERE
 
 
 def record_parser() -> argparse.ArgumentParser:

@@ -12,7 +12,7 @@ from pathlib import Path
 from ir_description import DescriptionError, PowerParameters, load_power_parameters
 from ir_recorder.analysis import Analysis, analyse, findings
 from ir_recorder.analysis.meter import with_meter
-from ir_recorder.arguments import add_roots
+from ir_recorder.arguments import add_roots, roots_of
 from ir_recorder.errors import ReadError, RecorderError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import is_further_part
@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Writes the page and prints its path; RecorderError when nothing can be read or written."""
-    roots = FileRoots.of(options.roots)
+    roots = roots_of(options.roots)
     costs = read_costs(options.costs, roots) if options.costs else None
     analyses = _analyses(options, roots)
     compared = [(analysis, findings(analysis)) for analysis in analyses]

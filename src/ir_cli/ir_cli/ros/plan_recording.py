@@ -15,7 +15,7 @@ from ir_description import cell_to_yaml, robot_urdf
 from ir_msgs.msg import RecordedCall
 from ir_msgs.srv import PlanProgram
 from ir_msgs_py import names
-from ir_msgs_py.file_roots import FileRoots
+from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.ros.conversions import status_to_msg, trajectory_to_msg
 from ir_msgs_py.ros.plan_conversions import plan_options_to_msg, program_savings_to_msg
@@ -58,7 +58,7 @@ def write_plan(
 
     PathError or WriteError where that can't be.
     """
-    writer = RecordingWriter(path, overwrite=overwrite, roots=roots or FileRoots.of())
+    writer = RecordingWriter(path, overwrite=overwrite, roots=roots or ANYWHERE)
     now = time.time_ns()
     cell = planner.cell
     facts = {contents.PLAN: "never driven"}

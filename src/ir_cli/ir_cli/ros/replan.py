@@ -28,7 +28,6 @@ from ir_description.files import power_from_yaml
 from ir_msgs.msg import RecordedCall
 from ir_msgs_py import names
 from ir_msgs_py.errors import InvalidValueError, MsgsError
-from ir_msgs_py.file_roots import FileRoots
 from ir_msgs_py.ros.conversions import configuration_from_msg
 from ir_msgs_py.ros.messages import interface_type
 from ir_msgs_py.ros.plan_conversions import machine_states_from_msg
@@ -38,7 +37,7 @@ from ir_msgs_py.status import StatusCode
 from ir_planner import Planner, PlannerSettings
 from ir_planner.node.inputs import MEASURED, LastState
 from ir_planner.node.requests import Requests
-from ir_recorder.arguments import add_roots
+from ir_recorder.arguments import add_roots, roots_of
 from ir_recorder.errors import ReadError
 from ir_recorder.format import contents
 from ir_recorder.reading.mcap_file import RawRecording, chosen_namespace, read_raw
@@ -405,7 +404,7 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run_replan(arguments: argparse.Namespace) -> int:
     """Plan again and print; exit code 0 where something was compared and all of it is equal."""
-    raw = read_raw(arguments.file, FileRoots.of(arguments.roots))
+    raw = read_raw(arguments.file, roots_of(arguments.roots))
     for problem in raw.problems:
         sys.stderr.write(f"{arguments.file}: {problem}\n")
     recorded = RecordedPlanner(raw, arguments.namespace)

@@ -24,7 +24,7 @@ from ir_msgs_py.ros.node_process import CommandLineError, own_words, run_node
 from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.ros.serving import BoundedService, answered
 from ir_msgs_py.status import Status, StatusCode
-from ir_recorder.arguments import record_parser
+from ir_recorder.arguments import record_parser, roots_of
 from ir_recorder.errors import (
     LostFileError,
     NothingRecordedError,
@@ -469,7 +469,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         recorders.append(node)
         try:
             if options.path:
-                roots = FileRoots.of(options.roots) if options.roots else None
+                roots = roots_of(options.roots)
                 split = Split(options.split_size, options.split_duration)
                 node.start(
                     options.path, options.overwrite, options.topics, options.cell, roots, split

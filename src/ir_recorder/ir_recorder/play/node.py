@@ -30,14 +30,13 @@ from ir_msgs_py.ros.messages import interface_type
 from ir_msgs_py.ros.node_process import CommandLineError, own_words, run_node
 from ir_msgs_py.ros.serving import BoundedService, answered
 from ir_msgs_py.status import Status, StatusCode
-from ir_recorder.arguments import play_parser
+from ir_recorder.arguments import play_parser, roots_of
 from ir_recorder.errors import RecorderError, SchemaError
 from ir_recorder.format.qos import offers_from_yaml
 from ir_recorder.format.schemas import SchemaLibrary
 from ir_recorder.play.playback import DueMessage, Player, Playhead, PlaySettings, is_command
 from ir_recorder.reading.mcap_file import RawChannel, RawRecording, read_raw
 from ir_values.errors import IrError, UnknownTypeError
-from ir_values.files import FileRoots
 
 # Keys of a terminal that control playback: space pauses, arrows seek and change the rate.
 
@@ -274,7 +273,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options = play_parser().parse_args(own_words("ir-play", everything))
         settings = PlaySettings(options.rate, options.loop, tuple(options.topics))
-        recording = read_raw(options.file, FileRoots.of(options.roots))
+        recording = read_raw(options.file, roots_of(options.roots))
     except (CommandLineError, RecorderError, IrError) as error:
         sys.stderr.write(f"ir-play: {error}\n")
         return 1
