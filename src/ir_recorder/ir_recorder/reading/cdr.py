@@ -54,6 +54,8 @@ class Columns:
         self.count = len(messages)
         self._groups: list[tuple[IntArray, NDArray[np.uint8], _Layout]] = []
         sizes = np.array([len(message) for message in messages], dtype=np.int64)
+        if self.count and sizes.min() < _HEADER:
+            raise ReadError(f"a message has {sizes.min()} bytes, CDR begins with {_HEADER}")
         for size in np.unique(sizes):
             open_rows = np.flatnonzero(sizes == size)
             block = np.frombuffer(
