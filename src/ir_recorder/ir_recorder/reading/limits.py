@@ -19,6 +19,7 @@ _HEAD = 9  # bytes of a record's kind and length
 MOST_RECORDS = 500_000  # in one chunk; one of 4 MB of the smallest messages has 100,000
 MOST_CHANNELS = 10_000  # of a recording, and as many schemas; a cell has 50
 MOST_RECORD = 1 << 20  # bytes of a record but chunks, messages and attachments; a schema has 20 kB
+MOST_CHANNEL = 1 << 16  # bytes of a channel; one of this project has 500
 _OVERHEAD = 120  # bytes of memory that a message takes beside its own
 _MAP_FACTOR = 30  # bytes of memory for a byte of a record that holds maps of short texts
 
@@ -101,6 +102,11 @@ class TooLargeError(ReadError):
     """The recording as a whole exceeds its bound; what was read so far stays."""
 
 
+def most_of(kind: int) -> int:
+    """Bytes that a record may have which is no chunk, message or attachment."""
+    return MOST_CHANNEL if kind == Opcode.CHANNEL else MOST_RECORD
+
+
 def _check_number(data: bytes) -> None:
     """ReadError for a chunk of so many records that making them takes minutes and gigabytes, or
     with a record of maps and texts that is too long.
@@ -110,8 +116,8 @@ def _check_number(data: bytes) -> None:
         if at + _HEAD > len(data):
             return
         length = int.from_bytes(data[at + 1 : at + _HEAD], "little")
-        if data[at] != Opcode.MESSAGE and length > MOST_RECORD:
-            raise ReadError(f"it has a record of {_mib(length)} that is no message")
+        if data[at] != Opcode.MESSAGE and length > most_of(data[at]):
+            raise ReadError(f"it has a record of {length:,} bytes that is no message")
         at += _HEAD + length
     raise ReadError(f"it has more than {MOST_RECORDS:,} records")
 

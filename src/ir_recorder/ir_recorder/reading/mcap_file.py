@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,7 +19,7 @@ from ir_msgs_py import names
 from ir_recorder.errors import ReadError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import part_path, repeated_messages
-from ir_recorder.reading.limits import MOST_RECORD, ChunkReader, ReadLimits, TooLargeError
+from ir_recorder.reading.limits import ChunkReader, ReadLimits, TooLargeError, most_of
 from ir_values.arrays import IntArray
 from ir_values.errors import FileRefusedError, one_line
 from ir_values.files import ANYWHERE, FileRoots
@@ -148,6 +149,8 @@ def _joined(channels: list[RawChannel]) -> tuple[RawChannel, ...]:
 LATEST = 2**63 - 1  # ns: the last time that an int64 holds
 
 
+_CHECK_SUM = 4  # bytes
+MOST_FACTS = 10_000  # a recording of the cell has 20
 _HEAD = 9  # bytes of a record's kind and length
 _INDEXES = frozenset(
     (
@@ -174,6 +177,7 @@ class _Collector:
         self.facts: list[tuple[str, str]] = []
         self.problems: list[str] = []
         self.orphans = 0
+        self.facts_left_out = 0
         self.timeless = 0
         self.complete = False
 
@@ -195,7 +199,9 @@ class _Collector:
         elif isinstance(record, Attachment):
             self.attachments.append(RawAttachment(record.name, record.media_type, record.data))
         elif isinstance(record, Metadata):
-            self.facts.extend(record.metadata.items())
+            taken = list(record.metadata.items())[: MOST_FACTS - len(self.facts)]
+            self.facts.extend(taken)
+            self.facts_left_out += len(record.metadata) - len(taken)
         elif isinstance(record, Footer):
             self.complete = True
 
@@ -241,6 +247,10 @@ def _read_file(path: Path, roots: FileRoots, chunks: ChunkReader) -> RawRecordin
     messages = sum(len(data) for data in found.data.values())
     if found.orphans:
         found.problems.append(f"{found.orphans} messages belong to channels that were lost")
+    if found.facts_left_out:
+        found.problems.append(
+            f"{found.facts_left_out} facts of more than {MOST_FACTS:,} are left out"
+        )
     if found.timeless:
         found.problems.append(f"{found.timeless} messages have a time after the year 2260")
     if not found.complete:
@@ -261,7 +271,7 @@ def _collect(stream: BinaryIO, chunks: ChunkReader) -> _Collector:
     records = StreamReader(stream, emit_chunks=True, record_size_limit=size).records
     while True:
         try:
-            offset = _skip_indexes(stream)
+            offset = _next_record(stream, found.problems)
             record = next(records)
         except ReadError as error:
             found.problems.append(str(error))
@@ -291,9 +301,9 @@ def _collect(stream: BinaryIO, chunks: ChunkReader) -> _Collector:
             return found
 
 
-def _skip_indexes(stream: BinaryIO) -> int:
+def _next_record(stream: BinaryIO, problems: list[str]) -> int:
     """Goes on to the next record that is read; its place [byte]. Indexes are for readers that
-    seek.
+    seek, and an attachment whose check sum is another is named and left out.
 
     ReadError for a record of maps and texts that is too long to be one.
     """
@@ -307,13 +317,24 @@ def _skip_indexes(stream: BinaryIO) -> int:
         if head[0] in _INDEXES:
             stream.seek(length, os.SEEK_CUR)
             continue
-        if head[0] not in _LARGE and length > MOST_RECORD:
+        if head[0] == Opcode.ATTACHMENT and not _is_whole(stream.read(length), length):
+            problems.append(f"attachment at byte {offset} is damaged: left out")
+            continue
+        if head[0] not in _LARGE and length > most_of(head[0]):
             raise ReadError(
-                f"record at byte {offset} claims {length} bytes, at most {MOST_RECORD:,} are read "
-                "of its kind"
+                f"record at byte {offset} claims {length} bytes, at most {most_of(head[0]):,} are "
+                "read of its kind"
             )
         stream.seek(offset)
         return offset
+
+
+def _is_whole(content: bytes, length: int) -> bool:
+    """Whether an attachment's check sum, which may be 0 for none, is that of its bytes."""
+    if len(content) < length or length < _CHECK_SUM:
+        return True  # cut off, which the next look at the file says
+    found = int.from_bytes(content[-_CHECK_SUM:], "little")
+    return found in (0, zlib.crc32(content[:-_CHECK_SUM]))
 
 
 def _size(record: McapRecord) -> int:
