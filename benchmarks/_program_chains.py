@@ -21,9 +21,8 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_planner import Goal, Planner, TimingError
 from ir_planner.program.chain import layers_of
-from ir_planner.program.node import Node
-from ir_planner.program.route import Route
-from ir_planner.program.steps import Scenes, placed_steps, steps_of
+from ir_planner.program.steps import Route, Scenes, placed_steps, steps_of
+from ir_planner.program.stops import Node
 from ir_planner.request import Context, Journal, Work
 from ir_planner.service import exit_searches, timed_service
 

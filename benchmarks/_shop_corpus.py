@@ -26,7 +26,7 @@ from ir_krl import (
 )
 from ir_msgs_py.arrays import FloatArray
 from ir_planner import Planner, tool_in_flange
-from ir_planner.krl.driven import DrivenStep, drive
+from ir_planner.krl.execution import DrivenStep, drive
 from ir_planner.krl.export import attached
 
 CORPUS = Path(__file__).parents[1] / "tests" / "krl" / "programs"

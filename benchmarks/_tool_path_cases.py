@@ -13,9 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import CartesianPath, CartesianSegment
-from ir_planner.cartesian.corners import joined
-from ir_planner.cartesian.parts import parts_of
-from ir_planner.cartesian.tool_path import ToolPath
+from ir_planner.cartesian.path_parts import parts_of
+from ir_planner.cartesian.tool_path import ToolPath, joined
 from ir_planner.scene import PlanningScene
 
 MARGIN = 0.02  # m

@@ -36,7 +36,7 @@ from ir_planner import (
     export_krl,
     tool_in_flange,
 )
-from ir_planner.krl.judged import contacts_at, scenes_of
+from ir_planner.krl.export import contacts_at, scenes_of
 
 SEEDS = 3
 QUICK_SEEDS = 1

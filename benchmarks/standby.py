@@ -22,7 +22,7 @@ from ir_msgs_py.modes import Mode, TransitionTimes
 from ir_msgs_py.names import NO_LOAD
 from ir_planner.checks.states import state_check
 from ir_planner.program import lengths_of
-from ir_planner.program.rests import Rests, rests_at
+from ir_planner.program.pauses import Rests, rests_at
 from ir_planner.program.standby import advice
 from ir_planner.scene import PlanningScene, load_text, scene_with
 from ir_sim_driver.controller import SimulationSettings, make_simulation

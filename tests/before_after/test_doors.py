@@ -9,9 +9,14 @@ from ir_cli.trace_programs import RecordedDoors
 from ir_description import ProgramStep, Signal, load_cell
 from ir_msgs_py.names import NO_LOAD
 from ir_planner import Planner, PlanOptions, Stretch, Today, parse_goal
-from ir_planner.before_after.asked import Asked, AskedProgram, asked_program
-from ir_planner.before_after.costed import costed_steps
-from ir_planner.before_after.stood import assumed_doors, doors_at_the_start
+from ir_planner.before_after.today_steps import (
+    Asked,
+    AskedProgram,
+    asked_program,
+    assumed_doors,
+    costed_steps,
+    doors_at_the_start,
+)
 from ir_planner.program import Doors, ProgramRequest
 from ir_recorder.reading.recording import TextEvent
 

@@ -25,9 +25,8 @@ from ir_planner import (
     today_of_krl,
     tool_in_flange,
 )
-from ir_planner.before_after.asked import asked_program
-from ir_planner.before_after.changes import changes
-from ir_planner.before_after.costs_of import Costed
+from ir_planner.before_after.changes import Costed, changes
+from ir_planner.before_after.today_steps import asked_program
 
 SEAM = """PTP XHOME
 PTP {A1 30,A5 30}

@@ -16,9 +16,8 @@ from ir_description import load_cell, load_power_data
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import Mode, TransitionTimes
 from ir_msgs_py.names import NO_LOAD
-from ir_planner.program.pause_lengths import lengths_of
-from ir_planner.program.rests import Step, rests_at
-from ir_planner.program.standby import advice, plan_standby
+from ir_planner.program.pauses import Step, rests_at
+from ir_planner.program.standby import advice, lengths_of, plan_standby
 from ir_planner.scene import scene_with
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.controller.simulation import make_simulation

@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from ir_description.poses import abc_from_rotation, rotation_from_abc
 from ir_krl import Followed, KrlMotionError, Place, Target, follow, parse
 from ir_planner import Planner, evaluate_krl, tool_in_flange
-from ir_planner.krl.driven import drive
-from ir_planner.krl.geometry import Arm
-from ir_planner.krl.status_turn import status_turn
+from ir_planner.krl.execution import drive
+from ir_planner.krl.geometry import Arm, status_turn
 
 Follow = Callable[..., Followed]
 START = "PTP {A1 0,A2 -90,A3 90,A4 0,A5 30,A6 0}\n"  # machine home is singular for the tool

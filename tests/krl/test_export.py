@@ -13,13 +13,13 @@ import pytest
 from ir_cli.main import main
 from ir_description import CellPath
 from ir_krl import SetOutput, WrittenSignals, check_name, follow, parse, written
-from ir_krl.names import SignalNames
+from ir_krl.write import SignalNames
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_planner import Planner, RequestError, evaluate_krl, export_krl, tool_in_flange
 from ir_planner.krl import DEVIATION_MAX
 from ir_planner.krl.export import attached
-from ir_planner.krl.passing import passing_times, resting_spline
+from ir_planner.krl.splines import passing_times, resting_spline
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 from _tool_path_judge import seen

@@ -9,7 +9,7 @@ import pytest
 
 from ir_krl import Followed
 from ir_planner import Planner
-from ir_planner.krl.driven import drive
+from ir_planner.krl.execution import drive
 
 Follow = Callable[..., Followed]
 

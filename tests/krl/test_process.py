@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 from ir_krl import Command, Followed, Motion, Place, SetOutput, Speeds, Target, Wait
 from ir_planner import Planner
-from ir_planner.krl.driven import drive
-from ir_planner.krl.process import process_motions
+from ir_planner.krl.execution import drive, process_motions
 
 SPEEDS = Speeds((1.0,) * 6, (1.0,) * 6, 0.1, 1.0, 1.0, 1.0, 1.0)
 TARGET = Target(None, {"X": 1.0}, None, None, True, False, np.eye(4), np.eye(4))

@@ -14,8 +14,14 @@ from hypothesis import strategies as st
 from ir_description import load_cell, load_power_data
 from ir_msgs_py.options import PlanOptions
 from ir_planner.checks.evaluation import evaluate_trajectory
-from ir_planner.program.bounds import Rates, least_cost, least_seconds, potential_energy
-from ir_planner.program.coarse_cost import MARGIN, CoarseCost
+from ir_planner.program.bounds import (
+    MARGIN,
+    CoarseCost,
+    Rates,
+    least_cost,
+    least_seconds,
+    potential_energy,
+)
 from ir_planner.regional.regional import plan_regional
 from ir_planner.request.context import Context
 from ir_planner.request.journal import Journal

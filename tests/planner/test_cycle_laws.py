@@ -17,7 +17,7 @@ import pytest
 
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner, ProgramPlan
-from ir_planner.program.near import optimised_near
+from ir_planner.program.movements import optimised_near
 from ir_planner.regional import search_regional
 from ir_planner.request import Context, Work
 from ir_planner.scene import PlanningScene

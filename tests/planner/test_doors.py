@@ -17,9 +17,9 @@ from ir_msgs_py.modes import TransitionTimes
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner import Planner
-from ir_planner.heard import Heard
+from ir_planner.current_cell import Heard
 from ir_planner.program import ProgramPlan, ProgramRequest, plan_program
-from ir_planner.program.doors import doors_along
+from ir_planner.program.steps import doors_along
 from ir_planner.request import Work, parse_goal
 from ir_sim_driver.controller.cell_scene import Machines
 

@@ -18,8 +18,7 @@ from ir_planner.errors import CancelledError, RequestError
 from ir_planner.planner import Planner
 from ir_planner.program.chain import TOLERANCE, layers_of
 from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
-from ir_planner.program.route import Route
-from ir_planner.program.steps import Scenes, placed_steps, steps_of
+from ir_planner.program.steps import Route, Scenes, placed_steps, steps_of
 from ir_planner.regional.regional import plan_regional
 from ir_planner.request.context import Context
 from ir_planner.request.journal import Journal

@@ -17,13 +17,12 @@ from ir_planner import Planner
 from ir_planner.checks import ROBOTS
 from ir_planner.program.chain import layers_of
 from ir_planner.program.choice import Choice
-from ir_planner.program.common_program import CommonProgram, common_program, nearest_chain
-from ir_planner.program.ladder import Ladder
 from ir_planner.program.movements import Movements
 from ir_planner.program.program import plan_program, prepared
 from ir_planner.program.request import ProgramPlan, ProgramRequest, nobody
-from ir_planner.program.savings import savings_of
+from ir_planner.program.savings import CommonProgram, common_program, nearest_chain, savings_of
 from ir_planner.program.station_graph import Chain
+from ir_planner.program.time_values import Ladder
 from ir_planner.request import Journal, Work
 from ir_planner.search.registry import registered
 from ir_planner.service.withdrawals import EXIT_SEARCHES
@@ -227,7 +226,7 @@ def test_programs_and_savings_are_the_same_on_one_core_and_on_two(
     answers = []
     for cores in ({0}, {0, 1}):
         monkeypatch.setattr(
-            "ir_planner.program.parallel.os.sched_getaffinity", lambda _, c=cores: c
+            "ir_planner.program.movements.os.sched_getaffinity", lambda _, c=cores: c
         )
         planner = Planner(lambda: 0.0)  # no ceiling cuts the plan
         planner.set_cell("", "open")

@@ -14,15 +14,16 @@ from hypothesis import strategies as st
 from ir_description import load_cell, load_power_data
 from ir_msgs_py.modes import TransitionTimes
 from ir_planner.errors import RequestError
-from ir_planner.program.pause_lengths import lengths_of
 from ir_planner.program.standby import (
+    Trip,
+    best_posture,
     break_even,
     late_start,
+    lengths_of,
     mode_watts,
     pause_energy,
     plan_standby,
 )
-from ir_planner.program.waiting import Trip, best_posture
 from ir_planner.scene.planning_scene import load_text, scene_with
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
 from ir_sim_driver.controller.simulation import make_simulation

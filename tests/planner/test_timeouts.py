@@ -15,10 +15,8 @@ from hypothesis import strategies as st
 from ir_description import load_cell, load_power_data
 from ir_msgs_py.modes import TransitionTimes
 from ir_planner.errors import RequestError
-from ir_planner.program.pause_lengths import SAMPLES_MAX, lengths_of
-from ir_planner.program.rests import Rest, Rests, rests_at
-from ir_planner.program.standby import advice, plan_standby
-from ir_planner.program.timeouts import Timeouts
+from ir_planner.program.pauses import Rest, Rests, rests_at
+from ir_planner.program.standby import SAMPLES_MAX, Timeouts, advice, lengths_of, plan_standby
 from ir_planner.scene.planning_scene import load_text, scene_with
 
 CELL = load_cell("demo")

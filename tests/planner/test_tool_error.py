@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 from ir_msgs_py.cartesian import CartesianPath, CartesianSegment
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner
-from ir_planner.cartesian.orientations import Evenly, Rates, ThroughPoses, about_tool, rates_of
-from ir_planner.cartesian.tool_motion import tool_motion
+from ir_planner.cartesian.path_parts import Evenly, Rates, ThroughPoses, about_tool, rates_of
+from ir_planner.cartesian.tool_error import tool_motion
 
 ROOT = np.sqrt(2.0)
 STEP = 1e-4

@@ -11,7 +11,7 @@ from asking import planned
 
 from ir_msgs_py.options import PlanOptions
 from ir_planner.checks import FreeSpace
-from ir_planner.program.parallel import mapped
+from ir_planner.program.movements import mapped
 from ir_planner.regional import search_regional
 from ir_planner.regional.asynchronous import LATE, Found, with_own_laws
 from ir_planner.request.context import Context

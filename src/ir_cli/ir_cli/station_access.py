@@ -14,8 +14,7 @@ from ir_cli.output import Columns, Row, number, text
 from ir_description import AllowedContact, Cell, Station
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.configurations import free_configurations, no_configuration
-from ir_planner.program.route import Route
-from ir_planner.program.steps import Scenes, placed_steps
+from ir_planner.program.steps import Route, Scenes, placed_steps
 from ir_planner.scene import PlanningScene, tcp_inside
 from ir_planner.service import line_poses
 

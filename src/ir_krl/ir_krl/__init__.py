@@ -8,7 +8,6 @@ What the motions mean for a robot among machines is `ir_planner.krl`'s.
 
 from ir_krl.errors import KrlError, KrlMotionError, KrlRunError, KrlSyntaxError, Place
 from ir_krl.language import Source, parse
-from ir_krl.names import NAME_MAX, check_name
 from ir_krl.run import (
     FRAME_NAMES,
     Blend,
@@ -26,12 +25,14 @@ from ir_krl.run import (
     follow,
 )
 from ir_krl.write import (
+    NAME_MAX,
     Attached,
     Part,
     WrittenPath,
     WrittenPause,
     WrittenSignals,
     WrittenSpline,
+    check_name,
     written,
 )
 

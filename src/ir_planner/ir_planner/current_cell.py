@@ -1,19 +1,70 @@
-"""The cell as it stands now, and the scenes that requests take of it and of what the robot
-carries.
-"""
+"""The cell as it stands, and scenes of it with what the driver says."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from threading import Lock
 
 from ir_description import Cell, PowerData, cell_from_yaml, cell_hash, cell_in, load_cell
+from ir_msgs_py.announcements import DATA, DRIVER, CarriedLoad, ControllerTimers, MachineState
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.modes import TransitionTimes
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError, UnknownNameError
-from ir_planner.heard import Heard
 from ir_planner.program import Doors
 from ir_planner.scene import Drives, PlanningScene, load_text, scene_with
+
+# What a driver publishes about its controller, its load and the machines around it, and what
+# counts while no driver does.
+
+
+class Heard:
+    """timers, load, machines: what the driver says, None while no driver does. settings: asked for
+    the transition times where no driver says them.
+    """
+
+    def __init__(self, settings: Callable[[], TransitionTimes]) -> None:
+        self._settings = settings
+        self.timers: ControllerTimers | None = None
+        self.load: CarriedLoad | None = None
+        self.machines: tuple[MachineState, ...] | None = None
+
+    def of(self, data: PowerData) -> PowerData:
+        """A controller's figures as its file has them, with the timer that counts."""
+        if self.timers is None or not data.has_table:
+            return data
+        return replace(data, motors_to_brakes_in_program=self.timers.brakes_after)
+
+    @property
+    def transitions(self) -> TransitionTimes:
+        """Transition times that count."""
+        return self._settings() if self.timers is None else self.timers.transitions
+
+    @property
+    def source(self) -> str:
+        """Where timer and transition times are from."""
+        return DATA if self.timers is None else DRIVER
+
+    def doors(self, cell: Cell) -> Doors:
+        """Machines of a cell with a switch that are not as the cell has them, as the driver
+        says.
+        """
+        return tuple(self._doors(cell))
+
+    def _doors(self, cell: Cell) -> Iterator[tuple[str, tuple[str, ...]]]:
+        heard = {each.equipment: each for each in self.machines or ()}
+        for machine in cell.equipment:
+            said = heard.get(machine.name)
+            if said is None or machine.switch is None or not machine.enabled:
+                continue
+            states = (said.state, said.next) if said.next else (said.state,)
+            known = {state.name for state in machine.states}
+            if known.issuperset(states) and states != (machine.state,):
+                yield machine.name, states
+
+
+# The cell as it stands now, and the scenes that requests take of it and of what the robot
+# carries.
 
 ReadCell = Callable[[str, str], Cell]
 """Gives the cell of a text, or else of a path or a bundled name."""

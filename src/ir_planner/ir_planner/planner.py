@@ -15,7 +15,6 @@ from ir_msgs_py.cartesian import CartesianPath
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.asked_states import StatesCheck, asked_state, asked_states
 from ir_planner.cartesian import CartesianPlan, checked_path_options, plan_path
 from ir_planner.certificates import (
     AnyMovement,
@@ -32,8 +31,7 @@ from ir_planner.configurations import (
     IkAnswer,
     configurations_at,
 )
-from ir_planner.current_cell import CurrentCell, ReadCell, read_cell_here
-from ir_planner.heard import Heard
+from ir_planner.current_cell import CurrentCell, Heard, ReadCell, read_cell_here
 from ir_planner.program import (
     Lengths,
     ProgramPlan,
@@ -69,9 +67,10 @@ from ir_planner.service import (
     plan_service,
 )
 from ir_planner.settings import PlannerSettings
+from ir_planner.state_queries import StatesCheck, asked_state, asked_states
 from ir_planner.store import StoredProgram, program_store, trajectory_store
 from ir_planner.trajectories import OptimizationPlan, Reference, optimize_trajectory, plan_through
-from ir_planner.trips import standby_at
+from ir_planner.waiting_postures import standby_at
 
 AnyPath = CartesianPath | CellPath  # a cell's own comes with what it allows to touch
 Cancelled = Callable[[], bool]

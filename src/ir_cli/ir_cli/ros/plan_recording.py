@@ -22,8 +22,8 @@ from ir_msgs_py.ros.plan_conversions import plan_options_to_msg, program_savings
 from ir_msgs_py.ros.power_conversions import cell_state_to_msg
 from ir_msgs_py.settings import tree
 from ir_planner import Planner, ProgramPlan, assumed_doors
-from ir_planner.node.announcements import cell_state
 from ir_planner.node.answers import fill_program
+from ir_planner.node.topics import cell_state
 from ir_recorder.format import contents
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.recording import CellFiles, RecordingSession, RecordingWriter

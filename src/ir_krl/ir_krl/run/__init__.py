@@ -15,8 +15,8 @@ from ir_krl.run.commands import (
     WaitFor,
 )
 from ir_krl.run.control import Note
-from ir_krl.run.frames import FRAME_NAMES
 from ir_krl.run.program import Followed, follow
+from ir_krl.run.values import FRAME_NAMES
 
 __all__ = [
     "FRAME_NAMES",

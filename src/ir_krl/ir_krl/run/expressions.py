@@ -9,19 +9,20 @@ from typing import Any
 
 from ir_krl.errors import KrlRunError, Place
 from ir_krl.language import Tree, place_of
-from ir_krl.run.frames import FRAME_NAMES, frame, pose
-from ir_krl.run.memory import Memory, Step
-from ir_krl.run.signals import SINGLE, Signals
+from ir_krl.run.memory import SINGLE, Memory, Signals, Step
 from ir_krl.run.values import (
+    FRAME_NAMES,
     INT_MAX,
     Structure,
     Symbol,
     Value,
     copied,
+    frame,
     in_range,
     integer,
     kind_of,
     number,
+    pose,
     truth,
 )
 

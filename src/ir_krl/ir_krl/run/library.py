@@ -7,10 +7,8 @@ from collections.abc import Callable
 
 from ir_description.poses import inverse
 from ir_krl.errors import KrlRunError, Place
-from ir_krl.run.frames import frame, pose
-from ir_krl.run.memory import Memory, Step
-from ir_krl.run.system import AXES, FULL, NULL, TOOL_ACCELERATION, system_speeds
-from ir_krl.run.values import Array, Structure, Symbol, Value, integer, kind_of, number
+from ir_krl.run.memory import AXES, FULL, NULL, TOOL_ACCELERATION, Memory, Step, system_speeds
+from ir_krl.run.values import Array, Structure, Symbol, Value, frame, integer, kind_of, number, pose
 
 Arguments = list[Value | None]
 

@@ -1,18 +1,120 @@
-"""Variables by name, as they stand while a program runs: of the routine that runs, of its module,
-of all.
-
-A module is a .src with its .dat. A variable of a data list is known in its module, one that is
-GLOBAL or stands in $CONFIG everywhere; where two have the same name the nearest one counts.
-"""
+"""Memory of a running program: system variables, variables, inputs, outputs and timers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from ir_krl.errors import KrlRunError, Place
-from ir_krl.run.system import STANDING
-from ir_krl.run.values import Array, Structure, Value, copied
+from ir_krl.run.values import FRAME_NAMES, Array, Structure, Value, copied, frame, integer, number
+from ir_msgs_py.arrays import FloatArray
+
+# What a controller brings along: system variables with the values they have at the start of a
+# program.
+
+AXES = 6
+FULL = 100.0  # %
+TOOL_VELOCITY = (
+    2.0  # m/s, assumed where a program sets no $VEL.CP: the usual value of the configuration file
+)
+TOOL_ACCELERATION = (
+    2.3  # m/s^2, likewise of $ACC.CP; what 100 % of an inline form's acceleration means
+)
+TURNING_VELOCITY = 200.0  # deg/s, likewise of $VEL.ORI1
+TURNING_ACCELERATION = 100.0  # deg/s^2, likewise of $ACC.ORI1
+TOOLS = 16  # numbers of TOOL_DATA
+BASES = 32  # numbers of BASE_DATA
+MODELLED = frozenset(
+    (
+        "$VEL_AXIS",
+        "$ACC_AXIS",
+        "$VEL",
+        "$ACC",
+        "$APO",
+        "$OV_PRO",
+        "$TOOL",
+        "$BASE",
+        "$OUT",
+        "$ORI_TYPE",
+    )
+)
+"""System variables that motions follow from."""
+HARMLESS = frozenset(
+    (
+        "$ADVANCE",
+        "$BWDSTART",
+        "$H_POS",
+        "$GEAR_JERK",
+        "$COLLMON_TOL_PRO",
+        "$CIRC_TYPE",
+        "$JERK",
+        "$IPO_MODE",
+        "$LOAD",
+    )
+)
+"""Set by nearly every program; nothing here follows from them."""
+STANDING = frozenset(("$POS_ACT", "$AXIS_ACT", "$POS_ACT_MES", "$AXIS_ACT_MEAS"))
+"""Where the robot stands: known when a program is driven, not when it is followed."""
+NULL: dict[str, Value] = dict.fromkeys(FRAME_NAMES, 0.0)
+
+
+def system_speeds() -> dict[str, Value]:
+    """Speeds, accelerations and approximation distances as BAS(#INITMOV) leaves them; override as
+    it is.
+    """
+    turning = {"ORI1": TURNING_VELOCITY, "ORI2": TURNING_VELOCITY}
+    turning_up = {"ORI1": TURNING_ACCELERATION, "ORI2": TURNING_ACCELERATION}
+    return {
+        "$VEL_AXIS": _all(FULL),
+        "$ACC_AXIS": _all(FULL),
+        "$VEL": Structure({"CP": TOOL_VELOCITY, **turning}),
+        "$ACC": Structure({"CP": TOOL_ACCELERATION, **turning_up}),
+        "$APO": Structure({"CPTP": 0.0, "CDIS": 0.0, "CORI": 0.0, "CVEL": 0.0}),
+    }
+
+
+def system_variables(home: FloatArray, tool: FloatArray) -> dict[str, Value]:
+    """Variables at the start: `home` (6,) [rad] is XHOME, `tool` (4, 4) [m] in the flange every
+    tool number whose data the program doesn't bring.
+    """
+    angles: dict[str, Value] = {
+        f"A{j + 1}": float(angle) for j, angle in enumerate(np.degrees(home))
+    }
+    tool_frame = frame(tool)
+    return {
+        **system_speeds(),
+        "$GEAR_JERK": _all(FULL),
+        "$OV_PRO": FULL,
+        "$ADVANCE": 3,
+        "$TOOL": tool_frame,
+        "$BASE": Structure(dict(NULL)),
+        "$NULLFRAME": Structure(dict(NULL)),
+        "$WORLD": Structure(dict(NULL)),
+        "$ROBROOT": Structure(dict(NULL)),
+        "TOOL_DATA": Array({(n,): tool_frame.copied() for n in range(1, TOOLS + 1)}),
+        "LOAD_DATA": Array({(n,): Structure({}, "LOAD") for n in range(1, TOOLS + 1)}),
+        "BASE_DATA": Array({(n,): Structure(dict(NULL)) for n in range(1, BASES + 1)}),
+        "XHOME": Structure(dict(angles), "E6AXIS"),
+        "$H_POS": Structure(dict(angles), "E6AXIS"),
+        "PDEFAULT": Structure({"VEL": FULL, "ACC": FULL, "APO_DIST": FULL}),
+        "FHOME": Structure({"TOOL_NO": 0, "BASE_NO": 0}),
+        "$STOPMESS": False,
+        "$BWDSTART": False,
+        "$OUT": Array(),
+    }
+
+
+def _all(value: float) -> Array:
+    return Array({(n,): value for n in range(1, AXES + 1)})
+
+
+# Variables by name, as they stand while a program runs: of the routine that runs, of its module,
+# of all.
+#
+# A module is a .src with its .dat. A variable of a data list is known in its module, one that is
+# GLOBAL or stands in $CONFIG everywhere; where two have the same name the nearest one counts.
 
 Step = tuple[str, tuple[int, ...] | None]
 """A name and, where one is written, its index."""
@@ -167,3 +269,101 @@ def _element(value: Value, name: str, index: tuple[int, ...] | None, place: Plac
     if index not in value.elements:
         raise KrlRunError(f"{name}[{', '.join(map(str, index))}] has no value", place)
     return value.elements[index]
+
+
+# Inputs, outputs, flags and timers as a program reads them, single or as the number of a group.
+
+INPUT = "$IN"
+OUTPUT = "$OUT"
+TIMER = "$TIMER"
+TIMER_FLAG = "$TIMER_FLAG"
+SINGLE = frozenset((INPUT, OUTPUT, TIMER_FLAG, "$FLAG", "$CYCFLAG"))
+"""What is TRUE or FALSE by its number."""
+SIGNALS = 8192
+"""A KR C4 has $OUT[1] to $OUT[8192], and as many inputs."""
+_GROUP_MAX = 32  # signals of a group: the bits of an INT
+
+
+@dataclass(frozen=True)
+class Group:
+    """Signals from `first` to `last` of $IN or $OUT as one number, the first its lowest bit."""
+
+    kind: str
+    first: int
+    last: int
+
+    @property
+    def numbers(self) -> range:
+        """Its signals, the lowest bit first."""
+        return range(self.first, self.last + 1)
+
+
+@dataclass
+class Signals:
+    """What is known of signals. inputs: what $IN[n] reads; noted: hears what is assumed, with its
+    place;
+    aliases and groups: what SIGNAL declares, by name.
+    """
+
+    memory: Memory
+    inputs: Mapping[int, bool]
+    noted: Callable[[Place, str], None]
+    aliases: dict[str, tuple[Step, ...]] = field(default_factory=dict)
+    groups: dict[str, Group] = field(default_factory=dict)
+
+    def read(self, name: str, index: int, place: Place) -> bool:
+        """One signal or flag. Raises KrlRunError for an input that isn't given."""
+        if name == INPUT:
+            if index not in self.inputs:
+                raise KrlRunError(
+                    f"the value of $IN[{index}] decides something here and isn't given", place
+                )
+            return self.inputs[index]
+        if name == TIMER_FLAG:
+            self.noted(place, f"$TIMER[{index}] stands still: no time passes for a timer")
+            return number(self._held(TIMER, index) or 0, f"$TIMER[{index}]", place) > 0.0
+        held = self._held(name, index)
+        if held is None:
+            self.noted(place, f"{name}[{index}] was never set: taken as FALSE")
+            return False
+        if not isinstance(held, bool):
+            raise KrlRunError(f"{name}[{index}] isn't TRUE or FALSE", place)
+        return held
+
+    def group_value(self, name: str, place: Place) -> int:
+        """The number of a group."""
+        group = self.groups[name]
+        return sum(self.read(group.kind, n, place) << k for k, n in enumerate(group.numbers))
+
+    def group_bits(self, name: str, value: Value, place: Place) -> list[tuple[int, bool]]:
+        """Outputs of a group and what they are set to. Raises KrlRunError for a number that it
+        can't hold.
+        """
+        group = self.groups[name]
+        wanted = integer(value, f"what {name} is set to", place)
+        if group.kind != OUTPUT:
+            raise KrlRunError(f"{name} is a group of inputs: it can't be set", place)
+        if not 0 <= wanted < 1 << len(group.numbers):
+            raise KrlRunError(
+                f"{name} has {len(group.numbers)} bits: it can't hold {wanted}", place
+            )
+        return [(n, bool(wanted >> k & 1)) for k, n in enumerate(group.numbers)]
+
+    def declare(
+        self, name: str, first: tuple[Step, ...], last: tuple[Step, ...] | None, place: Place
+    ) -> None:
+        """SIGNAL name first [TO last]. Raises KrlRunError for a group that makes no sense."""
+        if last is None:
+            self.aliases[name] = first
+            return
+        (kind, begin), (other, end) = first[0], last[0]
+        there = kind == other and kind in (INPUT, OUTPUT) and begin is not None and end is not None
+        if not there or begin is None or end is None or not 0 <= end[0] - begin[0] < _GROUP_MAX:
+            raise KrlRunError(
+                f"{name} must be a group of 1 to {_GROUP_MAX} inputs or outputs", place
+            )
+        self.groups[name] = Group(kind, begin[0], end[0])
+
+    def _held(self, name: str, index: int) -> Value | None:
+        array = self.memory.shared.get(name)
+        return array.elements.get((index,)) if isinstance(array, Array) else None

@@ -1,29 +1,97 @@
-"""Motions of a program as commands: targets, speeds and approximation as the system variables
-stand.
-"""
+"""Motions of a program as commands, with triggers and assignments."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import get_args
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import TypeVar, get_args
 
 from ir_krl.errors import KrlRunError, Place
 from ir_krl.language import Tree, place_of
-from ir_krl.run.commands import Blend, Kind, Motion, Speeds, Target
+from ir_krl.run.commands import (
+    Blend,
+    Kind,
+    Motion,
+    SetOutput,
+    Speeds,
+    SplineBlock,
+    Target,
+    TimeBlock,
+)
+from ir_krl.run.control import Control
 from ir_krl.run.expressions import Expressions
-from ir_krl.run.frames import (
+from ir_krl.run.memory import (
+    AXES,
+    FULL,
+    HARMLESS,
+    MODELLED,
+    OUTPUT,
+    SIGNALS,
+    STANDING,
+    Memory,
+    Signals,
+)
+from ir_krl.run.values import (
     AXIS_NAMES,
     EXTERNAL_NAMES,
     FRAME_NAMES,
+    Structure,
+    Symbol,
     axes,
     components,
+    copied,
+    integer,
     is_axis_value,
+    kind_of,
+    number,
     pose,
 )
-from ir_krl.run.memory import Memory
-from ir_krl.run.system import AXES, FULL, STANDING
-from ir_krl.run.values import Structure, Symbol, integer, kind_of, number
+
+# Assignments as statements: to variables, to outputs and to the groups of signals that name
+# them.
+
+
+class Assigning(Control):
+    """Sets values and outputs; what signals are called is known to `_signals`."""
+
+    _signals: Signals
+
+    def _assignment(self, tree: Tree) -> None:
+        access, expression = tree.children
+        path = self.expressions.path(access)
+        value = self.expressions.value(expression)
+        (name, index), where = path[0], self.place(tree)
+        if name in self._signals.groups and index is None:
+            for number, level in self._signals.group_bits(name, value, where):
+                self._set_output(number, level, where)
+            return
+        if name == OUTPUT and index is not None:
+            if not isinstance(value, bool):
+                raise KrlRunError(f"$OUT[{index[0]}] is set to {kind_of(value)}", where)
+            self._set_output(index[0], value, where)
+            return
+        if name == "$IPO_MODE" and value != Symbol("BASE"):
+            raise KrlRunError(
+                f"$IPO_MODE {kind_of(value)}: a tool that stands in the cell isn't read", where
+            )
+        if name.startswith("$") and name not in MODELLED and name not in HARMLESS:
+            self.note(tree, f"{name} isn't modelled")
+        self.memory.set(path, value, where)
+
+    def _set_output(self, number: float, level: bool, place: Place, pulse: float = 0.0) -> None:
+        """Set a digital output. Raises KrlRunError for one that no controller has."""
+        if number != int(number) or not 1 <= number <= SIGNALS:
+            raise KrlRunError(
+                f"$OUT[{number:g}]: outputs have whole numbers from 1 to {SIGNALS}", place
+            )
+        self.commands.append(SetOutput(int(number), level, place, pulse, self.continuing))
+        if pulse == 0.0:
+            self.memory.set(((OUTPUT, (int(number),)),), level, place)
+
+
+# Motions of a program as commands: targets, speeds and approximation as the system variables
+# stand.
 
 _COMPONENTS = frozenset((*FRAME_NAMES, *AXIS_NAMES, *EXTERNAL_NAMES, "S", "T"))
 _STANDS = 1e-3  # mm or deg: an external axis that moves by less stands
@@ -186,3 +254,115 @@ _OTHERS = ("settings", "approximation")
 
 def _is(child: object, data: str) -> bool:
     return isinstance(child, Tree) and child.data == data
+
+
+# Motions and spline blocks as statements, with what triggers do meanwhile and what stands after
+# WITH.
+
+_Built = TypeVar("_Built", Motion, SplineBlock)
+
+
+class Moving(Assigning):
+    """Runs motions; what they are is built by `_motions`."""
+
+    _motions: Motions
+    _triggers: list[tuple[float, Tree]]
+
+    def _trigger(self, tree: Tree) -> None:
+        when, where, delay, action = tree.children[0], *tree.children[1:4]
+        at = self.expressions.number(where, str(when))
+        if str(when) not in ("DISTANCE", "PATH") or self.expressions.number(delay, "DELAY") != 0.0:
+            self.note(
+                tree, "a TRIGGER acts at an end of its motion: path and delay aren't modelled"
+            )
+        self._triggers.append((at if str(when) == "DISTANCE" else 1.0, action))
+
+    def _ptp(self, tree: Tree) -> None:
+        due = self._triggers
+        self._triggers = []
+        self._act(action for at, action in due if at == 0.0)
+        self.commands.append(self._with_settings(tree, lambda: self._motions.motion(tree)))
+        self._act(action for at, action in due if at != 0.0)
+
+    def _act(self, actions: Iterable[Tree]) -> None:
+        """What triggers do while the robot moves."""
+        for action in actions:
+            self.continuing = True
+            getattr(self, f"_{action.data}")(action)
+        self.continuing = False
+
+    _lin = _circ = _ptp
+
+    def _spline_block(self, tree: Tree) -> None:
+        """A block with its triggers: what they switch on first counts from its start, the rest from
+        its end, so that no part of a process is taken for positioning.
+        """
+        due = self._triggers
+        self._triggers = []
+        block = self._with_settings(tree, lambda: self._block(tree))
+        inside = self._triggers
+        self._triggers = []
+        self._act(action for at, action in due if at == 0.0)
+        before = len(self.commands)
+        self._act(action for _, action in inside)
+        made = self.commands[before:]
+        self.commands[before:] = []
+        first = {one.number: one for one in reversed(made) if isinstance(one, SetOutput)}
+        early = [one for one in first.values() if one.value]
+        late = [one for one in made if one not in early]
+        self.commands += [*reversed(early), block, *late]
+        self._act(action for at, action in due if at != 0.0)
+
+    def _with_settings(self, tree: Tree, build: Callable[[], _Built]) -> _Built:
+        """Build with what stands after WITH; it holds for this motion only."""
+        settings = next(
+            child for child in tree.children if isinstance(child, Tree) and child.data == "settings"
+        )
+        assignments = [one for one in settings.children if one is not None]
+        if not assignments:
+            return build()
+        shared = self.memory.shared
+        before = {name: copied(value) for name, value in shared.items() if name.startswith("$")}
+        for assignment in assignments:
+            self._assignment(assignment)
+        built = build()
+        for name in [name for name in shared if name.startswith("$") and name not in before]:
+            del shared[name]
+        shared.update(before)
+        return built
+
+    def _block(self, tree: Tree) -> SplineBlock:
+        word, _, *parts, approximation = tree.children
+        motions: list[Motion] = []
+        times: list[TimeBlock] = []
+        start: int | None = None
+        marks: list[tuple[int, float]] = []
+        for part in parts:
+            match part.data:
+                case "time_start":
+                    start = len(motions)
+                    marks = []
+                case "time_part":
+                    marks.append(
+                        (len(motions), self.expressions.number(part.children[0], "TIME_BLOCK PART"))
+                    )
+                case "time_end":
+                    seconds = self.expressions.number(part.children[0], "TIME_BLOCK END")
+                    if start is None or seconds <= 0.0 or start == len(motions):
+                        raise KrlRunError(
+                            "TIME_BLOCK END needs a START, motions and a time above 0 s",
+                            self.place(part),
+                        )
+                    times.append(
+                        TimeBlock(start, len(motions), tuple(marks), seconds, self.place(part))
+                    )
+                    start = None
+                case "assignment" | "trigger" | "const_vel" | "stop_when":
+                    getattr(self, f"_{part.data}")(part)
+                case _:
+                    motions.append(self._with_settings(part, partial(self._motions.motion, part)))
+        if not motions:
+            raise KrlRunError("a spline block without motions", self.place(tree))
+        axis = str(word) == "PTP_SPLINE"
+        blend = self._motions.blend(approximation)
+        return SplineBlock(axis, tuple(motions), tuple(times), self.place(tree), blend)

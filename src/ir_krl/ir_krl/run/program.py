@@ -1,11 +1,10 @@
-"""Follows a program statement by statement; what reaches the controller is the list of its
-commands.
-"""
+"""Execution of a program statement by statement, to the list of its commands."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import PurePath
 from typing import Any
 
 from ir_krl.errors import KrlRunError, Place
@@ -14,14 +13,47 @@ from ir_krl.run.commands import Command
 from ir_krl.run.control import LoopExit, Note, Returned
 from ir_krl.run.expressions import Expressions
 from ir_krl.run.library import Library
-from ir_krl.run.memory import Memory
-from ir_krl.run.motions import Motions
-from ir_krl.run.moving import Moving
-from ir_krl.run.routines import Routines, module_of
-from ir_krl.run.signals import Signals
-from ir_krl.run.system import system_variables
+from ir_krl.run.memory import Memory, Signals, system_variables
+from ir_krl.run.motions import Motions, Moving
 from ir_krl.run.values import Array, Value, copied, typed
 from ir_msgs_py.arrays import FloatArray
+
+# Routines of several files: those of the same file come first, as on the controller.
+
+
+def module_of(file: str) -> str:
+    """The module that a file belongs to: a .src and its .dat have one."""
+    return PurePath(file).stem.upper()
+
+
+class Routines:
+    """All routines of the sources. Raises KrlRunError where a file has two of one name, or two
+    files begin with one of the same name, which other files then can't call.
+    """
+
+    def __init__(self, sources: Sequence[Source]) -> None:
+        self._found: dict[str, list[Routine]] = {}
+        leading = {source.routines[0] for source in sources if source.routines}
+        for source in sources:
+            for one in source.routines:
+                others = self._found.setdefault(one.name, [])
+                if any(other.file == one.file or {other, one} <= leading for other in others):
+                    raise KrlRunError(f"{one.name} is defined twice", place_of(one.body, one.file))
+                others.insert(0 if one in leading else len(others), one)
+
+    @property
+    def names(self) -> list[str]:
+        """In the order in which they are defined."""
+        return list(self._found)
+
+    def named(self, name: str, file: str = "") -> Routine | None:
+        """The routine that a call in `file` means."""
+        there = self._found.get(name, [])
+        return next((one for one in there if one.file == file), there[0] if there else None)
+
+
+# Follows a program statement by statement; what reaches the controller is the list of its
+# commands.
 
 GLOBAL = "GLOBAL"
 CONFIGURATION = "$CONFIG"

@@ -2,9 +2,9 @@
 others.
 """
 
-from ir_planner.before_after.compared import before_after, before_after_common
-from ir_planner.before_after.stood import assumed_doors
+from ir_planner.before_after.comparison import before_after, before_after_common
 from ir_planner.before_after.today import Stretch, Today, today_of_krl
+from ir_planner.before_after.today_steps import assumed_doors
 
 __all__ = [
     "Stretch",

@@ -1,15 +1,206 @@
-"""The changes from one program to another: which movement, which pause, how, and how much that
-saves.
-"""
+"""Changes from one program to another, movement by movement, with their intervals."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.report import MovementKind
-from ir_msgs_py.savings import Change
-from ir_planner.before_after.costs_of import Costed, CostedHop, hops_of, saving
+from ir_msgs_py.report import MovementKind, PlannedMovement
+from ir_msgs_py.savings import Change, Hop, Saving, Side
+from ir_planner.checks import Interval, interval, movement_energy, robots, total_report
+from ir_planner.program import ProgramRequest, Spreads
+from ir_planner.scene import PlanningScene, scene_with
+
+# Intervals of peak powers: what the drawn robots take in the instants that take most.
+
+ROBOTS = 40  # drawn: each drives the movements, so that fewer than for energies are affordable
+_NEAR = 0.7  # of the peak: movements that take less don't come to it with other parameters
+
+
+def peak_interval(steps: Sequence[PlannedMovement], request: ProgramRequest) -> Interval:
+    """The 90 % interval [W] of the largest power of some steps; it holds the nominal one."""
+    peak = max((step.report.peak_power for step in steps), default=0.0)
+    worst = np.zeros(ROBOTS)
+    for step in steps:
+        if step.trajectory is None or step.report.peak_power < _NEAR * peak:
+            continue
+        scene = scene_with(
+            request.cell, step.load or "none", request.power, request.settings.drives
+        )
+        if scene.parameters is None:
+            continue
+        nominal = movement_energy(step.trajectory, scene).watts.max()
+        drawn = [movement_energy(step.trajectory, one).watts.max() for one in _drawn(scene)]
+        worst = np.maximum(
+            worst, step.report.peak_power * np.array(drawn) / max(float(nominal), 1e-9)
+        )
+    if not worst.any():
+        return Interval(peak, peak)
+    return interval(peak, worst - peak)
+
+
+def _drawn(scene: PlanningScene) -> list[PlanningScene]:
+    """The same scene with each of the drawn robots."""
+    sets = [replace(scene.parameters, mean=row) for row in robots(scene.parameters)[:ROBOTS]]
+    return [
+        replace(
+            scene, drives=replace(scene.drives, parameters=one), power=one.power_with(scene.power)
+        )
+        for one in sets
+    ]
+
+
+# Steps with what their uncertainty leaves open, as a side of the comparison: hops, power over
+# time.
+
+_STEP = 0.02  # s between the values of a power over time, at least
+_MOST = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class Costed:
+    """Steps, and what the drawn robots add (ROBOTS,) J to each."""
+
+    steps: tuple[PlannedMovement, ...]
+    added: tuple[FloatArray, ...]
+
+    @property
+    def seconds(self) -> float:
+        """How long they take."""
+        return sum(step.duration for step in self.steps)
+
+    @property
+    def joules(self) -> float:
+        """Energy at the mains."""
+        return sum(step.report.energy for step in self.steps)
+
+    @property
+    def robots(self) -> FloatArray:
+        """What the drawn robots add (ROBOTS,) J to all of them."""
+        return np.asarray(np.sum(self.added, axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class CostedHop(Costed):
+    """The steps from one stop to the next, or one pause; ends: names of the stops."""
+
+    ends: tuple[str, str]
+
+    @property
+    def is_pause(self) -> bool:
+        """Whether the robot stands still."""
+        return self.steps[0].is_pause
+
+    @property
+    def title(self) -> str:
+        """What it is called."""
+        first, last = (name or "start" for name in self.ends)
+        if self.steps[0].kind == MovementKind.CARTESIAN:
+            return f"along {last}"
+        return f"pause at {last}" if self.is_pause else f"{first} to {last}"
+
+
+def costed(steps: Sequence[PlannedMovement], spreads: Spreads) -> Costed:
+    """Steps with what the drawn robots add to each."""
+    return Costed(tuple(steps), tuple(spreads.of(steps)))
+
+
+def saving(before: Costed, after: Costed) -> Saving:
+    """What `after` saves of the energy of `before`; its interval is by common draws."""
+    within = interval(before.joules - after.joules, before.robots - after.robots)
+    return Saving(before.joules, after.joules, after.seconds, within.low, within.high)
+
+
+def side_of(
+    name: str, cycle_time: float, program: Costed, request: ProgramRequest, saved: Saving
+) -> Side:
+    """A side with the intervals of its energies and its power over time."""
+    parameters = request.settings.drives.parameters
+    steps = tuple(
+        replace(step, report=replace(step.report, energy_low=within.low, energy_high=within.high))
+        for step, added in zip(program.steps, program.added, strict=True)
+        for within in [interval(step.report.energy, added)]
+    )
+    elapsed = np.cumsum([0.0, *(step.duration for step in steps)])[:-1]
+    report = total_report(tuple(step.report for step in steps), tuple(elapsed.tolist()))
+    whole = interval(report.energy, program.robots)
+    report = replace(report, energy_low=whole.low, energy_high=whole.high)
+    if parameters is not None:
+        report = replace(report, power_parameters=parameters.name)
+    time, watts = _power(steps, request)
+    hops = tuple(_hop(hop) for hop in hops_of(program))
+    peak = peak_interval(steps, request)
+    return Side(
+        name, cycle_time, steps, report, hops, time, watts, saved, "", (peak.low, peak.high)
+    )
+
+
+def hops_of(program: Costed) -> list[CostedHop]:
+    """A hop ends at a pause, before a line out of a station, where the stops of a movement change,
+    and at both ends of a path, which today's program may drive in several movements.
+    """
+    hops: list[CostedHop] = []
+    for step, added in zip(program.steps, program.added, strict=True):
+        ends = (step.from_station, step.to_station)
+        if not hops or _begins(step, hops[-1]):
+            hops.append(CostedHop((step,), (added,), ends))
+            continue
+        last = hops[-1]
+        named = step.kind == MovementKind.REGIONAL
+        ends = ends if named else last.ends
+        hops[-1] = CostedHop((*last.steps, step), (*last.added, added), ends)
+    return hops
+
+
+def _begins(step: PlannedMovement, last: CostedHop) -> bool:
+    """Whether a step is the first of a hop."""
+    before = last.steps[-1]
+    alone = (MovementKind.PAUSE, MovementKind.CARTESIAN)
+    if step.kind == before.kind == MovementKind.CARTESIAN:
+        return last.ends != (step.from_station, step.to_station)
+    if step.kind in alone or before.kind in alone or step.kind == MovementKind.SERVICE_EXIT:
+        return True
+    if step.kind == MovementKind.SERVICE_ENTRY:
+        return False
+    if before.kind == MovementKind.REGIONAL:
+        return last.ends != (step.from_station, step.to_station)
+    return before.kind == MovementKind.SERVICE_ENTRY
+
+
+def _hop(hop: CostedHop) -> Hop:
+    within = interval(hop.joules, hop.robots)
+    mode = hop.steps[0].power_mode
+    return Hop(hop.title, hop.is_pause, hop.seconds, hop.joules, within.low, within.high, mode)
+
+
+def _power(
+    steps: Sequence[PlannedMovement], request: ProgramRequest
+) -> tuple[FloatArray, FloatArray]:
+    """Times (N,) [s] and power at the mains (N,) [W]; a pause has its mean."""
+    ends = [0.0]
+    spent = [0.0]
+    for step in steps:
+        at = ends[-1]
+        joules = spent[-1]
+        if step.trajectory is not None:
+            scene = scene_with(
+                request.cell, step.load or "none", request.power, request.settings.drives
+            )
+            energy = movement_energy(step.trajectory, scene)
+            shares = np.cumsum(energy.watts) * (step.report.energy / max(energy.watts.sum(), 1e-9))
+            ends += (at + energy.times[:-1] + 0.5 * energy.dt - step.trajectory.times[0]).tolist()
+            spent += (joules + shares[:-1]).tolist()
+        ends.append(at + step.duration)
+        spent.append(joules + step.report.energy)
+    count = int(np.clip(ends[-1] / _STEP, 1, _MOST))
+    edges = np.linspace(0.0, ends[-1], count + 1)
+    watts = np.diff(np.interp(edges, ends, spent)) / np.maximum(np.diff(edges), 1e-9)
+    return 0.5 * (edges[1:] + edges[:-1]), watts
+
+
+# The changes from one program to another: which movement, which pause, how, and how much that
+# saves.
 
 MOST = 5
 # the work of a change

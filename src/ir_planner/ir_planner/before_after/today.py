@@ -1,17 +1,200 @@
-"""What a robot does today, wherever that is known from: movements between standstills, and
-waits.
-"""
+"""Today's movements and waits, and processes of a KRL program as tool paths."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ir_description import CellPath
+from ir_krl import Place
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.cartesian import LINE, CartesianPath
+from ir_msgs_py.errors import InvalidValueError
+from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.before_after.process_paths import Lines, lines_of, process_notes, process_paths
-from ir_planner.krl import DrivenStep, EvaluatedProgram
+from ir_planner.errors import RequestError
+from ir_planner.krl import DrivenStep, EvaluatedProgram, ToolMotion
 from ir_planner.program import Doors
+
+# What today's program works along: processes of a KRL program as paths of the tool.
+#
+# A saving may not come from cutting a process short: its motions become paths that every planned
+# program drives, or the program is refused.
+
+Lines = Sequence[tuple[int, int]]
+_AS_SLOW_AS_NEEDED = (
+    1.0  # speed tolerance: where an axis can't follow the controller slows the tool as well
+)
+_SAME_PLACE = 2e-3  # m, and of the rotation's entries: as for stations
+_NAMED = 6  # places in a note
+_SAME_CORNER = 0.1  # mm
+
+
+def process_paths(steps: Sequence[DrivenStep], lines: Lines | None) -> tuple[CellPath | None, ...]:
+    """For each step the path that it drives, alone or with its neighbours. Raises RequestError.
+
+    lines (first, last): whose motions are a process; None: those between an output's on and off.
+    """
+    _check_lines(steps, lines or ())
+    paths: list[CellPath | None] = []
+    run: list[DrivenStep] = []
+    names: set[str] = set()
+    for step in (*steps, None):
+        worked = () if step is None else _worked(step, lines)
+        if run and not worked:
+            paths += [_path(run, names)] * len(run)
+            run = []
+        if step is not None and worked:
+            _check_alone(step, worked)
+            run.append(step)
+        elif step is not None:
+            paths.append(None)
+    return tuple(paths)
+
+
+def process_notes(steps: Sequence[DrivenStep], paths: Sequence[CellPath | None]) -> list[str]:
+    """Which motions of the tool are kept as paths, and which the planner may replace."""
+    driven = dict.fromkeys(path.name for path in paths if path is not None)
+    pairs = list(zip(steps, paths, strict=True))
+    free = [lines_of(step.places) for step, path in pairs if path is None and _may_work(step)]
+    notes = [f"driven as paths of the tool by every program: {_listed(driven)}"] if driven else []
+    for name in driven:
+        run = [step for step, path in pairs if path is not None and path.name == name]
+        notes += [sentence] if (sentence := _corners(name, run)) else []
+    if free:
+        notes.append(
+            "motions of the tool taken for positioning, which the planner replaces: "
+            f"{_listed(free)}; where they are a process, name their lines (--process)"
+        )
+    return notes
+
+
+def _corners(name: str, run: Sequence[DrivenStep]) -> str:
+    """What is changed at the corners of a path whose motions have different ones; "" where nothing
+    is.
+    """
+    corners = [1e3 * one.corner for one in _drawn(run)[:-1]]
+    if not corners or max(corners) - min(corners) < _SAME_CORNER:
+        return ""
+    kept = "exactly" if min(corners) == 0.0 else f"with {min(corners):.3g} mm"
+    return (
+        f"{name}: its corners are approximated by {min(corners):.3g} to {max(corners):.3g} mm "
+        f"today; a path has one distance for all: the planner's programs drive them {kept}, "
+        "which takes them longer"
+    )
+
+
+def _drawn(run: Sequence[DrivenStep]) -> list[ToolMotion]:
+    return [one for step in run for one in step.tool if one is not None]
+
+
+def same_poses(first: CartesianPath, second: CartesianPath) -> bool:
+    """Whether two paths have the same segments through the same poses."""
+    kinds = [[one.kind for one in path.segments] for path in (first, second)]
+    poses = [
+        [path.start, *(pose for one in path.segments for pose in one.poses)]
+        for path in (first, second)
+    ]
+    if kinds[0] != kinds[1] or len(poses[0]) != len(poses[1]):
+        return False
+    return float(np.abs(np.array(poses[0]) - np.array(poses[1])).max()) < _SAME_PLACE
+
+
+def driven_as(own: CellPath, driven: CellPath) -> CellPath:
+    """The cell's own path, with what may be touched and how it may turn, as today's program drives
+    it.
+    """
+    kept = own.path
+    path = replace(
+        driven.path,
+        orientation=kept.orientation,
+        free_angle=kept.free_angle,
+        approach=kept.approach,
+        retract=kept.retract,
+    )
+    return replace(own, path=path)
+
+
+def lines_of(places: Sequence[Place]) -> str:
+    """Where motions stand in their source."""
+    first = places[0]
+    last = places[-1]
+    return f"{first}" if first.line == last.line else f"{first} to line {last.line}"
+
+
+def _check_lines(steps: Sequence[DrivenStep], lines: Lines) -> None:
+    """Raise RequestError for lines without a motion: a process would be left out without a word."""
+    driven = [place.line for step in steps if step.moves for place in step.places]
+    for first, last in lines:
+        if not any(first <= line <= last for line in driven):
+            raise RequestError(
+                StatusCode.INVALID_MOTION_PLAN,
+                f"no motion stands in lines {first} to {last}, which are called a process",
+            )
+
+
+def _worked(step: DrivenStep, lines: Lines | None) -> tuple[Place, ...]:
+    """Places of its motions that belong to a process."""
+    if lines is None or not step.moves:
+        return step.process
+    return tuple(
+        one for one in step.places if any(first <= one.line <= last for first, last in lines)
+    )
+
+
+def _may_work(step: DrivenStep) -> bool:
+    """Whether more than a straight line of the tool is driven through: perhaps a process."""
+    drawn = [one for one in step.tool if one is not None]
+    return len(drawn) > 1 or any(segment.kind != LINE for one in drawn for segment in one.segments)
+
+
+def _check_alone(step: DrivenStep, worked: tuple[Place, ...]) -> None:
+    """Raise RequestError where a step has motions that no path of the tool describes."""
+    if all(one is not None for one in step.tool) and step.tool:
+        return
+    raise RequestError(
+        StatusCode.INVALID_MOTION_PLAN,
+        f"{lines_of(worked)} is a process, but the movement {lines_of(step.places)} that it is "
+        "driven in has parts that no path of the tool describes (a PTP that is blended into it, "
+        "a turn on the spot, a tool that isn't the cell's): end these in exact stops, or name "
+        "the lines of processes or none (--process)",
+    )
+
+
+def _path(run: Sequence[DrivenStep], names: set[str]) -> CellPath:
+    """The path through all motions of steps that follow each other."""
+    motions = _drawn(run)
+    segments = tuple(segment for motion in motions for segment in motion.segments)
+    first = run[0].places[0].line
+    last = run[-1].places[-1].line
+    base = f"lines_{first}_to_{last}" if first != last else f"line_{first}"
+    name = next(
+        n for k in range(1, 10_000) if (n := base if k == 1 else f"{base}_{k}") not in names
+    )
+    names.add(name)
+    try:
+        path = CartesianPath(
+            motions[0].start,
+            segments,
+            tool_speed=segments[0].tool_speed,
+            speed_tolerance=_AS_SLOW_AS_NEEDED,
+            blending_radius=min((one.corner for one in motions[:-1]), default=0.0),
+        )
+    except InvalidValueError as error:
+        raise RequestError(
+            StatusCode.INVALID_MOTION_PLAN, f"{lines_of(run[0].places)}: {error}"
+        ) from error
+    return CellPath(name, path)
+
+
+def _listed(names: Sequence[str] | dict[str, None]) -> str:
+    known = list(names)
+    more = f" and {len(known) - _NAMED} more" if len(known) > _NAMED else ""
+    return ", ".join(known[:_NAMED]) + more
+
+
+# What a robot does today, wherever that is known from: movements between standstills, and
+# waits.
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,22 +1,297 @@
-"""A path of the tool as a certified movement: the chain of configurations of least J that keeps the
-speed.
-"""
+"""Plans of a tool path: the certified movement of least J, and several for a program."""
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
+from ir_kernels import portable
+from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.cartesian import TANGENT, CartesianPath
 from ir_msgs_py.options import PlanOptions
-from ir_msgs_py.report import TrajectoryReport
+from ir_msgs_py.report import PlanningInfo, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
-from ir_planner.cartesian.answer import CartesianPlan
-from ir_planner.cartesian.best import best_along
-from ir_planner.cartesian.drawn import drawn
-from ir_planner.cartesian.refusal import PathRefusedError
-from ir_planner.cartesian.remarks import remarks
-from ir_planner.cartesian.tool_path import HeadingError
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.cartesian.chains import Chain, Layers, layers_of
+from ir_planner.cartesian.dead_ends import chains_through
+from ir_planner.cartesian.path_movement import (
+    T1_SPEED,
+    DrivenPath,
+    best_along,
+    timed,
+    within_limits,
+)
+from ir_planner.cartesian.path_parts import parts_of
+from ir_planner.cartesian.tool_error import Kept, kept_of
+from ir_planner.cartesian.tool_path import (
+    REVERSAL,
+    Asked,
+    HeadingError,
+    Joint,
+    PathRefusedError,
+    ToolPath,
+    joined,
+)
+from ir_planner.checks import FreeSpace
+from ir_planner.curves import extremes
 from ir_planner.errors import RequestError
 from ir_planner.request import Context, checked_options, chosen
+from ir_planner.timing import Movement
+
+# What a request for a Cartesian path is answered with.
+
+
+@dataclass(frozen=True, eq=False)
+class CartesianPlan:
+    """trajectory None unless the status is SUCCESS.
+
+    Bounds at every instant: tool_error [m], the tcp's distance from the path; rotation_error [rad],
+    its turn against the path there; speed_deviation, the share of the tool's speed that it is off,
+    without approach, retract and changes of speed. lengths (K,) m at
+    which its segments end, counted from the beginning of the approach; configurations: how many
+    were looked at.
+    """
+
+    status: Status
+    info: PlanningInfo
+    report: TrajectoryReport
+    trajectory: JointTrajectory | None = None
+    tool_error: float = 0.0
+    rotation_error: float = 0.0
+    speed_deviation: float = 0.0
+    lengths: FloatArray = field(default_factory=lambda: np.zeros(0))
+    configurations: int = 0
+
+
+# A request's path as it is drawn, with all configurations along it, and what a movement keeps of
+# it.
+
+TOOL_ERROR_MAX = 1e-4  # m
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """What is asked for, how its parts are joined, and the configurations along it."""
+
+    asked: Asked
+    joints: tuple[Joint, ...]
+    layers: Layers
+
+    @property
+    def lengths(self) -> FloatArray:
+        """Where the K segments end (K,) m."""
+        whole = self.asked.whole
+        return whole.ends[1:][[part.kept for part in whole.parts]]
+
+    def kept(self, driven: DrivenPath) -> Kept:
+        """What a movement keeps of the path. Raises PathRefusedError where that isn't enough."""
+        found = kept_of(driven.sent, self.asked.whole, driven.angle, self.asked.context.scene)
+        leaves = max((joint.leaves for joint in self.joints), default=0.0)
+        turns = max((joint.turns for joint in self.joints), default=0.0)
+        found = replace(
+            found, tool_error=found.tool_error + leaves, rotation_error=found.rotation_error + turns
+        )
+        if found.tool_error > TOOL_ERROR_MAX:
+            raise PathRefusedError(
+                f"the tool can't be shown to keep within {TOOL_ERROR_MAX * 1e3:g} mm of the path: "
+                f"{found.tool_error * 1e3:.3g} mm"
+            )
+        return found
+
+
+def drawn(path: CartesianPath, start: FloatArray | None, t1: bool, context: Context) -> Drawn:
+    """A path with its configurations, from `start` (n,) or from all. Raises PathRefusedError."""
+    if t1:
+        path = _at_most(path, T1_SPEED)
+    with context.journal.stage("path") as notes:
+        whole, joints = joined(path, parts_of(path))
+        _check_corners(path, whole, joints)
+        notes.append(f"{whole.length:.3f} m in {len(whole.parts)} parts")
+        if (reduced := _reduced(path, whole, joints)) < path.blending_radius:
+            notes.append(f"blending radius down to {reduced:.4g} m: half of a part")
+    asked = Asked(path, whole, start is not None, t1, context)
+    with context.journal.stage("configurations") as notes:
+        layers = layers_of(whole, path.free_angle, asked.space, start)
+        notes.append(f"{len(layers.q)} at {len(layers.s)} samples, {int(layers.free.sum())} free")
+    return Drawn(asked, joints, layers)
+
+
+def _at_most(path: CartesianPath, speed: float) -> CartesianPath:
+    segments = tuple(replace(one, tool_speed=min(one.tool_speed, speed)) for one in path.segments)
+    return replace(path, tool_speed=min(path.tool_speed, speed), segments=segments)
+
+
+def _reduced(path: CartesianPath, whole: ToolPath, joints: tuple[Joint, ...]) -> float:
+    """The smallest radius [m] of a corner that is rounded as asked for."""
+    rounded = [joint.radius for joint in joints if joint.rounded]
+    return min(rounded, default=path.blending_radius)
+
+
+def _check_corners(path: CartesianPath, whole: ToolPath, joints: tuple[Joint, ...]) -> None:
+    """Raise PathRefusedError at a corner within the path where the tool would have to stop and may
+    not.
+    """
+    for k, joint in enumerate(joints, start=1):
+        before = whole.parts[k - 1]
+        after = whole.parts[k]
+        if joint.radius > 0.0 or not (before.kept and after.kept):
+            continue
+        corner = (
+            f"at {whole.ends[k]:.3f} m the path has a corner of {np.degrees(joint.angle):.1f} deg"
+        )
+        if path.orientation == TANGENT:
+            raise PathRefusedError(
+                f"{corner}: a tool that turns with the path can't follow it; give a "
+                "blending_radius",
+                StatusCode.INVALID_MOTION_PLAN,
+            )
+        if path.speed_tolerance < 1.0:
+            rounding = "" if joint.angle > REVERSAL else "give a blending_radius, or "
+            raise PathRefusedError(
+                f"{corner}, where the tool can't keep {before.speed:g} m/s: {rounding}"
+                f"speed_tolerance 1 to stop there (it is {path.speed_tolerance:g})",
+                StatusCode.INVALID_MOTION_PLAN,
+            )
+
+
+# Certified movements along a path from and to different configurations, for a program to choose
+# among.
+#
+# Candidates are the cheapest chain to each different end and from each different start; those that
+# differ by whole turns of joints are one movement, shifted.
+
+_OF_EACH = 12  # chains by their ends, and as many by their starts
+_SAME = 1e-3  # rad: chains that are nearer are one
+_TURNS = (-2, -1, 0, 1, 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """A movement along a path with its configurations (N, n) from its beginning to its end."""
+
+    points: FloatArray
+    movement: Movement
+
+
+def choices_along(
+    path: CartesianPath, context: Context, after: FreeSpace, most: int
+) -> list[Choice]:
+    """Certified movements whose ends keep the safety distance from everything, at their end also in
+    the space `after`; at most `most`. Raises PathRefusedError, HeadingError, RequestError.
+    """
+    whole = drawn(path, None, False, context)
+    whole = replace(whole, layers=replace(whole.layers, free=_ends_free(whole, after)))
+    reason: PathRefusedError | None = None
+    found: list[DrivenPath] = []
+    for chain in _different(whole):
+        context.work.check()
+        try:
+            driven = within_limits(whole.asked, timed(whole.asked, chain))
+            if driven.movement.certified:
+                whole.kept(driven)
+                found.append(driven)
+        except PathRefusedError as error:
+            reason = reason or error
+    if not found:
+        found = [best_along(whole.asked, whole.layers)]
+        whole.kept(found[0])
+    turned = (choice for driven in found for choice in _turned(driven))
+    return list(itertools.islice(turned, most))
+
+
+def _ends_free(whole: Drawn, after: FreeSpace) -> BoolArray:
+    """Which configurations take part (M,): at the ends those that nothing is allowed to touch."""
+    layers = whole.layers
+    context = whole.asked.context
+    free = layers.free.copy()
+    plain = FreeSpace.of(context.scene, context.safety_distance, context.work)
+    for k, spaces in ((0, (plain,)), (len(layers.s) - 1, (plain, after))):
+        there = np.flatnonzero(free & (layers.layer == k))
+        if len(there) == 0:
+            continue
+        for space in spaces:
+            free[there] &= space.states_free(layers.q[there])
+        if not free[there].any():
+            end = "its end: give it a retract" if k else "its beginning: give it an approach"
+            raise PathRefusedError(
+                f"no configuration keeps {1e3 * context.safety_distance:g} mm from everything at "
+                f"{end}"
+            )
+    return free
+
+
+def _different(whole: Drawn) -> list[Chain]:
+    """The cheapest chains by their ends and by their starts, each once, cheapest first."""
+    asked = whole.asked
+    layers = whole.layers
+    by_end, layers = chains_through(asked, layers, _OF_EACH)
+    by_start, _ = chains_through(asked, layers, _OF_EACH, by_start=True)
+    kept: list[Chain] = []
+    for chain in sorted((*by_end, *by_start), key=lambda one: one.joules):
+        if all(
+            np.abs(portable.sin(0.5 * (chain.q - other.q))).max() > 0.5 * _SAME for other in kept
+        ):
+            kept.append(chain)
+    return kept
+
+
+def _turned(driven: DrivenPath) -> Iterator[Choice]:
+    """A movement as it is, then by whole turns of joints as far as their limits allow."""
+    movement = driven.movement
+    robot = movement.context.scene.cell.robot
+    trajectory = movement.trajectory
+    largest = extremes(*trajectory.coefficients())
+    low = largest.lowest.min(axis=0)
+    high = largest.highest.max(axis=0)
+    turns = [
+        [k for k in _TURNS if a + 2.0 * np.pi * k >= least and b + 2.0 * np.pi * k <= most]
+        for a, b, least, most in zip(low, high, robot.position_min, robot.position_max, strict=True)
+    ]
+    own = trajectory.positions
+    for shift in sorted(itertools.product(*turns), key=lambda one: sum(map(abs, one))):
+        if not any(shift):
+            yield Choice(own, movement)
+            continue
+        moved = own + 2.0 * np.pi * np.array(shift)
+        yield Choice(moved, replace(movement, trajectory=replace(trajectory, positions=moved)))
+
+
+# What whoever drives a path should know of its speed.
+
+_REACHED = 0.999  # of a speed
+
+
+def remarks(path: CartesianPath, found: DrivenPath) -> Iterator[tuple[str, str]]:
+    """Names and texts of remarks: T1 slows the tool, ramps are long, or the speed isn't reached."""
+    if found.slower < 1.0:
+        yield "t1", f"{found.slower * path.tool_speed:.4g} m/s, so that the flange keeps 250 mm/s"
+    if found.longer:
+        yield "speed", f"the axes need long ramps: the tool keeps its speed {_kept_between(found)}"
+    asked = found.slower * max(part.tool_speed or path.tool_speed for part in path.segments)
+    top = max(float(stroke.law.last.max()) for stroke in found.sent.strokes)
+    if top < _REACHED * asked:
+        yield (
+            "speed",
+            f"the path is too short for {asked:.4g} m/s: the tool moves at {top:.4g} m/s at most",
+        )
+
+
+def _kept_between(found: DrivenPath) -> str:
+    """Where the tool keeps its speed."""
+    where = [
+        f"from {stroke.curve.begin + begin:.3f} to {stroke.curve.begin + end:.3f} m"
+        for stroke in found.sent.strokes
+        for begin, end, even in zip(
+            stroke.law.places[:-1], stroke.law.places[1:], stroke.law.even, strict=True
+        )
+        if even
+    ]
+    return ", ".join(where) or "nowhere"
+
+
+# A path of the tool as a certified movement: the chain of configurations of least J that keeps the
+# speed.
 
 PLANNER_ID = "cartesian"
 

@@ -1,12 +1,18 @@
 """Programs in KUKA's language: as a KR C4 drives them in the cell, and written for it."""
 
-from ir_planner.krl.driven import DrivenStep
-from ir_planner.krl.evaluated import EvaluatedProgram, EvaluatedStep
+from ir_planner.krl.execution import DrivenStep
 from ir_planner.krl.export import DEVIATION_MAX, KrlExport
 from ir_planner.krl.geometry import tool_in_flange
-from ir_planner.krl.requests import evaluate_krl, export_krl, one_movement
-from ir_planner.krl.stations import posture_at, station_at
-from ir_planner.krl.tool_motions import ToolMotion
+from ir_planner.krl.requests import (
+    EvaluatedProgram,
+    EvaluatedStep,
+    evaluate_krl,
+    export_krl,
+    one_movement,
+    posture_at,
+    station_at,
+)
+from ir_planner.krl.splines import ToolMotion
 
 __all__ = [
     "DEVIATION_MAX",

@@ -1,24 +1,168 @@
-"""Spline blocks: several parts driven through without a stop.
+"""Splines: blocks of several parts driven without a stop, and their motions of the tool."""
 
-Assumptions, where KUKA publishes no formula: a PTP_SPLINE is the interpolating spline of degree
-five through its points; with one TIME_BLOCK over all of its parts it passes them at the marked
-times, at rest at both ends. A SPLINE is the same of the tool, straight between the ends of its SLIN
-parts and round along its SCIRC parts as far as a spline through their points is, at the speeds of
-its first part.
-"""
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import BSpline
+from scipy.optimize import linprog
 
+from ir_description.poses import inverse
 from ir_kernels import portable
-from ir_krl import KrlMotionError, Motion, SplineBlock, TimeBlock
+from ir_krl import Blend, KrlMotionError, Motion, Speeds, SplineBlock, Target, TimeBlock
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.cartesian import (
+    CIRCLE,
+    LINE,
+    POSES_MAX,
+    SPEED_MAX,
+    SPEED_MIN,
+    SPLINE,
+    CartesianSegment,
+)
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.cartesian import Line
 from ir_planner.curves import RotationSpline, turn_of, turned_evenly
-from ir_planner.krl.curves import AxisCurve, drawn_from, followed, through_axes
-from ir_planner.krl.geometry import Arm
-from ir_planner.krl.passing import resting_spline
+from ir_planner.krl.geometry import Arm, tool_in_flange
+from ir_planner.krl.motions import AxisCurve, drawn_from, followed, through_axes, tool_ends
+from ir_planner.scene import PlanningScene, torque_use
 from ir_planner.timing import GRID_NS, GRID_S
+
+# When a PTP_SPLINE passes its points: near the planned times as far as the limits allow.
+#
+# A spline through points of a planned movement overshoots where the plan's jerk steps from one limit
+# to the other, so that at the planned times it exceeds them. A sequence of linear programs changes
+# the times between
+# points, by a piecewise linear slowness over the movement: within the limits, not longer than planned
+# where that can be, with the least changes.
+
+_DEGREE = 5
+_KNOTS_MAX = 32  # of the slowness
+_PER_INTERVAL = 6  # samples between two points, where limits are looked at
+_ROUNDS = 12
+_TRUST = (0.1, 0.002)  # of the logarithm of the slowness in one round: at first, at least
+_NEAR = 0.7  # of a limit: samples below take no part in a linear program
+_USED = 0.996  # of a limit at samples: between them a little more is needed
+_STEP = 1e-5  # of a difference quotient
+_MISSED = 100.0  # cost of what exceeds a limit, in durations: far above what it could save
+_CHANGED = 0.01  # cost of a slowness on average: small, so that durations decide
+
+
+def resting_spline(times: FloatArray, points: FloatArray) -> BSpline:
+    """The spline of degree five through points (M, n) at times (M,) s, at rest at both ends."""
+    still = np.zeros(points.shape[1])
+    rest = (still, still)
+    return portable.interpolating_spline(times, points, _DEGREE, ends=(rest, rest))
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """points (M + 1, n) at times that follow from steps (M,) s and what basis (M, K) makes of a
+    slowness.
+    """
+
+    points: FloatArray
+    steps: FloatArray
+    basis: FloatArray
+    scene: PlanningScene
+
+    def lasting(self, slowness: FloatArray) -> FloatArray:
+        """Seconds (M,) between points, with a logarithm of the slowness (K,)."""
+        return np.asarray(self.steps * portable.exp(portable.matmul(self.basis, slowness)))
+
+    def used(self, slowness: FloatArray) -> FloatArray:
+        """Shares (R,) of the limits at samples."""
+        lasting = self.lasting(slowness)
+        times = np.concatenate([[0.0], np.cumsum(lasting)])
+        spline = resting_spline(times, self.points)
+        inner = (np.arange(_PER_INTERVAL) / _PER_INTERVAL)[None, :] * lasting[:, None]
+        at = np.append((times[:-1, None] + inner).ravel(), times[-1])
+        q, qd, qdd, qddd = (np.asarray(spline(at, nu=k)) for k in range(4))
+        limits = self.scene.limits
+        torque = torque_use(self.scene.dynamics, q, qd, qdd) / limits.torque_share
+        shares = (qd / limits.velocity, qdd / limits.acceleration, qddd / limits.jerk, torque)
+        return np.concatenate([np.abs(share).ravel() for share in shares])
+
+
+def passing_times(points: FloatArray, times: FloatArray, scene: PlanningScene) -> FloatArray:
+    """Times (M,) s at which points (M, n) are passed within the limits, from those that were
+    planned.
+    """
+    steps = np.diff(times)
+    problem = _Problem(points, steps, _hats(len(steps)), scene)
+    slowness = np.zeros(problem.basis.shape[1])
+    used = problem.used(slowness)
+    trust = _TRUST[0]
+    for _ in range(_ROUNDS):
+        change = _change(problem, slowness, used, trust)
+        trial = problem.used(slowness + change)
+        if _cost(problem, slowness + change, trial) < _cost(problem, slowness, used):
+            slowness = slowness + change
+            used = trial
+            if np.abs(change).max() < _TRUST[1]:
+                break
+        else:
+            trust *= 0.3
+            if trust < _TRUST[1]:
+                break
+    return np.concatenate([times[:1], times[0] + np.cumsum(problem.lasting(slowness))])
+
+
+def _cost(problem: _Problem, slowness: FloatArray, used: FloatArray) -> float:
+    longer = problem.lasting(slowness).sum() / problem.steps.sum() - 1.0
+    changed = _CHANGED * float(np.abs(slowness).mean())
+    return float(max(longer, 0.0) + changed + _MISSED * max(used.max() - _USED, 0.0))
+
+
+def _change(problem: _Problem, slowness: FloatArray, used: FloatArray, trust: float) -> FloatArray:
+    """The change (K,) of the slowness that a linear program finds.
+
+    Its variables are the change, the sizes of the slowness, what limits are exceeded by, and by
+    what share the movement is longer than planned.
+    """
+    rows = np.flatnonzero(used > _NEAR)
+    count = len(slowness)
+    slopes = np.empty((len(rows), count))
+    for k, beside in enumerate(slowness + _STEP * np.eye(count)):
+        slopes[:, k] = (problem.used(beside)[rows] - used[rows]) / _STEP
+    planned = problem.steps.sum()
+    lasting = problem.lasting(slowness)
+    one = np.eye(count)
+    none = np.zeros((count, 1))
+    limits = np.column_stack(
+        [slopes, np.zeros_like(slopes), -np.ones(len(rows)), np.zeros(len(rows))]
+    )
+    longer = np.concatenate(
+        [portable.matmul(lasting, problem.basis) / planned, np.zeros(count), [0.0, -1.0]]
+    )
+    above, below = (np.column_stack([sign * one, -one, none, none]) for sign in (1.0, -1.0))
+    found = linprog(
+        np.concatenate([np.zeros(count), np.full(count, _CHANGED / count), [_MISSED, 1.0]]),
+        A_ub=np.vstack([limits, longer, above, below]),
+        b_ub=np.concatenate(
+            [_USED - used[rows], [1.0 - lasting.sum() / planned], -slowness, slowness]
+        ),
+        bounds=[*[(-trust, trust)] * count, *[(0.0, None)] * (count + 2)],
+        method="highs",
+    )
+    return np.zeros(count) if found.x is None else np.asarray(found.x[:count])
+
+
+def _hats(intervals: int) -> FloatArray:
+    """What each of at most _KNOTS_MAX knots contributes to each interval (M, K)."""
+    knots = np.linspace(0.0, 1.0, min(intervals, _KNOTS_MAX))
+    middle = (np.arange(intervals) + 0.5) / intervals
+    if len(knots) == intervals:
+        return np.eye(intervals)
+    return np.column_stack([np.interp(middle, knots, one) for one in np.eye(len(knots))])
+
+
+# Spline blocks: several parts driven through without a stop.
+#
+# Assumptions, where KUKA publishes no formula: a PTP_SPLINE is the interpolating spline of degree
+# five through its points; with one TIME_BLOCK over all of its parts it passes them at the marked
+# times, at rest at both ends. A SPLINE is the same of the tool, straight between the ends of its SLIN
+# parts and round along its SCIRC parts as far as a spline through their points is, at the speeds of
+# its first part.
 
 _LINE_POINTS = 9  # of an SLIN part, so that the spline through them is straight
 _ARC_STEP = np.radians(
@@ -27,7 +171,6 @@ _ARC_STEP = np.radians(
 _STEP_M = 4e-3
 _SAMPLES_MIN = 33
 _SAMPLES_MAX = 20_001
-_DEGREE = 5
 _KNOTS_PER_S = 125
 
 
@@ -145,3 +288,89 @@ def _tool_spline(block: SplineBlock, start: FloatArray, arm: Arm) -> AxisCurve:
     q = followed(along, first, start, arm)
     turning = float(turn_of(portable.matmul(stacked[0, :3, :3].T, stacked[-1, :3, :3])))
     return AxisCurve(portable.interpolating_spline(fine, q, _DEGREE), length, turning)
+
+
+# Motions of the tool as segments of a path of the cell's tcp, with the speed that the program
+# allows.
+
+_SHORTEST = 1e-4  # m: shorter ones turn on the spot, they are no segment
+_SAME_TOOL = 1e-6  # m, and of the rotation's entries
+_EVEN = 1e-6  # rad: below, the orientation is constant
+
+
+@dataclass(frozen=True, eq=False)
+class ToolMotion:
+    """Segments from `start` (4, 4) [m] of the tcp in the cell; corner [m]: how far around its end
+    the tool
+    may leave them for the next motion, 0: it passes its end exactly.
+    """
+
+    start: FloatArray
+    segments: tuple[CartesianSegment, ...]
+    corner: float
+
+
+def tool_motion(motion: Motion, start: FloatArray, arm: Arm) -> ToolMotion | None:
+    """A LIN or CIRC from the configuration `start` (n,); None for one that no segment describes: it
+    turns on the spot, it leads another tool than the cell's, which turns, or its speed is out of
+    bounds.
+    """
+    first, last, path = tool_ends(motion, start, arm)
+    pieces = 1 if isinstance(path, Line) else max(int(np.ceil(abs(path.angle) / np.pi)), 1)
+    share = np.linspace(0.0, 1.0, 2 * pieces + 1)
+    poses = np.tile(np.eye(4), (len(share), 1, 1))
+    poses[:, :3, 3] = path.at(share * path.length)
+    poses[:, :3, :3] = turned_evenly(first[:3, :3], last[:3, :3], share)
+    turning = float(turn_of(portable.matmul(first[:3, :3].T, last[:3, :3])))
+    speed = _speed(motion.speeds, path.length, turning)
+    if path.length < _SHORTEST or not _described(motion.target, turning, speed, arm):
+        return None
+    tcp = _in_cell(poses, motion.target, arm)
+    if isinstance(path, Line):
+        segments = [CartesianSegment(LINE, (tcp[-1],), speed)]
+    else:
+        segments = [
+            CartesianSegment(CIRCLE, (tcp[k], tcp[k + 1]), speed) for k in range(1, 2 * pieces, 2)
+        ]
+    return ToolMotion(tcp[0], tuple(segments), _corner(motion.blend, path.length))
+
+
+def tool_spline(block: SplineBlock, start: FloatArray, arm: Arm) -> ToolMotion | None:
+    """A SPLINE block from the configuration `start` (n,); None where no segment describes it."""
+    first = block.parts[0]
+    poses = spline_poses(block, start, arm)
+    length = float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).sum())
+    turns = portable.matmul(poses[:-1, :3, :3].transpose(0, 2, 1), poses[1:, :3, :3])
+    turning = float(turn_of(turns).sum())
+    speed = _speed(first.speeds, length, turning)
+    if len(poses) > POSES_MAX or not _described(first.target, turning, speed, arm):
+        return None
+    tcp = _in_cell(poses, first.target, arm)
+    segment = CartesianSegment(SPLINE, tuple(tcp[1:]), speed)
+    return ToolMotion(tcp[0], (segment,), _corner(block.blend, length))
+
+
+def _in_cell(poses: FloatArray, target: Target, arm: Arm) -> FloatArray:
+    """The cell's tcp (N, 4, 4) where the target's tool has `poses` (N, 4, 4) in its base."""
+    return arm.tcp(portable.matmul(target.base, poses, inverse(target.tool)))
+
+
+def _described(target: Target, turning: float, speed: float, arm: Arm) -> bool:
+    """Whether the cell's tcp draws what the program's tool does, at a speed that a path may
+    have.
+    """
+    own = tool_in_flange(arm.scene.chain.tcp)
+    same = turning < _EVEN or float(np.abs(target.tool - own).max()) < _SAME_TOOL
+    return same and SPEED_MIN <= speed <= SPEED_MAX
+
+
+def _speed(speeds: Speeds, length: float, turning: float) -> float:
+    """The tool's speed [m/s], no more than lets it turn as fast as it may."""
+    bound = speeds.turning * length / turning if turning > 0.0 else speeds.velocity
+    return min(speeds.velocity, bound) * speeds.override
+
+
+def _corner(blend: Blend | None, length: float) -> float:
+    if blend is None:
+        return 0.0
+    return min(blend.distance if blend.distance > 0.0 else 0.5 * blend.share * length, 0.5 * length)

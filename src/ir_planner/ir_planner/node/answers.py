@@ -26,7 +26,6 @@ from ir_msgs_py.ros.plan_conversions import (
 from ir_msgs_py.ros.power_conversions import power_mode_to_msg
 from ir_msgs_py.savings import ProgramPoint
 from ir_msgs_py.status import Status
-from ir_planner.asked_states import StatesCheck
 from ir_planner.cartesian import CartesianPlan
 from ir_planner.checks import Evaluation, StateCheck
 from ir_planner.configurations import IkAnswer
@@ -34,6 +33,7 @@ from ir_planner.krl import KrlExport
 from ir_planner.program import ProgramPlan, Standby
 from ir_planner.regional import MovementPlan
 from ir_planner.service import ServicePlan
+from ir_planner.state_queries import StatesCheck
 from ir_planner.store import StoredProgram
 from ir_planner.trajectories import OptimizationPlan
 

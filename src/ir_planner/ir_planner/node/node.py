@@ -58,12 +58,11 @@ from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import cell_shapes, movement_shapes
 from ir_planner.errors import PlannerError
-from ir_planner.node.announcements import Announcements
 from ir_planner.node.answers import fill_status
 from ir_planner.node.goal_queue import GoalQueue
 from ir_planner.node.inputs import LastState, measured_velocity
-from ir_planner.node.markers import ShownMarkers
 from ir_planner.node.requests import Requests
+from ir_planner.node.topics import Announcements, ShownMarkers
 from ir_planner.planner import Planner
 from ir_planner.service import ServicePlan, service_shapes
 from ir_planner.settings import PlannerSettings

@@ -35,11 +35,11 @@ from ir_planner.node.answers import (
     fill_stored_program,
     stations_to_msg,
 )
-from ir_planner.node.cartesian_inputs import path_of
 from ir_planner.node.inputs import (
     LastState,
     goal_of,
     options_of,
+    path_of,
     pose_of,
     reference_of,
     state_of,

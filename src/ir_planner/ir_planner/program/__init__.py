@@ -2,18 +2,27 @@
 modes.
 """
 
-from ir_planner.program.asked_searches import unknown_searches
-from ir_planner.program.charge import Charge
-from ir_planner.program.doors import Doors, doors_advice, doors_along, doors_text, with_doors
-from ir_planner.program.outlook import Outlook, outlook
-from ir_planner.program.pause_lengths import Lengths, lengths_of
-from ir_planner.program.pauses import AUTO, Pause, pause_by_itself
-from ir_planner.program.program import plan_program
-from ir_planner.program.request import ProgramPlan, ProgramRequest, Progress, nobody
+from ir_planner.program.pauses import AUTO, Charge, Pause, pause_by_itself
+from ir_planner.program.program import Outlook, outlook, plan_program
+from ir_planner.program.request import (
+    ProgramPlan,
+    ProgramRequest,
+    Progress,
+    nobody,
+    unknown_searches,
+)
 from ir_planner.program.spreads import Spreads, with_intervals
-from ir_planner.program.standby import Standby
-from ir_planner.program.steps import PlacedStep, Scenes, placed_steps
-from ir_planner.program.waiting import Trip, best_posture
+from ir_planner.program.standby import Lengths, Standby, Trip, best_posture, lengths_of
+from ir_planner.program.steps import (
+    Doors,
+    PlacedStep,
+    Scenes,
+    doors_advice,
+    doors_along,
+    doors_text,
+    placed_steps,
+    with_doors,
+)
 
 __all__ = [
     "AUTO",

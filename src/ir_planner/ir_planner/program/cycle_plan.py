@@ -1,24 +1,164 @@
-"""Which chain of configurations and which movements fill a cycle time with the least energy at the
-mains.
-"""
+"""Programs of least energy at the mains in a cycle time, and the front over cycle times."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.program.chain import cheapest_chain
-from ir_planner.program.choice import Choice, Steps
-from ir_planner.program.cycle_time import Task, Timed, shared_out
-from ir_planner.program.gap import cycle_bound
-from ir_planner.program.ladder import FASTEST, LADDER
+from ir_planner.program.choice import Choice, Found, Steps
 from ir_planner.program.movements import rates_of
 from ir_planner.program.request import Progress, StageError
-from ir_planner.program.station_graph import Chain
-from ir_planner.program.time_values import TimeValues
+from ir_planner.program.station_graph import Chain, Part
+from ir_planner.program.time_values import FASTEST, LADDER, Point, SlowDown, TimeValues, slow_downs
 from ir_planner.request import DURATION_MAX
 from ir_planner.timing import Movement
+
+# A program within a cycle time: the seconds there are go where they save most joules.
+#
+# The movements of the chain are known at several values of a second (time_values). From the fastest
+# of all, parts are slowed down in the order of joules saved per second; a step that takes more than
+# the time left is passed over. Every stage of that is a program that ends early and waits, in the
+# mode of least energy for the wait's length; the cheapest of them is the answer. What is left of the
+# time is given to the next part in turn where that is cheaper than waiting.
+
+_NEAREST = 8  # programs that are cheapest without carried charge: with it one of them is
+SHORTEST_WAIT = (
+    0.05  # s: less is given to a movement, so that a program doesn't end with a twitch of a pause
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Timed:
+    """A movement for every part, how long to wait at the end [s], and the joules at the mains."""
+
+    movements: dict[Part, Movement]
+    wait: float
+    energy: float
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """seconds: for movements and the wait. waiting(seconds): joules of the wait. slower(movement,
+    seconds): the same in more seconds, None where that isn't certified. spent: joules of a whole
+    program, with carried charge.
+    """
+
+    seconds: float
+    waiting: Callable[[float], float]
+    slower: Callable[[Movement, float], Movement | None]
+    spent: Callable[[Timed], float] = lambda timed: timed.energy
+
+
+def shared_out(values: TimeValues, task: Task) -> Timed | None:
+    """The cheapest distribution of the time over movements and wait; None where it is too short."""
+    fronts = values.fronts()
+    chosen = {part: front[0] for part, front in fronts.items()}
+    left = task.seconds - sum(point.seconds for point in chosen.values())
+    if left < 0.0:
+        return None
+    steps = slow_downs(fronts)
+    too_long: dict[Part, SlowDown] = {}  # the first step of a part that doesn't fit, and ends it
+    found = _filled(chosen, left, steps, task)
+    for k, step in enumerate(steps):
+        if step.part in too_long:
+            continue
+        if step.seconds > left:
+            too_long[step.part] = step
+            continue
+        chosen = {**chosen, step.part: fronts[step.part][step.to]}
+        left -= step.seconds
+        found += _filled(chosen, left, [*too_long.values(), *steps[k + 1 :]], task)
+    found.sort(key=lambda timed: timed.energy)
+    whole = [replace(timed, energy=task.spent(timed)) for timed in found[:_NEAREST]]
+    return min(whole, key=lambda timed: timed.energy, default=None)
+
+
+def _to_slow(point: Point) -> tuple[bool, float]:
+    """The last to be slowed down is the longest movement, but none along a path at a tool's
+    speed.
+    """
+    return not point.movement.fixed_time, point.seconds
+
+
+def _filled(
+    chosen: dict[Part, Point], left: float, open_steps: list[SlowDown], task: Task
+) -> list[Timed]:
+    """Programs of these points: one that waits at the end, and one in which a part takes the time
+    left.
+    """
+    movements = {part: point.movement for part, point in chosen.items()}
+    energy = sum(movement.energy.total for movement in movements.values())
+    found = [Timed(movements, left, energy + task.waiting(left))] if left >= SHORTEST_WAIT else []
+    last = bool(open_steps) and left <= open_steps[0].seconds
+    if not (last or not open_steps or left < SHORTEST_WAIT):
+        return found  # a whole step fits: that program comes next
+    part = (
+        open_steps[0].part if open_steps else max(chosen, key=lambda part: _to_slow(chosen[part]))
+    )
+    before = movements[part]
+    after = task.slower(before, before.trajectory.duration + left)
+    if after is not None:
+        more = after.energy.total - before.energy.total
+        found.append(Timed({**movements, part: after}, 0.0, energy + more))
+    return found
+
+
+# How far above the best an answer can be: of its cost, what lies above a lower bound, in percent.
+#
+# The bound is that of the chains (station_graph), less what carried charge could save: at most the
+# capacitor's energy per movement. Within a cycle time it is the Lagrangian one: no chain costs less
+# at a value of a second than the best one at that value, so none has less energy than that leaves of
+# any time spent moving.
+
+_SHARES = 128  # of a cycle that may be spent moving, at which the bound is looked at
+
+
+def free_gap(choice: Choice, found: Found, steps: Steps) -> float:
+    """Gap [%] of a program without a cycle time."""
+    context = choice.movements.context
+    chain = choice.chain
+    rates = rates_of(context)
+    if rates.joule == 0.0 or context.options.objective == "movement_cost" or not found:
+        return 100.0 * chain.gap
+    alone = sum(movement.energy.total for movement in found.values())
+    received = alone - sum(step.report.energy for step in steps if not step.is_pause)
+    return _above(chain.cost - received, chain.bound - could_be_carried(choice, len(found)))
+
+
+def cycle_gap(choice: Choice, count: int, energy: float, bound: float) -> float:
+    """Gap [%] of a program of `count` movements within a cycle time: its energy at the mains
+    without the pauses in it, and the `bound` of `cycle_bound` [J].
+    """
+    return _above(energy, bound - could_be_carried(choice, count))
+
+
+def cycle_bound(choice: Choice, least: float, value: float, seconds: float) -> float:
+    """Least energy [J] at the mains of movements and wait in a cycle of `seconds`, where no chain
+    costs less than `least` at a value of a second [W].
+    """
+    base = choice.movements.context.scene.base_watts
+    waits = np.linspace(0.0, seconds, _SHARES + 1)
+    standing = np.array([choice.waiting(float(wait)) if wait > 0.0 else 0.0 for wait in waits])
+    moving = seconds - waits
+    return float((least + (base - value) * moving + standing).min())
+
+
+def could_be_carried(choice: Choice, count: int) -> float:
+    """What charge can save [J] at most over `count` movements."""
+    bus = choice.movements.context.scene.dc_bus
+    return bus.capacity_energy * max(count - 1, 0) if bus.regeneration != "none" else 0.0
+
+
+def _above(cost: float, bound: float) -> float:
+    return 100.0 * max(cost - max(bound, 0.0), 0.0) / cost if cost > 0.0 else 0.0
+
+
+# Which chain of configurations and which movements fill a cycle time with the least energy at the
+# mains.
 
 _ROUNDING = 1e-6  # s: durations are whole nanoseconds, stretched by millionths
 _SAME_CHAIN = (
@@ -185,3 +325,38 @@ def _slower(movement: Movement, duration: float) -> Movement | None:
     factor = np.floor(1e6 * duration / movement.trajectory.duration) / 1e6
     slower = movement.stretched_by(max(float(factor), 1.0))
     return slower if slower.certified else None
+
+
+# A program's energy at the mains over its cycle time: every point a certified program.
+#
+# All points go along the chain of the free plan, which is not the cheapest for every cycle time; a
+# request with a point's cycle time looks for a better one as well.
+
+_FULLEST = 1.001  # of the movements' shortest time: durations are rounded to nanoseconds
+
+
+def front_of(choice: Choice, count: int, standing: float, progress: Progress) -> list[TimedChoice]:
+    """`count` programs from the shortest cycle time to twice the free one, shortest first;
+    standing: seconds of the pauses in the program.
+
+    Energy falls to the cheapest cycle time and rises from there, by what a second of waiting costs.
+    There is none where time or work have ended.
+    """
+    work = choice.movements.context.work
+    values = TimeValues(choice.ladder, choice.parts)
+    if work.exhausted:
+        return []
+    values.bracket(0.0)
+    shortest = values.shortest * _FULLEST
+    longest = max(2.0 * values.own_seconds + standing, shortest)
+    times = portable.geomspace(shortest, longest, count) if count > 1 else np.array([shortest])
+    for k, seconds in enumerate(times.tolist()):
+        progress("pareto front", k, count, choice.chain.cost)
+        if not work.exhausted:
+            values.bracket(seconds)
+    front = []
+    for seconds in times.tolist():  # every point from all movements that are known by now
+        timed = shared_out(values, task_of(choice, seconds, standing))
+        if timed is not None:
+            front.append(TimedChoice(choice, timed, seconds + standing))
+    return front

@@ -13,14 +13,12 @@ from dataclasses import dataclass
 from ir_planner.errors import RequestError
 from ir_planner.program.chain import cheapest_chain, layers_of
 from ir_planner.program.choice import Choice, Found, Steps
-from ir_planner.program.cycle_plan import timed_choice
-from ir_planner.program.gap import cycle_gap, free_gap
-from ir_planner.program.ladder import FASTEST, Ladder
+from ir_planner.program.cycle_plan import cycle_gap, free_gap, timed_choice
 from ir_planner.program.movements import Movements, Near, cost_of, rates_of
 from ir_planner.program.request import ProgramRequest, Progress, StageError
-from ir_planner.program.route import Route
 from ir_planner.program.station_graph import ACROSS
-from ir_planner.program.time_values import TimeValues
+from ir_planner.program.steps import Route
+from ir_planner.program.time_values import FASTEST, Ladder, TimeValues
 from ir_planner.request import Context, Work
 from ir_planner.service import exit_searches
 

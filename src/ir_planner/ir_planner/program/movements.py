@@ -1,27 +1,103 @@
-"""The movements of a program: out of one stop, across, into the next. Each is planned once, however
-often the program makes it.
-"""
+"""Movements of a program: out of one stop, across, into the next; each is planned once."""
 
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.search_log import SearchLog
 from ir_msgs_py.status import Status, StatusCode
+from ir_planner import optimize
 from ir_planner.checks import Consumption
 from ir_planner.errors import TimingError
 from ir_planner.program.bounds import Rates
-from ir_planner.program.near import optimised_near, slowed_near
-from ir_planner.program.node import Node
-from ir_planner.program.parallel import mapped
-from ir_planner.program.route import Route
 from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Part
+from ir_planner.program.steps import Route
+from ir_planner.program.stops import Node
 from ir_planner.regional import Searches, search_regional
-from ir_planner.request import Context
+from ir_planner.request import Context, Journal, Work
 from ir_planner.service import timed_service
-from ir_planner.timing import Movement
+from ir_planner.timing import Movement, best_stretch, stretched
+
+# Movements that are known, made again for another value of a second: near the path of one, from
+# its own time scaling.
+
+
+def optimised_near(known: Sequence[Movement], context: Context) -> Movement | None:
+    """The cheapest certified movement by descent from known ones, at least one, or the cheapest of
+    them slowed down; None where neither is certified.
+    """
+    found = (optimize.optimised_near_best(known, context), slowed_near(known, context))
+    certified = [movement for movement in found if movement is not None and movement.certified]
+    return min(certified, key=lambda movement: movement.cost, default=None)
+
+
+def slowed_near(known: Sequence[Movement], context: Context) -> Movement | None:
+    """The cheapest of known movements between the same ends, each slowed down evenly as far as that
+    pays; None where none is certified.
+    """
+    slower = [_slowed(one, best_stretch(one.trajectory, context), context) for one in known]
+    cheapest = sorted(slower, key=lambda movement: movement.coarse_cost)
+    return next((movement for movement in cheapest if movement.certified), None)
+
+
+def _slowed(one: Movement, factor: float, context: Context) -> Movement:
+    """A movement slowed down for another request; what is known of it as it is stays known."""
+    if factor == 1.0:
+        return one.asked_by(context)
+    return Movement(one.path, stretched(one.trajectory, factor), context, one.note)
+
+
+# Work of one request done by several threads: every item has work of its own, so that answers
+# don't depend on how many there are or which one is first.
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def mapped(
+    task: Callable[[Item, Context], Result],
+    items: Sequence[Item],
+    context: Context,
+    improvement: int,
+    most: Sequence[int],
+    threads: int = 0,
+) -> list[Result]:
+    """task(item, context of its own) for every item, in order; what each did is added to
+    `context`'s journal.
+
+    improvement: work of each for better answers; most: of each at all. threads: 0: those of the
+    context's work. Raises what the first failing task raises, CancelledError when asked to stop.
+    """
+    own = [_own(context, improvement, left) for left in most]
+    count = min(threads or context.work.threads or len(os.sched_getaffinity(0)), len(items))
+    if count <= 1:
+        results = [task(item, mine) for item, mine in zip(items, own, strict=True)]
+    else:
+        with ThreadPoolExecutor(count) as pool:
+            results = list(pool.map(task, items, own))
+    for mine in own:
+        context.work.iterations += mine.work.iterations
+        context.work.truncated |= mine.work.truncated
+        context.journal.rejected.update(mine.journal.rejected)
+    context.work.check()
+    return results
+
+
+def _own(context: Context, improvement: int, left: int) -> Context:
+    """The context with so much work and a journal of its own."""
+    work = context.work
+    mine = Work(left, work.deadline, work.clock, work.cancelled, improvement, work.threads)
+    return Context(
+        context.scene, context.options, Journal(mine, context.journal.seed), context.station
+    )
+
+
+# The movements of a program: out of one stop, across, into the next. Each is planned once, however
+# often the program makes it.
 
 _PARTS = 3  # of a hop: out, across, in
 Key = tuple[int, str, tuple[str, str], tuple[bytes, bytes]]  # scene, kind, names of the stops, ends

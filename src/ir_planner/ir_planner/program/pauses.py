@@ -1,14 +1,247 @@
-"""Pauses of a program as they are sent, with the mode that they are spent in and what they cost."""
+"""Pauses of a program: modes to rest in, what they cost, and the capacitor's charge."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from itertools import combinations
 
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.modes import DEEPER, TransitionTimes, modes_of
+from ir_msgs_py.modes import DEEPER, REST_MODES, TransitionTimes, modes_of
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
-from ir_planner.program.rests import BRAKES, MOTORS, Rests, rests_at
+from ir_planner.checks import (
+    MovementEnergy,
+    carried,
+    holding_slope,
+    holding_watts,
+    peak_power,
+    standing_slope,
+)
 from ir_planner.scene import PlanningScene
+
+# The modes that a robot can rest in at a posture, and what a sequence of them costs.
+#
+# A sequence goes from motors deeper and deeper, each mode asked for at a switch time. While a mode is
+# entered the power is that of the mode that is left; while it is left it is that of standing on
+# motors. A mode can be left, deeper or back to motors, when it was entered and its shortest stay is
+# over. Left alone on motors, the controller closes its brakes after `timer` s. These conventions of
+# the power data decide every break-even.
+
+MOTORS = "STAND_ON_MOTORS"
+BRAKES = "STAND_ON_BRAKES"
+
+
+@dataclass(frozen=True)
+class Rest:
+    """A mode to rest in: its power [W] and times [s]."""
+
+    name: str
+    watts: float
+    enter: float
+    stay: float
+    leave: float
+
+    @property
+    def busy(self) -> float:
+        """Seconds from asking for it until it can be left."""
+        return self.enter + self.stay
+
+
+@dataclass(frozen=True)
+class Step:
+    """A mode that is asked for at a time [s] from the start of the pause, if the pause is still on
+    then.
+    """
+
+    rest: Rest
+    at: float
+
+    @property
+    def free(self) -> float:
+        """When the mode can be left [s]."""
+        return self.at + self.rest.busy
+
+
+Steps = tuple[Step, ...]
+
+
+@dataclass(frozen=True)
+class Rests:
+    """motors: power [W] of standing on motors; timer [s]; modes: the others, shallow to deep."""
+
+    motors: float
+    timer: float
+    modes: tuple[Rest, ...]
+
+    def named(self, name: str) -> Rest:
+        """The mode of that name."""
+        return next(rest for rest in self.modes if rest.name == name)
+
+    def cost(self, steps: Steps, pause: float) -> tuple[float, float]:
+        """Energy [J] from the start of a pause [s] until the robot is ready, when its end wakes the
+        robot, and how late that is [s].
+        """
+        reached = tuple(step for step in self._with_timer(steps) if step.at < pause)
+        if not reached:
+            return self.motors * pause, 0.0
+        last = reached[-1]
+        awake = max(pause, last.free)
+        return self._energy(reached, awake), awake + last.rest.leave - pause
+
+    def in_time(self, rests: Sequence[Rest], pause: float) -> float:
+        """Energy [J] of a pause of known length [s] with these modes, ready at its end; inf: too
+        short.
+        """
+        steps = at_once(rests)
+        awake = pause - steps[-1].rest.leave
+        return self._energy(steps, awake) if awake >= steps[-1].free else float("inf")
+
+    def _energy(self, steps: Steps, awake: float) -> float:
+        """Energy [J] from motors through the steps, woken at a time [s], until the robot is
+        ready.
+        """
+        energy = 0.0
+        since = 0.0
+        watts = self.motors
+        for step in steps:
+            entered = step.at + step.rest.enter
+            energy += watts * (entered - since)
+            since = entered
+            watts = step.rest.watts
+        return energy + watts * (awake - since) + self.motors * steps[-1].rest.leave
+
+    def known(self, pause: float) -> tuple[float, Steps]:
+        """Least energy [J] of a pause of known length [s], ready at its end, and the sequence; no
+        steps: on motors, as the controller spends it by itself.
+        """
+        best = (self.cost((), pause)[0], Steps())
+        for rests in self.sequences:
+            energy = self.in_time(rests, pause)
+            if energy < best[0]:
+                best = energy, at_once(rests)
+        return best
+
+    def clairvoyant(self, pause: float) -> float:
+        """Least energy [J] of a pause whose length [s] is known at its start, ready as early as the
+        sequence allows.
+        """
+        energies = [self.cost((), pause)[0]]
+        for steps in map(at_once, self.sequences):
+            last = steps[-1]
+            energies.append(self._energy(steps, max(pause - last.rest.leave, last.free)))
+        return min(energies)
+
+    @cached_property
+    def sequences(self) -> tuple[tuple[Rest, ...], ...]:
+        """All sequences of modes, each deeper than the one before and drawing less."""
+        chosen = (
+            each for n in range(1, len(self.modes) + 1) for each in combinations(self.modes, n)
+        )
+        return tuple(
+            rests
+            for rests in chosen
+            if all(
+                b.watts <= a
+                for a, b in zip((self.motors, *(r.watts for r in rests)), rests, strict=False)
+            )
+        )
+
+    def _with_timer(self, steps: Steps) -> Steps:
+        """The steps with the brakes that the controller closes by itself."""
+        if steps and steps[0].at <= self.timer:
+            return steps
+        if not self.modes:  # nothing to rest in: motors stay on
+            return steps
+        brakes = Step(self.named(BRAKES), self.timer)
+        return (
+            brakes,
+            *(
+                replace(step, at=max(step.at, brakes.free))
+                for step in steps
+                if step.rest != brakes.rest
+            ),
+        )
+
+
+def at_once(rests: Sequence[Rest]) -> Steps:
+    """Each mode as soon as the one before can be left."""
+    steps: list[Step] = []
+    for rest in rests:
+        steps.append(Step(rest, steps[-1].free if steps else 0.0))
+    return tuple(steps)
+
+
+def mode_watts(name: str, q: FloatArray, scene: PlanningScene) -> float:
+    """Mains power [W] in a mode at q (n,): controller, tool (its bus share while the drive bus is
+    up), holding torque.
+    """
+    if name == MOTORS:
+        return holding_watts(q, scene)
+    return scene.power.mode(name).controller_watts + scene.tool_watts(drive_bus=name == BRAKES)
+
+
+def rests_at(q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> Rests:
+    """The modes of a robot that stands at q (n,)."""
+    return _rests_at(tuple(q.tolist()), scene, times)
+
+
+@lru_cache(maxsize=64)  # a program is compared with many of the same pauses
+def _rests_at(posture: tuple[float, ...], scene: PlanningScene, times: TransitionTimes) -> Rests:
+    q = np.array(posture)
+    return Rests(
+        mode_watts(MOTORS, q, scene),
+        scene.power.motors_to_brakes_in_program,
+        tuple(
+            Rest(
+                name,
+                mode_watts(name, q, scene),
+                times.enter(name),
+                times.minimum_stay(name),
+                times.leave(name),
+            )
+            for name in REST_MODES[1:]
+            if name in [mode.name for mode in scene.power.modes]
+        ),
+    )
+
+
+# How the energy of a pause changes with each power parameter.
+#
+# With given switch times the energy is linear in the powers of the modes, so the seconds that count
+# for a mode are the energy of a robot that draws 1 W in it and nothing in the others.
+
+Energy = Callable[[Rests], float]
+"""Energy [J] of a pause that is spent in one given sequence."""
+
+
+def pause_slope(q: FloatArray, scene: PlanningScene, rests: Rests, energy: Energy) -> FloatArray:
+    """d energy / d parameter (P,) of a pause at q (n,), J per unit."""
+    slope = np.zeros(len(scene.parameters.names))
+    for mode in (MOTORS, *(rest.name for rest in rests.modes)):
+        seconds = energy(_one_watt(rests, mode))
+        if seconds != 0.0:
+            slope += seconds * _mode_slope(mode, q, scene)
+    return slope
+
+
+def same_steps(steps: Steps, rests: Rests) -> Steps:
+    """The steps with the powers of other rests."""
+    return tuple(Step(rests.named(step.rest.name), step.at) for step in steps)
+
+
+def _one_watt(rests: Rests, mode: str) -> Rests:
+    modes = tuple(replace(rest, watts=float(rest.name == mode)) for rest in rests.modes)
+    return replace(rests, motors=float(mode == MOTORS), modes=modes)
+
+
+def _mode_slope(mode: str, q: FloatArray, scene: PlanningScene) -> FloatArray:
+    if mode == MOTORS:
+        return holding_slope(q, scene)
+    return standing_slope(1.0, scene, mode, drive_bus=mode == BRAKES)
+
+
+# Pauses of a program as they are sent, with the mode that they are spent in and what they cost.
 
 AUTO = "AUTO"
 
@@ -71,3 +304,60 @@ def _spent(pause: Pause, mode: str, rests: Rests) -> PlannedMovement:
         load=pause.scene.load_text,
         report=report,
     )
+
+
+# The charge of the DC link's capacitor, carried from step to step of a program.
+#
+# A movement leaves what its braking gave, the next one takes it first. While the motors hold the arm
+# the charge feeds the holding torque; with the brakes closed it stays.
+
+
+class Charge:
+    """stored [J] after the steps so far; empty at first."""
+
+    def __init__(self, times: TransitionTimes) -> None:
+        self.stored = 0.0
+        self._times = times
+
+    def moved(
+        self, step: PlannedMovement, alone: MovementEnergy, scene: PlanningScene
+    ) -> PlannedMovement:
+        """The step of a movement with the energy that it takes from the mains now; alone: what it
+        takes with an empty capacitor.
+        """
+        assert step.trajectory is not None  # it moves
+        charge = self.stored
+        energy = self.taken(alone, scene)
+        report = step.report
+        if energy is not alone:
+            peak = peak_power(step.trajectory, scene, charge)
+            report = replace(
+                report, energy=energy.total, burnt_energy=energy.dissipated, peak_power=peak
+            )
+        return replace(step, report=report)
+
+    def taken(self, alone: MovementEnergy, scene: PlanningScene) -> MovementEnergy:
+        """What a movement takes from the mains now; alone: the same with an empty capacitor."""
+        energy = carried(alone, self.stored, scene)
+        self.stored = energy.capacitor
+        return energy
+
+    def stood(self, step: PlannedMovement, pause: Pause) -> PlannedMovement:
+        """The step of a pause, whose holding torque takes the charge first."""
+        scene = pause.scene
+        watts = holding_watts(pause.q, scene) - scene.base_watts
+        fed = min(self.stored, max(watts, 0.0) * self._holding(step, pause))
+        self.stored -= fed
+        report = step.report
+        energy = report.energy - fed
+        return replace(step, report=replace(report, energy=energy, base_energy=energy))
+
+    def _holding(self, step: PlannedMovement, pause: Pause) -> float:
+        """How long the motors hold the arm [s]; the controller's own timer closes the brakes long
+        after the charge has gone.
+        """
+        modes = modes_of(step.power_mode)
+        times = self._times
+        if not modes:
+            return pause.seconds
+        return min(times.enter(modes[0].name) + times.leave(modes[-1].name), pause.seconds)

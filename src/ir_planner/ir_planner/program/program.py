@@ -1,35 +1,145 @@
-"""A whole program: configurations at the stations, all movements and pauses between them, loads and
-power modes.
-
-The chain of configurations that costs least by the objective, with the movements that it consists
-of, each with what is held at that moment.
-"""
+"""Programs: configurations at the stations, movements, pauses and power modes."""
 
 import hashlib
-from dataclasses import replace
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import NO_LOAD
-from ir_msgs_py.report import PlannedMovement, PlanningInfo
+from ir_msgs_py.report import MovementKind, PlannedMovement, PlanningInfo
 from ir_msgs_py.savings import ProgramSavings
+from ir_msgs_py.search_log import CorrectionLog, SearchLog, WithdrawalLog
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import total_report
 from ir_planner.errors import RequestError
-from ir_planner.program.asked_searches import check_searches
-from ir_planner.program.choice import Steps
-from ir_planner.program.comparison import held_against_common
-from ir_planner.program.doors import doors_advice, doors_text
-from ir_planner.program.front import front_of
-from ir_planner.program.logs import logs_of
+from ir_planner.program.chain import TOLERANCE, CostEdges, layers_of
+from ir_planner.program.choice import Choice, Steps
+from ir_planner.program.cycle_plan import front_of
 from ir_planner.program.more_work import best_answer
-from ir_planner.program.request import ProgramPlan, ProgramRequest, Progress, StageError, nobody
-from ir_planner.program.route import Route
-from ir_planner.program.savings import named
+from ir_planner.program.movements import Movements
+from ir_planner.program.request import (
+    ProgramPlan,
+    ProgramRequest,
+    Progress,
+    StageError,
+    check_searches,
+    nobody,
+)
+from ir_planner.program.savings import held_against_common, named
 from ir_planner.program.spreads import Spreads
-from ir_planner.program.steps import Scenes, placed_steps, steps_of
+from ir_planner.program.station_graph import Part, Settled, StationGraph
+from ir_planner.program.steps import Route, Scenes, doors_advice, doors_text, placed_steps, steps_of
+from ir_planner.program.stops import Node, leaves_zone
 from ir_planner.request import Context, Journal, Work, noted
+from ir_planner.scene import PlanningScene
+from ir_planner.service import ExitPath, exit_searches, lines_free, service_lines
 from ir_planner.timing import at_the_mains
+
+# What the searches that a cell asks for at its stations and steps did for the chain that was
+# chosen.
+
+_DROPPED = 300  # configurations that came too near something, kept for a picture
+_BETWEEN = 12  # positions of the tool along a step of a path
+_DRIVEN = 120  # along a movement
+_EDGES = 1_000_000  # certified edges to look at one straight line: they are no work of the request
+_SAME = 1e-6  # rad
+
+
+def logs_of(choice: Choice, steps: Sequence[PlannedMovement]) -> Iterator[SearchLog]:
+    """Of the withdrawals and genetic corrections along a chain, each once; steps: of its
+    program.
+    """
+    movements = choice.movements
+    seen = set[int]()
+    for place, row in enumerate(choice.chain.chosen):
+        node: Node = movements.layers[place][row]
+        found = node.line.exit
+        if found is not None and id(found) not in seen:
+            seen.add(id(found))
+            yield _withdrawal_log(place - 1, node, found, movements)
+    for part in choice.parts:
+        for log in movements.logs(part):
+            if isinstance(log, CorrectionLog) and id(log) not in seen:
+                seen.add(id(log))
+                names = movements.route.name(part.hop - 1), movements.route.name(part.hop)
+                driven = _driven(part, movements, steps)
+                yield replace(log, start=names[0], goal=names[1], driven=driven)
+
+
+def _driven(part: Part, movements: Movements, steps: Sequence[PlannedMovement]) -> FloatArray:
+    """Positions (M, 3) of the tool along the step that a part became; none where no step has its
+    ends.
+    """
+    ends = np.stack(movements.ends(part))
+    scene = movements.route.arriving(part.hop)
+    for step in steps:
+        motion = step.trajectory
+        if step.kind != MovementKind.REGIONAL or motion is None:
+            continue
+        if np.abs(motion.positions[[0, -1]] - ends).max() < _SAME:
+            times = np.linspace(motion.times[0], motion.times[-1], _DRIVEN)
+            return _tool(motion.sample(times).q, scene)
+    return np.zeros((0, 3))
+
+
+def _tool(q: FloatArray, scene: PlanningScene) -> FloatArray:
+    return scene.chain.tcp_poses(np.ascontiguousarray(q))[:, :3, 3] if len(q) else np.zeros((0, 3))
+
+
+def _withdrawal_log(place: int, node: Node, found: ExitPath, movements: Movements) -> WithdrawalLog:
+    """The withdrawal at a stop, along its points `found` but for whole turns."""
+    scene = movements.route.arriving(place)
+    station = scene.station(movements.route.name(place))
+    share = np.linspace(0.0, 1.0, _BETWEEN)[:, None, None]
+    steps = found.points[:-1] + share * np.diff(found.points, axis=0)
+    along = steps.transpose(1, 0, 2).reshape(-1, found.points.shape[1])
+    walk = found.search.walk
+    rejected = found.search.rejected
+    kept = found.points[:1] if walk is None else walk.kept
+    dropped = kept[:0] if walk is None else walk.dropped
+    every = max(-(-len(dropped) // _DROPPED), 1)
+    arriving = movements.context.inside(scene).at(station.name)
+    return WithdrawalLog(
+        station=station.name,
+        load=scene.load_text,
+        method=found.method,
+        generations=0 if walk is None else walk.generations,
+        candidates=0 if walk is None else walk.candidates,
+        rejected=tuple(sorted(rejected.items(), key=lambda item: (-item[1], item[0]))),
+        distance=(0.0, 0.0) if walk is None else walk.distance,
+        kept=_tool(kept, scene),
+        parents=np.zeros(1, dtype=np.int64) if walk is None else walk.parents,
+        dropped=_tool(dropped[::every], scene),
+        path=_tool(along, scene),
+        asked=station.search.withdrawal != "",
+        blocked=_blocked(
+            node.interaction, (arriving, arriving.inside(movements.route.leaving(place)))
+        ),
+    )
+
+
+def _blocked(q: FloatArray, both: tuple[Context, Context]) -> str:
+    """Why the straight line back along the tool from q (n,) leads nowhere, on arriving or on
+    leaving; "": it is free and leaves the zone.
+    """
+    uncounted = Journal(Work(_EDGES, np.inf, both[0].work.clock), both[0].journal.seed)
+    contexts = [replace(context, journal=uncounted) for context in both]
+    rejected: Counter[str] = Counter()
+    lines = service_lines(q[None], contexts[0], rejected)
+    free = bool(lines) and all(all(lines_free(lines, context, rejected)) for context in contexts)
+    if free and all(leaves_zone(lines, contexts[0])):
+        return ""
+    return next(iter(rejected), f"line out of {both[0].station}: it ends within the zone")
+
+
+# A whole program: configurations at the stations, all movements and pauses between them, loads and
+# power modes.
+#
+# The chain of configurations that costs least by the objective, with the movements that it consists
+# of, each with what is held at that moment.
 
 _SENTENCES = 4  # of a failure
 _ENDED = "{}; {} ended before all was tried: more of it may help"
@@ -161,3 +271,39 @@ def program_hash(movements: tuple[PlannedMovement, ...]) -> str:
         handling = (m.attach, m.detach, m.load, *m.wait_for, "|", *m.set_signals)
         digest.update("\0".join(str(value) for value in (*texts, *handling)).encode() + b"\n")
     return digest.hexdigest()[:16]
+
+
+# What to expect of a program before it is planned: whether its stops can be reached at all, and
+# what coarse movements cost that meet nothing. That takes a small part of the work of planning it.
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """status: why a stop has no configuration that can be entered and left. cost: by the objective,
+    without a cycle time, of the cheapest chain of coarse movements, less their margin; inf where
+    the status says why.
+    """
+
+    status: Status
+    cost: float
+
+
+def outlook(request: ProgramRequest, work: Work) -> Outlook:
+    """The outlook of a request; its cycle time doesn't count. Raises RequestError for one without
+    sense.
+    """
+    route, context = prepared(replace(request, cycle_time=0.0), Journal(work, request.options.seed))
+    settings = request.settings
+    searches = exit_searches(settings.withdrawal)
+    try:
+        layers = layers_of(route, request.start, context, searches, nobody, settings.interaction)
+    except StageError as failed:
+        return Outlook(failed.status, np.inf)
+    if not len(route):
+        return Outlook(Status.success(), 0.0)
+    edges = CostEdges(Movements(route, layers, context, settings.searches), 0)
+
+    def coarse(parts: list[Part]) -> list[Settled]:
+        return [replace(found, exact=True) for found in edges.settle(parts)]
+
+    return Outlook(Status.success(), StationGraph(edges.hops(), coarse, TOLERANCE).solve().cost)

@@ -1,12 +1,8 @@
-"""What a program saves, in three figures that stand up: movements, pauses, total.
+"""The common program, and what the planner's program saves against it in the same seconds."""
 
-Movements are held against the common program at equal cycle time; a wait at the end counts as
-movement. Pauses are held against what the controller does by itself. All energies are those at the
-mains, controller and tool included.
-"""
-
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,8 +10,126 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import ProgramSavings, Saving
 from ir_planner.checks import ROBOTS, interval
-from ir_planner.program.choice import Steps, duration_of
-from ir_planner.program.common_program import CommonProgram
+from ir_planner.errors import RequestError, TimingError
+from ir_planner.program.choice import Choice, Steps, duration_of
+from ir_planner.program.cycle_plan import timed_choice
+from ir_planner.program.movements import Failure, Movements, mapped
+from ir_planner.program.request import Progress, StageError
+from ir_planner.program.spreads import Spreads
+from ir_planner.program.station_graph import ACROSS, Chain, Part
+from ir_planner.program.time_values import FASTEST
+from ir_planner.scene import movement_cost
+from ir_planner.timing import Movement, baseline, straight_steps
+
+# The common program: what a commissioned robot would do at the same stations, to hold savings
+# against.
+#
+# Baseline movements (straight joint segments as synchronous S-curves at full speed) through the same
+# stations, at each stop the configuration that is nearest to the one before by W, turns included; the
+# same service lines, as fast as they can; the same pauses, left to the controller's own timers. Where
+# a segment is not free, the movement runs along the planner's path in straight steps with blended
+# corners; `around` counts these.
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True, eq=False)
+class CommonProgram:
+    """Its chain with the movements of all parts; `around` of its `across` regional movements run
+    around bodies.
+    """
+
+    choice: Choice
+    found: Mapping[Part, Movement]
+    around: int
+
+    @property
+    def across(self) -> int:
+        """How many regional movements it has."""
+        return sum(part.kind == ACROSS for part in self.found)
+
+    def steps(self, until: float = 0.0) -> Steps:
+        """Movements and pauses in order, and a wait at the end that lasts until `until` s."""
+        return self.choice.steps(self.found, until=until, by_itself=True)
+
+
+def common_program(choice: Choice) -> CommonProgram:
+    """The common program of a request, which moves as fast as it can; it needs the request's layers
+    only.
+
+    Raises StageError where it has a movement that isn't found.
+    """
+    fastest = choice.ladder.at(FASTEST)
+    improvement = choice.ladder.improvement
+    nearest = choice.along(nearest_chain(fastest))
+    parts = nearest.parts
+    across = [part for part in parts if part.kind == ACROSS]
+    lines = [part for part in parts if part.kind != ACROSS]
+    chosen = dict(zip(lines, _all_found(lines, fastest, improvement), strict=True))
+    plain = dict(
+        zip(across, _side_by_side(lambda part: _plain(part, fastest), across, fastest), strict=True)
+    )
+    around = [part for part, movement in plain.items() if movement is None]
+    chosen |= {part: movement for part, movement in plain.items() if movement is not None}
+    own = Movements(fastest.route, fastest.layers, fastest.context, fastest.searches)
+    paths = _all_found(around, own, 0)
+    chosen |= zip(around, _side_by_side(_in_straight_steps, paths, fastest), strict=True)
+    return CommonProgram(nearest, {part: chosen[part] for part in parts}, len(around))
+
+
+def nearest_chain(movements: Movements) -> Chain:
+    """At each stop the configuration nearest to the one before by W."""
+    chosen = [0]
+    total = 0.0
+    for hop in range(len(movements.route)):
+        weights = movements.route.arriving(hop).weights
+        here = movements.layers[hop][chosen[-1]].departure
+        there = np.array([node.arrival for node in movements.layers[hop + 1]])
+        costs = movement_cost(weights, here, there)
+        chosen.append(int(np.argmin(costs)))
+        total += float(costs.min())
+    return Chain(chosen, total, total, total)
+
+
+def _plain(part: Part, movements: Movements) -> Movement | None:
+    """The baseline movement of a part across, None where it isn't certified."""
+    first, second = movements.ends(part)
+    found = baseline(first, second, movements.context.inside(movements.route.arriving(part.hop)))
+    return found if found is not None and found.certified else None
+
+
+def _all_found(parts: list[Part], movements: Movements, improvement: int) -> list[Movement]:
+    """The movements of parts. Raises StageError for the first that isn't found."""
+    found = list[Movement]()
+    for each in movements.plan(parts, improvement):
+        if isinstance(each, Failure):
+            raise StageError(each.status)
+        found.append(each)
+    return found
+
+
+def _in_straight_steps(found: Movement) -> Movement:
+    """The movement along the planner's path; that itself where the other isn't certified."""
+    try:
+        along = straight_steps(found.path, found.context)
+    except TimingError:
+        return found
+    return along if along.certified else found
+
+
+def _side_by_side(
+    task: Callable[[Item], Result], items: Sequence[Item], movements: Movements
+) -> list[Result]:
+    """What a task that needs no work makes of every item."""
+    return mapped(lambda item, _: task(item), items, movements.context, 0, [0] * len(items))
+
+
+# What a program saves, in three figures that stand up: movements, pauses, total.
+#
+# Movements are held against the common program at equal cycle time; a wait at the end counts as
+# movement. Pauses are held against what the controller does by itself. All energies are those at the
+# mains, controller and tool included.
 
 Added = Callable[[Steps], list[FloatArray]]
 
@@ -102,3 +216,70 @@ def _percent(saving: Saving) -> str:
 
 def _energy(steps: Sequence[PlannedMovement]) -> float:
     return float(sum(step.report.energy for step in steps))
+
+
+# A program held against the common program, over the same seconds.
+#
+# Without a cycle time, and within one that the common program can't keep, the planner's program is
+# planned for the time that the common program takes. In a longer cycle both wait at their ends.
+
+_ENDED = "planning_time or max_iterations ended before the common program was compared"
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Savings, of which steps, what was compared in words, and the steps of the common program."""
+
+    savings: ProgramSavings
+    steps: Steps
+    compared: str
+    common: Steps
+
+
+def held_against_common(
+    choice: Choice,
+    own: Steps,
+    cycle_time: float,
+    standing: float,
+    spreads: Spreads,
+    progress: Progress,
+) -> Comparison | str:
+    """The comparison of a program; own: its steps in a cycle time (0: free), of which `standing` s
+    are pauses. Where there is none, the sentence why.
+    """
+    progress("savings", 0, 1, choice.chain.cost)
+    context = choice.movements.context
+    with context.journal.stage("savings") as notes:
+        if context.work.exhausted:
+            notes.append("none")
+            return f"no savings: {_ENDED}"
+        try:
+            common = common_program(choice)
+            plain = common.steps()
+            seconds = duration_of(plain)
+            if cycle_time >= seconds:
+                waiting = common.steps(until=cycle_time)
+                words = f"both in the cycle time of {cycle_time:g} s"
+                if len(waiting) > len(plain):
+                    words += (
+                        f", of which the common program waits {waiting[-1].duration:.2f} s "
+                        "at its end"
+                    )
+                savings = savings_of(waiting, own, _pauses(plain), common, spreads.of)
+                return Comparison(savings, own, words, waiting)
+            if context.work.exhausted:
+                notes.append("none")
+                return f"no savings: {_ENDED}"
+            steps = timed_choice(choice, seconds, standing, progress).steps
+        except (StageError, RequestError) as error:
+            notes.append("none")
+            return f"no savings: {error}"
+        words = f"both in the common program's {seconds:.2f} s"
+        words += f", which can't keep {cycle_time:g} s" if cycle_time > 0.0 else ""
+        return Comparison(
+            savings_of(plain, steps, _pauses(plain), common, spreads.of), steps, words, plain
+        )
+
+
+def _pauses(steps: Steps) -> int:
+    return sum(step.is_pause for step in steps)

@@ -1,23 +1,246 @@
-"""How a pause should be spent: a sequence of power modes with its switch times, and when to wake.
+"""Standby: how a pause is spent best, known or uncertain in length, and at which posture."""
 
-Of a pause of known length the modes are entered one after the other, each as soon as it can be, so
-that most of it is spent in the deepest, and the robot is woken in time. A pause whose end is not
-known has a timeout policy (timeouts), and its end wakes the robot, which is ready later then.
-"""
-
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import REST_MODES, Mode, PowerMode, TransitionTimes
+from ir_msgs_py.status import StatusCode
 from ir_planner.checks import Interval, interval, spread
-from ir_planner.program.pause_lengths import Lengths, lengths_of
-from ir_planner.program.pause_slopes import pause_slope, same_steps
-from ir_planner.program.rests import BRAKES, MOTORS, Rests, Step, Steps, mode_watts, rests_at
-from ir_planner.program.timeouts import Timeouts
+from ir_planner.errors import RequestError
+from ir_planner.program.pauses import (
+    BRAKES,
+    MOTORS,
+    Rest,
+    Rests,
+    Step,
+    Steps,
+    mode_watts,
+    pause_slope,
+    rests_at,
+    same_steps,
+)
 from ir_planner.scene import PlanningScene
+
+# How long a pause lasts: known, or as equally likely lengths, or as quantiles; checked at the
+# door.
+
+PAUSE_MAX = 604_800.0  # s: a week
+SAMPLES_MAX = 10_000  # planned in 40 ms of processor time
+# equally likely lengths that quantiles are taken as: the mean of a law with jumps to 0.1 %
+_BETWEEN = 1000
+
+_NONE: FloatArray = np.zeros(0)
+
+
+@dataclass(frozen=True, eq=False)
+class Lengths:
+    """likely (n,) [s]: equally likely lengths, sorted. most [s]: no pause is longer. known: there
+    is one only.
+    """
+
+    likely: FloatArray
+    most: float
+    known: bool = False
+
+    def less(self, seconds: float) -> "Lengths":
+        """What is left of each pause when `seconds` are taken from it; nothing is left of shorter
+        ones.
+        """
+        return Lengths(
+            np.maximum(self.likely - seconds, 0.0), max(self.most - seconds, 0.0), self.known
+        )
+
+    def extreme(self, switches: tuple[float, ...]) -> FloatArray:
+        """Lengths at which a policy with these switch times [s] may cost most: all that are likely,
+        the longest, and where lengths between the likely ones are possible, those just longer than
+        a switch.
+        """
+        if self.most == self.likely[-1]:
+            return self.likely
+        just = np.nextafter(np.array(switches), np.inf)
+        between = just[(just > self.likely[0]) & (just < self.most)]
+        return np.concatenate((self.likely, [self.most], between))
+
+
+def lengths_of(pause: float, samples: FloatArray = _NONE, quantiles: FloatArray = _NONE) -> Lengths:
+    """Lengths of a request that gives one of the three: pause [s], samples (n,) or quantiles (n,)
+    [s]. Raises RequestError for what is no pause.
+    """
+    given = {"pause_samples": samples, "pause_quantiles": quantiles}
+    lists = [name for name, values in given.items() if len(values)]
+    if len(lists) + (pause != 0.0) > 1:
+        counts = [f"{name} ({len(given[name])} values)" for name in lists]
+        named = " and ".join([*([f"pause ({pause:g} s)"] if pause != 0.0 else []), *counts])
+        raise _refused(
+            f"{named} are given: exactly one of pause, pause_samples and pause_quantiles must be"
+        )
+    if not lists:
+        _check(pause, "pause")
+        return Lengths(np.array([pause]), pause, known=True)
+    (name,) = lists
+    values = given[name]
+    if len(values) > SAMPLES_MAX:
+        raise _refused(f"{name} has {len(values)} values: at most {SAMPLES_MAX} are taken")
+    for k, value in enumerate(values):
+        _check(float(value), f"{name}[{k}]")
+    if name == "pause_samples":
+        return Lengths(np.sort(values), float(values.max()))
+    return _between(values)
+
+
+def _between(quantiles: FloatArray) -> Lengths:
+    """Equally likely lengths between neighbouring quantiles."""
+    if len(quantiles) < 2:
+        raise _refused(
+            "pause_quantiles has 1 value: at least 2 are needed, those of the levels 0 and 1"
+        )
+    for k, (a, b) in enumerate(pairwise(quantiles)):
+        if b < a:
+            raise _refused(
+                f"pause_quantiles[{k + 1}] is {b:g} s: it must be at least the one before, {a:g} s"
+            )
+    parts = max(1, -(-_BETWEEN // (len(quantiles) - 1)))
+    share = (np.arange(parts) + 0.5) / parts
+    likely = quantiles[:-1, None] + share * np.diff(quantiles)[:, None]
+    return Lengths(likely.ravel(), float(quantiles[-1]))
+
+
+def _check(seconds: float, name: str) -> None:
+    if not (np.isfinite(seconds) and 0.0 < seconds <= PAUSE_MAX):
+        raise _refused(f"{name} is {seconds:g} s: it must be in (0, {PAUSE_MAX:g}] s")
+
+
+def _refused(sentence: str) -> RequestError:
+    return RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, sentence)
+
+
+# When to rest deeper in a pause whose end is not known: the timeout policy of least expected
+# energy.
+#
+# The lengths of the pause are given as equally likely samples. A policy is a sequence of modes with
+# switch times; the end of the pause wakes the robot, whatever mode it is in. The best switch times
+# are among few: the expected energy grows with a switch time between two samples (every pause that
+# reaches it stays longer in the mode that draws more, or is ready later), and drops only where a
+# sample is passed, because that pause ends before the switch. So a switch is at 0, at a sample (of
+# the pauses longer than that), at the controller's own timer, or at the moment when the mode before
+# can be left. Over these times the policy is found backwards, mode
+# by mode, by dynamic programming: exact, in n log n.
+
+
+@dataclass(frozen=True, eq=False)
+class Timeouts:
+    """Policies for the modes of `rests` and lengths (n,) [s], sorted."""
+
+    rests: Rests
+    lengths: FloatArray
+
+    def best(self) -> Steps:
+        """The policy of least expected energy."""
+        steps = self._first()
+        while steps and (following := self._next(steps[-1])) is not None:
+            steps = (*steps, following)
+        return steps
+
+    def _first(self) -> Steps:
+        """The first mode and its switch time; none: no pause outlasts standing on motors."""
+        rests = self.rests
+        lengths = self.lengths
+        times = np.concatenate(([0.0], lengths[lengths <= rests.timer]))
+        best = float("inf"), Steps()
+        if lengths[-1] <= rests.timer:
+            best = self._until(np.array([lengths[-1]]), rests.motors, 0.0)[0], Steps()
+        for rest in rests.modes:
+            at = np.append(times, rests.timer) if rest.name == BRAKES else times
+            costs = self._until(at, rests.motors, 0.0) + self._from(at, rest, rests.motors)
+            k = int(np.argmin(costs))
+            if rest.watts <= rests.motors and costs[k] < best[0]:
+                best = float(costs[k]), (Step(rest, float(at[k])),)
+        return best[1]
+
+    def _next(self, step: Step) -> Step | None:
+        """The mode after a step and its switch time; None: it is the last."""
+        rest = step.rest
+        lengths = self.lengths
+        at = np.concatenate(([step.free], lengths[lengths >= step.free]))
+        least = self._until(lengths[-1:], rest.watts, rest.leave)[0]
+        best = None
+        for deeper in self._deeper(rest):
+            costs = self._until(at, rest.watts, rest.leave) + self._from(at, deeper, rest.watts)
+            k = int(np.argmin(costs))
+            if self._longer(at)[k] and costs[k] < least:
+                least = costs[k]
+                best = Step(deeper, float(at[k]))
+        return best
+
+    def _deeper(self, rest: Rest) -> tuple[Rest, ...]:
+        after = self.rests.modes[self.rests.modes.index(rest) + 1 :]
+        return tuple(each for each in after if each.watts <= rest.watts)
+
+    @cached_property
+    def _sums(self) -> FloatArray:
+        return np.concatenate(([0.0], np.cumsum(self.lengths)))
+
+    def _shorter(self, times: FloatArray) -> FloatArray:
+        """How many pauses end at each time or before."""
+        return np.searchsorted(self.lengths, times, side="right").astype(np.float64)
+
+    def _longer(self, times: FloatArray) -> FloatArray:
+        return len(self.lengths) - self._shorter(times)
+
+    def _until(self, times: FloatArray, watts: float, leave: float) -> FloatArray:
+        """Energy of all pauses in one mode from time 0 until each of these times, and back to
+        motors of those that end before; differences of two times are the energy between them.
+        """
+        ended = self._shorter(times)
+        lengths = self._sums[ended.astype(np.intp)]
+        staying = watts * (lengths + self._longer(times) * times)
+        back: FloatArray = ended * (self.rests.motors * leave)
+        return staying + back
+
+    def _from(self, times: FloatArray, rest: Rest, watts: float) -> FloatArray:
+        """Least energy, of all pauses that are longer, of entering a mode at each of these times
+        from one that draws `watts`, until the robot is ready.
+        """
+        longer = self._longer(times)
+        free = times + rest.busy
+        entering = longer * (watts * rest.enter + rest.watts * rest.stay)
+        early = (longer - self._longer(free)) * (self.rests.motors * rest.leave)
+        return entering + early + self._after(free, rest)
+
+    def _after(self, free: FloatArray, rest: Rest) -> FloatArray:
+        """Least energy from each of the times on, from which a mode can be left, of all pauses that
+        are longer.
+        """
+        ends = self._onward(self.lengths, rest)
+        later = np.minimum.accumulate(ends[::-1])[::-1]
+        following = np.searchsorted(self.lengths, free, side="left")
+        at_samples = np.append(later, np.inf)[following]
+        best = np.minimum(at_samples, self._onward(free, rest)) - self._until(
+            free, rest.watts, rest.leave
+        )
+        return np.where(self._longer(free) > 0, best, 0.0)
+
+    def _onward(self, times: FloatArray, rest: Rest) -> FloatArray:
+        """Energy in the mode from time 0 until each of these times, then deeper; the last: to the
+        end.
+        """
+        staying = self._until(times, rest.watts, rest.leave)
+        options = [self._from(times, deeper, rest.watts) for deeper in self._deeper(rest)]
+        nobody = self._longer(times) == 0
+        onward: FloatArray = np.min(options, axis=0) if options else np.full(len(times), np.inf)
+        return staying + np.where(nobody, 0.0, onward)
+
+
+# How a pause should be spent: a sequence of power modes with its switch times, and when to wake.
+#
+# Of a pause of known length the modes are entered one after the other, each as soon as it can be, so
+# that most of it is spent in the deepest, and the robot is woken in time. A pause whose end is not
+# known has a timeout policy (timeouts), and its end wakes the robot, which is ready later then.
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,3 +482,91 @@ def break_even(name: str, q: FloatArray, scene: PlanningScene, times: Transition
     ]
     gain = watts[0] - watts[1]
     return float("inf") if gain <= 0.0 else max((extra[1] - extra[0]) / gain, 0.0)
+
+
+# Where to wait: at which of some postures a pause costs least, moving there and back included.
+#
+# The movement there is the beginning of the pause. Of a pause of known length the movement back is
+# its end; where the end is not known, the robot is woken at the end and ready when it is back.
+
+
+@dataclass(frozen=True, eq=False)
+class Trip:
+    """To a posture q (n,) and back: seconds and joules at the mains of both; ids of the
+    trajectories.
+
+    problem: why it isn't possible, "" where it is.
+    """
+
+    posture: str
+    q: FloatArray
+    there: tuple[float, float] = (0.0, 0.0)
+    back: tuple[float, float] = (0.0, 0.0)
+    ids: tuple[str, str] = ("", "")
+    problem: str = ""
+
+    @property
+    def joules(self) -> float:
+        """Energy [J] of both movements."""
+        return self.there[1] + self.back[1]
+
+    @property
+    def sentence(self) -> str:
+        """What the trip takes."""
+        if self.problem:
+            return f"{self.posture} is out of the question: {self.problem}"
+        both = (("there", self.there, self.ids[0]), ("back", self.back, self.ids[1]))
+        return f"{self.posture}: " + ", ".join(
+            f"{joules:.0f} J in {seconds:.2f} s {where}" + (f" ({name})" if name else "")
+            for where, (seconds, joules), name in both
+        )
+
+
+def best_posture(
+    lengths: Lengths,
+    q: FloatArray,
+    trips: tuple[Trip, ...],
+    scene: PlanningScene,
+    times: TransitionTimes,
+) -> Standby:
+    """How to spend a pause of these lengths, and where: at q (n,), where the robot stands, or
+    elsewhere.
+    """
+    here = advice(lengths, q, scene, times)
+    options = [_after(trip, here, lengths, scene, times) for trip in trips]
+    energies = tuple(float("inf") if option is None else option.energy for option in options)
+    best = min(
+        (here, *(option for option in options if option is not None)), key=lambda each: each.energy
+    )
+    return replace(best, posture_energies=energies, trips=tuple(trip.sentence for trip in trips))
+
+
+def _after(
+    trip: Trip, here: Standby, lengths: Lengths, scene: PlanningScene, times: TransitionTimes
+) -> Standby | None:
+    """The advice with a trip; None where there is none, or not the time for it."""
+    back = trip.back[0] if lengths.known else 0.0
+    left = lengths.less(trip.there[0] + back)
+    if trip.problem or left.most <= 0.0:
+        return None
+    there = advice(left, trip.q, scene, times)
+    late = 0.0 if lengths.known else trip.back[0]
+    energy = there.energy + trip.joules
+    return replace(
+        there,
+        energy=energy,
+        expected=energy,
+        worst=there.worst + trip.joules,
+        clairvoyant=there.clairvoyant + trip.joules,
+        saving=here.saving + here.energy - energy,
+        saving_low=there.saving_low + here.saving + here.energy - energy - there.saving,
+        saving_high=there.saving_high + here.saving + here.energy - energy - there.saving,
+        saving_on_motors=here.saving_on_motors + here.energy - energy,
+        wake_at=there.wake_at + trip.there[0],
+        switch_times=tuple(at + trip.there[0] for at in there.switch_times),
+        alternatives=here.alternatives,
+        energies=here.energies,
+        late=there.late + late,
+        latest=there.latest + late,
+        posture=trip.posture,
+    )

@@ -1,15 +1,16 @@
-"""Nodes at a stop of a program: configurations that can be entered and left with what is held
-then.
-"""
+"""Stops of a program: configurations that can be entered and left, with service lines."""
 
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from ir_description import Station
+from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import Status, StatusCode
+from ir_planner.cartesian import HeadingError, PathRefusedError, choices_along, heading_status
 from ir_planner.checks import FreeSpace, too_near
 from ir_planner.configurations import (
     INTERACTION,
@@ -20,13 +21,163 @@ from ir_planner.configurations import (
     no_configuration,
     searched_configurations,
 )
-from ir_planner.program.node import Node
-from ir_planner.program.withdrawals import leaves_zone, withdrawn_lines
-from ir_planner.request import Context
-from ir_planner.scene import PlanningScene
-from ir_planner.service import ExitSearch, ServiceLine, lines_free, service_lines
+from ir_planner.errors import RequestError
+from ir_planner.request import Context, Journal
+from ir_planner.scene import PlanningScene, path_cost
+from ir_planner.search import EXIT, first_different
+from ir_planner.service import (
+    Exit,
+    ExitPath,
+    ExitSearch,
+    ServiceLine,
+    WorkArea,
+    lines_free,
+    service_lines,
+    withdrawal,
+)
+from ir_planner.timing import Movement
 
-_MOST = 64  # configurations per station that take part: 8 branches with all turns of A1, A4 and A6
+# A configuration at a stop with its service line: what the layers of the station graph consist
+# of.
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """Where the arm works at a stop, and where nothing else may be near it (the outer end of its
+    line).
+
+    driven: the movement along a stop that is a path. Its line leads from the path's beginning to
+    its end, and the arm leaves from there.
+    """
+
+    line: ServiceLine
+    driven: Movement | None = None
+
+    @property
+    def interaction(self) -> FloatArray:
+        """At the stop, at the end of a path (n,)."""
+        return self.line.interaction
+
+    @property
+    def arrival(self) -> FloatArray:
+        """Where a regional movement to the stop ends (n,)."""
+        return self.line.outside
+
+    @property
+    def departure(self) -> FloatArray:
+        """Where a regional movement from the stop starts (n,)."""
+        return self.line.outside if self.driven is None else self.line.interaction
+
+    @property
+    def enters(self) -> bool:
+        """Whether the arm moves from its arrival to where it works."""
+        return len(self.line.points) > 1
+
+    @property
+    def leaves(self) -> bool:
+        """Whether it moves from there to its departure."""
+        return self.enters and self.driven is None
+
+
+# Withdrawals for a program: at stations that lie in a zone which the straight service line does
+# not leave.
+#
+# Some searches per branch; configurations that differ by whole turns share their paths, shifted by
+# the turns. A path must be free both with what is held on arriving and with what is held on leaving.
+
+_WANTED = 2  # paths per search: the second is for the scene in which the first collides
+# per branch, whatever the seed, which adds to them: chance decided up to 2 % of a program's J
+_SEARCHES = 3
+# max_iterations that buy another search, and another path; at most
+_FOR_ANOTHER = 16_000
+_MOST = 16
+_KEPT = 6  # paths per branch: each is a configuration of its own for the chain
+_SAME = 1e-6  # rad
+
+
+def leaves_zone(lines: list[ServiceLine], context: Context) -> list[bool]:
+    """Which service lines end outside the zone of the station's machine; all where its work is
+    outside.
+    """
+    if not lines:
+        return []
+    area = WorkArea.of(context.scene, context.scene.station(context.station))
+    margin = context.safety_distance
+    interaction = area.left(np.array([line.interaction for line in lines]), margin)
+    outer = area.left(np.array([line.outside for line in lines]), margin)
+    return [bool(out) for out in interaction | outer]
+
+
+def withdrawn_lines(
+    interaction: FloatArray,
+    both: tuple[Context, Context],
+    searches: Mapping[str, ExitSearch],
+    rejected: Counter[str],
+) -> list[ServiceLine]:
+    """Paths out of the zone from interaction configurations (K, n), free on arriving and on
+    leaving.
+    """
+    found: list[ServiceLine] = []
+    searched: list[tuple[FloatArray, list[ExitPath]]] = []
+    robot = both[0].scene.cell.robot
+    for q in interaction:
+        known = next((paths for other, paths in searched if _turned(q, other)), None)
+        paths = _exit_paths(q, both, searches) if known is None else known
+        if known is None:
+            searched.append((q, paths))
+            if not paths:
+                rejected[f"no withdrawal from {both[0].station} found"] += 1
+        for path in paths:
+            shifted = path.points + (q - path.points[0])
+            if (shifted >= robot.position_min).all() and (shifted <= robot.position_max).all():
+                found.append(ServiceLine(shifted, straight=False, exit=path))
+    return found
+
+
+def _turned(a: FloatArray, b: FloatArray) -> bool:
+    """Whether two configurations differ by whole turns only."""
+    return bool(np.abs(portable.sin(0.5 * (a - b))).max() < _SAME)
+
+
+def _exit_paths(
+    q: FloatArray, both: tuple[Context, Context], searches: Mapping[str, ExitSearch]
+) -> list[ExitPath]:
+    """Different paths (M, n) that are free in both scenes, of several searches in each of them;
+    which serves best is decided with the chain.
+    """
+    found: list[ExitPath] = []
+    method = both[0].scene.station(both[0].station).search.withdrawal
+    more = min(both[0].work.improvement // _FOR_ANOTHER, _MOST)
+    for here, there in (both, both[::-1]):
+        inside = FreeSpace.of(here.scene, here.safety_distance, here.work, here.station)
+        if here.work.exhausted or not inside.states_free(q[None])[0]:
+            return []
+        problem = Exit.of(q, here)
+        other = Exit.of(q, there)
+        for seed in dict.fromkeys(
+            (*range(_SEARCHES), here.journal.seed, *range(_SEARCHES, _SEARCHES + more))
+        ):
+            paths: list[ExitPath] = []
+            inner = Journal(here.work, seed)
+            for path in withdrawal(problem, _WANTED, method, searches, inner).paths:
+                points = path.points
+                free = other.inside.edges_free(points[:-1], points[1:]).all()
+                if free and other.is_out(points[-1:])[0] and other.contacts_end(points):
+                    paths.append(path)
+            found += sorted(paths, key=lambda path: path_cost(here.scene.weights, path.points))
+            if not found:
+                break
+        if found or here.scene is there.scene:
+            break
+    return first_different(found, _KEPT + more, EXIT, lambda path: path.points[-1])
+
+
+# Nodes at a stop of a program: configurations that can be entered and left with what is held
+# then.
+
+_MOST_STOPS = (
+    64  # configurations per station that take part: 8 branches with all turns of A1, A4 and A6
+)
 
 
 def posture_nodes(name: str, arriving: Context) -> tuple[list[Node], Status]:
@@ -66,7 +217,7 @@ def station_nodes(
         return [], no_configuration(station.pose, scene, found, f"station {name}")
     both = (arriving, arriving.inside(leaving))
     rejected: Counter[str] = Counter()
-    lines = service_lines(found.q[:_MOST], arriving, rejected)
+    lines = service_lines(found.q[:_MOST_STOPS], arriving, rejected)
     for context in both:
         free = lines_free(lines, context, rejected)
         lines = [line for line, is_free in zip(lines, free, strict=True) if is_free]
@@ -76,7 +227,7 @@ def station_nodes(
     if straight and not asked.withdrawal:
         lines = straight
     else:
-        withdrawn = withdrawn_lines(found.q[:_MOST], both, searches, rejected)
+        withdrawn = withdrawn_lines(found.q[:_MOST_STOPS], both, searches, rejected)
         lines = withdrawn if withdrawn or asked.withdrawal else lines
     journal.rejected.update(+rejected)
     if not lines:
@@ -134,3 +285,34 @@ def _configurations(
         notes.append(f"{found.reached} of {search.starts} starts reach {station.name}")
     journal.keep(configuration_log(station.name, found, scene))
     return found
+
+
+# Nodes at a stop that is a path of the tool: movements along it in different configurations.
+
+_MOST_PATH_STOPS = (
+    64  # movements along a path that take part, as many as configurations of a station
+)
+
+
+def path_nodes(arriving: Context, leaving: PlanningScene) -> tuple[list[Node], Status]:
+    """Certified movements along the context's path, each from and to where nothing may be touched;
+    or none and why.
+    """
+    name = arriving.station
+    path = arriving.scene.cell.path(name)
+    after = FreeSpace.of(leaving, arriving.safety_distance, arriving.work)
+    try:
+        found = choices_along(path, arriving, after, _MOST_PATH_STOPS)
+    except PathRefusedError as error:
+        return [], _along(name, error.status)
+    except HeadingError as error:
+        return [], _along(name, heading_status(error))
+    except RequestError as error:  # a path that draws nothing
+        raise RequestError(error.code, f"path {name}: {error}") from error
+    return [
+        Node(ServiceLine(one.points[::-1], straight=False), one.movement) for one in found
+    ], Status.success()
+
+
+def _along(name: str, status: Status) -> Status:
+    return Status(StatusCode(status.code), f"along path {name}: {status.message}")

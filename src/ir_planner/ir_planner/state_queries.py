@@ -1,4 +1,4 @@
-"""Questions about states: one with its nearest pairs, or many at once."""
+"""Queries of states: one with its nearest pairs, or many at once."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-"""The planner's programs for today's stops: at its cycle time, free, at what the line needs."""
+"""Comparison of today's program with the planner's: at its cycle time and at others."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,12 +13,15 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import BeforeAfter, Saving, Side
 from ir_msgs_py.status import StatusCode
-from ir_planner.before_after.asked import Asked, asked_program
-from ir_planner.before_after.changes import changes
-from ir_planner.before_after.costed import costed_steps
-from ir_planner.before_after.costs_of import Costed, costed, saving, side_of
-from ir_planner.before_after.stood import assumed_doors, doors_at_the_start
+from ir_planner.before_after.changes import Costed, changes, costed, saving, side_of
 from ir_planner.before_after.today import Stretch, Today
+from ir_planner.before_after.today_steps import (
+    Asked,
+    asked_program,
+    assumed_doors,
+    costed_steps,
+    doors_at_the_start,
+)
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
 from ir_planner.program import AUTO, ProgramPlan, ProgramRequest, Progress, Spreads, nobody

@@ -1,10 +1,4 @@
-"""Where today's program stops to work, as steps that a planner can be asked for.
-
-A standstill at a station, at a posture, before a pause, and where outputs are set, is a stop. Other
-standstills are only passed through: no program needs them. A stop that is nowhere in the cell
-becomes a station of its own there. A process is a stop that is a path: it begins where the path
-does.
-"""
+"""Today's program as steps: its request, the doors at its start, what it costs."""
 
 from dataclasses import dataclass, replace
 
@@ -12,13 +6,30 @@ import numpy as np
 
 from ir_description import Cell, CellPath, Equipment, ProgramStep, Station, Zone
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.status import StatusCode
-from ir_planner.before_after.process_paths import driven_as, same_poses
-from ir_planner.before_after.today import Stretch, Today
+from ir_planner.before_after.today import Stretch, Today, driven_as, same_poses
+from ir_planner.checks import evaluate_trajectory
 from ir_planner.errors import RequestError
 from ir_planner.krl import posture_at, station_at
-from ir_planner.program import AUTO
+from ir_planner.program import (
+    AUTO,
+    Charge,
+    Doors,
+    Pause,
+    ProgramRequest,
+    Scenes,
+    pause_by_itself,
+    placed_steps,
+)
 from ir_planner.scene import PlanningScene
+
+# Where today's program stops to work, as steps that a planner can be asked for.
+#
+# A standstill at a station, at a posture, before a pause, and where outputs are set, is a stop. Other
+# standstills are only passed through: no program needs them. A stop that is nowhere in the cell
+# becomes a station of its own there. A process is a stop that is a path: it begins where the path
+# does.
 
 POINTS = "todays_points"  # the equipment that stations of today's own stand at
 _ZONE = 1e-3  # m: there is no machine
@@ -156,3 +167,117 @@ class _Stops:
         """What was added, in words."""
         names = ", ".join(name for name, _ in self._added)
         return [f"stops that are no station of the cell: {names}"] if names else []
+
+
+# Today's program costed as a planned one is: the same loads, the same doors, the capacitor's
+# charge carried from step to step, pauses as the controller spends them by itself.
+
+
+def costed_steps(asked: tuple[Asked, ...], request: ProgramRequest) -> tuple[PlannedMovement, ...]:
+    """The steps of today's program from the request's start. Raises RequestError for one that
+    handles what isn't there.
+    """
+    cell = request.cell
+    times = request.settings.transitions
+    steps = tuple(step.step for step in asked)
+    placed = placed_steps(cell, steps, cell.parts_at_start(), request.doors)
+    scenes = Scenes(cell, request.power, request.settings.drives)
+    costing = _Costing(request, Charge(times))
+    here = ""
+    for step, at in zip(asked, placed, strict=True):
+        there = here if step.step.kind == "PAUSE" else step.step.target
+        for stretch in step.stretches:
+            doors = at.doors_before if stretch.doors is None else stretch.doors
+            scene = scenes.of(at.before, doors)
+            if stretch.trajectory is None:
+                costing.pause(stretch, here, scene)
+            else:
+                costing.movement(stretch, here, there, scene)
+        here = there
+    return tuple(costing.steps)
+
+
+class _Costing:
+    """The steps so far, and where the robot stands after them."""
+
+    def __init__(self, request: ProgramRequest, charge: Charge) -> None:
+        self.steps: list[PlannedMovement] = []
+        self._request = request
+        self._charge = charge
+        self._q: FloatArray = request.start
+
+    def movement(self, stretch: Stretch, here: str, there: str, scene: PlanningScene) -> None:
+        """A movement of the hop from `here` to `there`."""
+        assert stretch.trajectory is not None  # asked before
+        along = stretch.process is not None
+        names = [there] if along else [station.name for station in scene.cell.stations]
+        contacts = next((name for name in (there, here) if name in names), "")
+        found = evaluate_trajectory(
+            stretch.trajectory, scene, self._request.options.safety_distance, contacts
+        )
+        step = PlannedMovement(
+            kind=MovementKind.CARTESIAN if along else MovementKind.REGIONAL,
+            from_station=there if along else here,
+            to_station=there,
+            trajectory_id=stretch.trajectory.trajectory_id,
+            trajectory=stretch.trajectory,
+            report=found.report,
+            duration=stretch.trajectory.duration,
+            load=scene.load_text,
+        )
+        self.steps.append(self._charge.moved(step, found.energy, scene))
+        self._q = stretch.q
+
+    def pause(self, stretch: Stretch, here: str, scene: PlanningScene) -> None:
+        """A standstill."""
+        spent = Pause(here, stretch.seconds, "", self._q, scene)
+        step = pause_by_itself(spent, self._request.settings.transitions)
+        self.steps.append(self._charge.stood(step, spent))
+
+
+# How the doors stood when today's program began: as a recording says, or else as the cell has
+# them, which is said.
+
+
+def doors_at_the_start(
+    today: Today, asked: AskedProgram, cell: Cell
+) -> tuple[Doors, tuple[str, ...]]:
+    """Machines that are not as the cell has them where the planner's programs begin, and sentences
+    on it.
+
+    Where doors moved meanwhile and no step that is asked for has the signals that move them, the
+    planner's programs can't follow: they are planned in the cell's states.
+    """
+    if today.doors is None:
+        return (), assumed_doors(cell)
+    recorded = {one.doors for one in today.stretches}
+    signals = {machine.switch.signal for machine in cell.equipment if machine.switch is not None}
+    moved = {signal.name for step in asked.steps for signal in step.step.set_signals}
+    if len(recorded) > 1 and not signals & moved:
+        note = (
+            "doors moved in the recording, by signals that no stop has: the planner's programs have"
+        )
+        return (), (
+            f"{note} {_states(cell, ())}; today's movements are judged with the doors as recorded",
+        )
+    return today.doors, ((f"doors at the start as recorded: {_states(cell, today.doors)}"),)
+
+
+def assumed_doors(cell: Cell) -> tuple[str, ...]:
+    """That the cell's states are assumed, where it has machines that a signal switches."""
+    return (
+        (f"doors at the start are assumed, as the cell has them: {known}",)
+        if (known := _states(cell, ()))
+        else ()
+    )
+
+
+def _states(cell: Cell, doors: Doors) -> str:
+    now = dict(doors)
+    switched = [
+        machine for machine in cell.equipment if machine.switch is not None and machine.enabled
+    ]
+    return ", ".join(
+        f"{machine.name} {' changing to '.join(now.get(machine.name, (machine.state,)))}"
+        for machine in switched
+    )

@@ -1,9 +1,4 @@
-"""The best movement along a path: the cheapest chains of configurations with their times,
-certified.
-
-A chain that isn't certified loses its configurations near the place where it isn't, and the search
-goes on.
-"""
+"""The movement along a path: the cheapest chains of configurations with their times, certified."""
 
 import itertools
 from dataclasses import dataclass, replace
@@ -11,18 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_msgs_py.status import StatusCode
-from ir_planner.cartesian.asked import Asked
-from ir_planner.cartesian.chains import Chain
-from ir_planner.cartesian.finer import chains_through
-from ir_planner.cartesian.free_angle import angle_along
-from ir_planner.cartesian.joint_curve import Angle, JointCurve, curve_of
-from ir_planner.cartesian.layers import Layers
-from ir_planner.cartesian.points import SentPath, sent
-from ir_planner.cartesian.refusal import PathRefusedError
-from ir_planner.cartesian.speed_law import Span
-from ir_planner.cartesian.timed import timed_stroke
-from ir_planner.cartesian.tool_path import ToolPath
-from ir_planner.cartesian.whole_turns import difference
+from ir_planner.cartesian.chains import Chain, Layers, difference
+from ir_planner.cartesian.dead_ends import chains_through
+from ir_planner.cartesian.joint_curve import Angle, JointCurve, angle_along, curve_of
+from ir_planner.cartesian.path_times import SentPath, sent, timed_stroke
+from ir_planner.cartesian.speed_ramps import Span
+from ir_planner.cartesian.tool_path import Asked, PathRefusedError, ToolPath
 from ir_planner.request import DURATION_MAX
 from ir_planner.scene import MotionLimits
 from ir_planner.timing import Movement, within_torque

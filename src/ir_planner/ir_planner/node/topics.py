@@ -1,12 +1,12 @@
-"""What planner and driver announce to each other: cell out; timers, load and machines in;
-latched.
-"""
+"""Topics of the node: cell and markers out; timers, load and machines in; latched."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
+from geometry_msgs.msg import Point
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
+from visualization_msgs.msg import Marker, MarkerArray
 
 from ir_description import Cell, cell_to_yaml
 from ir_msgs.msg import CarriedLoad as CarriedLoadMsg
@@ -16,6 +16,7 @@ from ir_msgs.msg import MachineStates as MachineStatesMsg
 from ir_msgs_py import names
 from ir_msgs_py.announcements import CellState
 from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.ros.conversions import pose_to_msg
 from ir_msgs_py.ros.plan_conversions import machine_states_from_msg
 from ir_msgs_py.ros.power_conversions import (
     carried_load_from_msg,
@@ -23,7 +24,11 @@ from ir_msgs_py.ros.power_conversions import (
     controller_timers_from_msg,
 )
 from ir_msgs_py.ros.topics import LATCHED
+from ir_planner.checks import Shape
 from ir_planner.planner import Planner
+
+# What planner and driver announce to each other: cell out; timers, load and machines in;
+# latched.
 
 _T = TypeVar("_T")
 
@@ -97,3 +102,45 @@ def cell_state(cell: Cell, content: str) -> CellState:
         tuple(machine.enabled for machine in machines),
         tuple(machine.state or "" for machine in machines),
     )
+
+
+# Shapes of the core as markers: the cell, and beside it what was planned last.
+
+_MARKER = {
+    "box": Marker.CUBE,
+    "cylinder": Marker.CYLINDER,
+    "sphere": Marker.SPHERE,
+    "line": Marker.LINE_STRIP,
+    "triangles": Marker.TRIANGLE_LIST,
+    "text": Marker.TEXT_VIEW_FACING,
+}
+
+
+class ShownMarkers:
+    """Everything in one message: a late listener gets the last one only."""
+
+    def __init__(self) -> None:
+        self._cell: list[Marker] = []
+
+    def with_cell(self, shapes: Sequence[Shape]) -> MarkerArray:
+        """The cell alone, from now on."""
+        self._cell = [marker(shape, k) for k, shape in enumerate(shapes)]
+        return self.beside_cell(())
+
+    def beside_cell(self, shapes: Sequence[Shape]) -> MarkerArray:
+        """The cell with these shapes."""
+        moving = [marker(shape, k) for k, shape in enumerate(shapes)]
+        return MarkerArray(markers=[Marker(action=Marker.DELETEALL), *self._cell, *moving])
+
+
+def marker(shape: Shape, number: int) -> Marker:
+    """A shape as RViz and Foxglove draw it."""
+    drawn = Marker(
+        ns=shape.namespace, id=number, type=_MARKER[shape.kind], action=Marker.ADD, text=shape.text
+    )
+    drawn.header.frame_id = names.WORLD_FRAME
+    drawn.pose = pose_to_msg(shape.pose)
+    drawn.scale.x, drawn.scale.y, drawn.scale.z = (float(value) for value in shape.size)
+    drawn.color.r, drawn.color.g, drawn.color.b, drawn.color.a = shape.colour
+    drawn.points = [Point(x=float(x), y=float(y), z=float(z)) for x, y, z in shape.points]
+    return drawn

@@ -1,4 +1,4 @@
-"""To a posture and back, planned: what a robot that waits elsewhere must do."""
+"""Waiting postures: the movements to a posture and back that a pause there takes."""
 
 from collections.abc import Callable, Sequence
 

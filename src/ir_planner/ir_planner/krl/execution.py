@@ -1,7 +1,6 @@
-"""A KRL program as a KR C4 drives it: a trajectory from one standstill to the next, waits,
-outputs.
-"""
+"""Execution of a KRL program as on a KR C4: movements between standstills, waits, outputs."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -22,15 +21,41 @@ from ir_krl import (
 )
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.krl.blending import overlap, trajectory
-from ir_planner.krl.curves import AxisLine, Curve, tool_curve
 from ir_planner.krl.geometry import Arm
-from ir_planner.krl.moves import Move, move
-from ir_planner.krl.process import process_motions
-from ir_planner.krl.splines import block_curve, timed_block
-from ir_planner.krl.tool_motions import ToolMotion, tool_motion, tool_spline
+from ir_planner.krl.motions import AxisLine, Curve, Move, move, overlap, tool_curve, trajectory
+from ir_planner.krl.splines import ToolMotion, block_curve, timed_block, tool_motion, tool_spline
 from ir_planner.scene import STILL, PlanningScene
 from ir_planner.timing import standing
+
+# Which motions of a program are its process: what the tool does between switching an output on and
+# off.
+
+
+def process_motions(commands: Sequence[Command]) -> frozenset[int]:
+    """Places in `commands` of the motions of a process.
+
+    A process begins where an output is switched on and ends where the same one is switched off, and
+    only the tool is led meanwhile (LIN, CIRC, SPLINE and their relatives; waits don't matter). A
+    PTP ends it: what is switched around one is a gripper or a message. A pulse switches nothing.
+    """
+    found: set[int] = set()
+    since: dict[int, set[int]] = {}  # by output: motions since it was switched on
+    for k, command in enumerate(commands):
+        match command:
+            case SetOutput(value=True, pulse=0.0):
+                since.setdefault(command.number, set())
+            case SetOutput(value=False):
+                found |= since.pop(command.number, set())
+            case Motion(kind="ptp") | SplineBlock(axis=True):
+                since.clear()
+            case Motion() | SplineBlock():
+                for motions in since.values():
+                    motions.add(k)
+    return frozenset(found)
+
+
+# A KRL program as a KR C4 drives it: a trajectory from one standstill to the next, waits,
+# outputs.
 
 _BLENDED_JERK = 0.5  # of the limit: while two moves overlap their jerks add up
 
