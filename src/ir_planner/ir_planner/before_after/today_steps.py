@@ -26,10 +26,10 @@ from ir_planner.scene import PlanningScene
 
 # Where today's program stops to work, as steps that a planner can be asked for.
 #
-# A standstill at a station, at a posture, before a pause, and where outputs are set, is a stop. Other
-# standstills are only passed through: no program needs them. A stop that is nowhere in the cell
-# becomes a station of its own there. A process is a stop that is a path: it begins where the path
-# does.
+# A standstill at a station, at a posture, before a pause, and where outputs are set, is a stop.
+# Other standstills are only passed through: no program needs them. A stop that is nowhere in the
+# cell becomes a station of its own there. A process is a stop that is a path: it begins where the
+# path does.
 
 POINTS = "todays_points"  # the equipment that stations of today's own stand at
 _ZONE = 1e-3  # m: there is no machine

@@ -189,9 +189,9 @@ def _divided(s: FloatArray, parts: int) -> FloatArray:
 # The angle about the tool's axis along the path, where it is free: from the steps of the search to
 # a smooth function.
 #
-# It is a cubic B-spline whose control points lie within the free angle, so it does too. Gauss-Newton
-# steps minimise what the axes move and bend along the path, as shares of their speeds; each step must
-# keep the configurations free and joined.
+# It is a cubic B-spline whose control points lie within the free angle, so it does too. Gauss-
+# Newton steps minimise what the axes move and bend along the path, as shares of their speeds;
+# each step must keep the configurations free and joined.
 
 WHOLE = np.pi - 1e-6  # rad: from here on any angle will do
 _SPACING = 0.05  # m between control points

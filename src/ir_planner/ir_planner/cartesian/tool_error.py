@@ -15,10 +15,10 @@ from ir_planner.scene import PlanningScene
 
 # Bounds of the tool's motion on each segment of a trajectory, from those of its axes.
 #
-# A place at the distance r from an axis moves by at most r per radian. By the chain rule a derivative
-# of the tool's place is a sum over axes, over pairs of them and over triples, each at most the
-# product of the axes' derivatives and the distance from the outermost axis of the term; with all
-# distances 1 it holds for its rotation.
+# A place at the distance r from an axis moves by at most r per radian. By the chain rule a
+# derivative of the tool's place is a sum over axes, over pairs of them and over triples, each at
+# most the product of the axes' derivatives and the distance from the outermost axis of the term;
+# with all distances 1 it holds for its rotation.
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +75,11 @@ def _reach(scene: PlanningScene) -> FloatArray:
 # How well the tool keeps to its path: bounds of its distance, its turn and its speed at every
 # instant.
 #
-# Between two instants a curve leaves the chord of its places by at most T^2 / 8 times a bound of its
-# second derivative, and the path leaves its own chord by at most du^2 / 8 times a bound of its. The
-# chords are nowhere farther apart than at their ends. So the largest distance at the instants with
-# these two sags is a bound of the distance at all times. The same holds for rotations as matrices,
-# and for the tool's velocity.
+# Between two instants a curve leaves the chord of its places by at most T^2 / 8 times a bound of
+# its second derivative, and the path leaves its own chord by at most du^2 / 8 times a bound of
+# its. The chords are nowhere farther apart than at their ends. So the largest distance at the
+# instants with these two sags is a bound of the distance at all times. The same holds for
+# rotations as matrices, and for the tool's velocity.
 
 _BETWEEN = 2e-5  # m that the bound may add between samples,
 _BETWEEN_TURN = 1e-4  # rad,

@@ -20,11 +20,11 @@ from ir_planner.request import Context
 # A path of the tool over its arc length: parts that follow each other, corners between them
 # rounded.
 #
-# Within its radius around a corner the next part begins while the last one ends: the place is the sum
-# of what both have covered. How much of each is covered rises by a polynomial whose fourth derivative
-# is continuous, so curvature is too. Parts that meet almost tangentially, or where only the curvature
-# or the turning of the tool jumps, are joined in the same manner within micrometres; at any other
-# corner without a radius the tool stops.
+# Within its radius around a corner the next part begins while the last one ends: the place is the
+# sum of what both have covered. How much of each is covered rises by a polynomial whose fourth
+# derivative is continuous, so curvature is too. Parts that meet almost tangentially, or where
+# only the curvature or the turning of the tool jumps, are joined in the same manner within
+# micrometres; at any other corner without a radius the tool stops.
 
 _PER_ZONE = 3  # breaks of a rounded corner, between which the speed of the parameter is smooth
 _SAME = 1e-9  # m

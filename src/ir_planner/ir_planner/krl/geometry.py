@@ -12,10 +12,9 @@ from ir_planner.scene import PlanningScene
 
 # Status and turn, S and T: which of the configurations that reach a pose a position means.
 #
-# S: bit 0 the wrist centre lies behind axis 1, bit 1 the elbow is bent towards positive angles of A3,
-# bit 2 A5 is negative. T: bit n is set where the angle of axis n + 1 is negative. Bits of an angle
-# that is 0 mean
-# nothing: a position that was taught there may carry either.
+# S: bit 0 the wrist centre lies behind axis 1, bit 1 the elbow is bent towards positive angles of
+# A3, bit 2 A5 is negative. T: bit n is set where the angle of axis n + 1 is negative. Bits of an
+# angle that is 0 mean nothing: a position that was taught there may carry either.
 
 _UNDECIDED = 1e-4  # rad or m: nearer to 0 than this, either bit is taken
 

@@ -154,10 +154,10 @@ def _name(motion: Motion) -> str:
 
 # One motion with its law: how a controller drives a curve of the axes.
 #
-# Assumptions, where a data sheet says nothing: all axes follow one seven-phase law (synchronous PTP);
-# axes keep their shares of the data's speed, acceleration and jerk; the tool keeps $VEL and $ACC,
-# whose acceleration builds up within `RAMP` seconds; where an axis or its torque can't follow, the
-# whole motion is slowed. A TIME_BLOCK slows a motion to the time it asks for.
+# Assumptions, where a data sheet says nothing: all axes follow one seven-phase law (synchronous
+# PTP); axes keep their shares of the data's speed, acceleration and jerk; the tool keeps $VEL and
+# $ACC, whose acceleration builds up within `RAMP` seconds; where an axis or its torque can't
+# follow, the whole motion is slowed. A TIME_BLOCK slows a motion to the time it asks for.
 
 RAMP = 0.1  # s
 _KNOTS_PER_S = 125  # of a tool path, so that points between them lie on it within micrometres
@@ -280,10 +280,10 @@ def _excess(made: Move, limits: MotionLimits, scene: PlanningScene) -> float:
 # Moves that follow each other without a stop: the next begins while the last one brakes.
 #
 # As `timing.blending` does for straight steps: q(t) is the sum of what the moves have covered, so
-# that the arm cuts the corner. Moves that are blended have half the jerk each, so that both together
-# keep the limit.
-# How early the next may begin follows from the approximation distance: what is left of the one and
-# what the other has covered stay within it, and within half of each move.
+# that the arm cuts the corner. Moves that are blended have half the jerk each, so that both
+# together keep the limit. How early the next may begin follows from the approximation distance:
+# what is left of the one and what the other has covered stay within it, and within half of each
+# move.
 
 _HALF = 0.5
 _TRIALS = 12

@@ -29,11 +29,10 @@ from ir_planner.timing import GRID_NS, GRID_S
 
 # When a PTP_SPLINE passes its points: near the planned times as far as the limits allow.
 #
-# A spline through points of a planned movement overshoots where the plan's jerk steps from one limit
-# to the other, so that at the planned times it exceeds them. A sequence of linear programs changes
-# the times between
-# points, by a piecewise linear slowness over the movement: within the limits, not longer than planned
-# where that can be, with the least changes.
+# A spline through points of a planned movement overshoots where the plan's jerk steps from one
+# limit to the other, so that at the planned times it exceeds them. A sequence of linear programs
+# changes the times between points, by a piecewise linear slowness over the movement: within the
+# limits, not longer than planned where that can be, with the least changes.
 
 _DEGREE = 5
 _KNOTS_MAX = 32  # of the slowness
@@ -160,9 +159,9 @@ def _hats(intervals: int) -> FloatArray:
 #
 # Assumptions, where KUKA publishes no formula: a PTP_SPLINE is the interpolating spline of degree
 # five through its points; with one TIME_BLOCK over all of its parts it passes them at the marked
-# times, at rest at both ends. A SPLINE is the same of the tool, straight between the ends of its SLIN
-# parts and round along its SCIRC parts as far as a spline through their points is, at the speeds of
-# its first part.
+# times, at rest at both ends. A SPLINE is the same of the tool, straight between the ends of its
+# SLIN parts and round along its SCIRC parts as far as a spline through their points is, at the
+# speeds of its first part.
 
 _LINE_POINTS = 9  # of an SLIN part, so that the spline through them is straight
 _ARC_STEP = np.radians(

@@ -13,11 +13,11 @@ from ir_planner.timing import objective_weights
 
 # What a movement costs at least, whatever its path: proved from limits, friction and weight.
 #
-# Every joint covers at least the straight distance. That takes at least the time of a bang-bang law
-# within its speed and acceleration, and does at least the work of Coulomb friction over the distance
-# and of viscous friction at an even speed. The potential energy (weight less counterbalance) changes
-# by what the ends say. Losses in the motors and what the brake resistor takes are not counted, so the
-# bound is below the true cost.
+# Every joint covers at least the straight distance. That takes at least the time of a bang-bang
+# law within its speed and acceleration, and does at least the work of Coulomb friction over the
+# distance and of viscous friction at an even speed. The potential energy (weight less
+# counterbalance) changes by what the ends say. Losses in the motors and what the brake resistor
+# takes are not counted, so the bound is below the true cost.
 
 # of the line over which static torque is integrated: smooth over a few rad, error below 0.01 J
 _PLACES = 64
@@ -82,12 +82,11 @@ def least_cost(
 # What a movement would cost if nothing were in its path: a coarse solution that never meets a
 # body.
 #
-# The descent is that of movements, on a spline with fewer points, without clearance. A movement that
-# keeps
-# clear of everything has one constraint more, so it costs as much or more, but for two things: the
-# descent may end in a poorer local minimum than the planner's, and a coarse spline bends less. MARGIN
-# is for both; benchmarks/program.py judges it by what chosen chains cost above the best of all
-# chains.
+# The descent is that of movements, on a spline with fewer points, without clearance. A movement
+# that keeps clear of everything has one constraint more, so it costs as much or more, but for two
+# things: the descent may end in a poorer local minimum than the planner's, and a coarse spline
+# bends less. MARGIN is for both; benchmarks/program.py judges it by what chosen chains cost above
+# the best of all chains.
 
 MARGIN = 0.04  # share of a coarse cost by which the planner's movement may be cheaper
 _SPACING = 0.1  # s between the knots of the coarse spline

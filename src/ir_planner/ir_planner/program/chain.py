@@ -31,8 +31,8 @@ from ir_planner.service import ExitSearch, ServiceLine
 # movements.
 #
 # By J, joules or time a part's bound is what physics demands, then a coarse solution without
-# obstacles less its margin, then the cost of the movement that the planner finds. By W of eq. (9) it
-# is the straight segment, and exact where that is free; else the path found.
+# obstacles less its margin, then the cost of the movement that the planner finds. By W of eq. (9)
+# it is the straight segment, and exact where that is free; else the path found.
 
 Turned = Part | tuple[int, str, bytes]  # what parts that cost the same have in common
 

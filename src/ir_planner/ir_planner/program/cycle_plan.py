@@ -19,11 +19,11 @@ from ir_planner.timing import Movement
 
 # A program within a cycle time: the seconds there are go where they save most joules.
 #
-# The movements of the chain are known at several values of a second (time_values). From the fastest
-# of all, parts are slowed down in the order of joules saved per second; a step that takes more than
-# the time left is passed over. Every stage of that is a program that ends early and waits, in the
-# mode of least energy for the wait's length; the cheapest of them is the answer. What is left of the
-# time is given to the next part in turn where that is cheaper than waiting.
+# The movements of the chain are known at several values of a second (time_values). From the
+# fastest of all, parts are slowed down in the order of joules saved per second; a step that takes
+# more than the time left is passed over. Every stage of that is a program that ends early and
+# waits, in the mode of least energy for the wait's length; the cheapest of them is the answer.
+# What is left of the time is given to the next part in turn where that is cheaper than waiting.
 
 _NEAREST = 8  # programs that are cheapest without carried charge: with it one of them is
 SHORTEST_WAIT = (
@@ -109,10 +109,10 @@ def _filled(
 
 # How far above the best an answer can be: of its cost, what lies above a lower bound, in percent.
 #
-# The bound is that of the chains (station_graph), less what carried charge could save: at most the
-# capacitor's energy per movement. Within a cycle time it is the Lagrangian one: no chain costs less
-# at a value of a second than the best one at that value, so none has less energy than that leaves of
-# any time spent moving.
+# The bound is that of the chains (station_graph), less what carried charge could save: at most
+# the capacitor's energy per movement. Within a cycle time it is the Lagrangian one: no chain
+# costs less at a value of a second than the best one at that value, so none has less energy than
+# that leaves of any time spent moving.
 
 _SHARES = 128  # of a cycle that may be spent moving, at which the bound is looked at
 

@@ -22,11 +22,11 @@ from ir_planner.scene import PlanningScene
 
 # The modes that a robot can rest in at a posture, and what a sequence of them costs.
 #
-# A sequence goes from motors deeper and deeper, each mode asked for at a switch time. While a mode is
-# entered the power is that of the mode that is left; while it is left it is that of standing on
-# motors. A mode can be left, deeper or back to motors, when it was entered and its shortest stay is
-# over. Left alone on motors, the controller closes its brakes after `timer` s. These conventions of
-# the power data decide every break-even.
+# A sequence goes from motors deeper and deeper, each mode asked for at a switch time. While a
+# mode is entered the power is that of the mode that is left; while it is left it is that of
+# standing on motors. A mode can be left, deeper or back to motors, when it was entered and its
+# shortest stay is over. Left alone on motors, the controller closes its brakes after `timer` s.
+# These conventions of the power data decide every break-even.
 
 MOTORS = "STAND_ON_MOTORS"
 BRAKES = "STAND_ON_BRAKES"
@@ -308,8 +308,8 @@ def _spent(pause: Pause, mode: str, rests: Rests) -> PlannedMovement:
 
 # The charge of the DC link's capacitor, carried from step to step of a program.
 #
-# A movement leaves what its braking gave, the next one takes it first. While the motors hold the arm
-# the charge feeds the holding torque; with the brakes closed it stays.
+# A movement leaves what its braking gave, the next one takes it first. While the motors hold the
+# arm the charge feeds the holding torque; with the brakes closed it stays.
 
 
 class Charge:

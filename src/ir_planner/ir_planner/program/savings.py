@@ -24,11 +24,11 @@ from ir_planner.timing import Movement, baseline, straight_steps
 # The common program: what a commissioned robot would do at the same stations, to hold savings
 # against.
 #
-# Baseline movements (straight joint segments as synchronous S-curves at full speed) through the same
-# stations, at each stop the configuration that is nearest to the one before by W, turns included; the
-# same service lines, as fast as they can; the same pauses, left to the controller's own timers. Where
-# a segment is not free, the movement runs along the planner's path in straight steps with blended
-# corners; `around` counts these.
+# Baseline movements (straight joint segments as synchronous S-curves at full speed) through the
+# same stations, at each stop the configuration that is nearest to the one before by W, turns
+# included; the same service lines, as fast as they can; the same pauses, left to the controller's
+# own timers. Where a segment is not free, the movement runs along the planner's path in straight
+# steps with blended corners; `around` counts these.
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -128,8 +128,8 @@ def _side_by_side(
 # What a program saves, in three figures that stand up: movements, pauses, total.
 #
 # Movements are held against the common program at equal cycle time; a wait at the end counts as
-# movement. Pauses are held against what the controller does by itself. All energies are those at the
-# mains, controller and tool included.
+# movement. Pauses are held against what the controller does by itself. All energies are those at
+# the mains, controller and tool included.
 
 Added = Callable[[Steps], list[FloatArray]]
 

@@ -238,9 +238,10 @@ class Timeouts:
 
 # How a pause should be spent: a sequence of power modes with its switch times, and when to wake.
 #
-# Of a pause of known length the modes are entered one after the other, each as soon as it can be, so
-# that most of it is spent in the deepest, and the robot is woken in time. A pause whose end is not
-# known has a timeout policy (timeouts), and its end wakes the robot, which is ready later then.
+# Of a pause of known length the modes are entered one after the other, each as soon as it can be,
+# so that most of it is spent in the deepest, and the robot is woken in time. A pause whose end is
+# not known has a timeout policy (timeouts), and its end wakes the robot, which is ready later
+# then.
 
 
 @dataclass(frozen=True, eq=False)

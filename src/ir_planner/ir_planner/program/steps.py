@@ -22,11 +22,10 @@ from ir_planner.scene import Drives, PlanningScene, with_parts
 
 # Which states the machines with a switch are in along a program, as its own signals move them.
 #
-# They begin as the cell has them, or as a driver says that they are. A machine whose signal is set
-# changes
-# from then on, until a step waits for the signal that follows, or dwells as long as the change takes:
-# meanwhile it is in both states, and what sweeps between them is there too. Movements are planned
-# among what may be there.
+# They begin as the cell has them, or as a driver says that they are. A machine whose signal is
+# set changes from then on, until a step waits for the signal that follows, or dwells as long as
+# the change takes: meanwhile it is in both states, and what sweeps between them is there too.
+# Movements are planned among what may be there.
 
 Doors = tuple[tuple[str, tuple[str, ...]], ...]
 """Machines that are not as the cell has them, with their state, or the two between which they

@@ -82,8 +82,9 @@ class Node:
 # Withdrawals for a program: at stations that lie in a zone which the straight service line does
 # not leave.
 #
-# Some searches per branch; configurations that differ by whole turns share their paths, shifted by
-# the turns. A path must be free both with what is held on arriving and with what is held on leaving.
+# Some searches per branch; configurations that differ by whole turns share their paths, shifted
+# by the turns. A path must be free both with what is held on arriving and with what is held on
+# leaving.
 
 _WANTED = 2  # paths per search: the second is for the scene in which the first collides
 # per branch, whatever the seed, which adds to them: chance decided up to 2 % of a program's J

@@ -149,9 +149,9 @@ class Ladder:
 # The movements of one chain at many values of a second: a Pareto front of time and energy for
 # every part.
 #
-# What a second is worth decides how fast a movement is: planned at the same value, all movements of a
-# program trade seconds for joules at the same rate, which is the best distribution of the time there
-# is.
+# What a second is worth decides how fast a movement is: planned at the same value, all movements
+# of a program trade seconds for joules at the same rate, which is the best distribution of the
+# time there is.
 #
 # A movement of one value may be in a poorer local minimum than that of another: near the cycle time
 # that is asked for, such a one is optimised again from the better one.
