@@ -17,9 +17,9 @@ SRC = Path(__file__).resolve().parents[2] / "src"
 ROOMS = {
     "ir_planner": (
         "errors", "curves", "scene", "request", "checks", "configurations", "timing", "search", "optimize",  # noqa: E501
-        "cartesian", "regional", "trajectories", "service", "settings", "program", "store", "heard",
-        "current_cell", "certificates", "asked_states", "trips", "planner", "krl", "before_after", "what_if",  # noqa: E501
-        "node",
+        "cartesian", "regional", "trajectories", "service", "settings", "program", "store",
+        "current_cell", "certificates", "state_queries", "waiting_postures", "planner", "krl",
+        "before_after", "what_if", "node",
     ),
     "ir_description": (
         "poses", "shapes", "robot", "cell", "files", "library",
