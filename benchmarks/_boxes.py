@@ -88,8 +88,8 @@ def boxes_rows(cells: int, first: int, more: int) -> list[dict[str, Any]]:
     """
     rows = []
     for seed in range(first, first + cells):
-        planner = Planner(time.process_time)
-        planner.set_cell(cell_to_yaml(boxes_cell(seed)), "")
+        planner = Planner(clock=time.process_time)
+        planner.set_cell(text=cell_to_yaml(boxes_cell(seed)))
         planner.settings = replace(planner.settings, max_iterations=EDGES_OF_A_REQUEST)
         for task in boxes_tasks(seed, TASKS):
             rows.append(_row(planner, task, more))
@@ -117,7 +117,9 @@ def boxes_claims(rows: list[dict[str, Any]]) -> list[Claim]:
 def _row(planner: Planner, task: Task, more: int) -> dict[str, Any]:
     options = PlanOptions(seed=1, safety_distance=task.margin, planning_time=600.0)
     begin = time.process_time()
-    plan = planner.plan_regional(task.start, Goal(configuration=task.goal), options)
+    plan = planner.plan_regional(
+        start=task.start, goal=Goal(configuration=task.goal), options=options
+    )
     seconds = time.process_time() - begin
     enclosed = "is enclosed" in plan.status.message
     return {

@@ -33,16 +33,16 @@ class CellMovement:
 
 def planner_in(cell: str, settings: PlannerSettings) -> Planner:
     """A planner in a bundled cell or the cell of a file."""
-    planner = Planner(time.monotonic, settings)
-    planner.set_cell("", cell)
-    return planner
+    return Planner(cell, clock=time.monotonic, settings=settings)
 
 
 def movements_of(planner: Planner, objective: str = "time_and_energy") -> Iterator[CellMovement]:
     """All movements of the planner's cell, planned with its defaults for an objective."""
     cell = planner.cell
     if cell.program:
-        plan = planner.plan_program((), 0.0, PlanOptions(objective=objective), np.array(cell.park))
+        plan = planner.plan_program(
+            options=PlanOptions(objective=objective), start=np.array(cell.park)
+        )
         for step in plan.movements:
             if step.trajectory is not None:
                 name = f"{step.from_station}->{step.to_station}"
@@ -53,7 +53,7 @@ def movements_of(planner: Planner, objective: str = "time_and_energy") -> Iterat
         for ends, name in ((there, task.name), (back, f"{task.name} back")):
             options = PlanOptions(objective=objective, safety_distance=_margin(planner, ends))
             plan_of = planner.plan_regional(
-                ends[0], Goal(configuration=ends[1], text=name), options
+                start=ends[0], goal=Goal(configuration=ends[1], text=name), options=options
             )
             if plan_of.trajectory is not None:
                 load = planner.scene().load_text
@@ -61,5 +61,5 @@ def movements_of(planner: Planner, objective: str = "time_and_energy") -> Iterat
 
 
 def _margin(planner: Planner, ends: tuple[FloatArray, ...]) -> float:
-    least = min(planner.check_state(q, 0.0, 1, "", "").min_distance for q in ends)
+    least = min(planner.check_state(q, safety_distance=0.0, max_pairs=1).min_distance for q in ends)
     return min(S_M, SHARE_OF_ENDS * float(least))

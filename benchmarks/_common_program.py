@@ -52,12 +52,14 @@ def common_program(chains: Chains, planner: Planner, options: PlanOptions) -> Co
         least = fastest_baseline(first.departure, second.arrival, scene, drives)
         movement = baseline(first.departure, second.arrival, scene, least)
         if planner.evaluate(
-            movement, options.safety_distance, options.load, ""
+            movement, safety_distance=options.safety_distance, load=options.load
         ).verification.violation:
             not_free += 1
             goal = Goal(configuration=second.arrival)
             around = replace(options, objective="movement_cost")
-            found = planner.plan_regional(first.departure, goal, around).trajectory
+            found = planner.plan_regional(
+                start=first.departure, goal=goal, options=around
+            ).trajectory
             assert found is not None
             movement = found
         T = T + movement.duration

@@ -75,7 +75,9 @@ def movement_of(plan: Any) -> Answer:
 def program(cell: str, stations: tuple[str, ...], cycle_time: float, **changed: Any) -> Answer:
     asked = planner(cell)
     home = np.array(asked.cell.machine_home)
-    plan = asked.plan_program(stations, cycle_time, options(**changed), home)
+    plan = asked.plan_program(
+        stations=stations, cycle_time=cycle_time, options=options(**changed), start=home
+    )
     found = {"status": int(plan.status.code), "id": plan.program_id, **info_of(plan.info)}
     for k, movement in enumerate(plan.movements):
         found[f"{k} id"] = movement.trajectory_id
@@ -91,7 +93,10 @@ def tasks_of(cell: str) -> list[tuple[str, Any, Any, float]]:
     found = []
     for task in asked.cell.tasks:
         start, goal = (np.array(q, dtype=np.float64) for q in (task.start, task.goal))
-        ends = min(asked.check_state(q, 0.0, 1, "", "").min_distance for q in (start, goal))
+        ends = min(
+            asked.check_state(q, safety_distance=0.0, max_pairs=1).min_distance
+            for q in (start, goal)
+        )
         margin = min(S_M, SHARE_OF_ENDS * ends)
         found += [(task.name, start, goal, margin), (f"{task.name} back", goal, start, margin)]
     return found
@@ -100,20 +105,26 @@ def tasks_of(cell: str) -> list[tuple[str, Any, Any, float]]:
 def moved(cell: str, start: Any, goal: Any, margin: float, **changed: Any) -> Answer:
     asked = options(safety_distance=margin, **changed)
     return movement_of(
-        planner(cell).plan_regional(start, name_of("Goal")(configuration=goal), asked)
+        planner(cell).plan_regional(
+            start=start, goal=name_of("Goal")(configuration=goal), options=asked
+        )
     )
 
 
 def to_station(cell: str) -> Answer:
     asked = planner(cell)
     goal = name_of("parse_goal")(asked.cell.stations[-1].name, asked.cell)
-    return movement_of(asked.plan_regional(np.array(asked.cell.machine_home), goal, options()))
+    return movement_of(
+        asked.plan_regional(start=np.array(asked.cell.machine_home), goal=goal, options=options())
+    )
 
 
 def service(cell: str, station: str, direction: str) -> Answer:
     asked = planner(cell)
     home = np.array(asked.cell.machine_home)
-    plan = asked.plan_service(station, direction, None, home, 3, options())
+    plan = asked.plan_service(
+        station, direction=direction, near=home, max_candidates=3, options=options()
+    )
     found = {"status": int(plan.status.code), **info_of(plan.info)}
     for k, candidate in enumerate(plan.candidates):
         found[f"{k} id"] = identity(candidate.trajectory)
@@ -135,7 +146,9 @@ def planned(cell: str, k: int) -> JointTrajectory:
     _, start, goal, margin = tasks_of(cell)[k]
     asked = options(safety_distance=margin)
     found = (
-        planner(cell).plan_regional(start, name_of("Goal")(configuration=goal), asked).trajectory
+        planner(cell)
+        .plan_regional(start=start, goal=name_of("Goal")(configuration=goal), options=asked)
+        .trajectory
     )
     assert isinstance(found, JointTrajectory)
     return found
@@ -143,7 +156,7 @@ def planned(cell: str, k: int) -> JointTrajectory:
 
 def optimized(cell: str, k: int, points: int, **changed: Any) -> Answer:
     asked = options(safety_distance=tasks_of(cell)[k][3], **changed)
-    plan = planner(cell).optimize_trajectory(thinned(planned(cell, k), points), asked)
+    plan = planner(cell).optimize_trajectory(thinned(planned(cell, k), points), options=asked)
     found = {"status": int(plan.status.code), "id": identity(plan.trajectory), **info_of(plan.info)}
     found["front"] = [point.trajectory.trajectory_id for point in plan.front]
     return found | numbers_of(plan.before, "before ") | numbers_of(plan.after, "after ")
@@ -153,7 +166,7 @@ def through(cell: str, k: int, points: int, timed: bool, **changed: Any) -> Answ
     given = thinned(planned(cell, k), points)
     reference = name_of("Reference")(given.positions, given.times if timed else None)
     asked = options(safety_distance=tasks_of(cell)[k][3], **changed)
-    return movement_of(planner(cell).plan_trajectory(reference, asked))
+    return movement_of(planner(cell).plan_trajectory(reference, options=asked))
 
 
 def pose(x: float, y: float, z: float, tilt: float = 0.0) -> FloatArray:
@@ -194,7 +207,7 @@ PATHS = {
 
 
 def along_path(cell: str, name: str) -> Answer:
-    plan = planner(cell).plan_cartesian(PATHS[name], options())
+    plan = planner(cell).plan_cartesian(PATHS[name], options=options())
     return {
         "status": int(plan.status.code),
         "id": identity(plan.trajectory),
@@ -204,7 +217,7 @@ def along_path(cell: str, name: str) -> Answer:
 
 
 def evaluated(cell: str, k: int) -> Answer:
-    found = planner(cell).evaluate(planned(cell, k), tasks_of(cell)[k][3], "", "")
+    found = planner(cell).evaluate(planned(cell, k), safety_distance=tasks_of(cell)[k][3])
     return {
         "status": int(found.verification.status.code),
         **numbers_of(found.report),
@@ -216,7 +229,7 @@ def ik(cell: str, station: str, method: str) -> Answer:
     asked = planner(cell)
     goal = name_of("parse_goal")(station, asked.cell)
     near = np.array(asked.cell.machine_home)
-    plan = asked.compute_ik(goal, method, S_M, near, "", 32, 3)
+    plan = asked.compute_ik(goal, method=method, safety_distance=S_M, near=near, starts=32, seed=3)
     found = {
         "status": int(plan.status.code),
         "rejected": sorted(one.count for one in plan.info.rejected),
@@ -228,7 +241,7 @@ def ik(cell: str, station: str, method: str) -> Answer:
 
 
 def standby(cell: str, pause: float) -> Answer:
-    found = planner(cell).standby(pause, None, "")
+    found = planner(cell).standby(pause)
     return {
         "mode": found.chosen.name,
         "wake_at": found.wake_at,
@@ -240,7 +253,7 @@ def standby(cell: str, pause: float) -> Answer:
 
 
 def state(cell: str, k: int) -> Answer:
-    found = planner(cell).check_state(tasks_of(cell)[k][1], S_M, 20, "", "")
+    found = planner(cell).check_state(tasks_of(cell)[k][1], safety_distance=S_M, max_pairs=20)
     return {
         "valid": found.valid,
         "min_distance": found.min_distance,

@@ -184,14 +184,24 @@ def _refused() -> Iterator[Request]:
     goal = name_of("Goal")(configuration=np.array(demo.cell.posture("park")))
     far = name_of("parse_goal")("X 9 Y 0 Z 1 A 0 B 90 C 0", demo.cell)
     cases: dict[str, Callable[[], Any]] = {
-        "unknown planner": lambda: demo.plan_regional(home, goal, options(planner_id="no_such")),
-        "duration too short": lambda: demo.plan_regional(home, goal, options(duration=0.05)),
-        "out of reach": lambda: demo.plan_regional(home, far, options()),
-        "outside the limits": lambda: demo.plan_regional(home + 9.0, goal, options()),
-        "unknown station": lambda: demo.plan_program(("no_such",), 0.0, options(), home),
-        "cycle time too short": lambda: demo.plan_program((), 1.0, options(), home),
+        "unknown planner": lambda: demo.plan_regional(
+            start=home, goal=goal, options=options(planner_id="no_such")
+        ),
+        "duration too short": lambda: demo.plan_regional(
+            start=home, goal=goal, options=options(duration=0.05)
+        ),
+        "out of reach": lambda: demo.plan_regional(start=home, goal=far, options=options()),
+        "outside the limits": lambda: demo.plan_regional(
+            start=home + 9.0, goal=goal, options=options()
+        ),
+        "unknown station": lambda: demo.plan_program(
+            stations=("no_such",), options=options(), start=home
+        ),
+        "cycle time too short": lambda: demo.plan_program(
+            cycle_time=1.0, options=options(), start=home
+        ),
         "budget of one": lambda: demo.plan_regional(
-            home, goal, replace(options(), max_iterations=1)
+            start=home, goal=goal, options=replace(options(), max_iterations=1)
         ),
     }
     for name, ask in cases.items():

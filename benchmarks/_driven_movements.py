@@ -34,7 +34,7 @@ def predicted(cell_name: str, objective: str = "time_and_energy") -> tuple[Predi
     """Every movement of a cell: of its program, and of its tasks there and back."""
     planner = planner_in(cell_name, PlannerSettings())
     return tuple(
-        Predicted(m, planner.evaluate(m.trajectory, 0.0, m.load, "").report.energy)
+        Predicted(m, planner.evaluate(m.trajectory, safety_distance=0.0, load=m.load).report.energy)
         for m in movements_of(planner, objective)
     )
 

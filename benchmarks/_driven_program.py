@@ -13,7 +13,6 @@ from _results import Claim, at_most
 
 from ir_description import Cell, cell_to_yaml, load_cell
 from ir_msgs_py.announcements import Event
-from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner import Planner
@@ -125,9 +124,9 @@ def driven(name: str, longest: float) -> tuple[list[Step], list[Claim]]:
     )
     # no ceiling
     cell = replace(cell, program=short)
-    planner = Planner(itertools.repeat(0.0).__next__)
-    planner.set_cell(cell_to_yaml(cell), "")
-    plan = planner.plan_program((), 0.0, PlanOptions(), np.array(cell.park))
+    planner = Planner(clock=itertools.repeat(0.0).__next__)
+    planner.set_cell(text=cell_to_yaml(cell))
+    plan = planner.plan_program(start=np.array(cell.park))
     robot = Robot(cell)
     begun = robot.plant.mains.energy()
     ended = robot.run(plan.movements)

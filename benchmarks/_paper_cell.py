@@ -44,7 +44,7 @@ def measure(seed: int, quick: bool) -> list[Row]:
     """A row per movement of the planned program: the tool's path, and what kind it is."""
     planner = planner_of(CELL)
     plan = planner.plan_program(
-        (), 0.0, PlanOptions(planning_time=60.0), np.array(planner.cell.park)
+        options=PlanOptions(planning_time=60.0), start=np.array(planner.cell.park)
     )
     chain = planner.scene().chain
     rows = []

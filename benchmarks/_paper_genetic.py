@@ -85,8 +85,8 @@ def _answers(cell: str, tasks: list[Task]) -> list[Row]:
     """Whole answers to tasks of one variant of a cell, by every planner."""
     if not tasks:
         return []
-    planner = Planner(time.process_time)
-    planner.set_cell(cell_to_yaml(tasks[0].scene.cell), "")
+    planner = Planner(clock=time.process_time)
+    planner.set_cell(text=cell_to_yaml(tasks[0].scene.cell))
     return [
         {"kind": "answer", "cell": cell, "variant": task.cell, "task": task.name}
         | _answer(planner, task, name)
@@ -103,7 +103,9 @@ def _answer(planner: Planner, task: Task, name: str) -> Row:
         time_value=TIME_VALUE,
     )
     begin = time.process_time()
-    plan = planner.plan_regional(task.start, Goal(configuration=task.goal), asked)
+    plan = planner.plan_regional(
+        start=task.start, goal=Goal(configuration=task.goal), options=asked
+    )
     report = plan.report
     row: Row = {"planner": name or "portfolio", "solved": plan.status.ok and report.certified}
     row["seconds"] = time.process_time() - begin

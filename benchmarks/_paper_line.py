@@ -41,7 +41,9 @@ def measure(seed: int, quick: bool) -> list[Row]:
 def _row(cell: str, stops: tuple[str, ...], seed: int) -> Row:
     planner = planner_of(cell)
     asked = PlanOptions(seed=seed, planning_time=PLANNING_S)
-    plan = planner.plan_program(stops, 0.0, asked, np.array(planner.cell.park), savings=True)
+    plan = planner.plan_program(
+        stations=stops, options=asked, start=np.array(planner.cell.park), savings=True
+    )
     found = plan.savings
     if not found.available:
         return {}

@@ -66,7 +66,9 @@ def _row(planner: Planner, pair: Pair) -> Row:
             planning_time=PLANNING_S,
             safety_distance=S_M,
         )
-        found = planner.plan_regional(pair.q0, Goal(configuration=pair.q1), asked).trajectory
+        found = planner.plan_regional(
+            start=pair.q0, goal=Goal(configuration=pair.q1), options=asked
+        ).trajectory
         if found is not None:
             row |= {f"{name} J": pair.drive_energy(found), f"{name} s": found.duration}
     return row

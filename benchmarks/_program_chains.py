@@ -175,7 +175,9 @@ class Chains:
             goal = Goal(configuration=second.arrival)
             if np.abs(second.arrival - first.departure).max() < 1e-9:
                 return 0.0
-            plan = self.planner.plan_regional(first.departure, goal, self.options)
+            plan = self.planner.plan_regional(
+                start=first.departure, goal=goal, options=self.options
+            )
             self.known[key] = cost_of(plan.report, self.options) if plan.status.ok else np.inf
             self.edges += 1
         return self.known[key]

@@ -66,10 +66,10 @@ def _followed(planner: Planner, task: Task, seconds: float) -> Iterator[Cost]:
         if time.perf_counter() > end:
             return
         try:
-            followed = planner.plan_trajectory(Reference(path.corners), asked(task))
+            followed = planner.plan_trajectory(Reference(path.corners), options=asked(task))
             if followed.trajectory is None:
                 continue
-            plan = planner.optimize_trajectory(followed.trajectory, asked(task))
+            plan = planner.optimize_trajectory(followed.trajectory, options=asked(task))
         except RequestError:
             continue
         if plan.status.ok and plan.after.certified:

@@ -49,9 +49,7 @@ class Run:
 
 def planner_of(cell: str) -> Planner:
     """A planner with the cell."""
-    planner = Planner(time.monotonic)
-    planner.set_cell("", cell)
-    return planner
+    return Planner(cell)
 
 
 def asked(task: Task, seed: int = 0) -> PlanOptions:
@@ -83,7 +81,9 @@ def notes_first(info: PlanningInfo) -> bool:
 def run(planner: Planner, task: Task, options: PlanOptions) -> Run:
     """Ask once; the time is that of the whole call."""
     begin = time.perf_counter()
-    plan = planner.plan_regional(task.start, Goal(configuration=task.goal), options)
+    plan = planner.plan_regional(
+        start=task.start, goal=Goal(configuration=task.goal), options=options
+    )
     took = time.perf_counter() - begin
     report = plan.report
     solved = plan.status.ok and report.certified
@@ -152,7 +152,9 @@ def knows(planner: Planner, task: Task, planner_id: str) -> bool:
     """Whether the planner takes this planner_id."""
     try:
         planner.plan_regional(
-            task.start, Goal(configuration=task.start), replace(asked(task), planner_id=planner_id)
+            start=task.start,
+            goal=Goal(configuration=task.start),
+            options=replace(asked(task), planner_id=planner_id),
         )
     except RequestError as error:
         if "unknown" in str(error):

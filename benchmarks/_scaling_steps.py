@@ -53,9 +53,9 @@ class Step:
 
 def planner_with(cell: Cell) -> Planner:
     """A planner with a cell, its scene built."""
-    planner = Planner(time.monotonic)
-    planner.set_cell(cell_to_yaml(cell), "")
-    planner.check_state(planner.cell.machine_home, 0.0, 1, "", "")
+    planner = Planner(clock=time.monotonic)
+    planner.set_cell(text=cell_to_yaml(cell))
+    planner.check_state(planner.cell.machine_home, safety_distance=0.0, max_pairs=1)
     return planner
 
 
@@ -95,8 +95,10 @@ def _scene(planner: Planner) -> Callable[[], object]:
     machine = cell.machine(cell.stations[-1].equipment)
 
     def call() -> object:
-        planner.set_equipment(machine.name, machine.pose, True, "")
-        return planner.check_state(cell.machine_home, MARGIN, 5, "", station)
+        planner.set_equipment(machine.name, pose=machine.pose, enabled=True)
+        return planner.check_state(
+            cell.machine_home, safety_distance=MARGIN, max_pairs=5, station=station
+        )
 
     return call
 
@@ -114,7 +116,7 @@ def _movement(planner: Planner) -> Callable[[], object]:
     goal = Goal(configuration=cell.park)
 
     def call() -> object:
-        plan = planner.plan_regional(start, goal, options(0))
+        plan = planner.plan_regional(start=start, goal=goal, options=options(0))
         if not plan.status.ok:
             raise RuntimeError(plan.status.message)
         return plan
@@ -124,7 +126,7 @@ def _movement(planner: Planner) -> Callable[[], object]:
 
 def _evaluation(planner: Planner) -> Callable[[], object]:
     trajectory = waves(planner.cell, 10)
-    return lambda: planner.evaluate(trajectory, MARGIN, "", "")
+    return lambda: planner.evaluate(trajectory, safety_distance=MARGIN)
 
 
 def _program(planner: Planner) -> Callable[[], object]:
@@ -132,7 +134,11 @@ def _program(planner: Planner) -> Callable[[], object]:
 
 
 def _planned(planner: Planner, stations: tuple[str, ...], seed: int) -> ProgramPlan:
-    return _found(planner.plan_program(stations, 0.0, options(seed), planner.cell.posture("park")))
+    return _found(
+        planner.plan_program(
+            stations=stations, options=options(seed), start=planner.cell.posture("park")
+        )
+    )
 
 
 def _found(plan: ProgramPlan) -> ProgramPlan:
@@ -185,22 +191,24 @@ def _of_points(
 
 def _timed(planner: Planner, points: int) -> Callable[[], object]:
     given = waves(planner.cell, points)
-    return lambda: planner.plan_trajectory(Reference(given.positions, given.times), options(0))
+    return lambda: planner.plan_trajectory(
+        Reference(given.positions, given.times), options=options(0)
+    )
 
 
 def _free(planner: Planner, points: int) -> Callable[[], object]:
     given = waves(planner.cell, points)
-    return lambda: planner.plan_trajectory(Reference(given.positions), options(0))
+    return lambda: planner.plan_trajectory(Reference(given.positions), options=options(0))
 
 
 def _evaluated(planner: Planner, points: int) -> Callable[[], object]:
     given = waves(planner.cell, points)
-    return lambda: planner.evaluate(given, MARGIN, "", "")
+    return lambda: planner.evaluate(given, safety_distance=MARGIN)
 
 
 def _optimised(planner: Planner, points: int) -> Callable[[], object]:
     given = waves(planner.cell, points)
-    return lambda: planner.optimize_trajectory(given, options(0))
+    return lambda: planner.optimize_trajectory(given, options=options(0))
 
 
 def _vetted(planner: Planner, points: int) -> Callable[[], object]:

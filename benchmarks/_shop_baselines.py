@@ -146,9 +146,7 @@ def _rows(name: str, run: Any) -> list[Row]:
 
 
 def _planner(cell: str) -> Planner:
-    planner = Planner(time.monotonic)
-    planner.set_cell("", cell)
-    return planner
+    return Planner(cell)
 
 
 def _common(cycle_time: float) -> BeforeAfter:

@@ -5,7 +5,6 @@ come.
 from __future__ import annotations
 
 import re
-import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -123,8 +122,7 @@ def _apart(first: FloatArray, second: FloatArray, planner: Planner) -> tuple[int
 
 def corpus() -> tuple[list[dict[str, Any]], list[Claim]]:
     """All programs, printed as a table, and what is claimed of them."""
-    planner = Planner(time.monotonic)
-    planner.set_cell("", CELL)
+    planner = Planner(CELL)
     rows = [_row(path, planner) for path in programs()]
     print(f"{'program':<44} movements  points  off deg   off mm  refused")
     for row in rows:

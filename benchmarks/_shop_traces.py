@@ -4,7 +4,6 @@ bound.
 
 from __future__ import annotations
 
-import time
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -13,7 +12,6 @@ from _results import Claim, at_least, at_most, line_of
 
 from ir_cli.smoothing import measured
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner
 from ir_planner.checks import movement_energy
@@ -42,9 +40,8 @@ class Row:
 
 def traces() -> tuple[list[dict[str, Any]], list[Claim]]:
     """Rows of all rates and noises, and what is claimed of them."""
-    planner = Planner(time.monotonic)
-    planner.set_cell("", "demo")
-    plan = planner.plan_program(VISIT, 0.0, PlanOptions(), planner.cell.machine_home, savings=True)
+    planner = Planner("demo")
+    plan = planner.plan_program(stations=VISIT, start=planner.cell.machine_home, savings=True)
     assert plan.common is not None
     steps = (*plan.movements, *plan.common.movements)
     motions = [_rested(step.trajectory) for step in steps if step.trajectory is not None]

@@ -83,7 +83,9 @@ def measured(asked: Asked) -> Found:
 def _to_first(planner: Planner, first: Test) -> Test:
     """The movement from machine home to where the cell's program begins."""
     goal = Goal(configuration=first.trajectory.positions[0])
-    plan = planner.plan_regional(planner.cell.machine_home, goal, PlanOptions(load=first.load))
+    plan = planner.plan_regional(
+        start=planner.cell.machine_home, goal=goal, options=PlanOptions(load=first.load)
+    )
     assert plan.trajectory is not None  # both are free in the bundled cell
     return Test(plan.trajectory, first.load)
 

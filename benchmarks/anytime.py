@@ -81,10 +81,10 @@ def planner_of(name: str, clock: Callable[[], float], turns: bool = False) -> Pl
     """A planner with a cell, its scene built. turns: A4 and A6 turn farther."""
     cell = with_turns(load_cell(name), FAR) if turns else load_cell(name)
     planner = Planner(
-        clock, read_cell=lambda *_: cell
+        clock=clock, read_cell=lambda *_: cell
     )  # the text of a cell doesn't say how far its robot turns
-    planner.set_cell("", name)
-    planner.check_state(planner.cell.machine_home, 0.0, 1, "", "")
+    planner.set_cell(name)
+    planner.check_state(planner.cell.machine_home, safety_distance=0.0, max_pairs=1)
     return planner
 
 
@@ -95,12 +95,16 @@ def planned(
     stops = len(request.stops or planner.cell.program)
     options = PlanOptions(seed=seed, planning_time=seconds / stops)
     start = np.array(planner.cell.park)
-    more = {"savings": request.savings}
     try:
         return planner.plan_program(
-            request.stops, request.cycle, options, start, cancelled=watch,
-            front_points=request.front_points, **more,
-        )  # fmt: skip
+            stations=request.stops,
+            cycle_time=request.cycle,
+            options=options,
+            start=start,
+            cancelled=watch,
+            front_points=request.front_points,
+            savings=request.savings,
+        )
     except RequestError:
         return None
 

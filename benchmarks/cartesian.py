@@ -74,7 +74,7 @@ def row_of(cell: str, seed: int, planner: Planner, judge: SecondOpinion) -> Row:
 def timed(planner: Planner, path: CartesianPath) -> tuple[CartesianPlan, float]:
     """The answer, and its seconds of processor time."""
     began = time.process_time()
-    plan = planner.plan_cartesian(path, PlanOptions(safety_distance=MARGIN))
+    plan = planner.plan_cartesian(path, options=PlanOptions(safety_distance=MARGIN))
     return plan, time.process_time() - began
 
 
@@ -103,8 +103,7 @@ def main() -> None:
     rows: list[Row] = []
     lines: list[float] = []
     for cell in arguments.cell or CELLS:
-        planner = Planner(time.monotonic)
-        planner.set_cell("", cell)
+        planner = Planner(cell)
         judge = SecondOpinion(planner.scene())
         for seed in range(arguments.first, arguments.first + seeds):
             rows.append(row_of(cell, seed, planner, judge))

@@ -67,8 +67,7 @@ class Programs:
         most = work * default.max_iterations
         improvement = work * default.improvement_iterations
         settings = replace(default, max_iterations=most, improvement_iterations=improvement)
-        self.planner = Planner(time.monotonic, settings)
-        self.planner.set_cell("", cell)
+        self.planner = Planner(cell, clock=time.monotonic, settings=settings)
         self.stops = (*(station.name for station in self.planner.cell.stations), "park")
         self.start = np.array(self.planner.cell.park)
 
@@ -80,7 +79,12 @@ class Programs:
         """The program in a cycle time [s], 0: free. A refused one costs nan."""
         begin = time.process_time()
         try:
-            plan = self.planner.plan_program(self.stops, cycle, self.options(objective), self.start)
+            plan = self.planner.plan_program(
+                stations=self.stops,
+                cycle_time=cycle,
+                options=self.options(objective),
+                start=self.start,
+            )
         except RequestError:
             plan = None
         if plan is None or not plan.status.ok:
@@ -129,7 +133,7 @@ class Programs:
     @property
     def waiting(self) -> float:
         """Mains power [W] of standing on motors at the end."""
-        return self.planner.standby(60.0, self.start, "").alternatives[0].power
+        return self.planner.standby(60.0, q=self.start).alternatives[0].power
 
 
 def rivals_of(rows: list[Row], count: int) -> list[Row]:

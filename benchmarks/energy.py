@@ -125,7 +125,7 @@ def certified(
     factor = 1.0
     while factor <= MOST:
         slower = _slowed(trajectory, factor)
-        if planner.evaluate(slower, S_M, load, "").verification.certified:
+        if planner.evaluate(slower, safety_distance=S_M, load=load).verification.certified:
             return slower
         factor *= SLOWER
     return None
@@ -164,7 +164,9 @@ def measured(
     took = []
     for _ in range(TIMED):
         begin = time.process_time()
-        plan = planner.plan_regional(case.q0, Goal(configuration=case.q1), options)
+        plan = planner.plan_regional(
+            start=case.q0, goal=Goal(configuration=case.q1), options=options
+        )
         took.append(1e3 * (time.process_time() - begin))
     mine = float("nan")
     disagreement = 0.0
@@ -199,8 +201,7 @@ def measured(
 
 def rows_of(cell: str, count: int, starts: int, seed: int) -> Iterator[Row]:
     """All durations of every movement of a cell."""
-    planner = Planner(time.monotonic)
-    planner.set_cell("", cell)
+    planner = Planner(cell)
     loads = ("", NO_LOAD)
     drives = {load: Drives(planner.scene(load)) for load in loads}
     peers = {load: peer_of(planner.scene(load)) if starts else None for load in loads}
@@ -209,7 +210,9 @@ def rows_of(cell: str, count: int, starts: int, seed: int) -> Iterator[Row]:
         options = PlanOptions(
             objective="time", load=load, planning_time=CEILING, safety_distance=S_M
         )
-        fastest = planner.plan_regional(q0, Goal(configuration=q1), options).report.duration
+        fastest = planner.plan_regional(
+            start=q0, goal=Goal(configuration=q1), options=options
+        ).report.duration
         for factor in FACTORS:
             case = Case(q0, q1, load, factor, factor * fastest)
             yield measured(cell, number, case, planner, drives[load], peers[load], starts)

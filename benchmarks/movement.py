@@ -86,7 +86,9 @@ def coarse(planner: Planner, task: Task, *, alone: bool) -> float:
 
 def answered(planner: Planner, task: Task) -> float:
     """J of the answer [J]."""
-    report = planner.plan_regional(task.start, Goal(configuration=task.goal), asked(task)).report
+    report = planner.plan_regional(
+        start=task.start, goal=Goal(configuration=task.goal), options=asked(task)
+    ).report
     drives: float = report.energy - report.base_energy
     return drives + asked(task).time_value * report.duration
 

@@ -51,11 +51,13 @@ class Row:
 
 def planned(cell: Cell, asked: str, value: float, options: PlanOptions, cycle: float = 0.0) -> Row:
     """The program through all stations of a cell, in a cycle time [s], 0: free."""
-    planner = Planner(time.monotonic)
-    planner.set_cell(cell_to_yaml(cell), "")
+    planner = Planner(clock=time.monotonic)
+    planner.set_cell(text=cell_to_yaml(cell))
     stops = (*(station.name for station in cell.stations), "park")
     begin = time.process_time()
-    plan = planner.plan_program(stops, cycle, options, np.array(cell.park))
+    plan = planner.plan_program(
+        stations=stops, cycle_time=cycle, options=options, start=np.array(cell.park)
+    )
     took = time.process_time() - begin
     if not plan.status.ok:
         return Row(cell.name, asked, value, np.nan, np.nan, np.nan, took)

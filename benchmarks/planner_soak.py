@@ -65,7 +65,7 @@ def soaked(node: PlannerNode, cell: str, calls: int, seed: int) -> dict[str, Any
             if call % 2:
                 request, _ = cases.disturbed(request, rng)
             handler(request, cases.RESPONSES[name]())
-        node.planner.set_cell("", cell)
+        node.planner.set_cell(cell)
     after = taken()
     return {
         "cell": cell,

@@ -95,9 +95,7 @@ class Row:
 @cache
 def planner_of(cell: str) -> Planner:
     """A planner with the cell."""
-    planner = Planner(time.monotonic)
-    planner.set_cell("", cell)
-    return planner
+    return Planner(cell)
 
 
 def instances(cell: str, count: int, seed: int) -> list[Instance]:
@@ -133,7 +131,7 @@ def compared(instance: Instance, objective: str, seed: int, known: EdgeCosts) ->
     )
     start = np.array(planner.cell.posture("park"))
     begin = time.perf_counter()
-    plan = planner.plan_program(instance.stops, 0.0, options, start)
+    plan = planner.plan_program(stations=instance.stops, options=options, start=start)
     planned = time.perf_counter()
     count = 0.0
     edges = 0

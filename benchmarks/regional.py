@@ -262,7 +262,7 @@ def main() -> None:
             shown = ("task", "solved", "first_ms", "final_ms", "J", "ompl_J", "best_J")
             print(line_of({key: row.get(key, "-") for key in shown}), flush=True)
         plan = planner.plan_regional(
-            tasks[0].start, Goal(configuration=tasks[0].goal), asked(tasks[0])
+            start=tasks[0].start, goal=Goal(configuration=tasks[0].goal), options=asked(tasks[0])
         )
         noted &= notes_first(plan.info)
     print()

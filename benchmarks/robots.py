@@ -118,15 +118,17 @@ def is_there(found: FloatArray, made: FloatArray) -> bool:
 
 def plan_rows(cell: str, seeds: int) -> list[Row]:
     """A row per movement and seed: certified, and what Coal and Pinocchio say."""
-    planner = Planner(time.monotonic)
-    loaded = planner.set_cell("", cell)
+    planner = Planner(cell)
+    loaded = planner.cell
     opinion = SecondOpinion(planner.scene())
     rows = []
     for seed in range(seeds):
         q = np.array(loaded.posture("park"))
         for name, start, goal in asked_of(loaded):
             options = PlanOptions(seed=seed, planning_time=60.0)
-            plan = planner.plan_regional(q if start is None else np.array(start), goal, options)
+            plan = planner.plan_regional(
+                start=q if start is None else np.array(start), goal=goal, options=options
+            )
             row: Row = {"cell": cell, "movement": name, "seed": seed, "solved": plan.status.ok}
             rows.append(row)
             if plan.trajectory is None:

@@ -25,7 +25,6 @@ from _shop_traces import traces
 
 from ir_description import bundled_cells, load_cell
 from ir_krl import follow, parse
-from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import (
     KrlExport,
@@ -86,7 +85,7 @@ def stations_for(planner: Planner, seed: int) -> tuple[str, ...]:
 def row_of(cell: str, seed: int, planner: Planner) -> Row | None:
     """Plan, export, read back; None where the planner finds no program."""
     plan = planner.plan_program(
-        stations_for(planner, seed), 0.0, PlanOptions(), planner.cell.posture("park")
+        stations=stations_for(planner, seed), start=planner.cell.posture("park")
     )
     if not plan.status.ok:
         return None
@@ -159,8 +158,7 @@ def main() -> None:
     rows: list[Row] = []
     for cell in arguments.cell or CELLS:
         load_cell(cell)
-        planner = Planner(time.monotonic)
-        planner.set_cell("", cell)
+        planner = Planner(cell)
         for seed in range(seeds):
             row = row_of(cell, seed, planner)
             if row is not None:

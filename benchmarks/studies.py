@@ -114,7 +114,9 @@ def answer(planner: Planner, task: Task, name: str, seeds: int) -> Answer:
                 "planning_time": CEILING_S,
             }
         )
-        plan = planner.plan_regional(task.start, Goal(configuration=task.goal), options)
+        plan = planner.plan_regional(
+            start=task.start, goal=Goal(configuration=task.goal), options=options
+        )
         if plan.trajectory is not None:
             break
     took = 1e3 * (time.perf_counter() - begin)

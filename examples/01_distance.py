@@ -1,7 +1,5 @@
 """Metric distance: which bodies are nearest to each other in a configuration, and how near."""
 
-import time
-
 import numpy as np
 
 from ir_planner import Planner
@@ -12,11 +10,10 @@ IN_A_TABLE_DEG = (-30.0, -60.0, 95.0, 0.0, 55.0, 0.0)
 
 
 def main() -> None:
-    planner = Planner(time.monotonic)
-    planner.set_cell("", "demo")
+    planner = Planner("demo")
     for joints_deg in (HOME_DEG, IN_A_TABLE_DEG):
         state = planner.check_state(
-            np.radians(joints_deg), SAFETY_DISTANCE, max_pairs=4, load="", station=""
+            np.radians(joints_deg), safety_distance=SAFETY_DISTANCE, max_pairs=4
         )
         print(f"{joints_deg} deg: {'free' if state.valid else 'not free'}")
         for pair in state.pairs:

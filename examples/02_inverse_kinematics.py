@@ -2,23 +2,15 @@
 search.
 """
 
-import time
-
 import numpy as np
 
-from ir_planner import Planner, parse_goal
-
-SAFETY_DISTANCE = 0.02  # m
+from ir_planner import Planner
 
 
 def main() -> None:
-    planner = Planner(time.monotonic)
-    cell = planner.set_cell("", "demo")
-    goal = parse_goal("gauge_measure", cell)
+    planner = Planner("demo")
     for method in ("analytic", "ccd"):
-        answer = planner.compute_ik(
-            goal, method, SAFETY_DISTANCE, np.array(cell.machine_home), load=""
-        )
+        answer = planner.compute_ik("gauge_measure", method=method)
         print(f"{method}: {len(answer.solutions)} configurations, cheapest first by W of eq. (9)")
         for solution in answer.solutions[:3]:
             joints = ", ".join(f"{angle:7.1f}" for angle in np.degrees(solution.q))

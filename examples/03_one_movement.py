@@ -2,29 +2,21 @@
 slower one.
 """
 
-import time
+from ir_planner import Planner
 
-import numpy as np
-
-from ir_planner import Planner, PlanOptions, parse_goal
+GOAL = "A1 60 A2 -70 A3 100 A4 0 A5 20 A6 0"  # degrees
 
 
 def main() -> None:
-    planner = Planner(time.monotonic)
-    cell = planner.set_cell("", "demo")
-    start = np.array(cell.machine_home)
-    goal = parse_goal("A1 60 A2 -70 A3 100 A4 0 A5 20 A6 0", cell)
-    for options in (PlanOptions(objective="time"), PlanOptions(objective="energy", duration=3.0)):
-        plan = planner.plan_regional(start, goal, options)
+    planner = Planner("demo")
+    for plan in (
+        planner.plan_regional(goal=GOAL, objective="time"),
+        planner.plan_regional(goal=GOAL, objective="energy", duration=3.0),
+    ):
         if plan.trajectory is None:
             raise SystemExit(plan.status.message)
-        report = plan.report
-        print(
-            f"objective {options.objective}: {report.duration:.2f} s, {report.energy:.0f} J at "
-            f"the mains, peak {report.peak_power / 1000.0:.1f} kW, clearance "
-            f"{1000.0 * report.min_clearance:.0f} mm, "
-            f"{'certified' if report.certified else 'not certified'}"
-        )
+        print(plan)
+        print(f"  peak {plan.report.peak_power / 1000.0:.1f} kW at the mains")
         print(f"  {len(plan.trajectory.times)} points, id {plan.trajectory.trajectory_id}")
 
 

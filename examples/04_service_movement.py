@@ -1,19 +1,11 @@
 """Service movements: candidates out of a machine's forbidden zone, ranked by the objective."""
 
-import time
-
-import numpy as np
-
-from ir_planner import Planner, PlanOptions
+from ir_planner import Planner
 
 
 def main() -> None:
-    planner = Planner(time.monotonic)
-    cell = planner.set_cell("", "demo")
-    near = np.array(cell.machine_home)
-    plan = planner.plan_service(
-        "lathe_work", "exit", None, near, max_candidates=3, options=PlanOptions()
-    )
+    planner = Planner("demo")
+    plan = planner.plan_service("lathe_work", direction="exit", max_candidates=3)
     if not plan.status.ok:
         raise SystemExit(plan.status.message)
     for candidate in plan.candidates:

@@ -1,16 +1,11 @@
 """A whole program: the cell's stations in order, with every movement, pause and load."""
 
-import time
-
-import numpy as np
-
-from ir_planner import Planner, PlanOptions
+from ir_planner import Planner
 
 
 def main() -> None:
-    planner = Planner(time.monotonic)
-    cell = planner.set_cell("", "demo")
-    plan = planner.plan_program((), 0.0, PlanOptions(), np.array(cell.park))
+    planner = Planner("demo")
+    plan = planner.plan_program()
     if not plan.status.ok:
         raise SystemExit(plan.status.message)
     for step in plan.movements:

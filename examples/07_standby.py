@@ -2,22 +2,19 @@
 saved.
 """
 
-import time
-
 from ir_planner import Planner
 
 PAUSES = (2.0, 10.0, 60.0, 600.0, 3600.0)  # s
 
 
 def main() -> None:
-    planner = Planner(time.monotonic)
-    planner.set_cell("", "demo")
+    planner = Planner("demo")
     print(
         "pause [s]  mode             wake at [s]  energy [kJ]  saved [kJ]: against the timer, "
         "against motors"
     )
     for pause in PAUSES:
-        advice = planner.standby(pause, q=None, load="")
+        advice = planner.standby(pause)
         print(
             f"{pause:9.0f}  {advice.chosen.name:15}  {advice.wake_at:11.1f}  "
             f"{advice.energy / 1000.0:11.1f}  "

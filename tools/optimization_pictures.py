@@ -9,8 +9,6 @@ names are printed.
 
 from __future__ import annotations
 
-import time
-
 import matplotlib as mpl
 import numpy as np
 from _pictures import folder_asked
@@ -51,14 +49,13 @@ def main() -> None:
 
 def optimized() -> tuple[PlanningScene, JointTrajectory, OptimizationPlan]:
     """The scene, the straight movement of 3 s, and what the planner makes of it."""
-    planner = Planner(time.monotonic)
-    planner.set_cell("", CELL)
+    planner = Planner(CELL)
     scene = planner.scene()
     task = scene.cell.task(TASK)
     ends = np.stack([task.start, task.goal])
     rest = np.zeros_like(ends)
     given = JointTrajectory.from_seconds(scene.cell.robot.joint_names, [0.0, 3.0], ends, rest, rest)
-    return scene, given, planner.optimize_trajectory(given, PlanOptions(planning_time=60.0))
+    return scene, given, planner.optimize_trajectory(given, options=PlanOptions(planning_time=60.0))
 
 
 def distances(

@@ -15,9 +15,7 @@ OLD = (Path(__file__).parent / "old.src").read_text(encoding="utf-8")
 
 @pytest.fixture(scope="session")
 def planner() -> Planner:
-    planner = Planner(lambda: 0.0)  # a clock that cuts no plan of a busy machine
-    planner.set_cell("", "open")
-    return planner
+    return Planner("open", clock=lambda: 0.0)  # a clock that cuts no plan of a busy machine
 
 
 @pytest.fixture(scope="session")

@@ -101,7 +101,7 @@ def test_the_common_program_saves_what_the_planner_says(planner: Planner) -> Non
     """Two computations of one figure: the answer's savings, and the sides of the comparison."""
     park = planner.cell.park
     found = before_after_common(planner, ("p1", "home"), park)
-    plan = planner.plan_program(("p1", "home"), 0.0, PlanOptions(), park, savings=True)
+    plan = planner.plan_program(stations=("p1", "home"), start=park, savings=True)
     total = plan.savings.total
     saving = found.sides[0].saving
     assert saving.common == pytest.approx(total.common)
@@ -113,7 +113,7 @@ def test_the_common_program_saves_what_the_planner_says(planner: Planner) -> Non
 
 def test_the_planners_own_program_as_todays_saves_next_to_nothing(planner: Planner) -> None:
     """Law: what is optimal already can't be improved by much."""
-    plan = planner.plan_program(("p1", "home"), 0.0, PlanOptions(), planner.cell.machine_home)
+    plan = planner.plan_program(stations=("p1", "home"), start=planner.cell.machine_home)
     moves = [step.trajectory for step in plan.movements if step.trajectory is not None]
     stretches = tuple(Stretch(one, one.positions[-1], one.duration) for one in moves)
     found = before_after(planner, Today("own", "trace", planner.cell.machine_home, stretches))

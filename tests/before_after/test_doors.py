@@ -35,9 +35,8 @@ def test_doors_of_a_recording_are_those_heard_before_and_all_that_came_meanwhile
 
 
 def today(*doors: Doors | None) -> tuple[Today, AskedProgram]:
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "demo")
-    plan = planner.plan_regional(CELL.machine_home, parse_goal("lathe_work", CELL), PlanOptions())
+    planner = Planner("demo", clock=lambda: 0.0)
+    plan = planner.plan_regional(start=CELL.machine_home, goal=parse_goal("lathe_work", CELL))
     assert plan.trajectory is not None
     into = plan.trajectory
     end = np.asarray(plan.trajectory.positions[-1])
@@ -48,8 +47,7 @@ def today(*doors: Doors | None) -> tuple[Today, AskedProgram]:
 
 def test_todays_movements_are_judged_with_the_doors_as_recorded() -> None:
     known, asked = today((), SHUT, MOVES)
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "demo")
+    planner = Planner("demo", clock=lambda: 0.0)
     power = planner.scene("").power
     request = ProgramRequest(CELL, power, (), known.start, PlanOptions())
     certified = [step.report.certified for step in costed_steps(asked.steps, request)]

@@ -178,8 +178,10 @@ def test_the_cells_own_path_gives_what_it_allows(planner: Planner, found: Evalua
     assert (driven.path.tool_speed, driven.path.blending_radius) == pytest.approx((SPEED, CORNER))
     own = CellPath("bead", replace(driven.path, tool_speed=0.3, free_angle=0.5))
     cell = replace(planner.cell, paths=(own,))
-    theirs = Planner(lambda: 0.0, planner.settings, read_cell=lambda _text, _name: cell)
-    theirs.set_cell("cell", "")
+    theirs = Planner(
+        clock=lambda: 0.0, settings=planner.settings, read_cell=lambda _text, _name: cell
+    )
+    theirs.set_cell(text="cell")
     asked = asked_program(today, theirs.scene("")).cell
     assert [step.target for step in asked.program] == ["bead", "home"]
     assert (asked.path("bead").tool_speed, asked.path("bead").free_angle) == pytest.approx(

@@ -18,9 +18,7 @@ from ir_planner.timing.time_law import GRID_S
 
 @pytest.fixture(scope="module")
 def planner() -> Planner:
-    made = Planner(lambda: 0.0)
-    made.set_cell("", "open")
-    return made
+    return Planner("open", clock=lambda: 0.0)
 
 
 def test_phases_last_as_long_as_those_of_the_planner() -> None:
@@ -65,7 +63,7 @@ def test_two_implementations_agree_on_the_energy(planner: Planner, load: str) ->
     for task in planner.cell.tasks[:3]:
         goal = Goal(configuration=np.array(task.goal))
         options = PlanOptions(load=load, max_iterations=500, planning_time=60.0)
-        plan = planner.plan_regional(np.array(task.start), goal, options)
+        plan = planner.plan_regional(start=np.array(task.start), goal=goal, options=options)
         assert plan.trajectory is not None
         found = movement_energy(plan.trajectory, scene)
         assert drives.energy(plan.trajectory) == pytest.approx(found.total - found.base, rel=1e-9)

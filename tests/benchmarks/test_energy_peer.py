@@ -17,8 +17,7 @@ from ir_planner import Planner
 def test_a_peer_is_certified_and_cheaper_than_the_baseline() -> None:
     from _energy_peer import EnergyPeer  # CasADi takes a second to load
 
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "open")
+    planner = Planner("open", clock=lambda: 0.0)
     scene = planner.scene()
     drives = Drives(scene)
     q0, q1 = next(movements(scene, 1, 0))
@@ -33,5 +32,5 @@ def test_a_peer_is_certified_and_cheaper_than_the_baseline() -> None:
     assert answer is not None
     assert answer.duration <= MOST * duration
     assert np.abs(answer.positions[[0, -1]] - [q0, q1]).max() < 1e-12
-    assert planner.evaluate(answer, S_M, "", "").verification.certified
+    assert planner.evaluate(answer, safety_distance=S_M).verification.certified
     assert drives.energy(answer) < drives.energy(baseline(q0, q1, scene, duration))

@@ -21,9 +21,7 @@ OBJECTIVES = ("time_and_energy", "movement_cost")
 
 @pytest.fixture(scope="module")
 def planner() -> Planner:
-    made = Planner(lambda: 0.0)
-    made.set_cell("", "open")
-    return made
+    return Planner("open", clock=lambda: 0.0)
 
 
 @pytest.mark.parametrize("objective", OBJECTIVES)
@@ -45,7 +43,9 @@ def test_no_movement_undercuts_its_lower_bounds(planner: Planner) -> None:
         start = np.array(task.start)
         goal = np.array(task.goal)
         options = PlanOptions(planning_time=60.0, max_iterations=2000)
-        report = planner.plan_regional(start, Goal(configuration=goal), options).report
+        report = planner.plan_regional(
+            start=start, goal=Goal(configuration=goal), options=options
+        ).report
         J = report.energy - report.base_energy + 500.0 * report.duration
         assert least_cost(scene, start, goal[None], 500.0)[0] <= J
         assert report.movement_cost >= least_travel(scene, start, goal[None])[0] - 1e-9

@@ -56,9 +56,9 @@ def check_planned(document: Document, seed: int) -> None:
     mended = with_suggestions(document)
     cell = cell_of(mended)
     assume(not errors(cell))
-    planner = Planner(itertools.repeat(0.0).__next__)
-    planner.set_cell(cell_to_yaml(cell), "")
-    plan = planner.plan_program((), 0.0, PlanOptions(seed=seed), cell.posture("park"))
+    planner = Planner(clock=itertools.repeat(0.0).__next__)
+    planner.set_cell(text=cell_to_yaml(cell))
+    plan = planner.plan_program(options=PlanOptions(seed=seed), start=cell.posture("park"))
     assert plan.status.ok, plan.status.message
 
 

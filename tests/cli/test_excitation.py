@@ -44,7 +44,9 @@ def test_every_movement_is_certified_and_begins_where_the_one_before_ended(
         trajectory = read_trace(tmp_path / step["trajectory"], names)
         np.testing.assert_allclose(trajectory.positions[0], here, atol=1e-9)
         here = trajectory.positions[-1]
-        assert planner.evaluate(trajectory, 0.02, step["load"], "").verification.certified
+        assert planner.evaluate(
+            trajectory, safety_distance=0.02, load=step["load"]
+        ).verification.certified
     assert {step["mode"] for step in page["steps"] if "mode" in step} >= {
         "STAND_ON_BRAKES",
         "BUS_POWER_OFF",

@@ -16,7 +16,7 @@ from ir_cli.trace_programs import stretches_of
 from ir_cli.traces import Rows, between, counted_turns, read_motion, write_trace
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner import Planner, PlanOptions, parse_goal
+from ir_planner import Planner, parse_goal
 from ir_planner.checks import movement_energy
 
 TRACES = Path(__file__).resolve().parents[2] / "examples" / "traces"
@@ -24,15 +24,13 @@ TRACES = Path(__file__).resolve().parents[2] / "examples" / "traces"
 
 @pytest.fixture(scope="module")
 def planner() -> Planner:
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "open")
-    return planner
+    return Planner("open", clock=lambda: 0.0)
 
 
 @pytest.fixture(scope="module")
 def movement(planner: Planner) -> JointTrajectory:
     plan = planner.plan_regional(
-        planner.cell.machine_home, parse_goal("p1", planner.cell), PlanOptions()
+        start=planner.cell.machine_home, goal=parse_goal("p1", planner.cell)
     )
     assert plan.trajectory is not None
     return plan.trajectory

@@ -30,9 +30,7 @@ def power(request: pytest.FixtureRequest) -> PowerData:
 @pytest.fixture
 def planner(power: PowerData) -> Planner:
     """A planner with these figures; its clock stands still."""
-    made = Planner(itertools.repeat(0.0).__next__, power=power)
-    made.set_cell("", "open")
-    return made
+    return Planner("open", clock=itertools.repeat(0.0).__next__, power=power)
 
 
 def test_its_modes_are_those_of_the_interface_from_shallow_to_deep(power: PowerData) -> None:
@@ -58,7 +56,7 @@ def test_bits_that_exclude_each_other_do_so_mutually(power: PowerData) -> None:
 
 
 def test_the_planner_draws_the_measured_watts(power: PowerData, planner: Planner) -> None:
-    advice = planner.standby(10.0, None, "")
+    advice = planner.standby(10.0)
     drawn = {mode.name: mode.power for mode in advice.alternatives}
     payload = max(row.payload for row in power.table_2)
     for name in REST_MODES:
@@ -78,9 +76,9 @@ def test_the_plant_draws_the_measured_watts(power: PowerData, mode: str) -> None
 def test_a_longer_pause_never_rests_shallower_and_costs_at_most_the_longer_rest(
     planner: Planner,
 ) -> None:
-    before = planner.standby(float(PAUSES[0]), None, "")
+    before = planner.standby(float(PAUSES[0]))
     for shorter, longer in itertools.pairwise(PAUSES):
-        now = planner.standby(float(longer), None, "")
+        now = planner.standby(float(longer))
         assert REST_MODES.index(now.chosen.name) >= REST_MODES.index(before.chosen.name)
         assert now.energy <= before.energy + before.chosen.power * (longer - shorter) + 1e-6
         assert 0.0 <= now.wake_at <= longer

@@ -38,8 +38,7 @@ def unhurried(most: int = WORK, cancelled: Callable[[], bool] = lambda: False) -
 
 def problem_at(cell: str, station: str, work: Work) -> Exit:
     """To leave a station from the free configuration of least W."""
-    planner = Planner(itertools.repeat(0.0).__next__)
-    planner.set_cell("", cell)
+    planner = Planner(cell, clock=itertools.repeat(0.0).__next__)
     scene = planner.scene()
     options = PlanOptions()
     context = Context(scene, options, Journal(work, SEED), station)
@@ -119,21 +118,21 @@ def test_its_settings_are_fields_with_a_sentence_and_a_range(search: ExitSearch)
 
 @pytest.mark.parametrize("name", list(EXIT_SEARCHES))
 def test_a_request_can_ask_for_it_by_name(name: str) -> None:
-    planner = Planner(itertools.repeat(0.0).__next__)
-    cell = planner.set_cell("", "demo")
+    planner = Planner("demo", clock=itertools.repeat(0.0).__next__)
+    cell = planner.cell
     near = np.array(cell.park)
     options = PlanOptions(planner_id=name)
-    plan = planner.plan_service("lathe_work", "exit", None, near, 1, options)
+    plan = planner.plan_service("lathe_work", near=near, max_candidates=1, options=options)
     assert plan.status.ok, plan.status.message
     assert [candidate.method for candidate in plan.candidates] == [name]
     assert all(candidate.report.certified for candidate in plan.candidates)
 
 
 def test_an_unknown_name_lists_the_known() -> None:
-    planner = Planner(itertools.repeat(0.0).__next__)
-    cell = planner.set_cell("", "demo")
+    planner = Planner("demo", clock=itertools.repeat(0.0).__next__)
+    cell = planner.cell
     near = np.array(cell.park)
     options = PlanOptions(planner_id="teleport")
     with pytest.raises(RequestError) as refused:
-        planner.plan_service("lathe_work", "exit", None, near, 1, options)
+        planner.plan_service("lathe_work", near=near, max_candidates=1, options=options)
     assert all(name in str(refused.value) for name in EXIT_SEARCHES)

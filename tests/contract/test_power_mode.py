@@ -64,9 +64,9 @@ def test_its_bit_is_an_input_that_a_plc_can_set(row: ModeRow) -> None:
 def test_a_program_may_rest_in_it_and_the_planner_knows_what_that_costs(row: ModeRow) -> None:
     cell = cell_from_yaml(CELL.format(mode=row.mode.name))
     assert cell.program[0].power_mode == row.mode.name
-    planner = Planner(itertools.repeat(0.0).__next__)
-    planner.set_cell(CELL.format(mode=row.mode.name), "")
-    alternatives = planner.standby(600.0, None, "").alternatives
+    planner = Planner(clock=itertools.repeat(0.0).__next__)
+    planner.set_cell(text=CELL.format(mode=row.mode.name))
+    alternatives = planner.standby(600.0).alternatives
     assert row.mode in {mode.mode for mode in alternatives}
 
 

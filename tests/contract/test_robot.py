@@ -19,7 +19,6 @@ from ir_description import (
     robot_urdf,
 )
 from ir_kernels import Chain, DynamicsModel, inverse_kinematics
-from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner, parse_goal
 from ir_sim_driver.controller.simulation import make_simulation
 from ir_sim_driver.motion.goal import TrajectoryGoal
@@ -75,9 +74,9 @@ def test_the_inverse_kinematics_finds_every_configuration_from_its_pose(robot: R
 
 
 def test_it_stands_free_at_machine_home_and_holds_itself_there(robot: RobotModel) -> None:
-    planner = Planner(itertools.repeat(0.0).__next__)
-    planner.set_cell(CELL.format(name=robot.name), "")
-    state = planner.check_state(np.array(robot.machine_home), 0.02, 1, "", "")
+    planner = Planner(clock=itertools.repeat(0.0).__next__)
+    planner.set_cell(text=CELL.format(name=robot.name))
+    state = planner.check_state(np.array(robot.machine_home), safety_distance=0.02, max_pairs=1)
     assert state.valid
     home = robot.machine_home[None]
     still = np.zeros_like(home)
@@ -90,12 +89,12 @@ def test_it_stands_free_at_machine_home_and_holds_itself_there(robot: RobotModel
 def test_a_movement_is_planned_certified_and_driven_at_the_planned_energy(
     robot: RobotModel,
 ) -> None:
-    planner = Planner(itertools.repeat(0.0).__next__)
-    cell = planner.set_cell(CELL.format(name=robot.name), "")
+    planner = Planner(clock=itertools.repeat(0.0).__next__)
+    cell = planner.set_cell(text=CELL.format(name=robot.name))
     home = np.array(robot.machine_home)
     there = np.degrees(home) + np.array([30.0, 10.0, -10.0, 20.0, -20.0, 30.0])
     goal = parse_goal(" ".join(f"A{k} {angle:.6f}" for k, angle in enumerate(there, start=1)), cell)
-    plan = planner.plan_regional(home, goal, PlanOptions())
+    plan = planner.plan_regional(start=home, goal=goal)
     assert plan.status.ok, plan.status.message
     assert plan.report.certified
     assert plan.trajectory is not None

@@ -57,8 +57,7 @@ def unhurried(most: int = WORK, cancelled: Callable[[], bool] = lambda: False) -
 
 @cache
 def scene_of(cell: str) -> PlanningScene:
-    planner = Planner(itertools.repeat(0.0).__next__)
-    planner.set_cell("", cell)
+    planner = Planner(cell, clock=itertools.repeat(0.0).__next__)
     return planner.scene()
 
 
@@ -158,8 +157,8 @@ def test_it_stops_when_it_is_asked_to(search: Search) -> None:
 
 def test_it_finds_nothing_where_no_path_leads(search: Search) -> None:
     """The ends lie on different sides of a wall that nothing passes."""
-    planner = Planner(itertools.repeat(0.0).__next__)
-    planner.set_cell(WALLED_IN, "")
+    planner = Planner(clock=itertools.repeat(0.0).__next__)
+    planner.set_cell(text=WALLED_IN)
     scene = planner.scene()
     ends = Ends(
         np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]),
@@ -183,10 +182,12 @@ def test_its_settings_are_fields_with_a_sentence_and_a_range(search: Search) -> 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_request_can_ask_for_it_by_name(name: str) -> None:
-    planner = Planner(itertools.repeat(0.0).__next__)
-    task = planner.set_cell("", "open").tasks[0]
+    planner = Planner(clock=itertools.repeat(0.0).__next__)
+    task = planner.set_cell("open").tasks[0]
     plan = planner.plan_regional(
-        np.array(task.start), Goal(configuration=np.array(task.goal)), PlanOptions(planner_id=name)
+        start=np.array(task.start),
+        goal=Goal(configuration=np.array(task.goal)),
+        options=PlanOptions(planner_id=name),
     )
     assert plan.info.planner_id == name
     assert plan.report.certified or not plan.status.ok
@@ -195,12 +196,14 @@ def test_a_request_can_ask_for_it_by_name(name: str) -> None:
 
 
 def test_an_unknown_name_lists_the_known() -> None:
-    planner = Planner(itertools.repeat(0.0).__next__)
-    task = planner.set_cell("", "open").tasks[0]
+    planner = Planner(clock=itertools.repeat(0.0).__next__)
+    task = planner.set_cell("open").tasks[0]
     options = PlanOptions(planner_id="teleport")
     with pytest.raises(RequestError) as refused:
         planner.plan_regional(
-            np.array(task.start), Goal(configuration=np.array(task.goal)), options
+            start=np.array(task.start),
+            goal=Goal(configuration=np.array(task.goal)),
+            options=options,
         )
     assert all(name in str(refused.value) for name in SEARCHES)
 

@@ -88,10 +88,10 @@ def drive(simulation: Simulation, movement: PlannedMovement) -> None:
 def test_every_step_and_the_whole_cost_what_was_planned(drawn: Drawn) -> None:
     cell = cell_of(drawn)
     planner = Planner(
-        itertools.repeat(0.0).__next__
+        clock=itertools.repeat(0.0).__next__
     )  # its clock stands still: no ceiling cuts the plan
-    planner.set_cell(cell_to_yaml(cell), "")
-    plan = planner.plan_program((), 0.0, PlanOptions(seed=0), np.array(cell.park))
+    planner.set_cell(text=cell_to_yaml(cell))
+    plan = planner.plan_program(options=PlanOptions(seed=0), start=np.array(cell.park))
     assert plan.status.ok, plan.status.message
     simulation = make_simulation(cell)
     simulation.backend.reset(np.array(cell.park))

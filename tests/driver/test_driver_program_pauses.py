@@ -142,9 +142,9 @@ def test_every_pause_of_a_program_costs_what_was_planned(
     pauses: tuple[tuple[float, str], ...], modes: tuple[str, ...]
 ) -> None:
     """The planner's clock stands still: no ceiling cuts the plan."""
-    planner = Planner(itertools.repeat(0.0).__next__)
-    cell = planner.set_cell(cell_to_yaml(with_pauses(load_cell("demo"), pauses)), "")
-    plan = planner.plan_program((), 0.0, PlanOptions(seed=0), np.array(cell.park))
+    planner = Planner(clock=itertools.repeat(0.0).__next__)
+    cell = planner.set_cell(text=cell_to_yaml(with_pauses(load_cell("demo"), pauses)))
+    plan = planner.plan_program(options=PlanOptions(seed=0), start=np.array(cell.park))
     assert plan.status.ok, plan.status.message
     planned = [step.power_mode for step in plan.movements if step.is_pause and step.duration > 1.0]
     assert planned[: len(modes)] == list(modes) or set(modes) <= set(planned)

@@ -196,8 +196,10 @@ class Asked:
     """The planner's handlers without ROS, with the demonstration cell and a robot at home."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self.planner = Planner(clock, PlannerSettings(cell="demo"), read_cell=read_cell_apart)
-        self.planner.set_cell("", "demo")
+        self.planner = Planner(
+            clock=clock, settings=PlannerSettings(cell="demo"), read_cell=read_cell_apart
+        )
+        self.planner.set_cell("demo")
         known = LastState()
         known.take(np.array(HOME), 0.0)
         self.logged: list[str] = []
@@ -243,7 +245,7 @@ def judged(cases: int, seed: int) -> list[str]:
         if problem:
             found.append(f"case {case} {name}({said}): {problem}")
         if changed:
-            asked.planner.set_cell("", "demo")
+            asked.planner.set_cell("demo")
     return found
 
 

@@ -13,9 +13,7 @@ from ir_planner import Planner, tool_in_flange
 
 @pytest.fixture(scope="session")
 def planner() -> Planner:
-    planner = Planner(lambda: 0.0)  # a clock that cuts no plan of a busy machine
-    planner.set_cell("", "open")
-    return planner
+    return Planner("open", clock=lambda: 0.0)  # a clock that cuts no plan of a busy machine
 
 
 @pytest.fixture

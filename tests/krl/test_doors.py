@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import pytest
 
-from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_planner import Planner
 from ir_planner.krl.export import judge_of
@@ -15,15 +14,12 @@ from ir_planner.krl.export import judge_of
 @pytest.fixture(scope="module")
 def out_of_the_lathe() -> tuple[Planner, PlannedMovement]:
     """A service line through the open door, in a cell whose door is closed at first."""
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "demo")
-    planner.set_equipment("lathe", None, True, "door_open")
-    found = planner.plan_service(
-        "lathe_work", "exit", None, planner.cell.machine_home, 1, PlanOptions()
-    )
+    planner = Planner("demo", clock=lambda: 0.0)
+    planner.set_equipment("lathe", enabled=True, state="door_open")
+    found = planner.plan_service("lathe_work", near=planner.cell.machine_home, max_candidates=1)
     trajectory = found.candidates[0].trajectory
     assert trajectory is not None
-    planner.set_equipment("lathe", None, True, "door_closed")
+    planner.set_equipment("lathe", enabled=True, state="door_closed")
     step = PlannedMovement(
         kind=MovementKind.SERVICE_EXIT,
         from_station="lathe_work",

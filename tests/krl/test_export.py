@@ -27,10 +27,9 @@ from _tool_path_judge import seen
 
 @pytest.fixture(scope="module")
 def planned() -> tuple[Planner, object]:
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "demo")
+    planner = Planner("demo", clock=lambda: 0.0)
     plan = planner.plan_program(
-        ("gauge_measure", "home"), 0.0, PlanOptions(), planner.cell.posture("park")
+        stations=("gauge_measure", "home"), start=planner.cell.posture("park")
     )
     return planner, plan
 
@@ -96,7 +95,7 @@ def test_points_are_passed_within_the_limits_and_hardly_later(planned) -> None:
 
 
 def path_movement(planner: Planner, name: str, path: CellPath) -> PlannedMovement:
-    plan = planner.plan_cartesian(path, PlanOptions())
+    plan = planner.plan_cartesian(path)
     assert plan.trajectory is not None, plan.status.message
     return PlannedMovement(
         kind=MovementKind.CARTESIAN,
@@ -110,9 +109,7 @@ def path_movement(planner: Planner, name: str, path: CellPath) -> PlannedMovemen
 
 @pytest.fixture(scope="module")
 def bench() -> Planner:
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "kr6_bench")
-    return planner
+    return Planner("kr6_bench", clock=lambda: 0.0)
 
 
 def test_a_path_of_the_tool_is_a_spline_at_its_speed(bench: Planner) -> None:

@@ -16,7 +16,6 @@ from sensor_msgs.msg import JointState
 from ir_description import cell_to_yaml, load_cell
 from ir_msgs.msg import CartesianSegment, PlannedMovement
 from ir_msgs.srv import PlanCartesianMovement, PlanProgram
-from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner.node.inputs import LastState
 from ir_planner.node.requests import Requests
@@ -34,8 +33,8 @@ SEAM = """paths:
 
 @pytest.fixture(scope="module")
 def requests() -> Requests:
-    planner = Planner(lambda: 0.0)
-    planner.set_cell(cell_to_yaml(load_cell("open")) + SEAM, "")
+    planner = Planner(clock=lambda: 0.0)
+    planner.set_cell(text=cell_to_yaml(load_cell("open")) + SEAM)
     return Requests(
         planner, LastState(), time.monotonic, lambda: None, lambda _: None, lambda: 7, print
     )
@@ -160,21 +159,19 @@ def test_t1_keeps_250_mm_per_second(requests: Requests) -> None:
 
 
 def test_what_a_path_of_the_cell_allows_to_touch_holds_for_it_alone() -> None:
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "kr6_bench")
+    planner = Planner("kr6_bench", clock=lambda: 0.0)
     own = Requests(
         planner, LastState(), time.monotonic, lambda: None, lambda _: None, lambda: 7, print
     )
     found = answer(own, PlanCartesianMovement.Request(path="bead"))
     assert found.status.code == StatusCode.SUCCESS, found.status.message
     assert [pair.body_b for pair in found.report.contacts] == ["tray_out_top"]
-    refused = planner.plan_cartesian(planner.cell.path("bead"), PlanOptions())
+    refused = planner.plan_cartesian(planner.cell.path("bead"))
     assert "gripper_body and tray_out_top" in refused.status.message
 
 
 def test_a_program_drives_a_path_that_is_named_as_a_stop() -> None:
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "kr6_bench")
+    planner = Planner("kr6_bench", clock=lambda: 0.0)
     own = Requests(
         planner, LastState(), time.monotonic, lambda: None, lambda _: None, lambda: 7, print
     )

@@ -32,8 +32,7 @@ def cell_name() -> str:
 
 
 def library() -> tuple[Planner, Task]:
-    planner = Planner(itertools.repeat(0.0).__next__)
-    planner.set_cell("", "open")
+    planner = Planner("open", clock=itertools.repeat(0.0).__next__)
     return planner, planner.cell.task("p1->p2")
 
 
@@ -59,7 +58,9 @@ def check(call: Callable[..., Any], names: tuple[str, ...]) -> None:
         assert answer.info.planner_id == name
         if repeatable(SEARCHES[name]):
             options = Options(planner_id=name, seed=SEED, max_iterations=WORK)
-            plan = planner.plan_regional(task.start, Goal(configuration=task.goal), options)
+            plan = planner.plan_regional(
+                start=task.start, goal=Goal(configuration=task.goal), options=options
+            )
             assert plan.trajectory is not None
             assert answer.trajectory_id == plan.trajectory.trajectory_id
 

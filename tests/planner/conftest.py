@@ -56,9 +56,9 @@ def budget() -> Work:
 
 @pytest.fixture
 def planner(demo_cell: Cell, power: PowerData) -> Planner:
-    planner = Planner(lambda: 0.0, power=power)  # a clock that cuts no plan of a busy machine
-    planner.set_cell("", "demo")
-    return planner
+    return Planner(
+        "demo", clock=lambda: 0.0, power=power
+    )  # a clock that cuts no plan of a busy machine
 
 
 @pytest.fixture(scope="session")

@@ -16,9 +16,7 @@ from ir_values.errors import InvalidValueError
 
 @pytest.fixture(scope="module")
 def planner() -> Planner:
-    made = Planner(itertools.repeat(0.0).__next__)
-    made.set_cell("", "demo")
-    return made
+    return Planner("demo", clock=itertools.repeat(0.0).__next__)
 
 
 @pytest.mark.parametrize("station", ["", "lathe_work"])
@@ -29,9 +27,11 @@ def test_a_batch_says_what_each_state_says(planner: Planner, station: str, load:
     q = rng.uniform(robot.position_min, robot.position_max, (300, robot.n))
     q[::3] = np.array(planner.cell.machine_home) + rng.uniform(-0.3, 0.3, (100, robot.n))
     q = np.clip(q, robot.position_min, robot.position_max)
-    batch = planner.check_states(q, 0.02, load, station)
+    batch = planner.check_states(q, safety_distance=0.02, load=load, station=station)
     for k, state in enumerate(q):
-        one = planner.check_state(state, 0.02, 1, load, station)
+        one = planner.check_state(
+            state, safety_distance=0.02, max_pairs=1, load=load, station=station
+        )
         assert batch.valid[k] == one.valid
         assert batch.distances[k] == pytest.approx(one.min_distance, abs=1e-6)
         pair = batch.closest[k]
@@ -46,7 +46,7 @@ def test_the_first_bad_state_is_named_by_its_index(planner: Planner, value: floa
     q = np.tile(np.array(planner.cell.machine_home), (5, 1))
     q[2, 3] = q[4, 0] = value
     with pytest.raises(RequestError, match=r"states\[2\]: joint_a4 is ") as refused:
-        planner.check_states(q, 0.02, "", "")
+        planner.check_states(q, safety_distance=0.02)
     assert "inf deg" not in str(refused.value)
 
 
@@ -55,14 +55,14 @@ def test_a_state_beyond_any_angle_is_a_clean_sentence(planner: Planner) -> None:
     q = np.array(planner.cell.machine_home)
     q[0] = 1e308
     with pytest.raises(RequestError, match=r"joint_a1 is 1e\+308 rad: it must be in \["):
-        planner.check_state(q, 0.02, 1, "", "")
+        planner.check_state(q, safety_distance=0.02, max_pairs=1)
 
 
 @pytest.mark.parametrize("count", [0, 10_001])
 def test_none_and_too_many_states_are_refused(planner: Planner, count: int) -> None:
     q = np.tile(np.array(planner.cell.machine_home), (count, 1))
     with pytest.raises(RequestError, match=f"states has {count} states: it must be 1 to 10000"):
-        planner.check_states(q, 0.02, "", "")
+        planner.check_states(q, safety_distance=0.02)
 
 
 def test_a_text_with_a_nul_is_refused_before_ros_cuts_it() -> None:

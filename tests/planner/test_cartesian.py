@@ -28,16 +28,12 @@ DOWN = Rotation.from_euler("y", 90.0, degrees=True)
 
 @pytest.fixture(scope="module")
 def planner() -> Planner:
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "open")
-    return planner
+    return Planner("open", clock=lambda: 0.0)
 
 
 @pytest.fixture(scope="module")
 def demo() -> Planner:
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "demo")
-    return planner
+    return Planner("demo", clock=lambda: 0.0)
 
 
 def pose(x: float, y: float, z: float, rotation: Rotation = DOWN) -> FloatArray:
@@ -52,7 +48,7 @@ def line(*poses: FloatArray) -> tuple[CartesianSegment, ...]:
 
 
 def planned(planner: Planner, path: CartesianPath, **more: object) -> CartesianPlan:
-    return planner.plan_cartesian(path, PlanOptions(), **more)  # type: ignore[arg-type]
+    return planner.plan_cartesian(path, **more)  # type: ignore[arg-type]
 
 
 TILTED = Rotation.from_euler("yz", (75.0, 20.0), degrees=True)
@@ -121,8 +117,7 @@ def judged(planner: Planner, seed: int) -> None:
 
 def test_a_path_that_begins_near_a_singularity_is_driven_slowly_there() -> None:
     """A circle whose first millimetre bends A3 beyond its acceleration at any short ramp."""
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "deep_box")
+    planner = Planner("deep_box", clock=lambda: 0.0)
     path = random_path(np.random.default_rng(5069), planner.scene())
     plan = planned(planner, path)
     assert plan.status.ok, plan.status.message
@@ -144,7 +139,7 @@ def test_what_passes_near_a_singularity_or_needs_long_ramps_is_driven(
     demo: Planner, seed: int
 ) -> None:
     path = random_path(np.random.default_rng(seed), demo.scene())
-    plan = demo.plan_cartesian(path, PlanOptions(safety_distance=MARGIN))
+    plan = demo.plan_cartesian(path, options=PlanOptions(safety_distance=MARGIN))
     assert plan.trajectory is not None, plan.status.message
     found = seen(plan.trajectory, path, demo.scene())
     assert found.error <= plan.tool_error + 1e-6
@@ -153,7 +148,7 @@ def test_what_passes_near_a_singularity_or_needs_long_ramps_is_driven(
 
 def test_where_no_configuration_leads_on_the_axis_is_named(demo: Planner) -> None:
     path = random_path(np.random.default_rng(20030), demo.scene())
-    refused = demo.plan_cartesian(path, PlanOptions(safety_distance=MARGIN)).status.message
+    refused = demo.plan_cartesian(path, options=PlanOptions(safety_distance=MARGIN)).status.message
     assert "past 0.504 m" in refused
     assert "joint_a1 reaches its limit of 185 deg" in refused
     assert "free_angle" in refused
@@ -170,8 +165,7 @@ def test_random_paths_are_kept_or_refused_with_their_place(planner: Planner, see
 @pytest.mark.long
 @pytest.mark.parametrize("cell", ["demo", "table_columns", "cnc_door", "deep_box"])
 def test_no_judge_objects_to_what_is_certified(cell: str) -> None:
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", cell)
+    planner = Planner(cell, clock=lambda: 0.0)
     scene = planner.scene()
     judge = SecondOpinion(planner.scene())
     for seed in range(10):

@@ -33,14 +33,13 @@ RISE = 5e-3  # of the drives' energy: parts are exchanged for others, whose path
 
 @pytest.mark.parametrize("cell", ["demo", "open", "table_columns"])
 def test_energy_over_cycle_time_keeps_its_laws(cell: str) -> None:
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", cell)
+    planner = Planner(cell, clock=lambda: 0.0)
     park = np.array(planner.cell.park)
     rng = np.random.default_rng([1, *cell.encode()])
     names = [station.name for station in planner.cell.stations]
     stops = (*(str(name) for name in rng.choice(names, 2, replace=False)), "park")
     options = PlanOptions(planning_time=100.0)
-    plan = planner.plan_program(stops, 0.0, options, park, front_points=POINTS)
+    plan = planner.plan_program(stations=stops, options=options, start=park, front_points=POINTS)
     assert plan.status.ok, plan.status.message
     front = plan.front
     assert len(front) == POINTS
@@ -51,7 +50,7 @@ def test_energy_over_cycle_time_keeps_its_laws(cell: str) -> None:
     for before, after in itertools.combinations(front, 2):
         d = after.report.duration - before.report.duration
         assert d > 0.0
-        wait = planner.standby(d, park, "").energy
+        wait = planner.standby(d, q=park).energy
         assert after.report.energy <= (1.0 + LAW) * (before.report.energy + wait)
         if wait_mode(before) == wait_mode(after):
             assert drive_energy(after) <= (1.0 + RISE) * drive_energy(before)
@@ -74,8 +73,7 @@ def drive_energy(plan: ProgramPlan) -> float:
 @pytest.mark.parametrize("cell", ["demo", "open", "table_columns", "cnc_door"])
 def test_energies_of_drawn_cycle_times_keep_the_law(cell: str) -> None:
     """Each is asked for alone: what one knows of fast movements, a longer one must know too."""
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", cell)
+    planner = Planner(cell, clock=lambda: 0.0)
     park = np.array(planner.cell.park)
     rng = np.random.default_rng([2, *cell.encode()])
     names = [station.name for station in planner.cell.stations]
@@ -83,7 +81,9 @@ def test_energies_of_drawn_cycle_times_keep_the_law(cell: str) -> None:
 
     def planned(objective: str, cycle_time: float) -> ProgramPlan:
         options = PlanOptions(objective=objective, planning_time=100.0)
-        plan = planner.plan_program(stops, cycle_time, options, park)
+        plan = planner.plan_program(
+            stations=stops, cycle_time=cycle_time, options=options, start=park
+        )
         assert plan.status.ok, plan.status.message
         return plan
 
@@ -91,7 +91,7 @@ def test_energies_of_drawn_cycle_times_keep_the_law(cell: str) -> None:
     times = np.sort(rng.uniform(1.01, 2.0, DRAWN)) * shortest
     energies = [planned("energy", float(cycle)).report.energy for cycle in times]
     for (t0, e0), (t1, e1) in itertools.combinations(zip(times, energies, strict=True), 2):
-        wait = planner.standby(float(t1 - t0), park, "").energy
+        wait = planner.standby(float(t1 - t0), q=park).energy
         assert e1 <= (1.0 + LAW) * (e0 + wait), (t0, t1)
 
 

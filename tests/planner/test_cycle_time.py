@@ -269,14 +269,15 @@ def test_the_front_of_a_program_keeps_the_law_of_waiting(demo_cell: Cell, power:
 
 
 def test_without_a_cycle_time_objective_energy_says_that_it_is_slow() -> None:
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "demo")
+    planner = Planner("demo", clock=lambda: 0.0)
     stops = ("infeed_pick", "park")
     start = np.array(planner.cell.park)
 
     def plan(objective: str, cycle_time: float) -> ProgramPlan:
         options = PlanOptions(objective=objective, planning_time=100.0)
-        return planner.plan_program(stops, cycle_time, options, start)
+        return planner.plan_program(
+            stations=stops, cycle_time=cycle_time, options=options, start=start
+        )
 
     slow = plan("energy", 0.0)
     usual = plan("time_and_energy", 0.0)
@@ -309,12 +310,16 @@ def test_no_cycle_time_that_the_fastest_program_keeps_is_refused(
     """The cheapest chain may be too slow, and the one for time alone is not the fastest at all
     values.
     """
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", cell)
+    planner = Planner(cell, clock=lambda: 0.0)
 
     def plan(objective: str, cycle_time: float) -> ProgramPlan:
         options = PlanOptions(objective=objective, seed=seed)
-        return planner.plan_program(stops, cycle_time, options, np.array(planner.cell.park))
+        return planner.plan_program(
+            stations=stops,
+            cycle_time=cycle_time,
+            options=options,
+            start=np.array(planner.cell.park),
+        )
 
     cycle = 1.0002 * plan("time", 0.0).report.duration
     for objective in ("time_and_energy", "time"):

@@ -94,11 +94,10 @@ def test_the_driver_s_machine_is_in_the_planned_states_however_long_movements_ta
 def test_a_door_that_the_driver_says_is_not_open_refuses_the_visit_and_names_the_signal(
     said, sentence
 ):
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "demo")
+    planner = Planner("demo", clock=lambda: 0.0)
     start = np.array(planner.cell.machine_home)
     planner.heard.machines = (said, MachineState("a machine of another cell", "open"))
-    plan = planner.plan_program(("lathe_work",), 0.0, PlanOptions(), start)
+    plan = planner.plan_program(stations=("lathe_work",), start=start)
     assert plan.status.code in (StatusCode.GOAL_IN_COLLISION, StatusCode.PLANNING_FAILED)
     assert sentence in plan.status.message
     assert [
@@ -106,9 +105,9 @@ def test_a_door_that_the_driver_says_is_not_open_refuses_the_visit_and_names_the
         for each in plan.info.stages
     ].count(True) == 1
     planner.heard.machines = (MachineState("lathe", "door_open"),)
-    again = planner.plan_program(("lathe_work",), 0.0, PlanOptions(), start)
+    again = planner.plan_program(stations=("lathe_work",), start=start)
     planner.heard.machines = None
-    as_the_cell_has_it = planner.plan_program(("lathe_work",), 0.0, PlanOptions(), start)
+    as_the_cell_has_it = planner.plan_program(stations=("lathe_work",), start=start)
     assert again.status.ok
     assert again.program_id == as_the_cell_has_it.program_id
 
@@ -151,8 +150,7 @@ def test_a_door_that_closes_on_the_robot_is_refused():
 
 
 def planner_that_hears(*said: MachineState) -> Planner:
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "demo")
+    planner = Planner("demo", clock=lambda: 0.0)
     planner.heard.machines = said
     return planner
 
@@ -165,24 +163,24 @@ def test_single_movements_and_states_count_with_doors_as_the_driver_says_and_nam
     home = np.array(planner.cell.machine_home)
     options = PlanOptions()
     there = parse_goal("lathe_work", planner.cell)
-    found = planner.plan_regional(home, there, options)
+    found = planner.plan_regional(start=home, goal=there, options=options)
     assert found.trajectory is not None
     inside = found.trajectory.positions[-1]
     planner.heard.machines = (MachineState("lathe", "door_closed"),)
-    refused = planner.plan_regional(home, there, options)
-    again = planner.evaluate(found.trajectory, 0.0, "", "lathe_work")
-    state = planner.check_state(inside, 0.0, 1, "", "lathe_work")
+    refused = planner.plan_regional(start=home, goal=there, options=options)
+    again = planner.evaluate(found.trajectory, safety_distance=0.0, station="lathe_work")
+    state = planner.check_state(inside, safety_distance=0.0, max_pairs=1, station="lathe_work")
     assert not refused.status.ok
     assert refused.status.message.endswith(SHUT)
     assert "as the driver says: lathe door_closed" in refused.info.stages[-1].note
     assert again.status.message.endswith(SHUT)
     assert not state.valid
     assert state.status.message.endswith(SHUT)
-    away = planner.plan_regional(home, parse_goal("park", planner.cell), options)
+    away = planner.plan_regional(start=home, goal=parse_goal("park", planner.cell), options=options)
     assert away.status.ok
     assert away.info.stages[-1].name == "doors"
     planner.heard.machines = None
     assert (
-        planner.plan_regional(home, there, options).trajectory.trajectory_id
+        planner.plan_regional(start=home, goal=there, options=options).trajectory.trajectory_id
         == found.trajectory.trajectory_id
     )

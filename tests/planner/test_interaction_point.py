@@ -190,7 +190,10 @@ def test_every_start_is_accepted_or_rejected_with_a_reason(
 
 def test_a_pose_out_of_reach_has_no_solution_and_says_so(planner: Planner) -> None:
     far = planner.compute_ik(
-        parse_goal("X 5 Y 0 Z 1 A 0 B 90 C 0", planner.cell), "ccd", 0.02, HOME, ""
+        parse_goal("X 5 Y 0 Z 1 A 0 B 90 C 0", planner.cell),
+        method="ccd",
+        safety_distance=0.02,
+        near=HOME,
     )
     assert not far.solutions
     assert "not converged" in " ".join(rejection.reason for rejection in far.info.rejected)
@@ -200,12 +203,16 @@ def test_a_number_of_starts_beyond_its_bound_is_refused(planner: Planner) -> Non
     goal = parse_goal("lathe_work", planner.cell)
     for starts in (0, 1_000_000):
         with pytest.raises(RequestError, match="starts"):
-            planner.compute_ik(goal, "ccd", 0.02, HOME, "", starts, 0)
+            planner.compute_ik(
+                goal, method="ccd", safety_distance=0.02, near=HOME, starts=starts, seed=0
+            )
 
 
 def test_an_unknown_method_lists_both(planner: Planner) -> None:
     with pytest.raises(RequestError, match="analytic, ccd"):
-        planner.compute_ik(parse_goal("lathe_work", planner.cell), "guess", 0.02, HOME, "")
+        planner.compute_ik(
+            parse_goal("lathe_work", planner.cell), method="guess", safety_distance=0.02, near=HOME
+        )
 
 
 def test_near_twins_are_one_configuration() -> None:

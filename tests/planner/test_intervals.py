@@ -29,9 +29,7 @@ QUANTILES = 0.12  # of a width: 1000 drawn robots, and a bus that is not linear
 @cache
 def planner() -> Planner:
     """In the open cell."""
-    made = Planner(lambda: 0.0, PlannerSettings())
-    made.set_cell("", "open")
-    return made
+    return Planner("open", clock=lambda: 0.0, settings=PlannerSettings())
 
 
 @cache
@@ -40,7 +38,7 @@ def movement(task: str) -> JointTrajectory:
     wanted = planner().cell.task(task)
     options = PlanOptions(safety_distance=0.005)
     found = planner().plan_regional(
-        wanted.start, Goal(configuration=wanted.goal, text=task), options
+        start=wanted.start, goal=Goal(configuration=wanted.goal, text=task), options=options
     )
     assert found.trajectory is not None, found.status.message
     return found.trajectory
@@ -184,7 +182,7 @@ def test_a_saving_of_a_pause_has_an_interval_of_its_own() -> None:
 
 
 def test_reports_name_their_parameters_and_hold_their_energy() -> None:
-    found = planner().evaluate(movement("home->p1"), 0.005, "", "").report
+    found = planner().evaluate(movement("home->p1"), safety_distance=0.005).report
     assert found.power_parameters == "data_sheet"
     assert found.energy_low <= found.energy < found.energy_high
 
@@ -200,9 +198,7 @@ def test_every_answer_lies_within_its_own_interval() -> None:
     cell = asked.cell
     start = np.array(asked.cell.park)
     name = cell.stations[0].name
-    plan = asked.plan_program(
-        (name, "park"), 0.0, PlanOptions(), start, savings=True, front_points=3
-    )
+    plan = asked.plan_program(stations=(name, "park"), start=start, savings=True, front_points=3)
     assert plan.compared is not None
     programs = (plan, plan.compared, *plan.front)
     reports = [step.report for program in programs for step in program.movements]
@@ -210,13 +206,17 @@ def test_every_answer_lies_within_its_own_interval() -> None:
     first = plan.movements[0].trajectory
     assert first is not None
     better = asked.optimize_trajectory(first)
-    reports += [better.before, better.after, asked.evaluate(first, 0.0, "", name).report]
-    service = asked.plan_service(name, "exit", None, start, 2, PlanOptions())
+    reports += [
+        better.before,
+        better.after,
+        asked.evaluate(first, safety_distance=0.0, station=name).report,
+    ]
+    service = asked.plan_service(name, near=start, max_candidates=2)
     reports += [one.report for one in service.candidates if one.trajectory is not None]
     assert len(plan.front) == 3
     assert all(report.energy_low <= report.energy <= report.energy_high for report in reports)
     assert all(report.power_parameters for report in reports)
     savings = plan.savings
     assert savings.movements.saved_low <= savings.movements.saved <= savings.movements.saved_high
-    rest = asked.standby(300.0, start, "")
+    rest = asked.standby(300.0, q=start)
     assert rest.saving_low <= rest.saving <= rest.saving_high

@@ -22,8 +22,7 @@ SETTLED = 2e-4
 @cache
 def asked(cell: str) -> tuple[Planner, tuple[str, ...], float]:
     """A cell with two stations drawn and back to park, and the shortest time that takes [s]."""
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", cell)
+    planner = Planner(cell, clock=lambda: 0.0)
     rng = np.random.default_rng([2, *cell.encode()])
     names = [station.name for station in planner.cell.stations]
     stops = (*(str(name) for name in rng.choice(names, min(2, len(names)), replace=False)), "park")
@@ -83,8 +82,7 @@ def test_no_budget_is_exceeded_in_any_cell(cell: str, seed: int) -> None:
 
 def keeps_its_budgets(cell: str, seed: int, count: int) -> None:
     """Budgets are drawn, from hardly any work to enough, for stations that are drawn too."""
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", cell)
+    planner = Planner(cell, clock=lambda: 0.0)
     rng = np.random.default_rng([seed, *cell.encode()])
     names = [station.name for station in planner.cell.stations]
     stops = (*(str(name) for name in rng.choice(names, min(2, len(names)), replace=False)), "park")
@@ -93,7 +91,9 @@ def keeps_its_budgets(cell: str, seed: int, count: int) -> None:
         np.sort(np.exp(rng.uniform(np.log(20.0), np.log(3_000.0), count))).astype(int).tolist()
     ):
         options = PlanOptions(max_iterations=most, planning_time=1000.0, seed=seed)
-        plan = planner.plan_program(stops, 0.0, options, np.array(planner.cell.park))
+        plan = planner.plan_program(
+            stations=stops, options=options, start=np.array(planner.cell.park)
+        )
         assert plan.info.iterations <= most * len(stops)
         assert plan.status.ok or not found, f"{most}: {plan.status.message}"
         found |= plan.status.ok
@@ -115,8 +115,7 @@ def no_slower_with_own_laws(cell: str, seed: int) -> None:
     """The fastest program of stations that are drawn, among them those that a withdrawal leads out
     of.
     """
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", cell)
+    planner = Planner(cell, clock=lambda: 0.0)
     rng = np.random.default_rng([seed, *cell.encode()])
     names = [station.name for station in planner.cell.stations]
     stops = (*(str(name) for name in rng.choice(names, min(2, len(names)), replace=False)), "park")
@@ -140,7 +139,9 @@ def planned(
 ) -> ProgramPlan | str:
     """The program, or the sentence of the refusal."""
     try:
-        plan = planner.plan_program(stops, cycle, options, np.array(planner.cell.park))
+        plan = planner.plan_program(
+            stations=stops, cycle_time=cycle, options=options, start=np.array(planner.cell.park)
+        )
     except RequestError as error:
         return str(error)
     assert not plan.info.truncated
@@ -159,10 +160,9 @@ def test_a_program_is_planned_with_little_work_and_takes_no_more_than_allowed() 
     """Service lines, known without any work, leave it to the movements and the searches of
     stations.
     """
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "demo")
+    planner = Planner("demo", clock=lambda: 0.0)
     options = PlanOptions(max_iterations=1_500, planning_time=100.0)
-    plan = planner.plan_program((), 0.0, options, np.array(planner.cell.machine_home))
+    plan = planner.plan_program(options=options, start=np.array(planner.cell.machine_home))
     assert plan.status.ok, plan.status.message
     assert not plan.info.truncated
     assert plan.info.iterations <= 1_500 * len(planner.cell.program)

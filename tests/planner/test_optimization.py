@@ -285,23 +285,27 @@ def test_the_safety_distance_is_kept(detour: JointTrajectory, scene: PlanningSce
 
 
 def test_what_the_arm_carries_counts(detour: JointTrajectory, planner: Planner) -> None:
-    planner.set_cell("", "open")
-    empty = planner.optimize_trajectory(detour, replace(OPTIONS, load="none"))
-    tool = planner.optimize_trajectory(detour, OPTIONS)
+    planner.set_cell("open")
+    empty = planner.optimize_trajectory(detour, options=replace(OPTIONS, load="none"))
+    tool = planner.optimize_trajectory(detour, options=OPTIONS)
     assert empty.before.energy < tool.before.energy
     assert empty.after.energy < tool.after.energy
 
 
 def test_contacts_of_a_station_hold_for_movements_into_it(planner: Planner) -> None:
     entry = planner.plan_service(
-        "lathe_work", "entry", None, np.array(planner.cell.park), 1, PlanOptions(planning_time=60.0)
+        "lathe_work",
+        direction="entry",
+        near=np.array(planner.cell.park),
+        max_candidates=1,
+        options=PlanOptions(planning_time=60.0),
     ).candidates[0]
     assert entry.trajectory is not None
-    plan = planner.optimize_trajectory(stretched(entry.trajectory, 1.5), OPTIONS)
+    plan = planner.optimize_trajectory(stretched(entry.trajectory, 1.5), options=OPTIONS)
     assert plan.status.ok, plan.status.message
     assert any("lathe_work" in stage.note for stage in plan.info.stages)
     assert plan.trajectory is not None
-    evaluation = planner.evaluate(plan.trajectory, 0.02, "", "lathe_work")
+    evaluation = planner.evaluate(plan.trajectory, safety_distance=0.02, station="lathe_work")
     assert evaluation.verification.certified
     assert plan.after.duration < plan.before.duration
 
@@ -323,10 +327,10 @@ def test_the_front_leads_from_the_fastest_to_the_least_energy(
         assert measured.total == point.report.energy
     fastest = optimized(full.front[-1].trajectory, scene, replace(OPTIONS, objective="time"))
     assert durations[0] <= 1.02 * fastest.after.duration
-    planner.set_cell("", "open")
+    planner.set_cell("open")
     with pytest.raises(RequestError, match="shortest"):
         planner.optimize_trajectory(
-            full.front[0].trajectory, replace(OPTIONS, duration=0.9 * durations[0])
+            full.front[0].trajectory, options=replace(OPTIONS, duration=0.9 * durations[0])
         )
 
 
@@ -391,10 +395,9 @@ def test_a_cancel_is_heard(after: int, detour: JointTrajectory, scene: PlanningS
 
 
 def test_the_answer_and_its_front_are_kept_by_id(detour: JointTrajectory, power: PowerData) -> None:
-    planner = Planner(lambda: 0.0, power=power)
-    planner.set_cell("", "open")
+    planner = Planner("open", clock=lambda: 0.0, power=power)
     plan = planner.optimize_trajectory(
-        detour, PlanOptions(planning_time=600.0, max_iterations=60_000)
+        detour, options=PlanOptions(planning_time=600.0, max_iterations=60_000)
     )
     assert plan.trajectory is not None
     for trajectory in (plan.trajectory, *(point.trajectory for point in plan.front)):
@@ -474,13 +477,13 @@ def test_other_joints_are_refused(planner: Planner) -> None:
 
 
 def test_a_spline_through_points_is_taken_as_it_is_planned(planner: Planner) -> None:
-    planner.set_cell("", "open")
+    planner.set_cell("open")
     ends = ends_of(planner.scene(), TASK)
     through = planner.plan_trajectory(
-        Reference(swung(ends, 1, -0.2)[::4]), PlanOptions(planning_time=60.0)
+        Reference(swung(ends, 1, -0.2)[::4]), options=PlanOptions(planning_time=60.0)
     )
     assert through.trajectory is not None
-    plan = planner.optimize_trajectory(through.trajectory, OPTIONS)
+    plan = planner.optimize_trajectory(through.trajectory, options=OPTIONS)
     assert plan.after.certified
     assert plan.after.energy - plan.after.base_energy + 500.0 * plan.after.duration < (
         through.report.energy - through.report.base_energy + 500.0 * through.report.duration

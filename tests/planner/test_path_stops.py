@@ -38,9 +38,7 @@ def planner() -> Planner:
 
 
 def planner_of(cell: Cell) -> Planner:
-    planner = Planner(lambda: 0.0, read_cell=lambda *_: cell)
-    planner.set_cell("", "kr6_bench")
-    return planner
+    return Planner("kr6_bench", clock=lambda: 0.0, read_cell=lambda *_: cell)
 
 
 def straight(cell: Cell) -> Cell:
@@ -56,7 +54,13 @@ def plan(planner: Planner) -> ProgramPlan:
 
 def planned(planner: Planner, cycle: float = 0.0, *, savings: bool = False) -> ProgramPlan:
     options = PlanOptions(planning_time=60.0)
-    found = planner.plan_program(STOPS, cycle, options, planner.cell.machine_home, savings=savings)
+    found = planner.plan_program(
+        stations=STOPS,
+        cycle_time=cycle,
+        options=options,
+        start=planner.cell.machine_home,
+        savings=savings,
+    )
     assert found.status.ok, found.status.message
     return found
 
@@ -157,6 +161,6 @@ def test_an_end_at_which_something_touches_is_refused(planner: Planner) -> None:
     cell = planner.cell
     (bead,) = cell.paths
     without = replace(cell, paths=(replace(bead, path=replace(bead.path, retract=0.0)),))
-    refused = planner_of(without).plan_program(STOPS, 0.0, PlanOptions(), cell.machine_home)
+    refused = planner_of(without).plan_program(stations=STOPS, start=cell.machine_home)
     assert "along path bead" in refused.status.message
     assert "give it a retract" in refused.status.message

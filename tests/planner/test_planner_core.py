@@ -32,19 +32,19 @@ HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 
 
 def test_without_a_cell_every_question_is_answered_by_a_sentence() -> None:
-    planner = Planner(lambda: 0.0)
+    planner = Planner(clock=lambda: 0.0)
     with pytest.raises(RequestError, match="set_cell first"):
         planner.scene()
     with pytest.raises(RequestError, match="neither is"):
-        planner.set_cell("", "")
+        planner.set_cell()
     with pytest.raises(RequestError, match="both are"):
-        planner.set_cell("a", "b")
+        planner.set_cell("b", text="a")
 
 
 def test_a_scene_does_not_change_with_the_cell(planner: Planner) -> None:
     before = planner.scene()
     distances = before.collision.distances(HOME[None])
-    planner.set_equipment("lathe", None, False, "")
+    planner.set_equipment("lathe", enabled=False)
     assert np.array_equal(before.collision.distances(HOME[None]), distances)
     assert planner.scene().collision.distances(HOME[None]).shape != distances.shape
 
@@ -70,7 +70,7 @@ def test_a_lying_part_is_a_body_and_a_held_one_a_load(demo_cell: Any, power: Any
 
 def test_every_configuration_reaches_the_pose_with_its_branch_and_turns(planner: Planner) -> None:
     goal = parse_goal("X 1.6 Y 0.4 Z 1.5 A 0 B 60 C 0", planner.cell)
-    answer = planner.compute_ik(goal, "analytic", 0.02, HOME, "")
+    answer = planner.compute_ik(goal, method="analytic", safety_distance=0.02, near=HOME)
     assert answer.status.ok
     assert len(answer.solutions) > 2
     for solution in answer.solutions:
@@ -85,11 +85,14 @@ def test_every_configuration_reaches_the_pose_with_its_branch_and_turns(planner:
 
 def test_an_unreachable_pose_and_an_occupied_one_are_distinguished(planner: Planner) -> None:
     far = planner.compute_ik(
-        parse_goal("X 5 Y 0 Z 1 A 0 B 90 C 0", planner.cell), "analytic", 0.02, HOME, ""
+        parse_goal("X 5 Y 0 Z 1 A 0 B 90 C 0", planner.cell),
+        method="analytic",
+        safety_distance=0.02,
+        near=HOME,
     )
     assert far.status.code == StatusCode.NO_IK_SOLUTION
     inside = parse_goal("X 1.88 Y 0.5 Z 0.4 A 0 B 90 C 0", planner.cell)
-    occupied = planner.compute_ik(inside, "analytic", 0.02, HOME, "")
+    occupied = planner.compute_ik(inside, method="analytic", safety_distance=0.02, near=HOME)
     assert occupied.status.code == StatusCode.GOAL_IN_COLLISION
     assert "gauge_table" in occupied.status.message
     assert re.search(
@@ -118,7 +121,7 @@ def test_service_lines_follow_the_approach_axis_in_one_branch(planner: Planner) 
 
 def test_a_pose_goal_takes_the_cheapest_configuration_that_can_be_reached(planner: Planner) -> None:
     goal = parse_goal("gauge_measure", planner.cell)
-    plan = planner.plan_regional(HOME, goal, PlanOptions(planning_time=60.0))
+    plan = planner.plan_regional(start=HOME, goal=goal, options=PlanOptions(planning_time=60.0))
     assert plan.status.ok
     assert plan.trajectory is not None
     end = planner.scene().chain.tcp_poses(plan.trajectory.positions[-1:])[0]
@@ -128,7 +131,7 @@ def test_a_pose_goal_takes_the_cheapest_configuration_that_can_be_reached(planne
 
 def test_a_long_planning_time_is_capped_and_said(planner: Planner) -> None:
     plan = planner.plan_regional(
-        HOME, parse_goal("park", planner.cell), PlanOptions(planning_time=1e9)
+        start=HOME, goal=parse_goal("park", planner.cell), options=PlanOptions(planning_time=1e9)
     )
     assert plan.status.ok
     assert (
@@ -143,7 +146,7 @@ def test_reference_points_are_passed_with_the_requested_proportions(
     points = HOME + np.radians(
         [[0] * 6, [10, 5, 5, 0, 10, 0], [30, 0, 5, 0, 0, 10], [40, 0, 0, 0, 0, 0]]
     )
-    plan = planner.plan_trajectory(Reference(points, times), PlanOptions())
+    plan = planner.plan_trajectory(Reference(points, times))
     assert plan.status.ok, plan.status.message
     trajectory = plan.trajectory
     assert trajectory is not None
@@ -158,14 +161,16 @@ def test_two_reference_points_take_their_time_or_the_shortest(
     requested: float, taken: float | None, planner: Planner
 ) -> None:
     points = HOME + np.radians([[0] * 6, [40, 10, 0, 0, 20, 0]])
-    plan = planner.plan_trajectory(Reference(points, np.array([0.0, requested])), PlanOptions())
-    fastest = planner.plan_trajectory(Reference(points), PlanOptions(objective="time"))
+    plan = planner.plan_trajectory(Reference(points, np.array([0.0, requested])))
+    fastest = planner.plan_trajectory(Reference(points), options=PlanOptions(objective="time"))
     assert plan.status.ok, plan.status.message
     assert plan.report.duration == pytest.approx(taken or fastest.report.duration, abs=1e-5)
 
 
 def test_a_state_in_collision_names_pair_value_and_bound(planner: Planner) -> None:
-    check = planner.check_state(np.radians([0.0, -20, 60, 0, 0, 0]), 0.02, 3, "", "")
+    check = planner.check_state(
+        np.radians([0.0, -20, 60, 0, 0, 0]), safety_distance=0.02, max_pairs=3
+    )
     assert not check.valid
     pair = check.pairs[0]
     assert f"{pair.body_a} and {pair.body_b}" in check.status.message
@@ -194,7 +199,7 @@ def test_the_bound_of_an_allowed_contact_is_its_own(planner: Planner) -> None:
 def test_a_reference_beyond_a_limit_names_the_point(planner: Planner) -> None:
     points = np.stack([HOME, HOME + np.radians([200.0, 0, 0, 0, 0, 0])])
     with pytest.raises(RequestError, match="point 1: joint_a1 is 200 deg") as caught:
-        planner.plan_trajectory(Reference(points), PlanOptions())
+        planner.plan_trajectory(Reference(points))
     assert caught.value.code == StatusCode.INVALID_MOTION_PLAN
 
 
@@ -203,8 +208,8 @@ def test_a_planner_named_for_a_trajectory_through_points_is_said_to_be_unused(
     planner: Planner, name: str
 ) -> None:
     points = np.stack([HOME, HOME + 0.1, HOME + 0.05])
-    plain = planner.plan_trajectory(Reference(points), PlanOptions())
-    plan = planner.plan_trajectory(Reference(points), PlanOptions(planner_id=name))
+    plain = planner.plan_trajectory(Reference(points))
+    plan = planner.plan_trajectory(Reference(points), options=PlanOptions(planner_id=name))
     assert plan.status.ok
     assert plan.trajectory == plain.trajectory
     said = [stage.note for stage in plan.info.stages if stage.name == "options"]
@@ -216,17 +221,19 @@ def test_a_planner_named_for_a_trajectory_through_points_is_said_to_be_unused(
 def test_an_unknown_planner_of_a_trajectory_through_points_is_refused(planner: Planner) -> None:
     with pytest.raises(RequestError, match=r"planner_id 'rrt_conect' is unknown.*rrt_connect"):
         planner.plan_trajectory(
-            Reference(np.stack([HOME, HOME + 0.1])), PlanOptions(planner_id="rrt_conect")
+            Reference(np.stack([HOME, HOME + 0.1])), options=PlanOptions(planner_id="rrt_conect")
         )
 
 
 def test_a_state_that_is_not_free_names_the_pair(planner: Planner) -> None:
-    check = planner.check_state(np.radians([0.0, -20, 60, 0, 0, 0]), 0.02, 3, "", "")
+    check = planner.check_state(
+        np.radians([0.0, -20, 60, 0, 0, 0]), safety_distance=0.02, max_pairs=3
+    )
     assert not check.valid
     assert check.min_distance < 0.0
     assert check.pairs[0].body_a in check.status.message
     with pytest.raises(RequestError, match="safety_distance is nan"):
-        planner.check_state(HOME, float("nan"), 3, "", "")
+        planner.check_state(HOME, safety_distance=float("nan"), max_pairs=3)
 
 
 def test_the_store_forgets_the_oldest_and_says_so() -> None:
@@ -262,7 +269,7 @@ def test_the_memory_of_trajectories_is_bounded_in_bytes_too() -> None:
 
 def test_a_goal_configuration_beyond_the_limits_of_start_is_refused(planner: Planner) -> None:
     with pytest.raises(RequestError, match="start: joint_a2") as caught:
-        planner.plan_regional(np.zeros(6), Goal(configuration=HOME), PlanOptions())
+        planner.plan_regional(start=np.zeros(6), goal=Goal(configuration=HOME))
     assert caught.value.code == StatusCode.START_STATE_INVALID
 
 
@@ -270,14 +277,13 @@ def test_the_demo_of_two_planners_is_the_same() -> None:
     """Nothing of a planner's past changes an answer."""
     ids = []
     for warm in (False, True):
-        planner = Planner(lambda: 0.0)
-        planner.set_cell("", "demo")
+        planner = Planner("demo", clock=lambda: 0.0)
         if warm:
             planner.plan_regional(
-                HOME, parse_goal("gauge_measure", planner.cell), PlanOptions(seed=9)
+                start=HOME,
+                goal=parse_goal("gauge_measure", planner.cell),
+                options=PlanOptions(seed=9),
             )
-        plan = planner.plan_regional(
-            HOME, parse_goal("lathe_work", load_cell("demo")), PlanOptions()
-        )
+        plan = planner.plan_regional(start=HOME, goal=parse_goal("lathe_work", load_cell("demo")))
         ids.append(plan.trajectory.trajectory_id if plan.trajectory else plan.status.message)
     assert ids[0] == ids[1]

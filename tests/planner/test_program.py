@@ -221,8 +221,7 @@ def test_a_program_is_truncated_when_time_runs_out_before_its_movements_are_plan
 ) -> None:
     """Time stands until the graph has been looked at `cut` times, then the ceiling has passed."""
     now = [0.0]
-    planner = Planner(lambda: now[0])
-    planner.set_cell("", "demo")
+    planner = Planner("demo", clock=lambda: now[0])
     stations = ("park", "home", "park")
     start = np.array(planner.cell.machine_home)
 
@@ -236,7 +235,10 @@ def test_a_program_is_truncated_when_time_runs_out_before_its_movements_are_plan
 
         now[0] = 0.0
         return planner.plan_program(
-            stations, 0.0, PlanOptions(planning_time=300.0), start, progress
+            stations=stations,
+            options=PlanOptions(planning_time=300.0),
+            start=start,
+            progress=progress,
         )
 
     whole = plan(1000)
@@ -332,12 +334,13 @@ def test_the_answer_does_not_depend_on_the_number_of_cores(
 
 def test_a_program_has_the_work_of_one_movement_for_each_of_its_steps(demo_cell: Cell) -> None:
     """Each movement goes on while its own work lasts, and what the program reports is the sum."""
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "demo")
+    planner = Planner("demo", clock=lambda: 0.0)
     start = np.array(demo_cell.machine_home)
     most = 20_000
     one, three = (
-        planner.plan_program(stations, 0.0, PlanOptions(max_iterations=most), start).info.iterations
+        planner.plan_program(
+            stations=stations, options=PlanOptions(max_iterations=most), start=start
+        ).info.iterations
         for stations in (("park",), ("park", "home", "park"))
     )
     assert one <= most < three <= 3 * most

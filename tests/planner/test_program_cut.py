@@ -30,12 +30,11 @@ class Ticking:
 def planned(seconds: float, *, savings: bool, front_points: int) -> tuple[ProgramPlan, float]:
     """The program with so much time in all, and how often the clock was asked."""
     clock = Ticking()
-    planner = Planner(clock)
-    planner.set_cell("", "demo")
+    planner = Planner("demo", clock=clock)
     start = np.array(planner.cell.machine_home)
     options = PlanOptions(planning_time=seconds / len(STOPS))
     plan = planner.plan_program(
-        STOPS, 0.0, options, start, savings=savings, front_points=front_points
+        stations=STOPS, options=options, start=start, savings=savings, front_points=front_points
     )
     return plan, clock.now
 
@@ -62,8 +61,7 @@ def test_time_that_ends_during_savings_or_front_cuts_them() -> None:
 
 
 def test_a_program_is_cancelled_at_any_time() -> None:
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "demo")
+    planner = Planner("demo", clock=lambda: 0.0)
     start = np.array(planner.cell.machine_home)
 
     def plan(until: float) -> int:
@@ -77,9 +75,7 @@ def test_a_program_is_cancelled_at_any_time() -> None:
             return heard >= until
 
         with contextlib.suppress(CancelledError):
-            planner.plan_program(
-                STOPS, 0.0, PlanOptions(), start, cancelled=cancelled, savings=True
-            )
+            planner.plan_program(stations=STOPS, start=start, cancelled=cancelled, savings=True)
         return heard
 
     asked = plan(np.inf)

@@ -15,13 +15,12 @@ MARGIN = 0.02
 
 @pytest.fixture(scope="module")
 def program():
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "demo")
+    planner = Planner("demo", clock=lambda: 0.0)
     home = np.array(planner.cell.machine_home)
     options = PlanOptions(max_iterations=4000, safety_distance=MARGIN)
-    plan = planner.plan_program((), 0.0, options, home)
+    plan = planner.plan_program(options=options, start=home)
     assert plan.status.ok, plan.status
-    planner.set_equipment("lathe", None, True, "door_closed")
+    planner.set_equipment("lathe", enabled=True, state="door_closed")
     return plan.movements, planner.scene()
 
 
@@ -47,6 +46,5 @@ def test_a_movement_relies_on_the_door_where_it_comes_too_near_to_the_closed_one
 
 def test_the_hash_of_the_cell_stays_while_the_door_moves(program):
     _, shut = program
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "demo")
+    planner = Planner("demo", clock=lambda: 0.0)
     assert planner.cell_hash == shut.cell_hash

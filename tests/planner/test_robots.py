@@ -18,16 +18,14 @@ CELLS = ("kr6_bench", "kr300_pallets", pytest.param("ur10e_bench", marks=pytest.
 
 
 def planner_in(cell: str) -> Planner:
-    planner = Planner(itertools.repeat(0.0).__next__)
-    planner.set_cell("", cell)
-    return planner
+    return Planner(cell, clock=itertools.repeat(0.0).__next__)
 
 
 @pytest.mark.parametrize("name", CELLS)
 def test_its_program_is_planned_and_certified(name: str) -> None:
     planner = planner_in(name)
     options = PlanOptions(planning_time=600.0)
-    plan = planner.plan_program((), 0.0, options, planner.cell.posture("park"))
+    plan = planner.plan_program(options=options, start=planner.cell.posture("park"))
     assert plan.status.ok, plan.status.message
     assert all(
         movement.report.certified for movement in plan.movements if movement.trajectory is not None
@@ -36,13 +34,13 @@ def test_its_program_is_planned_and_certified(name: str) -> None:
 
 def test_without_a_table_a_pause_stays_on_motors() -> None:
     planner = planner_in("ur10e_bench")
-    advice = planner.standby(3600.0, None, "none")
+    advice = planner.standby(3600.0, load="none")
     assert advice.modes == ("STAND_ON_MOTORS",)
     assert advice.saving == 0.0
     assert [mode.name for mode in advice.alternatives] == ["STAND_ON_MOTORS"]
-    unknown = planner.standby(lengths_of(0.0, np.array([10.0, 1000.0, 100_000.0])), None, "none")
+    unknown = planner.standby(lengths_of(0.0, np.array([10.0, 1000.0, 100_000.0])), load="none")
     assert unknown.modes == ("STAND_ON_MOTORS",)
 
 
 def test_with_a_table_it_rests_in_it() -> None:
-    assert planner_in("kr300_pallets").standby(3600.0, None, "none").chosen.name == "HIBERNATION"
+    assert planner_in("kr300_pallets").standby(3600.0, load="none").chosen.name == "HIBERNATION"

@@ -228,10 +228,9 @@ def test_programs_and_savings_are_the_same_on_one_core_and_on_two(
         monkeypatch.setattr(
             "ir_planner.program.movements.os.sched_getaffinity", lambda _, c=cores: c
         )
-        planner = Planner(lambda: 0.0)  # no ceiling cuts the plan
-        planner.set_cell("", "open")
+        planner = Planner("open", clock=lambda: 0.0)  # no ceiling cuts the plan
         park = np.array(planner.cell.park)
-        plan = planner.plan_program(("p1", "park"), 0.0, PlanOptions(), park, savings=True)
+        plan = planner.plan_program(stations=("p1", "park"), start=park, savings=True)
         answers.append((plan.program_id, plan.savings, plan.info.iterations))
     assert answers[0] == answers[1]
     assert answers[0][1].available

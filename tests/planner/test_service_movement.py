@@ -365,17 +365,14 @@ def test_cancelling_ends_the_search(scene_of: SceneOf) -> None:
 
 def test_unknown_choices_list_the_known(planner: Planner) -> None:
     park = np.array(planner.cell.park)
-    for fields, word in (
-        (("nowhere", "exit", None, park, 3, PlanOptions()), "lathe_work"),
-        (("lathe_work", "sideways", None, park, 3, PlanOptions()), "exit, entry"),
-        (("lathe_work", "exit", None, park, 0, PlanOptions()), r"\[1, 20\]"),
-        (
-            ("lathe_work", "exit", None, park, 3, PlanOptions(planner_id="magic")),
-            "modified_ga, tree",
-        ),
+    for station, fields, word in (
+        ("nowhere", {}, "lathe_work"),
+        ("lathe_work", {"direction": "sideways"}, "exit, entry"),
+        ("lathe_work", {"max_candidates": 0}, r"\[1, 20\]"),
+        ("lathe_work", {"planner_id": "magic"}, "modified_ga, tree"),
     ):
         with pytest.raises(RequestError, match=word):
-            planner.plan_service(*fields)
+            planner.plan_service(station, near=park, **fields)  # type: ignore[arg-type]
 
 
 # -- in a program

@@ -208,7 +208,7 @@ def test_a_movement_that_would_take_hours_is_refused(
     home = np.array(planner.cell.machine_home)
     park = Goal(configuration=np.array(planner.cell.park))
     with pytest.raises(RequestError, match=says):
-        planner.plan_regional(home, park, PlanOptions(velocity_scaling=scaling))
+        planner.plan_regional(start=home, goal=park, options=PlanOptions(velocity_scaling=scaling))
 
 
 def test_a_goal_that_is_the_start_takes_a_millisecond(

@@ -10,7 +10,6 @@ from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from ir_msgs_py.cartesian import CartesianPath, CartesianSegment
-from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner
 from ir_planner.cartesian.path_parts import Evenly, Rates, ThroughPoses, about_tool, rates_of
 from ir_planner.cartesian.tool_error import tool_motion
@@ -28,9 +27,7 @@ def differences(rotations: np.ndarray) -> tuple[float, float]:
 
 @pytest.fixture(scope="module")
 def planner() -> Planner:
-    made = Planner(lambda: 0.0)
-    made.set_cell("", "open")
-    return made
+    return Planner("open", clock=lambda: 0.0)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -62,7 +59,7 @@ def test_the_tool_keeps_within_the_bounds_of_its_path(planner: Planner) -> None:
         pose[:3, 3] += (0.1 * (k % 2), 0.15 * (k + 1), 0.05 * k)
         pose[:3, :3] = start[:3, :3] @ Rotation.from_rotvec([0.0, 0.1 * k, 0.15 * k]).as_matrix()
     path = CartesianPath(start, (CartesianSegment("spline", tuple(poses)),), tool_speed=0.2)
-    plan = planner.plan_cartesian(path, PlanOptions())
+    plan = planner.plan_cartesian(path)
     trajectory = plan.trajectory
     scene = planner.scene()
     assert trajectory is not None, plan.status.message

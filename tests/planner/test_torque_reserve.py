@@ -20,10 +20,12 @@ RESERVES = (0.0, 0.1, 0.3)
 @cache
 def movement(reserve: float) -> tuple[Planner, MovementPlan]:
     """The fastest movement of a task of the open cell."""
-    planner = Planner(lambda: 0.0, PlannerSettings(torque_reserve=reserve))
-    task = planner.set_cell("", "open").task("home->p1")
+    planner = Planner(clock=lambda: 0.0, settings=PlannerSettings(torque_reserve=reserve))
+    task = planner.set_cell("open").task("home->p1")
     goal = Goal(configuration=task.goal, text="p1")
-    return planner, planner.plan_regional(task.start, goal, PlanOptions(objective="time"))
+    return planner, planner.plan_regional(
+        start=task.start, goal=goal, options=PlanOptions(objective="time")
+    )
 
 
 @pytest.mark.parametrize("reserve", RESERVES)
@@ -50,7 +52,7 @@ def test_what_uses_the_reserve_is_no_violation_but_its_report_says_so() -> None:
     """The driver can follow it: the limit itself is kept."""
     fast = movement(0.0)[1].trajectory
     assert fast is not None
-    found = movement(0.1)[0].evaluate(fast, 0.02, "", "")
+    found = movement(0.1)[0].evaluate(fast, safety_distance=0.02)
     assert found.verification.certified
     assert found.report.torque_reserve < 0.03
 

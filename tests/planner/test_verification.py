@@ -153,7 +153,9 @@ def test_allowed_contacts_hold_only_while_the_tcp_is_in_the_zone(
     planner: Any, demo_scene: PlanningScene
 ) -> None:
     """With a zone that ends below the pick, the fingers may not come near the blank at all."""
-    plan = planner.plan_program(("infeed_pick",), 0.0, PlanOptions(planning_time=60.0), HOME)
+    plan = planner.plan_program(
+        stations=("infeed_pick",), options=PlanOptions(planning_time=60.0), start=HOME
+    )
     assert plan.status.ok, plan.status.message
     entry = next(m.trajectory for m in plan.movements if m.kind == "service_entry")
     assert verify(entry, demo_scene, 0.02, "infeed_pick").certified

@@ -27,18 +27,15 @@ OPTIONS = PlanOptions(safety_distance=MARGIN)
 
 @pytest.fixture(scope="module")
 def planner() -> Planner:
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "ur10e_bench")
-    return planner
+    return Planner("ur10e_bench", clock=lambda: 0.0)
 
 
 def with_all(path: CartesianPath, **more: object) -> CartesianPlan:
     """The answer of a planner that searches all whole turns."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(PlanningScene, "turning", np.zeros(6, dtype=bool))
-        planner = Planner(lambda: 0.0)
-        planner.set_cell("", "ur10e_bench")
-        return planner.plan_cartesian(path, OPTIONS, **more)  # type: ignore[arg-type]
+        planner = Planner("ur10e_bench", clock=lambda: 0.0)
+        return planner.plan_cartesian(path, options=OPTIONS, **more)  # type: ignore[arg-type]
 
 
 def not_worse(plan: CartesianPlan, other: CartesianPlan) -> None:
@@ -52,7 +49,7 @@ def not_worse(plan: CartesianPlan, other: CartesianPlan) -> None:
 @pytest.mark.parametrize("seed", [7, 8, 13, 15])
 def test_a_path_costs_no_more_than_with_all_turns(planner: Planner, seed: int) -> None:
     path = random_path(np.random.default_rng(seed), planner.scene())
-    not_worse(planner.plan_cartesian(path, OPTIONS), with_all(path))
+    not_worse(planner.plan_cartesian(path, options=OPTIONS), with_all(path))
 
 
 def test_from_a_start_near_a_limit_the_axis_turns_back_or_the_tool_does(planner: Planner) -> None:
@@ -67,7 +64,7 @@ def test_from_a_start_near_a_limit_the_axis_turns_back_or_the_tool_does(planner:
         path = CartesianPath(
             begin, (CartesianSegment("line", (end,)),), tool_speed=0.05, free_angle=free_angle
         )
-        plans[turn, free_angle] = plan = planner.plan_cartesian(path, OPTIONS, start=start)
+        plans[turn, free_angle] = plan = planner.plan_cartesian(path, options=OPTIONS, start=start)
         not_worse(plan, with_all(path, start=start))
     beyond = next(turn for turn in (-20.0, 20.0) if not plans[turn, 0.0].status.ok)
     assert plans[-beyond, 0.0].status.ok

@@ -20,9 +20,7 @@ ENTRY = Entry("portfolio", "deep_box", "pal->bin", 3, "", "synchronous")
 @pytest.fixture(scope="module")
 def planner() -> Planner:
     """With the cell of the run; its clock stands, so that none of its answers is cut."""
-    made = Planner(lambda: 0.0)
-    made.set_cell("", ENTRY.cell)
-    return made
+    return Planner(ENTRY.cell, clock=lambda: 0.0)
 
 
 def asked(

@@ -105,8 +105,7 @@ def test_starting_is_measured_where_an_end_of_a_task_is_near_something(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The first question asks for no safety distance, between the ends of the first task."""
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", "open")
+    planner = Planner("open", clock=lambda: 0.0)
     task = planner.cell.tasks[0]
     asked: list[PlanOptions] = []
 

@@ -190,8 +190,7 @@ def test_the_example_can_be_read() -> None:
 
 @pytest.mark.parametrize("name", ["table_columns", "demo"])
 def test_pairs_are_drawn_alike_and_keep_their_margin(name: str) -> None:
-    planner = Planner(lambda: 0.0)
-    planner.set_cell("", name)
+    planner = Planner(name, clock=lambda: 0.0)
     places = places_of(planner, "")
     limits = planner.cell.robot
     for number in range(20):
@@ -201,7 +200,7 @@ def test_pairs_are_drawn_alike_and_keep_their_margin(name: str) -> None:
         assert drawn.names[0] != drawn.names[1]
         assert 0.0 < drawn.margin <= 0.02
         for q in (drawn.start, drawn.goal):
-            state = planner.check_state(q, 0.0, 1, "", "")
+            state = planner.check_state(q, safety_distance=0.0, max_pairs=1)
             assert state.min_distance >= max(drawn.margin, NEAREST)
             assert ((q >= limits.position_min) & (q <= limits.position_max)).all()
 

@@ -65,7 +65,9 @@ def run_move(arguments: argparse.Namespace) -> int:
             arguments.start, planner, arguments.safety_distance, arguments.load
         )
         goal = goal_of(arguments.goal, planner)
-        plan = planner.plan_regional(start, goal, options_of(arguments, arguments.duration))
+        plan = planner.plan_regional(
+            start=start, goal=goal, options=options_of(arguments, arguments.duration)
+        )
     notes = assumed_doors(planner.cell)
     said = "".join(f"\nnote: {note}" for note in notes)
     if plan.trajectory is None:
@@ -111,7 +113,9 @@ def run_path(arguments: argparse.Namespace) -> int:
             start = configuration_of(
                 arguments.start, planner, arguments.safety_distance, arguments.load
             )
-        plan = planner.plan_cartesian(path, options_of(arguments), start, t1=arguments.t1)
+        plan = planner.plan_cartesian(
+            path, options=options_of(arguments), start=start, t1=arguments.t1
+        )
     notes = assumed_doors(planner.cell)
     said = "".join(f"\nnote: {note}" for note in notes)
     if plan.trajectory is None:
@@ -203,7 +207,11 @@ def run_ik(arguments: argparse.Namespace) -> int:
         planner = planner_of(arguments.cell)
         near = configuration_of(arguments.near, planner, margin, load)
         answer = planner.compute_ik(
-            goal_of(arguments.goal, planner), arguments.method, margin, near, load
+            goal_of(arguments.goal, planner),
+            method=arguments.method,
+            safety_distance=margin,
+            near=near,
+            load=load,
         )
     if not answer.solutions:
         return failed(answer.status.message)
@@ -245,7 +253,13 @@ def run_check(arguments: argparse.Namespace) -> int:
     with sentences():
         planner = planner_of(arguments.cell)
         q = configuration_of(arguments.state, planner, margin, load)
-        found = planner.check_state(q, margin, arguments.pairs, load, arguments.station)
+        found = planner.check_state(
+            q,
+            safety_distance=margin,
+            max_pairs=arguments.pairs,
+            load=load,
+            station=arguments.station,
+        )
     rows = [_row(pair) for pair in found.pairs]
     if arguments.json:
         print_json({"valid": found.valid, "min_distance": found.min_distance, "pairs": rows})
@@ -302,7 +316,7 @@ def run_standby(arguments: argparse.Namespace) -> int:
     with sentences():
         planner = planner_of(arguments.cell, arguments.power_parameters)
         q = configuration_of(arguments.state, planner, 0.0, arguments.load)
-        found = planner.standby(arguments.pause, q, arguments.load)
+        found = planner.standby(arguments.pause, q=q, load=arguments.load)
     rows: list[Row] = [
         {
             "mode": mode.name,

@@ -308,15 +308,15 @@ def _planned(cell: Cell) -> Iterator[Suggestion]:
     """What the planner refuses: the program, and stations where it does not go, from park and
     back.
     """
-    planner = Planner(time.monotonic)
+    planner = Planner(clock=time.monotonic)
     options = PlanOptions(planning_time=CEILING)
-    planner.set_cell(cell_to_yaml(cell), "")
+    planner.set_cell(text=cell_to_yaml(cell))
     visited = {step.target for step in cell.program}
     asked: list[tuple[str, tuple[str, ...]]] = [("program", ())] if cell.program else []
     asked += [
         (each.name, (each.name, "park")) for each in cell.stations if each.name not in visited
     ]
     for subject, stations in asked:
-        plan = planner.plan_program(stations, 0.0, options, cell.posture("park"))
+        plan = planner.plan_program(stations=stations, options=options, start=cell.posture("park"))
         if not plan.status.ok:
             yield Suggestion("error", subject, plan.status.message)

@@ -87,7 +87,7 @@ def postures(planner: Planner, load: str, margin: float, count: int, seed: int) 
 
 
 def _valid(planner: Planner, q: FloatArray, margin: float, load: str) -> list[bool]:
-    return [bool(each) for each in planner.check_states(q, margin, load, "").valid]
+    return [bool(each) for each in planner.check_states(q, safety_distance=margin, load=load).valid]
 
 
 def excursions(
@@ -162,7 +162,9 @@ def _certified_pair(
             straight(planner.cell.robot.joint_names, start, goal, seconds),
             straight(planner.cell.robot.joint_names, goal, start, seconds),
         )
-        found = [planner.evaluate(each, margin, load, "").verification for each in pair]
+        found = [
+            planner.evaluate(each, safety_distance=margin, load=load).verification for each in pair
+        ]
         if all(each.certified for each in found):
             return pair
         if any(
@@ -380,7 +382,9 @@ def _moved(
 ) -> JointTrajectory | None:
     """The certified movement between two configurations (n,), None where none is found."""
     options = PlanOptions(seed=asked.seed, safety_distance=asked.margin, load=load)
-    return planner.plan_regional(start, Goal(configuration=goal), options).trajectory
+    return planner.plan_regional(
+        start=start, goal=Goal(configuration=goal), options=options
+    ).trajectory
 
 
 def _with_load(

@@ -38,7 +38,6 @@ from ir_krl import Followed, follow, parse
 from ir_planner import (
     EvaluatedProgram,
     Planner,
-    PlanOptions,
     evaluate_krl,
     export_krl,
     tool_in_flange,
@@ -175,7 +174,13 @@ def run_export(arguments: argparse.Namespace) -> int:
         check_stations(stations, planner)
         start = configuration_of(arguments.start, planner, arguments.safety_distance)
         options = options_of(arguments)
-        plan = planner.plan_program(stations, arguments.cycle_time, options, start, line.show)
+        plan = planner.plan_program(
+            stations=stations,
+            cycle_time=arguments.cycle_time,
+            options=options,
+            start=start,
+            progress=line.show,
+        )
         if not plan.status.ok:
             return failed(plan.status.message)
         written = export_krl(planner, plan.movements, source.stem, options)
@@ -255,7 +260,7 @@ def _compared(planner: Planner, found: EvaluatedProgram) -> Row:
     start = found.steps[0].step.trajectory.positions[0]
     answer: dict[str, object] = {}
     for name, cycle_time in (("planned", 0.0), ("planned_in_time", found.report.duration)):
-        plan = planner.plan_program(found.stations, cycle_time, PlanOptions(), start)
+        plan = planner.plan_program(stations=found.stations, cycle_time=cycle_time, start=start)
         answer[name] = (
             {"seconds": plan.report.duration, "joules": plan.report.energy}
             if plan.status.ok

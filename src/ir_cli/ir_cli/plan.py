@@ -100,7 +100,12 @@ def run_plan(arguments: argparse.Namespace) -> int:
         start = configuration_of(arguments.start, planner, arguments.safety_distance)
         options = options_of(arguments)
         plan = planner.plan_program(
-            stations, arguments.cycle_time, options, start, line.show, savings=arguments.saving
+            stations=stations,
+            cycle_time=arguments.cycle_time,
+            options=options,
+            start=start,
+            progress=line.show,
+            savings=arguments.saving,
         )
     if arguments.html:
         _page(arguments, plan, planner, options)

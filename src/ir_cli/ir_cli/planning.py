@@ -40,7 +40,9 @@ def planner_of(cell: str, power_parameters: str = "") -> Planner:
     """A planner with a cell: the name of a bundled one, or a file; power_parameters: a file, or
     "".
     """
-    planner = Planner(time.monotonic, PlannerSettings(power_parameters=power_parameters))
+    planner = Planner(
+        clock=time.monotonic, settings=PlannerSettings(power_parameters=power_parameters)
+    )
     try:
         load_cell(cell)
     except UnknownNameError as error:
@@ -49,7 +51,7 @@ def planner_of(cell: str, power_parameters: str = "") -> Planner:
         ]
         known = beside or error.known
         raise InputError(unknown_name("cell", cell[:80], known, "ir cell list")) from error
-    planner.set_cell("", cell)
+    planner.set_cell(cell)
     return planner
 
 
@@ -85,7 +87,9 @@ def configuration_of(text: str, planner: Planner, margin: float, load: str = "")
     goal = goal_of(text, planner)
     if goal.configuration is not None:
         return goal.configuration
-    answer = planner.compute_ik(goal, "analytic", margin, planner.cell.machine_home, load)
+    answer = planner.compute_ik(
+        goal, method="analytic", safety_distance=margin, near=planner.cell.machine_home, load=load
+    )
     if not answer.solutions:
         raise CommandError(answer.status.message)
     return answer.solutions[0].q

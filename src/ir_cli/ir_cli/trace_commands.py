@@ -59,7 +59,7 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
         station = arguments.station
         known, trajectory = motion_of(arguments, planner, line.show)
         line.show("evaluate", 0, 1, 0.0)
-        found = planner.evaluate(trajectory, margin, load, station)
+        found = planner.evaluate(trajectory, safety_distance=margin, load=load, station=station)
     verification = found.verification
     if arguments.json:
         violations = [v for v in (verification.violation, *verification.others) if v is not None]
@@ -106,7 +106,9 @@ def run_optimize(arguments: argparse.Namespace) -> int:
         if known is not None and len(moving) == 1:
             motion = moving[0]  # standstills around a measured movement are no part of it
         line.show("optimise", 0, 1, 0.0)
-        found = planner.optimize_trajectory(motion, options_of(arguments, arguments.duration))
+        found = planner.optimize_trajectory(
+            motion, options=options_of(arguments, arguments.duration)
+        )
     if known is not None and len(moving) > 1:
         sys.stderr.write(
             f"ir: {len(moving)} movements with stops between them are made one: ir compare keeps "

@@ -1,9 +1,9 @@
 """Planning core: movements and programs of an industrial robot among machines, with joules, seconds
 and clearance.
 
-    planner = Planner(time.monotonic)
-    planner.set_cell("", "demo")
-    plan = planner.plan_regional(start, parse_goal("lathe_work", planner.cell), PlanOptions())
+    planner = Planner("demo")
+    plan = planner.plan_regional(goal="lathe_work", objective="energy")
+    print(plan)
 
 Everything a user needs is exported here; the rooms below are the planner's own.
 """

@@ -132,7 +132,14 @@ class CurrentCell:
         with self._changing:
             return self._replaced_by(self._read(cell_yaml, cell_file))
 
-    def set_equipment(self, name: str, pose: FloatArray | None, enabled: bool, state: str) -> Cell:
+    def take(self, cell: Cell) -> Cell:
+        """Another cell, given as a value."""
+        with self._changing:
+            return self._replaced_by(cell)
+
+    def set_equipment(
+        self, name: str, pose: FloatArray | None, enabled: bool | None, state: str
+    ) -> Cell:
         """Move a machine to a pose (4, 4), switch it on or off, or change its state (None, "":
         unchanged).
         """

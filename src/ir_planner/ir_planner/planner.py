@@ -1,17 +1,26 @@
 """The planner as a whole, without ROS: the cell as it stands, what is attached, and what was
 planned.
 
-Every request takes one immutable snapshot of the cell; changing the cell meanwhile reaches the next
-one.
+    planner = Planner("demo")
+    plan = planner.plan_regional(goal="lathe_work", objective="energy")
+    print(plan)
+
+Arguments are keywords with defaults that do the common job. Every request takes one immutable
+snapshot of the cell; changing the cell meanwhile reaches the next one.
 """
 
+import time
 from collections.abc import Callable
-from dataclasses import replace
-from functools import partial
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import TypedDict, Unpack
 
-from ir_description import Cell, CellPath, PowerData
+import numpy as np
+
+from ir_description import Cell, CellPath, PowerData, is_path
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import CartesianPath
+from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -32,6 +41,7 @@ from ir_planner.configurations import (
     configurations_at,
 )
 from ir_planner.current_cell import CurrentCell, Heard, ReadCell, read_cell_here
+from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.program import (
     Lengths,
     ProgramPlan,
@@ -54,8 +64,11 @@ from ir_planner.request import (
     chosen,
     examinable,
     noted,
-    safety_distance,
+    parse_goal,
     within_limits,
+)
+from ir_planner.request import (
+    safety_distance as checked_margin,
 )
 from ir_planner.scene import PlanningScene
 from ir_planner.service import (
@@ -72,24 +85,65 @@ from ir_planner.store import StoredProgram, program_store, trajectory_store
 from ir_planner.trajectories import OptimizationPlan, Reference, optimize_trajectory, plan_through
 from ir_planner.waiting_postures import standby_at
 
+Place = Goal | str | FloatArray
+"""Where to: a station, a posture or a text of values; joint values (n,) rad; a pose (4, 4) of the
+tcp in the cell."""
 AnyPath = CartesianPath | CellPath  # a cell's own comes with what it allows to touch
 Cancelled = Callable[[], bool]
 _NEVER: Cancelled = lambda: False  # noqa: E731 - a default argument
+MARGIN = 0.02  # m: S_m where a request names none, as in the messages
+
+
+class OptionFields(TypedDict, total=False):
+    """Fields of PlanOptions, which every planning call also takes one by one."""
+
+    planner_id: str
+    seed: int
+    random_seed: bool
+    max_iterations: int
+    planning_time: float
+    safety_distance: float
+    objective: str
+    time_value: float
+    duration: float
+    timing: str
+    velocity_scaling: float
+    acceleration_scaling: float
+    load: str
+    include_points: bool
+
+
+def options_with(options: PlanOptions | None, changes: OptionFields) -> PlanOptions:
+    """The options with some fields changed. Raises RequestError: an unknown one, a bad value."""
+    known = [field.name for field in fields(PlanOptions)]
+    for name in changes:
+        if name not in known:
+            raise UnknownNameError("option", name, known)
+    try:
+        return replace(options or PlanOptions(), **changes)
+    except InvalidValueError as error:
+        raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, str(error)) from error
 
 
 class Planner:
     """Answers requests about one cell. Methods raise RequestError for requests that make no sense.
 
-    clock: seconds, only for ceilings and for the times that answers report. power: the controller's
-    figures,
-    None: those of the cell's robot. read_cell: what reads cells.
+    cell: a bundled name ("demo"), a path, or a Cell; None: set_cell gives one later. settings:
+    those of the ROS parameters. power: the controller's figures, None: those of the cell's robot.
+    clock: seconds, only for ceilings and for the times that answers report. read_cell: reads the
+    cell of a text, or else of a path or a bundled name.
+
+    Planning calls take `options`, and its fields one by one (`objective="energy"`), which count
+    before it. `cancelled` is asked between steps: CancelledError ends the request.
     """
 
     def __init__(
         self,
-        clock: Clock,
+        cell: Cell | str | Path | None = None,
+        *,
         settings: PlannerSettings | None = None,
         power: PowerData | None = None,
+        clock: Clock = time.monotonic,
         read_cell: ReadCell = read_cell_here,
     ) -> None:
         self.clock = clock
@@ -99,6 +153,13 @@ class Planner:
         megabytes = self.settings.stored_megabytes
         self.trajectories = trajectory_store(self.settings.stored_trajectories, megabytes)
         self.programs = program_store(self.settings.stored_programs, megabytes)
+        if cell is not None:
+            self.set_cell(cell)
+
+    def __repr__(self) -> str:
+        name = repr(self.cell.name) if self.has_cell else "no cell"
+        planned = f"{len(self.trajectories)} trajectories, {len(self.programs)} programs"
+        return f"Planner({name}, {planned})"
 
     @property
     def cell(self) -> Cell:
@@ -115,15 +176,30 @@ class Planner:
         """Whether a cell is loaded."""
         return self._current.loaded
 
-    def set_cell(self, cell_yaml: str, cell_file: str) -> Cell:
-        """Load a cell from its text, or from a path or the name of a bundled cell.
+    def set_cell(self, cell: Cell | str | Path | None = None, *, text: str = "") -> Cell:
+        """Take another cell: a Cell, a path or the name of a bundled one, or the `text` of a file.
 
         Raises RequestError where not exactly one is given, DescriptionError for what is wrong with
         the cell.
         """
-        return self._current.load(cell_yaml, cell_file)
+        if isinstance(cell, Cell) and not text:
+            return self._current.take(cell)
+        if isinstance(cell, Cell):
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS, "cell and text are given: give one of them"
+            )
+        if isinstance(cell, Path) and not is_path(str(cell)):
+            cell = cell.absolute()  # a file without an ending is no bundled name
+        return self._current.load(text, "" if cell is None else str(cell))
 
-    def set_equipment(self, name: str, pose: FloatArray | None, enabled: bool, state: str) -> Cell:
+    def set_equipment(
+        self,
+        name: str,
+        *,
+        pose: FloatArray | None = None,
+        enabled: bool | None = None,
+        state: str = "",
+    ) -> Cell:
         """Move a machine to a pose (4, 4), switch it on or off, or change its state (None, "":
         unchanged).
         """
@@ -136,93 +212,128 @@ class Planner:
         return self._current.scene(load)
 
     def check_state(
-        self, q: FloatArray, margin: float, max_pairs: int, load: str, station: str
+        self,
+        q: Place,
+        *,
+        safety_distance: float = MARGIN,
+        max_pairs: int = 5,
+        load: str = "",
+        station: str = "",
     ) -> StateCheck:
         """Nearest pairs at q (n,), and whether all keep S_m (or what `station` allows)."""
-        return asked_state(self.scene(load), q, margin, max_pairs, station)
+        state = self._configuration(q, "state", StatusCode.INVALID_ROBOT_STATE)
+        return asked_state(self.scene(load), state, safety_distance, max_pairs, station)
 
-    def check_states(self, q: FloatArray, margin: float, load: str, station: str) -> StatesCheck:
+    def check_states(
+        self, q: FloatArray, *, safety_distance: float = MARGIN, load: str = "", station: str = ""
+    ) -> StatesCheck:
         """The same for many states q (N, n), with the nearest pair of each."""
-        return asked_states(self.scene(load), q, margin, station)
+        return asked_states(self.scene(load), q, safety_distance, station)
 
     def compute_ik(
         self,
-        goal: Goal,
-        method: str,
-        margin: float,
-        near: FloatArray,
-        load: str,
+        goal: Place,
+        *,
+        method: str = "analytic",
+        safety_distance: float = MARGIN,
+        near: Place | None = None,
+        load: str = "",
         starts: int = 32,
         seed: int = 0,
     ) -> IkAnswer:
-        """Free configurations that reach the goal's pose, ranked by W from `near` (n,): all of them
-        (analytic), or those that the paper's search finds from random starts (ccd).
+        """Free configurations that reach the goal's pose, ranked by W from `near`, None: machine
+        home: all of them (analytic), or those that the paper's search finds from random starts
+        (ccd).
         """
         chosen(method, IK_METHODS, "method")
-        safety_distance(margin)
+        checked_margin(safety_distance)
         bounded(starts, 1, STARTS_MAX, "starts")
+        here = self._configuration(near, "near", StatusCode.INVALID_ROBOT_STATE)
         journal = Journal(self._work(PlanOptions(), _NEVER), seed, planner_id=method)
-        context = Context(self.scene(load), PlanOptions(safety_distance=margin, seed=seed), journal)
-        return configurations_at(goal, near, context, starts, self.settings.interaction)
+        options = PlanOptions(safety_distance=safety_distance, seed=seed)
+        context = Context(self.scene(load), options, journal)
+        return configurations_at(self._goal(goal), here, context, starts, self.settings.interaction)
 
     def evaluate(
-        self, trajectory: JointTrajectory, margin: float, load: str, station: str
+        self,
+        trajectory: JointTrajectory,
+        *,
+        safety_distance: float = MARGIN,
+        load: str = "",
+        station: str = "",
     ) -> Evaluation:
-        """Everything that is known about a trajectory, with the first violation."""
-        safety_distance(margin)
+        """Everything that is known about a trajectory, with the first violation. station: its
+        allowed contacts hold.
+        """
+        checked_margin(safety_distance)
         scene = self.scene(load)
-        scene.allowed(station)  # one that nobody has is refused here
-        found = evaluate_trajectory(examinable(trajectory), scene, margin, station)
+        scene.allowed(station)  # an unknown one is refused here
+        found = evaluate_trajectory(examinable(trajectory), scene, safety_distance, station)
         return evaluation_in(found, trajectory, scene)
 
     def standby(
         self,
         pause: float | Lengths,
-        q: FloatArray | None,
-        load: str,
+        *,
+        q: FloatArray | None = None,
+        load: str = "",
         postures: tuple[str, ...] = (),
     ) -> Standby:
         """How to spend a pause [s] at q (n,), None: machine home, or at one of the postures."""
         scene = self.scene(load)
         options = PlanOptions(load=scene.load_text)
-        plan = partial(self.plan_regional, options=options)
+
+        def plan(start: FloatArray, goal: Goal) -> MovementPlan:
+            return self.plan_regional(start=start, goal=goal, options=options)
+
         return standby_at(pause, q, postures, scene, self.heard.transitions, plan)
 
     def plan_regional(
-        self, start: FloatArray, goal: Goal, options: PlanOptions, cancelled: Cancelled = _NEVER
+        self,
+        *,
+        goal: Place,
+        start: Place | None = None,
+        options: PlanOptions | None = None,
+        cancelled: Cancelled = _NEVER,
+        **changes: Unpack[OptionFields],
     ) -> MovementPlan:
-        """Movement from start (n,) to a goal; a pose is reached in the configuration that serves
-        best.
+        """Movement from start (n,), None: machine home, to a goal; a pose is reached in the
+        configuration that serves best.
         """
-        options, note = self._checked(options)
+        options, note = self._checked(options_with(options, changes))
         scene = self.scene(options.load)
-        start = within_limits(start, scene.cell, "start", StatusCode.START_STATE_INVALID)
+        begin = self._configuration(start, "start", StatusCode.START_STATE_INVALID)
+        end = self._goal(goal)
         context = Context.of(scene, options, self._work(options, cancelled))
-        return self._kept(plan_to_goal(start, goal, context, self.settings.searches), scene, note)
+        return self._kept(plan_to_goal(begin, end, context, self.settings.searches), scene, note)
 
     def plan_service(
         self,
         station: str,
-        direction: str,
-        configuration: FloatArray | None,
-        near: FloatArray,
-        max_candidates: int,
-        options: PlanOptions,
+        *,
+        direction: str = "exit",
+        configuration: FloatArray | None = None,
+        near: Place | None = None,
+        max_candidates: int = 3,
+        options: PlanOptions | None = None,
         cancelled: Cancelled = _NEVER,
+        **changes: Unpack[OptionFields],
     ) -> ServicePlan:
-        """Movements out of a station or into it. configuration (n,): there, None: the best; near
-        (n,): where its cost counts from.
+        """Movements out of a station ("exit") or into it ("entry"). configuration (n,): there,
+        None: the best; near (n,): where its cost counts from, None: machine home.
         """
+        options = options_with(options, changes)
         method = known_method(options.planner_id)
         options, note = checked_options(replace(options, planner_id=""))
         checked_request(direction, max_candidates)
         scene = self.scene(options.load)
+        here = self._configuration(near, "near", StatusCode.INVALID_ROBOT_STATE)
         if configuration is not None:
             configuration = within_limits(
                 configuration, scene.cell, "configuration", StatusCode.INVALID_ROBOT_STATE
             )
         request = ServiceRequest(
-            scene.station(station), direction, configuration, near, max_candidates
+            scene.station(station), direction, configuration, here, max_candidates
         )
         options = replace(options, planner_id=method)
         context = Context(scene, options, Journal(self._work(options, cancelled), options.seed))
@@ -233,37 +344,48 @@ class Planner:
         return service_in(plan, scene, note)
 
     def plan_trajectory(
-        self, reference: Reference, options: PlanOptions, cancelled: Cancelled = _NEVER
+        self,
+        reference: Reference,
+        *,
+        options: PlanOptions | None = None,
+        cancelled: Cancelled = _NEVER,
+        **changes: Unpack[OptionFields],
     ) -> MovementPlan:
         """Trajectory through points."""
-        options, note = self._checked(options)
+        options, note = self._checked(options_with(options, changes))
         scene = self.scene(options.load)
         plan = plan_through(reference, scene, options, self._work(options, cancelled))
         return self._kept(plan, scene, note)
 
     def plan_cartesian(
         self,
-        path: AnyPath,
-        options: PlanOptions,
-        start: FloatArray | None = None,
+        path: AnyPath | str,
         *,
+        start: FloatArray | None = None,
         t1: bool = False,
+        options: PlanOptions | None = None,
+        **changes: Unpack[OptionFields],
     ) -> CartesianPlan:
-        """The tool along a path from `start` (n,), None: from the best. t1: at most 250 mm/s."""
-        options, note = checked_path_options(options)
+        """The tool along a path, or along the one of the cell with this name, from `start` (n,),
+        None: from the best. t1: at most 250 mm/s.
+        """
+        options, note = checked_path_options(options_with(options, changes))
         scene = self.scene(options.load)
-        name, path = (path.name, path.path) if isinstance(path, CellPath) else ("", path)
+        given = scene.cell.path(path) if isinstance(path, str) else path
+        name, segments = (given.name, given.path) if isinstance(given, CellPath) else ("", given)
         context = Context.of(scene, options, self._work(options, _NEVER), name)
-        return self._kept(plan_path(path, start, t1, context), scene, note)
+        return self._kept(plan_path(segments, start, t1, context), scene, note)
 
     def optimize_trajectory(
         self,
         trajectory: JointTrajectory,
+        *,
         options: PlanOptions | None = None,
         cancelled: Cancelled = _NEVER,
+        **changes: Unpack[OptionFields],
     ) -> OptimizationPlan:
         """A trajectory made cheaper between its end points, with the trade of time for energy."""
-        options, note = self._checked(options or PlanOptions())
+        options, note = self._checked(options_with(options, changes))
         scene = self.scene(options.load)
         original = trajectory.reordered(scene.cell.robot.joint_names)
         work = self._work(options, cancelled)
@@ -278,36 +400,40 @@ class Planner:
 
     def plan_program(
         self,
-        stations: tuple[str, ...],
-        cycle_time: float,
-        options: PlanOptions,
-        start: FloatArray,
+        *,
+        stations: tuple[str, ...] = (),
+        cycle_time: float = 0.0,
+        start: Place | None = None,
+        options: PlanOptions | None = None,
         progress: Progress = nobody,
         cancelled: Cancelled = _NEVER,
-        *,
         savings: bool = False,
         front_points: int = 0,
+        **changes: Unpack[OptionFields],
     ) -> ProgramPlan:
-        """The cell's program, or a visit of stations, from start (n,); its `ProgramRequest` says
-        the rest.
+        """The cell's program, or a visit of `stations`, from start (n,), None: the park posture.
+
+        cycle_time [s]: 0 = as it costs least. savings: hold it against the common program.
+        front_points: so many programs over the cycle time. progress: called with phase, done, total
+        and the best cost.
         """
-        options, note = self._checked(options)
+        options, note = self._checked(options_with(options, changes))
         cell = self.cell
-        start = within_limits(start, cell, "start", StatusCode.START_STATE_INVALID)
-        cycle = bounded(cycle_time, 0.0, 604_800.0, "cycle_time", "s")
-        data = self._current.power(cell)
-        settings = replace(self.settings, transitions=self.heard.transitions)
-        asked = (
-            stations,
-            start,
+        begin = self._configuration(
+            "park" if start is None else start, "start", StatusCode.START_STATE_INVALID
+        )
+        request = ProgramRequest(
+            cell,
+            self._current.power(cell),
+            tuple(stations),
+            begin,
             options,
-            cycle,
-            settings,
+            bounded(cycle_time, 0.0, 604_800.0, "cycle_time", "s"),
+            replace(self.settings, transitions=self.heard.transitions),
             savings,
             front_points,
             self.heard.doors(cell),
         )
-        request = ProgramRequest(cell, data, *asked)
         spreads = Spreads(request)
         stops = max(len(stations or cell.program), 1)  # the ceilings are those of one movement
         plan = plan_program(request, self._work(options, cancelled, stops), progress, spreads)
@@ -316,6 +442,39 @@ class Planner:
             if program is not None and program.status.ok:
                 self._remember(program)
         return replace(plan, info=noted(plan.info, note))
+
+    def _goal(self, goal: Place) -> Goal:
+        """The goal as a value, joint values within their limits. Raises RequestError."""
+        if isinstance(goal, str):
+            return parse_goal(goal, self.cell)
+        if not isinstance(goal, Goal):
+            goal = Goal(pose=goal) if np.shape(goal) == (4, 4) else Goal(configuration=goal)
+        if goal.configuration is None:
+            return goal
+        q = self._joint_values(goal.configuration, "goal", StatusCode.GOAL_STATE_INVALID)
+        return replace(goal, configuration=q)
+
+    def _configuration(self, place: Place | None, what: str, code: StatusCode) -> FloatArray:
+        """Joint values (n,) of a posture, a text or an array, None: machine home. Raises
+        RequestError.
+        """
+        if place is None:
+            return np.array(self.cell.machine_home)
+        if isinstance(place, str):
+            place = parse_goal(place, self.cell)
+        q = place.configuration if isinstance(place, Goal) else place
+        if q is None:
+            raise RequestError(
+                code, f"{what} is a pose: joint values or a posture must be given, see compute_ik"
+            )
+        return self._joint_values(q, what, code)
+
+    def _joint_values(self, q: FloatArray, what: str, code: StatusCode) -> FloatArray:
+        """Joint values of the cell's robot within their limits. Raises RequestError."""
+        n = self.cell.robot.n
+        if np.shape(q) != (n,):
+            raise RequestError(code, f"{what} has shape {np.shape(q)}: it must be ({n},)")
+        return within_limits(np.asarray(q, dtype=np.float64), self.cell, what, code)
 
     def _remember(self, plan: ProgramPlan) -> None:
         for movement in plan.movements:

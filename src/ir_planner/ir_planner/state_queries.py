@@ -42,6 +42,9 @@ class StatesCheck:
     distances: FloatArray
     closest: tuple[DistancePair | None, ...]
 
+    def __repr__(self) -> str:
+        return f"StatesCheck({int(self.valid.sum())} of {len(self.valid)} states are free)"
+
 
 def asked_states(scene: PlanningScene, q: FloatArray, margin: float, station: str) -> StatesCheck:
     """The same for many states q (N, n) at once: one call of the compiled core, two where a station

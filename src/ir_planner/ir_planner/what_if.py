@@ -76,7 +76,7 @@ def what_if(
 def _row(base: Cell, change: Change, options: PlanOptions, stations: tuple[str, ...]) -> Row:
     """Plan with the values of one row."""
     planner = Planner(
-        itertools.repeat(0.0).__next__
+        clock=itertools.repeat(0.0).__next__
     )  # work is counted: the same rows on any machine
     nothing = dict.fromkeys(
         ("seconds", "joules", "joules_low", "joules_high", "kwh", "clearance"), np.nan
@@ -88,9 +88,11 @@ def _row(base: Cell, change: Change, options: PlanOptions, stations: tuple[str, 
         cell = base
         for name, value in change.items():
             cell = _changed(cell, name, value)
-        planner.set_cell(cell_to_yaml(cell), "")
+        planner.set_cell(text=cell_to_yaml(cell))
         start = cell.posture("park")
-        plan = planner.plan_program(stations, change.get(CYCLE_TIME, 0.0), chosen, start)
+        plan = planner.plan_program(
+            stations=stations, cycle_time=change.get(CYCLE_TIME, 0.0), options=chosen, start=start
+        )
     except (InvalidValueError, RequestError) as error:  # one that no robot carries, or can't be met
         return row | {"sentence": str(error)}
     if not plan.status.ok:

@@ -88,8 +88,8 @@ class RecordedPlanner:
             raise ReadError(f"{self._raw.path} holds no cell: nothing can be planned again")
         power = self._raw.attachment(contents.POWER)
         data = power_from_yaml(power.decode(), contents.POWER) if power is not None else None
-        planner = Planner(clock, self._settings(), data)
-        planner.set_cell(self.cell_yaml, "")
+        planner = Planner(clock=clock, settings=self._settings(), power=data)
+        planner.set_cell(text=self.cell_yaml)
         return planner
 
     def calls(self) -> Iterator[Call]:
@@ -212,7 +212,7 @@ def _with(settings: PlannerSettings, values: dict[str, Any]) -> PlannerSettings:
 
 def _set_cell(text: str) -> Callable[[Planner], None]:
     def learn(planner: Planner) -> None:
-        planner.set_cell(text, "")
+        planner.set_cell(text=text)
 
     return learn
 

@@ -165,8 +165,7 @@ class PlanWorker:
 
     def _plan(self, asked: ViewRequest) -> Planned:
         cell = asked.cell
-        planner = Planner(time.monotonic, read_cell=lambda text, file: cell)
-        planner.set_cell("", cell.name)
+        planner = Planner(cell.name, clock=time.monotonic, read_cell=lambda text, file: cell)
 
         def old() -> bool:
             return self._latest != asked.number
@@ -177,7 +176,11 @@ class PlanWorker:
         if cell.program or asked.stations:
             options = PlanOptions(planning_time=CEILING)
             plan = planner.plan_program(
-                asked.stations, 0.0, options, cell.posture("park"), progress, cancelled=old
+                stations=asked.stations,
+                options=options,
+                start=cell.posture("park"),
+                progress=progress,
+                cancelled=old,
             )
             if not plan.status.ok:
                 return Planned(None, failure=plan.status.message)
@@ -209,7 +212,9 @@ def _tasks(
     for done, task in enumerate(tasks):
         progress("tasks", done, len(tasks), 0.0)
         options = PlanOptions(planning_time=CEILING)
-        plan = planner.plan_regional(task.start, Goal(configuration=task.goal), options, old)
+        plan = planner.plan_regional(
+            start=task.start, goal=Goal(configuration=task.goal), options=options, cancelled=old
+        )
         if plan.trajectory is None:
             yield f"task {task.name}: {plan.status.message}"
             continue

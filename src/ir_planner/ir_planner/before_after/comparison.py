@@ -49,8 +49,7 @@ def before_after(
     """
     chosen = options or PlanOptions()
     asked = asked_program(today, planner.scene(NO_LOAD if chosen.load == NO_LOAD else ""))
-    own = Planner(planner.clock, planner.settings, read_cell=lambda _text, _name: asked.cell)
-    own.set_cell("cell", "")
+    own = Planner(asked.cell, clock=planner.clock, settings=planner.settings)
     doors, stood = doors_at_the_start(today, asked, own.cell)
     own.heard.machines = tuple(
         MachineState(name, states[0], "".join(states[1:])) for name, states in doors
@@ -149,7 +148,12 @@ class _Asking:
         """The planner's answer."""
         asked = self.request
         return self._planner.plan_program(
-            asked.stations, cycle_time, self._options, asked.start, self._progress, savings=savings
+            stations=asked.stations,
+            cycle_time=cycle_time,
+            options=self._options,
+            start=asked.start,
+            progress=self._progress,
+            savings=savings,
         )
 
     def costed(self, steps: Sequence[PlannedMovement]) -> Costed:

@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -36,6 +37,7 @@ from ir_planner.cartesian.tool_path import (
 from ir_planner.checks import FreeSpace
 from ir_planner.curves import extremes
 from ir_planner.errors import RequestError
+from ir_planner.presentation import plot_trajectory, result_text
 from ir_planner.request import Context, checked_options, chosen
 from ir_planner.timing import Movement
 
@@ -62,6 +64,15 @@ class CartesianPlan:
     speed_deviation: float = 0.0
     lengths: FloatArray = field(default_factory=lambda: np.zeros(0))
     configurations: int = 0
+
+    def __repr__(self) -> str:
+        identity = "" if self.trajectory is None else self.trajectory.trajectory_id
+        error = f"tool error {1e3 * self.tool_error:.3f} mm"
+        return result_text("CartesianPlan", self.status, self.report, identity, error)
+
+    def plot(self) -> Any:
+        """Angles and speeds of the joints over time; a matplotlib figure."""
+        return plot_trajectory(self.trajectory, repr(self))
 
 
 # A request's path as it is drawn, with all configurations along it, and what a movement keeps of

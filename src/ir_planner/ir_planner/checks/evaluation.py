@@ -3,6 +3,7 @@ is proved.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from ir_planner.checks.clearance import ClearanceProfile, clearance_profile
 from ir_planner.checks.energy import MovementEnergy, movement_energy
 from ir_planner.checks.peak_power import peak_power
 from ir_planner.checks.verification import Verification, verify
+from ir_planner.presentation import plot_profiles, report_text, status_text
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
 
 
@@ -41,6 +43,17 @@ class Evaluation:
     clearance: ClearanceProfile
     energy: MovementEnergy
     advice: str = ""
+
+    def __repr__(self) -> str:
+        return f"Evaluation({report_text(self.report)}, {status_text(self.status)})"
+
+    def plot(self) -> Any:
+        """Clearance and power over time; a matplotlib figure."""
+        clearance = self.clearance
+        energy = self.energy
+        return plot_profiles(
+            clearance.times, clearance.distances, energy.times, energy.watts, repr(self)
+        )
 
     @property
     def status(self) -> Status:

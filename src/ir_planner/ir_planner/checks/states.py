@@ -10,6 +10,7 @@ from ir_msgs_py.report import DistancePair
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks.clearance import nearest_pairs, pair_value
 from ir_planner.checks.free_space import FreeSpace
+from ir_planner.presentation import status_text
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
 
 
@@ -21,6 +22,10 @@ class StateCheck:
     valid: bool
     min_distance: float
     pairs: tuple[DistancePair, ...]
+
+    def __repr__(self) -> str:
+        distance = f"smallest distance {1e3 * self.min_distance:.0f} mm"
+        return f"StateCheck({'free' if self.valid else status_text(self.status)}, {distance})"
 
 
 def state_check(

@@ -13,6 +13,7 @@ from ir_planner.configurations.inverse_kinematics import (
 )
 from ir_planner.configurations.settings import InteractionSettings
 from ir_planner.errors import RequestError
+from ir_planner.presentation import status_text
 from ir_planner.request import Context, Goal
 
 IK_METHODS = ("analytic", "ccd")
@@ -25,6 +26,13 @@ class IkAnswer:
     status: Status
     solutions: tuple[IkSolution, ...]
     info: PlanningInfo
+
+    def __repr__(self) -> str:
+        if not self.solutions:
+            return f"IkAnswer({status_text(self.status)})"
+        best = self.solutions[0]
+        first = f"W {best.movement_cost:.0f}, clearance {1e3 * best.clearance:.0f} mm"
+        return f"IkAnswer({len(self.solutions)} solutions, the first: {first})"
 
 
 def configurations_at(

@@ -166,7 +166,7 @@ def export_krl(
 def one_movement(planner: Planner, trajectory_id: str) -> tuple[PlannedMovement, ...]:
     """A stored trajectory as a program of one movement. Raises RequestError for an unknown id."""
     trajectory = planner.trajectories.get(trajectory_id)
-    report = planner.evaluate(trajectory, 0.0, "", "").report
+    report = planner.evaluate(trajectory, safety_distance=0.0).report
     movement = PlannedMovement(
         kind=MovementKind.REGIONAL,
         trajectory_id=trajectory_id,

@@ -87,7 +87,9 @@ class PlannerNode(Node):
         super().__init__(names.PLANNER, context=context, **options)
         parameters = Parameters(self, PlannerSettings, on_change=self._change_settings)
         make = make_planner or (
-            lambda settings: Planner(time.monotonic, settings, read_cell=read_cell_apart)
+            lambda settings: Planner(
+                clock=time.monotonic, settings=settings, read_cell=read_cell_apart
+            )
         )
         self.planner = make(parameters.value)
         self._last_state = LastState(
@@ -212,7 +214,7 @@ class PlannerNode(Node):
         if not cell:
             return
         try:
-            self.planner.set_cell("", cell)
+            self.planner.set_cell(cell)
         except DescriptionError as error:
             self.get_logger().error(f"parameter cell: {error}")
             return

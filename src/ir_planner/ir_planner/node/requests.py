@@ -122,7 +122,7 @@ class Requests:
         file = request.cell_file
         if is_path(file):
             file = str(self.planner.settings.file_roots.inside(file))
-        cell = self.planner.set_cell(request.cell_yaml, file)
+        cell = self.planner.set_cell(file, text=request.cell_yaml)
         response.cell_name = cell.name
         response.stations = stations_to_msg(cell)
         self.cell_changed()
@@ -139,7 +139,9 @@ class Requests:
     def set_equipment(self, request: Any, response: Any) -> Status:
         """A machine moved, switched or in another state."""
         pose = pose_of(request.pose, self.planner.cell)
-        self.planner.set_equipment(request.name, pose, request.enabled, request.state)
+        self.planner.set_equipment(
+            request.name, pose=pose, enabled=request.enabled, state=request.state
+        )
         self.cell_changed()
         return Status.success()
 
@@ -148,14 +150,22 @@ class Requests:
         q = self._state(request.state, StatusCode.INVALID_ROBOT_STATE)
         margin = request.safety_distance
         station = request.station
-        check = self.planner.check_state(q, margin, request.max_pairs, request.load, station)
+        check = self.planner.check_state(
+            q,
+            safety_distance=margin,
+            max_pairs=request.max_pairs,
+            load=request.load,
+            station=station,
+        )
         fill_state_check(response, check)
         return check.status
 
     def check_states(self, request: Any, response: Any) -> Status:
         """Are these states free."""
         q = states_of(request.states, self.planner.cell)
-        check = self.planner.check_states(q, request.safety_distance, request.load, request.station)
+        check = self.planner.check_states(
+            q, safety_distance=request.safety_distance, load=request.load, station=request.station
+        )
         fill_states_check(response, check)
         blocked = int((~check.valid).sum())
         return Status.success(f"{blocked} of {len(q)} states are not free" if blocked else "")
@@ -169,12 +179,12 @@ class Requests:
         goal = goal_of(request, cell)
         answer = self.planner.compute_ik(
             goal,
-            request.method,
-            request.safety_distance,
-            near,
-            request.load,
-            request.starts,
-            request.seed,
+            method=request.method,
+            safety_distance=request.safety_distance,
+            near=near,
+            load=request.load,
+            starts=request.starts,
+            seed=request.seed,
         )
         fill_ik(response, answer)
         return answer.status
@@ -185,7 +195,7 @@ class Requests:
         options = options_of(request.options, self.draw_seed)
         goal = goal_of(request, cell)
         start = self._state(request.start, StatusCode.START_STATE_INVALID, at_rest="start")
-        plan = self.planner.plan_regional(start, goal, options)
+        plan = self.planner.plan_regional(start=start, goal=goal, options=options)
         return self._movement(plan, response, options.include_points)
 
     def plan_service(self, request: Any, response: Any) -> Status:
@@ -196,7 +206,12 @@ class Requests:
         here = self._known_or_home()
         most = request.max_candidates
         plan = self.planner.plan_service(
-            request.station, request.direction, configuration, here, most, options
+            request.station,
+            direction=request.direction,
+            configuration=configuration,
+            near=here,
+            max_candidates=most,
+            options=options,
         )
         fill_service(response, plan, options.include_points)
         if plan.candidates:
@@ -208,7 +223,9 @@ class Requests:
         options = options_of(request.options, self.draw_seed)
         reference = reference_of(request.reference, self.planner.cell)
         return self._movement(
-            self.planner.plan_trajectory(reference, options), response, options.include_points
+            self.planner.plan_trajectory(reference, options=options),
+            response,
+            options.include_points,
         )
 
     def plan_cartesian(self, request: Any, response: Any) -> Status:
@@ -216,14 +233,18 @@ class Requests:
         options = options_of(request.options, self.draw_seed)
         cell = self.planner.cell
         start = state_of(request.start, cell, StatusCode.START_STATE_INVALID, "start")
-        plan = self.planner.plan_cartesian(path_of(request, cell), options, start, t1=request.t1)
+        plan = self.planner.plan_cartesian(
+            path_of(request, cell), options=options, start=start, t1=request.t1
+        )
         fill_cartesian(response, plan, options.include_points)
         return self._shown(plan)
 
     def optimize_trajectory(self, request: Any, response: Any) -> Status:
         """The same end points for less."""
         options = options_of(request.options, self.draw_seed)
-        plan = self.planner.optimize_trajectory(trajectory_of(request, self.planner), options)
+        plan = self.planner.optimize_trajectory(
+            trajectory_of(request, self.planner), options=options
+        )
         fill_optimization(response, plan, options.include_points)
         return self._shown(plan)
 
@@ -248,12 +269,12 @@ class Requests:
         options = options_of(request.options, self.draw_seed)
         start = self._known_or_home(at_rest=True)
         plan: ProgramPlan = self.planner.plan_program(
-            tuple(request.stations),
-            request.cycle_time,
-            options,
-            start,
-            progress,
-            cancelled,
+            stations=tuple(request.stations),
+            cycle_time=request.cycle_time,
+            options=options,
+            start=start,
+            progress=progress,
+            cancelled=cancelled,
             savings=request.savings,
             front_points=request.front_points,
         )
@@ -290,7 +311,10 @@ class Requests:
         """What a trajectory costs and where it first breaks a bound."""
         trajectory = trajectory_of(request, self.planner)
         evaluation = self.planner.evaluate(
-            trajectory, request.safety_distance, request.load, request.station
+            trajectory,
+            safety_distance=request.safety_distance,
+            load=request.load,
+            station=request.station,
         )
         fill_evaluation(response, evaluation)
         return evaluation.status
@@ -308,7 +332,9 @@ class Requests:
         samples = np.array(request.pause_samples)
         quantiles = np.array(request.pause_quantiles)
         lengths = lengths_of(request.pause, samples, quantiles)
-        standby = self.planner.standby(lengths, q, request.load, tuple(request.postures))
+        standby = self.planner.standby(
+            lengths, q=q, load=request.load, postures=tuple(request.postures)
+        )
         fill_standby(response, standby, self.planner.heard.source)
         return Status.success(standby.sentence)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from ir_description import Cell, Finding, PowerData, ProgramStep
 from ir_msgs_py.arrays import FloatArray
@@ -11,6 +12,7 @@ from ir_msgs_py.report import PlannedMovement, PlanningInfo, TrajectoryReport
 from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.errors import RequestError
+from ir_planner.presentation import plot_steps, result_text
 from ir_planner.program.steps import Doors
 from ir_planner.regional import Searches
 from ir_planner.request import bounded, chosen
@@ -44,6 +46,14 @@ class ProgramPlan:
     compared: "ProgramPlan | None" = None
     common: "ProgramPlan | None" = None
     front: tuple["ProgramPlan", ...] = ()
+
+    def __repr__(self) -> str:
+        steps = f"{len(self.movements)} steps"
+        return result_text("ProgramPlan", self.status, self.report, self.program_id, steps)
+
+    def plot(self) -> Any:
+        """The steps over time, as high as their mean power; a matplotlib figure."""
+        return plot_steps(self.movements, repr(self))
 
 
 @dataclass(frozen=True, eq=False)

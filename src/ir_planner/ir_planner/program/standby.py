@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from ir_msgs_py.modes import REST_MODES, Mode, PowerMode, TransitionTimes
 from ir_msgs_py.status import StatusCode
 from ir_planner.checks import Interval, interval, spread
 from ir_planner.errors import RequestError
+from ir_planner.presentation import plot_choices
 from ir_planner.program.pauses import (
     BRAKES,
     MOTORS,
@@ -281,6 +282,14 @@ class Standby:
     saving_low: float = 0.0
     saving_high: float = 0.0
     trips: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"Standby({self.sentence})"
+
+    def plot(self) -> Any:
+        """The joules of each mode over the pause; a matplotlib figure."""
+        names = [mode.name for mode in self.alternatives]
+        return plot_choices(names, list(self.energies), repr(self))
 
     @property
     def sentence(self) -> str:

@@ -9,12 +9,14 @@ clearance, then by time.
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
-from ir_msgs_py.report import PlanningInfo, ServiceCandidate
+from ir_msgs_py.report import PlanningInfo, ServiceCandidate, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import nearest_pair
 from ir_planner.errors import TimingError
 from ir_planner.optimize import movement_over
+from ir_planner.presentation import plot_trajectory, result_text
 from ir_planner.request import Context, Journal
 from ir_planner.service.exit import Exit
 from ir_planner.service.exit_search import ExitSearch
@@ -36,6 +38,18 @@ class ServicePlan:
     status: Status
     candidates: tuple[ServiceCandidate, ...]
     info: PlanningInfo
+
+    def __repr__(self) -> str:
+        if not self.candidates:
+            return result_text("ServicePlan", self.status, TrajectoryReport(), "")
+        best = self.candidates[0]
+        count = f"first of {len(self.candidates)}"
+        return result_text("ServicePlan", self.status, best.report, best.trajectory_id, count)
+
+    def plot(self) -> Any:
+        """Angles and speeds of the first candidate over time; a matplotlib figure."""
+        best = self.candidates[0].trajectory if self.candidates else None
+        return plot_trajectory(best, repr(self))
 
 
 def plan_service(

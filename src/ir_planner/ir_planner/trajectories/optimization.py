@@ -8,6 +8,7 @@ answer.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from ir_planner.checks import AT_REST, SLACK, FreeSpace, end_in_collision
 from ir_planner.curves import UniformSpline, evenly_spaced
 from ir_planner.errors import RequestError
 from ir_planner.optimize import Descents, path_of
+from ir_planner.presentation import plot_front, result_text
 from ir_planner.regional import Searches, search_regional
 from ir_planner.request import DURATION_MAX, Context, Journal, Work, bounded, within_limits
 from ir_planner.scene import STILL, PlanningScene
@@ -45,6 +47,15 @@ class OptimizationPlan:
     after: TrajectoryReport
     trajectory: JointTrajectory | None = None
     front: tuple[Movement, ...] = ()
+
+    def __repr__(self) -> str:
+        identity = "" if self.trajectory is None else self.trajectory.trajectory_id
+        before = f"before {self.before.duration:.2f} s and {self.before.energy:.0f} J"
+        return result_text("OptimizationPlan", self.status, self.after, identity, before)
+
+    def plot(self) -> Any:
+        """The front: joules over seconds; a matplotlib figure."""
+        return plot_front([point.report for point in self.front], repr(self))
 
 
 def optimize_trajectory(

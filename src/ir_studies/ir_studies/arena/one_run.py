@@ -108,7 +108,9 @@ def one_run(
         options = _options(entry, settings, requests, left, margin)
         requests += 1
         try:
-            plan = planner.plan_regional(start, Goal(configuration=goal), options)
+            plan = planner.plan_regional(
+                start=start, goal=Goal(configuration=goal), options=options
+            )
         except PlannerError as error:  # asked again, it would be refused again
             said = str(error)
             break
@@ -258,7 +260,7 @@ def warm_up(settings: ArenaSettings) -> float:
                 )
                 begin = others_time()
                 with suppress(PlannerError):
-                    planner.plan_regional(start, goal, options)
+                    planner.plan_regional(start=start, goal=goal, options=options)
                 if others_time() > begin:
                     least = min(least, others_time() - begin)
     return least if math.isfinite(least) else 0.0
@@ -267,6 +269,4 @@ def warm_up(settings: ArenaSettings) -> float:
 @cache
 def planner_of(cell: str) -> Planner:
     """One planner per cell."""
-    planner = Planner(processor_time)
-    planner.set_cell("", cell)
-    return planner
+    return Planner(cell, clock=processor_time)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -70,7 +69,7 @@ def places_of(planner: Planner, load: str) -> tuple[Place, ...]:
     options = PlanOptions(load=load, planning_time=LONGEST)
     for station in cell.stations:
         found = planner.plan_service(
-            station.name, "exit", None, cell.machine_home, CANDIDATES, options
+            station.name, near=cell.machine_home, max_candidates=CANDIDATES, options=options
         )
         outside = [candidate.outside for candidate in found.candidates]
         named[station.name] = np.array(outside).reshape(-1, cell.robot.n)
@@ -117,8 +116,7 @@ def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
     given = settings.get("read", {})
     asked = StatisticsSettings(**{key: value for key, value in settings.items() if key != "read"})
     refuse_others(given, read_by(asked) if given else {})
-    planner = Planner(time.monotonic)
-    planner.set_cell("", asked.cell)
+    planner = Planner(asked.cell)
     try:
         places = places_of(planner, asked.load)
         why = ""
@@ -156,7 +154,9 @@ def one_timing(pair: Pair, timing: str, asked: StatisticsSettings, planner: Plan
         planning_time=asked.hang_after,
     )
     try:
-        plan = planner.plan_regional(pair.start, Goal(configuration=pair.goal), options)
+        plan = planner.plan_regional(
+            start=pair.start, goal=Goal(configuration=pair.goal), options=options
+        )
     except PlannerError as error:
         return {"solved": False, "message": str(error)}
     if plan.trajectory is None or not plan.report.certified:

@@ -1,0 +1,121 @@
+"""Results as people see them: one line of text each, and plots where matplotlib is installed.
+
+The text says what is asked first: found or why not, seconds, joules, minimum clearance, the proof
+and the id that other requests take.
+"""
+
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.report import PlannedMovement, TrajectoryReport
+from ir_msgs_py.status import Status, StatusCode
+from ir_msgs_py.trajectory import JointTrajectory
+
+_SAMPLES = 400  # of a plotted trajectory: finer than a screen shows
+
+
+def status_text(status: Status) -> str:
+    """The name of the status, with its sentence where it is no success."""
+    name = StatusCode(status.code).name
+    return name if status.ok or not status.message else f"{name}: {status.message}"
+
+
+def report_text(report: TrajectoryReport) -> str:
+    """Seconds, joules, clearance and proof of a report."""
+    clearance = f"clearance {1e3 * report.min_clearance:.0f} mm"
+    parts = [f"{report.duration:.2f} s", f"{report.energy:.0f} J"]
+    if np.isfinite(report.min_clearance):
+        parts.append(clearance)
+    parts.append("certified" if report.certified else "not certified")
+    return ", ".join(parts)
+
+
+def result_text(
+    kind: str, status: Status, report: TrajectoryReport, identity: str, *more: str
+) -> str:
+    """One line: kind of the result, status, and where it is one the figures, `more` and the id."""
+    if not status.ok:
+        return f"{kind}({status_text(status)})"
+    parts = (report_text(report), *(each for each in more if each), f"id {identity}")
+    return f"{kind}({', '.join(parts)})"
+
+
+def _figure(rows: int) -> tuple[Any, list[Any]]:
+    """A figure with `rows` axes above each other. Raises ImportError with what to install."""
+    try:
+        pyplot = import_module("matplotlib.pyplot")
+    except ImportError as error:
+        raise ImportError("plot() needs matplotlib: pip install matplotlib") from error
+    figure, axes = pyplot.subplots(rows, 1, squeeze=False, layout="constrained")
+    return figure, list(axes[:, 0])
+
+
+def plot_trajectory(trajectory: JointTrajectory | None, title: str) -> Any:
+    """The joints' angles and speeds over time, as a matplotlib figure; of no trajectory the title
+    alone.
+    """
+    figure, (angles, speeds) = _figure(2)
+    figure.suptitle(title, wrap=True, fontsize="medium")
+    if trajectory is not None:
+        times = np.linspace(0.0, float(trajectory.times[-1]), _SAMPLES)
+        motion = trajectory.sample(times)
+        angles.plot(times, np.degrees(motion.q), label=trajectory.joint_names)
+        speeds.plot(times, np.degrees(motion.qd))
+        angles.legend(fontsize="small")
+    angles.set_ylabel("angle [deg]")
+    speeds.set_ylabel("speed [deg/s]")
+    speeds.set_xlabel("time [s]")
+    return figure
+
+
+def plot_front(reports: list[TrajectoryReport], title: str) -> Any:
+    """Joules over seconds of answers with different durations, as a matplotlib figure."""
+    figure, (axes,) = _figure(1)
+    figure.suptitle(title, wrap=True, fontsize="medium")
+    axes.plot([each.duration for each in reports], [each.energy for each in reports], "o-")
+    axes.set_xlabel("duration [s]")
+    axes.set_ylabel("energy [J]")
+    return figure
+
+
+def plot_profiles(
+    times: FloatArray, distances: FloatArray, watt_times: FloatArray, watts: FloatArray, title: str
+) -> Any:
+    """Clearance and mains power over time, as a matplotlib figure."""
+    figure, (clearance, power) = _figure(2)
+    figure.suptitle(title, wrap=True, fontsize="medium")
+    clearance.plot(times, 1e3 * distances)
+    clearance.set_ylabel("clearance [mm]")
+    power.plot(watt_times, watts)
+    power.set_ylabel("power [W]")
+    power.set_xlabel("time [s]")
+    return figure
+
+
+def plot_steps(movements: tuple[PlannedMovement, ...], title: str) -> Any:
+    """The steps of a program as bars: from begin to end, as high as their mean power."""
+    figure, (axes,) = _figure(1)
+    figure.suptitle(title, wrap=True, fontsize="medium")
+    begin = 0.0
+    for step in movements:
+        if step.duration > 0.0:
+            colour = "tab:gray" if step.is_pause else "tab:blue"
+            watts = step.report.energy / step.duration
+            axes.bar(begin, watts, step.duration, align="edge", color=colour, edgecolor="white")
+        begin += step.duration
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("mean power [W]")
+    return figure
+
+
+def plot_choices(names: list[str], energies: list[float], title: str) -> Any:
+    """Alternatives with their joules as bars; one that is not possible (inf) has none."""
+    figure, (axes,) = _figure(1)
+    figure.suptitle(title, wrap=True, fontsize="medium")
+    axes.bar(names, [each if np.isfinite(each) else 0.0 for each in energies])
+    axes.tick_params(axis="x", rotation=30)
+    axes.set_ylabel("energy [J]")
+    return figure
