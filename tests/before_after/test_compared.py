@@ -7,7 +7,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.savings import BeforeAfter
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import (
@@ -17,7 +16,6 @@ from ir_planner import (
     Today,
     before_after,
     before_after_common,
-    parse_goal,
 )
 
 
@@ -126,8 +124,7 @@ def test_a_motion_that_is_faster_than_the_limits_is_compared_with_the_free_progr
 ) -> None:
     """A trace a little faster than the limits ended in "the shortest is ..." and no comparison."""
     home = planner.cell.machine_home
-    plan = planner.plan_regional
-    found = plan(home, parse_goal("p1", planner.cell), PlanOptions(objective="time")).trajectory
+    found = planner.plan_regional(start=home, goal="p1", objective="time").trajectory
     assert found is not None
     fast = JointTrajectory.from_seconds(found.joint_names, 0.9 * found.times, found.positions)
     stretch = Stretch(fast, fast.positions[-1], fast.duration, label="0.00 s")

@@ -18,7 +18,7 @@ EXAMPLES = sorted((ROOT / "examples").glob("[0-9]*.py"))
 PRINTS = {
     "01_distance": r" -\d+\.\d mm  t_f1 and gauge_table \(environment\)",
     "02_inverse_kinematics": r"ccd: [1-9]\d* configurations",
-    "03_one_movement": r"objective energy: 3\.00 s, \d+ J at the mains, .* certified",
+    "03_one_movement": r"MovementPlan\(3\.00 s, \d+ J, clearance \d+ mm, certified, id \w+\)",
     "04_service_movement": r"modified_ga: \d\.\d\d s, \d+ J at the mains",
     "05_pareto_front": r"^ +\d\.\d\d +\d+ +\d\.\d$",
     "06_program": r"^program \w+: \d+\.\d s, \d+\.\d kJ",

@@ -18,6 +18,8 @@ def test_every_snippet_runs_without_ros() -> None:
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stderr
     lines = ran.stdout.splitlines()
-    assert re.fullmatch(r"\d+\.\d\d s, \d+ J, \d+ mm", lines[0])
+    assert re.fullmatch(
+        r"MovementPlan\(\d+\.\d\d s, \d+ J, clearance \d+ mm, certified, id \w+\)", lines[0]
+    )
     assert any("safety_distance is 7 m" in line for line in lines)
     assert any("against synchronous S-curve PTP" in line for line in lines)

@@ -286,8 +286,8 @@ def charge(process):
     yield
 
 with_ompl.charge_to(charge)
-planner = Planner(lambda: 0.0)
-task = planner.set_cell("", "table_columns").task("tL->tR")
+planner = Planner("table_columns", clock=lambda: 0.0)
+task = planner.cell.task("tL->tR")
 space = FreeSpace.of(planner.scene(), 0.02, Work(10**12, 1.0, lambda: 0.0))
 beyond = np.array([task.goal]) + 50.0  # of every range: nobody gets there
 SEARCHES[sys.argv[1]].find(Ends(np.array(task.start), beyond), space, 1, space.work)

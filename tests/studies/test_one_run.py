@@ -27,19 +27,19 @@ def asked(
     planner: Planner, monkeypatch: pytest.MonkeyPatch, **settings: Any
 ) -> tuple[list[PlanOptions], Any]:
     """The options of the run's requests, and its row."""
-    options: list[PlanOptions] = []
+    options_seen: list[PlanOptions] = []
     plan = planner.plan_regional
 
-    def noted(start: Any, goal: Goal, asked: PlanOptions) -> MovementPlan:
-        options.append(asked)
-        return plan(start, goal, asked)
+    def noted(*, start: Any, goal: Goal, options: PlanOptions) -> MovementPlan:
+        options_seen.append(options)
+        return plan(start=start, goal=goal, options=options)
 
     with monkeypatch.context() as patch:
         patch.setattr(planner, "plan_regional", noted)
         row = one_run(
             ENTRY, ArenaSettings((ENTRY.cell,), seconds=3600.0, **settings), planner, lambda: 0.0
         )
-    return options, row
+    return options_seen, row
 
 
 def test_requests_after_the_first_may_use_more_work(
@@ -91,11 +91,11 @@ def test_a_request_that_is_refused_takes_no_answer_of_the_run_away(
     plan = planner.plan_regional
     asked: list[int] = []
 
-    def refused(start: Any, goal: Goal, options: PlanOptions) -> MovementPlan:
+    def refused(*, start: Any, goal: Goal, options: PlanOptions) -> MovementPlan:
         asked.append(options.seed)
         if len(asked) > 1:
             raise RequestError(StatusCode.FAILURE, "OMPL's process does not start")
-        return plan(start, goal, options)
+        return plan(start=start, goal=goal, options=options)
 
     monkeypatch.setattr(planner, "plan_regional", refused)
     settings = ArenaSettings((ENTRY.cell,), seconds=3600.0, further_iterations=0)
