@@ -26,8 +26,8 @@ from ir_planner.request import Work
 from ir_planner.scene import PlanningScene, path_cost
 from ir_planner.search import SEARCHES, Ends, fewest_corners, pulled
 from ir_planner.search.with_ompl import worker
-from ir_planner.search.with_ompl.ompl_search import OmplSearch
-from ir_planner.search.with_ompl.problem import Parameters, Problem
+from ir_planner.search.with_ompl.host import Parameters, Problem
+from ir_planner.search.with_ompl.planners import OmplSearch
 
 LATE_S = 60.0  # of wall time: a search that hangs is ended
 _FORK = multiprocessing.get_context("fork")  # the scene is large, and OMPL is loaded only once

@@ -26,7 +26,7 @@ from ir_planner.request import Work
 from ir_planner.scene import PlanningScene
 from ir_planner.search import SEARCHES, Ends, Found, with_ompl
 from ir_planner.search.with_ompl import host, worker
-from ir_planner.search.with_ompl.problem import STOP, Parameters, Problem
+from ir_planner.search.with_ompl.host import STOP, Parameters, Problem
 
 SceneOf = Callable[[str], PlanningScene]
 S_M = 0.02
@@ -278,7 +278,7 @@ from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.search import SEARCHES, Ends, with_ompl
 from ir_planner.search.with_ompl import host, worker
-from ir_planner.search.with_ompl.problem import STOP, Parameters, Problem
+from ir_planner.search.with_ompl.host import STOP, Parameters, Problem
 
 @contextmanager
 def charge(process):

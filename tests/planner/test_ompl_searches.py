@@ -24,9 +24,10 @@ from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.scene import PlanningScene
 from ir_planner.search import SEARCHES, Ends, with_ompl
-from ir_planner.search.with_ompl import adapter, host
-from ir_planner.search.with_ompl.adapter import repaired
-from ir_planner.search.with_ompl.problem import Outcome, Parameters, Problem
+from ir_planner.search.with_ompl import host
+from ir_planner.search.with_ompl import planners as adapter
+from ir_planner.search.with_ompl.host import Outcome, Parameters, Problem
+from ir_planner.search.with_ompl.planners import repaired
 
 SceneOf = Callable[[str], PlanningScene]
 S_M = 0.02

@@ -9,7 +9,7 @@ import numpy as np
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.search.correction import corrected
-from ir_planner.search.genetic_settings import GeneticSettings
+from ir_planner.search.population import GeneticSettings
 from ir_planner.search.port import Ends, Found
 from ir_planner.search.variety import NEAREST_GOALS
 

@@ -3,8 +3,8 @@
 Descents start from them (optimize/portfolio.py). Clearance is a part of their cost, and penetration
 counts with its depth, so a guess is pushed out of what it collides with, into the local minimum of
 its class. The arm is folded, lifted or turned to a side between start and goal, or goes over the
-cell's park posture. Which
-guesses, and in which order, was measured on variants of cells: each adds most to those before it.
+cell's park posture. Which guesses, and in which order, was measured on variants of cells: each adds
+most to those before it.
 """
 
 from collections.abc import Iterator

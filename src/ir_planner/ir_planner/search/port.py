@@ -42,8 +42,8 @@ class Search(Protocol):
         `work`).
 
         The same ends, space and seed give the same paths; a search that can't promise that has a
-        class attribute `repeatable = False`. Ends early when `work.exhausted`; what a search
-        does beside certifying steps it charges itself. Raises CancelledError when asked to stop.
+        class attribute `repeatable = False`. Ends early when `work.exhausted`; what a search does
+        beside certifying steps it charges itself. Raises CancelledError when asked to stop.
         """
 
 

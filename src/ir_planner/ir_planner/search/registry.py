@@ -3,11 +3,9 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from ir_planner.search.detours import Detours
-from ir_planner.search.direct import Direct
+from ir_planner.search.detours import Detours, Direct, Retract
 from ir_planner.search.genetic import Genetic
 from ir_planner.search.port import Search
-from ir_planner.search.retract import Retract
 from ir_planner.search.sbl import Sbl
 from ir_planner.search.tree import Tree
 from ir_planner.search.with_ompl import (

@@ -3,15 +3,17 @@ process.
 """
 
 from ir_planner.search.port import Search
-from ir_planner.search.with_ompl.aorrtc import Aorrtc
-from ir_planner.search.with_ompl.bkpiece import Bkpiece
 from ir_planner.search.with_ompl.host import charge_to, missing
-from ir_planner.search.with_ompl.kpiece import Kpiece
-from ir_planner.search.with_ompl.lbkpiece import Lbkpiece
-from ir_planner.search.with_ompl.ompl_search import OmplSearch
-from ir_planner.search.with_ompl.prm import Prm
-from ir_planner.search.with_ompl.rrt import Rrt
-from ir_planner.search.with_ompl.rrt_connect import RrtConnect
+from ir_planner.search.with_ompl.planners import (
+    Aorrtc,
+    Bkpiece,
+    Kpiece,
+    Lbkpiece,
+    OmplSearch,
+    Prm,
+    Rrt,
+    RrtConnect,
+)
 
 __all__ = [
     "Aorrtc",

@@ -2,9 +2,8 @@
 that.
 
 OMPL draws from one generator per process and stops where it looks for its end, so each request gets
-a
-process of its own: the seed decides its answer, and whatever it does it can be killed. Motions are
-certified edges of the same kernel that the project's searches use; what a planner may spend is
+a process of its own: the seed decides its answer, and whatever it does it can be killed. Motions
+are certified edges of the same kernel that the project's searches use; what a planner may spend is
 counted in them.
 """
 
@@ -23,7 +22,7 @@ import numpy as np
 
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
-from ir_planner.search.with_ompl.problem import Outcome, Parameters, Problem
+from ir_planner.search.with_ompl.host import Outcome, Parameters, Problem
 
 try:
     from ompl import base, geometric, util
