@@ -16,9 +16,9 @@ from ir_description import Station
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.configurations.ccd_search import InteractionSettings
 from ir_planner.configurations.interaction_point import searched_configurations
 from ir_planner.configurations.inverse_kinematics import free_configurations
-from ir_planner.configurations.settings import InteractionSettings
 from ir_planner.request.context import Context
 from ir_planner.request.journal import Journal
 from ir_planner.request.work import Work

@@ -20,7 +20,7 @@ from ir_description import load_cell, load_power_data
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import Mode, TransitionTimes
 from ir_msgs_py.names import NO_LOAD
-from ir_planner.checks.states import state_check
+from ir_planner.checks.free_space import state_check
 from ir_planner.program import lengths_of
 from ir_planner.program.pauses import Rests, rests_at
 from ir_planner.program.standby import advice

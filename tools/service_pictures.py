@@ -21,8 +21,8 @@ from scipy.spatial import ConvexHull
 from ir_description import load_cell, load_power_data
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
+from ir_planner.configurations.ccd_search import InteractionSettings
 from ir_planner.configurations.interaction_point import searched_configurations
-from ir_planner.configurations.settings import InteractionSettings
 from ir_planner.request.context import Context
 from ir_planner.request.journal import Journal
 from ir_planner.request.work import Work

@@ -12,7 +12,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_planner.configurations.ccd_search import descend
+from ir_planner.configurations.ccd_search import (
+    LITERAL,
+    NONE,
+    SECANT,
+    InteractionSettings,
+    descend,
+    increments,
+    shares_back,
+)
 from ir_planner.configurations.interaction_point import (
     branches,
     distinct_configurations,
@@ -20,8 +28,6 @@ from ir_planner.configurations.interaction_point import (
     searched_configurations,
 )
 from ir_planner.configurations.inverse_kinematics import free_configurations
-from ir_planner.configurations.set_back import LITERAL, NONE, SECANT, increments, shares_back
-from ir_planner.configurations.settings import InteractionSettings
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
 from ir_planner.request.goals import parse_goal

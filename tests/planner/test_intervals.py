@@ -16,7 +16,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner, PlannerSettings
 from ir_planner.checks import interval, movement_energy, movement_spread, peak_power
-from ir_planner.checks.energy_slopes import Sampled, energy_and_slope, holding_slope
+from ir_planner.checks.intervals import Sampled, energy_and_slope, holding_slope
 from ir_planner.program.standby import plan_standby
 from ir_planner.request import Goal
 from ir_planner.scene import Drives, PlanningScene

@@ -14,8 +14,7 @@ from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks.free_space import FreeSpace
-from ir_planner.checks.states import too_near
+from ir_planner.checks.free_space import FreeSpace, too_near
 from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.planner import Planner
 from ir_planner.request.bounds import PLANNING_TIME_MAX

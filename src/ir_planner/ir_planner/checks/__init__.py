@@ -3,9 +3,13 @@ proof.
 """
 
 from ir_planner.checks.clearance import nearest_pair, nearest_pairs, pair_value
-from ir_planner.checks.clearance_checks import clearance_violation
-from ir_planner.checks.energy import MovementEnergy, carried, holding_watts, movement_energy
-from ir_planner.checks.energy_slopes import energy_and_slope, holding_slope, standing_slope
+from ir_planner.checks.energy import (
+    MovementEnergy,
+    carried,
+    holding_watts,
+    movement_energy,
+    peak_power,
+)
 from ir_planner.checks.evaluation import (
     Consumption,
     Evaluation,
@@ -13,10 +17,26 @@ from ir_planner.checks.evaluation import (
     measured,
     total_report,
 )
-from ir_planner.checks.free_space import FreeSpace
-from ir_planner.checks.intervals import ROBOTS, Interval, interval, movement_spread, robots, spread
-from ir_planner.checks.limit_checks import AT_REST, SLACK, Violation
-from ir_planner.checks.peak_power import peak_power
+from ir_planner.checks.free_space import (
+    FreeSpace,
+    StateCheck,
+    end_in_collision,
+    first_too_near,
+    state_check,
+    too_near,
+    too_near_sentence,
+)
+from ir_planner.checks.intervals import (
+    ROBOTS,
+    Interval,
+    energy_and_slope,
+    holding_slope,
+    interval,
+    movement_spread,
+    robots,
+    spread,
+    standing_slope,
+)
 from ir_planner.checks.shapes import (
     CLOSEST,
     PATH,
@@ -26,15 +46,16 @@ from ir_planner.checks.shapes import (
     cell_shapes,
     movement_shapes,
 )
-from ir_planner.checks.states import (
-    StateCheck,
-    end_in_collision,
-    first_too_near,
-    state_check,
-    too_near,
-    too_near_sentence,
+from ir_planner.checks.verification import (
+    AT_REST,
+    SLACK,
+    TorqueProof,
+    Verification,
+    Violation,
+    clearance_violation,
+    torque_proof,
+    verified,
 )
-from ir_planner.checks.verification import TorqueProof, Verification, torque_proof, verified
 
 __all__ = [
     "AT_REST",

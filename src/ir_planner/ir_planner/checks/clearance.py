@@ -34,9 +34,8 @@ class ClearanceProfile:
     pair).
 
     bound [m]: proved, no distance at any instant is smaller; it lies 1e-5 m below the smallest one
-    found.
-    smallest: that pair where it is nearest (None: no pair), and when. contacts: the pairs with a
-    safety distance of their own, where they are nearest. path_length [m] of the tcp.
+    found. smallest: that pair where it is nearest (None: no pair), and when. contacts: the pairs
+    with a safety distance of their own, where they are nearest. path_length [m] of the tcp.
     """
 
     times: FloatArray

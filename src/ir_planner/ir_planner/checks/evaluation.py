@@ -13,8 +13,7 @@ from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.clearance import ClearanceProfile, clearance_profile
-from ir_planner.checks.energy import MovementEnergy, movement_energy
-from ir_planner.checks.peak_power import peak_power
+from ir_planner.checks.energy import MovementEnergy, movement_energy, peak_power
 from ir_planner.checks.verification import Verification, verify
 from ir_planner.presentation import plot_profiles, report_text, status_text
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene

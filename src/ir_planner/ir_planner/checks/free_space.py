@@ -8,6 +8,10 @@ import numpy as np
 
 from ir_kernels.collision import FREE, Certificates
 from ir_msgs_py.arrays import BoolArray, FloatArray
+from ir_msgs_py.report import DistancePair
+from ir_msgs_py.status import Status, StatusCode
+from ir_planner.checks.clearance import nearest_pairs, pair_value
+from ir_planner.presentation import status_text
 from ir_planner.request import Work
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
 
@@ -89,3 +93,84 @@ class FreeSpace:
             q1 = np.concatenate([paths[k][1:] for k in left])
             result[owner[~self.edges_free(q0, q1)]] = False
         return result
+
+
+@dataclass(frozen=True, eq=False)
+class StateCheck:
+    """Whether a state is free, its smallest distance [m] (inf: no pair) and the nearest pairs."""
+
+    status: Status
+    valid: bool
+    min_distance: float
+    pairs: tuple[DistancePair, ...]
+
+    def __repr__(self) -> str:
+        distance = f"smallest distance {1e3 * self.min_distance:.0f} mm"
+        return f"StateCheck({'free' if self.valid else status_text(self.status)}, {distance})"
+
+
+def state_check(
+    q: FloatArray, scene: PlanningScene, margin: float, max_pairs: int, station: str = ""
+) -> StateCheck:
+    """Nearest pairs at q (n,), and whether all keep S_m, `margin` m (or what `station` allows)."""
+    threshold = scene.thresholds(margin, station)
+    distance = scene.collision.distances(q[None])[0]
+    valid = bool((distance > threshold - PROOF_TOLERANCE).all())
+    pairs = nearest_pairs(scene, q, threshold, max_pairs, station)
+    smallest = float(distance.min(initial=np.inf))
+    if valid or not len(distance):
+        return StateCheck(Status.success(), valid, smallest, pairs)
+    worst = nearest_pairs(scene, q, threshold, 1, station)[0]
+    kept = float(threshold[int(np.argmin(distance - threshold))])
+    return StateCheck(Status.success(too_near_sentence(worst, kept)), False, smallest, pairs)
+
+
+def end_in_collision(
+    start: FloatArray, goal: FloatArray, space: FreeSpace, safety_distance: float
+) -> Status | None:
+    """The status for a start or goal (n,) that is not free; None where both are."""
+    for q, what, code in (
+        (start, "start", StatusCode.START_STATE_IN_COLLISION),
+        (goal, "goal", StatusCode.GOAL_IN_COLLISION),
+    ):
+        if not space.states_free(q[None])[0]:
+            return Status(code, too_near(q, space, what, safety_distance))
+    return None
+
+
+def too_near(q: FloatArray, space: FreeSpace, what: str, safety_distance: float) -> str:
+    """The sentence for a configuration (n,) in which a pair is nearer than it may be."""
+    z = int(space.scene.collision.min_distance(q[None], space.threshold).pair[0])
+    if z < 0:
+        return f"{what} is not free"
+    kept = min(
+        safety_distance, float(space.threshold[z]) + PROOF_TOLERANCE / 2
+    )  # a contact has its own
+    return f"{what}: {too_near_sentence(pair_value(space.scene, q, z), kept)}"
+
+
+def first_too_near(path: FloatArray, space: FreeSpace) -> str:
+    """The first pair along a path (M, n) that is nearer than it may be, as counts of what was
+    rejected name it.
+    """
+    near = space.scene.collision.min_distance(path, space.threshold)
+    for distance, z in zip(near.distance, near.pair, strict=True):
+        if z >= 0 and distance <= space.threshold[z]:
+            return _named(space.scene, int(z))
+    found = space.scene.collision.certify_edges(path[:-1], path[1:], space.threshold)
+    for z in found.pair[found.verdict != FREE]:
+        return _named(space.scene, int(z))
+    return "no work is left to prove it free"
+
+
+def _named(scene: PlanningScene, pair: int) -> str:
+    return f"{scene.collision.pairs[pair].body_a} too near {scene.collision.pairs[pair].body_b}"
+
+
+def too_near_sentence(pair: DistancePair, kept: float) -> str:
+    """Which pair is how near, and the distance [m] it must keep."""
+    where = "in penetration" if pair.distance < 0.0 else "too near"
+    return (
+        f"{pair.body_a} and {pair.body_b} ({pair.kind}) are {where}: "
+        f"distance {pair.distance * 1e3:.1f} mm, it must be more than {kept * 1e3:.1f} mm"
+    )

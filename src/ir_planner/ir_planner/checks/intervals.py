@@ -1,8 +1,11 @@
 """Intervals of energies: what the uncertainty of the power parameters leaves open.
 
-Powers change linearly with the parameters, but the bus does not: slopes are taken at the mean of
-the drawn robots, where optimised movements no longer balance between drawing power and dissipating
-it.
+Mains energy is piecewise linear in powers. What a joule more from the bus costs at the mains is 1
+while the mains feed it, 0 while the surplus is dissipated, and what the next such time says while
+the capacitor does both. So one pass over the samples of a movement gives its derivative by each
+power parameter, and the energies of many robots are one product with it. Slopes are taken at the
+mean of the drawn robots, where optimised movements no longer balance between drawing power and
+dissipating it.
 
 All energies of one set of parameters are sampled over the same drawn robots, so that a difference
 of two energies has an interval of its own, mostly far narrower than theirs.
@@ -11,12 +14,160 @@ of two energies has an interval of its own, mostly far narrower than theirs.
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from ir_description import PowerParameters, interval_over
-from ir_kernels import portable
+import numpy as np
+
+from ir_description import AXIS_UNITS, IDLE, PowerParameters, interval_over
+from ir_kernels import DcBus, dc_bus, portable
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks.energy_slopes import Sampled, energy_and_slope, sampled_energy
-from ir_planner.scene import PlanningScene
+from ir_msgs_py.trajectory import JointTrajectory, Samples
+from ir_planner.curves import motion_at
+from ir_planner.scene import RUNNING, PlanningScene
+
+STEP_S = 8e-3  # intervals need no finer samples than these
+_MOST = 20_000  # samples: what lasts longer is sampled more coarsely
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """A motion at the middles of N steps of dt s, and how long it takes [s]."""
+
+    motion: Samples
+    dt: float
+    span: float
+
+    @staticmethod
+    def of(trajectory: JointTrajectory) -> "Sampled":
+        """Of a trajectory; no samples where nothing lasts."""
+        begin = float(trajectory.times[0])
+        span = trajectory.duration - begin
+        count = int(np.clip(np.ceil(span / STEP_S), 1, _MOST)) if span > 0.0 else 0
+        dt = span / max(count, 1)
+        return Sampled(motion_at(trajectory, begin + (np.arange(count) + 0.5) * dt), dt, span)
+
+
+def sampled_energy(at: Sampled, scene: PlanningScene) -> float:
+    """Energy [J] at the mains of a sampled motion, with the loads of the scene."""
+    if at.span <= 0.0:
+        return 0.0
+    _, _, bus = _powers(at, scene)
+    return _drawn(bus, at.dt) / scene.drives.rectifier_efficiency + scene.base_watts * at.span
+
+
+def energy_and_slope(at: Sampled, scene: PlanningScene) -> tuple[float, FloatArray]:
+    """The same, and d energy / d parameter (P,) with the loads of the scene, J per unit."""
+    if at.span <= 0.0:
+        return 0.0, np.zeros(len(scene.parameters.names))
+    torque, power, bus = _powers(at, scene)
+    efficiency = scene.drives.rectifier_efficiency
+    energy = _drawn(bus, at.dt) / efficiency + scene.base_watts * at.span
+    price = _price(power, bus, scene) * (at.dt / efficiency)
+    slope = _axis_slope(_States(at.motion, torque, price), scene)
+    slope[scene.parameters.index("rectifier_efficiency")] = -_drawn(bus, at.dt) / (
+        efficiency * efficiency
+    )
+    return energy, slope + standing_slope(at.span, scene)
+
+
+def _powers(at: Sampled, scene: PlanningScene) -> tuple[FloatArray, FloatArray, DcBus]:
+    """Torque (N, n) Nm, power of the axes (N, n) W, and what the bus makes of it."""
+    motion = at.motion
+    torque = scene.dynamics.inverse_dynamics(motion.q, motion.qd, motion.qdd)
+    power = scene.dynamics.axis_power(motion.qd, torque)
+    return torque, power, dc_bus(power, at.dt, scene.dc_bus)
+
+
+def _drawn(bus: DcBus, dt: float) -> float:
+    """Joules that the bus takes from the rectifier, less those that go back."""
+    return float(bus.mains.sum()) * dt
+
+
+def holding_slope(q: FloatArray, scene: PlanningScene) -> FloatArray:
+    """d watts / d parameter (P,) of motors that hold the arm still at q (n,), W per unit."""
+    rest = np.zeros((1, len(q)))
+    motion = Samples(q[None], rest, rest, rest)
+    torque = scene.dynamics.inverse_dynamics(q[None], rest, rest)
+    efficiency = scene.drives.rectifier_efficiency
+    slope = _axis_slope(_States(motion, torque, np.full((1, len(q)), 1.0 / efficiency)), scene)
+    drawn = float(scene.dynamics.axis_power(rest, torque).sum())
+    slope[scene.parameters.index("rectifier_efficiency")] = -drawn / (efficiency * efficiency)
+    return slope + standing_slope(1.0, scene)
+
+
+def standing_slope(
+    seconds: float, scene: PlanningScene, mode: str = RUNNING, *, drive_bus: bool = True
+) -> FloatArray:
+    """d energy / d parameter (P,) of controller, drives and tool over some seconds in a mode."""
+    parameters = scene.parameters
+    slope = np.zeros(len(parameters.names))
+    slope[parameters.index(f"watts.{mode}")] = seconds
+    slope[parameters.index("drives_watts")] = seconds if mode == RUNNING else 0.0
+    share = max(parameters.value("tool_watts"), 1e-9)
+    slope[parameters.index("tool_watts")] = scene.tool_watts(drive_bus=drive_bus) * seconds / share
+    return slope
+
+
+@dataclass(frozen=True, eq=False)
+class _States:
+    """motion, torque (N, n) Nm, and price (N, n): mains joules per watt of an axis in a sample."""
+
+    motion: Samples
+    torque: FloatArray
+    price: FloatArray
+
+
+def _price(power: FloatArray, bus: DcBus, scene: PlanningScene) -> FloatArray:
+    """What a joule more of each axis costs at the mains (N, n), before the rectifier."""
+    if scene.dc_bus.regeneration == "none":
+        return np.asarray(power > 0.0, dtype=np.float64)
+    decided = (bus.mains != 0.0) | (bus.dissipated > 0.0)
+    places = np.where(decided, np.arange(len(decided)), len(decided))
+    following = np.minimum.accumulate(places[::-1])[::-1]  # what is left at the end is not credited
+    known = np.append((bus.mains != 0.0).astype(np.float64), 0.0)
+    return np.repeat(known[following][:, None], power.shape[1], axis=1)
+
+
+def _axis_slope(at: _States, scene: PlanningScene) -> FloatArray:
+    """The part of friction, losses and masses; rectifier and constant watts are zero."""
+    parameters = scene.parameters
+    model = scene.dynamics
+    d = scene.dynamics.data
+    q, qd, qdd, _ = at.motion
+    speed = np.abs(qd)
+    size = np.abs(at.torque)
+    ratio = np.abs(d.gear_ratio)
+    sign = np.sign(at.torque)
+    losses = d.inverter_loss / ratio + d.gear_loss * speed
+    of_torque = at.price * (qd + 2.0 * d.copper_loss / (ratio * ratio) * at.torque + sign * losses)
+    direction = np.sign(qd)
+    slope = np.zeros(len(parameters.names))
+    axes = {
+        "viscous": of_torque * qd,
+        "coulomb": of_torque * direction,
+        "copper": at.price * np.square(size / ratio),
+        "iron": at.price * (speed * speed),
+        "inverter": at.price * size / ratio,
+        "gear": at.price * size * speed,
+    }
+    for term in AXIS_UNITS:
+        slope[parameters.places(term)] = axes[term].sum(axis=0)
+    slope[parameters.index(IDLE)] = at.price.mean(axis=1).sum()  # of all axes alike
+    rotor = d.rotor_inertia * qdd
+    balance = model.counterbalance(q)
+    body = at.torque - rotor - d.viscous * qd - d.coulomb * direction + balance
+    carried = _carried(at, scene)
+    scaled = {"rotor_inertia": rotor, "counterbalance": -balance, "load_mass": carried}
+    for name, torque in (*scaled.items(), ("link_mass", body - carried)):
+        value = max(parameters.value(name), 1e-9)
+        slope[parameters.index(name)] = float((of_torque * torque).sum()) / value
+    return slope
+
+
+def _carried(at: _States, scene: PlanningScene) -> FloatArray:
+    """The part of the torque (N, n) that is due to what is attached."""
+    if not scene.loads:
+        return np.zeros_like(at.torque)
+    return at.torque - scene.unloaded.inverse_dynamics(*at.motion[:3])
+
 
 ROBOTS = 1000  # drawn: the ends of a 90 % interval are then known to some 5 % of its width
 SEED = 90

@@ -7,21 +7,240 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ir_kernels import portable
+from ir_kernels.collision import COLLIDES, FREE
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.report import DistancePair
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks.clearance_checks import clearance_violation
-from ir_planner.checks.limit_checks import (
-    SLACK,
-    Violation,
-    jump_violation,
-    position_violation,
-    rest_violation,
-    segment_at,
-    share_violation,
+from ir_planner.checks.clearance import pair_value
+from ir_planner.curves import Extremes, extremes
+from ir_planner.scene import (
+    PROOF_TOLERANCE,
+    PlanningScene,
+    polynomials_between,
+    spans_outside,
+    tcp_inside,
+    torque_use,
 )
-from ir_planner.curves import extremes
-from ir_planner.scene import PlanningScene, torque_use
+
+SLACK = 1e-6  # relative: what rounding of a limit that is reached exactly may cost
+POSITION_SLACK = 1e-9  # rad
+JUMP = 1e-4  # rad/s, rad/s^2: rounding of times and points
+AT_REST = 1e-6  # rad/s and rad/s^2 that count as rest
+
+
+@dataclass(frozen=True)
+class Violation:
+    """The first one: time [s] and segment (waypoint index before it), what, value, limit and unit,
+    and a sentence.
+    """
+
+    time: float
+    waypoint: int
+    what: str
+    excess: float
+    sentence: str
+    pair: DistancePair | None = None
+
+
+def segment_at(trajectory: JointTrajectory, time: float) -> int:
+    """Index of the segment at an instant [s], which is that of the waypoint before it."""
+    last = max(len(trajectory.times_ns) - 2, 0)
+    return int(np.clip(np.searchsorted(trajectory.times, time, side="right") - 1, 0, last))
+
+
+def position_violation(
+    trajectory: JointTrajectory, largest: Extremes, scene: PlanningScene
+) -> Violation | None:
+    """Where a joint leaves its range."""
+    robot = scene.cell.robot
+    low = largest.lowest
+    high = largest.highest
+    if len(low) == 0:
+        low = high = trajectory.positions
+    excess = np.maximum(low * -1.0 + robot.position_min, high - robot.position_max)
+    beyond = np.argwhere(excess > POSITION_SLACK)
+    if len(beyond) == 0:
+        return None
+    k, j = (int(i) for i in beyond[0])
+    reached = low[k, j] if robot.position_min[j] - low[k, j] > POSITION_SLACK else high[k, j]
+    sentence = (
+        f"{robot.joint_names[j]} reaches {np.degrees(reached):.6g} deg after waypoint {k}: it "
+        f"must be in [{np.degrees(robot.position_min[j]):g}, "
+        f"{np.degrees(robot.position_max[j]):g}] deg (excess {np.degrees(excess[k, j]):.3g} deg)"
+    )
+    return Violation(float(trajectory.times[k]), k, "position", float(excess[k, j]), sentence)
+
+
+def rest_violation(trajectory: JointTrajectory, scene: PlanningScene) -> Violation | None:
+    """Where the movement does not start or end at rest."""
+    ends = trajectory.sample(trajectory.times[[0, -1]])
+    names = scene.cell.robot.joint_names
+    coefficients, durations = trajectory.coefficients()
+    if len(durations) == 0:
+        return None
+    first = (coefficients[0, :, 1], 2.0 * coefficients[0, :, 2])
+    final = (ends.qd[-1], ends.qdd[-1])
+    for (speed, acceleration), k in ((first, 0), (final, len(durations))):
+        for what, values, unit in (
+            ("velocity", speed, "rad/s"),
+            ("acceleration", acceleration, "rad/s^2"),
+        ):
+            j = int(np.argmax(np.abs(values)))
+            if abs(values[j]) > AT_REST:
+                where = "starts" if k == 0 else "ends"
+                sentence = (
+                    f"the movement {where} with {what} {values[j]:.4g} {unit} of {names[j]} at "
+                    f"waypoint {k}: it must be 0 {unit} within {AT_REST:g}"
+                )
+                return Violation(
+                    float(trajectory.times[k]),
+                    k,
+                    f"{what} at rest",
+                    abs(float(values[j])),
+                    sentence,
+                )
+    return None
+
+
+def jump_violation(trajectory: JointTrajectory, joint_names: tuple[str, ...]) -> Violation | None:
+    """Where the interpolant's velocity or acceleration jumps: the next derivative has no bound
+    there.
+    """
+    coefficients, durations = trajectory.coefficients()
+    if len(durations) < 2:
+        return None
+    powers = portable.power(durations[:-1, None, None], np.arange(6))
+    order = np.arange(6)
+    before = coefficients[:-1] * powers
+    ends = (
+        (
+            "velocity",
+            "rad/s",
+            (before * order).sum(axis=2) / durations[:-1, None],
+            coefficients[1:, :, 1],
+        ),
+        (
+            "acceleration",
+            "rad/s^2",
+            (before * order * (order - 1)).sum(axis=2) / durations[:-1, None] ** 2,
+            2.0 * coefficients[1:, :, 2],
+        ),
+    )
+    for what, unit, end, begin in ends:
+        jump = np.abs(end - begin)
+        beyond = np.argwhere(jump > JUMP)
+        if len(beyond):
+            k, j = (int(i) for i in beyond[0])
+            sentence = (
+                f"{what} of {joint_names[j]} jumps by {jump[k, j]:.4g} {unit} at waypoint {k + 1}: "
+                "it must be continuous"
+            )
+            return Violation(
+                float(trajectory.times[k + 1]), k + 1, what, float(jump[k, j]), sentence
+            )
+    return None
+
+
+def share_violation(
+    name: str, share: FloatArray, trajectory: JointTrajectory, joint_names: tuple[str, ...]
+) -> Violation | None:
+    """Where more than a limit is used; `share` (S, n) of it in each segment."""
+    beyond = np.argwhere(share > 1.0 + SLACK)
+    if len(beyond) == 0:
+        return None
+    k, j = (int(i) for i in beyond[0])
+    sentence = (
+        f"{joint_names[j]} needs {share[k, j]:.3f} times its {name} limit after waypoint {k}: it "
+        f"must be at most 1 (excess {100.0 * (share[k, j] - 1.0):.1f} %)"
+    )
+    return Violation(float(trajectory.times[k]), k, name, float(share[k, j] - 1.0), sentence)
+
+
+# The proof of clearance leaves out no instant between samples. At a station its allowed contacts
+# hold while the tcp is in the machine's zone; outside every pair keeps S_m.
+
+
+def clearance_violation(
+    trajectory: JointTrajectory, scene: PlanningScene, safety_distance: float, station: str = ""
+) -> Violation | None:
+    """The first instant at which a pair is too near, or not proved to be far enough; None:
+    proved.
+    """
+    plain = scene.thresholds(safety_distance) - PROOF_TOLERANCE
+    if len(trajectory.times_ns) == 1:
+        return _of_point(trajectory, scene, safety_distance, station)
+    begin = float(trajectory.times[0])
+    end = float(trajectory.times[-1])
+    if not station or not scene.allowed(station).any():
+        return _of_part(trajectory, (begin, end), plain, scene, "")
+    relaxed = scene.thresholds(safety_distance, station) - PROOF_TOLERANCE
+    outside = spans_outside(trajectory, scene, station, safety_distance)
+    found = [
+        _of_part(trajectory, (begin, end), relaxed, scene, station),
+        *(_of_part(trajectory, span, plain, scene, "") for span in outside),
+    ]
+    violations = [violation for violation in found if violation is not None]
+    return min(violations, key=lambda violation: violation.time) if violations else None
+
+
+def _of_part(
+    trajectory: JointTrajectory,
+    span: tuple[float, float],
+    threshold: FloatArray,
+    scene: PlanningScene,
+    station: str,
+) -> Violation | None:
+    coefficients, durations = polynomials_between(trajectory, *span)
+    if len(durations) == 0:
+        return None
+    found = scene.collision.certify_trajectory(coefficients, durations, threshold)
+    if found.verdict == FREE:
+        return None
+    first, last = (span[0] + t for t in found.interval)
+    q = trajectory.sample([last]).q[0]
+    return _violation(
+        trajectory, q, (first, last), found.verdict, found.pair, threshold, scene, station
+    )
+
+
+def _of_point(
+    trajectory: JointTrajectory, scene: PlanningScene, safety_distance: float, station: str
+) -> Violation | None:
+    q = trajectory.positions
+    inside = bool(station) and bool(tcp_inside(q, scene, station, safety_distance)[0])
+    where = station if inside else ""
+    threshold = scene.thresholds(safety_distance, where) - PROOF_TOLERANCE
+    near = scene.collision.min_distance(q, threshold)
+    z = int(near.pair[0])
+    if z < 0 or near.distance[0] > threshold[z]:
+        return None
+    time = float(trajectory.times[0])
+    return _violation(trajectory, q[0], (time, time), COLLIDES, z, threshold, scene, where)
+
+
+def _violation(
+    trajectory: JointTrajectory,
+    q: FloatArray,
+    interval: tuple[float, float],
+    verdict: int,
+    z: int,
+    threshold: FloatArray,
+    scene: PlanningScene,
+    station: str,
+) -> Violation:
+    pair = pair_value(scene, q, z, bool(scene.allowed(station)[z]))
+    kept = float(threshold[z]) + PROOF_TOLERANCE
+    excess = kept - pair.distance
+    k = segment_at(trajectory, interval[1])
+    come = "come to" if verdict == COLLIDES else "can't be proved to stay apart, they are at"
+    sentence = (
+        f"{pair.body_a} and {pair.body_b} ({pair.kind}) {come} {pair.distance * 1e3:.1f} mm "
+        f"after waypoint {k} at {interval[1]:.3f} s: they must stay {kept * 1e3:.1f} mm apart "
+        f"(excess {excess * 1e3:.1f} mm)"
+    )
+    return Violation(interval[0], k, "clearance", excess, sentence, pair)
 
 
 @dataclass(frozen=True, eq=False)

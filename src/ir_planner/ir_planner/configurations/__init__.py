@@ -2,16 +2,21 @@
 6).
 """
 
-from ir_planner.configurations.answer import IK_METHODS, IkAnswer, configurations_at
-from ir_planner.configurations.interaction_point import STARTS_MAX, searched_configurations
+from ir_planner.configurations.ccd_search import INTERACTION, InteractionSettings
+from ir_planner.configurations.interaction_point import (
+    IK_METHODS,
+    STARTS_MAX,
+    IkAnswer,
+    configurations_at,
+    searched_configurations,
+)
 from ir_planner.configurations.inverse_kinematics import (
     Configurations,
+    configuration_log,
     free_configurations,
     no_configuration,
     ranked_solutions,
 )
-from ir_planner.configurations.log import configuration_log
-from ir_planner.configurations.settings import INTERACTION, InteractionSettings
 
 __all__ = [
     "IK_METHODS",

@@ -15,10 +15,94 @@ import numpy as np
 from ir_kernels import CcdSettings, ccd, portable
 from ir_kernels.reference.ccd import best_value
 from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
-from ir_planner.configurations.set_back import NONE, shares_back
-from ir_planner.configurations.settings import InteractionSettings
+from ir_msgs_py.settings import check_settings, setting
 from ir_planner.request import Work
 from ir_planner.scene import PlanningScene
+
+# The set-back of a joint that ends in collision, eqs. (4) and (5). As printed the step of eq. (5)
+# has the wrong unit and vanishes where bodies touch. Read as a secant it is the share of the step
+# that is lost where the distance, taken as linear, falls to S_m. The literal reading keeps the gain
+# of distance in metres as the factor.
+
+SECANT = "secant"
+LITERAL = "literal"
+NONE = "none"
+
+
+def increments(before: FloatArray, after: FloatArray) -> FloatArray:
+    """Eq. (4): dd_z (Z,) [m], how much each metric distance (Z,) grew in a step."""
+    return np.asarray(after - before)
+
+
+def shares_back(
+    before: FloatArray, after: FloatArray, threshold: FloatArray, reading: str, overshoot: float
+) -> FloatArray:
+    """Eq. (5): which share (P,) of its last step each start's joint is set back, in [0, 1].
+
+    `before`, `after` (P, Z) m; `threshold` (Z,) m, S_m or what the station allows. Only pairs that
+    were free and no longer are count: setting back can't repair what was in collision before the
+    step. secant: (S_m - d') / (d - d') (1 + overshoot) of the worst pair; literal: |dd_z| of it in
+    metres.
+    """
+    result = np.zeros(len(after))
+    row, z = np.nonzero((after <= threshold) & (before > threshold))
+    lost = -increments(before[row, z], after[row, z])
+    if reading == SECANT:
+        share = np.maximum((threshold[z] - after[row, z]) / lost * (1.0 + overshoot), overshoot)
+    else:
+        share = lost
+    np.maximum.at(result, row, np.minimum(share, 1.0))
+    return result
+
+
+@dataclass(frozen=True)
+class InteractionSettings:
+    """The search of goal configurations by cyclic coordinate descent with metric distances."""
+
+    distribution: str = setting(
+        "truncated_normal",
+        "Random starts of eq. 1: truncated_normal (mean mid-range, sigma a sixth of the range) "
+        "or uniform.",
+        choices=("truncated_normal", "uniform"),
+    )
+    set_back: str = setting(
+        "secant",
+        "How eq. 5 sets a joint back: secant (until the distance is S_m), literal (by the gain "
+        "in m), or none: collisions are sorted out at the pose.",
+        choices=("secant", "literal", "none"),
+    )
+    overshoot: float = setting(
+        0.05, "eps of eq. 5: how much farther than the secant says.", minimum=0.0, maximum=1.0
+    )
+    repairs: int = setting(
+        2, "Times a step is set back before it is taken back.", minimum=1, maximum=50
+    )
+    sweeps: int = setting(
+        6, "Sweeps over the joints before a start is given up.", minimum=1, maximum=1000
+    )
+    finish_every: int = setting(
+        2, "Sweeps between two tries to finish with Newton's steps.", minimum=1, maximum=1000
+    )
+    newton_steps: int = setting(
+        30,
+        "Newton's steps of a finish; 0: cyclic coordinate descent alone.",
+        minimum=0,
+        maximum=1000,
+    )
+    xi: float = setting(
+        1e-8,
+        "A start has arrived when Psi is less (eq. 6).",
+        unit="m^2",
+        minimum=1e-16,
+        maximum=1.0,
+    )
+
+    def __post_init__(self) -> None:
+        check_settings(self)
+
+
+INTERACTION = InteractionSettings()
+"""The default settings."""
 
 ROTATION_LENGTH = 0.5  # m/rad: lambda of eq. (2)
 _STALLED = 0.02  # of Psi that a sweep must gain where it was set back

@@ -14,6 +14,7 @@ from ir_kernels import portable
 from ir_kernels.collision import MinDistance
 from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.report import IkSolution
+from ir_msgs_py.search_log import ConfigurationLog, Track
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import nearest_pair
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, movement_cost
@@ -24,8 +25,7 @@ class Configurations:
     """Free configurations q (K, n), ranked; branch (K,); and why the others were dropped.
 
     nearest: where none is free, the obstructing pair of the one that lacks least ("" where it is
-    not known).
-    tracks, outcome: of a search from random starts, as in `Descent`; else empty.
+    not known). tracks, outcome: of a search from random starts, as in `Descent`; else empty.
     """
 
     q: FloatArray
@@ -129,3 +129,26 @@ def ranked_solutions(
             )
         )
     return tuple(solutions)
+
+
+_TRACKS = 64  # starts whose positions are kept: more than a picture shows
+
+
+def configuration_log(
+    station: str, found: Configurations, scene: PlanningScene
+) -> ConfigurationLog:
+    """The starts of a search at a station: where the tool was from sweep to sweep, and what ended
+    them.
+    """
+    tracks = tuple(
+        Track(outcome, scene.chain.tcp_poses(np.ascontiguousarray(q))[:, :3, 3])
+        for q, outcome in zip(found.tracks[:_TRACKS], found.outcome, strict=False)
+    )
+    return ConfigurationLog(
+        station=station,
+        starts=len(found.outcome),
+        accepted=sum(outcome == "" for outcome in found.outcome),
+        distinct=len(found.q),
+        rejected=tuple(sorted(found.rejected.items(), key=lambda item: (-item[1], item[0]))),
+        tracks=tracks,
+    )
