@@ -21,9 +21,8 @@ from ir_planner.scene import path_cost
 from ir_planner.search import fewest_corners
 from ir_planner.service import modified_ga
 from ir_planner.service.exit import Exit
-from ir_planner.service.exit_population import ExitPopulation
-from ir_planner.service.exit_tree import ExitTree
-from ir_planner.service.modified_ga import ModifiedGa
+from ir_planner.service.modified_ga import ExitPopulation, ModifiedGa
+from ir_planner.service.withdrawals import ExitTree
 
 CELLS = ("cnc_door", "deep_box", "demo")
 # of each cell and seed; searches per station and reading

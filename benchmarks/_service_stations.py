@@ -25,8 +25,7 @@ from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.service.exit import Exit
 from ir_planner.service.modified_ga import ModifiedGa, withdraw
-from ir_planner.service.service_movement import ServicePlan, plan_service
-from ir_planner.service.work_configurations import ServiceRequest
+from ir_planner.service.service_movement import ServicePlan, ServiceRequest, plan_service
 
 T = TypeVar("T")
 S_M = 0.02  # m

@@ -29,8 +29,7 @@ from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.service.exit import Exit
 from ir_planner.service.modified_ga import ModifiedGa, Walk, withdraw
-from ir_planner.service.service_movement import ServicePlan, plan_service
-from ir_planner.service.work_configurations import ServiceRequest
+from ir_planner.service.service_movement import ServicePlan, ServiceRequest, plan_service
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt

@@ -22,8 +22,7 @@ from ir_planner.optimize.refinement import Refinement, movement_over
 from ir_planner.request.context import Context
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene
-from ir_planner.service.service_movement import plan_service
-from ir_planner.service.work_configurations import ServiceRequest
+from ir_planner.service.service_movement import ServiceRequest, plan_service
 from ir_planner.timing.objective import coarse_cost, objective_value
 from ir_planner.timing.straight_steps import straight_steps
 

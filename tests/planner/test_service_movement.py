@@ -25,13 +25,10 @@ from ir_planner.request.context import Context
 from ir_planner.request.journal import Journal
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
-from ir_planner.service.exit import Exit
-from ir_planner.service.modified_ga import ModifiedGa, withdraw
-from ir_planner.service.service_movement import ServicePlan, plan_service
-from ir_planner.service.step_weights import accumulated_mass, step_weights
+from ir_planner.service.exit import Exit, WorkArea
+from ir_planner.service.modified_ga import ModifiedGa, accumulated_mass, step_weights, withdraw
+from ir_planner.service.service_movement import ServicePlan, ServiceRequest, plan_service
 from ir_planner.service.withdrawals import exit_searches, withdrawal
-from ir_planner.service.work_area import WorkArea
-from ir_planner.service.work_configurations import ServiceRequest
 
 IN_ZONES = [
     ("cnc_door", "cnc"),

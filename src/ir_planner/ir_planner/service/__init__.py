@@ -1,8 +1,6 @@
 """Service movements: straight lines at a station, and the withdrawal from a machine (eq. 7)."""
 
-from ir_planner.service.candidate_shapes import service_shapes
-from ir_planner.service.exit import Exit
-from ir_planner.service.exit_search import ExitSearch, ExitsFound
+from ir_planner.service.exit import Exit, ExitSearch, ExitsFound, WorkArea
 from ir_planner.service.modified_ga import ModifiedGa
 from ir_planner.service.service_lines import (
     ServiceLine,
@@ -11,7 +9,13 @@ from ir_planner.service.service_lines import (
     service_lines,
     timed_service,
 )
-from ir_planner.service.service_movement import ServicePlan, plan_service
+from ir_planner.service.service_movement import (
+    ServicePlan,
+    ServiceRequest,
+    checked_request,
+    plan_service,
+    service_shapes,
+)
 from ir_planner.service.withdrawals import (
     EXIT_SEARCHES,
     ExitPath,
@@ -19,8 +23,6 @@ from ir_planner.service.withdrawals import (
     known_method,
     withdrawal,
 )
-from ir_planner.service.work_area import WorkArea
-from ir_planner.service.work_configurations import ServiceRequest, checked_request
 
 __all__ = [
     "EXIT_SEARCHES",

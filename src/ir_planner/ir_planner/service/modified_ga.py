@@ -1,12 +1,12 @@
 """Withdrawal from a machine's work area by the modified genetic algorithm of eq. (7): the raw
 paths.
 
-A population of copies of the interaction configuration is perturbed, q_i <- q_i + W_i n_i with
-n_i ~ N(mu_i, sigma). What comes nearer than S_m is dropped, with its reason; the rest is ranked by
-the total metric distance D to the machine. The mean grows with D and points where D grew and the
-tool leaves; the spread shrinks with the gain of D, and is 1 rad around a configuration whose
-offspring all collide, to get round what closes the zone. It goes on until D grows for every
-configuration and the zone is left. Every step is a certified edge.
+A population of copies of the interaction configuration is perturbed, q_i <- q_i + W_i n_i with n_i
+~ N(mu_i, sigma). What comes nearer than S_m is dropped, with its reason; the rest is ranked by the
+total metric distance D to the machine. The mean grows with D and points where D grew and the tool
+leaves; the spread shrinks with the gain of D, and is 1 rad around a configuration whose offspring
+all collide, to get round what closes the zone. It goes on until D grows for every configuration and
+the zone is left. Every step is a certified edge.
 """
 
 from collections import Counter
@@ -19,10 +19,63 @@ from ir_kernels.collision import FREE
 from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_msgs_py.settings import check_settings, setting
 from ir_planner.request import Work
-from ir_planner.service.exit import Exit
-from ir_planner.service.exit_population import ExitPopulation, counted, joined
-from ir_planner.service.exit_search import ExitsFound, WalkRecord
-from ir_planner.service.step_weights import step_weights
+from ir_planner.service.exit import Exit, ExitsFound, WalkRecord
+
+
+@dataclass(eq=False)
+class ExitPopulation:
+    """Configurations (N, n) with D (N,), spread (N,) rad, the step (N, n) that led here, index of
+    their node.
+    """
+
+    q: FloatArray
+    total: FloatArray
+    sigma: FloatArray
+    step: FloatArray
+    node: IntArray
+
+    def of(self, rows: IntArray) -> "ExitPopulation":
+        """Those of the `rows` (M,)."""
+        return ExitPopulation(
+            self.q[rows], self.total[rows], self.sigma[rows], self.step[rows], self.node[rows]
+        )
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+
+def joined(a: ExitPopulation, b: ExitPopulation) -> ExitPopulation:
+    """The configurations of both."""
+    both = ((getattr(a, name), getattr(b, name)) for name in a.__dataclass_fields__)
+    return ExitPopulation(*(np.concatenate(pair) for pair in both))
+
+
+def counted(numbers: IntArray) -> list[tuple[int, int]]:
+    """Every one of the numbers (N,), none negative, and how often it is there, in order."""
+    counts = np.bincount(numbers)
+    return [(z, int(counts[z])) for z in np.flatnonzero(counts).tolist()]
+
+
+# Steps of the joints in the walk of eq. (7) are weighted by the mass from the tool to the joint,
+# M_i = sum_{l>=i} m_l, the load with the last link. As printed W_i is proportional to M_i
+# ("literal"); the option "inverse" lets the light joints, which move little of the arm, step more.
+
+WEIGHTINGS = ("literal", "inverse")
+
+
+def accumulated_mass(link_mass: FloatArray, load_mass: float = 0.0) -> FloatArray:
+    """M (n,) kg behind each joint; `link_mass` (n+1,) from the base on."""
+    mass = np.array(link_mass[1:], dtype=float)
+    mass[-1] += load_mass
+    return np.ascontiguousarray(np.cumsum(mass[::-1])[::-1])
+
+
+def step_weights(link_mass: FloatArray, load_mass: float, weighting: str) -> FloatArray:
+    """W (n,) with mean 1: proportional to M, or to 1/M."""
+    mass = accumulated_mass(link_mass, load_mass)
+    weight = mass if weighting == "literal" else 1.0 / np.maximum(mass, 1e-9)
+    return np.asarray(weight / weight.mean())
+
 
 _DAMPING = (
     0.02  # m^2, of the least squares: near a singular wrist rates stay below 1 / (2 * damping)

@@ -33,8 +33,7 @@ class ServiceLine:
     """Configurations (L, n) from the interaction configuration to the outer end.
 
     straight: points of a straight line of the tool; else waypoints of a withdrawal (eq. 7), with
-    the `exit`
-    that they are of: the same points, but for whole turns.
+    the `exit` that they are of: the same points, but for whole turns.
     """
 
     points: FloatArray

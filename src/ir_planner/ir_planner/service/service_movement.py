@@ -7,19 +7,25 @@ clearance, then by time.
 """
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from ir_description import Station
+from ir_kernels import portable
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import PlanningInfo, ServiceCandidate, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
-from ir_planner.checks import nearest_pair
-from ir_planner.errors import TimingError
+from ir_planner.checks import CLOSEST, PATH, ZONES, Colour, FreeSpace, Shape, nearest_pair, too_near
+from ir_planner.configurations import free_configurations, no_configuration
+from ir_planner.errors import RequestError, TimingError
 from ir_planner.optimize import movement_over
 from ir_planner.presentation import plot_trajectory, result_text
 from ir_planner.request import Context, Journal
-from ir_planner.service.exit import Exit
-from ir_planner.service.exit_search import ExitSearch
+from ir_planner.scene import PlanningScene
+from ir_planner.service.exit import Exit, ExitSearch
 from ir_planner.service.withdrawals import (
     EXIT_SEARCHES,
     ExitPath,
@@ -27,8 +33,87 @@ from ir_planner.service.withdrawals import (
     known_method,
     withdrawal,
 )
-from ir_planner.service.work_configurations import ENTRY, ServiceRequest, work_configurations
 from ir_planner.timing import Movement, objective_value
+
+EXIT = "exit"
+ENTRY = "entry"
+CANDIDATES_MAX = 20  # trajectories in one answer
+_BRANCHES = 4  # configurations that are tried: each that fails costs a whole search
+_SAME_BRANCH = 1e-6  # rad
+
+
+@dataclass(frozen=True, eq=False)
+class ServiceRequest:
+    """configuration (n,): at the station, None: the best. near (n,): where the cost of
+    configurations counts from.
+    """
+
+    station: Station
+    direction: str
+    configuration: FloatArray | None
+    near: FloatArray
+    max_candidates: int = 3
+
+
+def checked_request(direction: str, max_candidates: int) -> None:
+    """Raise RequestError for a direction or a number of candidates that makes no sense."""
+    if direction not in (EXIT, ENTRY):
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"direction {direction[:60]!a} is unknown: known are {EXIT}, {ENTRY}",
+        )
+    if not 1 <= max_candidates <= CANDIDATES_MAX:
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"max_candidates is {max_candidates}: it must be in [1, {CANDIDATES_MAX}]",
+        )
+
+
+def work_configurations(
+    request: ServiceRequest, context: Context
+) -> tuple[list[FloatArray], Status]:
+    """Free configurations (n,) at the station to start from, one per branch, best first; or none
+    and why.
+    """
+    scene = context.scene
+    margin = context.safety_distance
+    name = request.station.name
+    inside = FreeSpace.of(scene, margin, context.work, name)
+    if request.configuration is not None:
+        q = request.configuration
+        if inside.states_free(q[None])[0]:
+            return [q], Status.success()
+        entering = request.direction == ENTRY
+        code = StatusCode.GOAL_IN_COLLISION if entering else StatusCode.START_STATE_IN_COLLISION
+        return [], Status(code, too_near(q, inside, "goal" if entering else "start", margin))
+    found = free_configurations(request.station.pose, scene, inside.threshold, request.near)
+    context.journal.rejected.update(found.rejected)
+    if len(found.q) == 0:
+        status = no_configuration(request.station.pose, scene, found, f"station {name}")
+        return [], Status(
+            status.code, status.message + _best_clearance(request.station.pose, inside)
+        )
+    chosen: list[FloatArray] = []
+    for q in found.q:
+        if all(np.abs(portable.sin(0.5 * (q - other))).max() > _SAME_BRANCH for other in chosen):
+            chosen.append(q)
+    return chosen[:_BRANCHES], Status.success()
+
+
+def _best_clearance(pose: FloatArray, inside: FreeSpace) -> str:
+    """What the freest of the configurations that reach a pose comes to; "" where none reaches
+    it.
+    """
+    q = inside.scene.inverse_kinematics.solve(np.asarray(pose)[None]).q
+    if len(q) == 0:
+        return ""
+    near = inside.scene.collision.min_distance(q, inside.threshold)
+    best = int(np.argmax(near.distance - inside.threshold[near.pair]))
+    pair = inside.scene.collision.pairs[int(near.pair[best])]
+    return (
+        f"; the best clearance is {near.distance[best] * 1e3:.1f} mm between {pair.body_a} and "
+        f"{pair.body_b}, it must be more than {inside.threshold[near.pair[best]] * 1e3:.1f} mm"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,3 +252,51 @@ def blocked(found: Withdrawal, problem: Exit, journal: Journal) -> Status:
         "configuration, an opened door or a smaller safety distance may help"
     )
     return Status(StatusCode.PLANNING_FAILED, sentence)
+
+
+_NONE = np.zeros((0, 3))
+_OTHERS: Colour = (0.45, 0.6, 0.85, 0.7)  # candidates after the best
+_WHITE: Colour = (1.0, 1.0, 1.0, 1.0)
+_SAMPLES = 60
+
+
+def service_shapes(
+    candidates: Sequence[ServiceCandidate], station: str, scene: PlanningScene
+) -> tuple[Shape, ...]:
+    """Shapes of ranked candidates at a station: the best path is thick, its closest pair has a
+    label.
+    """
+    machine = scene.cell.machine(scene.station(station).equipment)
+    zone = machine.zone
+    shapes = []
+    if machine.enabled:
+        red, green, blue, alpha = ZONES[zone.kind]
+        colour = (red, green, blue, min(2.0 * alpha, 1.0))
+        shapes.append(Shape("service_zone", "box", zone.pose, zone.size, colour, _NONE))
+    for rank, candidate in enumerate(candidates):
+        if candidate.trajectory is None:
+            continue
+        times = np.linspace(candidate.trajectory.times[0], candidate.trajectory.times[-1], _SAMPLES)
+        path = scene.chain.tcp_poses(candidate.trajectory.sample(times).q)[:, :3, 3]
+        width = np.array([0.006 if rank else 0.014, 0.0, 0.0])
+        colour = _OTHERS if rank else PATH
+        shapes.append(Shape("service_candidates", "line", np.eye(4), width, colour, path))
+        shapes.extend(_closest(candidate, rank == 0))
+    return tuple(shapes)
+
+
+def _closest(candidate: ServiceCandidate, labelled: bool) -> list[Shape]:
+    """The line between the closest points of the path's nearest pair, and its label."""
+    pair = candidate.report.closest
+    if pair is None:
+        return []
+    ends = np.stack([pair.point_a, pair.point_b])
+    shapes = [
+        Shape("service_closest", "line", np.eye(4), np.array([0.012, 0.0, 0.0]), CLOSEST, ends)
+    ]
+    if labelled:
+        pose = np.eye(4)
+        pose[:3, 3] = ends.mean(axis=0) + np.array([0.0, 0.0, 0.05])
+        text = f"{candidate.method}: {pair.distance * 1e3:.1f} mm {pair.body_a} - {pair.body_b}"
+        shapes.append(Shape("service_closest", "text", pose, np.full(3, 0.06), _WHITE, _NONE, text))
+    return shapes
