@@ -9,7 +9,7 @@ import pytest
 
 from ir_description import load_cell, load_power_data
 from ir_planner.checks import FreeSpace
-from ir_planner.regional.self_barrier import barrier, refused, spreads
+from ir_planner.regional.self_barrier import barrier, spreads
 from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.search import Ends
@@ -49,7 +49,7 @@ def test_an_offset_wrist_that_always_meets_itself_between_two_ends_is_a_proof() 
     found = barrier(Ends(BEFORE, BEYOND[None]), space)
     assert found is not None
     assert found.joint == "wrist_2_joint"
-    assert "wrist_2_joint would have to pass 180 deg" in refused(found).message
+    assert "wrist_2_joint would have to pass 180 deg" in found.status.message
     robot = scene.cell.robot
     rng = np.random.default_rng(5)
     q = rng.uniform(robot.position_min, robot.position_max, (1000, 6))

@@ -46,6 +46,19 @@ class Enclosure:
     clearance: float
     needed: float
 
+    @property
+    def status(self) -> Status:
+        """The status for a request that can't be met."""
+        needed = 1e3 * self.needed
+        return Status(
+            StatusCode.PLANNING_FAILED,
+            f"no path exists: the {self.end} is enclosed: {self.capsule} can't get out past "
+            f"{self.body}; where the passage is widest, the two come to {1e3 * self.clearance:.0f} "
+            f"mm at most, {needed - 1e3 * self.clearance:.0f} mm below the {needed:.1f} mm they "
+            "must keep; another configuration, an open door, or a smaller safety distance, may "
+            "help",
+        )
+
 
 def enclosure(ends: Ends, space: FreeSpace) -> Enclosure | None:
     """What proves that no path leads from the start to any of the goals; None: nothing is
@@ -87,18 +100,6 @@ def _joined(field: BallField, needed: float, farthest: float, cubes: list[Index]
     """Whether the first cube and any other are in one component."""
     part = field.components(needed, farthest)
     return any(part[cube] == part[cubes[0]] for cube in cubes[1:])
-
-
-def refused(found: Enclosure) -> Status:
-    """The status for a request that can't be met."""
-    needed = 1e3 * found.needed
-    return Status(
-        StatusCode.PLANNING_FAILED,
-        f"no path exists: the {found.end} is enclosed: {found.capsule} can't get out past "
-        f"{found.body}; where the passage is widest, the two come to {1e3 * found.clearance:.0f} "
-        f"mm at most, {needed - 1e3 * found.clearance:.0f} mm below the {needed:.1f} mm they "
-        "must keep; another configuration, an open door, or a smaller safety distance, may help",
-    )
 
 
 def _kept(balls: list[Ball], space: FreeSpace) -> dict[str, float]:

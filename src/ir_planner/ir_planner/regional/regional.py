@@ -14,10 +14,9 @@ from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status
 from ir_planner.checks import FreeSpace, end_in_collision
 from ir_planner.optimize import Portfolio, Refinement
-from ir_planner.regional import self_barrier
 from ir_planner.regional.answer import MovementPlan
 from ir_planner.regional.asynchronous import with_own_laws
-from ir_planner.regional.enclosure import enclosure, refused
+from ir_planner.regional.enclosure import enclosure
 from ir_planner.regional.exploration import Path, Searches, first_paths
 from ir_planner.regional.refusal import refusal
 from ir_planner.regional.safeguards import DIRECT, Exploration, best_found, not_worse_than_baseline
@@ -107,9 +106,9 @@ def _impossible(ends: Ends, space: FreeSpace, context: Context) -> Status | None
         enclosed = enclosure(ends, space) if passed is None else None
         if passed is not None:
             notes.append(f"{passed.joint} can't pass {np.degrees(passed.value):.0f} deg")
-            return self_barrier.refused(passed)
+            return passed.status
         notes.append(f"the {enclosed.end} is enclosed" if enclosed else "none is proved")
-    return None if enclosed is None else refused(enclosed)
+    return None if enclosed is None else enclosed.status
 
 
 def _in_straight_steps(

@@ -36,24 +36,24 @@ class Barrier:
     distance: float
     needed: float
 
+    @property
+    def status(self) -> Status:
+        """The status for a request that can't be met."""
+        first, second = self.pair
+        return Status(
+            StatusCode.PLANNING_FAILED,
+            f"no path exists: {self.joint} would have to pass {np.degrees(self.value):.0f} deg, "
+            f"where {first} and {second} are {1e3 * self.distance:.0f} mm apart at most, below the "
+            f"{1e3 * self.needed:.1f} mm they must keep; another configuration, or a smaller "
+            "safety distance, may help",
+        )
+
 
 def barrier(ends: Ends, space: FreeSpace) -> Barrier | None:
     """What proves that no path leads from the start to any of the goals, shown for the first."""
     spread = spreads(space.scene)
     found = [_between(ends.start, goal, space, spread) for goal in ends.goals]
     return found[0] if None not in found else None
-
-
-def refused(found: Barrier) -> Status:
-    """The status for a request that can't be met."""
-    first, second = found.pair
-    return Status(
-        StatusCode.PLANNING_FAILED,
-        f"no path exists: {found.joint} would have to pass {np.degrees(found.value):.0f} deg, "
-        f"where {first} and {second} are {1e3 * found.distance:.0f} mm apart at most, below the "
-        f"{1e3 * found.needed:.1f} mm they must keep; another configuration, or a smaller safety "
-        "distance, may help",
-    )
 
 
 def _between(
