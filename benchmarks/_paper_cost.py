@@ -17,7 +17,7 @@ from scipy.stats import kendalltau
 
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.scene import movement_cost
-from ir_planner.scene.movement_cost import movement_weights
+from ir_planner.scene.planning_scene import movement_weights
 
 # per seed
 PAIRS = 4000

@@ -19,9 +19,7 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.configurations.ccd_search import InteractionSettings
 from ir_planner.configurations.interaction_point import searched_configurations
 from ir_planner.configurations.inverse_kinematics import free_configurations
-from ir_planner.request.context import Context
-from ir_planner.request.journal import Journal
-from ir_planner.request.work import Work
+from ir_planner.request.context import Context, Journal, Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.service.exit import Exit
 from ir_planner.service.modified_ga import ModifiedGa, withdraw

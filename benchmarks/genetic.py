@@ -20,8 +20,8 @@ from _regional_tasks import CELLS, Task, tasks_of
 from _results import Claim, at_least, at_most, command_line, finish, line_of
 
 from ir_planner.checks.free_space import FreeSpace
-from ir_planner.request.work import Work
-from ir_planner.scene.movement_cost import movement_cost, path_cost
+from ir_planner.request.context import Work
+from ir_planner.scene.planning_scene import movement_cost, path_cost
 from ir_planner.search.correction import Correction, corrected
 from ir_planner.search.genetic import Genetic
 from ir_planner.search.shortcuts import fewest_corners, pulled

@@ -15,8 +15,8 @@ import pytest
 from ir_description import Cell, PowerData, load_cell, load_power_data
 from ir_msgs_py.options import PlanOptions
 from ir_planner.planner import Planner
+from ir_planner.request.context import Work
 from ir_planner.request.goals import Goal
-from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 
 sys.path.insert(0, str(Path(__file__).parent))  # asking.py

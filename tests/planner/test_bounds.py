@@ -23,9 +23,7 @@ from ir_planner.program.bounds import (
     potential_energy,
 )
 from ir_planner.regional.regional import plan_regional
-from ir_planner.request.context import Context
-from ir_planner.request.journal import Journal
-from ir_planner.request.work import Work
+from ir_planner.request.context import Context, Journal, Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.search.registry import registered
 

@@ -27,7 +27,7 @@ from ir_planner.program.request import ProgramPlan, ProgramRequest
 from ir_planner.program.standby import plan_standby
 from ir_planner.program.station_graph import Part
 from ir_planner.program.time_values import FASTEST, LADDER, Ladder, Point, TimeValues, convex_front
-from ir_planner.request.work import Work
+from ir_planner.request.context import Work
 from ir_planner.scene.planning_scene import load_text, scene_with
 from ir_planner.timing import Movement
 

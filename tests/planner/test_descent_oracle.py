@@ -13,7 +13,7 @@ from ir_description import robot_urdf
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.configurations.ccd_search import InteractionSettings, descend
 from ir_planner.configurations.interaction_point import random_starts
-from ir_planner.request.work import Work
+from ir_planner.request.context import Work
 from ir_planner.scene.planning_scene import PlanningScene
 
 SWEEPS = 6

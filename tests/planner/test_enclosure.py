@@ -15,9 +15,8 @@ from ir_description import Body, Cell, Equipment, Zone, cell_from_yaml, load_pow
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner.checks import FreeSpace
-from ir_planner.regional.ball_field import distance_at_most
-from ir_planner.regional.enclosure import enclosure
-from ir_planner.request.work import Work
+from ir_planner.regional.no_path import distance_at_most, enclosure
+from ir_planner.request.context import Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.search import Ends
 

@@ -15,8 +15,7 @@ from ir_kernels.power import REGENERATIONS
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.energy import holding_watts, movement_energy
-from ir_planner.request.context import Context
-from ir_planner.request.work import Work
+from ir_planner.request.context import Context, Work
 from ir_planner.scene import Drives
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.timing.blending import standing, stretched

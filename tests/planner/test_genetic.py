@@ -22,9 +22,15 @@ from ir_msgs_py.status import StatusCode
 from ir_planner.checks.free_space import FreeSpace
 from ir_planner.curves.joint_spline import spline_through, to_ppoly, virtual_knots
 from ir_planner.errors import CancelledError
-from ir_planner.request.work import Work
-from ir_planner.scene.movement_cost import movement_cost, path_cost
-from ir_planner.scene.planning_scene import PROOF_TOLERANCE, PlanningScene, load_text, scene_with
+from ir_planner.request.context import Work
+from ir_planner.scene.planning_scene import (
+    PROOF_TOLERANCE,
+    PlanningScene,
+    load_text,
+    movement_cost,
+    path_cost,
+    scene_with,
+)
 from ir_planner.search.correction import colliding_stretch, corrected
 from ir_planner.search.genetic import Genetic
 from ir_planner.search.population import _Breeder, evolve, path_matrix

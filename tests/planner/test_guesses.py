@@ -14,7 +14,7 @@ from ir_kernels.collision import FREE
 from ir_msgs_py.options import PlanOptions
 from ir_planner.checks import FreeSpace
 from ir_planner.curves import along_path
-from ir_planner.request.work import Work
+from ir_planner.request.context import Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.search import guesses, straight_along
 

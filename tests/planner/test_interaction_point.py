@@ -30,8 +30,8 @@ from ir_planner.configurations.interaction_point import (
 from ir_planner.configurations.inverse_kinematics import free_configurations
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
+from ir_planner.request.context import Work
 from ir_planner.request.goals import parse_goal
-from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import PlanningScene
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])

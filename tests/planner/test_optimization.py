@@ -22,12 +22,16 @@ from ir_planner.checks.energy import movement_energy
 from ir_planner.errors import CancelledError, RequestError
 from ir_planner.optimize.descents import Descents
 from ir_planner.planner import Planner
-from ir_planner.request.work import Work
+from ir_planner.request.context import Work
 from ir_planner.scene.planning_scene import PROOF_TOLERANCE, PlanningScene
 from ir_planner.search import SEARCHES
 from ir_planner.timing.blending import stretched
-from ir_planner.trajectories.optimization import POINTS_MAX, OptimizationPlan, optimize_trajectory
-from ir_planner.trajectories.pareto import non_dominated
+from ir_planner.trajectories.optimization import (
+    POINTS_MAX,
+    OptimizationPlan,
+    non_dominated,
+    optimize_trajectory,
+)
 from ir_planner.trajectories.through_points import Reference
 
 FloatArray = NDArray[np.float64]

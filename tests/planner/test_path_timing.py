@@ -23,8 +23,7 @@ from ir_planner.optimize.fixed_path import FixedPath, never_back
 from ir_planner.optimize.path_timing import KEPT, Passing, PathTiming, along_its_path
 from ir_planner.optimize.spline_cost import spline_cost
 from ir_planner.regional.regional import MovementPlan
-from ir_planner.request.context import Context
-from ir_planner.request.work import Work
+from ir_planner.request.context import Context, Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.timing.blending import stretched
 from ir_planner.timing.movement import TORQUE_SHARES

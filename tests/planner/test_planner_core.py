@@ -18,10 +18,8 @@ from ir_planner.checks.free_space import FreeSpace, too_near
 from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.planner import Planner
 from ir_planner.request.bounds import PLANNING_TIME_MAX
-from ir_planner.request.context import Context
+from ir_planner.request.context import Context, Journal, Work
 from ir_planner.request.goals import Goal, parse_goal
-from ir_planner.request.journal import Journal
-from ir_planner.request.work import Work
 from ir_planner.scene.planning_scene import scene_with, with_parts
 from ir_planner.service.service_lines import line_poses, service_lines
 from ir_planner.store import trajectory_store

@@ -20,9 +20,7 @@ from ir_planner.program.chain import TOLERANCE, layers_of
 from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
 from ir_planner.program.steps import Route, Scenes, placed_steps, steps_of
 from ir_planner.regional.regional import plan_regional
-from ir_planner.request.context import Context
-from ir_planner.request.journal import Journal
-from ir_planner.request.work import Work
+from ir_planner.request.context import Context, Journal, Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.search.registry import registered
 from ir_planner.service.service_lines import timed_service

@@ -32,7 +32,7 @@ from ir_msgs_py.status import StatusCode
 from ir_planner import PlannerSettings
 from ir_planner.errors import RequestError
 from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
-from ir_planner.request.work import Work
+from ir_planner.request.context import Work
 from ir_planner.service import ModifiedGa
 from ir_values.errors import DescriptionError
 

@@ -19,8 +19,7 @@ from ir_planner.checks.evaluation import evaluate_trajectory
 from ir_planner.curves.uniform_spline import UniformSpline, along_path
 from ir_planner.errors import RequestError
 from ir_planner.optimize.refinement import Refinement, movement_over
-from ir_planner.request.context import Context
-from ir_planner.request.work import Work
+from ir_planner.request.context import Context, Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.service.service_movement import ServiceRequest, plan_service
 from ir_planner.timing.objective import coarse_cost, objective_value

@@ -17,7 +17,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import CancelledError
-from ir_planner.request.work import Work
+from ir_planner.request.context import Work
 from ir_planner.scene.planning_scene import PROOF_TOLERANCE, PlanningScene, load_text, scene_with
 from ir_planner.search import SEARCHES, Ends, Found
 

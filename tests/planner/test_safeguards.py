@@ -18,7 +18,7 @@ from oracles import torques
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_planner.regional import MovementPlan
-from ir_planner.request.work import Work
+from ir_planner.request.context import Work
 from ir_planner.scene.planning_scene import PlanningScene
 
 SceneOf = Callable[[str], PlanningScene]

@@ -9,8 +9,8 @@ import pytest
 
 from ir_description import load_cell, load_power_data
 from ir_planner.checks import FreeSpace
-from ir_planner.regional.self_barrier import barrier, spreads
-from ir_planner.request.work import Work
+from ir_planner.regional.no_path import barrier, spreads
+from ir_planner.request.context import Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.search import Ends
 

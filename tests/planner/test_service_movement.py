@@ -21,9 +21,7 @@ from ir_planner.configurations.inverse_kinematics import free_configurations
 from ir_planner.errors import CancelledError, RequestError
 from ir_planner.planner import Planner
 from ir_planner.program.program import ProgramRequest, plan_program
-from ir_planner.request.context import Context
-from ir_planner.request.journal import Journal
-from ir_planner.request.work import Work
+from ir_planner.request.context import Context, Journal, Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.service.exit import Exit, WorkArea
 from ir_planner.service.modified_ga import ModifiedGa, accumulated_mass, step_weights, withdraw

@@ -19,9 +19,8 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.energy import movement_energy
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
-from ir_planner.request.context import Context
+from ir_planner.request.context import Context, Work
 from ir_planner.request.goals import Goal
-from ir_planner.request.work import Work
 from ir_planner.scene.motion_limits import MotionLimits, torque_use
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.timing.blending import TimedPath, blended, largest_overlaps, standing, stretched

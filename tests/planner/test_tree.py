@@ -10,7 +10,7 @@ import pytest
 from ir_kernels.collision import FREE
 from ir_planner.checks.free_space import FreeSpace
 from ir_planner.errors import CancelledError
-from ir_planner.request.work import Work
+from ir_planner.request.context import Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.search.tree import connect, joint_scale
 

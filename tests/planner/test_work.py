@@ -13,10 +13,8 @@ from ir_msgs_py.options import PlanOptions
 from ir_planner.checks import FreeSpace
 from ir_planner.program.movements import mapped
 from ir_planner.regional import search_regional
-from ir_planner.regional.asynchronous import LATE, Found, with_own_laws
-from ir_planner.request.context import Context
-from ir_planner.request.journal import Journal
-from ir_planner.request.work import Work
+from ir_planner.regional.safeguards import LATE, Found, with_own_laws
+from ir_planner.request.context import Context, Journal, Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.search import SEARCHES, Ends
 

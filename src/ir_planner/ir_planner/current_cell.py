@@ -14,9 +14,6 @@ from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.program import Doors
 from ir_planner.scene import Drives, PlanningScene, load_text, scene_with
 
-# What a driver publishes about its controller, its load and the machines around it, and what
-# counts while no driver does.
-
 
 class Heard:
     """timers, load, machines: what the driver says, None while no driver does. settings: asked for
@@ -63,9 +60,6 @@ class Heard:
                 yield machine.name, states
 
 
-# The cell as it stands now, and the scenes that requests take of it and of what the robot
-# carries.
-
 ReadCell = Callable[[str, str], Cell]
 """Gives the cell of a text, or else of a path or a bundled name."""
 _Key = tuple[str, Doors, Drives, float]
@@ -80,9 +74,8 @@ class CurrentCell:
     """Holds one immutable cell after the other; a scene that was taken never changes.
 
     heard: what the driver says. drives: asked for each scene, what is assumed of them. power: the
-    controller's figures, None: those of the cell's robot.
-    Changes wait for each other, readers for none: a cell is replaced when it is read and its models
-    are built.
+    controller's figures, None: those of the cell's robot. Changes wait for each other, readers for
+    none: a cell is replaced when it is read and its models are built.
     """
 
     def __init__(

@@ -127,9 +127,8 @@ def _refined_first(
 ) -> str:
     """Optimise the first paths and, where `guided` while there is more work, guesses; refine the
     best. A note what came of it. Guesses alone lead to movements as good as those with the first
-    path of a search beside
-    them: where it isn't straight it counts where none of them is certified, or a duration is
-    requested.
+    path of a search beside them: where it isn't straight it counts where none of them is certified,
+    or a duration is requested.
     """
     requested = portfolio.context.options.duration > 0.0
     straight = any(len(path) == 2 for _, path in paths)
@@ -155,8 +154,7 @@ def _refined_first(
 
 def _guessed(ends: Ends, portfolio: Portfolio, straight: bool) -> int:
     """Descend from guesses to the nearest goals, which share them; how many new local minima there
-    are.
-    straight: a straight segment is free.
+    are. straight: a straight segment is free.
     """
     space = portfolio.space
     park = np.array(space.scene.cell.park)

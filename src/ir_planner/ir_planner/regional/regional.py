@@ -3,29 +3,97 @@
 First the straight movement of all joints (PTP, cost W of eq. 9); where it collides, the searches of
 the registry. From the first free path on the answer gets better with work: guesses and paths of
 many homotopy classes descend by gradient, and the cheapest to the best path and time scaling near
-them, certified.
-Nothing found is an answer too: which pair blocks, where, by how much, and what was tried.
+them, certified. Nothing found is an answer too: which pair blocks, where, by how much, and what was
+tried.
 """
+
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from ir_kernels.collision import FREE
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.report import TrajectoryReport
-from ir_msgs_py.status import Status
-from ir_planner.checks import FreeSpace, end_in_collision
+from ir_msgs_py.report import PlanningInfo, TrajectoryReport
+from ir_msgs_py.status import Status, StatusCode
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.checks import FreeSpace, end_in_collision, pair_value
+from ir_planner.configurations import free_configurations, no_configuration
 from ir_planner.optimize import Portfolio, Refinement
-from ir_planner.regional.answer import MovementPlan
-from ir_planner.regional.asynchronous import with_own_laws
-from ir_planner.regional.enclosure import enclosure
+from ir_planner.presentation import plot_trajectory, result_text
 from ir_planner.regional.exploration import Path, Searches, first_paths
-from ir_planner.regional.refusal import refusal
-from ir_planner.regional.safeguards import DIRECT, Exploration, best_found, not_worse_than_baseline
-from ir_planner.regional.self_barrier import barrier
-from ir_planner.regional.waypoints import over_free_steps
-from ir_planner.request import Context
+from ir_planner.regional.no_path import barrier, enclosure
+from ir_planner.regional.safeguards import (
+    DIRECT,
+    Exploration,
+    best_found,
+    not_worse_than_baseline,
+    over_free_steps,
+    with_own_laws,
+)
+from ir_planner.request import Context, Goal, Journal
 from ir_planner.scene import STILL, path_cost
 from ir_planner.search import Ends, fewest_corners, pulled
 from ir_planner.timing import Movement, check_requested
+
+# What a request for a movement is answered with.
+
+
+@dataclass(frozen=True, eq=False)
+class MovementPlan:
+    """The answer to a request for a movement; trajectory and waypoints (M, n) None unless the
+    status is SUCCESS.
+    """
+
+    status: Status
+    info: PlanningInfo
+    report: TrajectoryReport
+    trajectory: JointTrajectory | None = None
+    waypoints: FloatArray | None = None
+
+    def __repr__(self) -> str:
+        identity = "" if self.trajectory is None else self.trajectory.trajectory_id
+        return result_text("MovementPlan", self.status, self.report, identity)
+
+    def plot(self) -> Any:
+        """Angles and speeds of the joints over time; a matplotlib figure."""
+        return plot_trajectory(self.trajectory, repr(self))
+
+
+def refusal(
+    start: FloatArray, goal: FloatArray, space: FreeSpace, journal: Journal, *, path: bool
+) -> Status:
+    """The status for a movement from start to goal (n,), both free, that was not found; path: one
+    was.
+    """
+    found = space.scene.collision.certify_edges(start[None], goal[None], space.threshold)
+    tried = ", ".join(f"{stage.name} ({stage.note})" for stage in journal.stages) or "nothing"
+    cut = " within planning_time" if journal.work.truncated else ""
+    if found.verdict[0] == FREE:
+        rejected = (f"{reason} ({count})" for reason, count in journal.rejected.items())
+        reasons = (
+            "; ".join(rejected) or "max_iterations or planning_time ended before one was timed"
+        )
+        return Status(
+            StatusCode.PLANNING_FAILED,
+            f"the straight path is free but no movement could be certified: {reasons}"
+            if path
+            else f"no path found{cut}, though the straight movement is free: tried: {tried}",
+        )
+    share = float(found.t1[0])
+    q = start + share * (goal - start)
+    pair = pair_value(space.scene, q, int(found.pair[0]))
+    x, y, z = space.scene.chain.tcp_poses(q[None])[0, :3, 3]
+    needed = float(space.threshold[int(found.pair[0])])
+    return Status(
+        StatusCode.PLANNING_FAILED,
+        f"no path found{cut}: on the straight movement {pair.body_a} and {pair.body_b} "
+        f"({pair.kind}) come to {pair.distance * 1e3:.1f} mm at {100 * share:.0f} % of it (tcp "
+        f"at {x:.2f}, {y:.2f}, {z:.2f} m), {1e3 * max(needed - pair.distance, 0.0):.1f} mm below "
+        f"the {needed * 1e3:.1f} mm they must keep; tried: {tried}; another start or goal "
+        "configuration, or a smaller safety distance, may help",
+    )
+
 
 _TIMED = (
     3  # paths that get straight steps with blended corners: the cheapest by W is rarely not best
@@ -129,3 +197,21 @@ def _in_straight_steps(
 def _straightened(path: FloatArray, space: FreeSpace) -> FloatArray:
     weights = space.scene.weights
     return pulled(fewest_corners(path, space, weights), space, weights) if len(path) > 2 else path
+
+
+def plan_to_goal(
+    start: FloatArray, goal: Goal, context: Context, searches: Searches
+) -> MovementPlan:
+    """Movement from start (n,) to a configuration, or to any free one at a pose. Raises
+    RequestError.
+    """
+    if goal.configuration is not None:
+        return plan_regional(start, goal.configuration[None], context, searches)
+    assert goal.pose is not None  # a Goal has one of both
+    found = free_configurations(goal.pose, context.scene, context.thresholds(), start)
+    if len(found.q) == 0:
+        status = no_configuration(goal.pose, context.scene, found, goal.text or "goal")
+        return MovementPlan(
+            status, context.journal.info(start, context.joint_names), TrajectoryReport()
+        )
+    return plan_regional(start, found.q, context, searches)

@@ -3,25 +3,25 @@ better one.
 
 The baseline movement is a candidate of every answer of the default portfolio. A requested duration
 is met by the cheapest movement of free duration too, and where nothing else is left by the fastest
-one, both stretched.
-The movements of least W have few turns: some of them are faster than what the descent for time ends
-in.
+one, both stretched. The movements of least W have few turns: some of them are faster than what the
+descent for time ends in.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.status import Status
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import RequestError, TimingError
-from ir_planner.optimize import Portfolio, Refinement
+from ir_planner.optimize import Portfolio, Refinement, path_of
 from ir_planner.optimize import optimised_near as near
 from ir_planner.regional.exploration import Path, Searches, improve
 from ir_planner.request import DURATION_MAX, Context
 from ir_planner.scene import STILL
-from ir_planner.search import Ends
+from ir_planner.search import Ends, straight_along
 from ir_planner.timing import (
     DURATION_SLACK,
     Movement,
@@ -209,3 +209,76 @@ def _cheaper(best: Answer | None, other: Answer | None) -> Answer | None:
     if best is None or other is None:
         return best or other
     return other if other[1].cost < best[1].cost else best
+
+
+def over_free_steps(movement: Movement, space: FreeSpace) -> Movement:
+    """The same trajectory with free straight steps along it as waypoints; as it is where its own
+    are free, or where no work is left.
+    """
+    if space.edges_free(movement.path[:-1], movement.path[1:]).all():
+        return movement
+    along = straight_along(path_of(movement.trajectory, space.scene), space, space.scene.weights)
+    return movement if along is None else movement.passing(along)
+
+
+Found = tuple[Status, Movement | None]
+LATE = "timing is synchronous: no time was left for own laws of the joints"
+SYNCHRONOUS = "timing is synchronous: own laws for the joints serve no better"
+
+
+def with_own_laws(context: Context, synchronous: Callable[[], Found]) -> Found:
+    """The better of the synchronous answer and of the same free path in straight steps, each joint
+    with its own law; it notes when it is the synchronous one. The synchronous one too where
+    planning_time is over.
+
+    Raises what `synchronous` raises where own laws don't serve either.
+    """
+    refused: RequestError | None = None
+    try:
+        status, common = synchronous()
+    except RequestError as error:
+        status = Status.success()
+        common = None
+        refused = error
+    with context.journal.stage("asynchronous") as notes:
+        if common is not None and _too_late(context):
+            notes.append(LATE)
+            return status, common
+        own = None if common is None else _own(common, context)
+        if (
+            own is not None
+            and common is not None
+            and (_as_named(context) or own.cost <= common.cost)
+        ):
+            notes.append(own.note or "each joint has its own law")
+            context.journal.timing = own.timing
+            return status, own
+        notes.append(SYNCHRONOUS)
+    if refused is not None:
+        raise refused
+    return status, common
+
+
+def _too_late(context: Context) -> bool:
+    """Whether planning_time is over, with an answer at hand."""
+    return not _as_named(context) and context.work.exhausted and context.work.truncated
+
+
+def _as_named(context: Context) -> bool:
+    """Whether asynchronous joints are asked for at any cost: a PTP by name, unless the fastest."""
+    return context.options.planner_id == DIRECT and context.options.objective != "time"
+
+
+def _own(common: Movement, context: Context) -> Movement | None:
+    """The movement over the free path that the synchronous one came from; None where no joint has a
+    law of its own, or it isn't certified.
+    """
+    try:
+        space = FreeSpace.of(context.scene, context.safety_distance, context.work)
+        movement = straight_steps(over_free_steps(common, space).path, context)
+    except (TimingError, RequestError) as error:
+        context.journal.reject(f"own laws: {error}")
+        return None
+    if movement.timing == "synchronous":
+        return None
+    return movement if movement.certified else None

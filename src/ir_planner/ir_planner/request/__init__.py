@@ -4,16 +4,15 @@ journal.
 
 from ir_planner.request.bounds import (
     DURATION_MAX,
+    POSITION_MAX,
     bounded,
     checked_options,
     chosen,
+    examinable,
     safety_distance,
 )
-from ir_planner.request.context import Context
+from ir_planner.request.context import Clock, Context, Journal, Work, noted
 from ir_planner.request.goals import POSTURES, Goal, one_goal, parse_goal, within_limits
-from ir_planner.request.journal import Journal, noted
-from ir_planner.request.trajectory_bounds import POSITION_MAX, examinable
-from ir_planner.request.work import Clock, Work
 
 __all__ = [
     "DURATION_MAX",

@@ -2,14 +2,15 @@
 W.
 """
 
-from ir_planner.scene.drives import Drives
 from ir_planner.scene.motion_limits import STILL, Dynamics, MotionLimits, lasting_longer, torque_use
-from ir_planner.scene.movement_cost import movement_cost, path_cost
 from ir_planner.scene.planning_scene import (
     PROOF_TOLERANCE,
     RUNNING,
+    Drives,
     PlanningScene,
     load_text,
+    movement_cost,
+    path_cost,
     scene_with,
     with_parts,
 )

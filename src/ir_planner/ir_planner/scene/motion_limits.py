@@ -72,8 +72,8 @@ def lasting_longer(
     jerk: FloatArray,
     torque: FloatArray,
 ) -> FloatArray:
-    """By what factor (...) each part of a motion should last longer, from its largest values
-    (..., n); at most 1: within the limits. torque: share of the envelope.
+    """By what factor (...) each part of a motion should last longer, from its largest values (...,
+    n); at most 1: within the limits. torque: share of the envelope.
 
     When a motion lasts f times as long on the same path, its velocities fall by f, its
     accelerations by f^2 and its jerks by f^3. The part of the torque that accelerates falls by f^2;

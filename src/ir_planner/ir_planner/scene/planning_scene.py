@@ -17,6 +17,7 @@ from ir_description import (
     PartPlaces,
     PowerData,
     PowerParameters,
+    RobotModel,
     Station,
     Zone,
     data_sheet_of,
@@ -28,14 +29,83 @@ from ir_kernels import (
     DynamicsModel,
     InverseKinematics,
     inverse_kinematics,
+    portable,
 )
+from ir_kernels.power import Regeneration
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError, UnknownNameError
-from ir_planner.scene.drives import Drives
 from ir_planner.scene.motion_limits import MotionLimits
-from ir_planner.scene.movement_cost import movement_weights
+
+
+@dataclass(frozen=True)
+class Drives:
+    """regeneration: what the bus does with braking energy. torque_reserve: share of the torque
+    envelope that plans leave to the feedback. parameters: None, as the data have them.
+    """
+
+    regeneration: Regeneration = "shared"
+    torque_reserve: float = 0.0
+    parameters: PowerParameters | None = None
+
+    @property
+    def rectifier_efficiency(self) -> float:
+        """Share of the mains power that reaches the bus."""
+        return 1.0 if self.parameters is None else self.parameters.value("rectifier_efficiency")
+
+    def robot(self, robot: RobotModel) -> RobotModel:
+        """The robot with the friction, losses and masses of the parameters. Raises RequestError for
+        those of another robot.
+        """
+        own = self.parameters
+        if own is None:
+            return robot
+        if (own.robot, own.joints) != (robot.name, robot.joint_names):
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"power parameters {own.name!r} are of robot {own.robot!r}: the cell has "
+                f"{robot.name!r}",
+            )
+        return own.robot_with(robot)
+
+    def loads(self, loads: Iterable[Load]) -> tuple[Load, ...]:
+        """Loads with the masses and watts of the parameters."""
+        return tuple(loads) if self.parameters is None else self.parameters.loads_with(loads)
+
+    def power(self, power: PowerData) -> PowerData:
+        """The controller with the watts of the parameters."""
+        return power if self.parameters is None else self.parameters.power_with(power)
+
+
+# Cost of a movement by the masses that it swings, eq. (9): W = sum_i w_i |q_{s+1}^i - q_s^i| with
+# w_i = 1/2 sum_{l=i..n} m_l qd_{l,max}^2: a joint near the base carries more of the arm and counts
+# more. (As printed the lower index of the sum makes all weights equal; it starts at the joint.)
+
+
+def movement_weights(
+    link_mass: FloatArray, velocity_max: FloatArray, load_mass: float = 0.0
+) -> FloatArray:
+    """Weights w (n,) of eq. (9) [kg rad^2/s^2].
+
+    `link_mass` (n+1,) kg from the base on (the base never moves and does not count), `velocity_max`
+    (n,) rad/s, `load_mass` kg is carried by the last link.
+    """
+    mass = np.array(link_mass[1:], dtype=float)
+    mass[-1] += load_mass
+    kinetic = 0.5 * mass * np.square(velocity_max)
+    return np.ascontiguousarray(np.cumsum(kinetic[::-1])[::-1])
+
+
+def movement_cost(weights: FloatArray, start: FloatArray, goal: FloatArray) -> FloatArray:
+    """W of the movement from `start` to `goal`, shapes (..., n) that broadcast; result (...)."""
+    return np.asarray(portable.matmul(np.abs(np.asarray(goal) - np.asarray(start)), weights))
+
+
+def path_cost(weights: FloatArray, waypoints: FloatArray) -> float:
+    """W summed over the steps of a path (N, n)."""
+    return float(np.sum(portable.matmul(np.abs(np.diff(waypoints, axis=0)), weights)))
+
 
 PROOF_TOLERANCE = 1e-6  # m: proofs show d > S_m - 1e-6
 _TURN = 2.0 * np.pi

@@ -2,9 +2,8 @@
 
 Between the points the spline is free to swing; where that is not free, the points are joined by
 straight movements that stop at each. Where no times are given, the spline's path stays and its time
-scaling becomes
-the best: fastest, or as the objective and the requested duration ask for. What violates a limit or
-a clearance is named with the first violation.
+scaling becomes the best: fastest, or as the objective and the requested duration ask for. What
+violates a limit or a clearance is named with the first violation.
 """
 
 import itertools
