@@ -26,7 +26,7 @@ from ir_planner.scene import PlanningScene
 from ir_planner.search import SEARCHES, Ends, with_ompl
 from ir_planner.search.with_ompl import host
 from ir_planner.search.with_ompl import planners as adapter
-from ir_planner.search.with_ompl.host import Outcome, Parameters, Problem
+from ir_planner.search.with_ompl.host import OmplAnswer, Parameters, Problem
 from ir_planner.search.with_ompl.planners import repaired
 
 SceneOf = Callable[[str], PlanningScene]
@@ -151,7 +151,7 @@ def test_a_request_that_is_cancelled_meanwhile_raises(scene_of: SceneOf) -> None
 def test_a_process_that_dies_is_an_answer_without_a_path(
     scene_of: SceneOf, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def no_planner(problem: Problem, work: Work) -> Outcome:
+    def no_planner(problem: Problem, work: Work) -> OmplAnswer:
         return asked(Problem(**{**vars(problem), "parameters": "no parameters"}), work)
 
     asked = adapter.asked
@@ -182,7 +182,7 @@ def test_what_ompl_answers_is_never_returned_unchecked(
 ) -> None:
     ends, space = a_blocked_task(scene_of, Work(100_000, 1.0, lambda: 0.0))
     straight = np.stack([ends.start, ends.goals[0]])
-    monkeypatch.setattr(adapter, "asked", lambda problem, work: Outcome(straight, 1))
+    monkeypatch.setattr(adapter, "asked", lambda problem, work: OmplAnswer(straight, 1))
     (path,) = with_ompl.Rrt().find(ends, space, 1, space.work).paths
     assert (space.certificates(path[:-1].copy(), path[1:].copy()).verdict == FREE).all()
 

@@ -62,7 +62,7 @@ class Problem:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class OmplAnswer:
     """A path (M, n), None where none was found; checks in edges; error: why OMPL could not be
     asked; unusable: because it is installed but can't be loaded.
     """
@@ -212,7 +212,7 @@ def check_installed(name: str) -> None:
         raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, f"planner_id {name!r}: {missing()}")
 
 
-def asked(problem: Problem, work: Work) -> Outcome:
+def asked(problem: Problem, work: Work) -> OmplAnswer:
     """OMPL's answer; its checks are charged to `work`, at whose end, or deadline, it is stopped.
 
     Raises CancelledError when asked to stop.
@@ -220,7 +220,7 @@ def asked(problem: Problem, work: Work) -> Outcome:
     work.check()
     with _connected(work) as connected:
         if connected is None:
-            return Outcome(None, 0, "OMPL's process was not ready within planning_time")
+            return OmplAnswer(None, 0, "OMPL's process was not ready within planning_time")
         connection, process = connected
         with _charged(process):
             outcome = _answer(connection, process, problem, work)
@@ -228,7 +228,7 @@ def asked(problem: Problem, work: Work) -> Outcome:
     return outcome
 
 
-def _answer(connection: Connection, process: int, problem: Problem, work: Work) -> Outcome:
+def _answer(connection: Connection, process: int, problem: Problem, work: Work) -> OmplAnswer:
     """What the process says to the problem. Both go through a file in memory, which never
     blocks.
     """
@@ -240,12 +240,12 @@ def _answer(connection: Connection, process: int, problem: Problem, work: Work) 
         try:
             send_handle(connection, sheet.fileno(), process)
             if not _answered(connection, work):
-                return Outcome(None)
+                return OmplAnswer(None)
             connection.recv()
         except (EOFError, OSError):
-            return Outcome(None, 0, "OMPL's process ended without an answer")
+            return OmplAnswer(None, 0, "OMPL's process ended without an answer")
         sheet.seek(0)
-        outcome: Outcome = pickle.load(sheet)
+        outcome: OmplAnswer = pickle.load(sheet)
         return outcome
 
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
-from ir_planner.search.with_ompl.host import Outcome, Parameters, Problem
+from ir_planner.search.with_ompl.host import OmplAnswer, Parameters, Problem
 
 try:
     from ompl import base, geometric, util
@@ -75,12 +75,14 @@ def _answer(connection: Connection, parent: int) -> None:
         signal.setitimer(signal.ITIMER_REAL, problem.seconds + _GRACE)
         try:
             outcome = (
-                Outcome(None, 0, _REASON, unusable=True) if _REASON else solved(problem, connection)
+                OmplAnswer(None, 0, _REASON, unusable=True)
+                if _REASON
+                else solved(problem, connection)
             )
         except (
             Exception
         ) as error:  # goes to who asked, whatever it is: this process has no other voice
-            outcome = Outcome(None, 0, f"{type(error).__name__}: {error}")
+            outcome = OmplAnswer(None, 0, f"{type(error).__name__}: {error}")
         sheet.seek(0)
         pickle.dump(outcome, sheet)
         sheet.flush()
@@ -140,7 +142,7 @@ class _Counted:
         self.end.terminate()
 
 
-def solved(problem: Problem, connection: Connection) -> Outcome:
+def solved(problem: Problem, connection: Connection) -> OmplAnswer:
     """One planner, one problem."""
     util.RNG.setSeed(problem.seed % (2**32 - 1) + 1)
     counted = _Counted(problem, connection)
@@ -174,9 +176,9 @@ def solved(problem: Problem, connection: Connection) -> Outcome:
     setup.setPlanner(_planner(information, space, problem.parameters))
     setup.solve(counted.end)
     if not setup.haveExactSolutionPath():
-        return Outcome(None, counted.edges)
+        return OmplAnswer(None, counted.edges)
     path = np.array([state[0:n] for state in setup.getSolutionPath().getStates()])
-    return Outcome(path[::-1] if problem.parameters.reverse else path, counted.edges)
+    return OmplAnswer(path[::-1] if problem.parameters.reverse else path, counted.edges)
 
 
 def _validator(information: base.SpaceInformation, counted: _Counted) -> base.MotionValidator:
