@@ -12,8 +12,7 @@ import sys
 import time
 from typing import Any
 
-from _compare_face import checkout, name_of
-from _compare_requests import Request, requests
+from _compare_requests import Request, checkout, name_of, requests
 
 
 def answered(request: Request) -> dict[str, Any]:

@@ -25,9 +25,8 @@ from _paper_ccd import (
     share_free,
     tried,
 )
-from _paper_result import FAILS, HOLDS, Experiment, Row, Statement
+from _paper_result import FAILS, HOLDS, Experiment, Row, Statement, percent, share
 from _paper_stations import CELLS, Place, of_reading
-from _paper_statistics import percent, share
 from _regional_tasks import scene_of_cell
 from _service_stations import S_M
 from _variants import variant

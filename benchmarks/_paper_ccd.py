@@ -11,10 +11,21 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from _paper_plots import finished, panels
-from _paper_result import FAILS, HOLDS, Experiment, Row, Statement
+from _paper_result import (
+    FAILS,
+    HOLDS,
+    Experiment,
+    Row,
+    Statement,
+    finished,
+    interval,
+    mean,
+    mean_difference,
+    panels,
+    percent,
+    share,
+)
 from _paper_stations import CELLS, MARGIN, Place, cells_of, difference, of_reading, places
-from _paper_statistics import interval, mean, mean_difference, percent, share
 
 from ir_planner.configurations import InteractionSettings
 from ir_planner.configurations.ccd_search import descend

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from _paper_plots import finished, panels
-from _paper_result import MEASURED, Experiment, Row, Statement
+from _paper_result import MEASURED, Experiment, Row, Statement, finished, panels
 from _regional_ours import planner_of
 from matplotlib.axes import Axes
 from matplotlib.patches import Polygon

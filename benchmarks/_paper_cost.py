@@ -9,9 +9,18 @@ from pathlib import Path
 
 import numpy as np
 from _paper_pairs import CELL, DRAWN, Pair, pairs
-from _paper_plots import finished, panels
-from _paper_result import FAILS, HOLDS, Experiment, Row, Statement
-from _paper_statistics import interval, percent, rank_correlation
+from _paper_result import (
+    FAILS,
+    HOLDS,
+    Experiment,
+    Row,
+    Statement,
+    finished,
+    interval,
+    panels,
+    percent,
+    rank_correlation,
+)
 from _regional_ours import planner_of
 from scipy.stats import kendalltau
 

@@ -9,8 +9,17 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from _paper_result import FAILS, HOLDS, Experiment, Row, Statement
-from _paper_statistics import geometric_mean, interval, percent, share
+from _paper_result import (
+    FAILS,
+    HOLDS,
+    Experiment,
+    Row,
+    Statement,
+    geometric_mean,
+    interval,
+    percent,
+    share,
+)
 from _regional_tasks import CELLS, TIME_VALUE, Task, scene_of_cell, tasks_of
 from _variants import variant
 from genetic import EDGES, searched, straight_is_free

@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from _paper_plots import finished, panels
-from _paper_result import FAILS, HOLDS, Experiment, Row, Statement
-from _paper_statistics import interval
+from _paper_result import FAILS, HOLDS, Experiment, Row, Statement, finished, interval, panels
 from _regional_ours import planner_of
 
 from ir_description import load_power_data

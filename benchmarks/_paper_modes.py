@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from _paper_plots import finished, panels
-from _paper_result import CALIBRATED, Experiment, Row, Statement
+from _paper_result import CALIBRATED, Experiment, Row, Statement, finished, panels
 
 from ir_description import load_cell, load_power_data
 from ir_msgs_py.names import NO_LOAD

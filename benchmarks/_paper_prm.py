@@ -6,8 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 from _paper_peers import Question, searched
-from _paper_result import FAILS, HOLDS, Experiment, Row, Statement
-from _paper_statistics import geometric_mean, interval, median, variation
+from _paper_result import (
+    FAILS,
+    HOLDS,
+    Experiment,
+    Row,
+    Statement,
+    geometric_mean,
+    interval,
+    median,
+    variation,
+)
 from _paper_zones import KINDS, MOST, questions
 from _regional_tasks import tasks_of
 

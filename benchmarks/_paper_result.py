@@ -11,10 +11,19 @@ either. What can't be decided says how much larger a sample would decide it, if 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.stats import rankdata
+
+from ir_msgs_py.arrays import FloatArray, IntArray
 
 Row = dict[str, Any]
 
@@ -122,3 +131,163 @@ def _larger(times: float) -> str:
     if times > MOST_TIMES:
         return f"too near its bound for {MOST_TIMES} times the sample"
     return f"about {max(math.ceil(times), 2)} times the sample would"
+
+
+# Intervals for the claims of the paper: bootstrap over what was drawn independently, 95 %.
+
+RESAMPLES = 1000
+LEVEL = 95.0  # %
+_SEED = 7  # of the resampling, so that the same rows give the same interval
+Statistic = Callable[..., float]
+
+
+def interval(
+    statistic: Statistic,
+    *columns: Sequence[float] | FloatArray,
+    groups: Sequence[Hashable] | None = None,
+) -> tuple[float, float, float]:
+    """The statistic of columns (N,) with its 95 % interval: value, low, high.
+
+    groups: what each row belongs to; groups are drawn as a whole, for rows of one task are no
+    independent sample. Nan where there is nothing to draw from.
+    """
+    data = [np.asarray(column, dtype=float) for column in columns]
+    if len(data[0]) == 0:
+        return math.nan, math.nan, math.nan
+    members = _members(groups) if groups is not None else None
+    count = len(members) if members is not None else len(data[0])
+    value = float(statistic(*data))
+    rng = np.random.default_rng(_SEED)
+    if count < 2:
+        return value, math.nan, math.nan
+    drawn = np.empty(RESAMPLES)
+    for k in range(RESAMPLES):
+        rows = rng.integers(0, count, count)
+        if members is not None:
+            rows = np.concatenate([members[j] for j in rows])
+        drawn[k] = statistic(*(column[rows] for column in data))
+    tail = (100.0 - LEVEL) / 2.0
+    low, high = np.nanpercentile(drawn, [tail, 100.0 - tail])
+    return value, float(low), float(high)
+
+
+def _members(groups: Sequence[Hashable]) -> list[IntArray]:
+    rows: dict[Hashable, list[int]] = {}
+    for k, group in enumerate(groups):
+        rows.setdefault(group, []).append(k)
+    return [np.array(some) for some in rows.values()]
+
+
+def mean(x: FloatArray) -> float:
+    """Arithmetic mean."""
+    return float(np.mean(x))
+
+
+def median(x: FloatArray) -> float:
+    """Median."""
+    return float(np.median(x))
+
+
+def geometric_mean(x: FloatArray) -> float:
+    """Geometric mean, of ratios."""
+    return float(np.exp(np.mean(np.log(x))))
+
+
+def rank_correlation(x: FloatArray, y: FloatArray) -> float:
+    """Spearman's, nan where one of both is constant."""
+    a = rankdata(x)
+    b = rankdata(y)
+    if np.ptp(a) == 0.0 or np.ptp(b) == 0.0:
+        return math.nan
+    return float(np.corrcoef(a, b)[0, 1])
+
+
+def variation(x: FloatArray) -> float:
+    """Coefficient of variation: standard deviation over mean."""
+    return float(np.std(x, ddof=1) / np.mean(x)) if len(x) > 1 and np.mean(x) > 0.0 else math.nan
+
+
+def share(
+    successes: Sequence[float], groups: Sequence[Hashable] | None = None
+) -> tuple[float, float, float]:
+    """The mean of successes or chances (N,) in [0, 1] with its interval; where all are equal
+    nothing can be resampled, and the interval is Wilson's for so many groups.
+    """
+    found = interval(mean, successes, groups=groups)
+    if found[1] < found[2] or not len(successes):
+        return found
+    count = len(set(groups)) if groups is not None else len(successes)
+    return wilson(round(found[0] * count), count)
+
+
+def mean_difference(
+    points: Sequence[float], groups: Sequence[Hashable] | None = None
+) -> tuple[float, float, float]:
+    """The mean of differences (N,) of two successes [percentage points] with its interval. Where
+    all are
+    equal nothing can be resampled: as many groups without another difference leave a share of such
+    by Wilson possible, to either side.
+    """
+    found = interval(mean, points, groups=groups)
+    if not len(points) or found[1] < found[2]:
+        return found
+    count = len(set(groups)) if groups is not None else len(points)
+    other = 100.0 * wilson(0, count)[2]
+    return found[0], max(found[0] - other, -100.0), min(found[0] + other, 100.0)
+
+
+def percent(found: tuple[float, float, float]) -> tuple[float, float, float]:
+    """The same in percent."""
+    return 100.0 * found[0], 100.0 * found[1], 100.0 * found[2]
+
+
+def wilson(successes: int, count: int) -> tuple[float, float, float]:
+    """A share with its 95 % interval after Wilson, which is right near 0 and 1 too."""
+    if count == 0:
+        return math.nan, math.nan, math.nan
+    z = 1.96
+    share = successes / count
+    middle = (share + z * z / (2 * count)) / (1 + z * z / count)
+    half = (
+        z
+        * math.sqrt(share * (1 - share) / count + z * z / (4 * count * count))
+        / (1 + z * z / count)
+    )
+    return share, middle - half, middle + half
+
+
+# Pictures of the claims of the paper: small PNG files in one style.
+
+mpl.use("Agg")
+
+
+DPI = 100
+
+
+def panels(
+    count: int, *, width: float = 4.6, height: float = 4.0
+) -> tuple[Figure, tuple[Axes, ...]]:
+    """A figure with so many panels side by side, `width` x `height` inch each."""
+    figure, axes = plt.subplots(1, count, figsize=(width * count, height), squeeze=False)
+    for panel in axes[0]:
+        panel.grid(alpha=0.3)
+    return figure, tuple(axes[0])
+
+
+def finished(figure: Figure, file: Path) -> None:
+    """Write the figure."""
+    figure.tight_layout()
+    file.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(file, dpi=DPI)
+    plt.close(figure)
+
+
+def bars(axes: Axes, values: dict[str, tuple[float, float, float]], **style: Any) -> None:
+    """Horizontal bars with their intervals: value, low, high by label."""
+    labels = list(values)
+    middle = [values[name][0] for name in labels]
+    lower = [max(values[name][0] - values[name][1], 0.0) for name in labels]
+    upper = [max(values[name][2] - values[name][0], 0.0) for name in labels]
+    axes.barh(range(len(labels)), middle, xerr=[lower, upper], capsize=3, **style)
+    axes.set_yticks(range(len(labels)), labels)
+    axes.invert_yaxis()

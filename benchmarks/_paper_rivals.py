@@ -8,9 +8,17 @@ from pathlib import Path
 
 import numpy as np
 from _paper_peers import Question, searched
-from _paper_plots import finished, panels
-from _paper_result import FAILS, HOLDS, Experiment, Row, Statement
-from _paper_statistics import geometric_mean, interval
+from _paper_result import (
+    FAILS,
+    HOLDS,
+    Experiment,
+    Row,
+    Statement,
+    finished,
+    geometric_mean,
+    interval,
+    panels,
+)
 from _paper_zones import KINDS, MOST, questions
 
 from ir_msgs_py.arrays import FloatArray

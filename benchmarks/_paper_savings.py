@@ -9,9 +9,19 @@ from pathlib import Path
 
 import numpy as np
 from _paper_pairs import CELL, DRAWN, S_M, Pair, pairs
-from _paper_plots import finished, panels
-from _paper_result import FAILS, HOLDS, Experiment, Row, Statement
-from _paper_statistics import interval, median, percent, wilson
+from _paper_result import (
+    FAILS,
+    HOLDS,
+    Experiment,
+    Row,
+    Statement,
+    finished,
+    interval,
+    median,
+    panels,
+    percent,
+    wilson,
+)
 from _regional_ours import planner_of
 
 from ir_msgs_py.arrays import FloatArray

@@ -10,9 +10,18 @@ from typing import Any
 
 import numpy as np
 from _paper_pairs import CELL, DRAWN, Pair, pairs
-from _paper_plots import bars, finished, panels
-from _paper_result import FAILS, HOLDS, OPEN, Experiment, Row, Statement
-from _paper_statistics import interval
+from _paper_result import (
+    FAILS,
+    HOLDS,
+    OPEN,
+    Experiment,
+    Row,
+    Statement,
+    bars,
+    finished,
+    interval,
+    panels,
+)
 from _regional_ours import planner_of
 from scipy.interpolate import make_interp_spline
 

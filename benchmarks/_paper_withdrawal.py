@@ -10,9 +10,19 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from _paper_result import FAILS, HOLDS, Experiment, Row, Statement
+from _paper_result import (
+    FAILS,
+    HOLDS,
+    Experiment,
+    Row,
+    Statement,
+    geometric_mean,
+    interval,
+    mean_difference,
+    percent,
+    share,
+)
 from _paper_stations import MARGIN, Place, cells_of, difference, of_reading, places
-from _paper_statistics import geometric_mean, interval, mean_difference, percent, share
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions

@@ -15,13 +15,160 @@ of the same name.
 from __future__ import annotations
 
 import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from _compare_scripts import script_rows
-from _compare_sides import Side, both_built, differences
 from _results import Claim, add_ending, at_most, commit, finish
+
+# A checkout's process that answers requests, and how two answers differ.
+
+WORKER = Path(__file__).with_name("_compare_worker.py")
+CORE = "src/ir_kernels/ir_kernels/_native*.so"
+
+
+def both_built(before: Path, after: Path) -> str:
+    """What is missing before both can be asked, "" for nothing."""
+    for root in (before, after):
+        if not (root / "src/ir_planner").is_dir():
+            return f"{root} is no checkout of this project: src/ir_planner is not there"
+        if not any(root.glob(CORE)):
+            build = "`python setup.py build_ext --inplace` in src/ir_kernels"
+            return f"{root} has no compiled core ({CORE}): run {build}"
+    return ""
+
+
+def environment(root: Path) -> dict[str, str]:
+    """The environment in which the packages of a checkout are imported, on one thread."""
+    packages = os.pathsep.join(
+        str(place) for place in sorted((root.resolve() / "src").glob("ir_*"))
+    )
+    return os.environ | {
+        "PYTHONPATH": packages,
+        "OMP_NUM_THREADS": "1",
+        "OPENBLAS_NUM_THREADS": "1",
+    }
+
+
+class Side:
+    """The process of one checkout, with changed variables of its environment; `requests`: group and
+    name of each.
+    """
+
+    def __init__(self, root: Path, changed: Mapping[str, str] | None = None) -> None:
+        self.root = root.resolve()
+        self.process = subprocess.Popen(
+            [sys.executable, str(WORKER)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=environment(root) | dict(changed or {}),
+        )
+        first = self._line()
+        if Path(first["checkout"]) != self.root:
+            raise SystemExit(
+                f"{self.root} was to be asked, but the planner is that of {first['checkout']}"
+            )
+        self.requests: list[list[str]] = first["requests"]
+
+    def __enter__(self) -> Side:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.communicate()
+
+    def ask(self, k: int) -> dict[str, Any]:
+        """Answer of request k."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(f"{k}\n")
+        self.process.stdin.flush()
+        return self._line()
+
+    def _line(self) -> dict[str, Any]:
+        assert self.process.stdout is not None
+        line = self.process.stdout.readline()
+        if not line:
+            raise SystemExit(f"the process of {self.root} ended with code {self.process.wait()}")
+        found: dict[str, Any] = json.loads(line)
+        return found
+
+
+def differences(before: dict[str, Any], after: dict[str, Any]) -> list[str]:
+    """`name: before -> after` of everything that is not the same; NaN is the same as NaN."""
+    found = []
+    for name in dict.fromkeys([*before, *after]):
+        old = before.get(name, "missing")
+        new = after.get(name, "missing")
+        if json.dumps(old) != json.dumps(new):
+            found.append(f"{name}: {old} -> {new}")
+    return found
+
+
+# Benchmarks of two checkouts run in turns, and the ratio of their times of the same name.
+
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+
+
+def script_rows(name: str, before: Path, after: Path, rounds: int) -> list[dict[str, Any]]:
+    """A row with the ratio of the least times for every time that both checkouts' benchmark
+    reports.
+    """
+    least: tuple[dict[str, float], dict[str, float]] = ({}, {})
+    for _ in range(rounds):
+        for place, root in enumerate((before, after)):
+            for key, value in _times(name, root).items():
+                least[place][key] = min(value, least[place].get(key, value))
+    shared = [key for key in least[0] if least[1].get(key, 0.0) > 0.0 and least[0][key] > 0.0]
+    rows = []
+    for key in shared:
+        old, new = (1e3 * side[key] for side in least)
+        rows.append(
+            {"group": f"{name}: {key}", "before_ms": old, "after_ms": new, "ratio": new / old}
+        )
+        print(f"{name}: {key:70s} {old:12.5g} {new:12.5g} ms  ratio {new / old:.3f}", flush=True)
+    if not shared:
+        print(f"benchmark {name}: the checkouts report no time of the same name")
+    return rows
+
+
+def _times(name: str, root: Path) -> dict[str, float]:
+    """Times [s] by name that a checkout's benchmark reports in its quick form."""
+    script = root.resolve() / "benchmarks" / f"{name}.py"
+    if not script.exists():
+        raise SystemExit(f"{root} has no benchmark {name}")
+    short = ["--quick"] if '"--quick"' in script.read_text() else ["--seeds", "1"]
+    with tempfile.TemporaryDirectory() as place:
+        result = Path(place) / "result.json"
+        command = [sys.executable, str(script), *short, "--json", str(result)]
+        subprocess.run(
+            command, env=environment(root), cwd=root, check=True, stdout=subprocess.DEVNULL
+        )
+        return times_in(json.loads(result.read_text()))
+
+
+def times_in(result: dict[str, Any]) -> dict[str, float]:
+    """Claims with a unit of time, rows with value and unit, and fields `*_ms` of rows."""
+    found: dict[str, float] = {}
+    for claim in result["claims"]:
+        if claim["unit"] in SECONDS:
+            found[f"claim {claim['name']}"] = claim["value"] * SECONDS[claim["unit"]]
+    for row in result["rows"]:
+        words = " ".join(
+            str(value) for key, value in row.items() if isinstance(value, str) and key != "unit"
+        )
+        if row.get("unit") in SECONDS and isinstance(row.get("value"), float):
+            found[words] = row["value"] * SECONDS[row["unit"]]
+        for key, value in row.items():
+            if key.endswith("_ms") and isinstance(value, (int, float)):
+                found[f"{words} {key}"] = 1e-3 * value
+    return found
+
 
 HERE = Path(__file__).resolve().parents[1]
 RATIO = 1.05

@@ -11,27 +11,235 @@ from __future__ import annotations
 
 import argparse
 import os
+import random
 import re
 import resource
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from _driver_stream import process_cpu
 from _node_process import DOMAIN
-from _recording_killed import seconds_lost
-from _recording_readers import reader_rows
-from _recording_run import write_run
 from _results import Claim, add_ending, at_least, at_most, finish, line_of
+from builtin_interfaces.msg import Time
+from mcap.records import Schema
+from mcap_ros2.decoder import DecoderFactory
+from rclpy.serialization import serialize_message
+from rosbags.typesys import Stores, get_typestore
+from sensor_msgs.msg import JointState
 
+from ir_description import cell_to_yaml, load_cell, robot_urdf
+from ir_msgs.msg import ControllerState, PlannedMovement, PowerState, ProgramState
+from ir_msgs_py.arrays import FloatArray
+from ir_recorder.errors import ReadError
+from ir_recorder.format.qos import QosOffer
 from ir_recorder.reading.cdr import Columns
-from ir_recorder.reading.mcap_file import read_raw
+from ir_recorder.reading.mcap_file import RawChannel, read_raw
+from ir_recorder.recording import CellFiles, RecordingSession, RecordingWriter
+
+# The columns of many CDR messages: the project's reader beside mcap-ros2-support and rosbags.
+
+Read = Callable[[Sequence[bytes]], FloatArray]
+DAMAGED = 2000
+
+
+def readers_of(channel: RawChannel) -> dict[str, Read]:
+    """Each gives positions (N, 6) of joint states."""
+    schema = Schema(1, channel.schema_text.encode(), channel.schema_encoding, channel.type)
+    decode = DecoderFactory().decoder_for("cdr", schema)
+    assert decode is not None
+    store = get_typestore(Stores.ROS2_JAZZY)
+    return {
+        "this project": lambda messages: Columns(
+            messages, channel.type, channel.schema_text
+        ).numbers("position", 6),
+        "mcap-ros2-support": lambda messages: np.array([decode(m).position for m in messages]),
+        "rosbags": lambda messages: np.array(
+            [_position(store.deserialize_cdr(m, channel.type)) for m in messages]
+        ),
+    }
+
+
+def _position(message: Any) -> Any:
+    return message.position
+
+
+def reader_rows(path: Path, most: int) -> Iterator[dict[str, Any]]:
+    """Processor time per message; whether all agree; what damaged messages do to each."""
+    channel = read_raw(path).channel("/joint_states")
+    assert channel is not None
+    messages = channel.messages[:most]
+    expected = None
+    damaged = damaged_messages(messages[0])
+    for name, read in readers_of(channel).items():
+        begun = time.process_time()
+        found = read(messages)
+        seconds = time.process_time() - begun
+        expected = found if expected is None else expected
+        refused, wrong = outcome_of(read, damaged)
+        yield {
+            "case": "reader",
+            "reader": name,
+            "messages": len(messages),
+            "us_per_message": 1e6 * seconds / len(messages),
+            "equal": bool(np.array_equal(found, expected)),
+            "refused": refused,
+            "other_errors": wrong,
+        }
+
+
+def damaged_messages(message: bytes) -> list[bytes]:
+    """The message cut short, or with some bytes replaced."""
+    chance = random.Random(1)
+    found = []
+    for _ in range(DAMAGED):
+        data = bytearray(message)
+        for _ in range(chance.randint(1, 8)):
+            data[chance.randrange(len(data))] = chance.randrange(256)
+        found.append(bytes(data[: chance.randint(1, len(data))] if chance.random() < 0.5 else data))
+    return found
+
+
+def outcome_of(read: Read, damaged: Sequence[bytes]) -> tuple[int, int]:
+    """How many damaged messages end in an error with a sentence, and in any other exception."""
+    refused = other = 0
+    for message in damaged:
+        try:
+            read([message])
+        except ReadError:
+            refused += 1
+        except Exception:  # what the library happens to raise
+            other += 1
+    return refused, other
+
+
+# A cell's run as a recording, made without a robot: movements and rests at 500 Hz with their mains
+# meter.
+
+# ns
+START = 1_700_000_000_000_000_000
+TICK = 2_000_000
+STEP_SECONDS = 4.0
+# ticks between two readings of the meter, and of the controller
+METER = 5
+STATES = 10
+TOPICS = {
+    "/joint_states": ("sensor_msgs/msg/JointState", False),
+    "/ir_sim_driver/power_state": ("ir_msgs/msg/PowerState", False),
+    "/ir_sim_driver/controller_state": ("ir_msgs/msg/ControllerState", False),
+    "/ir_program_runner/program_state": ("ir_msgs/msg/ProgramState", True),
+}
+
+
+def write_run(path: Path, seconds: float) -> int:
+    """Write a program of movements that lasts so long; returns the number of messages."""
+    cell = load_cell("demo")
+    session = RecordingSession(RecordingWriter(path), {}, START)
+    urdf = robot_urdf(cell.robot, cell.tool, cell.tcp, cell.base_pose)
+    session.attach_cell(CellFiles(cell_to_yaml(cell), urdf), START)
+    for topic, (kind, latched) in TOPICS.items():
+        session.open_topic(topic, kind, [QosOffer(transient_local=latched)])
+    count = max(int(seconds / STEP_SECONDS), 1)
+    home = np.array(cell.machine_home)
+    ends = (home, home + np.array([0.4, 0.1, -0.1, 0.3, 0.2, -0.4]))
+    for index in range(count):
+        _step(
+            session,
+            index,
+            count,
+            ends[index % 2],
+            ends[(index + 1) % 2],
+            list(cell.robot.joint_names),
+        )
+    return session.finish().messages
+
+
+def _step(
+    session: RecordingSession, index: int, count: int, start: Any, end: Any, joints: list[str]
+) -> None:
+    ticks = round(STEP_SECONDS * 1e9 / TICK)
+    begun = START + index * ticks * TICK
+    x = np.arange(ticks) / ticks
+    q = start + (end - start) * (10.0 * x**3 - 15.0 * x**4 + 6.0 * x**5)[:, None]
+    qd = (end - start) * ((30.0 * x**2 - 60.0 * x**3 + 30.0 * x**4) / STEP_SECONDS)[:, None]
+    effort = np.random.default_rng(index).normal(0.0, 100.0, q.shape)  # noise, as of a real robot
+    movement = PlannedMovement(
+        kind="regional", from_station="home", to_station="home", load="gripper"
+    )
+    movement.trajectory_id = f"{index:016x}"
+    movement.duration = STEP_SECONDS
+    state = ProgramState(
+        program_id="run", index=index, total=count, event="started", movement=movement
+    )
+    _put(session, "/ir_program_runner/program_state", state, begun)
+    for k in range(ticks):
+        now = begun + k * TICK
+        message = JointState(name=joints, position=q[k], velocity=qd[k], effort=effort[k])
+        _put(session, "/joint_states", message, now)
+        if k % METER == 0:
+            power = PowerState(
+                mode=1, target_mode=1, power=900.0, base_power=735.0, bus_voltage=560.0
+            )
+            power.energy = 900.0 * (now - START) * 1e-9
+            power.joint_power = effort[k] * qd[k]
+            power.joint_torque = effort[k]
+            _put(session, "/ir_sim_driver/power_state", power, now)
+        if k % STATES == 0:
+            follows = ControllerState(
+                joint_names=joints, trajectory_id=f"{index:016x}", speed_scaling=1.0
+            )
+            follows.path_time = k * TICK * 1e-9
+            _put(session, "/ir_sim_driver/controller_state", follows, now)
+    state.event = "ended"
+    _put(session, "/ir_program_runner/program_state", state, begun + ticks * TICK)
+
+
+def _put(session: RecordingSession, topic: str, message: Any, time: int) -> None:
+    message.header.stamp = Time(sec=time // 1_000_000_000, nanosec=time % 1_000_000_000)
+    session.message(topic, serialize_message(message), time)
+
+
+# Recordings of a process that is killed: how many seconds of messages are missing.
+
+WRITER = """
+import sys, time
+from ir_recorder.recording import RecordingSession, RecordingWriter
+from ir_recorder.recording.worker import Message, RecordingWorker
+
+session = RecordingSession(RecordingWriter(sys.argv[1]), {}, time.monotonic_ns())
+session.open_topic("/text", "std_msgs/msg/String", [])
+worker = RecordingWorker(session, 10_000_000)
+while True:
+    now = time.monotonic_ns()
+    worker.write([Message("/text", now.to_bytes(8, "little") * 50, now)])
+    time.sleep(0.001)
+"""
+
+
+def seconds_lost(folder: Path, number: int) -> float:
+    """Seconds between the kill and the last message that is in the file."""
+    path = folder / f"killed_{number}.mcap"
+    process = subprocess.Popen([sys.executable, "-c", WRITER, str(path)])
+    try:
+        while not path.exists() or path.stat().st_size < 20_000:
+            time.sleep(0.01)
+        time.sleep(random.Random(number).uniform(0.0, 1.5))
+    finally:
+        process.kill()
+        killed = time.monotonic_ns()
+        process.wait()
+    channel = read_raw(path).channel("/text")
+    assert channel is not None
+    (last,) = struct.unpack_from("<q", channel.messages[-1])
+    return float(killed - last) * 1e-9
+
 
 HERE = Path(__file__).resolve().parent
 

@@ -23,7 +23,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "benchmarks"))
 
-from _compare_sides import Side, differences, environment  # noqa: E402
+from compare import Side, differences, environment  # noqa: E402
 
 TESTED = ("tests/kernels", "tests/planner", "tests/studies", "tests/recorder")
 SHOWN = 3  # differences of a request

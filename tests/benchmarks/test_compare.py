@@ -9,8 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import _compare_scripts
-import _compare_sides
+import compare
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -50,9 +49,9 @@ def test_a_checkout_answers_as_itself(tmp_path: Path) -> None:
 def test_every_difference_is_listed() -> None:
     before = {"id": "a", "energy": 1.0, "ratio": [0.1, 0.2], "nan": float("nan"), "gone": 3}
     after = {"id": "b", "energy": 1.0 + 1e-15, "ratio": [0.1, 0.2], "nan": float("nan"), "new": 4}
-    names = [line.split(":")[0] for line in _compare_sides.differences(before, after)]
+    names = [line.split(":")[0] for line in compare.differences(before, after)]
     assert names == ["id", "energy", "gone", "new"]
-    assert _compare_sides.differences(before, dict(before)) == []
+    assert compare.differences(before, dict(before)) == []
 
 
 def test_a_folder_without_core_is_refused_with_a_sentence(tmp_path: Path) -> None:
@@ -75,5 +74,5 @@ def test_times_of_a_benchmark_are_found_by_name() -> None:
         {"kernel": "edge", "peer": "", "value": 3.0, "unit": "us"},
         {"cell": "open", "first_ms": 4.0, "work": 12},
     ]
-    found = _compare_scripts.times_in({"claims": claims, "rows": rows})
+    found = compare.times_in({"claims": claims, "rows": rows})
     assert found == {"claim median": 2e-3, "edge ": 3e-6, "open first_ms": 4e-3}

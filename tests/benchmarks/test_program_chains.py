@@ -8,8 +8,7 @@ import itertools
 
 import numpy as np
 import pytest
-from _lower_bounds import least_cost, least_times, least_travel, potential_gain
-from _program_chains import Chains
+from _program_chains import Chains, least_cost, least_times, least_travel, potential_gain
 
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Goal, Planner

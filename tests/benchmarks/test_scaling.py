@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from _scaling_cells import crowded, tour, waves, with_turns
-from _scaling_measure import Prepared, exponent, measured
+from scaling import Prepared, exponent, measured
 
 from ir_description import load_cell
 

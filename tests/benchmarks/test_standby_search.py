@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from _standby_search import Controller
-from standby import Row, off
+from standby import Controller, Row, off
 
 CONTROLLER = Controller((700.0, 300.0, 200.0), (0.5, 3.0), (1.0, 2.0), (1.0, 20.0), 20.0)
 

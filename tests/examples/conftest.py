@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # _pages.py
+sys.path.append(str(Path(__file__).parent))  # _pages.py
 
 
 @pytest.fixture(autouse=True)

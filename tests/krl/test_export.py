@@ -22,7 +22,7 @@ from ir_planner.krl.export import attached
 from ir_planner.krl.splines import passing_times, resting_spline
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-from _tool_path_judge import seen
+from cartesian import seen
 
 
 @pytest.fixture(scope="module")

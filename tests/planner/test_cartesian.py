@@ -20,8 +20,7 @@ from ir_planner import CartesianPlan, Planner
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # the judge of paths
 from _second_opinion import SecondOpinion
-from _tool_path_cases import MARGIN, oracle, random_path
-from _tool_path_judge import seen
+from cartesian import MARGIN, oracle, random_path, seen
 
 DOWN = Rotation.from_euler("y", 90.0, degrees=True)
 

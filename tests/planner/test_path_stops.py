@@ -26,8 +26,8 @@ from ir_planner.service import exit_searches
 from ir_planner.settings import PlannerSettings
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-from _driven_program import Robot
-from _tool_path_judge import seen
+from cartesian import seen
+from program import Robot
 
 STOPS = ("home", "bead", "park")
 

@@ -19,7 +19,7 @@ from ir_planner.cartesian.path_parts import about_tool
 from ir_planner.scene import PlanningScene
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # random paths
-from _tool_path_cases import MARGIN, random_path
+from cartesian import MARGIN, random_path
 
 TURN = 2.0 * np.pi
 OPTIONS = PlanOptions(safety_distance=MARGIN)

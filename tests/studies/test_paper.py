@@ -10,13 +10,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-import _paper_claims
+import _paper_result as statistics
 import _paper_rivals
-import _paper_statistics as statistics
 import numpy as np
 import paper
 import pytest
-from _paper_page import Chapter, bound, number, page
 from _paper_result import (
     CALIBRATED,
     FAILS,
@@ -28,6 +26,7 @@ from _paper_result import (
     Statement,
     judged,
 )
+from paper import Chapter, bound, number, page
 
 ROOT = Path(__file__).parents[2]
 CHEAP = ("spline", "modes", "withdrawal")  # two seconds of processor time
@@ -180,7 +179,7 @@ def test_the_page_shows_verdict_interval_bound_and_what_is_missing() -> None:
 
 def test_the_page_in_the_documentation_has_every_claim_and_its_picture() -> None:
     text = (ROOT / "docs" / "reproduction.md").read_text()
-    for name, one in _paper_claims.EXPERIMENTS.items():
+    for name, one in paper.EXPERIMENTS.items():
         assert f"## {one.title}\n" in text
         assert f"(`{name}`)" in text
         assert (one.draw is not None) == (f"images/paper_{name}.png" in text)
@@ -221,5 +220,5 @@ def test_every_claim_has_a_short_version(tmp_path: Path, monkeypatch: pytest.Mon
     run(monkeypatch, tmp_path, "--workers", "2")
     text = (tmp_path / "quick" / "reproduction.md").read_text()
     assert "Not run" not in text
-    for one in _paper_claims.EXPERIMENTS.values():
+    for one in paper.EXPERIMENTS.values():
         assert f"## {one.title}\n" in text

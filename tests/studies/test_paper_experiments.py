@@ -8,9 +8,8 @@ from typing import Any
 
 import _paper_blocked
 import _paper_ccd
-import _paper_page
+import _paper_result as statistics
 import _paper_rivals
-import _paper_statistics as statistics
 import _paper_withdrawal
 import numpy as np
 import paper
@@ -70,7 +69,7 @@ def test_seeds_draw_cells_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_page_names_the_seeds_of_the_pilots() -> None:
-    assert f"pilots with seeds 0 to {paper.FIRST - 1}," in _paper_page.HEAD
+    assert f"pilots with seeds 0 to {paper.FIRST - 1}," in paper.HEAD
 
 
 def test_sizes_are_compared_on_the_same_cells() -> None:
@@ -169,5 +168,5 @@ def test_blocked_places_have_configurations_that_collide_and_others() -> None:
 
 def test_figures_near_each_other_look_different() -> None:
     near = Statement("", "", 99.97, 99.95, 99.98, 2521, "stations", "%", 95.0)
-    assert _paper_page.measured(near) == "99.97 [99.95, 99.98] %, 2521 stations"
-    assert _paper_page.numbers(0.0, 0.0, 0.0) == ["0", "0", "0"]
+    assert paper.measured(near) == "99.97 [99.95, 99.98] %, 2521 stations"
+    assert paper.numbers(0.0, 0.0, 0.0) == ["0", "0", "0"]

@@ -7,16 +7,16 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-import _paper_claims
 import _paper_cost
 import _paper_line
 import _paper_savings
 import numpy as np
+import paper
 import pytest
 from _paper_result import FAILS, HOLDS, JUDGED, OPEN, Row, Statement, judged
 
 PAGE = (Path(__file__).parents[2] / "docs" / "reproduction.md").read_text()
-CLAIMS = [name for name in _paper_claims.EXPERIMENTS if name not in ("modes", "figures")]
+CLAIMS = [name for name in paper.EXPERIMENTS if name not in ("modes", "figures")]
 # A phrase, which statement of the experiment it is about, and the verdicts that it may stand
 # beside.
 PHRASES: dict[str, tuple[tuple[str, int, tuple[str, ...]], ...]] = {
@@ -69,7 +69,7 @@ PHRASES: dict[str, tuple[tuple[str, int, tuple[str, ...]], ...]] = {
 
 def statements_of(name: str) -> list[Statement]:
     """The statements of an experiment as the page has them; of `savings` from rows made up."""
-    experiment = _paper_claims.EXPERIMENTS[name]
+    experiment = paper.EXPERIMENTS[name]
     if name == "savings":
         rng = np.random.default_rng(1)
         rows: list[Row] = []
@@ -110,7 +110,7 @@ def as_found(one: Statement, verdict: str) -> Statement:
 
 @pytest.mark.parametrize("name", CLAIMS)
 def test_what_follows_says_nothing_that_its_verdicts_deny(name: str) -> None:
-    experiment = _paper_claims.EXPERIMENTS[name]
+    experiment = paper.EXPERIMENTS[name]
     statements = statements_of(name)
     rng = np.random.default_rng(5)
     mixed = [rng.choice(JUDGED, len(statements)).tolist() for _ in range(40)]
@@ -129,7 +129,7 @@ def test_what_follows_says_nothing_that_its_verdicts_deny(name: str) -> None:
 
 @pytest.mark.parametrize("name", CLAIMS)
 def test_opposite_verdicts_have_different_conclusions(name: str) -> None:
-    experiment = _paper_claims.EXPERIMENTS[name]
+    experiment = paper.EXPERIMENTS[name]
     statements = statements_of(name)
     words = [
         re.sub(
@@ -146,7 +146,7 @@ def test_the_spline_names_what_it_costs_more_than() -> None:
     statements = statements_of("spline")
     verdicts = [HOLDS, FAILS, *[HOLDS] * (len(statements) - 2)]
     found = [as_found(one, v) for one, v in zip(statements, verdicts, strict=True)]
-    text = _paper_claims.EXPERIMENTS["spline"].follows(found)
+    text = paper.EXPERIMENTS["spline"].follows(found)
     assert "It costs more than the quintic between two points." in text
     assert "It costs no more than the cubic between two points; " in text
 
@@ -155,7 +155,7 @@ def test_prm_is_compared_by_verdict() -> None:
     statements = statements_of("prm_time")
     verdicts = [FAILS, HOLDS, FAILS, OPEN, *[HOLDS] * (len(statements) - 4)]
     found = [as_found(one, v) for one, v in zip(statements, verdicts, strict=True)]
-    text = _paper_claims.EXPERIMENTS["prm_time"].follows(found)
+    text = paper.EXPERIMENTS["prm_time"].follows(found)
     assert "more than that of kpiece, " in text
     assert "less than that of bkpiece;" in text
     assert "open against lbkpiece." in text
