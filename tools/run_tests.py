@@ -1,11 +1,11 @@
-"""Run the tests in two parts side by side, and close with one summary of both.
+"""Run the tests in two parts, and close with one summary of both.
 
     python tools/run_tests.py [what pytest takes]
 
-The tests of tests/system start the nodes as processes and mostly wait for a robot that moves in
-real time: they run in one process beside all others, which share the cores. What they print comes
-when the others have ended. Both parts run to their end whatever fails. Paths and options are
-pytest's (`tests/planner -n0`, `-k energy`); a part whose paths are not asked for is left out.
+The tests of tests/system start the nodes as processes, with a robot that moves in real time: they
+run last, in one process and alone on the machine. Both parts run to their end whatever fails.
+Paths and options are pytest's (`tests/planner -n0`, `-k energy`); a part whose paths are not asked
+for is left out.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from xml.etree import ElementTree
 ROOT = Path(__file__).resolve().parent.parent
 OUTPUT = ROOT / "out" / "tests"
 SYSTEM = "tests/system"
-MINUTES = 8  # on two quiet cores
+MINUTES = 13  # on two quiet cores
 WITH_VALUE = ("-k", "-m", "-n", "-p", "-W", "-o", "-c", "--dist", "--deselect", "--ignore")
 NOTHING_COLLECTED = 5  # pytest's exit code: the words may choose tests of one part only
 
@@ -83,32 +83,8 @@ def without_workers(options: list[str]) -> list[str]:
 
 
 def run(chosen: list[Part]) -> dict[str, int]:
-    """Run the parts side by side, and print what the later ones said after the first.
-
-    Exit codes by name.
-    """
-    first, *behind = chosen
-    logs = {
-        part.name: (OUTPUT / f"{part.name}.log").open("w+", errors="replace") for part in behind
-    }
-    started = {
-        part.name: subprocess.Popen(
-            part.command(), cwd=ROOT, stdout=logs[part.name], stderr=subprocess.STDOUT
-        )
-        for part in behind
-    }
-    try:
-        codes = {first.name: subprocess.run(first.command(), cwd=ROOT).returncode}
-        for name, process in started.items():
-            codes[name] = process.wait()
-            logs[name].seek(0)
-            print(logs[name].read(), flush=True)
-    finally:
-        for process in started.values():
-            process.terminate()
-        for log in logs.values():
-            log.close()
-    return codes
+    """Run one part after the other, whatever fails; exit codes by name."""
+    return {part.name: subprocess.run(part.command(), cwd=ROOT).returncode for part in chosen}
 
 
 def outcome(chosen: list[Part]) -> tuple[dict[str, int], list[str]]:
