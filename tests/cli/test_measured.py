@@ -36,11 +36,13 @@ def movement(planner: Planner) -> JointTrajectory:
     return plan.trajectory
 
 
-def sampled(movement: JointTrajectory, rate: float, noise: float) -> tuple[np.ndarray, np.ndarray]:
+def sampled(
+    movement: JointTrajectory, rate: float, noise: float, seed: int = 1
+) -> tuple[np.ndarray, np.ndarray]:
     """Rows of the movement with half a second of standstill around it."""
     times = np.arange(0.0, movement.duration + 1.0, 1.0 / rate)
     q = movement.sample(np.clip(times - 0.5, 0.0, movement.duration)).q
-    return times, q + np.random.default_rng(1).normal(0.0, noise, q.shape)
+    return times, q + np.random.default_rng(seed).normal(0.0, noise, q.shape)
 
 
 @pytest.mark.parametrize(
@@ -264,12 +266,16 @@ def test_few_rows_are_a_sentence() -> None:
 
 def test_a_movement_lasts_as_long_as_it_did(movement: JointTrajectory) -> None:
     """Below a threshold of speed 12 ms were cut off at each end: a fast movement seemed to break
-    limits.
+    limits. Noise beside an end may look like motion: the median of nine draws is held to the bound.
     """
-    found = measured(JOINT_NAMES, *sampled(movement, 500.0, 1e-5), lambda _: 1.0, 22.0)
-    ((stretch,), lost) = stretches_of(found.trajectory)
-    assert stretch.seconds == pytest.approx(movement.duration, abs=0.016)
-    assert stretch.seconds + lost == pytest.approx(found.trajectory.duration, abs=1e-6)
+    lengths = []
+    for seed in range(9):
+        rows = sampled(movement, 500.0, 1e-5, seed)
+        found = measured(JOINT_NAMES, *rows, lambda _: 1.0, 22.0)
+        ((stretch,), lost) = stretches_of(found.trajectory)
+        lengths.append(stretch.seconds)
+        assert stretch.seconds + lost == pytest.approx(found.trajectory.duration, abs=1e-6)
+    assert np.median(lengths) == pytest.approx(movement.duration, abs=0.016)
 
 
 def test_pauses_of_a_trace_are_standstills_of_half_a_second(movement: JointTrajectory) -> None:

@@ -14,6 +14,7 @@ import pytest
 from ir_description import Cell, cell_to_yaml, load_cell
 from ir_msgs_py.announcements import Event
 from ir_msgs_py.modes import modes_of
+from ir_msgs_py.names import END_REST
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -69,6 +70,9 @@ class Plant:
                 if event is Event.STARTED:
                     self.took[index] = energy
                 self.notes[index] = note
+            case ask.SetPlcInput(name, value) if name == END_REST:
+                if value:
+                    plant.control.end_rest()
             case ask.SetPlcInput(name, value):
                 plant.plc.set_bit(name, value)
             case ask.AskModes():

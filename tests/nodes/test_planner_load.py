@@ -54,11 +54,10 @@ def go_on(planner_node: PlannerNode, monkeypatch: pytest.MonkeyPatch) -> Iterato
     event = threading.Event()
     plan = planner_node.planner.plan_program
 
-    def later(*arguments: Any, **more: Any) -> Any:
-        *_, cancelled = arguments
-        while not (event.wait(0.005) or cancelled()):
+    def later(**asked: Any) -> Any:
+        while not (event.wait(0.005) or asked["cancelled"]()):
             pass
-        return plan(*arguments, **more)
+        return plan(**asked)
 
     monkeypatch.setattr(planner_node.planner, "plan_program", later)
     yield event

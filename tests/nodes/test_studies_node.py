@@ -127,10 +127,10 @@ def test_a_study_is_made_with_progress_and_its_files_lie_below_the_output(
     [
         ({"kind": "teleport"}, "kind 'teleport' is unknown; known are layout"),
         ({"kind": ""}, ""),
-        ({"settings": ""}, "expected keys and values with format: ir_layout/1"),
-        ({"settings": "{["}, "is no YAML"),
-        ({"settings": "!!python/object/apply:os.system [id]"}, "is no YAML"),
-        ({"settings": SETTINGS + "a: &a [1]\nb: *a\n"}, "aliases are not read"),
+        ({"settings": ""}, "line 1: the file is empty"),
+        ({"settings": "{["}, "this is not YAML"),
+        ({"settings": "!!python/object/apply:os.system [id]"}, "is not allowed"),
+        ({"settings": SETTINGS + "a: &a [1]\nb: *a\n"}, "aliases (& and *) are not allowed"),
         (
             {"settings": SETTINGS.replace("demo", "/etc/passwd")},
             "outside of the folders that may be used",

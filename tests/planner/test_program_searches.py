@@ -220,7 +220,9 @@ def test_lines_out_of_the_washer_are_blocked_about_the_tool_s_axis() -> None:
 
 
 def test_a_withdrawal_that_is_asked_for_and_found_by_nobody_is_refused(power: PowerData) -> None:
-    cell = cell_from_yaml(bench("withdrawal: modified_ga,"))
+    deep = "zone: {kind: OPEN, size: [0.3, 0.3, 0.8], xyz: [0, 0, 0.4]}"  # no small step leaves it
+    text = bench("withdrawal: modified_ga,").replace("zone: OPEN", deep, 1)
+    cell = cell_from_yaml(text)
     feeble = ModifiedGa(population=2, offspring=1, generations=1, step=0.001, spread=0.01)
     settings = PlannerSettings(withdrawal=feeble)
     start = np.array(cell.machine_home)

@@ -176,7 +176,7 @@ def bombs() -> Iterator[tuple[str, bytes]]:
 
 
 READ = """
-import json, resource, sys, time, traceback
+import json, sys, time, traceback
 from ir_recorder import RecorderError, analyse, findings, read_recording
 from ir_recorder.report import report_html
 for path in sys.argv[1:]:
@@ -192,7 +192,8 @@ for path in sys.argv[1:]:
         said.append(str(error))
     except BaseException:
         other = traceback.format_exc()
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    status = open("/proc/self/status").read()  # ru_maxrss would hold that of the parent process
+    peak = int(status.partition("VmHWM:")[2].split()[0]) * 1024
     print(json.dumps([path, said, other, time.process_time() - begun, peak]), flush=True)
 """
 
