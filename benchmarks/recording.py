@@ -313,10 +313,10 @@ def replanned(folder: Path, demo: Path | None) -> dict[str, Any]:
     path = demo or folder / "plan.mcap"
     base = [sys.executable, "-m", "ir_cli.main"]
     if demo is None:
-        plan = [*base, "plan", "demo", "--record", str(path)]
+        plan = [*base, "plan", "demo", "-o", str(path)]
         environment = {**os.environ, "IR_FILE_ROOTS": str(folder)}
         subprocess.run(plan, check=True, capture_output=True, env=environment)
-    command = [*base, "replan", str(path), "--root", str(path.parent)]
+    command = [*base, "ros", "replan", str(path), "--root", str(path.parent)]
     said = subprocess.run(command, capture_output=True, text=True, check=False).stdout
     found = re.search(r"(\d+) of (\d+) requests planned again with equal ids \((\d+) ids\)", said)
     equal, requests, ids = map(int, found.groups()) if found else (0, 1, 0)

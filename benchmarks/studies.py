@@ -172,7 +172,8 @@ def settings_file(folder: Path, cells: Sequence[str], planners: Sequence[str], s
 
 def arena(settings: Path, folder: Path) -> subprocess.Popen[bytes]:
     """Start the command."""
-    command = (sys.executable, "-m", "ir_cli.main", "arena", str(settings), "-o", str(folder))
+    words = ("study", "arena", str(settings), "-o", str(folder))
+    command = (sys.executable, "-m", "ir_cli.main", *words)
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, start_new_session=True)
 
 

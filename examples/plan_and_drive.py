@@ -1,6 +1,6 @@
 """Plan a movement, look at its joules, drive it, plan the movement back at half the speed.
 
-Start the nodes first (`.venv/bin/ir up`), then `.venv/bin/python examples/plan_and_drive.py`.
+Start the nodes first (`.venv/bin/ir ros up`), then `.venv/bin/python examples/plan_and_drive.py`.
 """
 
 from ir_msgs_py.options import PlanOptions

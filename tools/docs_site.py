@@ -13,10 +13,9 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from importlib import import_module
 from pathlib import Path
 
-from ir_cli.main import COMMAND_MODULES
+from ir_cli.commands import COMMANDS, GROUPS
 
 ROOT = Path(__file__).resolve().parent.parent
 STAGE = ROOT / "out" / "site_source"
@@ -52,22 +51,10 @@ def _linked(page: Path) -> Iterator[Path]:
 def command_page() -> str:
     """The help of every command and its verbs."""
     lines = ["# Commands", "", "Written from the help of the commands.", ""]
-    for module in dict.fromkeys(COMMAND_MODULES.values()):
-        parser = argparse.ArgumentParser(prog="ir")
-        commands = parser.add_subparsers()
-        import_module(module).add_commands(commands)
-        for name, command in commands.choices.items():
-            lines += [f"## ir {name}", "", *_help(command)]
+    for command in sorted(COMMANDS, key=lambda each: [*("", *GROUPS)].index(each.group)):
+        parser = command.parser()
+        lines += [f"## ir {command.path}", "", "```text", parser.format_help().rstrip(), "```", ""]
     return "\n".join(lines)
-
-
-def _help(parser: argparse.ArgumentParser) -> Iterator[str]:
-    parser.formatter_class = lambda prog: argparse.HelpFormatter(prog, width=100)
-    yield from ("```text", parser.format_help().rstrip(), "```", "")
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            for name, verb in action.choices.items():
-                yield from (f"### {parser.prog} {name}", "", *_help(verb))
 
 
 def main() -> int:

@@ -1,7 +1,7 @@
 """Writes docs/mistakes.md: what people get wrong in a cell file, and the sentence that each mistake
 gets.
 
-Each mistake is made in examples/first_cell.yaml, and `ir cell check` is asked.
+Each mistake is made in examples/first_cell.yaml, and `ir check` is asked.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ CELL = ROOT / "examples" / "first_cell.yaml"
 HEAD = """\
 # Mistakes, and what the check says
 
-Written by `make docs` from the answers of `ir cell check`; a test compares. Each mistake is made in
+Written by `make docs` from the answers of `ir check`; a test compares. Each mistake is made in
 `examples/first_cell.yaml`, the cell of [the tutorial](tutorial.md). *deep*: asked with `--deep`.
 """
 

@@ -1,4 +1,4 @@
-"""`ir send_goal` and `ir cancel` against a real action."""
+"""`ir ros send_goal` and `ir ros cancel` against a real action."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def machine(
 def test_a_goal_is_sent_and_its_result_printed(
     machine: Machine, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["send_goal", ACTION, "{program_id: short}", "--feedback"]) == 0
+    assert main(["ros", "send_goal", ACTION, "{program_id: short}", "--feedback"]) == 0
     printed = capsys.readouterr().out
     assert "phase: moving" in printed
     assert "executed: 3" in printed
@@ -109,7 +109,7 @@ def test_another_process_cancels_what_runs(
     sender = threading.Thread(target=send)
     sender.start()
     assert machine.running.wait(PATIENCE)
-    assert main(["cancel", ACTION]) == 0
+    assert main(["ros", "cancel", ACTION]) == 0
     sender.join(60.0)
     assert codes == [1]
     printed = capsys.readouterr().out
@@ -118,7 +118,7 @@ def test_another_process_cancels_what_runs(
 
 
 def test_nothing_to_cancel_is_said(machine: Machine, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["cancel", ACTION]) == 1
+    assert main(["ros", "cancel", ACTION]) == 1
     assert "has no goal to cancel" in capsys.readouterr().err
 
 
@@ -126,7 +126,7 @@ def test_a_misspelt_action_is_answered_with_the_one_that_was_meant(
     machine: Machine, capsys: pytest.CaptureFixture[str], wait_for: WaitFor
 ) -> None:
     def answered() -> bool:
-        assert main(["send_goal", "/machine/rum", "{}"]) == 1
+        assert main(["ros", "send_goal", "/machine/rum", "{}"]) == 1
         return f"did you mean {ACTION}?" in capsys.readouterr().err
 
     wait_for(answered, what="the name that was meant")

@@ -1,4 +1,4 @@
-"""`ir arena`: what is asked by its options."""
+"""`ir study arena`: what is asked by its options."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from ir_studies.arena import EXAMPLE, read_settings
 
 def parsed(*words: str) -> argparse.Namespace:
     parser = argparse.ArgumentParser()
-    add_arena(parser.add_subparsers())
-    return parser.parse_args(["arena", *words])
+    add_arena(parser)
+    return parser.parse_args(list(words))
 
 
 def test_a_quick_one_needs_no_settings_and_has_a_folder_of_its_own(tmp_path: Path) -> None:
@@ -43,6 +43,6 @@ def test_a_quick_one_of_settings_keeps_the_rest(tmp_path: Path) -> None:
 
 def test_settings_that_are_missing_are_asked_for() -> None:
     with pytest.raises(
-        InputError, match=r"SETTINGS\.yaml is missing: ir arena --example prints one"
+        InputError, match=r"SETTINGS\.yaml is missing: ir study arena --example prints one"
     ):
         asked(parsed())

@@ -7,14 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from ir_cli.main import COMMAND_MODULES, main
+from ir_cli.commands import NAMES
+from ir_cli.main import main
 
 ASK = """
 source "$1"
 shift
 COMP_WORDS=("$@")
 COMP_CWORD=$(($# - 1))
-_ir
+COMPREPLY=()
+_shtab_ir ir "${COMP_WORDS[COMP_CWORD]}" "${COMP_WORDS[COMP_CWORD-1]}"
 printf '%s\\n' "${COMPREPLY[@]}"
 """
 
@@ -38,9 +40,15 @@ def completed(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
 
 
 def test_commands_options_and_choices_are_completed(completed) -> None:
-    assert completed("") == {*COMMAND_MODULES, "--help", "--version"}
-    assert completed("se") == {"send_goal"}
-    assert {"--namespace", "--domain", "--cell", "-p"} <= completed("up", "-")
-    assert completed("list", "t") == {"topics"}
-    assert completed("cell", "ch") == {"check"}
-    assert completed("call", "/x", "--fu") == {"--full"}
+    assert set(NAMES) <= completed("")
+    assert "send_goal" in completed("ros", "se")
+    assert {"--namespace", "--domain", "--cell", "-p"} <= completed("ros", "up", "-")
+    assert "topics" in completed("ros", "list", "t")
+    assert "check" in completed("cell", "ch")
+    assert "--full" in completed("ros", "call", "/x", "--fu")
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "tcsh"])
+def test_every_shell_has_a_script(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["completion", shell]) == 0
+    assert "send_goal" in capsys.readouterr().out

@@ -1,4 +1,4 @@
-"""`ir cell check --deep`: what it suggests makes the cell plan, and what it calls fine is
+"""`ir check --deep`: what it suggests makes the cell plan, and what it calls fine is
 planned.
 """
 

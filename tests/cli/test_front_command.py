@@ -1,4 +1,4 @@
-"""`ir front` against an action that answers as the planner does."""
+"""`ir ros front` against an action that answers as the planner does."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_the_front_is_printed_and_drawn(
     planner: Planner, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     picture = tmp_path / "new" / "front.png"
-    assert main(["front", "home", "park", "--points", "3", "--out", str(picture)]) == 0
+    assert main(["ros", "front", "home", "park", "--points", "3", "--output", str(picture)]) == 0
     (asked,) = planner.asked
     assert (list(asked.stations), asked.front_points, asked.savings) == (["home", "park"], 3, True)
     shown = capsys.readouterr().out
@@ -95,7 +95,7 @@ def test_a_chosen_cycle_time_is_planned_too(
         "13",
         "--points",
         "3",
-        "--out",
+        "--output",
         str(tmp_path / "front.png"),
     ]
     assert main(arguments) == 0

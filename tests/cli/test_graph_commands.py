@@ -1,4 +1,4 @@
-"""`ir call`, `ir echo` and `ir list` against a real node, in the syntax of ros2cli."""
+"""`ir ros call`, `ir ros echo` and `ir ros list` against a real node, in the syntax of ros2cli."""
 
 from __future__ import annotations
 
@@ -56,26 +56,26 @@ def machine(
 def test_call_prints_the_response_with_or_without_the_type(
     machine: Node, typed: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["call", SERVICE, *typed, "{name: ab, value: true}"]) == 0
+    assert main(["ros", "call", SERVICE, *typed, "{name: ab, value: true}"]) == 0
     assert "  ab: true" in capsys.readouterr().out
 
 
 def test_call_ends_with_1_when_the_status_is_no_success(
     machine: Node, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["call", SERVICE, "{name: door}"]) == 1
+    assert main(["ros", "call", SERVICE, "{name: door}"]) == 1
     assert "input door is unknown" in capsys.readouterr().out
 
 
 def test_call_refuses_an_unknown_field_and_lists_the_known_ones(
     machine: Node, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["call", SERVICE, "{bit: ab}"]) == 1
+    assert main(["ros", "call", SERVICE, "{bit: ab}"]) == 1
     assert 'unknown field "bit": known are name, value' in capsys.readouterr().err
 
 
 def test_echo_prints_the_latched_message(machine: Node, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["echo", TOPIC, "--once"]) == 0
+    assert main(["ros", "echo", TOPIC, "--once"]) == 0
     output = capsys.readouterr().out
     assert "name: door_open\nvalue: true\n---" in output
 
@@ -88,7 +88,7 @@ def test_list_shows_names_with_types(
     """
 
     def listed() -> bool:
-        assert main(["list", "topics"]) == 0
+        assert main(["ros", "list", "topics"]) == 0
         return f"{TOPIC} [ir_msgs/msg/Signal]\n" in capsys.readouterr().out
 
     wait_for(listed, what="the topic is listed")
@@ -102,7 +102,7 @@ def test_a_typo_is_answered_with_the_name_that_was_meant(
     """
 
     def answered() -> bool:
-        assert main(["call", "/machin/set", "{}"]) == 1
+        assert main(["ros", "call", "/machin/set", "{}"]) == 1
         return f"no service /machin/set: did you mean {SERVICE}?" in capsys.readouterr().err
 
     wait_for(answered, what="the name that was meant")
@@ -111,5 +111,5 @@ def test_a_typo_is_answered_with_the_name_that_was_meant(
 def test_another_type_than_the_services_is_refused_at_once(
     machine: Node, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["call", SERVICE, "ir_msgs/srv/SetLoad", "{}"]) == 1
+    assert main(["ros", "call", SERVICE, "ir_msgs/srv/SetLoad", "{}"]) == 1
     assert f"service {SERVICE} has the type ir_msgs/srv/SetPlcInput" in capsys.readouterr().err

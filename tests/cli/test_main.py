@@ -48,13 +48,13 @@ def test_a_domain_that_is_none_is_a_sentence(
     domain: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", domain)
-    assert main(["list"]) == 1
+    assert main(["ros", "list"]) == 1
     said = capsys.readouterr().err
     assert f"ROS_DOMAIN_ID is '{domain}': it must be a whole number 0 .. 232" in said
 
 
 def test_a_process_of_such_a_domain_ends_without_a_traceback() -> None:
-    ended = ir("list", ROS_DOMAIN_ID="233")
+    ended = ir("ros", "list", ROS_DOMAIN_ID="233")
     assert ended.returncode == 1
     assert ended.stderr.startswith("ir: ROS_DOMAIN_ID is '233'")
     assert "Traceback" not in ended.stderr

@@ -115,7 +115,7 @@ def test_a_trace_says_how_far_its_smoothing_is(
         ProgressLine, "show", lambda line, phase, done, of, cost: shown.append((phase, done, of))
     )
     trace = trace_of(tmp_path / "t.csv", SWING)
-    main(["evaluate", "open", str(trace), *cut, *given])
+    main(["ask", "evaluate", "open", str(trace), *cut, *given])
     smoothing = [("smooth", done, total) for done in range(total + 1)]
     assert shown == [("read t.csv", 0, 1), *smoothing, ("evaluate", 0, 1)]
     assert capsys.readouterr().err == ""  # nobody looks

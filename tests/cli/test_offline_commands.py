@@ -1,4 +1,4 @@
-"""`ir plan`, `ir move` and the others without ROS: what they print, and how they end."""
+"""`ir plan`, `ir ask move` and the others without ROS: what they print, and how they end."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ir_cli.main import COMMAND_MODULES, HELP, WITHOUT_ROS, _parser, main
+from ir_cli.commands import COMMANDS
+from ir_cli.main import main
 from ir_description import load_cell
 from ir_planner import Planner
 
@@ -26,16 +27,9 @@ def answered(capsys: pytest.CaptureFixture[str], *words: str) -> Any:
     return json.loads(capsys.readouterr().out)
 
 
-def test_help_is_that_of_the_commands() -> None:
-    assert list(HELP) == list(COMMAND_MODULES)
-    for command in COMMAND_MODULES:
-        choices = _parser(command)._subparsers._group_actions[0]._choices_actions  # type: ignore[union-attr, attr-defined]
-        assert HELP[command] in [action.help for action in choices], command
-
-
 def test_help_imports_nothing_that_takes_long() -> None:
     code = (
-        "import sys; from ir_cli.main import _parser; _parser('').format_help(); "
+        "import sys; from ir_cli.main import main; main(['--help']); main(['ask', '--help']); "
         "print(*sys.modules)"
     )
     loaded = subprocess.run(
@@ -47,9 +41,9 @@ def test_help_imports_nothing_that_takes_long() -> None:
 def test_no_command_without_ros_imports_rclpy(tmp_path: Path) -> None:
     trace = tmp_path / "m.csv"
     lines = (
-        ["move", "demo", "home", "park", "--trajectory", str(trace)],
-        ["evaluate", "demo", str(trace)],
-        ["optimize", "demo", str(trace), "--planning-time", "1"],
+        ["ask", "move", "demo", "home", "park", "-o", str(trace)],
+        ["ask", "evaluate", "demo", str(trace)],
+        ["ask", "optimize", "demo", str(trace), "--planning-time", "1"],
         [
             "compare",
             "open",
@@ -60,9 +54,10 @@ def test_no_command_without_ros_imports_rclpy(tmp_path: Path) -> None:
             "-o",
             str(tmp_path / "compared.html"),
         ],
-        ["ik", "demo", "lathe_work"],
-        ["check", "demo", "home"],
-        ["standby", "demo", "--pause", "300"],
+        ["ask", "ik", "demo", "lathe_work"],
+        ["ask", "state", "demo", "home"],
+        ["check", "open"],
+        ["ask", "standby", "demo", "--pause", "300"],
         ["cell", "check", "open"],
         ["cell", "list"],
         ["robot", "list"],
@@ -74,8 +69,9 @@ def test_no_command_without_ros_imports_rclpy(tmp_path: Path) -> None:
         [sys.executable, "-c", code, json.dumps(lines)], capture_output=True, text=True, check=False
     )
     assert ran.returncode == 0, ran.stdout + ran.stderr
-    others = {"arena", "completion", "energy", "fleet", "krl", "path", "report", "study", "view"}
-    assert {line[0] for line in lines} | others == set(WITHOUT_ROS)
+    others = {"completion", "energy", "export", "krl", "new", "report", "study", "view"}
+    first = {each.path.split()[0] for each in COMMANDS if not each.ros}
+    assert {line[0] for line in lines} | others == first
 
 
 def test_the_totals_of_a_program_are_the_sums_of_its_steps(
@@ -117,11 +113,10 @@ def test_what_is_written_is_evaluated_to_the_same(
     goal: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     trace = tmp_path / "m.csv"
-    planned = answered(capsys, "move", "open" if goal != "gauge_measure" else "demo", "home", goal,
-                       "--trajectory", str(trace))  # fmt: skip
     cell = "open" if goal != "gauge_measure" else "demo"
+    planned = answered(capsys, "ask", "move", cell, "home", goal, "-o", str(trace))
     assert planned["notes"] == ([] if cell == "open" else [DOORS])
-    evaluated = answered(capsys, "evaluate", cell, str(trace))
+    evaluated = answered(capsys, "ask", "evaluate", cell, str(trace))
     assert evaluated["violations"] == []
     for key in ("seconds", "joules", "clearance", "torque_share"):
         assert evaluated[key] == pytest.approx(planned[key], rel=1e-9), key
@@ -132,7 +127,7 @@ def test_a_trace_of_positions_alone_in_degrees_costs_nearly_the_same(
 ) -> None:
     trace = tmp_path / "m.csv"
     sampled = tmp_path / "sampled.csv"
-    planned = answered(capsys, "move", "open", "home", "park", "--trajectory", str(trace))
+    planned = answered(capsys, "ask", "move", "open", "home", "park", "-o", str(trace))
     rows = list(csv.DictReader(trace.open()))
     from ir_cli.traces import read_trace
 
@@ -145,13 +140,13 @@ def test_a_trace_of_positions_alone_in_degrees_costs_nearly_the_same(
         writer = csv.writer(file)
         writer.writerow(["time", *(f"{name}_deg" for name in robot.joint_names)])
         writer.writerows(np.column_stack([times, q]).tolist())
-    main(["evaluate", "open", str(sampled), "--json"])
+    main(["ask", "evaluate", "open", str(sampled), "--json"])
     evaluated = json.loads(capsys.readouterr().out)
     assert evaluated["joules"] == pytest.approx(planned["joules"], rel=0.01)
 
 
 def test_every_configuration_of_ik_is_free(capsys: pytest.CaptureFixture[str]) -> None:
-    found = answered(capsys, "ik", "demo", "gauge_measure")["configurations"]
+    found = answered(capsys, "ask", "ik", "demo", "gauge_measure")["configurations"]
     assert len(found) >= 5
     for each in found[:2]:
         state = " ".join(f"A{k} {float(np.degrees(each[f'joint_a{k}']))!r}" for k in range(1, 7))
@@ -161,12 +156,12 @@ def test_every_configuration_of_ik_is_free(capsys: pytest.CaptureFixture[str]) -
 
 
 def test_a_state_in_collision_names_the_pair(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["check", "open", "A1 0 A2 -10 A3 100 A4 0 A5 0 A6 0"]) == 1
+    assert main(["ask", "state", "open", "A1 0 A2 -10 A3 100 A4 0 A5 0 A6 0"]) == 1
     assert " and floor (environment) are in penetration" in capsys.readouterr().out
 
 
 def test_a_standby_names_its_mode_and_what_it_saves(capsys: pytest.CaptureFixture[str]) -> None:
-    found = answered(capsys, "standby", "demo", "--pause", "300")
+    found = answered(capsys, "ask", "standby", "demo", "--pause", "300")
     energies = {each["mode"]: each["joules"] for each in found["alternatives"]}
     assert found["modes"][-1]["mode"] == found["chosen"]
     assert found["modes"][0]["seconds"] >= 0.0
@@ -215,12 +210,12 @@ def test_a_broken_trace_is_refused_with_its_line(
     content: str, sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "t.csv").write_text(content)
-    assert main(["evaluate", "open", str(tmp_path / "t.csv")]) == 2
+    assert main(["ask", "evaluate", "open", str(tmp_path / "t.csv")]) == 2
     assert sentence in capsys.readouterr().err
 
 
 def test_what_can_not_be_planned_ends_with_one(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["move", "demo", "home", "X 9 Y 0 Z 1 A 0 B 90 C 0"]) == 1
+    assert main(["ask", "move", "demo", "home", "X 9 Y 0 Z 1 A 0 B 90 C 0"]) == 1
     said = capsys.readouterr().err
     assert "can't be reached" in said
     assert said.endswith(f"\nnote: {DOORS}\n")

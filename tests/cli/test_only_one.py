@@ -15,7 +15,7 @@ def test_a_claim_is_refused_while_another_holds_it_and_free_after() -> None:
     first = claim("77", namespace)
     assert first is not None
     with pytest.raises(
-        CommandError, match=f"another `ir up` or `ir demo` .* in {namespace} of domain 77"
+        CommandError, match=f"another `ir ros up` or `ir demo` .* in {namespace} of domain 77"
     ):
         claim("77", namespace)
     others = [claim("78", namespace), claim("77", f"{namespace}_b")]

@@ -47,7 +47,7 @@ def test_a_plan_that_was_never_driven_is_recorded_and_planned_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    plan = ["plan", "demo", "--stations", "outfeed_place", "--seed", "3", "--record", "plan.mcap"]
+    plan = ["plan", "demo", "--stations", "outfeed_place", "--seed", "3", "-o", "plan.mcap"]
     assert main(plan) == 0
     raw = read_raw(tmp_path / "plan.mcap")
     assert raw.problems == ()
@@ -68,7 +68,7 @@ def test_a_plan_that_was_never_driven_is_recorded_and_planned_again(
     assert f"of {search.starts} random starts {search.accepted} were accepted" in page
     assert f"<li>doors at the start <b>{doors}</b></li>" in page
     assert capsys.readouterr().out.endswith(f"\nnote: doors at the start are {doors}\n")
-    assert main(["replan", "plan.mcap"]) == 0
+    assert main(["ros", "replan", "plan.mcap"]) == 0
     assert "1 of 1 requests planned again with equal ids" in capsys.readouterr().out
     assert main(plan) == 1
     assert "is there already" in capsys.readouterr().err
@@ -103,7 +103,7 @@ def test_a_plan_is_a_page_and_a_failed_one_says_which_pair_is_in_the_path(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    asked = ["plan", "kr6_bench", "--stations", "pick", "--json", "--html"]
+    asked = ["plan", "kr6_bench", "--stations", "pick", "--json", "-o"]
     assert main([*asked, "found.html"]) == 0
     found = (tmp_path / "found.html").read_text()
     assert "planned program" in found

@@ -85,7 +85,7 @@ def test_a_cell_beside_it_is_planned_in(made: Path, capsys: pytest.CaptureFixtur
     cell.write_text("format: ir_cell/1\nname: first\nrobot: copied.yaml\n")
     assert load_cell(cell).robot.name == "copied"
     goal = "A1 30 A2 -80 A3 -80 A4 -80 A5 80 A6 20"
-    assert main(["move", str(cell), "home", goal, "--json"]) == 0
+    assert main(["ask", "move", str(cell), "home", goal, "--json"]) == 0
     assert json.loads(capsys.readouterr().out.partition("{")[2].join(["{", ""]))["certified"]
 
 

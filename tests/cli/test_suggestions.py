@@ -20,7 +20,7 @@ def test_typing_mistakes_and_missing_nodes_are_understood() -> None:
 
 def test_a_long_list_is_cut() -> None:
     sentence = unknown_name(
-        "service", "/q", [f"/name_{k:02d}" for k in range(55)], "ir list services"
+        "service", "/q", [f"/name_{k:02d}" for k in range(55)], "ir ros list services"
     )
-    assert "and 47 more (ir list services shows all)" in sentence
+    assert "and 47 more (ir ros list services shows all)" in sentence
     assert sentence.count("/name_") == 8

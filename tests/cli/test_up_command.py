@@ -1,4 +1,4 @@
-"""`ir up`: parameters are held against what the nodes know, ports are free, and nothing is left
+"""`ir ros up`: parameters are held against what the nodes know, ports are free, and nothing is left
 behind.
 """
 
@@ -185,7 +185,7 @@ def test_the_namespace_reaches_every_node() -> None:
 def test_what_makes_no_sense_is_refused_before_anything_starts(
     words: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["up", *words]) == 1
+    assert main(["ros", "up", *words]) == 1
     said = capsys.readouterr()
     assert said.err.startswith("ir: ")
     assert said.out == ""

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_cli.main import _parser
+from ir_cli.commands import BY_PATH, renamed
 from ir_cli.view.cell_file import SavingError, Watched, save
 from ir_cli.view.moves import Target, cell_with, edited, meant, pose_in, snippet, targets
 from ir_description import Cell, cell_from_yaml, cell_to_yaml, load_cell
@@ -120,4 +120,6 @@ def test_commands_of_the_pages_are_understood(page: str) -> None:
     commands = [line.split()[1:] for line in text.splitlines() if line.startswith("    ir ")]
     assert commands
     for words in commands:
-        assert _parser(words[0]).parse_args(words).run is not None
+        path, count, notice = renamed(words)
+        assert not notice
+        assert BY_PATH[path].parser().parse_args(words[count:]).run is not None

@@ -19,14 +19,14 @@ ABSENT = ("[", "…", "...", "COMMAND")  # of lines that show a pattern, not a c
 
 NODES = "needs running nodes"
 NOT_RUN = {
-    r"(up|demo)\b.*": "starts nodes: tests/system/test_readme.py, tests/system/test_demo.py",
-    r"(call|echo|list|send_goal|front|live)\b.*": f"{NODES}: tests/system/test_readme.py, "
+    r"(ros up|demo)\b.*": "starts nodes: tests/system/test_readme.py, tests/system/test_demo.py",
+    r"ros (call|echo|list|send_goal|front|live)\b.*": f"{NODES}: tests/system/test_readme.py, "
     "tests/system",
     r"view\b.*": "waits for a browser until Ctrl-C: tests/cli/test_view.py",
     r"study .* --scheduler .*": "needs a cluster: tests/studies",
-    r"(study layout layout|study statistics statistics|arena arena).yaml -o "
+    r"(study layout layout|study statistics statistics|study arena arena).yaml -o "
     r".*": "minutes: tests/studies",
-    r"arena --quick": "two minutes: tests/cli/test_arena_command.py, tests/studies",
+    r"study arena --quick": "two minutes: tests/cli/test_arena_command.py, tests/studies",
     r"energy fit (run\.mcap|joints\.csv) "
     r".*": "needs a meter: tests/recorder/test_measuring_page.py",
     r"energy excite .*": "takes minutes: tests/recorder/test_measuring_page.py, shorter",

@@ -14,7 +14,7 @@ from types import ModuleType
 import pytest
 import yaml
 
-from ir_cli.main import COMMAND_MODULES
+from ir_cli.commands import NAMES
 from ir_msgs_py import names
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -223,7 +223,7 @@ def commands() -> set[str]:
     scripts = re.findall(r'"(ir-\w+) = ', setups)
     return {
         *scripts,
-        *(f"ir {name}" for name in COMMAND_MODULES),
+        *(f"ir {name}" for name in NAMES),
         *(f"make {name}" for name in targets),
     }
 

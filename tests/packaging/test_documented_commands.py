@@ -7,21 +7,18 @@ from __future__ import annotations
 import argparse
 import re
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 
 import pytest
 from _documented import FOLLOWED, NOT_RUN, PAGES, ROOT, SNIPPETS, lines
 
-from ir_cli.main import COMMAND_MODULES
+from ir_cli.commands import BY_PATH, renamed, with_cell
 
 
 @cache
 def parser_of(command: str) -> argparse.ArgumentParser:
     """The parser of a command, as `ir` makes it."""
-    parser = argparse.ArgumentParser(prog="ir", exit_on_error=False)
-    import_module(COMMAND_MODULES[command]).add_commands(parser.add_subparsers())
-    return parser
+    return BY_PATH[command].parser()
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
@@ -29,11 +26,16 @@ def test_every_command_is_understood(page: Path, capsys: pytest.CaptureFixture[s
     wrong = []
     for words in (words for line in lines(page) for words in line.commands):
         line = " ".join(words)
-        if words[0] not in COMMAND_MODULES:
-            wrong.append(line)
+        path, count, notice = renamed(words)
+        if not path or notice:
+            wrong.append(f"{line}: {notice}")
             continue
         try:
-            parser_of(words[0]).parse_args(words)
+            parser = parser_of(path)
+            parser.parse_args(with_cell(words[count:], parser))
+            said = capsys.readouterr().err
+            if said:
+                wrong.append(f"{line}: {said}")
         except (SystemExit, argparse.ArgumentError) as refused:
             wrong.append(f"{line}: {refused} {capsys.readouterr().err.strip().splitlines()[-1:]}")
     assert wrong == []

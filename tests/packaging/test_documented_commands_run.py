@@ -57,7 +57,7 @@ def trace(folder: Path) -> None:
 def recordings(folder: Path) -> None:
     """One plan as the recordings of a run, of two days, of a week, and of a factory."""
     cell(folder)
-    shell(folder, "ir plan my_cell.yaml --saving --record made.mcap")
+    shell(folder, "ir plan my_cell.yaml --saving -o made.mcap")
     for name in ("out/demo", "monday", "friday", "out/week/1", "out/week/2", "out/factory/a/1"):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(folder / "made.mcap", folder / f"{name}.mcap")
@@ -74,7 +74,7 @@ def mesh(folder: Path) -> None:
 
 
 def world(folder: Path) -> None:
-    shell(folder, "ir cell export open world.sdf")
+    shell(folder, "ir cell export open -o world.sdf")
 
 
 def robot(folder: Path) -> None:

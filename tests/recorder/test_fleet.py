@@ -184,5 +184,5 @@ def test_the_table_as_parquet_has_the_same_columns(member: Member, tmp_path: Pat
 def test_nothing_to_sum_up_is_a_sentence(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["fleet", str(tmp_path), "--root", str(tmp_path)]) == 1
+    assert main(["energy", "fleet", str(tmp_path), "--root", str(tmp_path)]) == 1
     assert "no recording could be used" in capsys.readouterr().err

@@ -132,7 +132,7 @@ def test_a_file_is_named_in_its_refusal_and_its_cell_stands_beside_it(tmp_path: 
 
 def test_the_goal_in_the_documentation_carries_the_settings_as_they_are(tmp_path: Path) -> None:
     (tmp_path / "layout.yaml").write_text(EXAMPLE)
-    command = next(part for part in STUDIES.read_text().split("```") if "ir send_goal" in part)
+    command = next(part for part in STUDIES.read_text().split("```") if "ir ros send_goal" in part)
     shown = 'ir() { printf %s "${@: -1}"; }\n' + command
     goal = subprocess.run(
         ["bash", "-c", shown], cwd=tmp_path, capture_output=True, check=True

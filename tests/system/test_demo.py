@@ -48,7 +48,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         "demo",
         "--plant",
         "nominal",
-        "--out",
+        "--output",
         str(folder),
     ]
     done = subprocess.run(
@@ -75,7 +75,8 @@ def test_every_check_of_the_demonstration_held(run: Run) -> None:
 
 def test_the_recorded_requests_are_planned_again_with_equal_ids(run: Run) -> None:
     file = str(run.folder / "demo.mcap")
-    command = [sys.executable, "-m", "ir_cli.main", "replan", file, "--root", str(run.folder)]
+    words = ["ros", "replan", file, "--root", str(run.folder)]
+    command = [sys.executable, "-m", "ir_cli.main", *words]
     done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     (plan,) = re.findall(r"/ir_planner/plan +equal +(\d+)", done.stdout)

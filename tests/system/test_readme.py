@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 IR = [sys.executable, "-m", "ir_cli.main"]
-START = ".venv/bin/ir up &"
+START = ".venv/bin/ir ros up &"
 READY = "Ctrl-C ends them"
 PATIENCE = 400.0  # s; each command starts an interpreter, on a busy machine
 
@@ -32,9 +32,10 @@ def commands() -> list[str]:
 
 @pytest.fixture(scope="module")
 def nodes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """`ir up`, as the README starts it."""
+    """`ir ros up`, as the README starts it."""
     logs = tmp_path_factory.mktemp("log")
-    process = subprocess.Popen([*IR, "up", "--logs", str(logs)], stdout=subprocess.PIPE, text=True)
+    command = [*IR, "ros", "up", "--logs", str(logs)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None
         assert any(

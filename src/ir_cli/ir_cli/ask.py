@@ -9,7 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from ir_cli.errors import InputError, unknown_name
-from ir_cli.output import Row, add_formats, number, print_csv, print_json, print_table, text
+from ir_cli.output import (
+    Row,
+    add_formats,
+    add_renamed,
+    number,
+    print_csv,
+    print_json,
+    print_table,
+    text,
+)
 from ir_cli.planning import (
     FAILED,
     add_cell,
@@ -32,17 +41,8 @@ from ir_msgs_py.report import DistancePair
 from ir_planner import CartesianPlan, Planner, assumed_doors
 
 
-def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add move, path, ik, check and standby."""
-    add_move(commands)
-    add_path(commands)
-    add_states(commands)
-    add_standby(commands)
-
-
-def add_move(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add move."""
-    move = commands.add_parser("move", help="plan one movement from START to GOAL; needs no ROS")
+def add_move(move: argparse.ArgumentParser) -> None:
+    """Arguments of `ir ask move`."""
     add_cell(move)
     form = 'a posture, a station, "A1 0 A2 -90 ..." in degrees or "X 1.8 Y 0 ..." in m and degrees'
     move.add_argument("start", metavar="START", help=form)
@@ -50,7 +50,10 @@ def add_move(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
     move.add_argument(
         "--duration", type=float, default=0.0, metavar="S", help="s it takes; 0: the best (0)"
     )
-    move.add_argument("--trajectory", type=Path, metavar="FILE", help="write its points as CSV")
+    output = move.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="write its points as CSV"
+    )
+    add_renamed(move, "--trajectory", output)
     add_options(move)
     add_parameters(move)
     add_formats(move, comma=False)
@@ -72,8 +75,8 @@ def run_move(arguments: argparse.Namespace) -> int:
     said = "".join(f"\nnote: {note}" for note in notes)
     if plan.trajectory is None:
         return failed(plan.status.message + said)
-    if arguments.trajectory:
-        write_trace(arguments.trajectory, plan.trajectory)
+    if arguments.output:
+        write_trace(arguments.output, plan.trajectory)
     if arguments.json:
         figures = figures_of(plan.report)
         print_json({"trajectory_id": plan.trajectory.trajectory_id, **figures, "notes": notes})
@@ -82,11 +85,8 @@ def run_move(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def add_path(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add path."""
-    path = commands.add_parser(
-        "path", help="drive the tool along a path at a given speed; needs no ROS"
-    )
+def add_path(path: argparse.ArgumentParser) -> None:
+    """Arguments of `ir ask path`."""
     add_cell(path)
     words = "a path of the cell file by its name, or a file with a path (docs/cartesian.md)"
     path.add_argument("path", metavar="PATH", help=words)
@@ -96,7 +96,10 @@ def add_path(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
     path.add_argument(
         "--t1", action="store_true", help="at most 250 mm/s at the tcp and the flange"
     )
-    path.add_argument("--trajectory", type=Path, metavar="FILE", help="write its points as CSV")
+    output = path.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="write its points as CSV"
+    )
+    add_renamed(path, "--trajectory", output)
     add_options(path)
     add_parameters(path)
     add_formats(path, comma=False)
@@ -120,8 +123,8 @@ def run_path(arguments: argparse.Namespace) -> int:
     said = "".join(f"\nnote: {note}" for note in notes)
     if plan.trajectory is None:
         return failed(plan.status.message + said)
-    if arguments.trajectory:
-        write_trace(arguments.trajectory, plan.trajectory)
+    if arguments.output:
+        write_trace(arguments.output, plan.trajectory)
     if arguments.json:
         kept = {
             "tool_error": plan.tool_error,
@@ -145,7 +148,7 @@ def _path(text: str, planner: Planner) -> CartesianPath | CellPath:
     try:
         return planner.cell.own_path(text)
     except UnknownNameError as error:
-        listing = f"ir cell check {planner.cell.name}"
+        listing = f"ir check {planner.cell.name}"
         raise InputError(unknown_name("path", text[:80], error.known, listing)) from error
 
 
@@ -170,26 +173,24 @@ PAIRS = {
 }
 
 
-def add_states(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add ik and check."""
-    ik = commands.add_parser(
-        "ik", help="all configurations that reach a pose or a station; needs no ROS"
-    )
+def add_ik(ik: argparse.ArgumentParser) -> None:
+    """Arguments of `ir ask ik`."""
     add_cell(ik)
     ik.add_argument(
         "goal", metavar="GOAL", help='a station, or "X 1.8 Y 0 Z 1.2 A 0 B 90 C 0" (m, degrees)'
     )
-    ik.add_argument(
-        "--near", default="home", metavar="STATE", help="where their cost counts from (home)"
+    start = ik.add_argument(
+        "--start", default="home", metavar="STATE", help="where their cost counts from (home)"
     )
+    add_renamed(ik, "--near", start)
     ik.add_argument("--method", choices=("analytic", "ccd"), default="analytic")
     add_margin(ik)
     add_formats(ik)
     ik.set_defaults(run=run_ik)
 
-    check = commands.add_parser(
-        "check", help="whether a configuration is free, and its nearest pairs; needs no ROS"
-    )
+
+def add_check(check: argparse.ArgumentParser) -> None:
+    """Arguments of `ir ask state`."""
     add_cell(check)
     check.add_argument("state", metavar="STATE", help='a posture, or "A1 0 A2 -90 ..." in degrees')
     check.add_argument("--station", default="", help="whose allowed contacts hold")
@@ -205,7 +206,7 @@ def run_ik(arguments: argparse.Namespace) -> int:
     load = arguments.load
     with sentences():
         planner = planner_of(arguments.cell)
-        near = configuration_of(arguments.near, planner, margin, load)
+        near = configuration_of(arguments.start, planner, margin, load)
         answer = planner.compute_ik(
             goal_of(arguments.goal, planner),
             method=arguments.method,
@@ -293,16 +294,16 @@ MODES = {
 }
 
 
-def add_standby(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add standby."""
-    standby = commands.add_parser(
-        "standby", help="the power mode of least energy for a pause; needs no ROS"
-    )
+def add_standby(standby: argparse.ArgumentParser) -> None:
+    """Arguments of `ir ask standby`."""
     add_cell(standby)
     standby.add_argument(
         "--pause", type=float, required=True, metavar="S", help="s from stop to next start"
     )
-    standby.add_argument("--state", default="home", help="where the robot stands (home)")
+    start = standby.add_argument(
+        "--start", default="home", metavar="STATE", help="where the robot stands (home)"
+    )
+    add_renamed(standby, "--state", start)
     standby.add_argument(
         "--load", default="", help='what is held: "gripper+part", "none" (the tool)'
     )
@@ -315,7 +316,7 @@ def run_standby(arguments: argparse.Namespace) -> int:
     """Print the modes, shallow to deep, and the one to choose."""
     with sentences():
         planner = planner_of(arguments.cell, arguments.power_parameters)
-        q = configuration_of(arguments.state, planner, 0.0, arguments.load)
+        q = configuration_of(arguments.start, planner, 0.0, arguments.load)
         found = planner.standby(arguments.pause, q=q, load=arguments.load)
     rows: list[Row] = [
         {

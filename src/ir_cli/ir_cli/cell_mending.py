@@ -1,6 +1,6 @@
 """Changes to a cell file that its stations lack: contacts, zones and approach distances.
 
-`ir cell check --deep` looks at every station in every situation of the program: is there a
+`ir check --deep` looks at every station in every situation of the program: is there a
 configuration with a free line in and out, or which contacts, zone and approach distance would make
 one? Then the cell with these changes is planned; failures that remain are reported too.
 """

@@ -95,17 +95,30 @@ def _container(text: bytes, binary: bytes) -> bytes:
 WORLDS = (".sdf", ".world", ".urdf")
 
 
-def add_export(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add cell export."""
-    command = verbs.add_parser("export", help="the machines of a cell as SDF, URDF or glTF")
+def add_export(command: argparse.ArgumentParser) -> None:
+    """Arguments of `ir cell export`."""
     add_cell(command)
-    command.add_argument("file", metavar="FILE", help="world.sdf, world.urdf or world.glb")
+    command.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="world.sdf, world.urdf or world.glb"
+    )
+    command.add_argument("file", nargs="?", type=Path, help=argparse.SUPPRESS)  # the old place
     command.set_defaults(run=run_export)
+
+
+def _output(arguments: argparse.Namespace) -> Path:
+    """-o FILE, or the old argument after the cell. InputError where there is neither."""
+    old: Path | None = getattr(arguments, "file", None)
+    if old is not None:
+        sys.stderr.write("ir: FILE is now -o FILE\n")
+    chosen = arguments.output or old
+    if chosen is None:
+        raise InputError("say which file: -o world.sdf, world.urdf or world.glb")
+    return Path(chosen)
 
 
 def run_export(arguments: argparse.Namespace) -> int:
     """Write the world; files that are there are not overwritten."""
-    path = Path(arguments.file)
+    path = _output(arguments)
     form = path.suffix.lower().removeprefix(".")
     if form not in (*WRITERS, "glb"):
         raise InputError(f"{path.name[:60]!a} must end with .sdf, .urdf or .glb")
@@ -156,11 +169,8 @@ def run_world(path: Path, robot_name: str) -> int:
 _NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
 
 
-def add_import(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add cell import."""
-    command = verbs.add_parser(
-        "import", help="a mesh from CAD as a line to paste, or a world as a cell"
-    )
+def add_import(command: argparse.ArgumentParser) -> None:
+    """Arguments of `ir cell import`."""
     command.add_argument(
         "file", metavar="FILE", help="a mesh: .stl, .obj, .glb, .gltf; a world: .sdf, .urdf"
     )

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ir_cli.cell_worlds import add_export, add_import
 from ir_cli.errors import CommandError, InputError, unknown_name
 from ir_cli.output import (
     Columns,
@@ -25,6 +24,7 @@ from ir_cli.output import (
     table,
     text,
 )
+from ir_cli.planning import add_cell
 from ir_description import (
     Cell,
     CellFileError,
@@ -160,14 +160,9 @@ CELLS: Columns = {
 }
 
 
-def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add cell new, cell check, cell import, cell export and cell list."""
-    cell = commands.add_parser("cell", help="begin and check cell files, list the bundled cells")
-    verbs = cell.add_subparsers(dest="verb", required=True)
-    check = verbs.add_parser(
-        "check", help="everything that is wrong with a cell file, and its stations"
-    )
-    check.add_argument("file", metavar="CELL", help="a path, or the name of a bundled cell")
+def add_check(check: argparse.ArgumentParser) -> None:
+    """Arguments of `ir check`."""
+    add_cell(check)
     check.add_argument(
         "--deep",
         action="store_true",
@@ -175,24 +170,26 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     add_formats(check, comma=False)
     check.set_defaults(run=run_check)
-    new = verbs.add_parser(
-        "new", help="begin a cell file: a robot, two tables and a program that plans"
-    )
+
+
+def add_new(new: argparse.ArgumentParser) -> None:
+    """Arguments of `ir new`."""
     new.add_argument("file", metavar="FILE", help="the file to write: my_cell.yaml")
     new.add_argument(
         "--robot", default="kr210_r2700_extra", metavar="ROBOT", help="ir robot list, or a file"
     )
     new.set_defaults(run=run_new)
-    add_import(verbs)
-    add_export(verbs)
-    listing = verbs.add_parser("list", help="the bundled cells")
+
+
+def add_list(listing: argparse.ArgumentParser) -> None:
+    """Arguments of `ir cell list`."""
     add_formats(listing)
     listing.set_defaults(run=run_list)
 
 
 def run_check(arguments: argparse.Namespace) -> int:
     """Print all errors of a file, else what is in it; exit code 1 where its program can't run."""
-    cell = _readable(arguments.file)
+    cell = _readable(arguments.cell)
     if cell is None:
         return 1
     from ir_cli.station_access import stations_of
@@ -221,7 +218,7 @@ def run_check(arguments: argparse.Namespace) -> int:
 
             print_table(configurations, CONFIGURATIONS)
         for finding in findings:
-            _print_finding(finding, arguments.file)
+            _print_finding(finding, arguments.cell)
     unreached = any(not row["free"] for row in stations)
     return 1 if unreached or any(each.severity == "error" for each in findings) else 0
 

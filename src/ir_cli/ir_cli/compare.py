@@ -57,11 +57,8 @@ COLUMNS: Columns = {
 }
 
 
-def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add compare."""
-    compare = commands.add_parser(
-        "compare", help="today's program (KRL, a trace, or PTP at 100 %%) against the planner's"
-    )
+def add_compare(compare: argparse.ArgumentParser) -> None:
+    """Arguments of `ir compare`."""
     add_cell(compare)
     words = (
         "a KRL program (.src, then .dat), or a trace (.csv, .parquet, .mcap); none: PTP at 100 %%"

@@ -1,66 +1,50 @@
-"""`ir completion`: a bash script that completes commands, options and choices; elsewhere file
-names.
+"""`ir completion`: a script for bash, zsh or tcsh that completes commands, options and choices.
 
-The script holds the words, so that a press of the tab key starts no Python.
+The script holds the words, so that a press of the tab key starts no Python; shtab writes it.
 """
 
 from __future__ import annotations
 
 import argparse
-import shlex
 import sys
-from importlib import import_module
 
-SCRIPT = """# completion of the ir command for bash: source <(ir completion)
-_ir() {{
-    local words=""
-    if [ "$COMP_CWORD" -eq 1 ]; then
-        words={commands}
-    else
-        case "${{COMP_WORDS[1]}}" in
-{cases}
-        esac
-    fi
-    COMPREPLY=($(compgen -W "$words" -- "${{COMP_WORDS[COMP_CWORD]}}"))
-}}
-complete -o default -F _ir ir
-"""
+from ir_cli.commands import COMMANDS, GROUPS, OLD, QUIET
+from ir_cli.errors import InputError
+
+SHELLS = ("bash", "zsh", "tcsh")
 
 
-def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add completion."""
-    completion = commands.add_parser(
-        "completion", help="completion for bash: source <(ir completion)"
-    )
+def add_completion(completion: argparse.ArgumentParser) -> None:
+    """Arguments of `ir completion`."""
+    completion.add_argument("shell", nargs="?", default="bash", choices=SHELLS, help="(bash)")
     completion.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the script."""
-    from ir_cli.main import COMMAND_MODULES  # it knows this module by name only
-
-    words: dict[str, list[str]] = {}
-    for module in dict.fromkeys(COMMAND_MODULES.values()):
-        commands = argparse.ArgumentParser(prog="ir").add_subparsers()
-        import_module(module).add_commands(commands)
-        words |= {name: _words(parser) for name, parser in commands.choices.items()}
-    cases = [
-        f"            {name}) words={shlex.quote(' '.join(each))} ;;"
-        for name, each in words.items()
-    ]
-    text = SCRIPT.format(
-        commands=shlex.quote(" ".join([*COMMAND_MODULES, "--help", "--version"])),
-        cases="\n".join(cases),
-    )
-    sys.stdout.write(text)
+    """Print the script. InputError where shtab is missing."""
+    try:
+        import shtab
+    except ImportError as error:
+        raise InputError("ir completion needs shtab: pip install shtab") from error
+    sys.stdout.write(shtab.complete(whole_parser(), arguments.shell) + "\n")
     return 0
 
 
-def _words(parser: argparse.ArgumentParser) -> list[str]:
-    """Options of a command, and the choices of its words."""
-    found: list[str] = []
-    for action in parser._actions:
-        found += action.option_strings
-        if not action.option_strings and action.choices:
-            found += [str(choice) for choice in action.choices]
-    return found
+def whole_parser() -> argparse.ArgumentParser:
+    """One parser of all commands, with those of a group below it."""
+    parser = argparse.ArgumentParser(prog="ir")
+    parser.add_argument("--version", action="store_true", help="show the version")
+    first = parser.add_subparsers()
+    groups = {
+        name: first.add_parser(name, help=words).add_subparsers() for name, words in GROUPS.items()
+    }
+    for command in COMMANDS:
+        names = [command.path, *(old for old in OLD if old in QUIET and OLD[old] == command.path)]
+        for path in names:
+            group, _, name = path.rpartition(" ")
+            parent = groups[group] if group else first
+            own = command.parser()
+            parent.add_parser(
+                name, help=command.help.replace("%", "%%"), parents=[own], add_help=False
+            )
+    return parser

@@ -14,6 +14,7 @@ from ir_cli.output import (
     Columns,
     Row,
     add_formats,
+    add_renamed,
     number,
     print_csv,
     print_json,
@@ -22,13 +23,13 @@ from ir_cli.output import (
 )
 from ir_cli.planning import add_cell, planner_of, sentences
 from ir_description import load_cell, load_power_parameters, power_parameters_to_yaml
-from ir_msgs_py.file_roots import ANYWHERE
 from ir_recorder import analyse, read_recording
 from ir_recorder.analysis.indirect import agreement
 from ir_recorder.fit import Source, fit, fit_data, parameter_rows, write_fit_picture
 from ir_recorder.fit import sentences as fit_sentences
 from ir_recorder.report.files import write_output
 from ir_recorder.traces import read_mapping
+from ir_values.files import ANYWHERE
 
 COMPARED: Columns = {
     "movement": ("movement", text),
@@ -51,34 +52,27 @@ FITTED: Columns = {
 PARAMETERS_START = b"format: ir_description/power_parameters/"
 
 
-def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add energy compare, fit, excite and drive."""
-    energy = commands.add_parser(
-        "energy",
-        help="compare measurements, fit power parameters, plan what identifies them; needs no ROS",
-    )
-    verbs = energy.add_subparsers(dest="verb", required=True)
-    compare = verbs.add_parser(
-        "compare", help="the meter beside the energy from positions, by movement"
-    )
+def add_compare(compare: argparse.ArgumentParser) -> None:
+    """Arguments of `ir energy compare`."""
     compare.add_argument("recording", type=Path, metavar="RECORDING", help="a recording (.mcap)")
     add_formats(compare)
     compare.set_defaults(run=run_compare)
-    _add_fit(verbs)
-    _add_excite(verbs)
-    drive = verbs.add_parser("drive", help="drive such a programme on a simulated plant")
+
+
+def add_drive(drive: argparse.ArgumentParser) -> None:
+    """Arguments of `ir energy drive`."""
     drive.add_argument("folder", type=Path, metavar="FOLDER", help="what ir energy excite wrote")
     drive.add_argument(
         "--plant", default="typical", help="nominal, typical:SEED or a file (typical)"
     )
-    drive.add_argument("--output", type=Path, metavar="CSV", help="file to write (FOLDER/run.csv)")
+    drive.add_argument(
+        "-o", "--output", type=Path, metavar="CSV", help="file to write (FOLDER/run.csv)"
+    )
     drive.set_defaults(run=run_drive)
 
 
-def _add_fit(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    fitted = verbs.add_parser(
-        "fit", help="power parameters from a meter, with what is left uncertain"
-    )
+def add_fit(fitted: argparse.ArgumentParser) -> None:
+    """Arguments of `ir energy fit`."""
     fitted.add_argument(
         "motion", type=Path, metavar="RECORDING", help="a recording, or CSV of the joints"
     )
@@ -91,18 +85,25 @@ def _add_fit(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
     )
     fitted.add_argument("--cell", default="", help="of the robot, where the recording carries none")
     fitted.add_argument("--load", default="", help='what is held all the time: "gripper+part"')
-    fitted.add_argument(
-        "--prior", default="", metavar="FILE", help="parameters to begin with (data sheet)"
+    prior = fitted.add_argument(
+        "--power-parameters", default="", metavar="FILE", help="to begin with (the data sheet)"
     )
+    add_renamed(fitted, "--prior", prior)
     fitted.add_argument("--name", default="fit", help="of the parameters (fit)")
-    fitted.add_argument("--output", type=Path, default=Path("out/power.yaml"), help="file to write")
+    fitted.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        default=Path("out/power.yaml"),
+        help="file to write (out/power.yaml)",
+    )
     fitted.add_argument("--picture", type=Path, metavar="PNG", help="picture to write as well")
     add_formats(fitted, comma=False)
     fitted.set_defaults(run=run_fit)
 
 
-def _add_excite(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    excite = verbs.add_parser("excite", help="plan movements that identify power parameters")
+def add_excite(excite: argparse.ArgumentParser) -> None:
+    """Arguments of `ir energy excite`."""
     add_cell(excite)
     excite.add_argument(
         "--seconds", type=float, default=180.0, help="s of excursions, at most (180)"
@@ -114,12 +115,17 @@ def _add_excite(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
     excite.add_argument(
         "--safety-distance", type=float, default=0.02, metavar="M", help="m to keep (0.02)"
     )
-    excite.add_argument(
-        "--prior", default="", metavar="FILE", help="what is known already (data sheet)"
+    prior = excite.add_argument(
+        "--power-parameters", default="", metavar="FILE", help="known already (the data sheet)"
     )
+    add_renamed(excite, "--prior", prior)
     excite.add_argument("--seed", type=int, default=0)
     excite.add_argument(
-        "--output", type=Path, default=Path("out/excitation"), help="folder to write"
+        "-o",
+        "--output",
+        type=Path,
+        default=Path("out/excitation"),
+        help="folder to write (out/excitation)",
     )
     add_formats(excite, comma=False)
     excite.set_defaults(run=run_excite)
@@ -160,7 +166,7 @@ def run_compare(arguments: argparse.Namespace) -> int:
 def run_fit(arguments: argparse.Namespace) -> int:
     """Fit, write the file and the picture, print what was found."""
     with sentences():
-        prior = load_power_parameters(arguments.prior)
+        prior = load_power_parameters(arguments.power_parameters)
         cell = load_cell(arguments.cell) if arguments.cell else None
     motion = arguments.mapping
     meter = arguments.meter_mapping
@@ -216,7 +222,7 @@ def run_excite(arguments: argparse.Namespace) -> int:
 
     with sentences():
         planner = planner_of(arguments.cell)
-        prior = load_power_parameters(arguments.prior)
+        prior = load_power_parameters(arguments.power_parameters)
         asked = ExcitationRequest(
             arguments.seconds,
             arguments.postures,

@@ -58,20 +58,8 @@ COLUMNS: Columns = {
 }
 
 
-def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add krl import and krl export."""
-    krl = commands.add_parser(
-        "krl", help="KUKA programs: what one costs in a cell, and planned ones as KRL"
-    )
-    actions = krl.add_subparsers(dest="action", required=True, metavar="ACTION")
-    _add_import(actions)
-    _add_export(actions)
-
-
-def _add_import(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    read = actions.add_parser(
-        "import", help="drive a .src (with its .dat) as a KR C4 would, in a cell"
-    )
+def add_import(read: argparse.ArgumentParser) -> None:
+    """Arguments of `ir krl import`."""
     read.add_argument(
         "files", nargs="+", type=Path, metavar="FILE", help=".src first, then .dat and subprograms"
     )
@@ -114,13 +102,16 @@ def followed(files: Sequence[Path], cell: Cell, arguments: argparse.Namespace) -
     )
 
 
-def _add_export(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    write = actions.add_parser(
-        "export", help="plan a program and write it as .src and .dat, certified again"
-    )
+def add_export(write: argparse.ArgumentParser) -> None:
+    """Arguments of `ir krl export`."""
     add_cell(write)
     write.add_argument(
-        "-o", "--output", type=Path, required=True, metavar="FILE.src", help="the .dat is beside it"
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="FILE.src",
+        help="the .dat is beside it",
     )
     write.add_argument(
         "--stations", nargs="+", default=[], metavar="NAME", help="visit these instead"

@@ -159,3 +159,37 @@ class ProgressLine:
         if self._live:
             self._stream.write(f"\r\x1b[2K{line}")
             self._stream.flush()
+
+
+class _Renamed(argparse.Action):
+    """An old name of an option: it does what the new one does, and says so on stderr."""
+
+    def __init__(self, *arguments: Any, new: argparse.Action, **settings: Any) -> None:
+        super().__init__(*arguments, **settings)
+        self._new = new
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        name = self._new.option_strings[-1] if self._new.option_strings else self._new.metavar
+        sys.stderr.write(f"ir: {option_string} is now {name}\n")
+        self._new(parser, namespace, values, option_string)
+
+
+def add_renamed(parser: argparse.ArgumentParser, old: str, new: argparse.Action) -> None:
+    """Keep an old name of an option, without help."""
+    parser.add_argument(
+        old,
+        dest=new.dest,
+        action=_Renamed,
+        new=new,
+        nargs=new.nargs,
+        type=new.type or str,
+        choices=new.choices,
+        default=argparse.SUPPRESS,
+        help=argparse.SUPPRESS,
+    )

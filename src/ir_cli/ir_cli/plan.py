@@ -14,6 +14,7 @@ from ir_cli.output import (
     ProgressLine,
     Row,
     add_formats,
+    add_renamed,
     kilowatt_hours,
     number,
     print_csv,
@@ -33,10 +34,10 @@ from ir_cli.planning import (
     predicted,
     sentences,
 )
-from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
 from ir_planner import Planner, ProgramPlan, assumed_doors
+from ir_values.files import ANYWHERE
 
 J_PER_KWH = 3.6e6
 HOW_TO_SAVE = (
@@ -57,11 +58,8 @@ COLUMNS: Columns = {
 }
 
 
-def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add plan."""
-    plan = commands.add_parser(
-        "plan", help="plan a cell's program: seconds, joules, clearance; needs no ROS"
-    )
+def add_plan(plan: argparse.ArgumentParser) -> None:
+    """Arguments of `ir plan`."""
     add_cell(plan)
     plan.add_argument(
         "--stations", nargs="+", default=[], metavar="NAME", help="visit these instead"
@@ -76,19 +74,26 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="hold it against a common program in equal time as well",
     )
     words = (
-        "also write the plan as a recording, for ir report and ir replan (needs ROS's Python "
-        "packages)"
+        "also write the plan, repeatable: .mcap a recording for ir report and ir ros replan, .html "
+        "its report, also where it failed (needs ROS's Python packages)"
     )
-    plan.add_argument("--record", default="", metavar="FILE.mcap", help=words)
-    words = (
-        "also write the report of the plan as a page; why, where it failed (needs these "
-        "packages, too)"
+    output = plan.add_argument(
+        "-o", "--output", type=_output, action="append", default=[], metavar="FILE", help=words
     )
-    plan.add_argument("--html", default="", metavar="FILE.html", help=words)
+    add_renamed(plan, "--record", output)
+    add_renamed(plan, "--html", output)
     add_options(plan)
     add_parameters(plan)
     add_formats(plan)
     plan.set_defaults(run=run_plan)
+
+
+def _output(text: str) -> Path:
+    """A file whose ending says what is written."""
+    path = Path(text)
+    if path.suffix not in (".mcap", ".html"):
+        raise argparse.ArgumentTypeError(f"{text[:60]!r} must end in .mcap or .html")
+    return path
 
 
 def run_plan(arguments: argparse.Namespace) -> int:
@@ -107,14 +112,14 @@ def run_plan(arguments: argparse.Namespace) -> int:
             progress=line.show,
             savings=arguments.saving,
         )
-    if arguments.html:
-        _page(arguments, plan, planner, options)
+    for page in (each for each in arguments.output if each.suffix == ".html"):
+        _page(page, arguments, plan, planner, options)
     notes = assumed_doors(planner.cell)
     said = "".join(f"\nnote: {note}" for note in notes)
     if not plan.status.ok:
         return failed(plan.status.message + said)
-    if arguments.record:
-        sys.stderr.write(f"ir: {_record(arguments.record, arguments, plan, planner, options)}\n")
+    for file in (each for each in arguments.output if each.suffix == ".mcap"):
+        sys.stderr.write(f"ir: {_record(str(file), arguments, plan, planner, options)}\n")
     rows = rows_of(plan.movements)
     if arguments.json:
         saving = asdict(plan.savings) if plan.savings.available else None
@@ -133,18 +138,21 @@ def _record(
     plan: ProgramPlan,
     planner: Planner,
     options: PlanOptions,
-    roots: FileRoots | None = None,
 ) -> Path:
-    """Write the recording below `roots`; only here ROS is imported."""
+    """Write the recording; only here ROS is imported."""
     from ir_cli.ros.plan_recording import ProgramRequest, write_plan
 
     stations = tuple(arguments.stations)
     request = ProgramRequest(stations, arguments.cycle_time, options, arguments.saving)
-    return write_plan(file, plan, request, planner, roots)
+    return write_plan(file, plan, request, planner, ANYWHERE)
 
 
 def _page(
-    arguments: argparse.Namespace, plan: ProgramPlan, planner: Planner, options: PlanOptions
+    page: Path,
+    arguments: argparse.Namespace,
+    plan: ProgramPlan,
+    planner: Planner,
+    options: PlanOptions,
 ) -> None:
     """Write the report of the plan; of one that failed with the sentence that says why."""
     from ir_recorder.analysis import analyse, findings
@@ -153,14 +161,14 @@ def _page(
 
     with tempfile.TemporaryDirectory() as folder:
         file = str(Path(folder) / "plan.mcap")
-        recording = _record(file, arguments, plan, planner, options, ANYWHERE)
+        recording = _record(file, arguments, plan, planner, options)
         analysis = analyse(read_recording(recording))
     moved = replace(
         analysis.recording, planned=tuple(plan.movements)
     )  # the file has no trajectories by step
     problems = analysis.problems if plan.status.ok else (plan.status.message,)
     analysis = replace(analysis, recording=moved, problems=problems)
-    sys.stderr.write(f"ir: {write_report(analysis, findings(analysis), arguments.html)}\n")
+    sys.stderr.write(f"ir: {write_report(analysis, findings(analysis), page)}\n")
 
 
 def rows_of(movements: Sequence[PlannedMovement]) -> list[Row]:

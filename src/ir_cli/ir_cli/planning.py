@@ -72,7 +72,7 @@ def check_stations(names: Iterable[str], planner: Planner) -> None:
     known = [*_places(planner), *(path.name for path in planner.cell.paths)]
     for name in names:
         if name not in known:
-            listing = f"ir cell check {planner.cell.name}"
+            listing = f"ir check {planner.cell.name}"
             raise InputError(unknown_name("station", name[:80], known, listing))
 
 

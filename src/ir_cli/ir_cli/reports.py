@@ -1,4 +1,4 @@
-"""`ir report` and `ir fleet`: pages of recordings."""
+"""`ir report` and `ir energy fleet`: pages of recordings."""
 
 from __future__ import annotations
 
@@ -13,21 +13,14 @@ from ir_recorder.report_main import add_arguments, run
 _CLEAR = "\r\x1b[2K"
 
 
-def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add report and fleet."""
-    report = commands.add_parser(
-        "report", help="write the HTML report of a recording, or compare several"
-    )
+def add_report(report: argparse.ArgumentParser) -> None:
+    """Arguments of `ir report`."""
     add_arguments(report)
     report.set_defaults(run=run)
-    add_fleet(commands)
 
 
-def add_fleet(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add fleet."""
-    fleet = commands.add_parser(
-        "fleet", help="recordings of many robots and shifts on one page, summed up"
-    )
+def add_fleet(fleet: argparse.ArgumentParser) -> None:
+    """Arguments of `ir energy fleet`."""
     words = "recordings (.mcap), or folders; a folder below one that is named is a robot"
     fleet.add_argument("paths", nargs="+", metavar="PATH", help=words)
     fleet.add_argument(

@@ -12,7 +12,16 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from ir_cli.errors import InputError, unknown_name
-from ir_cli.output import Row, add_formats, number, print_csv, print_json, print_table, text
+from ir_cli.output import (
+    Row,
+    add_formats,
+    add_renamed,
+    number,
+    print_csv,
+    print_json,
+    print_table,
+    text,
+)
 from ir_description import (
     DescriptionFileError,
     Load,
@@ -211,25 +220,23 @@ COLUMNS = {
 }
 
 
-def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add robot new, robot check and robot list."""
-    robot = commands.add_parser(
-        "robot", help="check robot files, make one from a URDF, list the bundled ones"
-    )
-    verbs = robot.add_subparsers(dest="verb", required=True)
-    listing = verbs.add_parser("list", help="robots that a cell file may name, with their payload")
+def add_list(listing: argparse.ArgumentParser) -> None:
+    """Arguments of `ir robot list`."""
     add_formats(listing)
     listing.set_defaults(run=run_list)
-    check = verbs.add_parser("check", help="what a robot file lacks, before anything is planned")
+
+
+def add_check(check: argparse.ArgumentParser) -> None:
+    """Arguments of `ir robot check`."""
     check.add_argument(
         "robot", metavar="ROBOT", help="a robot file, or the name of a bundled robot"
     )
     add_formats(check, comma=False)
     check.set_defaults(run=run_check)
-    _add_new(verbs.add_parser("new", help="a robot file from a URDF and a sheet of drive figures"))
 
 
-def _add_new(new: argparse.ArgumentParser) -> None:
+def add_new(new: argparse.ArgumentParser) -> None:
+    """Arguments of `ir robot new`."""
     new.add_argument(
         "--template", action="store_true", help="print an empty sheet of drive figures, and end"
     )
@@ -237,9 +244,10 @@ def _add_new(new: argparse.ArgumentParser) -> None:
         "--urdf", metavar="FILE", help="how the arm is built: links, joints, masses, shapes"
     )
     new.add_argument("--drives", metavar="FILE", help="what the URDF does not say; see --template")
-    new.add_argument(
-        "-o", "--out", metavar="FILE", default="robot.yaml", help="robot file (robot.yaml)"
+    output = new.add_argument(
+        "-o", "--output", metavar="FILE", default="robot.yaml", help="robot file (robot.yaml)"
     )
+    add_renamed(new, "--out", output)
     new.add_argument("--tip", default="", metavar="LINK", help="link at the flange (flange, tool0)")
     words = "folder below which package://NAME/.. is found (that of the URDF and those above)"
     new.add_argument("--packages", default="", metavar="FOLDER", help=words)
@@ -260,7 +268,9 @@ def run_new(arguments: argparse.Namespace) -> int:
     from ir_cli.robot_from_urdf import write_robot
 
     packages = Path(arguments.packages) if arguments.packages else None
-    urdf, drives, out = (Path(name) for name in (arguments.urdf, arguments.drives, arguments.out))
+    urdf, drives, out = (
+        Path(name) for name in (arguments.urdf, arguments.drives, arguments.output)
+    )
     write_robot(urdf, drives, arguments.tip, packages, out)
     return 0
 

@@ -1,6 +1,6 @@
 """Access to stations: configurations that reach them, and the straight line out of each.
 
-`ir cell check` prints it; `--deep` adds every configuration with its line.
+`ir check` prints it; `--deep` adds every configuration with its line.
 """
 
 from __future__ import annotations

@@ -103,31 +103,22 @@ def studied(arguments: argparse.Namespace, make: Callable[[Means], Made]) -> Mad
 # One command per kind.
 
 
-def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add study and arena."""
-    add_kinds(commands)
-    add_arena(commands)
+def add_layout(layout: argparse.ArgumentParser) -> None:
+    """Arguments of `ir study layout`."""
+    _add_kind(layout, "layout")
 
 
-def add_kinds(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add study with a command per kind; the arena has a command of its own."""
-    about = "where things should stand, statistics: many plans of one cell; needs no ROS"
-    study = commands.add_parser("study", help=about)
-    kinds = study.add_subparsers(dest="kind", required=True, metavar="KIND")
-    for name, kind in KINDS.items():
-        if name == "arena":
-            continue
-        one = kinds.add_parser(
-            name,
-            help=kind.about,
-            description=f"{kind.about.capitalize()}. Makes what the folder has no result of; the "
-            "same command goes on after an interruption.",
-        )
-        add_study(one, f"out/{name}")
-        one.add_argument(
-            "--json", action="store_true", help="print summary, files and table as JSON"
-        )
-    study.set_defaults(run=run_study)
+def add_statistics(statistics: argparse.ArgumentParser) -> None:
+    """Arguments of `ir study statistics`."""
+    _add_kind(statistics, "statistics")
+
+
+def _add_kind(parser: argparse.ArgumentParser, kind: str) -> None:
+    add_study(parser, f"out/{kind}")
+    parser.add_argument(
+        "--json", action="store_true", help="print summary, files and table as JSON"
+    )
+    parser.set_defaults(run=run_study, kind=kind)
 
 
 def run_study(arguments: argparse.Namespace) -> int:
@@ -154,14 +145,8 @@ _QUICK_FOLDER = "out/arena_quick"
 _QUICK_S = 0.2  # of processor per run: 550 runs of the example take two minutes on two cores
 
 
-def add_arena(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add arena."""
-    arena = commands.add_parser(
-        "arena",
-        help="planners against each other over cells, tasks and seeds; needs no ROS",
-        description="Runs what the folder has no result of; the same command goes on after an "
-        "interruption.",
-    )
+def add_arena(arena: argparse.ArgumentParser) -> None:
+    """Arguments of `ir study arena`."""
     add_study(arena, _FOLDER)
     words = (
         f"one seed and {_QUICK_S:g} s per run, in {_QUICK_FOLDER}; without SETTINGS.yaml "
@@ -189,7 +174,7 @@ def run_arena_command(arguments: argparse.Namespace) -> int:
 def asked(arguments: argparse.Namespace) -> tuple[ArenaSettings, str]:
     """The settings, and the folder of the results."""
     if not arguments.quick:
-        return read_settings(settings_of(arguments, "ir arena")), str(arguments.output)
+        return read_settings(settings_of(arguments, "ir study arena")), str(arguments.output)
     named = arguments.settings is not None
     settings = read_settings(arguments.settings) if named else arena_settings(EXAMPLE, str)
     folder = _QUICK_FOLDER if arguments.output == _FOLDER else str(arguments.output)

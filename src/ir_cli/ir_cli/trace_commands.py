@@ -1,4 +1,4 @@
-"""`ir evaluate` and `ir optimize`: a trace held against the limits, and made cheaper."""
+"""`ir ask evaluate` and `ir ask optimize`: a trace held against the limits, and made cheaper."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from ir_cli.output import ProgressLine, add_formats, print_json
+from ir_cli.output import ProgressLine, add_formats, add_renamed, print_json
 from ir_cli.planning import (
     FAILED,
     add_cell,
@@ -24,17 +24,8 @@ from ir_cli.trace_programs import stretches_of
 from ir_cli.traces import add_measured, measured_figures, motion_of, write_trace
 
 
-def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add evaluate and optimize."""
-    add_evaluate(commands)
-    add_optimize(commands)
-
-
-def add_evaluate(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add evaluate."""
-    evaluate = commands.add_parser(
-        "evaluate", help="joules, limits and clearance of a trajectory in a file; needs no ROS"
-    )
+def add_evaluate(evaluate: argparse.ArgumentParser) -> None:
+    """Arguments of `ir ask evaluate`."""
     add_cell(evaluate)
     evaluate.add_argument(
         "trace",
@@ -74,11 +65,8 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     return 0 if verification.certified else FAILED
 
 
-def add_optimize(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add optimize."""
-    optimize = commands.add_parser(
-        "optimize", help="make the motion of a trace cheaper between its ends; needs no ROS"
-    )
+def add_optimize(optimize: argparse.ArgumentParser) -> None:
+    """Arguments of `ir ask optimize`."""
     add_cell(optimize)
     optimize.add_argument(
         "trace",
@@ -89,7 +77,10 @@ def add_optimize(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     optimize.add_argument(
         "--duration", type=float, default=0.0, metavar="S", help="s it takes; 0: the best (0)"
     )
-    optimize.add_argument("--trajectory", type=Path, metavar="FILE", help="write its points as CSV")
+    output = optimize.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="write its points as CSV"
+    )
+    add_renamed(optimize, "--trajectory", output)
     add_measured(optimize)
     add_options(optimize)
     add_parameters(optimize)
@@ -116,8 +107,8 @@ def run_optimize(arguments: argparse.Namespace) -> int:
         )
     if found.trajectory is None:
         return failed(found.status.message)
-    if arguments.trajectory:
-        write_trace(arguments.trajectory, found.trajectory)
+    if arguments.output:
+        write_trace(arguments.output, found.trajectory)
     if arguments.json:
         before = {**figures_of(found.before), **measured_figures(known)}
         print_json({"before": before, "after": figures_of(found.after)})

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ir_cli.errors import DemonstrationError
-from ir_cli.output import Progress, table
+from ir_cli.output import Progress, add_renamed, table
 from ir_cli.ports import UDP, free_port
 from ir_cli.ros.domain import apply, own_domain
 from ir_cli.ros.power_tour import MODE_SECONDS, PowerWatch, tour
@@ -373,15 +373,20 @@ def with_short_pauses(cell: Cell, longest: float) -> Cell:
     return replace(cell, program=steps)
 
 
-def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add demo."""
-    demo = commands.add_parser("demo", help="plan, drive, record and explain a cell")
+def add_demo(demo: argparse.ArgumentParser) -> None:
+    """Arguments of `ir demo`."""
     demo.add_argument(
         "--cell", default="demo", help="a cell file, or the name of a bundled cell (demo)"
     )
-    demo.add_argument(
-        "--out", type=Path, default=Path("out"), help="folder for recording and report (out)"
+    output = demo.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        default=Path("out"),
+        metavar="FOLDER",
+        help="folder for recording and report (out)",
     )
+    add_renamed(demo, "--out", output)
     demo.add_argument("--seed", type=int, default=0, help="seed of the planner (0)")
     demo.add_argument(
         "--plant",
@@ -399,7 +404,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from ir_cli.ros.domain import alone
 
-    words = (arguments.cell, arguments.out, arguments.seed, arguments.plant)
+    words = (arguments.cell, arguments.output, arguments.seed, arguments.plant)
     with alone(""):
         outcome = Demonstration(*words, Progress(), real_pauses=arguments.real_pauses).run()
     sys.stdout.write(outcome.text() + "\n")

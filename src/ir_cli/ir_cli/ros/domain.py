@@ -61,7 +61,7 @@ def claim(domain: str, namespace: str) -> socket.socket | None:
         held.close()
         where = f"in {namespace}" if namespace else "without a namespace"
         raise CommandError(
-            f"another `ir up` or `ir demo` starts or runs the nodes {where} of domain "
+            f"another `ir ros up` or `ir demo` starts or runs the nodes {where} of domain "
             f"{domain or '0'}: end it, or choose another domain (ROS_DOMAIN_ID) or --namespace"
         ) from error
     return held

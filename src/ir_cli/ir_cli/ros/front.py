@@ -1,4 +1,4 @@
-"""`ir front`: a program's energy over its cycle time, as a table and a picture."""
+"""`ir ros front`: a program's energy over its cycle time, as a table and a picture."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from io import BytesIO
 from pathlib import Path
 
 from ir_cli.errors import CommandError
-from ir_cli.output import Progress, table
-from ir_msgs_py.file_roots import ANYWHERE
+from ir_cli.output import Progress, add_renamed, table
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.savings import ProgramPoint
 from ir_recorder.report.files import write_output
 from ir_recorder.report.picture import PICTURE_START
+from ir_values.files import ANYWHERE
 
 _STYLES = ("o", "*", "s", "D")
 _COLOURS = ("#5b8def", "#e8590c", "#868e96", "#37b24d")
@@ -82,9 +82,8 @@ def write_front(front: Front, path: Path) -> Path:
     return write_output(path, picture.getvalue(), PICTURE_START, ANYWHERE)
 
 
-def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add front."""
-    front = commands.add_parser("front", help="energy over cycle time: front home infeed_pick park")
+def add_front(front: argparse.ArgumentParser) -> None:
+    """Arguments of `ir ros front`."""
     front.add_argument(
         "stations", nargs="*", help="stations and postures to visit; none: the cell's program"
     )
@@ -95,9 +94,15 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--points", type=int, default=12, help="programs of the front, at most 50 (12)"
     )
     front.add_argument("--seed", type=int, default=0, help="seed of the planner (0)")
-    front.add_argument(
-        "--out", type=Path, default=Path("out/front.png"), help="the picture (out/front.png)"
+    output = front.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        default=Path("out/front.png"),
+        metavar="FILE.png",
+        help="the picture (out/front.png)",
     )
+    add_renamed(front, "--out", output)
     front.set_defaults(run=run)
 
 
@@ -134,8 +139,8 @@ def run(arguments: argparse.Namespace) -> int:
             Mark("planned in its time", total.seconds, total.planned, free.savings.program_id)
         )
     front = Front(free.front, tuple(marks))
-    arguments.out.parent.mkdir(parents=True, exist_ok=True)
-    picture = write_front(front, arguments.out)
+    arguments.output.parent.mkdir(parents=True, exist_ok=True)
+    picture = write_front(front, arguments.output)
     sys.stdout.write(_text(front) + f"\n\n{free.savings.sentence}\n{picture}\n")
     return 0
 

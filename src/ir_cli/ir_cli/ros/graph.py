@@ -30,7 +30,7 @@ DISCOVERY_SECONDS = 10.0
 seconds.
 """
 START_SECONDS = 60.0
-"""The same for what this project's nodes offer, while `ir up` starts or runs them on this host."""
+"""The same for offers of this project's nodes, while `ir ros up` starts or runs them here."""
 SETTLED_SECONDS = 1.0
 """A graph that has not grown for this long, nor for as long as it took so far, is complete: a name
 that is near a known one is a typo then, unless a node of this project has it as soon as it runs.
@@ -133,7 +133,7 @@ def checked_type(typed: str, found: str, name: str, kind: str) -> str:
 
 def _missing(name: str, kind: str, known: Mapping[str, str]) -> str:
     if known:
-        return unknown_name(kind, name, known, f"ir list {kind}s")
+        return unknown_name(kind, name, known, f"ir ros list {kind}s")
     domain = os.environ.get("ROS_DOMAIN_ID", "")
     where = f"ROS_DOMAIN_ID is {domain}" if domain else "ROS_DOMAIN_ID is not set, which means 0"
     return f"no {kind} {name}, and no other either: do the nodes run, and in this domain? {where}"
@@ -150,10 +150,8 @@ def type_and_text(values: list[str], kind: str) -> tuple[str, str]:
     return typed, text
 
 
-def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add call, echo, list, send_goal and cancel."""
-    add_actions(commands)
-    call = commands.add_parser("call", help="call a service: call /ir_planner/get_cell '{}'")
+def add_call(call: argparse.ArgumentParser) -> None:
+    """Arguments of `ir ros call`."""
     call.add_argument("service")
     call.add_argument(
         "values", nargs="*", help="[type] and request as YAML, as for `ros2 service call`"
@@ -162,17 +160,19 @@ def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     call.add_argument("--full", action="store_true", help="print long arrays whole")
     call.set_defaults(run=run_call)
 
-    echo = commands.add_parser(
-        "echo", help="print a topic's messages: echo /ir_sim_driver/power_state"
-    )
+
+def add_echo(echo: argparse.ArgumentParser) -> None:
+    """Arguments of `ir ros echo`."""
     echo.add_argument("topic")
     echo.add_argument("--once", action="store_true", help="one message, then end")
-    words = "s to wait for the topic (10, longer while `ir up` starts its node)"
+    words = "s to wait for the topic (10, longer while `ir ros up` starts its node)"
     echo.add_argument("--timeout", type=float, help=words)
     echo.add_argument("--full", action="store_true", help="print long arrays whole")
     echo.set_defaults(run=run_echo)
 
-    listing = commands.add_parser("list", help="list services, topics or actions with their types")
+
+def add_list(listing: argparse.ArgumentParser) -> None:
+    """Arguments of `ir ros list`."""
     listing.add_argument(
         "kind", nargs="?", default="services", choices=("services", "topics", "actions")
     )
@@ -225,11 +225,8 @@ def run_list(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def add_actions(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add send_goal and cancel."""
-    send = commands.add_parser(
-        "send_goal", help="send a goal: send_goal /ir_planner/plan '{}'; Ctrl-C cancels"
-    )
+def add_send_goal(send: argparse.ArgumentParser) -> None:
+    """Arguments of `ir ros send_goal`."""
     send.add_argument("action")
     send.add_argument(
         "values", nargs="*", help="[type] and goal as YAML, as for `ros2 action send_goal`"
@@ -241,9 +238,9 @@ def add_actions(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -
     send.add_argument("--full", action="store_true", help="print long arrays whole")
     send.set_defaults(run=run_send_goal)
 
-    cancel = commands.add_parser(
-        "cancel", help="cancel all goals of an action: cancel /ir_planner/plan"
-    )
+
+def add_cancel(cancel: argparse.ArgumentParser) -> None:
+    """Arguments of `ir ros cancel`."""
     cancel.add_argument("action")
     cancel.set_defaults(run=run_cancel)
 

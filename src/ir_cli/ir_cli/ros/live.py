@@ -1,4 +1,4 @@
-"""`ir live`: the running cell in a browser of this machine, until Ctrl-C."""
+"""`ir ros live`: the running cell in a browser of this machine, until Ctrl-C."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from ir_recorder.live.node import LiveNode
 PORT = 8870
 
 
-def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add live."""
-    live = commands.add_parser("live", help="watch the running cell in a browser, until Ctrl-C")
+def add_live(live: argparse.ArgumentParser) -> None:
+    """Arguments of `ir ros live`."""
     live.add_argument("--namespace", default="", help="of the cell's nodes: cell_1 (none)")
     live.add_argument(
         "--port", type=_port, help=f"on 127.0.0.1 ({PORT}, or a free one where that is taken)"
@@ -40,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
         sys.stdout.flush()
         return node
 
-    return run_node("ir live", make, [], refusals=(RecorderError,))
+    return run_node("ir ros live", make, [], refusals=(RecorderError,))
 
 
 def _port(text: str) -> int:

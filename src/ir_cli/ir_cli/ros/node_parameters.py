@@ -77,7 +77,7 @@ def given_parameters(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
             raise CommandError(f"-p {text[:200]!r}: write name:=value, or node:name:=value")
         node, _, name = left.rpartition(":")
         if node and node not in known:
-            raise CommandError(unknown_name("node", node[:200], known, "ir list"))
+            raise CommandError(unknown_name("node", node[:200], known, "ir ros list"))
         takers = [each for each in ([node] if node else known) if name in known[each]]
         if not takers:
             names = {each for taker in ([node] if node else known) for each in known[taker]}

@@ -15,7 +15,6 @@ from ir_description import cell_to_yaml, robot_urdf
 from ir_msgs.msg import RecordedCall
 from ir_msgs.srv import PlanProgram
 from ir_msgs_py import names
-from ir_msgs_py.file_roots import ANYWHERE, FileRoots
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.ros.conversions import status_to_msg, trajectory_to_msg
 from ir_msgs_py.ros.plan_conversions import plan_options_to_msg, program_savings_to_msg
@@ -27,6 +26,7 @@ from ir_planner.node.topics import cell_state
 from ir_recorder.format import contents
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.recording import CellFiles, RecordingSession, RecordingWriter
+from ir_values.files import ANYWHERE, FileRoots
 
 _DOORS = "doors_at_the_start"
 _DOORS_ARE = "doors at the start are "

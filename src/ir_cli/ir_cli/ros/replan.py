@@ -1,4 +1,4 @@
-"""`ir replan`: requests of a recording planned again, and their ids compared.
+"""`ir ros replan`: requests of a recording planned again, and their ids compared.
 
 The planner gets what it had: cell, settings, timers, load and doors as the recording holds them;
 start states and drawn seeds are those of the answers.
@@ -391,11 +391,8 @@ def _not_compared(call: Call, why: str) -> Replanned:
     return Replanned(call.service, 0, Comparison.NOT_COMPARED, why)
 
 
-def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add replan."""
-    again = commands.add_parser(
-        "replan", help="plan a recording's requests again and compare the ids"
-    )
+def add_replan(again: argparse.ArgumentParser) -> None:
+    """Arguments of `ir ros replan`."""
     again.add_argument("file", help="recording (.mcap)")
     again.add_argument("--namespace", help="of the cell, where the recording holds several")
     add_roots(again)

@@ -1,4 +1,4 @@
-"""`ir up`: the four nodes of a cell without a launch file, until Ctrl-C."""
+"""`ir ros up`: the four nodes of a cell without a launch file, until Ctrl-C."""
 
 from __future__ import annotations
 
@@ -26,9 +26,8 @@ LOOK_SECONDS = 0.5
 """Between two looks at the processes: a node that ended is reported within this."""
 
 
-def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add up."""
-    up = commands.add_parser("up", help="start planner, driver, runner and recorder until Ctrl-C")
+def add_up(up: argparse.ArgumentParser) -> None:
+    """Arguments of `ir ros up`."""
     up.add_argument(
         "--cell", default="demo", help="a cell file, or the name of a bundled cell (demo)"
     )

@@ -10,12 +10,9 @@ import time
 from ir_cli.planning import add_cell
 from ir_cli.view.server import HOST, PORT, address, check_installed, closed, new_token, opened
 
-HELP = "look at a cell in a browser, move it about, plan it; needs no ROS"
 
-
-def add_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add view."""
-    view = commands.add_parser("view", help=HELP)
+def add_view(view: argparse.ArgumentParser) -> None:
+    """Arguments of `ir view`."""
     add_cell(view)
     words = f"on {HOST}; 0: a free one ({PORT}, or a free one where that is taken)"
     view.add_argument("--port", type=_port, help=words)

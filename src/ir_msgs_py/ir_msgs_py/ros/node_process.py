@@ -42,7 +42,7 @@ _HELP = """usage: {name} [--ros-args [-p NAME:=VALUE ...] [--params-file FILE] [
 {about}
 
 It runs until SIGINT or SIGTERM. Its parameters, with units and ranges, are in docs/parameters.md;
-`ros2 param describe /{name} NAME` says the same while it runs. `ir up` starts all nodes of a cell.
+`ros2 param describe /{name} NAME` says the same while it runs. `ir ros up` starts all nodes of a cell.
 """  # noqa: E501
 
 

@@ -75,7 +75,7 @@ class Guard:
         """Why a request that acts is not answered, "" where it is."""
         given = headers.get(TOKEN_HEADER, "").encode("utf-8", "replace")
         if not compare_digest(given, self.token.encode()):
-            return "the buttons need the address that `ir live` printed: it ends with a token"
+            return "the buttons need the address that `ir ros live` printed: it ends with a token"
         if headers.get("Content-Type", "").partition(";")[0].strip() != "application/json":
             return "a request has to be application/json"
         return ""
