@@ -30,9 +30,7 @@ def ir(
 
 
 def test_the_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["--version"])
-    assert ended.value.code == 0
+    assert main(["--version"]) == 0
     assert capsys.readouterr().out.startswith("ir ")
 
 
@@ -40,7 +38,7 @@ def test_an_unknown_command_is_answered_with_the_one_that_was_meant(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert main(["reprot", "a.mcap"]) == 2
-    assert capsys.readouterr().err == "ir: no command reprot: did you mean report?\n"
+    assert capsys.readouterr().err.startswith("ir: no command reprot: did you mean report")
 
 
 @pytest.mark.parametrize("domain", ["abc", "233", "-1", "1.5"])
@@ -77,5 +75,5 @@ def test_a_file_that_cannot_be_written_is_a_sentence(
 ) -> None:
     (tmp_path / "file").touch()
     into = tmp_path / "file" / "cell.sdf"
-    assert main(["cell", "export", "open", str(into)]) == 1
+    assert main(["cell", "export", "open", "-o", str(into)]) == 1
     assert capsys.readouterr().err == f"ir: {into} can't be used: Not a directory\n"
