@@ -104,7 +104,7 @@ class Stages:
         self.pip = (str(PYTHON), *PIP)
 
     def all(self, tests: bool, portable: bool) -> list[Stage]:
-        """Return the steps; with those for tests, and with the core for any x86-64."""
+        """Return the steps; with those for tests, or with the core for any x86-64 alone."""
         stages = [
             self.wheels(TOOLS, "tools that compile"),
             self.wheels(BUILD, "ROS 2 Jazzy and what builds on it (300 MB)", TOOLS),
@@ -115,7 +115,7 @@ class Stages:
         ]
         if tests:
             stages.append(self.wheels(TESTS, "wheels of tests and checks", RUN))
-        if portable:
+        if tests or portable:  # tests compare both builds
             stages.append(self.core("baseline", "any x86-64"))
         return stages
 
