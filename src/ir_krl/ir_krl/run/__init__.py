@@ -6,6 +6,7 @@ from ir_krl.run.commands import (
     Blend,
     Command,
     Motion,
+    Payload,
     SetOutput,
     Speeds,
     SplineBlock,
@@ -15,6 +16,7 @@ from ir_krl.run.commands import (
     WaitFor,
 )
 from ir_krl.run.control import Note
+from ir_krl.run.memory import SignalRange
 from ir_krl.run.program import Followed, follow
 from ir_krl.run.values import FRAME_NAMES
 
@@ -25,7 +27,9 @@ __all__ = [
     "Followed",
     "Motion",
     "Note",
+    "Payload",
     "SetOutput",
+    "SignalRange",
     "Speeds",
     "SplineBlock",
     "Target",

@@ -61,10 +61,24 @@ class Blend:
     share: float
 
 
+@dataclass(frozen=True)
+class Payload:
+    """What $LOAD says is carried: mass [kg], below 0 "as the machine data have it"; centre of mass
+    [m] and the angles A, B, C [deg] of the axes of inertia in the flange, inertia about them
+    [kg m^2].
+    """
+
+    mass: float
+    centre: tuple[float, float, float]
+    angles: tuple[float, float, float]
+    inertia: tuple[float, float, float]
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """One motion to `target`; circles pass `via` and end after `angle` [rad] where one is given.
     keeps_orientation: the tool doesn't turn, whatever the target says ($ORI_TYPE #CONSTANT).
+    payload: None where the program never says what is carried.
     """
 
     kind: Kind
@@ -75,6 +89,7 @@ class Motion:
     via: Target | None = None
     angle: float | None = None
     keeps_orientation: bool = False
+    payload: Payload | None = None
 
 
 @dataclass(frozen=True)

@@ -285,7 +285,7 @@ _GROUP_MAX = 32  # signals of a group: the bits of an INT
 
 
 @dataclass(frozen=True)
-class Group:
+class SignalRange:
     """Signals from `first` to `last` of $IN or $OUT as one number, the first its lowest bit."""
 
     kind: str
@@ -309,7 +309,7 @@ class Signals:
     inputs: Mapping[int, bool]
     noted: Callable[[Place, str], None]
     aliases: dict[str, tuple[Step, ...]] = field(default_factory=dict)
-    groups: dict[str, Group] = field(default_factory=dict)
+    groups: dict[str, SignalRange] = field(default_factory=dict)
 
     def read(self, name: str, index: int, place: Place) -> bool:
         """One signal or flag. Raises KrlRunError for an input that isn't given."""
@@ -362,7 +362,17 @@ class Signals:
             raise KrlRunError(
                 f"{name} must be a group of 1 to {_GROUP_MAX} inputs or outputs", place
             )
-        self.groups[name] = Group(kind, begin[0], end[0])
+        self.groups[name] = SignalRange(kind, begin[0], end[0])
+
+    @property
+    def named(self) -> dict[str, SignalRange]:
+        """What the names of signals stand for; one signal is a range of one."""
+        single = {
+            name: SignalRange(path[0][0], path[0][1][0], path[0][1][0])
+            for name, path in self.aliases.items()
+            if path[0][1] is not None
+        }
+        return single | self.groups
 
     def _held(self, name: str, index: int) -> Value | None:
         array = self.memory.shared.get(name)

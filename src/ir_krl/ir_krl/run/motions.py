@@ -13,6 +13,7 @@ from ir_krl.run.commands import (
     Blend,
     Kind,
     Motion,
+    Payload,
     SetOutput,
     Speeds,
     SplineBlock,
@@ -38,6 +39,7 @@ from ir_krl.run.values import (
     FRAME_NAMES,
     Structure,
     Symbol,
+    Value,
     axes,
     components,
     copied,
@@ -140,8 +142,17 @@ class Motions:
         blend = next(
             (self.blend(child) for child in tree.children if _is(child, "approximation")), None
         )
+        payload = payload_of(self._memory.shared.get("$LOAD"), place)
         return Motion(
-            kind, end, self.speeds(place), place, blend, via, angle, self._keeps_orientation()
+            kind,
+            end,
+            self.speeds(place),
+            place,
+            blend,
+            via,
+            angle,
+            self._keeps_orientation(),
+            payload,
         )
 
     def target(self, tree: Tree, relative: bool, in_tool: bool) -> Target:
@@ -247,6 +258,27 @@ class Motions:
         if not 0.0 < value <= FULL:
             raise KrlRunError(f"{name} is {value:g} %; it must be above 0 and at most 100 %", place)
         return value / FULL
+
+
+def payload_of(value: Value | None, place: Place) -> Payload | None:
+    """What a LOAD says; None where it has no mass. Raises KrlRunError."""
+    if not isinstance(value, Structure) or "M" not in value.fields:
+        return None
+    centre = _part_of(value, "CM")
+    inertia = _part_of(value, "J")
+    x, y, z, a, b, c = (_given(centre, name, place) for name in FRAME_NAMES)
+    jx, jy, jz = (_given(inertia, name, place) for name in FRAME_NAMES[:3])
+    mass = number(value.fields["M"], "M", place)
+    return Payload(mass, (_MM * x, _MM * y, _MM * z), (a, b, c), (jx, jy, jz))
+
+
+def _part_of(value: Structure, name: str) -> Structure:
+    found = value.fields.get(name)
+    return found if isinstance(found, Structure) else Structure({})
+
+
+def _given(value: Structure, name: str, place: Place) -> float:
+    return number(value.fields.get(name, 0.0), name, place)
 
 
 _OTHERS = ("settings", "approximation")

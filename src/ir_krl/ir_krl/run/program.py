@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import PurePath
 from typing import Any
 
@@ -13,7 +13,7 @@ from ir_krl.run.commands import Command
 from ir_krl.run.control import LoopExit, Note, Returned
 from ir_krl.run.expressions import Expressions
 from ir_krl.run.library import Library
-from ir_krl.run.memory import Memory, Signals, system_variables
+from ir_krl.run.memory import Memory, SignalRange, Signals, system_variables
 from ir_krl.run.motions import Motions, Moving
 from ir_krl.run.values import Array, Value, copied, typed
 from ir_msgs_py.arrays import FloatArray
@@ -64,11 +64,14 @@ DEPTH_MAX = 60
 
 @dataclass(frozen=True)
 class Followed:
-    """What a program does: its name, the commands in their order, and what was assumed."""
+    """What a program does: its name, the commands in their order, what was assumed, and what its
+    SIGNAL declarations name.
+    """
 
     name: str
     commands: tuple[Command, ...]
     notes: tuple[Note, ...]
+    signals: Mapping[str, SignalRange] = field(default_factory=dict)
 
 
 def follow(
@@ -100,7 +103,7 @@ def follow(
         run.routine(first, [], Place(first.file))
     except RecursionError:
         raise KrlRunError(NESTED, Place(run.expressions.file)) from None
-    return Followed(name, tuple(run.commands), tuple(run.notes))
+    return Followed(name, tuple(run.commands), tuple(run.notes), run.signals)
 
 
 class _Run(Moving):
@@ -116,6 +119,11 @@ class _Run(Moving):
         self.expressions = Expressions(memory, self._signals, self._called)
         self._motions = Motions(self.expressions, memory, self.note_at)
         self._triggers: list[tuple[float, Tree]] = []
+
+    @property
+    def signals(self) -> dict[str, SignalRange]:
+        """What SIGNAL declarations name."""
+        return self._signals.named
 
     def data(self, body: Tree, file: str) -> None:
         """Declarations and values of a data list."""
