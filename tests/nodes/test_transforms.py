@@ -12,11 +12,12 @@ import pytest
 from builtin_interfaces.msg import Time
 from rclpy.qos import DurabilityPolicy
 from scipy.spatial.transform import Rotation
+from visualization_msgs.msg import Marker
 
 from ir_description import load_cell
 from ir_sim_driver.controller import Driver, make_simulation
 from ir_sim_driver.controller.settings import SimulationSettings
-from ir_sim_driver.node.visualization import Transforms, open_transforms
+from ir_sim_driver.node.visualization import RobotMarkers, Transforms, open_transforms
 from ir_sim_driver.plant import carried
 
 TOLERANCE = 1e-9  # m and rad: quaternions keep double precision
@@ -85,7 +86,7 @@ def test_every_link_of_the_description_has_its_place_in_the_cell(driver):
     frames = tree(*node.heard["tf_static"], *node.heard["tf"])
     links = {link.get("name") for link in Xml.fromstring(driver.description()).iter("link")}
     assert set(frames) | {"cell"} == links
-    poses = driver.bodies(q).link_poses
+    poses = driver.link_poses(q)
     for k, name in enumerate(load_cell("demo").robot.link_names):
         assert np.abs(in_the_cell(frames, name) - poses[k]).max() < TOLERANCE
     assert node.heard["tf"][0].transforms[0].header.stamp == Time(sec=2, nanosec=1)
@@ -104,3 +105,24 @@ def test_what_is_fixed_is_latched_and_follows_the_load(driver):
 
 def test_nothing_is_published_where_it_is_not_wanted(driver):
     assert open_transforms(Listener(), driver, wanted=False) is None
+
+
+def test_markers_are_the_capsules_wherever_the_robot_stands(driver):
+    robot, load = driver.capsules()
+    markers = RobotMarkers(robot, load)
+    for k, q in enumerate(np.random.default_rng(1).uniform(-1.5, 1.5, (5, 6))):
+        poses = driver.link_poses(q)
+        drawn = markers.at(poses, Time(sec=k)).markers
+        assert len(drawn) == 2 * len(robot + load)
+        for capsule, cylinder, balls in zip(robot + load, drawn[::2], drawn[1::2], strict=True):
+            T = poses[capsule.link]
+            ends = np.array([T[:3, :3] @ p + T[:3, 3] for p in (capsule.p0, capsule.p1)])
+            place, turn = cylinder.pose.position, cylinder.pose.orientation
+            axis = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).apply([0.0, 0.0, 1.0])
+            centre = np.array([place.x, place.y, place.z])
+            half = 0.5 * cylinder.scale.z * axis
+            assert np.array([centre - half, centre + half]) == pytest.approx(ends, abs=2e-6)
+            assert np.array([(p.x, p.y, p.z) for p in balls.points]) == pytest.approx(ends)
+            assert (cylinder.type, balls.type) == (Marker.CYLINDER, Marker.SPHERE_LIST)
+            assert cylinder.scale.x == balls.scale.x == 2.0 * capsule.radius
+            assert cylinder.header.stamp.sec == balls.header.stamp.sec == k

@@ -2,7 +2,7 @@
 it.
 """
 
-from ir_sim_driver.controller.driver import Bodies, Driver, Snapshot
+from ir_sim_driver.controller.driver import Driver, Snapshot
 from ir_sim_driver.controller.goal_checks import VettedGoal
 from ir_sim_driver.controller.goals import NO_GOAL, refused
 from ir_sim_driver.controller.outputs import Entry, Frame, Joints, report
@@ -13,7 +13,6 @@ from ir_sim_driver.controller.surroundings import PlannedCell
 
 __all__ = [
     "NO_GOAL",
-    "Bodies",
     "ControllerSettings",
     "Driver",
     "Entry",

@@ -119,17 +119,6 @@ class Snapshot:
     entries: list[Entry]
 
 
-@dataclass(frozen=True, eq=False)
-class Bodies:
-    """Poses (n+1, 4, 4) of the links in the world, and capsules of the robot and of its load on
-    them.
-    """
-
-    link_poses: FloatArray
-    robot: tuple[Capsule, ...]
-    load: tuple[Capsule, ...]
-
-
 class Driver:
     """Runs `simulation`, `steps` of its steps per tick.
 
@@ -421,13 +410,15 @@ class Driver:
 
     def moving_frames(self, q: FloatArray) -> tuple[FramePose, ...]:
         """Frames of the joints at q (n,) [rad]."""
-        poses = self._simulation.tool.chain.link_poses(q[None])[0]
-        return moving_frames(self._simulation.robot, poses)
+        return moving_frames(self._simulation.robot, self.link_poses(q))
 
-    def bodies(self, q: FloatArray) -> Bodies:
-        """Robot and load at q (n,) [rad]."""
-        with self._lock:
-            load = self._simulation.load
-        poses = self._simulation.tool.chain.link_poses(q[None])[0]
-        of_load = tuple(capsule for item in load.loads for capsule in item.capsules)
-        return Bodies(poses, tuple(self._simulation.robot.capsules), of_load)
+    def link_poses(self, q: FloatArray) -> FloatArray:
+        """Poses (n+1, 4, 4) of the links in the world at q (n,) [rad]."""
+        poses: FloatArray = self._simulation.tool.chain.link_poses(q[None])[0]
+        return poses
+
+    def capsules(self) -> tuple[tuple[Capsule, ...], tuple[Capsule, ...]]:
+        """Capsules of the robot and of its load, on their links."""
+        loads = self.carried.loads
+        of_load = tuple(capsule for item in loads for capsule in item.capsules)
+        return tuple(self._simulation.robot.capsules), of_load

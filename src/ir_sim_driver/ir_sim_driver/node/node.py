@@ -16,12 +16,13 @@ from rclpy.parameter import Parameter
 from rclpy.task import Future
 from rclpy.time_source import USE_SIM_TIME_NAME
 from std_msgs.msg import Float64
-from visualization_msgs.msg import Marker, MarkerArray
+from visualization_msgs.msg import MarkerArray
 
 from ir_description import DescriptionError
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, StartPause
 from ir_msgs_py import names
+from ir_msgs_py.ros.conversions import time_to_msg
 from ir_msgs_py.ros.diagnostics import Diagnostics
 from ir_msgs_py.ros.node_process import run_node
 from ir_msgs_py.ros.serving import BoundedService
@@ -41,7 +42,7 @@ from ir_sim_driver.node.real_time import FOREIGN, OWN, SYSTEM, GridThread, Scale
 from ir_sim_driver.node.services import Services
 from ir_sim_driver.node.streams import Streams
 from ir_sim_driver.node.trajectory_actions import Admission, BoundedActionServer, Executions
-from ir_sim_driver.node.visualization import open_transforms, robot_markers
+from ir_sim_driver.node.visualization import RobotMarkers, open_transforms
 from ir_sim_driver.notices import Level, Notice, shortened
 from ir_sim_driver.plc import Link, OpenLink, WakeOnLan
 from ir_values.errors import IrError
@@ -150,7 +151,7 @@ class SimDriver(Node):
         self._transforms = open_transforms(self, self._driver, self._configuration.node.publish_tf)
         if self._transforms is not None:
             self.create_timer(_TRANSFORMS_PERIOD, self._publish_transforms)
-        self._announcements = Announcements(self, self._driver, self._publish_fixed_transforms)
+        self._announcements = Announcements(self, self._driver, self._load_changed)
 
     def _open_requests(self) -> None:
         self._actions = [self._serve_action(ExecuteTrajectory, names.EXECUTE_TRAJECTORY)]
@@ -276,7 +277,8 @@ class SimDriver(Node):
 
     # slow topics out
 
-    def _publish_fixed_transforms(self) -> None:
+    def _load_changed(self) -> None:
+        self._robot = RobotMarkers(*self._driver.capsules())
         if self._transforms is not None:
             self._transforms.publish_fixed(self.now_msg())
 
@@ -293,8 +295,8 @@ class SimDriver(Node):
             return
         if joints is None or joints.q is None:
             return
-        markers = robot_markers(self._driver.bodies(joints.q), joints.stamp_ns, Marker)
-        self._markers.publish(MarkerArray(markers=markers))
+        poses = self._driver.link_poses(joints.q)
+        self._markers.publish(self._robot.at(poses, time_to_msg(joints.stamp_ns)))
 
     def _publish_diagnostics(self) -> None:
         if self._markers_timer.is_canceled() and self._markers.get_subscription_count():

@@ -2,56 +2,64 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Transform, TransformStamped, Vector3
+from geometry_msgs.msg import Point, Transform, TransformStamped, Vector3
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from scipy.spatial.transform import Rotation
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
 
 from ir_description import Capsule, FramePose
 from ir_msgs_py import names
-from ir_msgs_py.ros.conversions import point_to_msg, pose_to_msg, time_to_msg
-from ir_sim_driver.controller import Bodies, Driver
+from ir_msgs_py.ros.conversions import pose_to_msg, time_to_msg
+from ir_sim_driver.controller import Driver
 from ir_values.arrays import FloatArray
 
-# The robot's capsules as bodies to draw: a cylinder and two balls each, in the world.
+# Robot and load as markers: each capsule a cylinder and two balls, in the world.
 
 _SHORTEST = 1e-6  # m; a cylinder of no length is no marker
+_COLOURS = {"robot": (1.0, 0.45, 0.1), "load": (0.35, 0.4, 0.45)}  # KUKA orange, steel
 
 
-class Shape(NamedTuple):
-    """A capsule in the world: ends (2, 3) [m], radius and length [m], centre (3,), quaternion xyzw
-    (4,) of its axis z.
-    """
+class RobotMarkers:
+    """Markers of the capsules of robot and load, made once: 20 times a second they only move."""
 
-    ends: FloatArray
-    radius: float
-    length: float
-    centre: FloatArray
-    quaternion: FloatArray
+    def __init__(self, robot: Sequence[Capsule], load: Sequence[Capsule]) -> None:
+        capsules = (*robot, *load)
+        axes = np.array([capsule.p1 - capsule.p0 for capsule in capsules]).reshape(-1, 3)
+        lengths = np.linalg.norm(axes, axis=1)
+        turns = [turn_z_to(*axis) for axis in zip(axes, lengths.tolist(), strict=True)]
+        self._links = [capsule.link for capsule in capsules]
+        self._ends = np.array([(c.p0, c.p1) for c in capsules]).reshape(-1, 2, 3)
+        self._turns = Rotation.from_quat(turns) if turns else None
+        parts = [("robot", robot), ("load", load)]
+        self._pairs = [
+            _pair(name, k, capsule) for name, part in parts for k, capsule in enumerate(part)
+        ]
+        self._message = MarkerArray(markers=[each for pair in self._pairs for each in pair])
 
-
-def shapes_of(capsules: Sequence[Capsule], link_poses: FloatArray) -> list[Shape]:
-    """Shapes of capsules on links that stand at link_poses (n+1, 4, 4)."""
-    shapes = []
-    for capsule in capsules:
-        T = link_poses[capsule.link]
-        ends = np.array([T[:3, :3] @ p + T[:3, 3] for p in (capsule.p0, capsule.p1)])
-        axis = ends[1] - ends[0]
-        length = float(np.linalg.norm(axis))
-        shapes.append(
-            Shape(
-                ends,
-                float(capsule.radius),
-                max(length, _SHORTEST),
-                ends.mean(axis=0),
-                turn_z_to(axis, length),
-            )
-        )
-    return shapes
+    def at(self, link_poses: FloatArray, stamp: Time) -> MarkerArray:
+        """All markers where the links stand (n+1, 4, 4); the same message in every call."""
+        if self._turns is None:
+            return self._message
+        poses = link_poses[self._links]
+        ends = np.einsum("kij,kej->kei", poses[:, :3, :3], self._ends) + poses[:, None, :3, 3]
+        turned = (Rotation.from_matrix(poses[:, :3, :3]) * self._turns).as_quat()
+        places = zip(self._pairs, ends.mean(axis=1), turned, ends, strict=True)
+        for (cylinder, balls), centre, quaternion, both in places:
+            cylinder.header.stamp = balls.header.stamp = stamp
+            place = cylinder.pose.position
+            place.x, place.y, place.z = centre.tolist()
+            turn = cylinder.pose.orientation
+            turn.x, turn.y, turn.z, turn.w = quaternion.tolist()
+            for ball, end in zip(balls.points, both.tolist(), strict=True):
+                ball.x, ball.y, ball.z = end
+        return self._message
 
 
 def turn_z_to(direction: FloatArray, length: float) -> FloatArray:
@@ -66,55 +74,20 @@ def turn_z_to(direction: FloatArray, length: float) -> FloatArray:
     return unit
 
 
-# Robot and load as markers: each capsule a cylinder and two balls, in messages that the node
-# makes.
-
-_COLOURS = {"robot": (1.0, 0.45, 0.1), "load": (0.35, 0.4, 0.45)}  # KUKA orange, steel
-
-
-def robot_markers(bodies: Bodies, stamp_ns: int, make: Callable[[], Any]) -> list[Any]:
-    """Markers of robot and load; make: a new visualization_msgs/Marker."""
-    parts: tuple[tuple[str, Sequence[Capsule]], ...] = (
-        ("robot", bodies.robot),
-        ("load", bodies.load),
-    )
-    return [
-        marker
-        for name, capsules in parts
-        for k, shape in enumerate(shapes_of(capsules, bodies.link_poses))
-        for marker in _markers_of(shape, name, k, stamp_ns, make)
-    ]
-
-
-def _markers_of(
-    shape: Shape, name: str, k: int, stamp_ns: int, make: Callable[[], Any]
-) -> tuple[Any, Any]:
-    """A cylinder with round ends."""
-    body = make()
-    balls = make()
-    body.type = body.CYLINDER
-    body.id = 2 * k
-    body.pose.position = point_to_msg(shape.centre)
-    turned = body.pose.orientation
-    turned.x, turned.y, turned.z, turned.w = shape.quaternion.tolist()
-    _scale(body, shape.radius, shape.length)
-    balls.type = balls.SPHERE_LIST
-    balls.id = 2 * k + 1
-    balls.points = [point_to_msg(end) for end in shape.ends]
-    _scale(balls, shape.radius, 2.0 * shape.radius)
-    for marker in (body, balls):
+def _pair(name: str, k: int, capsule: Capsule) -> tuple[Marker, Marker]:
+    """A cylinder and its round ends, of size and colour."""
+    cylinder = Marker(type=Marker.CYLINDER, id=2 * k)
+    balls = Marker(type=Marker.SPHERE_LIST, id=2 * k + 1, points=[Point(), Point()])
+    across = 2.0 * float(capsule.radius)
+    length = max(float(np.linalg.norm(capsule.p1 - capsule.p0)), _SHORTEST)
+    cylinder.scale = Vector3(x=across, y=across, z=length)
+    balls.scale = Vector3(x=across, y=across, z=across)
+    red, green, blue = _COLOURS[name]
+    for marker in (cylinder, balls):
         marker.header.frame_id = names.WORLD_FRAME
-        marker.header.stamp = time_to_msg(stamp_ns)
         marker.ns = name
-        marker.action = marker.ADD
-        marker.color.r, marker.color.g, marker.color.b = _COLOURS[name]
-        marker.color.a = 1.0
-    return body, balls
-
-
-def _scale(marker: Any, radius: float, height: float) -> None:
-    marker.scale.x = marker.scale.y = 2.0 * radius
-    marker.scale.z = height
+        marker.color = ColorRGBA(r=red, g=green, b=blue, a=1.0)
+    return cylinder, balls
 
 
 # The frames of cell, robot and load on tf and tf_static, where tf2_msgs is installed.
