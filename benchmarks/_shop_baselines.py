@@ -16,14 +16,9 @@ from ir_cli.trace_programs import today_of_trace
 from ir_krl import follow, parse
 from ir_msgs_py.report import MovementKind
 from ir_msgs_py.savings import BeforeAfter
-from ir_planner import (
-    Planner,
-    before_after,
-    before_after_common,
-    evaluate_krl,
-    today_of_krl,
-    tool_in_flange,
-)
+from ir_planner import Planner
+from ir_planner.before_after import before_after, before_after_common, today_of_krl
+from ir_planner.krl import evaluate_krl, tool_in_flange
 
 TRACES = Path(__file__).resolve().parents[1] / "examples" / "traces"
 ALONG = 0.01  # that the tool may be faster along a seam: what the speed of a path may differ by

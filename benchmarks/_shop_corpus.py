@@ -24,7 +24,8 @@ from ir_krl import (
     written,
 )
 from ir_msgs_py.arrays import FloatArray
-from ir_planner import Planner, tool_in_flange
+from ir_planner import Planner
+from ir_planner.krl import tool_in_flange
 from ir_planner.krl.execution import DrivenStep, drive
 from ir_planner.krl.export import attached
 

@@ -26,15 +26,8 @@ from _shop_traces import traces
 from ir_description import bundled_cells, load_cell
 from ir_krl import follow, parse
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner import (
-    KrlExport,
-    Planner,
-    ProgramPlan,
-    RequestError,
-    evaluate_krl,
-    export_krl,
-    tool_in_flange,
-)
+from ir_planner import Planner, ProgramPlan, RequestError
+from ir_planner.krl import KrlExport, evaluate_krl, export_krl, tool_in_flange
 from ir_planner.krl.export import contacts_at, scenes_of
 
 SEEDS = 3

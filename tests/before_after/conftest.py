@@ -8,7 +8,9 @@ import pytest
 
 from ir_krl import follow, parse
 from ir_msgs_py.savings import BeforeAfter
-from ir_planner import Planner, before_after, evaluate_krl, today_of_krl, tool_in_flange
+from ir_planner import Planner
+from ir_planner.before_after import before_after, today_of_krl
+from ir_planner.krl import evaluate_krl, tool_in_flange
 
 OLD = (Path(__file__).parent / "old.src").read_text(encoding="utf-8")
 

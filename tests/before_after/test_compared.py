@@ -9,14 +9,8 @@ import pytest
 
 from ir_msgs_py.savings import BeforeAfter
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner import (
-    Planner,
-    RequestError,
-    Stretch,
-    Today,
-    before_after,
-    before_after_common,
-)
+from ir_planner import Planner, RequestError
+from ir_planner.before_after import Stretch, Today, before_after, before_after_common
 
 
 def test_all_programs_make_the_same_stops_and_pauses(compared: BeforeAfter) -> None:

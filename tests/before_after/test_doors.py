@@ -8,7 +8,8 @@ import pytest
 from ir_cli.trace_programs import RecordedDoors
 from ir_description import ProgramStep, Signal, load_cell
 from ir_msgs_py.names import NO_LOAD
-from ir_planner import Planner, PlanOptions, Stretch, Today, parse_goal
+from ir_planner import Planner, PlanOptions, parse_goal
+from ir_planner.before_after import Stretch, Today
 from ir_planner.before_after.today_steps import (
     Asked,
     AskedProgram,

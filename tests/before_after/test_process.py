@@ -16,17 +16,11 @@ from ir_description import CellPath
 from ir_krl import follow, parse
 from ir_msgs_py.report import MovementKind
 from ir_msgs_py.savings import BeforeAfter, Side
-from ir_planner import (
-    EvaluatedProgram,
-    Planner,
-    RequestError,
-    before_after,
-    evaluate_krl,
-    today_of_krl,
-    tool_in_flange,
-)
+from ir_planner import Planner, RequestError
+from ir_planner.before_after import before_after, today_of_krl
 from ir_planner.before_after.changes import Costed, changes
 from ir_planner.before_after.today_steps import asked_program
+from ir_planner.krl import EvaluatedProgram, evaluate_krl, tool_in_flange
 
 SEAM = """PTP XHOME
 PTP {A1 30,A5 30}

@@ -229,7 +229,7 @@ def test_dividing_again_gives_the_same_bytes(divided: ConvexPieces) -> None:
 def test_a_broken_cache_is_not_believed(
     divided: ConvexPieces, cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(piece_cache, "convex_pieces", lambda triangles, most: divided)
+    monkeypatch.setattr(convex, "convex_pieces", lambda triangles, most: divided)
     for content in (b"", b"PK\x03\x04 nothing"):
         for path in (cache / "pieces").glob("*.npz"):
             path.write_bytes(content)

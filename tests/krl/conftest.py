@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from ir_krl import Followed, follow, parse
-from ir_planner import Planner, tool_in_flange
+from ir_planner import Planner
+from ir_planner.krl import tool_in_flange
 
 
 @pytest.fixture(scope="session")

@@ -16,8 +16,8 @@ from ir_krl import SetOutput, WrittenSignals, check_name, follow, parse, written
 from ir_krl.write import SignalNames
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement
-from ir_planner import Planner, RequestError, evaluate_krl, export_krl, tool_in_flange
-from ir_planner.krl import DEVIATION_MAX
+from ir_planner import Planner, RequestError
+from ir_planner.krl import DEVIATION_MAX, evaluate_krl, export_krl, tool_in_flange
 from ir_planner.krl.export import attached
 from ir_planner.krl.splines import passing_times, resting_spline
 

@@ -38,7 +38,8 @@ from ir_cli.traces import write_trace
 from ir_description import CellPath, UnknownNameError, is_path, load_path
 from ir_msgs_py.cartesian import CartesianPath
 from ir_msgs_py.report import DistancePair
-from ir_planner import CartesianPlan, Planner, assumed_doors
+from ir_planner import CartesianPlan, Planner
+from ir_planner.before_after import assumed_doors
 
 
 def add_move(move: argparse.ArgumentParser) -> None:

@@ -34,7 +34,9 @@ from ir_cli.planning import (
 from ir_cli.trace_programs import today_of_trace
 from ir_cli.traces import add_measured
 from ir_msgs_py.savings import BeforeAfter, Side
-from ir_planner import Planner, before_after, before_after_common, evaluate_krl, today_of_krl
+from ir_planner import Planner
+from ir_planner.before_after import before_after, before_after_common, today_of_krl
+from ir_planner.krl import evaluate_krl
 
 KRL = (".src", ".dat", ".sub")
 TRACES = (".csv", ".txt", ".parquet", ".mcap")

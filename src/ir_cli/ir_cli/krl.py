@@ -35,13 +35,8 @@ from ir_cli.planning import (
 from ir_description import Cell
 from ir_description.files import is_utf16
 from ir_krl import Followed, follow, parse
-from ir_planner import (
-    EvaluatedProgram,
-    Planner,
-    evaluate_krl,
-    export_krl,
-    tool_in_flange,
-)
+from ir_planner import Planner
+from ir_planner.krl import EvaluatedProgram, evaluate_krl, export_krl, tool_in_flange
 from ir_values.output_files import write_file
 
 BYTES_MAX = 4_000_000

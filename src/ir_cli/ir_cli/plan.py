@@ -36,7 +36,8 @@ from ir_cli.planning import (
 )
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
-from ir_planner import Planner, ProgramPlan, assumed_doors
+from ir_planner import Planner, ProgramPlan
+from ir_planner.before_after import assumed_doors
 from ir_values.files import ANYWHERE
 
 J_PER_KWH = 3.6e6

@@ -13,7 +13,8 @@ from ir_cli.traces import motion_of
 from ir_description import Cell, Equipment
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner import Planner, Stretch, Today
+from ir_planner import Planner
+from ir_planner.before_after import Stretch, Today
 from ir_planner.program import Doors, Progress, nobody
 from ir_recorder import read_recording
 from ir_recorder.errors import RecorderError

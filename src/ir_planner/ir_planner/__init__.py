@@ -5,18 +5,11 @@ and clearance.
     plan = planner.plan_regional(goal="lathe_work", objective="energy")
     print(plan)
 
-Everything a user needs is exported here; the rooms below are the planner's own.
+Two further topics have faces of their own, for those who have KUKA programs: `ir_planner.krl` and
+`ir_planner.before_after`. The other rooms are the planner's own.
 """
 
 from ir_msgs_py.options import PlanOptions
-from ir_planner.before_after import (
-    Stretch,
-    Today,
-    assumed_doors,
-    before_after,
-    before_after_common,
-    today_of_krl,
-)
 from ir_planner.cartesian import CartesianPlan
 from ir_planner.checks import Evaluation, StateCheck
 from ir_planner.configurations import IkAnswer
@@ -27,7 +20,6 @@ from ir_planner.errors import (
     TimingError,
     UnknownNameError,
 )
-from ir_planner.krl import EvaluatedProgram, KrlExport, evaluate_krl, export_krl, tool_in_flange
 from ir_planner.planner import Planner
 from ir_planner.program import ProgramPlan, Standby
 from ir_planner.regional import MovementPlan
@@ -41,11 +33,9 @@ from ir_planner.what_if import what_if
 __all__ = [
     "CancelledError",
     "CartesianPlan",
-    "EvaluatedProgram",
     "Evaluation",
     "Goal",
     "IkAnswer",
-    "KrlExport",
     "MovementPlan",
     "OptimizationPlan",
     "PlanOptions",
@@ -59,17 +49,8 @@ __all__ = [
     "Standby",
     "StateCheck",
     "StoredProgram",
-    "Stretch",
     "TimingError",
-    "Today",
     "UnknownNameError",
-    "assumed_doors",
-    "before_after",
-    "before_after_common",
-    "evaluate_krl",
-    "export_krl",
     "parse_goal",
-    "today_of_krl",
-    "tool_in_flange",
     "what_if",
 ]

@@ -20,7 +20,8 @@ from ir_msgs_py.ros.conversions import status_to_msg, trajectory_to_msg
 from ir_msgs_py.ros.plan_conversions import plan_options_to_msg, program_savings_to_msg
 from ir_msgs_py.ros.power_conversions import cell_state_to_msg
 from ir_msgs_py.settings import tree
-from ir_planner import Planner, ProgramPlan, assumed_doors
+from ir_planner import Planner, ProgramPlan
+from ir_planner.before_after import assumed_doors
 from ir_planner.node.answers import fill_program
 from ir_planner.node.topics import cell_state
 from ir_recorder.format import contents

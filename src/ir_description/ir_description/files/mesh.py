@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from ir_values.arrays import FloatArray, frozen
 from ir_values.errors import InvalidValueError, shown
 from ir_values.files import read_regular_file
+
+if TYPE_CHECKING:
+    from scipy.spatial import ConvexHull
 
 BYTES_MAX = 20_000_000
 TRIANGLES_MAX = 200_000
@@ -111,6 +114,8 @@ def convex_vertices(triangles: FloatArray, take_hull: bool) -> FloatArray:
 
 
 def _hull(points: FloatArray) -> ConvexHull:
+    from scipy.spatial import ConvexHull, QhullError
+
     if not np.isfinite(points).all():
         raise InvalidValueError("the mesh has corners that are not finite")
     try:

@@ -16,17 +16,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ir_description.files.convex_pieces import (
-    CONCAVITY,
-    MARGINS,
-    ConvexPieces,
-    contains,
-    convex_pieces,
-)
 from ir_description.files.mesh import (
     BYTES_MAX,
     CELL_TRIANGLES_MAX,
@@ -39,6 +32,9 @@ from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError, shown
 from ir_values.files import read_regular_file
 from ir_values.yaml_items import Table
+
+if TYPE_CHECKING:  # only cells with solids pay for the division of meshes
+    from ir_description.files.convex_pieces import ConvexPieces
 
 SUFFIXES = (".stl", ".obj", ".glb", ".gltf")
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
@@ -185,6 +181,8 @@ _BYTES_MAX = 50_000_000
 
 def pieces_of(triangles: FloatArray, most: int) -> ConvexPieces:
     """At most `most` convex pieces that contain a mesh (T, 3, 3) [m], divided now or before."""
+    from ir_description.files.convex_pieces import contains, convex_pieces
+
     path = _folder() / f"{_key(triangles, most)}.npz"
     known = _read(path)
     if known is not None and contains(known.vertices, triangles):
@@ -201,12 +199,16 @@ def _folder() -> Path:
 
 
 def _key(triangles: FloatArray, most: int) -> str:
+    from ir_description.files.convex_pieces import CONCAVITY, MARGINS
+
     settings = f"{VERSION} {most} {CONCAVITY} {MARGINS}"
     return hashlib.sha256(settings.encode() + np.ascontiguousarray(triangles).tobytes()).hexdigest()
 
 
 def _read(path: Path) -> ConvexPieces | None:
-    """What was kept, None where nothing was, or something else stands there."""
+    """The pieces kept in a file, None where nothing was, or something else stands there."""
+    from ir_description.files.convex_pieces import ConvexPieces
+
     try:
         if path.stat().st_size > _BYTES_MAX:
             return None

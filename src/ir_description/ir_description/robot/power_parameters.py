@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.special import ndtr, ndtri
 
 from ir_description.robot.power import PowerData
 from ir_description.robot.robot import Load, RobotModel
@@ -66,6 +65,8 @@ def _bounded(
     generator: np.random.Generator,
 ) -> FloatArray:
     """Draws (count, B) about 0 with covariance (B, B) between the bounds (B,)."""
+    from scipy.special import ndtr, ndtri
+
     size = len(matrix)
     precision = portable.inv(matrix)
     deviation = 1.0 / np.sqrt(np.diag(precision))

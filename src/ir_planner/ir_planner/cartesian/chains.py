@@ -4,9 +4,6 @@ import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from ir_kernels import portable
 from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
@@ -349,6 +346,9 @@ def _neighbours(
 
 def _families(count: int, before: IntArray, after: IntArray) -> IntArray:
     """Which of `count` configurations are joined (M,), by the number of their family."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     edges = coo_array((np.ones(len(before), dtype=bool), (before, after)), shape=(count, count))
     return np.asarray(connected_components(edges, directed=False)[1])
 
@@ -378,6 +378,8 @@ def _by_tree(
     q: FloatArray, layer: IntArray, turning: BoolArray, jump: float
 ) -> tuple[IntArray, IntArray]:
     """The same by a tree of all configurations: where layers are large."""
+    from scipy.spatial import cKDTree
+
     box = np.append(np.where(turning, TURN / jump, 0.0), 0.0)  # 0: not periodic
     ahead, place = (
         cKDTree(np.column_stack([without_turns(q, turning) / jump, number * _LAYER]), boxsize=box)

@@ -1,12 +1,14 @@
 """The joint curve along a path: splines of degree five through the configurations of one chain."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
@@ -16,6 +18,9 @@ from ir_planner.cartesian.path_parts import Rates, about_tool, rates_of
 from ir_planner.cartesian.tool_path import PathRefusedError, ToolPath
 from ir_planner.checks import FreeSpace
 from ir_planner.scene import PlanningScene
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 # The axes along a path: configurations of one chain at dense samples, joined by a spline of degree
 # five.
@@ -220,6 +225,8 @@ class _Problem:
     fixed: bool
 
     def angle(self, control: FloatArray) -> Angle:
+        from scipy.interpolate import BSpline
+
         return Angle(BSpline(self.knots, control, 3))
 
     def reached(self, control: FloatArray, near: Chain) -> Chain | None:
@@ -272,6 +279,8 @@ def angle_along(
 def _problem(
     path: ToolPath, chain: Chain, free_angle: float, space: FreeSpace, fixed: bool
 ) -> _Problem:
+    from scipy.interpolate import BSpline
+
     begin = float(chain.s[0])
     end = float(chain.s[-1])
     count = int(np.clip(np.ceil((end - begin) / _SPACING), _FEWEST_FREE_ANGLE, _MOST))

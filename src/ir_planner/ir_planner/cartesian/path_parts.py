@@ -1,12 +1,13 @@
 """Parts of a tool path: lines, arcs and splines over arc length, with orientations."""
 
+from __future__ import annotations
+
 import itertools
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray
@@ -14,6 +15,9 @@ from ir_msgs_py.cartesian import CIRCLE, CONSTANT, LENGTH_MAX, LINE, CartesianPa
 from ir_msgs_py.status import StatusCode
 from ir_planner.curves import RotationSpline, rotation_of, rotation_vector, turn_of
 from ir_planner.errors import RequestError
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 # Where a tool goes, as curves over their arc length: straight lines, arcs, splines through
 # places.
@@ -205,7 +209,7 @@ class ArcLength:
     (K,).
     """
 
-    def __init__(self, breaks: FloatArray, speed: "_Speed") -> None:
+    def __init__(self, breaks: FloatArray, speed: _Speed) -> None:
         share = np.linspace(0.0, 1.0, _PER_PIECE + 1)[:-1]
         u = (breaks[:-1, None] + share * np.diff(breaks)[:, None]).ravel()
         self._u = np.append(u, breaks[-1])
@@ -249,7 +253,7 @@ class Rates:
     first: float = 0.0
     second: float = 0.0
 
-    def then(self, other: "Rates") -> "Rates":
+    def then(self, other: Rates) -> Rates:
         """Of the product of two rotations."""
         return Rates(
             self.first + other.first, self.second + other.second + 2.0 * self.first * other.first
@@ -267,7 +271,7 @@ class Evenly:
     length: float
 
     @staticmethod
-    def between(start: FloatArray, end: FloatArray, length: float) -> "Evenly":
+    def between(start: FloatArray, end: FloatArray, length: float) -> Evenly:
         """The shortest turn between rotations (3, 3)."""
         return Evenly(start, rotation_vector(portable.matmul(start.T, end)), length)
 
@@ -279,7 +283,7 @@ class Evenly:
         return portable.matmul(self.start, rotation_of(share * self.turn))
 
     @property
-    def rates(self) -> "Rates":
+    def rates(self) -> Rates:
         """How fast it turns."""
         rate = float(portable.norm(self.turn)) / self.length
         return Rates(rate, rate * rate)
@@ -299,7 +303,7 @@ class ThroughPoses:
         return self._spline(np.clip(s, 0.0, self._end))
 
     @cached_property
-    def rates(self) -> "Rates":
+    def rates(self) -> Rates:
         """How fast it turns: in each piece R = R_k exp(v) with a cubic v, so that |R'| <= |v'| and
         |R''| <= |v''| + 3/2 |v'|^2.
         """

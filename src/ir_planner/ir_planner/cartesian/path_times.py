@@ -1,12 +1,13 @@
 """Times along one stroke of a path, and the trajectory that is sent."""
 
+from __future__ import annotations
+
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import BSpline
-from scipy.ndimage import convolve1d, maximum_filter1d
 
 from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray, IntArray
@@ -28,6 +29,9 @@ from ir_planner.cartesian.speed_ramps import (
 )
 from ir_planner.cartesian.tool_path import PathRefusedError
 from ir_planner.scene import MotionLimits, PlanningScene, torque_use
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 # The time along one stroke of a path, from rest to rest: the tool's speed as asked for where the
 # axes can follow; within the tolerance slower where they can't, else refused with the place and the
@@ -231,6 +235,8 @@ def _slowed(
     most = np.inf if tolerance >= 1.0 else 1.0 / (1.0 - _SHOWN * tolerance)
     knots = np.linspace(0.0, law.total, int(np.clip(law.total / _WARP_S, _WARP_MIN, _WARP_MAX)))
     slowness = np.ones(len(knots))
+    from scipy.ndimage import convolve1d, maximum_filter1d
+
     window = np.hanning(2 * _AROUND + 3)[1:-1]
     tau = np.unique(np.concatenate([_instants(law), knots]))
     owner = np.clip(np.searchsorted(knots, tau), 0, len(knots) - 1)

@@ -1,12 +1,14 @@
 """A tool path over its arc length: parts in order, with rounded corners between them."""
 
+from __future__ import annotations
+
 import itertools
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from ir_kernels import portable
 from ir_msgs_py.arrays import FloatArray, IntArray
@@ -16,6 +18,9 @@ from ir_planner.cartesian.path_parts import ArcLength, Part, Rates, about_tool, 
 from ir_planner.checks import FreeSpace
 from ir_planner.curves import turn_of
 from ir_planner.request import Context
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 # A path of the tool over its arc length: parts that follow each other, corners between them
 # rounded.

@@ -8,13 +8,18 @@ virtual, their positions follow. (As printed the linear coefficient of the last 
 t_n / 2; only with a_f t_n^2 / 2 do the end conditions hold.)
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import PPoly
 
 from ir_kernels import portable
 from ir_values.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 
 @dataclass(frozen=True)
@@ -83,6 +88,8 @@ def natural_durations(points: FloatArray, velocity_max: FloatArray) -> FloatArra
 
 def to_ppoly(spline: JointSpline) -> PPoly:
     """The spline as scipy's piecewise polynomial."""
+    from scipy.interpolate import PPoly
+
     h = np.diff(spline.times)[:, None]
     jerk = np.diff(spline.accelerations, axis=0) / h
     c = np.stack(

@@ -6,7 +6,6 @@ volume 2 (2012), section 10.6.
 """
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ir_kernels import portable
 from ir_values.arrays import FloatArray
@@ -67,6 +66,8 @@ def turned_evenly(first: FloatArray, last: FloatArray, share: FloatArray) -> Flo
 
 def _quaternions(rotations: FloatArray) -> FloatArray:
     """(..., 4) x, y, z, w with w >= 0."""
+    from scipy.spatial.transform import Rotation
+
     R = np.asarray(rotations, dtype=float)
     q = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat()  # roots and quotients alone
     q = np.where(q[:, 3:] < 0.0, -q, q)

@@ -12,7 +12,6 @@ time.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import convolve1d, maximum_filter1d
 
 from ir_kernels import portable
 from ir_msgs_py.trajectory import JointTrajectory
@@ -303,6 +302,8 @@ def _slowed_where_needed(
     """s and duration with more time around the intervals in which a limit is exceeded: the best of
     some rounds.
     """
+    from scipy.ndimage import convolve1d, maximum_filter1d
+
     window = np.hanning(2 * _AROUND + 3)[1:-1]
     knots = np.concatenate([[0], np.arange(2, len(s) + 2), [len(s) + 3]])
     best: tuple[float, FloatArray, float] | None = None

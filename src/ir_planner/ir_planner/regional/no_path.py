@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, label
 
 from ir_description import Body, Capsule, RobotModel
 from ir_kernels import portable
@@ -114,11 +113,15 @@ class BallField:
         """Number of the connected component of each cube (X, Y, Z) in which a ball that needs so
         many m may be, up to `beyond` m from where joint 2 may be; 0: in none.
         """
+        from scipy.ndimage import label
+
         there = (self.left > needed - _CORNER) & (self.circle <= beyond + _CORNER)
         return np.asarray(label(there, _NEIGHBOURS)[0], np.int32)
 
     def beside_widest_exit(self, part: BoolArray) -> int:
         """Number of the body at which what surrounds a part (X, Y, Z) of the space leaves most."""
+        from scipy.ndimage import binary_dilation
+
         around = binary_dilation(part) & ~part & (self.nearest >= 0)
         places = np.flatnonzero(around)
         return int(self.nearest.ravel()[places[np.argmax(self.left.ravel()[places])]])

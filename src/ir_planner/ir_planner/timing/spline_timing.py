@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgtsv
 
 from ir_kernels import portable
 from ir_msgs_py.trajectory import JointTrajectory
@@ -62,6 +61,8 @@ def spline_use(
 
 def _knots(points: FloatArray, span: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """q, qd, qdd (M+2, n) at the knots of the spline whose segments last `span` (M+1,) s."""
+    from scipy.linalg.lapack import dgtsv
+
     q = np.concatenate([points[:1], points[:1], points[1:-1], points[-1:], points[-1:]])
     h = span[:, None]
     slope = np.diff(q, axis=0) / h
