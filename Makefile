@@ -41,10 +41,11 @@ test-versions: setup-tests ## the tests with the oldest versions, and with the n
 	@$(BIN)/python tools/oldest_versions.py $(ARGS)
 	@$(BIN)/python tools/oldest_versions.py --newest --python 3.12 --python 3.13 $(ARGS)
 
-check: setup-tests ## ruff and mypy --strict
+check: setup-tests ## ruff, mypy --strict and dead code
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
+	@$(BIN)/python tools/dead_code.py
 
 processors: setup-tests ## are answers the same bytes on other processors? ARGS='--tests' also runs tests as they would
 	@$(BIN)/python tools/processors.py $(ARGS)

@@ -244,12 +244,6 @@ class Page:
         path.write_bytes(base64.b64decode(answer["data"]))
         return path
 
-    def pdf(self, path: Path) -> Path:
-        """Prints the page into a PDF, on the paper that the page asks for."""
-        answer = self.call("Page.printToPDF", preferCSSPageSize=True, printBackground=True)
-        path.write_bytes(base64.b64decode(answer["data"]))
-        return path
-
     def downloads(self, folder: Path) -> None:
         """Files that the page offers go into a folder without asking."""
         self._browser.call(

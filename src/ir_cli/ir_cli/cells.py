@@ -151,13 +151,6 @@ STATIONS: Columns = {
     "clearance": ("clearance mm", number(1, 1e3)),
     "obstacle": ("obstructed by", text),
 }
-CELLS: Columns = {
-    "cell": ("cell", text),
-    "robot": ("robot", text),
-    "machines": ("machines", text),
-    "stations": ("stations", text),
-    "steps": ("steps", text),
-}
 
 
 def add_check(check: argparse.ArgumentParser) -> None:

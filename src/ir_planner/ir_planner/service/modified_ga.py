@@ -60,8 +60,6 @@ def counted(numbers: IntArray) -> list[tuple[int, int]]:
 # M_i = sum_{l>=i} m_l, the load with the last link. As printed W_i is proportional to M_i
 # ("literal"); the option "inverse" lets the light joints, which move little of the arm, step more.
 
-WEIGHTINGS = ("literal", "inverse")
-
 
 def accumulated_mass(link_mass: FloatArray, load_mass: float = 0.0) -> FloatArray:
     """M (n,) kg behind each joint; `link_mass` (n+1,) from the base on."""
