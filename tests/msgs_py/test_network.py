@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from ir_msgs_py.errors import ParameterError
-from ir_msgs_py.ros.network import CHOICES, apply_network, network_variables
+from ir_msgs_py.ros.network import CHOICES, apply_network, network_variables, profile
 from ir_msgs_py.ros.testing import PATIENCE
 
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
@@ -29,6 +29,15 @@ def test_whatever_the_range_says_discovery_stays_here(asked: str) -> None:
     assert environment[RANGE] == "LOCALHOST"
     assert PEERS not in environment
     assert "<address>127.0.0.1</address>" in Path(environment[PROFILES]).read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", ["loopback", "fast_discovery"])
+def test_what_a_full_receiver_dropped_is_sent_again_soon(name: str) -> None:
+    """By default it takes 3 s, and as long again each time that the receiver is full."""
+    text = Path(profile(name)).read_text(encoding="utf-8")
+    period = re.search(r"<heartbeatPeriod>\s*<sec>0</sec>\s*<nanosec>(\d+)", text)
+    assert period is not None
+    assert int(period[1]) <= 50_000_000
 
 
 def test_no_discovery_at_all_stays_none() -> None:
