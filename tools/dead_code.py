@@ -25,6 +25,7 @@ KNOWN = (
     ("src/ir_recorder/ir_recorder/live/server.py", "*", "the interface of http.server"),
     ("src/ir_msgs_py/ir_msgs_py/ros/*", "*_execution can_execute entity", "callbacks of rclpy"),
     ("src/ir_msgs_py/ir_msgs_py/ros/*", "get_num_entities add_to_wait_set", "callbacks of rclpy"),
+    ("src/ir_msgs_py/ir_msgs_py/ros/*", "*_from_msg", "conversions back, tested in pairs by name"),
     ("src/ir_msgs_py/ir_msgs_py/ros/*", "*_range clock_callback _*goal_request*", "its attributes"),
     ("src/ir_*/ir_*/node/*", "_*", "rclpy keeps an entity as long as its node refers to it"),
     ("src/ir_planner/ir_planner/node/answers.py", "*", "fields of messages"),

@@ -36,6 +36,7 @@ from ir_msgs_py.report import (
     TrajectoryReport,
 )
 from ir_msgs_py.ros.conversions import (
+    configuration_from_msg,
     configuration_to_msg,
     float_array,
     point_from_msg,
@@ -326,6 +327,18 @@ def ik_solution_to_msg(solution: IkSolution) -> IkSolutionMsg:
     )
 
 
+def ik_solution_from_msg(msg: IkSolutionMsg) -> IkSolution:
+    """Configuration that reaches a pose."""
+    return IkSolution(
+        joint_names=tuple(msg.state.name),
+        q=msg.state.position,
+        branch=msg.branch,
+        turns=tuple(msg.turns),
+        closest=distance_pair_from_msg(msg.closest),
+        **{name: getattr(msg, name) for name in _IK_NUMBERS},
+    )
+
+
 def service_candidate_to_msg(
     candidate: ServiceCandidate, include_points: bool = True
 ) -> ServiceCandidateMsg:
@@ -338,4 +351,20 @@ def service_candidate_to_msg(
         trajectory_id=candidate.trajectory_id,
         trajectory=JointTrajectoryMsg() if points is None else trajectory_to_msg(points),
         report=report_to_msg(candidate.report),
+    )
+
+
+def service_candidate_from_msg(msg: ServiceCandidateMsg) -> ServiceCandidate:
+    """Withdrawal or entry; trajectory None where the message carries no points."""
+    names = tuple(msg.work_configuration.name)
+    return ServiceCandidate(
+        method=msg.method,
+        joint_names=names,
+        work=configuration_from_msg(msg.work_configuration, names),
+        outside=configuration_from_msg(msg.outside_configuration, names),
+        trajectory_id=msg.trajectory_id,
+        trajectory=trajectory_from_msg(msg.trajectory)
+        if trajectory_given(msg.trajectory)
+        else None,
+        report=report_from_msg(msg.report),
     )

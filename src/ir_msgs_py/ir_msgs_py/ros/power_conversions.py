@@ -37,7 +37,7 @@ from ir_msgs_py.ros.conversions import (
     time_from_msg,
     time_to_msg,
 )
-from ir_msgs_py.ros.plan_conversions import planned_movement_to_msg
+from ir_msgs_py.ros.plan_conversions import planned_movement_from_msg, planned_movement_to_msg
 from ir_values.errors import InvalidValueError, ParameterError
 
 _POWER_MODE = tuple(field.name for field in fields(PowerMode))
@@ -69,6 +69,17 @@ def power_state_to_msg(state: PowerState) -> PowerStateMsg:
     return msg
 
 
+def power_state_from_msg(msg: PowerStateMsg) -> PowerState:
+    """Reading of the mains meter."""
+    return PowerState(
+        stamp_ns=time_from_msg(msg.header.stamp),
+        mode=msg.mode,
+        target_mode=msg.target_mode,
+        plant=msg.plant,
+        **{name: getattr(msg, name) for name in (*METER, *AXES)},
+    )
+
+
 def plc_inputs_to_msg(inputs: PlcInputs) -> PlcInputsMsg:
     """Levels from the PLC."""
     values = {name: getattr(inputs, name) for name in _INPUTS}
@@ -86,6 +97,13 @@ def plc_outputs_to_msg(outputs: PlcOutputs) -> PlcOutputsMsg:
     msg = PlcOutputsMsg(**{**values, "operating_mode": int(outputs.operating_mode)})
     msg.header.stamp = time_to_msg(outputs.stamp_ns)
     return msg
+
+
+def plc_outputs_from_msg(msg: PlcOutputsMsg) -> PlcOutputs:
+    """Levels from the controller."""
+    return PlcOutputs(
+        stamp_ns=time_from_msg(msg.header.stamp), **{name: getattr(msg, name) for name in _OUTPUTS}
+    )
 
 
 def signal_to_msg(signal: Signal) -> SignalMsg:
@@ -110,6 +128,19 @@ def program_state_to_msg(state: ProgramState) -> ProgramStateMsg:
     )
     msg.header.stamp = time_to_msg(state.stamp_ns)
     return msg
+
+
+def program_state_from_msg(msg: ProgramStateMsg) -> ProgramState:
+    """Event of a program."""
+    return ProgramState(
+        stamp_ns=time_from_msg(msg.header.stamp),
+        program_id=msg.program_id,
+        index=msg.index,
+        total=msg.total,
+        event=msg.event,
+        movement=planned_movement_from_msg(msg.movement),
+        note=msg.note,
+    )
 
 
 _UPPER = np.triu_indices(3)
