@@ -18,9 +18,9 @@ from hypothesis import strategies as st
 
 from ir_msgs_py.savings import ProgramPoint
 from ir_recorder import Analysis, analyse, findings
+from ir_recorder.analysis.production import production_of
 from ir_recorder.report.charts import COLOURS, MARKS, Point, front_chart, front_section, pareto
 from ir_recorder.report.compare import comparison_html
-from ir_recorder.report.costs import cycle_of
 from ir_recorder.report.headline import source
 from ir_recorder.report.page import asset
 from ir_recorder.report.step_table import step_columns, write_table
@@ -171,7 +171,7 @@ def test_plans_that_were_not_driven_are_compared_by_what_was_predicted(analysis:
     page = page_of(plan, plan)
     assert page.count("predicted, not driven") == 2
     assert "3 800 J" in page
-    cycle = cycle_of(plan)
+    cycle = production_of(plan)
     assert cycle is not None
     assert (cycle.energy, cycle.seconds) == (3800.0, 5.7)
     assert "this run" not in front_section(plan)

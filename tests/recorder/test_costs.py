@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from ir_recorder import Analysis, analyse
+from ir_recorder.analysis.production import production_of
 from ir_recorder.errors import RecorderError
 from ir_recorder.report.costs import (
     NAMES,
     Costs,
     costs_section,
-    cycle_of,
     lever_section,
     read_costs,
 )
@@ -84,8 +84,8 @@ def test_assumptions_are_marked_and_given_figures_are_not(analysis: Analysis) ->
 
 
 def test_the_cycle_is_the_one_with_full_pauses(analysis: Analysis) -> None:
-    run = cycle_of(analysis)
-    full = cycle_of(
+    run = production_of(analysis)
+    full = production_of(
         analyse(replace(analysis.recording, facts=(("unshortened_pauses", "600 s, 1800 s"),)))
     )
     assert run is not None

@@ -28,7 +28,7 @@ from ir_recorder.report.fleet import (
     recordings_below,
     robots_of,
     write_fleet_table,
-    yearly_of,
+    year_of,
 )
 from ir_values.files import FileRoots
 
@@ -42,14 +42,17 @@ def member(analysis: Analysis) -> Member:
 
 def test_the_sums_are_those_of_the_members(member: Member) -> None:
     costs = Costs()
-    other = replace(member, robot="right", joules=2.0 * member.joules)
+    cycle = member.cycle
+    modes = {k: replace(v, energy=2.0 * v.energy) for k, v in cycle.modes.items()}
+    energies = {name: 2.0 * getattr(cycle, name) for name in ("energy", "low", "high")}
+    other = replace(member, robot="right", cycle=replace(cycle, modes=modes, **energies))
     robots = robots_of([member, other], costs)
     assert [robot.name for robot in robots] == ["right", "left"]
-    assert robots[0].yearly == pytest.approx(2.0 * yearly_of(member, costs))
-    by_robot = {robot.name: robot.yearly for robot in robots}
-    for found in (by_mode([member, other], costs),):
-        for robot, yearly in by_robot.items():
-            assert sum(own.get(robot, 0.0) for own in found.values()) == pytest.approx(yearly)
+    assert robots[0].yearly.value == pytest.approx(2.0 * year_of(member, costs).value)
+    by_robot = {robot.name: robot.yearly.value for robot in robots}
+    found = by_mode([member, other], costs)
+    for robot, yearly in by_robot.items():
+        assert sum(own.get(robot, 0.0) for own in found.values()) == pytest.approx(yearly)
     moved = by_movement([member], costs)
     assert sum(sum(own.values()) for own in moved.values()) <= 1.001 * by_robot["left"]
     measures = by_measure([member], costs)
@@ -166,8 +169,8 @@ def test_several_cycles_of_a_recording_are_one_on_average(analysis: Analysis) ->
     twice = member_of(replace(analysis, steps=(*analysis.steps, *analysis.steps)), "r")
     assert once is not None
     assert twice is not None
-    assert twice.joules == pytest.approx(0.5 * once.joules)
-    assert twice.seconds == pytest.approx(0.5 * once.seconds)
+    assert twice.cycle.energy == pytest.approx(0.5 * once.cycle.energy)
+    assert twice.cycle.seconds == pytest.approx(0.5 * once.cycle.seconds)
     said: list[str] = []
     more = member_of(
         replace(analysis, steps=(*analysis.steps, analysis.steps[0])), "r", said.append

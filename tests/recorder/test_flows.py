@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ir_recorder import Analysis, analyse
-from ir_recorder.analysis.flows import EnergyFlows, energy_flows, levers
+from ir_recorder.analysis.flows import EnergyFlows, energy_flows
+from ir_recorder.analysis.production import levers
 from ir_recorder.report.sankey import TALL, rows, sankey, sankey_section
 
 OF_READINGS = 1.0  # J: the program's ends lie between two readings of the meter

@@ -41,6 +41,7 @@ from ir_recorder.analysis.resting_power import plateaus
 from ir_recorder.analysis.results import (
     NAN,
     Analysis,
+    FullPause,
     ProgramTotals,
     Share,
     StepResult,
@@ -101,28 +102,56 @@ def unshortened_cycle(
     lengths = [float(number) for number in re.findall(r"\d+(?:\.\d+)?(?=\s*s\b)", fact)]
     if not lengths:
         return None
-    pauses = [r for r in results if r.step.movement.is_pause and r.step.movement.power_mode]
+    pauses = [
+        (place, result)
+        for place, result in enumerate(results)
+        if result.step.movement.is_pause and result.step.movement.power_mode
+    ]
+    run_pauses = sum(result.seconds for _, result in pauses)
+    if len(pauses) != len(lengths):
+        return Unshortened(NAN, NAN, run_pauses, sum(lengths))
+    added = tuple(
+        _full_pause(place, result, length, change, timer, watts)
+        for (place, result), length in zip(pauses, lengths, strict=True)
+    )
     start = results[0].step.start
     end = results[-1].step.end
-    if len(pauses) != len(lengths):
-        return Unshortened(NAN, NAN, sum(r.seconds for r in pauses), sum(lengths))
-    energy = meter.energy(start, end)
-    seconds = end - start
-    for result, length in zip(pauses, lengths, strict=True):
-        sequence = result.step.movement.power_mode
-        mode = deepest(sequence)
-        motors = watts(MOTORS, result)
-        if (
-            mode != sequence and length >= result.seconds
-        ):  # one after the other: the last one lasts longer
-            full = result.energy + (length - result.seconds) * watts(mode, result)
-        elif mode == MOTORS or length < change(mode):
-            full = left_alone_joules(motors, watts(BRAKES, result), length, timer, change(BRAKES))
-        else:
-            full = pause_joules(watts(mode, result), motors, length, change(mode))
-        energy = energy + full - result.energy
-        seconds = seconds + length - result.seconds
-    return Unshortened(seconds, energy, sum(r.seconds for r in pauses), sum(lengths))
+    return Unshortened(
+        end - start + sum(pause.seconds for pause in added),
+        meter.energy(start, end) + sum(pause.energy for pause in added),
+        run_pauses,
+        sum(lengths),
+        added,
+    )
+
+
+def _full_pause(
+    place: int,
+    result: StepResult,
+    length: float,
+    change: Callable[[str], float],
+    timer: float,
+    watts: Watts,
+) -> FullPause:
+    """What `length` [s] adds to a pause of the run, and to that of the common program."""
+    sequence = result.step.movement.power_mode
+    mode = deepest(sequence)
+    motors = watts(MOTORS, result)
+    brakes = watts(BRAKES, result)
+
+    def left_alone(seconds: float) -> float:
+        return left_alone_joules(motors, brakes, seconds, timer, change(BRAKES))
+
+    if mode != sequence and length >= result.seconds:
+        # one mode after the other: the last one lasts longer
+        full = result.energy + (length - result.seconds) * watts(mode, result)
+    elif mode == MOTORS or length < change(mode):
+        full = left_alone(length)
+        mode = BRAKES if length > timer + change(BRAKES) else MOTORS
+    else:
+        full = pause_joules(watts(mode, result), motors, length, change(mode))
+    common = left_alone(length) - left_alone(result.seconds)
+    return FullPause(place, mode, length - result.seconds, full - result.energy, common)
 
 
 def _measured(name: str, results: Sequence[StepResult]) -> Share:

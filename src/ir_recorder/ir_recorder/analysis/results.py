@@ -158,17 +158,34 @@ class StationUse:
 
 
 @dataclass(frozen=True)
+class FullPause:
+    """What the full length of a shortened pause adds to the run, computed.
+
+    step: its place among the results; mode: where the time is spent. energy [J]; common_energy [J]:
+    the same for the common program, whose controller closes the brakes by its own timer.
+    """
+
+    step: int
+    mode: str
+    seconds: float
+    energy: float
+    common_energy: float
+
+
+@dataclass(frozen=True)
 class Unshortened:
     """The cycle with its pauses in power modes at full length: seconds [s] and energy [J],
     computed.
 
-    NaN where the pauses of the run don't match. run_pauses, full_pauses [s]: their sums.
+    NaN where the pauses of the run don't match. run_pauses, full_pauses [s]: their sums; added: by
+    pause.
     """
 
     seconds: float
     energy: float
     run_pauses: float
     full_pauses: float
+    added: tuple[FullPause, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,11 @@ import numpy as np
 from ir_msgs_py.savings import ProgramSavings
 from ir_recorder.analysis import Analysis, Finding, summary
 from ir_recorder.analysis.flows import energy_flows
+from ir_recorder.analysis.production import planned_clearance, planned_share, production_of
 from ir_recorder.analysis.results import ProgramTotals, Share
 from ir_recorder.analysis.steps import step_label
 from ir_recorder.report.charts import Point, front_chart
-from ir_recorder.report.costs import Costs, cycle_of, money, planned_clearance, planned_share
+from ir_recorder.report.costs import Costs, money
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import plant_of
 from ir_recorder.report.number_text import DASH, joules, millimetres, percent, seconds, text, watts
@@ -115,7 +116,7 @@ def _against(value: float, first: float, unit: Callable[[float], str], own: bool
 
 
 def _yearly(analysis: Analysis, costs: Costs) -> str:
-    cycle = cycle_of(analysis)
+    cycle = production_of(analysis)
     if cycle is None:
         return DASH
     return text(

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ir_description import DescriptionFileError
 from ir_description.files import plain_yaml
-from ir_msgs_py.report import PlannedMovement
-from ir_msgs_py.savings import Saving
+from ir_msgs_py.savings import ProgramSavings, Saving
 from ir_recorder.analysis import Analysis
-from ir_recorder.analysis.flows import levers
-from ir_recorder.analysis.results import Share
+from ir_recorder.analysis.production import levers, production_of
 from ir_recorder.errors import RecorderError
 from ir_recorder.report.number_text import (
     DASH,
@@ -136,91 +133,33 @@ def _checked(where: str, key: str, value: object) -> float | str:
     return float(value)
 
 
-# Figures of a program that was planned and not driven.
-
-_PARTS = {"whole": (True, False), "movements": (False,), "pauses": (True,)}
-
-
-def planned_share(steps: Sequence[PlannedMovement], part: str = "whole") -> Share | None:
-    """Time and energy of the whole program, its movements or its pauses; None for no plan or
-    another part.
-    """
-    if not steps or part not in _PARTS:
-        return None
-    own = [step for step in steps if step.is_pause in _PARTS[part]]
-    return Share(part, sum(step.duration for step in own), sum(step.report.energy for step in own))
-
-
-def planned_interval(steps: Sequence[PlannedMovement]) -> tuple[float, float] | None:
-    """90 % interval of the whole energy [J], None where the plan has none."""
-    low, high = (
-        sum(getattr(step.report, name) for step in steps) for name in ("energy_low", "energy_high")
-    )
-    return (low, high) if high > low else None
-
-
-def planned_clearance(steps: Sequence[PlannedMovement]) -> float:
-    """The least clearance of the movements [m], NaN without any."""
-    return min((step.report.min_clearance for step in steps if not step.is_pause), default=math.nan)
-
-
 # What a cycle costs and what its plan saves: joules, money and CO2 per part, per shift and per
 # year.
 
 
-@dataclass(frozen=True)
-class Cycle:
-    """Energy [J] and time [s] of the cycle that the costs are of; name: which cycle that is."""
-
-    name: str
-    energy: float
-    seconds: float
-
-
-def cycle_of(analysis: Analysis) -> Cycle | None:
-    """The cycle as it is in production: with full pauses where the run's are shortened; of a plan
-    that was not driven the planned one; None without either.
-    """
-    program = analysis.program
-    savings = analysis.savings
-    planned = planned_share(analysis.recording.planned)
-    if program is None and planned is not None:
-        return Cycle("planned program, predicted", planned.energy, planned.seconds)
-    if program is None and savings is not None and savings.total.seconds > 0.0:
-        name = "planned in the common program's time, predicted"
-        return Cycle(name, savings.total.planned, savings.total.seconds)
-    if program is None or not math.isfinite(program.whole.energy) or program.whole.seconds <= 0.0:
-        return None
-    full = program.unshortened
-    if full is not None and math.isfinite(full.energy):
-        return Cycle(
-            "cycle with full pauses, computed from this run and the data", full.energy, full.seconds
-        )
-    name = "this run" if full is None else "this run, its pauses shortened"
-    return Cycle(name, program.whole.energy, program.whole.seconds)
-
-
 def costs_section(analysis: Analysis, costs: Costs) -> str:
-    """Section of the page; "" where no program was executed or its energy is unknown."""
-    cycle = cycle_of(analysis)
+    """Section of the page; "" where no whole cycle is known."""
+    cycle = production_of(analysis)
     if cycle is None:
         return ""
-    shift = costs.cycles_per_shift(cycle.seconds)
-    year = costs.cycles_per_year(cycle.seconds)
-    counts = (1.0 / costs.parts_per_cycle, shift, year)
+    counts = (
+        1.0 / costs.parts_per_cycle,
+        costs.cycles_per_shift(cycle.seconds),
+        costs.cycles_per_year(cycle.seconds),
+    )
     rows = [_row(cycle.name, cycle.energy, cycle.seconds, counts, costs)]
-    rows += _saved(analysis, counts, costs)
+    rows += _saved(cycle.savings, counts, costs)
     heads = ("", ">a cycle", ">a part", ">a shift", ">a year")
     origin = (
         analysis.recording.origin
         if analysis.program is not None
         else "not there: nothing was driven"
     )
+    notes = "".join(f" {note[0].upper()}{note[1:]}." for note in cycle.notes)
     return (
         '<section id="costs"><h2>What a cycle costs</h2>'
         f'<p class="hint">Energy of the run is {text(origin)}; savings are predicted, with their '
-        "90 % "
-        "interval, at the same number of cycles.</p>"
+        f"90 % interval, at the same number of cycles.{text(notes)}</p>"
         f"{table(heads, rows, 'What a cycle costs')}{_assumptions(costs, counts)}</section>"
     )
 
@@ -253,21 +192,15 @@ def money(value: float, currency: str) -> str:
     return f"{shown.replace(',', ' ')} {currency}"
 
 
-def _saved(analysis: Analysis, counts: tuple[float, ...], costs: Costs) -> list[tuple[str, ...]]:
-    savings = analysis.savings
+def _saved(
+    savings: ProgramSavings | None, counts: tuple[float, ...], costs: Costs
+) -> list[tuple[str, ...]]:
     if savings is None:
         return []
-    program = analysis.program
-    cut = (
-        " (pauses as shortened)" if program is not None and program.unshortened is not None else ""
-    )
-    parts = [("saved by its movements", savings.movements, "")]
+    parts = [("saved by its movements", savings.movements)]
     if savings.pauses.seconds > 0.0:
-        parts += [
-            ("saved in its pauses", savings.pauses, cut),
-            ("saved together", savings.total, cut),
-        ]
-    return [_saving(f"{name}{note}", saving, counts, costs) for name, saving, note in parts]
+        parts += [("saved in its pauses", savings.pauses), ("saved together", savings.total)]
+    return [_saving(name, saving, counts, costs) for name, saving in parts]
 
 
 def _saving(name: str, saving: Saving, counts: tuple[float, ...], costs: Costs) -> tuple[str, ...]:
@@ -308,22 +241,21 @@ def _assumptions(costs: Costs, counts: tuple[float, ...]) -> str:
 def lever_section(analysis: Analysis, costs: Costs) -> str:
     """Section of the page; "" where no lever is known."""
     found = levers(analysis)
-    program = analysis.program
-    cycle = cycle_of(analysis)
-    if not found or program is None or cycle is None:
+    cycle = production_of(analysis)
+    if not found or cycle is None:
         return ""
     yearly = costs.cycles_per_year(cycle.seconds)
     rows = (
         (
             text(lever.name),
             f"at most <b>{joules(lever.joules)}</b>",
-            share(lever.joules, program.whole.energy),
+            share(lever.joules, cycle.energy),
             text(money(costs.money(lever.joules * yearly), costs.currency)),
             f"{text(lever.means)}<small>counted: {text(lever.basis)}</small>",
         )
         for lever in found
     )
-    heads = ("lever", ">joules of this run", ">share", ">a year, at most", "what would save them")
+    heads = ("lever", ">joules of a cycle", ">share", ">a year, at most", "what would save them")
     return (
         '<section id="levers"><h2>The biggest levers</h2><p class="hint">Upper bounds from '
         "figures of this "

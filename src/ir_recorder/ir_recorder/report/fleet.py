@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -10,15 +9,23 @@ from hashlib import sha256
 from pathlib import Path
 
 from ir_recorder.analysis import Analysis, analyse
-from ir_recorder.analysis.flows import levers
-from ir_recorder.analysis.results import Share
+from ir_recorder.analysis.production import (
+    Amount,
+    Production,
+    levers,
+    mean_of,
+    production_of,
+    sum_of,
+    without_production,
+)
 from ir_recorder.errors import ReadError, RecorderError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import is_further_part
 from ir_recorder.reading.reader import read_recording
 from ir_recorder.report.costs import SETTINGS, Costs, money
 from ir_recorder.report.files import write_output
-from ir_recorder.report.number_text import joules, kilowatt_hours, number, seconds, text
+from ir_recorder.report.methods import counted
+from ir_recorder.report.number_text import DASH, joules, kilowatt_hours, number, seconds, text
 from ir_recorder.report.page import PAGE_START, asset
 from ir_recorder.report.step_table import TableValue, write_columns
 from ir_recorder.report.tables import table
@@ -124,28 +131,18 @@ def _distinguished(files: Sequence[RecordedFile]) -> list[RecordedFile]:
 # What a fleet keeps of each recording: totals only, so that hundreds of them fit.
 
 MOST = 200  # recordings of a fleet
-PLANNED = "its program as planned"  # a measure beside the levers
-ENDED = "ended"  # outcome of a step
 
 
 @dataclass(frozen=True)
 class Member:
-    """A recording of a robot. robot: the folder that the file lies in, or its own name; origin:
-    "measured", "simulated", "recorded", or "predicted" for a plan that was not driven.
-
-    seconds, joules: of a cycle; modes, movements: seconds and joules by name (modes: of the whole
-    recording);
-    measures: joules of a cycle that each could save at most.
+    """A recording of a robot. robot: the folder that the file lies in, or its own name; cycle: what
+    its program takes in production; measures: joules of a cycle that each could save at most.
     """
 
     robot: str
     file: str
     cell: str
-    origin: str
-    seconds: float
-    joules: float
-    modes: Mapping[str, Share]
-    movements: Mapping[str, Share]
+    cycle: Production
     measures: Mapping[str, float]
 
 
@@ -185,85 +182,15 @@ def member_of(analysis: Analysis, robot: str, said: Said = lambda _: None) -> Me
     """The totals of a recording; None where it has none, and `said` hears why, and what limits
     them.
     """
-    recording = analysis.recording
-    savings = analysis.savings
+    cycle = production_of(analysis)
+    if cycle is None:
+        said(f"left out: {without_production(analysis)}")
+        return None
+    for note in cycle.notes:
+        said(note)
     cell = analysis.cell.name if analysis.cell is not None else ""
     measures = {lever.name: lever.joules for lever in levers(analysis, most=20)}
-    if analysis.program is not None and math.isfinite(analysis.program.whole.energy):
-        return _driven(analysis, robot, cell, measures, said)
-    if savings is None:
-        said("left out: it holds neither a program that was driven nor a plan with its savings")
-        return None
-    total = savings.total
-    parts = {"movements": savings.movements, "pauses": savings.pauses}
-    movements = {
-        name: Share(name, one.seconds, one.planned)
-        for name, one in parts.items()
-        if one.seconds > 0.0
-    }
-    measures[PLANNED] = total.saved
-    return Member(
-        robot,
-        recording.path.name,
-        cell,
-        "predicted",
-        total.seconds,
-        total.planned,
-        {},
-        movements,
-        measures,
-    )
-
-
-def _driven(
-    analysis: Analysis, robot: str, cell: str, measures: Mapping[str, float], said: Said
-) -> Member | None:
-    """The mean cycle of a program that was driven; None where no cycle was driven to its end."""
-    recording = analysis.recording
-    program = analysis.program
-    assert program is not None  # asked before
-    cycles, ended = _cycles(analysis)
-    if cycles < 1.0:
-        said(f"left out: its program was not driven to the end: {ended}")
-        return None
-    if cycles != round(cycles):
-        said(
-            f"its last cycle was not driven to the end ({ended}): it counts as "
-            f"{cycles % 1.0:.2f} of one"
-        )
-    if program.unshortened is not None:
-        said("the pauses of the run are shortened: its year is one of such cycles")
-    return Member(
-        robot,
-        recording.path.name,
-        cell,
-        recording.origin,
-        program.whole.seconds / cycles,
-        program.whole.energy / cycles,
-        {share.name: share for share in analysis.modes},
-        _by_name((r.step.label, r.seconds / cycles, r.energy / cycles) for r in analysis.steps),
-        {name: joules / cycles for name, joules in measures.items()},
-    )
-
-
-def _cycles(analysis: Analysis) -> tuple[float, str]:
-    """How many cycles of its program a recording holds, and of the steps which ended, in words."""
-    steps = [result.step for result in analysis.steps]
-    ended = sum(step.outcome == ENDED for step in steps)
-    total = steps[0].total
-    return ended / max(total, 1), f"{ended % total or total} of {total} steps ended"
-
-
-def _by_name(rows: Iterator[tuple[str, float, float]]) -> dict[str, Share]:
-    found: dict[str, Share] = {}
-    for name, time, energy in rows:
-        before = found.get(name, Share(name, 0.0, 0.0))
-        found[name] = Share(
-            name,
-            before.seconds + time,
-            before.energy + (energy if math.isfinite(energy) else 0.0),
-        )
-    return found
+    return Member(robot, analysis.recording.path.name, cell, cycle, measures)
 
 
 # Sums over the members of a fleet, in production: joules of a year by robot, mode, movement and
@@ -272,8 +199,8 @@ def _by_name(rows: Iterator[tuple[str, float, float]]) -> dict[str, Share]:
 
 @dataclass(frozen=True)
 class Robot:
-    """All members of one robot: recordings, mean seconds and joules of a cycle, joules of a
-    year.
+    """All members of one robot: recordings, mean seconds and joules of a cycle; joules of a year,
+    and those that its plans save of the common program's, each with its 90 % interval.
     """
 
     name: str
@@ -282,7 +209,8 @@ class Robot:
     recordings: int
     seconds: float
     joules: float
-    yearly: float
+    yearly: Amount
+    saved: Amount | None
 
 
 def robots_of(members: Sequence[Member], costs: Costs) -> list[Robot]:
@@ -292,37 +220,52 @@ def robots_of(members: Sequence[Member], costs: Costs) -> list[Robot]:
     found = []
     for name in dict.fromkeys(member.robot for member in members):
         own = [member for member in members if member.robot == name]
-        seconds, joules = (
-            sum(values) / len(own) for values in ([m.seconds for m in own], [m.joules for m in own])
+        saved = [amount for member in own if (amount := saved_of(member, costs)) is not None]
+        found.append(
+            Robot(
+                name,
+                ", ".join(dict.fromkeys(member.cell for member in own if member.cell)),
+                tuple(dict.fromkeys(member.cycle.origin for member in own)),
+                len(own),
+                sum(member.cycle.seconds for member in own) / len(own),
+                sum(member.cycle.energy for member in own) / len(own),
+                mean_of([year_of(member, costs) for member in own]),
+                mean_of(saved) if saved else None,
+            )
         )
-        yearly = sum(yearly_of(member, costs) for member in own) / len(own)
-        origins = tuple(dict.fromkeys(member.origin for member in own))
-        cells = ", ".join(dict.fromkeys(member.cell for member in own if member.cell))
-        found.append(Robot(name, cells, origins, len(own), seconds, joules, yearly))
-    return sorted(found, key=lambda robot: -robot.yearly)
+    return sorted(found, key=lambda robot: -robot.yearly.value)
 
 
-def yearly_of(member: Member, costs: Costs) -> float:
+def year_of(member: Member, costs: Costs) -> Amount:
     """Joules of a year, one cycle after the other."""
-    return member.joules * costs.cycles_per_year(member.seconds) if member.seconds > 0.0 else 0.0
+    cycle = member.cycle
+    amount = Amount(cycle.energy, cycle.low, cycle.high)
+    return amount.times(costs.cycles_per_year(cycle.seconds))
+
+
+def saved_of(member: Member, costs: Costs) -> Amount | None:
+    """Joules of a year that the plan saves, by prediction; None where the recording has none."""
+    savings = member.cycle.savings
+    if savings is None:
+        return None
+    total = savings.total
+    amount = Amount(total.saved, total.saved_low, total.saved_high)
+    return amount.times(costs.cycles_per_year(member.cycle.seconds))
 
 
 def by_mode(members: Sequence[Member], costs: Costs) -> dict[str, dict[str, float]]:
-    """Joules of a year by robot and mode: a recording's modes share its year as they share its
-    joules.
-    """
+    """Joules of a year by robot and power mode."""
     return _summed(
         members,
-        ((m, s.name, s.energy) for m in members for s in m.modes.values()),
+        ((m, s.name, s.energy) for m in members for s in m.cycle.modes.values()),
         costs,
-        share=True,
     )
 
 
 def by_movement(members: Sequence[Member], costs: Costs) -> dict[str, dict[str, float]]:
     """Joules of a year by robot and movement or pause."""
     return _summed(
-        members, ((m, s.name, s.energy) for m in members for s in m.movements.values()), costs
+        members, ((m, s.name, s.energy) for m in members for s in m.cycle.steps.values()), costs
     )
 
 
@@ -334,21 +277,15 @@ def by_measure(members: Sequence[Member], costs: Costs) -> dict[str, dict[str, f
 
 
 def _summed(
-    members: Sequence[Member],
-    rows: Iterator[tuple[Member, str, float]],
-    costs: Costs,
-    share: bool = False,
+    members: Sequence[Member], rows: Iterator[tuple[Member, str, float]], costs: Costs
 ) -> dict[str, dict[str, float]]:
-    """By name, then by robot; largest names first."""
+    """Joules of a year by name, then by robot; largest names first."""
     count = {m.robot: sum(other.robot == m.robot for other in members) for m in members}
     found: dict[str, dict[str, float]] = {}
     for member, name, energy in rows:
-        whole = sum(one.energy for one in member.modes.values()) if share else member.joules
-        if whole <= 0.0:
-            continue
-        yearly = energy / whole * yearly_of(member, costs) / count[member.robot]
+        cycles = costs.cycles_per_year(member.cycle.seconds) / count[member.robot]
         own = found.setdefault(name, {})
-        own[member.robot] = own.get(member.robot, 0.0) + yearly
+        own[member.robot] = own.get(member.robot, 0.0) + energy * cycles
     return dict(sorted(found.items(), key=lambda item: -sum(item[1].values())))
 
 
@@ -383,7 +320,7 @@ def fleet_html(
             "By movement and pause", _matrix("movement", by_movement(members, prices), robots)
         ),
     ]
-    title = f"{len(robots)} robots, {len(members)} recordings"
+    title = f"{counted(len(robots), 'robot')}, {counted(len(members), 'recording')}"
     head = (
         '<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
     )
@@ -398,33 +335,30 @@ def fleet_html(
 
 
 def _robots(robots: Sequence[Robot], costs: Costs) -> str:
-    most = max((robot.yearly for robot in robots), default=1.0) or 1.0
+    most = max((robot.yearly.value for robot in robots), default=1.0) or 1.0
     rows = [
         (
             f"{text(robot.name)}<small>{text(robot.cell)}</small>",
             text(", ".join(robot.origins)),
             str(robot.recordings),
+            *_yearly(robot.yearly, costs),
+            _saved(robot.saved, costs),
             seconds(robot.seconds),
             text(joules(robot.joules)),
-            f"<b>{text(kilowatt_hours(robot.yearly))}</b>",
-            text(money(costs.money(robot.yearly), costs.currency)),
-            text(number(costs.co2(robot.yearly), "kg")),
-            f'<i class="bar" style="width:{100.0 * robot.yearly / most:.1f}%"></i>',
+            f'<i class="bar" style="width:{100.0 * robot.yearly.value / most:.1f}%"></i>',
         )
         for robot in robots
     ]
-    whole = sum(robot.yearly for robot in robots)
-    sums = (text(kilowatt_hours(whole)), text(money(costs.money(whole), costs.currency)))
+    saved = [robot.saved for robot in robots if robot.saved is not None]
     rows.append(
         (
             "<b>all</b>",
             "",
-            str(sum(r.recordings for r in robots)),
+            str(sum(robot.recordings for robot in robots)),
+            *_yearly(sum_of([robot.yearly for robot in robots]), costs),
+            _saved(sum_of(saved) if saved else None, costs),
             "",
             "",
-            f"<b>{sums[0]}</b>",
-            sums[1],
-            text(number(costs.co2(whole), "kg")),
             "",
         )
     )
@@ -432,14 +366,47 @@ def _robots(robots: Sequence[Robot], costs: Costs) -> str:
         "robot",
         "origin",
         ">recordings",
+        ">energy a year",
+        ">costs a year",
+        ">CO2 a year",
+        ">saved a year, predicted",
         ">cycle",
-        ">energy",
-        ">a year",
-        ">costs",
-        ">CO2",
-        "share",
+        ">energy a cycle",
+        "share of the largest",
     )
-    return table(heads, rows, "Robots")
+    hint = (
+        "A year is one cycle after the other, pauses at full length. What plans save is "
+        "predicted, against the same stations by PTP at full speed and the controller's own "
+        "timers; intervals hold 90 %, and those of several robots add up as if all were wrong "
+        "alike."
+    )
+    return f'<p class="hint">{hint}</p>{table(heads, rows, "Robots")}'
+
+
+def _yearly(amount: Amount, costs: Costs) -> tuple[str, str, str]:
+    """Energy, price and CO2 of a year, with their intervals."""
+    return (
+        f"<b>{text(kilowatt_hours(amount.value))}</b>{_between(amount, kilowatt_hours)}",
+        text(money(costs.money(amount.value), costs.currency)),
+        text(number(costs.co2(amount.value), "kg")),
+    )
+
+
+def _saved(amount: Amount | None, costs: Costs) -> str:
+    if amount is None:
+        return DASH
+    price = money(costs.money(amount.value), costs.currency)
+    energy = kilowatt_hours(amount.value)
+    return (
+        f"<b>{text(price)}</b><small>{text(energy)}</small>"
+        f"{_between(amount, lambda value: money(costs.money(value), costs.currency))}"
+    )
+
+
+def _between(amount: Amount, show: Callable[[float], str]) -> str:
+    if amount.high <= amount.low:
+        return ""
+    return f"<small>{text(show(amount.low))} to {text(show(amount.high))}</small>"
 
 
 def _matrix(what: str, found: Mapping[str, Mapping[str, float]], robots: Sequence[Robot]) -> str:
@@ -471,10 +438,7 @@ def _potential(members: Sequence[Member], robots: Sequence[Robot], costs: Costs)
         for name, own in found.items()
     ]
     heads = ("measure", *(f">{robot.name}" for robot in robots), ">all", ">a year, at most")
-    hint = (
-        "Upper bounds, each by itself: together they count some joules twice. What a plan "
-        "saves is predicted."
-    )
+    hint = "Upper bounds, each by itself: together they count some joules twice."
     return f'<p class="hint">{hint}</p>{table(heads, rows, "kWh a year by measure")}'
 
 
@@ -484,8 +448,8 @@ def _section(title: str, content: str) -> str:
 
 def _origins(members: Sequence[Member]) -> str:
     counts = {
-        origin: sum(m.origin == origin for m in members)
-        for origin in dict.fromkeys(m.origin for m in members)
+        origin: sum(m.cycle.origin == origin for m in members)
+        for origin in dict.fromkeys(m.cycle.origin for m in members)
     }
     return ", ".join(f"{count} {origin}" for origin, count in counts.items())
 
@@ -515,9 +479,13 @@ def fleet_columns(members: Sequence[Member]) -> dict[str, list[TableValue]]:
     """A row for every cycle, mode, movement and measure of every recording."""
     rows: list[tuple[TableValue, ...]] = []
     for member in members:
-        whose = (member.robot, member.file, member.origin)
-        rows.append((*whose, "cycle", "", member.seconds, member.joules))
-        for what, shares in (("mode", member.modes), ("movement", member.movements)):
+        cycle = member.cycle
+        whose = (member.robot, member.file, cycle.origin)
+        rows.append((*whose, "cycle", "", cycle.seconds, cycle.energy))
+        if cycle.savings is not None:
+            total = cycle.savings.total
+            rows.append((*whose, "saved", "by its plan", total.seconds, total.saved))
+        for what, shares in (("mode", cycle.modes), ("movement", cycle.steps)):
             rows += [
                 (*whose, what, name, share.seconds, share.energy) for name, share in shares.items()
             ]

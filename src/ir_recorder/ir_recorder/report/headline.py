@@ -9,16 +9,14 @@ from datetime import UTC, datetime, timedelta
 
 from ir_msgs_py.savings import one_sided
 from ir_recorder.analysis import Analysis, Finding, ProgramTotals, Share, Verdict, summary
-from ir_recorder.format.contents import OWN_FACTS, VERSION
-from ir_recorder.report.costs import (
-    NAMES,
-    Costs,
-    cycle_of,
-    money,
+from ir_recorder.analysis.production import (
     planned_clearance,
     planned_interval,
     planned_share,
+    production_of,
 )
+from ir_recorder.format.contents import OWN_FACTS, VERSION
+from ir_recorder.report.costs import NAMES, Costs, money
 from ir_recorder.report.number_text import (
     DASH,
     joules,
@@ -237,7 +235,7 @@ def _saved(analysis: Analysis) -> Tile | None:
 
 
 def _yearly(analysis: Analysis, costs: Costs) -> Tile | None:
-    cycle = cycle_of(analysis)
+    cycle = production_of(analysis)
     if cycle is None:
         return None
     energy = cycle.energy * costs.cycles_per_year(cycle.seconds)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from ir_description import Cell
 from ir_msgs_py.savings import BeforeAfter, Change, Side
+from ir_recorder.analysis.production import Amount
 from ir_recorder.report.cell_scene import cell_scene
 from ir_recorder.report.charts import Point, front_chart
 from ir_recorder.report.costs import J_PER_KWH, SETTINGS, Costs, money
@@ -32,23 +33,6 @@ from ir_recorder.report.tables import table
 from ir_values.files import ANYWHERE, FileRoots
 
 # Joules of a cycle as those of a shift and a year, and as money and CO2, bounds included.
-
-
-@dataclass(frozen=True)
-class Amount:
-    """A value with the ends of its 90 % interval."""
-
-    value: float
-    low: float
-    high: float
-
-    def of(self, unit: Callable[[float], float]) -> Amount:
-        """The same in another unit."""
-        return Amount(unit(self.value), unit(self.low), unit(self.high))
-
-    def times(self, count: float) -> Amount:
-        """So many of it."""
-        return self.of(lambda value: value * count)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,404 @@
+"""A program in production: what one cycle of it takes, and what could be saved of it.
+
+Every page, table and command that shows a cycle, a year or a saving of a recording reads it here. A
+recording may hold several cycles, and its pauses may be shortened: a cycle is their mean, with its
+pauses at full length, computed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ir_msgs_py.report import PlannedMovement
+from ir_msgs_py.savings import ProgramSavings, Saving
+from ir_recorder.analysis.flows import EnergyFlows, energy_flows
+from ir_recorder.analysis.results import (
+    Analysis,
+    FullPause,
+    ProgramTotals,
+    Share,
+    Unshortened,
+    mode_name,
+)
+from ir_recorder.analysis.steps import step_label
+
+ENDED = "ended"  # outcome of a step
+PREDICTED = "predicted"
+PLANNED_MOVING = "MOVING"
+NO_MODE = "STAND_ON_MOTORS"
+
+
+@dataclass(frozen=True)
+class Amount:
+    """A value with the ends of its 90 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    def of(self, unit: Callable[[float], float]) -> Amount:
+        """The same in another unit."""
+        return Amount(unit(self.value), unit(self.low), unit(self.high))
+
+    def times(self, count: float) -> Amount:
+        """So many of it."""
+        return self.of(lambda value: value * count)
+
+
+def sum_of(amounts: Sequence[Amount]) -> Amount:
+    """Values and ends add up: what is unsure is so in all alike."""
+    return Amount(
+        sum(amount.value for amount in amounts),
+        sum(amount.low for amount in amounts),
+        sum(amount.high for amount in amounts),
+    )
+
+
+def mean_of(amounts: Sequence[Amount]) -> Amount:
+    """The mean of amounts that are as unsure alike."""
+    return sum_of(amounts).times(1.0 / len(amounts))
+
+
+@dataclass(frozen=True)
+class Production:
+    """One cycle of a program: seconds [s] and energy [J] at the mains.
+
+    name: which cycle that is; origin: "measured", "simulated", "recorded" or "predicted". low, high
+    [J]: 90 % interval of the energy, alike where there is none. cycles: how many the recording
+    holds. modes, steps: shares by power mode and by movement or pause; the modes' sum is the
+    cycle's energy. savings: what the plan saves of the common program, pauses at full length; None
+    where it is not known. notes: sentences that limit the figures.
+    """
+
+    name: str
+    origin: str
+    seconds: float
+    energy: float
+    low: float
+    high: float
+    cycles: float = 1.0
+    modes: Mapping[str, Share] = field(default_factory=dict)
+    steps: Mapping[str, Share] = field(default_factory=dict)
+    savings: ProgramSavings | None = None
+    notes: tuple[str, ...] = ()
+
+
+def production_of(analysis: Analysis) -> Production | None:
+    """The cycle of what was driven, else of what was planned; None without a whole cycle of known
+    energy (`without_production` says why).
+    """
+    if analysis.program is not None:
+        return _driven(analysis, analysis.program)
+    planned = analysis.recording.planned
+    if planned_share(planned) is not None:
+        return _planned(analysis, planned)
+    savings = analysis.savings
+    if savings is None or savings.total.seconds <= 0.0:
+        return None
+    total = savings.total
+    parts = {"movements": savings.movements, "pauses": savings.pauses}
+    return Production(
+        "planned in the common program's time, predicted",
+        PREDICTED,
+        total.seconds,
+        total.planned,
+        total.planned,
+        total.planned,
+        steps={name: Share(name, s.seconds, s.planned) for name, s in parts.items() if s.seconds},
+        savings=savings,
+    )
+
+
+def without_production(analysis: Analysis) -> str:
+    """Why a recording has no cycle in production."""
+    if analysis.program is None:
+        return "it holds neither a program that was driven nor a plan with its savings"
+    if not math.isfinite(analysis.program.whole.energy):
+        return "the energy of its program was not recorded"
+    return f"its program was not driven to the end: {_ended(analysis)}"
+
+
+def _ended(analysis: Analysis) -> str:
+    total = max(analysis.steps[0].step.total, 1)
+    ended = sum(result.step.outcome == ENDED for result in analysis.steps)
+    return f"{ended % total or total} of {total} steps ended"
+
+
+def _driven(analysis: Analysis, program: ProgramTotals) -> Production | None:
+    """The mean cycle of what was driven."""
+    steps = analysis.steps
+    ended = sum(result.step.outcome == ENDED for result in steps)
+    cycles = ended / max(steps[0].step.total, 1)
+    whole = program.whole
+    if cycles < 1.0 or not math.isfinite(whole.energy) or whole.seconds <= 0.0:
+        return None
+    notes = []
+    if cycles != round(cycles):
+        notes.append(
+            f"its last cycle was not driven to the end ({_ended(analysis)}): it counts as "
+            f"{cycles % 1.0:.2f} of one"
+        )
+    name = "this run" if cycles == 1.0 else f"mean of {cycles:.3g} cycles of this run"
+    full = program.unshortened
+    if full is not None and math.isnan(full.energy):
+        notes.append("the pauses of the run are shortened: its year is one of such cycles")
+        name = f"{name}, its pauses shortened"
+        full = None
+    elif full is not None:
+        name = "cycle with full pauses, computed from this run and the data"
+    energy = (full.energy if full is not None else whole.energy) / cycles
+    seconds = (full.seconds if full is not None else whole.seconds) / cycles
+    return Production(
+        name,
+        analysis.recording.origin,
+        seconds,
+        energy,
+        energy,
+        energy,
+        cycles,
+        _modes(analysis, full, seconds, energy, cycles),
+        _steps(analysis, full, cycles),
+        _full_savings(analysis.savings, full),
+        tuple(notes),
+    )
+
+
+def _modes(
+    analysis: Analysis, full: Unshortened | None, seconds: float, energy: float, cycles: float
+) -> dict[str, Share]:
+    """Shares of the modes in the program's time; readings at its ends count by their part."""
+    power = analysis.recording.power
+    if power is None or len(power.time) < 2:
+        return {}
+    start = analysis.steps[0].step.start
+    end = analysis.steps[-1].step.end
+    rows = []
+    since = power.time[0]
+    for time, watts, mode in zip(
+        power.time.tolist(), power.power.tolist(), power.mode.tolist(), strict=True
+    ):
+        inside = min(time, end) - max(since, start)
+        since = time
+        if inside > 0.0 and math.isfinite(watts):
+            rows.append((mode_name(int(mode)), inside, watts * inside))
+    if full is not None:
+        rows += [(pause.mode, pause.seconds, pause.energy) for pause in full.added]
+    found = _summed(rows, cycles)
+    # the sums are those of the cycle, whatever the meter's counter rounds
+    times = seconds / (sum(share.seconds for share in found.values()) or 1.0)
+    joules = energy / (sum(share.energy for share in found.values()) or 1.0)
+    return {
+        name: Share(name, share.seconds * times, share.energy * joules)
+        for name, share in found.items()
+    }
+
+
+def _added(program: ProgramTotals | None) -> tuple[FullPause, ...]:
+    """What the full lengths of shortened pauses add to a run."""
+    full = program.unshortened if program is not None else None
+    return full.added if full is not None else ()
+
+
+def _steps(analysis: Analysis, full: Unshortened | None, cycles: float) -> dict[str, Share]:
+    rows = [(result.step.label, result.seconds, result.energy) for result in analysis.steps]
+    if full is not None:
+        rows += [
+            (analysis.steps[pause.step].step.label, pause.seconds, pause.energy)
+            for pause in full.added
+        ]
+    return _summed(rows, cycles)
+
+
+def _summed(rows: Iterable[tuple[str, float, float]], cycles: float = 1.0) -> dict[str, Share]:
+    found: dict[str, Share] = {}
+    for name, time, energy in rows:
+        before = found.get(name, Share(name, 0.0, 0.0))
+        joules = energy if math.isfinite(energy) else 0.0
+        found[name] = Share(name, before.seconds + time / cycles, before.energy + joules / cycles)
+    return found
+
+
+def _full_savings(
+    savings: ProgramSavings | None, full: Unshortened | None
+) -> ProgramSavings | None:
+    """The savings with pauses at full length: the intervals grow as what is saved."""
+    if savings is None or full is None:
+        return savings
+    rested = savings.pauses
+    pauses = _stretched(
+        rested,
+        Saving(
+            rested.common + sum(pause.common_energy for pause in full.added),
+            rested.planned + sum(pause.energy for pause in full.added),
+            rested.seconds + sum(pause.seconds for pause in full.added),
+        ),
+    )
+    total = savings.total
+    low = total.saved_low + pauses.saved_low - rested.saved_low
+    high = total.saved_high + pauses.saved_high - rested.saved_high
+    return replace(savings, pauses=pauses, total_low=low, total_high=high)
+
+
+def _stretched(before: Saving, after: Saving) -> Saving:
+    """`after` with the interval of `before`, as wide in proportion to the watts that rests differ
+    by.
+    """
+    if before.saved == 0.0:
+        return replace(after, saved_low=after.saved, saved_high=after.saved)
+    times = after.saved / before.saved
+    ends = sorted((before.saved_low * times, before.saved_high * times))
+    return replace(after, saved_low=ends[0], saved_high=ends[1])
+
+
+# A plan that was not driven.
+
+_PARTS = {"whole": (True, False), "movements": (False,), "pauses": (True,)}
+
+
+def planned_share(steps: Sequence[PlannedMovement], part: str = "whole") -> Share | None:
+    """Time and energy of the whole program, its movements or its pauses; None for no plan or
+    another part.
+    """
+    if not steps or part not in _PARTS:
+        return None
+    own = [step for step in steps if step.is_pause in _PARTS[part]]
+    return Share(part, sum(step.duration for step in own), sum(step.report.energy for step in own))
+
+
+def planned_interval(steps: Sequence[PlannedMovement]) -> tuple[float, float] | None:
+    """90 % interval of the whole energy [J], None where the plan has none."""
+    low, high = (
+        sum(getattr(step.report, name) for step in steps) for name in ("energy_low", "energy_high")
+    )
+    return (low, high) if high > low else None
+
+
+def planned_clearance(steps: Sequence[PlannedMovement]) -> float:
+    """The least clearance of the movements [m], NaN without any."""
+    return min((step.report.min_clearance for step in steps if not step.is_pause), default=math.nan)
+
+
+def _planned(analysis: Analysis, planned: Sequence[PlannedMovement]) -> Production | None:
+    whole = planned_share(planned)
+    if whole is None or whole.seconds <= 0.0 or not math.isfinite(whole.energy):
+        return None
+    modes = _summed(
+        (
+            (step.power_mode or NO_MODE) if step.is_pause else PLANNED_MOVING,
+            step.duration,
+            step.report.energy,
+        )
+        for step in planned
+    )
+    steps = _summed((step_label(step), step.duration, step.report.energy) for step in planned)
+    low, high = planned_interval(planned) or (whole.energy, whole.energy)
+    name = "planned program, predicted"
+    return Production(
+        name,
+        PREDICTED,
+        whole.seconds,
+        whole.energy,
+        low,
+        high,
+        modes=modes,
+        steps=steps,
+        savings=analysis.savings,
+    )
+
+
+# What could be saved at most, and by what: the levers of a cycle, the biggest first.
+#
+# Each is an upper bound by itself from figures of the run; together they count some joules twice.
+
+_STANDING = ("", "STAND_ON_MOTORS")
+FASTER = 0.1  # share of the moving time that a shorter layout or a quicker program might save
+
+
+@dataclass(frozen=True)
+class Lever:
+    """Up to so many joules of a cycle; means: what would save them; basis: how they are
+    computed.
+    """
+
+    name: str
+    joules: float
+    means: str
+    basis: str
+
+
+def levers(analysis: Analysis, most: int = 5) -> tuple[Lever, ...]:
+    """The biggest levers of a cycle that was driven; none where energies are missing."""
+    flows = energy_flows(analysis)
+    cycle = production_of(analysis)
+    if flows is None or not flows.known or analysis.program is None or cycle is None:
+        return ()
+    found = [
+        replace(lever, joules=lever.joules / cycle.cycles)
+        for lever in [*_drive_levers(flows), *_time_levers(analysis)]
+    ]
+    real = [lever for lever in found if math.isfinite(lever.joules) and lever.joules >= 1.0]
+    return tuple(sorted(real, key=lambda lever: -lever.joules)[:most])
+
+
+def _drive_levers(flows: EnergyFlows) -> list[Lever]:
+    return [
+        Lever(
+            "heat in the brake resistor",
+            flows.resistor,
+            "brake one axis while another accelerates, a larger capacitor, or a supply that "
+            "feeds back",
+            "all of it",
+        ),
+        Lever(
+            "friction of gears and bearings",
+            flows.friction * (1.0 - (1.0 - FASTER) ** 2) if flows.split else math.nan,
+            "shorter paths and lower speeds",
+            "a tenth less speed, friction in proportion to its square",
+        ),
+        Lever(
+            "losses of motors and inverters",
+            flows.motors * (1.0 - (1.0 - FASTER) ** 2) if flows.split else math.nan,
+            "gentler acceleration, postures that hold less torque",
+            "a tenth less torque, losses in proportion to its square",
+        ),
+    ]
+
+
+def _time_levers(analysis: Analysis) -> list[Lever]:
+    moving = sum(result.base_energy for result in analysis.movements)
+    pauses = [result for result in analysis.steps if result.step.movement.is_pause]
+    standing = sum(r.energy for r in pauses if r.step.movement.power_mode in _STANDING)
+    resting = sum(r.energy for r in pauses if r.step.movement.power_mode not in _STANDING)
+    program = analysis.program
+    waiting = program.waiting.energy if program is not None else math.nan
+    for pause in _added(program):
+        own = analysis.steps[pause.step].step.movement.power_mode
+        standing += pause.energy if own in _STANDING else 0.0
+        resting += 0.0 if own in _STANDING else pause.energy
+    return [
+        Lever(
+            "controller, drives and tool while the robot moves",
+            FASTER * float(np.nan_to_num(moving)),
+            "a shorter cycle: fewer or shorter movements",
+            "a tenth less time in movements",
+        ),
+        Lever(
+            "stops with the motors on",
+            standing,
+            "shorter stops; brakes closed earlier by the controller's timer",
+            "all of it",
+        ),
+        Lever(
+            "pauses in a power mode",
+            resting,
+            "deeper modes, earlier, woken later; a tool that can be switched off",
+            "all of it",
+        ),
+        Lever(
+            "waiting between steps", waiting, "machines and nodes that answer sooner", "all of it"
+        ),
+    ]

@@ -1,0 +1,87 @@
+"""Law: a quantity has one definition. The cycle, its year and its saving are the same on every page
+and in every table, whatever a recording holds and costs are given.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ir_recorder import Analysis, analyse, findings
+from ir_recorder.analysis.production import levers, production_of
+from ir_recorder.report import report_html
+from ir_recorder.report.compare import comparison_html
+from ir_recorder.report.costs import J_PER_KWH, Costs, money
+from ir_recorder.report.fleet import by_mode, fleet_columns, fleet_html, member_of, robots_of
+from ir_recorder.report.number_text import kilowatt_hours
+
+PAUSES = ("", "600 s, 1800 s", "5 s, 7 s", "60 s")
+
+
+@pytest.fixture(scope="module", params=PAUSES)
+def found(request: pytest.FixtureRequest, analysis: Analysis) -> Analysis:
+    """A recording whose pauses are as long as in production, shorter, longer, or do not match."""
+    facts = (("unshortened_pauses", request.param),) if request.param else ()
+    return analyse(replace(analysis.recording, facts=facts))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_year_is_one_value_on_every_page(found: Analysis, seed: int) -> None:
+    draw = np.random.default_rng(seed).uniform
+    costs = Costs(
+        price=draw(0.05, 2.0),
+        shift_hours=draw(1.0, 8.0),
+        days_per_year=draw(10.0, 366.0),
+        parts_per_cycle=draw(0.5, 20.0),
+    )
+    price = costs.price
+    checks = findings(found)
+    cycle = production_of(found)
+    member = member_of(found, "robot")
+    assert cycle is not None
+    assert member is not None
+    year = cycle.energy * costs.cycles_per_year(cycle.seconds)
+    shown = (kilowatt_hours(year), money(year / J_PER_KWH * price, "EUR"))
+    (robot,) = robots_of([member], costs)
+    assert robot.yearly.value == pytest.approx(year)
+    pages = [report_html(found, checks, costs=costs), fleet_html([member], costs=costs)]
+    for page in pages:
+        assert all(figure in page for figure in shown)
+    assert shown[1] in comparison_html([(found, checks), (found, checks)], costs=costs)
+    if cycle.savings is not None:
+        saved = cycle.savings.total.saved * costs.cycles_per_year(cycle.seconds)
+        price_of_it = money(saved / J_PER_KWH * price, "EUR")
+        assert all(price_of_it in page for page in pages)
+
+
+def test_modes_and_steps_are_parts_of_the_cycle(found: Analysis) -> None:
+    cycle = production_of(found)
+    member = member_of(found, "robot")
+    assert cycle is not None
+    assert member is not None
+    assert sum(share.energy for share in cycle.modes.values()) == pytest.approx(cycle.energy)
+    assert sum(share.seconds for share in cycle.modes.values()) == pytest.approx(cycle.seconds)
+    assert sum(share.energy for share in cycle.steps.values()) <= 1.001 * cycle.energy
+    assert all(lever.joules <= cycle.energy for lever in levers(found, most=20))
+    costs = Costs()
+    years = by_mode([member], costs)
+    (robot,) = robots_of([member], costs)
+    assert sum(sum(own.values()) for own in years.values()) == pytest.approx(robot.yearly.value)
+    columns = fleet_columns([member])
+    assert columns["energy_j"][0] == cycle.energy
+
+
+def test_savings_are_of_the_cycle_that_is_counted(found: Analysis) -> None:
+    """Over the same seconds as the cycle's pauses, with the saving inside of its interval."""
+    cycle = production_of(found)
+    assert cycle is not None
+    if cycle.savings is None or found.savings is None:
+        pytest.skip("the recording carries no savings")
+    total = cycle.savings.total
+    full = found.program.unshortened if found.program is not None else None
+    added = sum(pause.seconds for pause in full.added) if full is not None else 0.0
+    assert total.seconds == pytest.approx(found.savings.total.seconds + added)
+    if found.savings.total.saved_high > found.savings.total.saved_low:
+        assert total.saved_low <= total.saved <= total.saved_high
