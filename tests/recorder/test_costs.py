@@ -5,16 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ir_recorder import Analysis, analyse
-from ir_recorder.analysis.production import production_of
+from ir_recorder.analysis.production import demand_watts, idle_watts, production_of
 from ir_recorder.errors import RecorderError
 from ir_recorder.report.costs import (
     NAMES,
     Costs,
     costs_section,
     lever_section,
+    money,
     read_costs,
 )
 from ir_values.settings import settings_table
@@ -28,6 +30,12 @@ shifts_per_day: 1
 days_per_year: 100
 parts_per_cycle: 2
 availability: 1.0
+first_shift: 7
+night_from: 21
+night_to: 5
+price_night: 0.5
+demand_price: 80
+engineer_hour: 90
 """
 
 
@@ -49,6 +57,7 @@ def test_a_file_says_what_a_joule_costs(tmp_path: Path) -> None:
         ("format: ir_costs/1\nprize: 0.2", "prize is unknown, known are price"),
         ("format: ir_costs/1\nprice: cheap", "must be a number"),
         ("format: ir_costs/1\nprice: true", "must be a number"),
+        ("format: ir_costs/1\nprice: 0,24", "must be a number: write 0.24"),
         ("format: ir_costs/1\nprice: -1", "price is -1"),
         ("format: ir_costs/1\nprice: .nan", "must be finite"),
         ("format: ir_costs/1\navailability: 2", "availability is 2"),
@@ -72,6 +81,55 @@ def test_a_file_that_makes_no_sense_is_a_sentence(tmp_path: Path, text: str, wor
     path.write_text(text)
     with pytest.raises(RecorderError, match=words):
         read_costs(path)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_prices_by_day_and_night_are_means_over_the_minutes_of_a_day(seed: int) -> None:
+    """Judge: each minute of a working day and of a free day, with the price of its hour."""
+    draw = np.random.default_rng(seed)
+    shifts = draw.choice([1.0, 2.0, 3.0])
+    costs = Costs(
+        price=0.3,
+        price_night=0.1,
+        shift_hours=float(draw.integers(1, int(24.0 / shifts) + 1)),
+        shifts_per_day=float(shifts),
+        days_per_year=float(draw.integers(1, 366)),
+        first_shift=float(draw.integers(0, 25)),
+        night_from=float(draw.integers(0, 25)),
+        night_to=float(draw.integers(0, 25)),
+    )
+    minute = (np.arange(1440) + 0.5) / 60.0
+    length = (costs.night_to - costs.night_from) % 24.0
+    price = np.where((minute - costs.night_from) % 24.0 < length, 0.1, 0.3)
+    work = (minute - costs.first_shift) % 24.0 < costs.shift_hours * costs.shifts_per_day
+    assert costs.production_price == pytest.approx(price[work].mean())
+    free = 365.0 - costs.days_per_year
+    hours = (~work).sum() * costs.days_per_year + 1440.0 * free
+    paid = price[~work].sum() * costs.days_per_year + price.sum() * free
+    assert costs.idle_hours == pytest.approx(hours / 60.0)
+    if hours > 0.0:
+        assert costs.idle_price == pytest.approx(paid / hours)
+
+
+def test_the_largest_quarter_of_an_hour_lies_between_mean_and_largest_step(
+    analysis: Analysis,
+) -> None:
+    for fact in ("", "600 s, 1800 s"):
+        facts = (("unshortened_pauses", fact),) if fact else ()
+        found = analyse(replace(analysis.recording, facts=facts))
+        cycle = production_of(found)
+        assert cycle is not None
+        largest = max(share.energy / share.seconds for share in cycle.steps.values())
+        assert cycle.energy / cycle.seconds * 0.99 <= demand_watts(found, cycle) <= largest
+
+
+def test_rest_outside_of_the_shifts_is_priced_by_mode(analysis: Analysis) -> None:
+    costs = Costs(price=0.2)
+    for mode, power in idle_watts(analysis).items():
+        energy = power * costs.idle_hours * 3600.0
+        section = costs_section(analysis, costs)
+        assert mode.replace("_", " ").lower() in section
+        assert money(energy / 3.6e6 * 0.2, "EUR") in section
 
 
 def test_assumptions_are_marked_and_given_figures_are_not(analysis: Analysis) -> None:

@@ -13,9 +13,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ir_msgs_py.modes import REST_MODES
+from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import ProgramSavings, Saving
 from ir_recorder.analysis.flows import EnergyFlows, energy_flows
+from ir_recorder.analysis.loads import carried
+from ir_recorder.analysis.predicted_power import recorded_power_data, resting_watts
 from ir_recorder.analysis.results import (
     Analysis,
     FullPause,
@@ -252,6 +256,64 @@ def _stretched(before: Saving, after: Saving) -> Saving:
     times = after.saved / before.saved
     ends = sorted((before.saved_low * times, before.saved_high * times))
     return replace(after, saved_low=ends[0], saved_high=ends[1])
+
+
+# Beside the cycle: the largest quarter of an hour, and rest while nobody works.
+
+QUARTER = 900.0  # s: over which suppliers measure demand
+
+
+def demand_watts(analysis: Analysis, cycle: Production) -> float:
+    """The largest mean power [W] of a quarter of an hour of cycles, one after the other.
+
+    The steps draw their mean power, in their order; a cycle that fits a quarter of an hour often
+    has little more than its mean.
+    """
+    rows = _in_order(analysis)
+    seconds = np.array([time for time, _ in rows])
+    joules = np.array([energy for _, energy in rows])
+    if not len(rows) or seconds.sum() <= 0.0 or not np.isfinite(joules).all():
+        return cycle.energy / cycle.seconds
+    repeated = 2 + int(QUARTER / seconds.sum())
+    ends = np.concatenate(([0.0], np.cumsum(np.tile(seconds, repeated))))
+    energy = np.concatenate(([0.0], np.cumsum(np.tile(joules, repeated))))
+    # the largest window begins or ends where a step does
+    starts = np.concatenate((ends, ends - QUARTER))
+    starts = starts[(starts >= 0.0) & (starts <= ends[-1] - QUARTER)]
+    found = np.interp(starts + QUARTER, ends, energy) - np.interp(starts, ends, energy)
+    return float(found.max() / QUARTER)
+
+
+def _in_order(analysis: Analysis) -> list[tuple[float, float]]:
+    """Seconds and joules of the steps of one cycle, pauses at full length."""
+    if analysis.program is None:
+        return [(step.duration, step.report.energy) for step in analysis.recording.planned]
+    longer = {pause.step: pause for pause in _added(analysis.program)}
+    rows = []
+    for place, result in enumerate(analysis.steps[: analysis.steps[0].step.total]):
+        seconds = result.seconds
+        energy = result.energy
+        if place in longer:
+            seconds += longer[place].seconds
+            energy += longer[place].energy
+        rows.append((seconds, energy))
+    return rows
+
+
+def idle_watts(analysis: Analysis) -> dict[str, float]:
+    """W at rest at machine home in each power mode that the controller has, with what the program
+    holds at its end, by the data; empty where the recording has no cell.
+    """
+    cell = analysis.cell
+    if cell is None:
+        return {}
+    data, _ = recorded_power_data(analysis.recording)
+    ends = [step.load for step in analysis.recording.planned[-1:]]
+    ends += [result.step.movement.load for result in analysis.steps[-1:]]
+    loads = carried(cell, ends[-1] if ends else NO_LOAD)
+    return {
+        mode: resting_watts(mode, cell.robot.machine_home, cell, loads, data) for mode in REST_MODES
+    }
 
 
 # A plan that was not driven.

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeGuard
 
 from ir_description import DescriptionFileError
 from ir_description.files import plain_yaml
 from ir_msgs_py.savings import ProgramSavings, Saving
 from ir_recorder.analysis import Analysis
-from ir_recorder.analysis.production import levers, production_of
+from ir_recorder.analysis.production import (
+    Production,
+    demand_watts,
+    idle_watts,
+    levers,
+    production_of,
+)
 from ir_recorder.errors import RecorderError
 from ir_recorder.report.number_text import (
     DASH,
@@ -20,24 +28,21 @@ from ir_recorder.report.number_text import (
     seconds,
     share,
     text,
+    watts,
 )
 from ir_recorder.report.tables import table
 from ir_values.errors import InvalidValueError, IrError
 from ir_values.files import ANYWHERE, FileRoots
 from ir_values.settings import Setting, check_settings, describe, setting
 
-# What joules cost: price, currency, shifts and the grid's CO2, from a file or as assumed.
-#
-# ::
-#
-# format: ir_costs/1 price: 0.24            # per kWh currency: EUR grid: 0.35             # kg
-# CO2 per kWh shift_hours: 8.0 shifts_per_day: 2 days_per_year: 240 parts_per_cycle: 1
-# availability: 0.85     # share of a shift in which cycles run
+# What joules cost, from a file or as assumed: prices by day and night and of the peak, the calendar
+# of shifts, and the grid's CO2.
 
 FORMAT = "ir_costs/1"
 _CURRENCY_MAX = 12  # characters
 J_PER_KWH = 3.6e6
 _DAY = 24.0  # h
+_YEAR = 365.0  # days
 
 
 @dataclass(frozen=True)
@@ -64,6 +69,25 @@ class Costs:
     availability: float = setting(
         0.85, "Share of a shift in which cycles run one after the other.", minimum=0.01, maximum=1.0
     )
+    first_shift: float = setting(
+        6.0, "When the first shift of a day begins.", unit="h", minimum=0.0, maximum=24.0
+    )
+    night_from: float = setting(
+        22.0, "When the price of the night begins.", unit="h", minimum=0.0, maximum=24.0
+    )
+    night_to: float = setting(6.0, "When it ends.", unit="h", minimum=0.0, maximum=24.0)
+    price_night: float = setting(
+        0.0, "Price of a kilowatt-hour at night; 0: as by day.", minimum=0.0, maximum=1e4
+    )
+    demand_price: float = setting(
+        0.0,
+        "Price of a kilowatt of the largest quarter of an hour, each year.",
+        minimum=0.0,
+        maximum=1e6,
+    )
+    engineer_hour: float = setting(
+        60.0, "What an hour of an engineer costs.", minimum=0.0, maximum=1e4
+    )
     given: tuple[str, ...] = setting((), "Names that a file gave; the others are assumptions.")
 
     def __post_init__(self) -> None:
@@ -74,9 +98,45 @@ class Costs:
                 f"{self.shifts_per_day:g}: together they must be at most {_DAY:g} h a day"
             )
 
+    @property
+    def production_hours(self) -> float:
+        """Hours of shifts in a year."""
+        return self.shift_hours * self.shifts_per_day * self.days_per_year
+
+    @property
+    def idle_hours(self) -> float:
+        """Hours of a year outside of the shifts: nights, weekends and holidays."""
+        return max(_YEAR * _DAY - self.production_hours, 0.0)
+
+    @property
+    def production_price(self) -> float:
+        """Mean price of a kilowatt-hour in the shifts."""
+        hours = self.shift_hours * self.shifts_per_day
+        return self._mean_price(self._night_hours(self.first_shift, hours), hours)
+
+    @property
+    def idle_price(self) -> float:
+        """Mean price of a kilowatt-hour outside of the shifts."""
+        worked = self._night_hours(self.first_shift, self.shift_hours * self.shifts_per_day)
+        night = self._night_hours(0.0, _DAY) * _YEAR - worked * self.days_per_year
+        return self._mean_price(max(night, 0.0), self.idle_hours)
+
+    def _mean_price(self, night: float, hours: float) -> float:
+        share = min(night / hours, 1.0) if hours > 0.0 else 0.0
+        cheap = self.price_night or self.price
+        return self.price * (1.0 - share) + cheap * share
+
+    def _night_hours(self, start: float, hours: float) -> float:
+        """Hours at night within `hours` (at most 24) from `start` on."""
+        length = (self.night_to - self.night_from) % _DAY
+        nights = (self.night_from + _DAY * day for day in (-1, 0, 1))
+        return sum(
+            max(min(start + hours, night + length) - max(start, night), 0.0) for night in nights
+        )
+
     def money(self, energy: float) -> float:
-        """Price of so many joules."""
-        return energy / J_PER_KWH * self.price
+        """Price of so many joules in the shifts."""
+        return energy / J_PER_KWH * self.production_price
 
     def co2(self, energy: float) -> float:
         """kg of CO2 for so many joules."""
@@ -129,12 +189,18 @@ def _checked(where: str, key: str, value: object) -> float | str:
             )
         return value
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise RecorderError(f"{where} is {str(value)[:40]!r}, it must be a number")
+        example = f": write {value.replace(',', '.')}" if _with_comma(value) else ""
+        raise RecorderError(f"{where} is {str(value)[:40]!r}, it must be a number{example}")
     return float(value)
 
 
 # What a cycle costs and what its plan saves: joules, money and CO2 per part, per shift and per
 # year.
+
+
+def _with_comma(value: object) -> TypeGuard[str]:
+    """Whether a text is a number whose decimals follow a comma."""
+    return isinstance(value, str) and re.fullmatch(r"-?\d{1,12},\d{1,12}", value) is not None
 
 
 def costs_section(analysis: Analysis, costs: Costs) -> str:
@@ -160,8 +226,62 @@ def costs_section(analysis: Analysis, costs: Costs) -> str:
         '<section id="costs"><h2>What a cycle costs</h2>'
         f'<p class="hint">Energy of the run is {text(origin)}; savings are predicted, with their '
         f"90 % interval, at the same number of cycles.{text(notes)}</p>"
-        f"{table(heads, rows, 'What a cycle costs')}{_assumptions(costs, counts)}</section>"
+        f"{table(heads, rows, 'What a cycle costs')}{_payback(cycle, counts[2], costs)}"
+        f"{_demand(analysis, cycle, costs)}{_idle(analysis, costs)}"
+        f"{_assumptions(costs, counts)}</section>"
     )
+
+
+def _payback(cycle: Production, cycles: float, costs: Costs) -> str:
+    """How much work the saving of a year pays."""
+    if cycle.savings is None or costs.engineer_hour <= 0.0:
+        return ""
+    saved = costs.money(cycle.savings.total.saved * cycles)
+    if saved <= 0.0:
+        return ""
+    hours = saved / costs.engineer_hour
+    return (
+        f'<p class="hint">What the plan saves in a year pays {hours:.2g} h of an engineer at '
+        f"{text(money(costs.engineer_hour, costs.currency))} an hour.</p>"
+    )
+
+
+def _demand(analysis: Analysis, cycle: Production, costs: Costs) -> str:
+    """The largest quarter of an hour, and its price where one is given."""
+    peak = demand_watts(analysis, cycle)
+    price = ""
+    if costs.demand_price > 0.0:
+        price = f", {money(peak / 1000.0 * costs.demand_price, costs.currency)} a year"
+    return f'<p class="hint">Largest quarter of an hour: {watts(peak)} on average{text(price)}.</p>'
+
+
+def _idle(analysis: Analysis, costs: Costs) -> str:
+    """What the robot draws while nobody works, by power mode."""
+    found = idle_watts(analysis)
+    if not found or costs.idle_hours <= 0.0:
+        return ""
+    seconds_idle = costs.idle_hours * 3600.0
+    rows = [
+        (
+            text(mode.replace("_", " ").lower()),
+            watts(power),
+            f"<b>{text(idle_money(power * seconds_idle, costs))}</b>"
+            f"<small>{kilowatt_hours(power * seconds_idle)}</small>",
+        )
+        for mode, power in found.items()
+    ]
+    title = "When nobody works"
+    return (
+        f'<h3>{title}</h3><p class="hint">{costs.idle_hours:,.0f} hours a year outside of the '
+        "shifts (nights, weekends, holidays), at machine home, by the data of controller and tool. "
+        "Left alone, the controller only closes the brakes.</p>"
+        f"{table(('power mode', '>power', '>a year'), rows, title)}"
+    )
+
+
+def idle_money(energy: float, costs: Costs) -> str:
+    """Price of so many joules outside of the shifts."""
+    return money(energy / J_PER_KWH * costs.idle_price, costs.currency)
 
 
 def _row(

@@ -12,6 +12,8 @@ from ir_recorder.analysis import Analysis, analyse
 from ir_recorder.analysis.production import (
     Amount,
     Production,
+    demand_watts,
+    idle_watts,
     levers,
     mean_of,
     production_of,
@@ -22,10 +24,18 @@ from ir_recorder.errors import ReadError, RecorderError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import is_further_part
 from ir_recorder.reading.reader import read_recording
-from ir_recorder.report.costs import SETTINGS, Costs, money
+from ir_recorder.report.costs import SETTINGS, Costs, idle_money, money
 from ir_recorder.report.files import write_output
 from ir_recorder.report.methods import counted
-from ir_recorder.report.number_text import DASH, joules, kilowatt_hours, number, seconds, text
+from ir_recorder.report.number_text import (
+    DASH,
+    joules,
+    kilowatt_hours,
+    number,
+    seconds,
+    text,
+    watts,
+)
 from ir_recorder.report.page import PAGE_START, asset
 from ir_recorder.report.step_table import TableValue, write_columns
 from ir_recorder.report.tables import table
@@ -136,7 +146,8 @@ MOST = 200  # recordings of a fleet
 @dataclass(frozen=True)
 class Member:
     """A recording of a robot. robot: the folder that the file lies in, or its own name; cycle: what
-    its program takes in production; measures: joules of a cycle that each could save at most.
+    its program takes in production; measures: joules of a cycle that each could save at most;
+    demand [W]: of its largest quarter of an hour; idle [W]: at rest by power mode.
     """
 
     robot: str
@@ -144,6 +155,8 @@ class Member:
     cell: str
     cycle: Production
     measures: Mapping[str, float]
+    demand: float
+    idle: Mapping[str, float]
 
 
 def read_members(
@@ -190,7 +203,15 @@ def member_of(analysis: Analysis, robot: str, said: Said = lambda _: None) -> Me
         said(note)
     cell = analysis.cell.name if analysis.cell is not None else ""
     measures = {lever.name: lever.joules for lever in levers(analysis, most=20)}
-    return Member(robot, analysis.recording.path.name, cell, cycle, measures)
+    return Member(
+        robot,
+        analysis.recording.path.name,
+        cell,
+        cycle,
+        measures,
+        demand_watts(analysis, cycle),
+        idle_watts(analysis),
+    )
 
 
 # Sums over the members of a fleet, in production: joules of a year by robot, mode, movement and
@@ -314,6 +335,7 @@ def fleet_html(
     robots = robots_of(members, prices)
     sections = [
         _section("Robots", _robots(robots, prices)),
+        _section("Peak, and when nobody works", _around_the_clock(members, robots, prices)),
         _section("By power mode", _matrix("mode", by_mode(members, prices), robots)),
         _section("What could be saved, by measure", _potential(members, robots, prices)),
         _section(
@@ -383,6 +405,51 @@ def _robots(robots: Sequence[Robot], costs: Costs) -> str:
     return f'<p class="hint">{hint}</p>{table(heads, rows, "Robots")}'
 
 
+def _around_the_clock(members: Sequence[Member], robots: Sequence[Robot], costs: Costs) -> str:
+    """The largest quarter of an hour, and what rest outside of the shifts takes, by robot."""
+    modes = list(dict.fromkeys(mode for member in members for mode in member.idle))
+    rows = []
+    demands = []
+    idle: dict[str, list[float]] = {mode: [] for mode in modes}
+    for robot in robots:
+        own = [member for member in members if member.robot == robot.name]
+        demand = max(member.demand for member in own)
+        demands.append(demand)
+        energies = []
+        for mode in modes:
+            known = [member.idle[mode] for member in own if mode in member.idle]
+            energy = max(known) * costs.idle_hours * 3600.0 if known else float("nan")
+            energies.append(energy)
+            idle[mode].append(energy)
+        rows.append(_clock_row(text(robot.name), demand, energies, costs))
+    sums = [sum(idle[mode]) for mode in modes]
+    rows.append(_clock_row("<b>all</b>", sum(demands), sums, costs))
+    heads = ("robot", ">largest quarter of an hour", *(f">{_shown(mode)}" for mode in modes))
+    hint = (
+        f"{costs.idle_hours:,.0f} hours a year lie outside of the shifts; the columns of modes say "
+        "what rest takes in them, by the data. The peak of all robots is the sum of theirs: as if "
+        "all came at once."
+    )
+    return f'<p class="hint">{text(hint)}</p>{table(heads, rows, "Peak and rest")}'
+
+
+def _clock_row(
+    name: str, demand: float, energies: Sequence[float], costs: Costs
+) -> tuple[str, ...]:
+    price = demand / 1000.0 * costs.demand_price
+    small = f"<small>{text(money(price, costs.currency))} a year</small>" if price > 0.0 else ""
+    cells = (
+        f"{text(idle_money(energy, costs))}<small>{text(kilowatt_hours(energy))}</small>"
+        for energy in energies
+    )
+    return (name, f"<b>{watts(demand)}</b>{small}", *cells)
+
+
+def _shown(name: str) -> str:
+    """A mode as people read it; names of movements as they are."""
+    return name.replace("_", " ").lower() if name.isupper() else name
+
+
 def _yearly(amount: Amount, costs: Costs) -> tuple[str, str, str]:
     """Energy, price and CO2 of a year, with their intervals."""
     return (
@@ -424,9 +491,8 @@ def _matrix(what: str, found: Mapping[str, Mapping[str, float]], robots: Sequenc
 
 
 def _row(name: str, own: Mapping[str, float], robots: Sequence[Robot]) -> tuple[str, ...]:
-    shown = name.replace("_", " ").lower() if name.isupper() else name
     cells = (text(kilowatt_hours(own[robot.name])) if robot.name in own else "" for robot in robots)
-    return (text(shown), *cells, f"<b>{text(kilowatt_hours(sum(own.values())))}</b>")
+    return (text(_shown(name)), *cells, f"<b>{text(kilowatt_hours(sum(own.values())))}</b>")
 
 
 def _potential(members: Sequence[Member], robots: Sequence[Robot], costs: Costs) -> str:
