@@ -299,16 +299,15 @@ def _priced(energy: float, costs: Costs) -> str:
 
 
 def money(value: float, currency: str) -> str:
-    """An amount with its currency; small ones with four significant digits."""
+    """An amount with its currency; small ones with three significant digits."""
     if not math.isfinite(value):
         return DASH
-    shown = (
-        f"{value:,.0f}"
-        if abs(value) >= 100.0
-        else f"{value:.2f}"
-        if abs(value) >= 1.0
-        else f"{value:.4f}"
-    )
+    if abs(value) >= 100.0:
+        shown = f"{value:,.0f}"
+    elif abs(value) >= 1.0:
+        shown = f"{value:.2f}"
+    else:
+        shown = f"{value:.3g}"
     return f"{shown.replace(',', ' ')} {currency}"
 
 

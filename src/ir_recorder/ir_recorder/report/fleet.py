@@ -26,6 +26,7 @@ from ir_recorder.format.contents import is_further_part
 from ir_recorder.reading.reader import read_recording
 from ir_recorder.report.costs import SETTINGS, Costs, idle_money, money
 from ir_recorder.report.files import write_output
+from ir_recorder.report.headline import Tile
 from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import (
     DASH,
@@ -351,13 +352,35 @@ def fleet_html(
         f"<style>{asset('page.css')}</style></head><body><header><div><h1>{text(title)}</h1>"
         f'<p class="subtitle">{text(_origins(members))}; a year of each robot, one cycle after '
         "the other</p>"
-        f"</div></header><main>{_problems(left_out)}{''.join(sections)}{_assumptions(prices)}</main>"
+        f"</div></header><main>{_problems(left_out)}{_tiles(robots, prices)}{''.join(sections)}"
+        f"{_assumptions(prices)}</main>"
         f"<script>{asset('export.js')}\nexportButtons();</script></body></html>"
     )
 
 
+def _tiles(robots: Sequence[Robot], costs: Costs) -> str:
+    """The fleet in three figures."""
+    yearly = sum_of([robot.yearly for robot in robots])
+    saved = [robot.saved for robot in robots if robot.saved is not None]
+    of_it = sum_of(saved)
+    price = money(costs.money(yearly.value), costs.currency)
+    found = [
+        Tile("energy a year", kilowatt_hours(yearly.value), (f"{counted(len(robots), 'robot')}",)),
+        Tile("costs a year", price, (f"{number(costs.co2(yearly.value), 'kg')} of CO2",)),
+    ]
+    if saved:
+        ends = [money(costs.money(end), costs.currency) for end in (of_it.low, of_it.high)]
+        found.append(
+            Tile(
+                "saved a year by plans, predicted",
+                money(costs.money(of_it.value), costs.currency),
+                (kilowatt_hours(of_it.value), f"90 % interval {ends[0]} to {ends[1]}"),
+            )
+        )
+    return f'<section class="tiles">{"".join(tile.html() for tile in found)}</section>'
+
+
 def _robots(robots: Sequence[Robot], costs: Costs) -> str:
-    most = max((robot.yearly.value for robot in robots), default=1.0) or 1.0
     rows = [
         (
             f"{text(robot.name)}<small>{text(robot.cell)}</small>",
@@ -367,7 +390,6 @@ def _robots(robots: Sequence[Robot], costs: Costs) -> str:
             _saved(robot.saved, costs),
             seconds(robot.seconds),
             text(joules(robot.joules)),
-            f'<i class="bar" style="width:{100.0 * robot.yearly.value / most:.1f}%"></i>',
         )
         for robot in robots
     ]
@@ -379,7 +401,6 @@ def _robots(robots: Sequence[Robot], costs: Costs) -> str:
             str(sum(robot.recordings for robot in robots)),
             *_yearly(sum_of([robot.yearly for robot in robots]), costs),
             _saved(sum_of(saved) if saved else None, costs),
-            "",
             "",
             "",
         )
@@ -394,7 +415,6 @@ def _robots(robots: Sequence[Robot], costs: Costs) -> str:
         ">saved a year, predicted",
         ">cycle",
         ">energy a cycle",
-        "share of the largest",
     )
     hint = (
         "A year is one cycle after the other, pauses at full length. What plans save is "

@@ -221,10 +221,12 @@ def _unshortened(program: ProgramTotals) -> Tile | None:
 
 
 def _saved(analysis: Analysis) -> Tile | None:
-    """What the common program takes, and what the plan saves of it."""
-    if analysis.savings is None:
+    """What the common program takes, and what the plan saves of it, pauses at full length."""
+    cycle = production_of(analysis)
+    savings = cycle.savings if cycle is not None else analysis.savings
+    if savings is None:
         return None
-    total = analysis.savings.total
+    total = savings.total
     within = (
         f"90 % interval {joules(total.saved_low)} to {joules(total.saved_high)}"
         if total.saved_high > total.saved_low

@@ -11,6 +11,7 @@ from ir_msgs_py.savings import ProgramSavings, Saving
 from ir_recorder.analysis import Analysis, Finding, Verdict
 from ir_recorder.analysis.checks import row_name
 from ir_recorder.analysis.indirect import Agreement
+from ir_recorder.analysis.production import production_of
 from ir_recorder.analysis.results import Share, StepResult
 from ir_recorder.format import contents
 from ir_recorder.report.number_text import (
@@ -32,6 +33,10 @@ MOST_WARNINGS = 100  # a node that repeats itself must not fill the page
 LONGEST_TEXT = 500  # characters of one warning
 
 
+_NARROW = 3  # columns: a phone shows the rows of wider tables as cards,
+_FEW = 8  # unless there are more rows than these: it scrolls long ones sideways
+
+
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str, kind: str = "") -> str:
     """A table; cells are HTML. A head that starts with ">" is a column of numbers.
 
@@ -40,14 +45,16 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str, kin
     columns = "".join(
         f'<th scope="col"{_number(head)}>{text(head.lstrip(">"))}</th>' for head in heads
     )
-    body = "".join(f"<tr>{_cells(heads, row)}</tr>" for row in rows)
+    cells = [_cells(heads, row) for row in rows]
+    body = "".join(f"<tr>{row}</tr>" for row in cells)
     if not body:
         return '<p class="empty">Nothing was recorded.</p>'
     head = f"<thead><tr>{columns}</tr></thead>"
     named = f'<caption class="unseen">{text(caption)}</caption>'
+    wide = "cards" if len(heads) > _NARROW and len(cells) <= _FEW else ""
     return (
         '<div class="scroll"><table '
-        f'class="{kind}">{named}{head}<tbody>{body}</tbody></table></div>'
+        f'class="{f"{kind} {wide}".strip()}">{named}{head}<tbody>{body}</tbody></table></div>'
     )
 
 
@@ -226,7 +233,11 @@ def problem_list(problems: Sequence[str]) -> str:
 
 
 def _cells(heads: Sequence[str], row: Sequence[str]) -> str:
-    return "".join(f"<td{_number(head)}>{cell}</td>" for head, cell in zip(heads, row, strict=True))
+    """Each cell with its head, which a narrow screen shows beside it."""
+    return "".join(
+        f'<td{_number(head)} data-head="{text(head.lstrip(">"))}">{cell}</td>'
+        for head, cell in zip(heads, row, strict=True)
+    )
 
 
 def _small(name: str, value: str) -> str:
@@ -414,7 +425,11 @@ def _rows(analysis: Analysis, savings: ProgramSavings) -> list[Row]:
     rows = [("movements", savings.movements, common)]
     if savings.pauses.seconds > 0.0:
         rows.append(("pauses", savings.pauses, f"the controller's own timers{shortened}"))
-    return [*rows, ("total", savings.total, f"both{shortened}")]
+    rows.append(("total", savings.total, f"both{shortened}"))
+    cycle = production_of(analysis)
+    if cycle is not None and cycle.savings is not None and cycle.savings != savings:
+        rows.append(("total, pauses at full length", cycle.savings.total, "both, computed"))
+    return rows
 
 
 def _within(saving: Saving) -> str:
