@@ -14,6 +14,7 @@ from ir_recorder.errors import RecorderError
 from ir_recorder.report.costs import (
     NAMES,
     Costs,
+    clock_section,
     costs_section,
     lever_section,
     money,
@@ -127,7 +128,7 @@ def test_rest_outside_of_the_shifts_is_priced_by_mode(analysis: Analysis) -> Non
     costs = Costs(price=0.2)
     for mode, power in idle_watts(analysis).items():
         energy = power * costs.idle_hours * 3600.0
-        section = costs_section(analysis, costs)
+        section = clock_section(analysis, costs)
         assert mode.replace("_", " ").lower() in section
         assert money(energy / 3.6e6 * 0.2, "EUR") in section
 
@@ -168,3 +169,4 @@ def test_without_a_program_there_is_nothing_to_pay(analysis: Analysis) -> None:
     bare = analyse(replace(analysis.recording, events=(), savings=()))
     assert costs_section(bare, Costs()) == ""
     assert lever_section(bare, Costs()) == ""
+    assert clock_section(bare, Costs()) == ""

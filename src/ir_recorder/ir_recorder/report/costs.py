@@ -226,56 +226,7 @@ def costs_section(analysis: Analysis, costs: Costs) -> str:
         '<section id="costs"><h2>What a cycle costs</h2>'
         f'<p class="hint">Energy of the run is {text(origin)}; savings are predicted, with their '
         f"90 % interval, at the same number of cycles.{text(notes)}</p>"
-        f"{table(heads, rows, 'What a cycle costs')}{_payback(cycle, counts[2], costs)}"
-        f"{_demand(analysis, cycle, costs)}{_idle(analysis, costs)}"
-        f"{_assumptions(costs, counts)}</section>"
-    )
-
-
-def _payback(cycle: Production, cycles: float, costs: Costs) -> str:
-    """How much work the saving of a year pays."""
-    if cycle.savings is None or costs.engineer_hour <= 0.0:
-        return ""
-    saved = costs.money(cycle.savings.total.saved * cycles)
-    if saved <= 0.0:
-        return ""
-    hours = saved / costs.engineer_hour
-    return (
-        f'<p class="hint">What the plan saves in a year pays {hours:.2g} h of an engineer at '
-        f"{text(money(costs.engineer_hour, costs.currency))} an hour.</p>"
-    )
-
-
-def _demand(analysis: Analysis, cycle: Production, costs: Costs) -> str:
-    """The largest quarter of an hour, and its price where one is given."""
-    peak = demand_watts(analysis, cycle)
-    price = ""
-    if costs.demand_price > 0.0:
-        price = f", {money(peak / 1000.0 * costs.demand_price, costs.currency)} a year"
-    return f'<p class="hint">Largest quarter of an hour: {watts(peak)} on average{text(price)}.</p>'
-
-
-def _idle(analysis: Analysis, costs: Costs) -> str:
-    """What the robot draws while nobody works, by power mode."""
-    found = idle_watts(analysis)
-    if not found or costs.idle_hours <= 0.0:
-        return ""
-    seconds_idle = costs.idle_hours * 3600.0
-    rows = [
-        (
-            text(mode.replace("_", " ").lower()),
-            watts(power),
-            f"<b>{text(idle_money(power * seconds_idle, costs))}</b>"
-            f"<small>{kilowatt_hours(power * seconds_idle)}</small>",
-        )
-        for mode, power in found.items()
-    ]
-    title = "When nobody works"
-    return (
-        f'<h3>{title}</h3><p class="hint">{costs.idle_hours:,.0f} hours a year outside of the '
-        "shifts (nights, weekends, holidays), at machine home, by the data of controller and tool. "
-        "Left alone, the controller only closes the brakes.</p>"
-        f"{table(('power mode', '>power', '>a year'), rows, title)}"
+        f"{table(heads, rows, 'What a cycle costs')}{_assumptions(costs, counts)}</section>"
     )
 
 
@@ -380,4 +331,67 @@ def lever_section(analysis: Analysis, costs: Costs) -> str:
         "figures of this "
         "run, each by itself: together they count some joules twice.</p>"
         f"{table(heads, rows, 'The biggest levers')}</section>"
+    )
+
+
+# The robot around the clock: the largest quarter of an hour, rest outside of the shifts, payback.
+
+
+def clock_section(analysis: Analysis, costs: Costs) -> str:
+    """Section of the page; "" where no whole cycle is known."""
+    cycle = production_of(analysis)
+    if cycle is None:
+        return ""
+    found = [_demand(analysis, cycle, costs), _payback(cycle, costs)]
+    return (
+        f'<section id="clock"><h2>Around the clock</h2><p class="hint">{" ".join(found).strip()}'
+        f"</p>{_idle(analysis, costs)}</section>"
+    )
+
+
+def _payback(cycle: Production, costs: Costs) -> str:
+    """How much work the saving of a year pays."""
+    if cycle.savings is None or costs.engineer_hour <= 0.0:
+        return ""
+    cycles = costs.cycles_per_year(cycle.seconds)
+    saved = costs.money(cycle.savings.total.saved * cycles)
+    if saved <= 0.0:
+        return ""
+    hours = saved / costs.engineer_hour
+    return (
+        f"What the plan saves in a year pays {hours:.2g} h of an engineer at "
+        f"{text(money(costs.engineer_hour, costs.currency))} an hour."
+    )
+
+
+def _demand(analysis: Analysis, cycle: Production, costs: Costs) -> str:
+    """The largest quarter of an hour, and its price where one is given."""
+    peak = demand_watts(analysis, cycle)
+    price = ""
+    if costs.demand_price > 0.0:
+        price = f", {money(peak / 1000.0 * costs.demand_price, costs.currency)} a year"
+    return f"The largest quarter of an hour takes {watts(peak)} on average{text(price)}."
+
+
+def _idle(analysis: Analysis, costs: Costs) -> str:
+    """What the robot draws while nobody works, by power mode."""
+    found = idle_watts(analysis)
+    if not found or costs.idle_hours <= 0.0:
+        return ""
+    seconds_idle = costs.idle_hours * 3600.0
+    rows = [
+        (
+            text(mode.replace("_", " ").lower()),
+            watts(power),
+            f"<b>{text(idle_money(power * seconds_idle, costs))}</b>"
+            f"<small>{kilowatt_hours(power * seconds_idle)}</small>",
+        )
+        for mode, power in found.items()
+    ]
+    heads = ("when nobody works", ">power", ">a year")
+    return (
+        f'<p class="hint">{costs.idle_hours:,.0f} hours a year lie outside of the shifts (nights, '
+        "weekends, holidays): at machine home, by the data of controller and tool. Left alone, the "
+        "controller only closes the brakes.</p>"
+        f"{table(heads, rows, 'When nobody works')}"
     )

@@ -13,7 +13,7 @@ from ir_msgs_py.savings import ProgramPoint
 from ir_recorder.analysis import Analysis, Finding, Tolerances
 from ir_recorder.analysis.indirect import agreement
 from ir_recorder.report.charts import front_section, joule_bars
-from ir_recorder.report.costs import Costs, costs_section, lever_section
+from ir_recorder.report.costs import Costs, clock_section, costs_section, lever_section
 from ir_recorder.report.data import page_data
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import notes, source, subtitle, tiles, verdict
@@ -107,6 +107,7 @@ def report_html(
         "costs": costs_section(analysis, costs or Costs()),
         "front": front_section(analysis, front),
         "levers": lever_section(analysis, costs or Costs()),
+        "clock": clock_section(analysis, costs or Costs()),
         "checks": check_table(checks),
         "style": asset("page.css"),
         "data": page_data(analysis, drawn),
