@@ -96,8 +96,8 @@ def round_trip(steps: Sequence[DrivenStep], planner: Planner) -> tuple[int, floa
             parts.append(WrittenPause("stands", step.trajectory.duration))
         if step.outputs:
             parts.append(WrittenSignals((), tuple((f"OUTPUT_{n}", on) for n, on in step.outputs)))
-    source, data = written("AGAIN", moving[0].positions[0], parts, attached(scene), [])
-    texts = [parse(source, "again.src"), parse(data, "again.dat")]
+    again_text = written("AGAIN", moving[0].positions[0], parts, attached(scene), [])
+    texts = [parse(again_text.source, "again.src"), parse(again_text.data, "again.dat")]
     again = drive(
         follow(texts, cell.machine_home, tool_in_flange(cell.tcp)), scene, cell.machine_home
     )[0]

@@ -24,11 +24,11 @@ from _shop_corpus import corpus
 from _shop_traces import traces
 
 from ir_description import bundled_cells, load_cell
-from ir_krl import follow, parse
+from ir_krl import follow, parse, plc_input
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner, ProgramPlan, RequestError
 from ir_planner.krl import KrlExport, evaluate_krl, export_krl, tool_in_flange
-from ir_planner.krl.export import contacts_at, scenes_of
+from ir_planner.krl.judged import contacts_at, scenes_of
 
 SEEDS = 3
 QUICK_SEEDS = 1
@@ -104,7 +104,8 @@ def driven_again(planner: Planner, export: KrlExport) -> list[JointTrajectory]:
     """The movements of what is read back."""
     cell = planner.cell
     texts = [parse(export.source, "shop_floor.src"), parse(export.data, "shop_floor.dat")]
-    program = follow(texts, cell.machine_home, tool_in_flange(cell.tcp))
+    inputs = plc_input(texts, there=False)
+    program = follow(texts, cell.machine_home, tool_in_flange(cell.tcp), inputs=inputs)
     return [one.step.trajectory for one in evaluate_krl(planner, program).steps if one.step.moves]
 
 

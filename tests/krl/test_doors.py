@@ -8,7 +8,7 @@ import pytest
 
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_planner import Planner
-from ir_planner.krl.export import judge_of
+from ir_planner.krl.judged import judge_of
 
 
 @pytest.fixture(scope="module")

@@ -68,7 +68,7 @@ def test_a_controller_would_take_the_files(planned) -> None:
     assert export.data.isascii()
     assert export.source.isascii()
     for line in export.data.splitlines()[3:-1]:
-        assert line.startswith(("DECL ", "EXT ", "SIGNAL ")), line
+        assert line.startswith(("DECL ", "EXT ", "SIGNAL ", ";")), line
     for block in re.findall(r"PTP_SPLINE\n(.*?)ENDSPLINE", export.source, re.DOTALL):
         shares = [float(share) for share in re.findall(r"PART=([\d.]+)", block)]
         assert len(shares) == block.count("SPTP") - 1
@@ -186,15 +186,15 @@ def test_signals_get_names_that_a_controller_takes() -> None:
 def test_written_signals_are_read_back(planner: Planner) -> None:
     tool = attached(planner.scene("none"))
     signals = WrittenSignals((("part there", True),), (("wait", True), ("Door-Open", False)))
-    source, data = written("SPEAKS", planner.cell.machine_home, [signals], tool, [])
+    texts = written("SPEAKS", planner.cell.machine_home, [signals], tool, [])
     program = follow(
-        [parse(source, "speaks.src"), parse(data, "speaks.dat")],
+        [parse(texts.source, "speaks.src"), parse(texts.data, "speaks.dat")],
         planner.cell.machine_home,
         np.eye(4),
     )
     assert [one.value for one in program.commands if isinstance(one, SetOutput)] == [True, False]
-    assert "WAIT FOR PART_THERE" in source
-    assert "SIGNAL S_WAIT $OUT[1]" in data
+    assert "WAIT FOR PART_THERE" in texts.source
+    assert "SIGNAL S_WAIT $OUT[1]" in texts.data
 
 
 def test_the_commands_of_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ir_cli.errors import InputError
-from ir_cli.krl import add_followed, followed
+from ir_cli.krl import add_followed, followed, plc_pauses
 from ir_cli.output import (
     Columns,
     ProgressLine,
@@ -148,7 +148,10 @@ def _found(arguments: argparse.Namespace, planner: Planner, line: ProgressLine) 
         known = f"{', '.join(KRL)}, or one trace: {', '.join(TRACES)}"
         raise InputError(f"{named}: today's program is read from {known}")
     program = followed(arguments.today, planner.cell, arguments)
-    evaluated = evaluate_krl(planner, program, arguments.safety_distance, arguments.load)
+    pauses = plc_pauses(program, arguments)
+    evaluated = evaluate_krl(
+        planner, program, arguments.safety_distance, arguments.load, plc=pauses
+    )
     today = today_of_krl(evaluated, process)
     return before_after(planner, today, arguments.cycle_time, options, line.show)
 

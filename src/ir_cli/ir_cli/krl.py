@@ -34,7 +34,16 @@ from ir_cli.planning import (
 )
 from ir_description import Cell
 from ir_description.files import is_utf16
-from ir_krl import Followed, follow, parse
+from ir_krl import (
+    PLC_PAUSE,
+    STYLES,
+    Followed,
+    PlcPause,
+    follow,
+    parse,
+    plc_input,
+    read_plc_table,
+)
 from ir_planner import Planner
 from ir_planner.krl import EvaluatedProgram, evaluate_krl, export_krl, tool_in_flange
 from ir_values.output_files import write_file
@@ -81,20 +90,39 @@ def add_followed(parser: argparse.ArgumentParser) -> None:
         metavar="N=VALUE",
         help="of KRL: what $IN[N] reads: 3=true; repeatable",
     )
+    parser.add_argument(
+        "--plc",
+        type=Path,
+        metavar="FILE.csv",
+        help="of KRL: table of the pauses that the PLC spends in power modes",
+    )
     passes = "of KRL: of a LOOP without EXIT (1)"
     parser.add_argument("--loop-passes", type=int, default=1, metavar="N", help=passes)
 
 
 def followed(files: Sequence[Path], cell: Cell, arguments: argparse.Namespace) -> Followed:
     """The commands of the program in these files, as the options of `add_followed` say."""
+    sources = [parse(_text(path), path.name) for path in files]
+    inputs = {**plc_input(sources, there=arguments.plc is not None), **_inputs(arguments.input)}
     return follow(
-        [parse(_text(path), path.name) for path in files],
+        sources,
         cell.machine_home,
         tool_in_flange(cell.tcp),
         routine=arguments.routine,
-        inputs=_inputs(arguments.input),
+        inputs=inputs,
         loop_passes=arguments.loop_passes,
     )
+
+
+def plc_pauses(program: Followed, arguments: argparse.Namespace) -> dict[int, PlcPause]:
+    """The table that `--plc` names. Raises InputError for one that the program doesn't ask for."""
+    if arguments.plc is None:
+        return {}
+    if PLC_PAUSE not in program.signals:
+        raise InputError(
+            f"--plc {arguments.plc}: {program.name} asks for no pause, it declares no {PLC_PAUSE}"
+        )
+    return read_plc_table(_text(arguments.plc), arguments.plc.name)
 
 
 def add_export(write: argparse.ArgumentParser) -> None:
@@ -114,6 +142,12 @@ def add_export(write: argparse.ArgumentParser) -> None:
     write.add_argument(
         "--cycle-time", type=float, default=0.0, metavar="S", help="for the cycle; 0: free (0)"
     )
+    write.add_argument(
+        "--style",
+        choices=STYLES,
+        default="spline",
+        help="spline keeps the plan; kss8, krc2: inline forms to touch up (spline)",
+    )
     write.add_argument("--start", default="park", help="posture or joint values (park)")
     add_options(write)
     add_parameters(write)
@@ -125,7 +159,10 @@ def run_import(arguments: argparse.Namespace) -> int:
     with sentences():
         planner = planner_of(arguments.cell, arguments.power_parameters)
         program = followed(arguments.files, planner.cell, arguments)
-        found = evaluate_krl(planner, program, arguments.safety_distance, arguments.load)
+        pauses = plc_pauses(program, arguments)
+        found = evaluate_krl(
+            planner, program, arguments.safety_distance, arguments.load, plc=pauses
+        )
     rows = rows_of(found)
     compared = _compared(planner, found) if arguments.compare else {}
     if arguments.json:
@@ -151,7 +188,9 @@ def run_export(arguments: argparse.Namespace) -> int:
     if source.suffix.lower() != ".src":
         raise InputError(f"{source.name} must end in .src")
     data = source.with_suffix(".dat")
-    for path in (source, data):
+    table = source.with_suffix(".plc.csv")
+    text = source.with_suffix(".plc.st")
+    for path in (source, data, table, text):
         if path.exists():
             raise InputError(f"{path} is there already")
     with sentences(), ProgressLine() as line:
@@ -169,8 +208,11 @@ def run_export(arguments: argparse.Namespace) -> int:
         )
         if not plan.status.ok:
             return failed(plan.status.message)
-        written = export_krl(planner, plan.movements, source.stem, options)
+        written = export_krl(planner, plan.movements, source.stem, options, arguments.style)
     write_file(data, written.data, new=True)
+    if written.plc_table:
+        write_file(table, written.plc_table, new=True)
+        write_file(text, written.plc_text, new=True)
     write_file(source, written.source, new=True)
     planned = written.planned
     driven = written.exported
@@ -180,7 +222,13 @@ def run_export(arguments: argparse.Namespace) -> int:
         f"{1e3 * driven.min_clearance:.1f} mm clear as the controller drives it, certified\n"
         f"planned: {planned.duration:.2f} s, {planned.energy:.0f} J; "
         f"joints at most {written.deviation:.2g} rad apart\n"
+        f"with its pauses: {written.seconds:.2f} s, {written.joules:.0f} J\n"
     )
+    if written.plc_table:
+        sys.stdout.write(
+            f"{table.name} and {text.name}: the PLC's part, it spends pauses in power modes in "
+            f"EXT; read back with --plc {table}\n"
+        )
     return 0
 
 
@@ -194,11 +242,20 @@ def rows_of(found: EvaluatedProgram) -> list[Row]:
             "to": one.to_station if one.step.moves else "",
             "seconds": one.report.duration,
             "joules": one.report.energy,
-            "joules_low": one.report.energy_low,
-            "joules_high": one.report.energy_high,
+            "joules_low": one.report.energy_low if one.step.moves else None,
+            "joules_high": one.report.energy_high if one.step.moves else None,
             "clearance": one.report.min_clearance if one.step.moves else None,
             "certified": one.found.verification.certified if one.step.moves else None,
-            "note": _note(one.step.waits_for, one.found.verification.status.message),
+            "note": "; ".join(
+                filter(
+                    None,
+                    (
+                        one.found.verification.status.message,
+                        one.power_mode or _waiting(one.step.waits_for),
+                        _handled(one.step.handled),
+                    ),
+                )
+            ),
         }
         for one in found.steps
     ]
@@ -216,8 +273,13 @@ def totals_of(found: EvaluatedProgram) -> Row:
     }
 
 
-def _note(condition: str, violation: str) -> str:
-    return f"waits for {condition}" if condition else violation
+def _waiting(condition: str) -> str:
+    return f"waits for {condition}" if condition else ""
+
+
+def _handled(part: str) -> str:
+    """What the gripper does with a part, from its name after "+" or "-"."""
+    return f"{'takes' if part[0] == '+' else 'leaves'} {part[1:]}" if part else ""
 
 
 def _sentences(found: EvaluatedProgram) -> list[str]:

@@ -147,6 +147,10 @@ class Item:
         """The value as it was read."""
         return Node(self.line, self._content)
 
+    def is_mapping(self) -> bool:
+        """Whether this is a mapping."""
+        return isinstance(self._content, dict)
+
     def is_scalar(self) -> bool:
         """Whether this is a single value."""
         return isinstance(self._content, Scalar)

@@ -8,6 +8,7 @@ from ir_description.cell.cell import (
     check_base_contact,
     check_contact,
     check_follows,
+    check_numbers,
     check_part_mass,
     check_path,
     check_posture,
@@ -37,6 +38,7 @@ from ir_description.cell.equipment import (
 from ir_description.cell.moving import cell_in, machine_in, sweep_speeds
 from ir_description.cell.program import (
     AUTO,
+    NUMBER_MAX,
     PAUSE_MAX,
     PAUSE_POWER_MODES,
     POSTURES,
@@ -51,6 +53,7 @@ __all__ = [
     "AUTO",
     "BODIES_MAX",
     "CONFIGURATION_SEARCHES",
+    "NUMBER_MAX",
     "PAUSE_MAX",
     "PAUSE_POWER_MODES",
     "POSTURES",
@@ -78,6 +81,7 @@ __all__ = [
     "check_base_contact",
     "check_contact",
     "check_follows",
+    "check_numbers",
     "check_part_mass",
     "check_path",
     "check_posture",

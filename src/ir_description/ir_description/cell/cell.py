@@ -139,6 +139,18 @@ def check_follows(signals: Iterable[CellSignal]) -> None:
             raise UnknownNameError(f"signal that {signal.name} follows", signal.follows, names)
 
 
+def check_numbers(signals: Iterable[CellSignal]) -> None:
+    """Refuse two signals with the same output, or the same input."""
+    taken: dict[tuple[str, int], str] = {}
+    for signal in signals:
+        for what, number in (("output", signal.output), ("input", signal.input)):
+            other = taken.setdefault((what, number), signal.name)
+            if number and other != signal.name:
+                raise InvalidValueError(
+                    f"{what} of {signal.name} is {number}, which {other} has already"
+                )
+
+
 def check_switch(machine: Equipment, signals: Collection[str]) -> None:
     """Refuse a machine whose switch names a signal that nobody has."""
     if machine.switch is not None and machine.switch.signal not in signals:
@@ -179,6 +191,7 @@ def check_names(cell: _Cell) -> None:  # noqa: C901
                 f"equipment of station {station.name}", station.equipment, machines
             )
     check_follows(cell.signals)
+    check_numbers(cell.signals)
     signals = dict.fromkeys(signal.name for signal in cell.signals)
     for machine in cell.equipment:
         check_switch(machine, signals)

@@ -19,6 +19,8 @@ StepKind = Literal["STATION", "POSTURE", "PATH", "PAUSE"]
 POSTURES = ("home", "park")
 AUTO = "AUTO"
 PAUSE_POWER_MODES = (AUTO, *REST_MODES)
+NUMBER_MAX = 8192
+"""Highest number of an output or input at a KR C4."""
 PAUSE_MAX = 604_800.0
 """Longest pause or dwell [s]: a week."""
 
@@ -28,15 +30,20 @@ class CellSignal:
     """A signal of the cell, its value at the start, and how the machine answers.
 
     Where `follows` is given the signal takes its value `delay` [s] after that signal was set (the
-    soft PLC's rule), e.g. the door is open 1.5 s after it was asked to.
+    soft PLC's rule), e.g. the door is open 1.5 s after it was asked to. output, input: its numbers
+    at the controller, where the robot sets it and where it reads it, 0: nobody said.
     """
 
     name: str
     initial: bool = False
     follows: str = ""
     delay: float = 0.0
+    output: int = 0
+    input: int = 0
 
     def __post_init__(self) -> None:
+        for what in ("output", "input"):
+            in_range(getattr(self, what), 0, NUMBER_MAX, "", f"{what} of {self.name}")
         in_range(self.delay, 0.0, PAUSE_MAX, "s", f"delay of {self.name}")
         if self.follows == self.name:
             raise InvalidValueError(f"signal {self.name} follows itself")

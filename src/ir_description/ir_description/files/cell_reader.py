@@ -26,6 +26,7 @@ from ir_description.cell import (
     check_base_contact,
     check_contact,
     check_follows,
+    check_numbers,
     check_part_mass,
     check_path,
     check_posture,
@@ -43,7 +44,7 @@ from ir_description.files.equipment_reader import (
 from ir_description.files.program_reader import (
     PATHS_MAX,
     read_paths,
-    read_signal,
+    read_signals,
     read_step,
     read_tasks,
 )
@@ -256,16 +257,18 @@ class _CellReader:
         return tuple(pairs)
 
     def _signals(self) -> tuple[CellSignal, ...]:
+        given = self._table.get("signals")
+        if given is None:
+            return ()
         names = NameRegister("signal")
-        signals = []
-        for item in self._list("signals", 1000):
+        signals: list[CellSignal] = []
+        for item, signal in read_signals(given, 1000):
             with item.blamed():
-                signal = read_signal(item)
                 names.add(signal.name)
+                check_numbers((*signals, signal))
             signals.append(signal)
-        if signals:
-            with self._table["signals"].blamed():
-                check_follows(signals)
+        with given.blamed():
+            check_follows(signals)
         return tuple(signals)
 
     def _check_switches(

@@ -175,7 +175,9 @@ def _signal(signal: CellSignal) -> str:
     follows = (
         f", follows: {signal.follows}, delay: {_number(signal.delay)}" if signal.follows else ""
     )
-    return f"{{name: {signal.name}, initial: {_word(signal.initial)}{follows}}}"
+    given = (("output", signal.output), ("input", signal.input))
+    numbers = "".join(f", {key}: {number}" for key, number in given if number)
+    return f"{{name: {signal.name}, initial: {_word(signal.initial)}{follows}{numbers}}}"
 
 
 def _step(step: ProgramStep) -> str:

@@ -7,6 +7,7 @@ from dataclasses import MISSING, fields
 from typing import Any, TypedDict
 
 from ir_description.cell import (
+    NUMBER_MAX,
     PAUSE_MAX,
     PAUSE_POWER_MODES,
     POSTURES,
@@ -54,16 +55,33 @@ class _Moving(TypedDict):
     planner: str
 
 
-def read_signal(item: Item) -> CellSignal:
-    """Return a signal of the cell."""
-    table = item.table(("name",), ("initial", "follows", "delay"))
+def read_signals(item: Item, high: int) -> list[tuple[Item, CellSignal]]:
+    """Return the signals of the cell, at most `high`, from a list or from a mapping by their
+    names.
+    """
+    if not item.is_mapping():
+        return [(one, _cell_signal(one)) for one in item.list(0, high)]
+    named = item.pairs()
+    if len(named) > high:
+        item.fail(f"has {len(named)} signals, must have at most {high}")
+    return [(one, _cell_signal(one, name)) for name, one in named]
+
+
+def _cell_signal(item: Item, named: str = "") -> CellSignal:
+    table = item.table(
+        () if named else ("name",), ("initial", "follows", "delay", "output", "input")
+    )
     if "delay" in table and "follows" not in table:
         table["delay"].fail("belongs to a signal that follows another")
+    numbers = {
+        key: table[key].integer(1, NUMBER_MAX) for key in ("output", "input") if key in table
+    }
     return CellSignal(
-        name=table["name"].name(),
+        name=named or table["name"].name(),
         initial=table["initial"].boolean() if "initial" in table else False,
         follows=table["follows"].name() if "follows" in table else "",
         delay=table["delay"].number(0.0, PAUSE_MAX, "s") if "delay" in table else 0.0,
+        **numbers,
     )
 
 

@@ -6,14 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_description import CellPath
-from ir_krl import Place
+from ir_krl import PLC_DONE, Place
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import LINE, CartesianPath
 from ir_msgs_py.errors import InvalidValueError
+from ir_msgs_py.plc import Signal
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.errors import RequestError
-from ir_planner.krl import DrivenStep, EvaluatedProgram, ToolMotion
+from ir_planner.krl import DrivenStep, EvaluatedProgram, EvaluatedStep, ToolMotion
 from ir_planner.program import Doors
 
 # What today's program works along: processes of a KRL program as paths of the tool.
@@ -205,7 +206,9 @@ class Stretch:
     not only passed through. label: where it stands in its source. doors: machines that were not as
     the cell has them meanwhile; None: nobody recorded it, they are as the program's own signals
     move them. process: the path of the tool that it drives, alone or with neighbours that have the
-    same one.
+    same one. power_mode: in which a standstill is spent, "" as the controller does by itself.
+    awaited, signals: of the cell, waited for in it and set at its end; handled: the part that is
+    taken ("+gear") or left ("-gear") there.
     """
 
     trajectory: JointTrajectory | None
@@ -215,6 +218,10 @@ class Stretch:
     label: str = ""
     doors: Doors | None = None
     process: CellPath | None = None
+    power_mode: str = ""
+    awaited: tuple[Signal, ...] = ()
+    signals: tuple[Signal, ...] = ()
+    handled: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,12 +254,12 @@ def today_of_krl(found: EvaluatedProgram, process: Lines | None = None) -> Today
     off, (): none. Raises RequestError for a process that can't be asked for as paths of the tool.
     """
     paths = process_paths([one.step for one in found.steps], process)
-    stretches = tuple(
-        _stretch(one.step, path) for one, path in zip(found.steps, paths, strict=True)
-    )
+    stretches = tuple(_stretch(one, path) for one, path in zip(found.steps, paths, strict=True))
     start = np.asarray(found.steps[0].step.trajectory.positions[0])
     notes = [str(note) for note in found.notes]
-    waits = [step.step for step in found.steps if step.step.waits_for]
+    waits = [
+        one for one in found.steps if one.step.waits_for and PLC_DONE not in one.step.waits_for
+    ]
     if waits:
         notes.append(
             f"{len(waits)} waits for machines count no time: how long they take is not in a program"
@@ -261,9 +268,21 @@ def today_of_krl(found: EvaluatedProgram, process: Lines | None = None) -> Today
     return Today(found.name, "KRL program", start, stretches, tuple(notes))
 
 
-def _stretch(step: DrivenStep, process: CellPath | None) -> Stretch:
+def _stretch(one: EvaluatedStep, process: CellPath | None) -> Stretch:
+    step = one.step
     end = np.asarray(step.trajectory.positions[-1])
     works = bool(step.outputs or step.waits_for)
     trajectory = step.trajectory if step.moves else None
     label = lines_of(step.places)
-    return Stretch(trajectory, end, step.trajectory.duration, works, label, process=process)
+    return Stretch(
+        trajectory,
+        end,
+        step.trajectory.duration,
+        works,
+        label,
+        process=process,
+        power_mode=one.power_mode,
+        awaited=step.awaited,
+        signals=step.signals,
+        handled=step.handled,
+    )

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_description import Cell, CellPath, Equipment, ProgramStep, Station, Zone
+from ir_description import Cell, CellPath, Equipment, ProgramStep, Signal, Station, Zone
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.status import StatusCode
@@ -19,8 +19,8 @@ from ir_planner.program import (
     Pause,
     ProgramRequest,
     Scenes,
-    pause_by_itself,
     placed_steps,
+    spent,
 )
 from ir_planner.scene import PlanningScene
 
@@ -82,9 +82,41 @@ def asked_program(today: Today, scene: PlanningScene) -> AskedProgram:
             StatusCode.INVALID_MOTION_PLAN,
             f"{today.name} has no movement: there is nothing to compare",
         )
-    steps, notes = _handled(steps, scene.cell)
+    if any(one.handled or one.signals or one.awaited for one in today.stretches):
+        steps = _with_signals(steps)
+        notes = ["parts and signals at the stops are those of the program's own outputs and waits"]
+    else:
+        steps, notes = _handled(steps, scene.cell)
     cell = replace(stops.cell(), program=tuple(step.step for step in steps))
     return AskedProgram(cell, tuple(steps), (*stops.notes(), *notes))
+
+
+def _with_signals(steps: list[Asked]) -> list[Asked]:
+    """The steps with what the program itself waits for, sets, takes and leaves at them. What is
+    waited for in a standstill counts before the next movement.
+    """
+    result: list[Asked] = []
+    awaited: list[Signal] = []
+    for asked in steps:
+        done = asked.stretches
+        waits = tuple(signal for one in done for signal in one.awaited)
+        signals = tuple(signal for one in done for signal in one.signals)
+        handled = "".join(one.handled for one in done)
+        if asked.step.kind == "PAUSE":
+            awaited += waits
+            result.append(replace(asked, step=replace(asked.step, set_signals=signals)))
+            continue
+        taken, left = (handled[1:], "") if handled[:1] == "+" else ("", handled[1:])
+        step = replace(
+            asked.step,
+            wait_for=(*awaited, *waits),
+            set_signals=signals,
+            attach=taken if asked.step.kind == "STATION" else "",
+            detach=left if asked.step.kind == "STATION" else "",
+        )
+        awaited = []
+        result.append(replace(asked, step=step))
+    return result
 
 
 def _handled(steps: list[Asked], cell: Cell) -> tuple[list[Asked], list[str]]:
@@ -211,7 +243,7 @@ class _Costing:
         assert stretch.trajectory is not None  # asked before
         along = stretch.process is not None
         names = [there] if along else [station.name for station in scene.cell.stations]
-        contacts = next((name for name in (there, here) if name in names), "")
+        contacts = tuple(dict.fromkeys(name for name in (here, there) if name in names))
         found = evaluate_trajectory(
             stretch.trajectory, scene, self._request.options.safety_distance, contacts
         )
@@ -230,9 +262,9 @@ class _Costing:
 
     def pause(self, stretch: Stretch, here: str, scene: PlanningScene) -> None:
         """A standstill."""
-        spent = Pause(here, stretch.seconds, "", self._q, scene)
-        step = pause_by_itself(spent, self._request.settings.transitions)
-        self.steps.append(self._charge.stood(step, spent))
+        pause = Pause(here, stretch.seconds, stretch.power_mode, self._q, scene)
+        step = spent(pause, self._request.settings.transitions)
+        self.steps.append(self._charge.stood(step, pause))
 
 
 # How the doors stood when today's program began: as a recording says, or else as the cell has

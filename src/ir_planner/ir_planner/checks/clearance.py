@@ -12,7 +12,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import motion_at
-from ir_planner.scene import PlanningScene
+from ir_planner.scene import PlanningScene, Stops
 
 # s between the samples of a profile, and how many of them
 _STEP = 0.01
@@ -91,7 +91,7 @@ def nearest_pairs(
 
 
 def clearance_profile(
-    trajectory: JointTrajectory, scene: PlanningScene, station: str = ""
+    trajectory: JointTrajectory, scene: PlanningScene, station: Stops = ""
 ) -> ClearanceProfile:
     """Distances along a trajectory, sampled every 10 ms or finer, and a proved bound of the
     smallest one.

@@ -16,7 +16,7 @@ from ir_planner.checks.clearance import ClearanceProfile, clearance_profile
 from ir_planner.checks.energy import MovementEnergy, movement_energy, peak_power
 from ir_planner.checks.verification import Verification, verify
 from ir_planner.presentation import plot_profiles, report_text, status_text
-from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
+from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, Stops
 
 
 @dataclass(frozen=True)
@@ -64,9 +64,11 @@ class Evaluation:
 
 
 def evaluate_trajectory(
-    trajectory: JointTrajectory, scene: PlanningScene, safety_distance: float, station: str = ""
+    trajectory: JointTrajectory, scene: PlanningScene, safety_distance: float, station: Stops = ""
 ) -> Evaluation:
-    """Verify and measure a trajectory with the loads of the scene."""
+    """Verify and measure a trajectory with the loads of the scene. station: whose contacts are
+    allowed; of a hop between two stations both, each in its own zone.
+    """
     verification = verify(trajectory, scene, safety_distance, station)
     energy = movement_energy(trajectory, scene)
     return measured(trajectory, scene, safety_distance, station, verification, energy)
@@ -76,7 +78,7 @@ def measured(
     trajectory: JointTrajectory,
     scene: PlanningScene,
     safety_distance: float,
-    station: str,
+    station: Stops,
     verification: Verification,
     energy: MovementEnergy,
 ) -> Evaluation:

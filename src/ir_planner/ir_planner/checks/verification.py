@@ -3,7 +3,9 @@ the polynomials, torque by guaranteed bounds, clearance by a certificate. The fi
 every kind is named with place, limit and excess.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from ir_planner.curves import Extremes, extremes
 from ir_planner.scene import (
     PROOF_TOLERANCE,
     PlanningScene,
+    Stops,
     polynomials_between,
     spans_outside,
     tcp_inside,
@@ -163,7 +166,7 @@ def share_violation(
 
 
 def clearance_violation(
-    trajectory: JointTrajectory, scene: PlanningScene, safety_distance: float, station: str = ""
+    trajectory: JointTrajectory, scene: PlanningScene, safety_distance: float, station: Stops = ""
 ) -> Violation | None:
     """The first instant at which a pair is too near, or not proved to be far enough; None:
     proved.
@@ -175,12 +178,39 @@ def clearance_violation(
     end = float(trajectory.times[-1])
     if not station or not scene.allowed(station).any():
         return _of_part(trajectory, (begin, end), plain, scene, "")
+    if not isinstance(station, str):
+        return _first(_of_hop(trajectory, scene, safety_distance, station))
     relaxed = scene.thresholds(safety_distance, station) - PROOF_TOLERANCE
     outside = spans_outside(trajectory, scene, station, safety_distance)
     found = [
         _of_part(trajectory, (begin, end), relaxed, scene, station),
         *(_of_part(trajectory, span, plain, scene, "") for span in outside),
     ]
+    return _first(found)
+
+
+def _of_hop(
+    trajectory: JointTrajectory, scene: PlanningScene, margin: float, stations: tuple[str, ...]
+) -> list[Violation | None]:
+    """What is wrong between several stations: the trajectory is cut where the tcp leaves or enters
+    a zone; between two cuts the contacts of those stations hold whose zone it is in.
+    """
+    outside = {one: spans_outside(trajectory, scene, one, margin) for one in stations}
+    cuts = {float(trajectory.times[0]), float(trajectory.times[-1])}
+    cuts |= {at for spans in outside.values() for span in spans for at in span}
+    found = []
+    for begin, end in pairwise(sorted(cuts)):
+        there = tuple(
+            one
+            for one, spans in outside.items()
+            if not any(left <= begin and end <= right for left, right in spans)
+        )
+        threshold = scene.thresholds(margin, there) - PROOF_TOLERANCE
+        found.append(_of_part(trajectory, (begin, end), threshold, scene, there))
+    return found
+
+
+def _first(found: Sequence[Violation | None]) -> Violation | None:
     violations = [violation for violation in found if violation is not None]
     return min(violations, key=lambda violation: violation.time) if violations else None
 
@@ -190,7 +220,7 @@ def _of_part(
     span: tuple[float, float],
     threshold: FloatArray,
     scene: PlanningScene,
-    station: str,
+    station: Stops,
 ) -> Violation | None:
     coefficients, durations = polynomials_between(trajectory, *span)
     if len(durations) == 0:
@@ -206,11 +236,13 @@ def _of_part(
 
 
 def _of_point(
-    trajectory: JointTrajectory, scene: PlanningScene, safety_distance: float, station: str
+    trajectory: JointTrajectory, scene: PlanningScene, safety_distance: float, station: Stops
 ) -> Violation | None:
     q = trajectory.positions
-    inside = bool(station) and bool(tcp_inside(q, scene, station, safety_distance)[0])
-    where = station if inside else ""
+    named = (station,) if isinstance(station, str) else station
+    where = tuple(
+        one for one in named if one and bool(tcp_inside(q, scene, one, safety_distance)[0])
+    )
     threshold = scene.thresholds(safety_distance, where) - PROOF_TOLERANCE
     near = scene.collision.min_distance(q, threshold)
     z = int(near.pair[0])
@@ -228,7 +260,7 @@ def _violation(
     z: int,
     threshold: FloatArray,
     scene: PlanningScene,
-    station: str,
+    station: Stops,
 ) -> Violation:
     pair = pair_value(scene, q, z, bool(scene.allowed(station)[z]))
     kept = float(threshold[z]) + PROOF_TOLERANCE
@@ -291,7 +323,7 @@ class TorqueProof:
 
 
 def verify(
-    trajectory: JointTrajectory, scene: PlanningScene, safety_distance: float, station: str = ""
+    trajectory: JointTrajectory, scene: PlanningScene, safety_distance: float, station: Stops = ""
 ) -> Verification:
     """Check a trajectory against the robot's limits and S_m (or what `station` allows its
     pairs).

@@ -3,14 +3,14 @@
 from ir_planner.krl.execution import DrivenStep
 from ir_planner.krl.export import DEVIATION_MAX, KrlExport
 from ir_planner.krl.geometry import tool_in_flange
+from ir_planner.krl.places import posture_at, station_at
 from ir_planner.krl.requests import (
     EvaluatedProgram,
     EvaluatedStep,
     evaluate_krl,
     export_krl,
     one_movement,
-    posture_at,
-    station_at,
+    surroundings,
 )
 from ir_planner.krl.splines import ToolMotion
 
@@ -26,5 +26,6 @@ __all__ = [
     "one_movement",
     "posture_at",
     "station_at",
+    "surroundings",
     "tool_in_flange",
 ]

@@ -1,7 +1,7 @@
 """Execution of a KRL program as on a KR C4: movements between standstills, waits, outputs."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from ir_krl import (
     KrlMotionError,
     Motion,
     Note,
+    Payload,
     Place,
     SetOutput,
     Speeds,
@@ -20,10 +21,12 @@ from ir_krl import (
     WaitFor,
 )
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.plc import Signal
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.krl.geometry import Arm
 from ir_planner.krl.motions import AxisLine, Curve, Move, move, overlap, tool_curve, trajectory
 from ir_planner.krl.splines import ToolMotion, block_curve, timed_block, tool_motion, tool_spline
+from ir_planner.krl.surroundings import Surroundings, nothing_around
 from ir_planner.scene import STILL, PlanningScene
 from ir_planner.timing import standing
 
@@ -66,7 +69,9 @@ class DrivenStep:
 
     places: of its motions in the program; outputs: set at its end, number and value; waits_for: a
     condition that ends a wait; tool: for each motion what the tool draws, None for a PTP and where
-    no segment describes it; process: places of the motions that belong to a process.
+    no segment describes it; process: places of the motions that belong to a process. scene: in
+    which it is driven; handled: the part that is taken ("+gear") or left ("-gear") at its end;
+    awaited, signals: of the cell, that it waits for and that are set at its end.
     """
 
     trajectory: JointTrajectory
@@ -76,67 +81,88 @@ class DrivenStep:
     waits_for: str = ""
     tool: tuple[ToolMotion | None, ...] = ()
     process: tuple[Place, ...] = ()
+    handled: str = ""
+    awaited: tuple[Signal, ...] = ()
+    signals: tuple[Signal, ...] = ()
+    _: KW_ONLY
+    scene: PlanningScene
 
 
 def drive(
-    program: Followed, scene: PlanningScene, start: FloatArray
+    program: Followed, among: Surroundings | PlanningScene, start: FloatArray
 ) -> tuple[tuple[DrivenStep, ...], tuple[Note, ...]]:
     """All steps of the program, and what was assumed; `start` (n,) is where the robot stands
-    before.
+    before; among: what it changes as it runs, or a scene that it doesn't change.
 
     As on the controller, the first motion brings the robot onto the programmed path (block
     coincidence): it is no part of the cycle. Raises KrlMotionError.
     """
-    run = _Drive(scene, np.array(start), list(program.notes))
+    around = among if isinstance(among, Surroundings) else nothing_around(among)
+    run = _Drive(around, np.array(start), list(program.notes))
     process = process_motions(program.commands)
     for k, command in enumerate(program.commands):
         run.working = k in process
         run.take(command)
     run.finish()
-    return tuple(run.steps), tuple(run.notes)
+    return tuple(run.steps), (*run.notes, *around.notes)
 
 
 @dataclass
 class _Drive:
     """Where the robot stands (n,), and the motions that are being driven through."""
 
-    scene: PlanningScene
+    around: Surroundings
     here: FloatArray
     notes: list[Note]
     steps: list[DrivenStep] = field(default_factory=list)
     _moves: list[Move] = field(default_factory=list)
     _overlaps: list[int] = field(default_factory=list)
     _places: list[Place] = field(default_factory=list)
-    _outputs: list[tuple[int, bool]] = field(default_factory=list)  # set while the robot moves
+    _outputs: list[SetOutput] = field(default_factory=list)  # set while the robot moves
     _tool: list[ToolMotion | None] = field(default_factory=list)
     _process: list[Place] = field(default_factory=list)
     working: bool = False  # the command belongs to a process
     _on_path: bool = False  # the first motion has led to the programmed path
     _blend: Blend | None = None  # of the last motion; None: it ends at rest
+    _payload: Payload | None = None  # of the last motion
 
     def __post_init__(self) -> None:
-        self.arm = Arm(self.scene)
+        self._among(self.around.scene(None, Place()))
+
+    def _carry(self, payload: Payload | None, place: Place) -> None:
+        """What a motion from rest carries; one that is blended goes on with the load before."""
+        if not self._moves:
+            self._payload = payload
+            self._among(self.around.scene(payload, place))
+
+    def _among(self, scene: PlanningScene) -> None:
+        """Drive in this scene from here on."""
+        self.scene = scene
+        self.arm = Arm(scene)
 
     def take(self, command: Command) -> None:
         """Drive one command."""
         match command:
             case Motion():
+                self._carry(command.payload, command.place)
                 self._motion(command)
             case SplineBlock():
+                self._carry(command.parts[0].payload, command.place)
                 self._block(command)
             case SetOutput() if command.on_path and self._moves:
-                self._outputs.append((command.number, command.value))
+                self._outputs.append(command)
             case SetOutput():
                 self.finish()
-                if self.steps:
-                    outputs = (*self.steps[-1].outputs, (command.number, command.value))
-                    self.steps[-1] = replace(self.steps[-1], outputs=outputs)
+                self._set(command)
             case Wait():
                 self.finish()
                 self._stand(command.seconds, command.place, "")
+                self.around.stood(command.seconds)
             case WaitFor():
                 self.finish()
                 self._stand(0.0, command.place, command.condition)
+                signals = self.around.awaited(command.condition)
+                self.steps[-1] = replace(self.steps[-1], awaited=signals)
 
     def finish(self) -> None:
         """Come to rest: what is being driven through becomes a step."""
@@ -146,7 +172,6 @@ class _Drive:
         self._step(trajectory(self._moves, self._overlaps, names), tuple(self._places), moves=True)
         self.steps[-1] = replace(
             self.steps[-1],
-            outputs=tuple(self._outputs),
             tool=tuple(self._tool),
             process=tuple(self._process),
         )
@@ -154,9 +179,29 @@ class _Drive:
         self._overlaps = []
         self._places = []
         self._blend = None
+        for output in self._outputs:
+            self._set(output)
         self._outputs = []
         self._tool = []
         self._process = []
+
+    def _set(self, command: SetOutput) -> None:
+        """An output is set at the end of the last step, where the robot stands."""
+        if not self.steps and self._on_path:
+            self._stand(0.0, command.place, "")
+        signals = self.around.signalled(command.number, command.value)
+        handled = self.around.gripped(command.number, command.value, self.here, command.place)
+        if handled:  # until a motion says what $LOAD is then
+            self._payload = None
+        if self.steps:
+            last = self.steps[-1]
+            outputs = (*last.outputs, (command.number, command.value))
+            self.steps[-1] = replace(
+                last,
+                outputs=outputs,
+                handled=handled or last.handled,
+                signals=(*last.signals, *signals),
+            )
 
     def _motion(self, motion: Motion) -> None:
         if not self._on_path:
@@ -237,4 +282,6 @@ class _Drive:
         moves: bool,
         waits_for: str = "",
     ) -> None:
-        self.steps.append(DrivenStep(driven, moves, places, (), waits_for))
+        if not self._moves:
+            self._among(self.around.scene(self._payload, places[0]))
+        self.steps.append(DrivenStep(driven, moves, places, (), waits_for, scene=self.scene))

@@ -1,326 +1,73 @@
 """Export of programs as KRL: written, read back, executed and certified again."""
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
-from scipy.spatial import cKDTree
 
-from ir_description import Cell, PowerData, ProgramStep, Signal, cell_in
-from ir_kernels import portable
+from ir_description import Cell
 from ir_krl import (
+    PLC_THERE,
     Attached,
+    Followed,
+    Numbers,
     Part,
+    Payload,
+    PlcPause,
+    Style,
+    Texts,
+    WrittenHandling,
+    WrittenMove,
     WrittenPath,
     WrittenPause,
     WrittenSignals,
     WrittenSpline,
     check_name,
+    check_style,
     follow,
     parse,
+    plc_table,
+    structured_text,
     written,
 )
 from ir_msgs_py.arrays import FloatArray
+from ir_msgs_py.modes import TransitionTimes
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks import Evaluation, evaluate_trajectory, total_report
+from ir_planner.checks import total_report
 from ir_planner.errors import RequestError
-from ir_planner.krl.execution import DrivenStep, drive
-from ir_planner.krl.geometry import Arm, tool_in_flange
-from ir_planner.krl.splines import passing_times
-from ir_planner.program import Charge, Pause, doors_along
-from ir_planner.scene import STILL, Drives, PlanningScene, with_parts
-from ir_planner.timing import GRID_S
+from ir_planner.krl.execution import drive
+from ir_planner.krl.geometry import tool_in_flange
+from ir_planner.krl.inline_moves import fitted_moves
+from ir_planner.krl.judged import Judge, ReadBack, called, points_of
+from ir_planner.krl.strokes import deviation_along, fitted_path, one_after_the_other
+from ir_planner.krl.surroundings import Surroundings, payload_of
+from ir_planner.krl.timed_splines import DEVIATION_MAX, deviation_in_time, fitted_spline
+from ir_planner.program import Charge, Pause, spent, switch_times
+from ir_planner.scene import STILL, PlanningScene
 
-# Steps of a planned program, each judged as it was planned: with its load, its parts where they
-# lie, doors as its signals move them, sweeping while they do, and what its station allows.
+__all__ = ["DEVIATION_MAX", "KrlExport", "attached", "export"]
 
+# Programs written as KRL, read back, driven by the controller's model and proved again. What a
+# style can't keep of the plan shows in seconds and joules. Modes of pauses are the PLC's.
 
-@dataclass(frozen=True, eq=False)
-class Judge:
-    """Evaluates trajectories as the steps that they belong to: with their load, their parts, their
-    station.
-
-    scenes: of each step by its id(); margin: S_m [m].
-    """
-
-    scenes: Mapping[int, PlanningScene]
-    margin: float
-
-    def __call__(self, trajectory: JointTrajectory, step: PlannedMovement) -> Evaluation:
-        """What a trajectory makes of a step."""
-        return evaluate_trajectory(trajectory, self.scene(step), self.margin, contacts_at(step))
-
-    def scene(self, step: PlannedMovement) -> PlanningScene:
-        """In which a step is driven."""
-        return self.scenes[id(step)]
-
-
-def judge_of(
-    steps: Sequence[PlannedMovement], cell: Cell, power: PowerData, drives: Drives, margin: float
-) -> Judge:
-    """A judge of these steps, S_m `margin` m."""
-    found = zip(steps, scenes_of(steps, cell, power, drives), strict=True)
-    return Judge({id(step): scene for step, scene in found}, margin)
-
-
-def contacts_at(step: PlannedMovement) -> str:
-    """The station or path whose allowed contacts hold in a step, "" for none."""
-    at = {
-        MovementKind.SERVICE_EXIT: step.from_station,
-        MovementKind.SERVICE_ENTRY: step.to_station,
-        MovementKind.CARTESIAN: step.to_station,
-    }
-    return at.get(MovementKind(step.kind), "")
-
-
-def scenes_of(
-    steps: Sequence[PlannedMovement], cell: Cell, power: PowerData, drives: Drives
-) -> list[PlanningScene]:
-    """The scene of each step: what is held, where the parts lie, how the doors stand or sweep."""
-    scenes = []
-    places = cell.parts_at_start()
-    doors = [dict(before) for before, _ in doors_along(cell, [_signalling(step) for step in steps])]
-    for step, moved in zip(steps, doors, strict=True):
-        standing = cell_in(with_parts(cell, places), moved)
-        for (
-            text
-        ) in step.states:  # of machines that no signal moves: those that the step was planned with
-            machine, _, state = text.partition("=")
-            if machine not in moved:
-                standing = standing.with_equipment(machine, state=state)
-        scenes.append(PlanningScene(standing, cell.loads(places.held), power, drives))
-        if step.attach or step.detach:
-            places = places.after(
-                ProgramStep("STATION", step.to_station, attach=step.attach, detach=step.detach)
-            )
-    return scenes
-
-
-def _signalling(step: PlannedMovement) -> ProgramStep:
-    """What a step waits for and sets, and how long it dwells."""
-    return ProgramStep(
-        "POSTURE",
-        "home",
-        dwell=step.duration if step.is_pause else 0.0,
-        wait_for=tuple(_signal(text) for text in step.wait_for),
-        set_signals=tuple(_signal(text) for text in step.set_signals),
-    )
-
-
-def _signal(text: str) -> Signal:
-    name, _, value = text.partition("=")
-    return Signal(name, value != "0")
-
-
-# A movement along a path of the tool as KRL: one SPLINE of the tool from rest to rest, at its
-# speed.
-#
-# Points lie on the planned path at equal distances. They are doubled until the path that the
-# controller's model drives through them keeps to the planned one, and the tool's acceleration is
-# lowered until the axes follow without losing the tool's speed.
-
-TOOL_MAX = 1e-4  # m, of the tool from the planned path
-JOINT_MAX = 2e-3  # rad, of a joint from the planned path
-SPEED_MAX = 0.01  # share of the tool's speed
-# m between points at first, how many at least and at most
-_SPACING = 0.04
-_FEWEST = 6
-_MOST = 2000
-_DENSE = 2e-5  # m between the places of the planned path that others are held against
-_FINER = (1, 2, 4, 8, 16)
-_ACCELERATIONS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15)  # shares of the planned one
-_EVEN = 0.97  # of its speed that the tool keeps between its ramps
-# shares of its speed and of its largest acceleration
-_RAMP = 0.05
-_LEVEL = 0.02
-_RATE = 500.0  # Hz
-
-ReadBack = Callable[[list[Part]], list[JointTrajectory]]
-"""The movements of parts as the controller's model drives them, one for each."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Stroke:
-    """Part of the movement from rest to rest: times (M,) s, the tcp's places (M, 3) m, its speed
-    (M,) m/s.
-    """
-
-    times: FloatArray
-    places: FloatArray
-    speed: FloatArray
-
-    @property
-    def along(self) -> FloatArray:
-        """Arc lengths (M,) m."""
-        steps = np.linalg.norm(np.diff(self.places, axis=0), axis=1)
-        return np.concatenate([[0.0], np.cumsum(steps)])
-
-    @property
-    def top(self) -> float:
-        """The tool's speed [m/s]."""
-        return float(self.speed.max())
-
-
-def fitted_path(
-    step: PlannedMovement, planned: JointTrajectory, scene: PlanningScene, back: ReadBack
-) -> list[Part]:
-    """A SPLINE for each stroke of a movement along a path. Raises RequestError where none keeps to
-    it.
-    """
-    strokes = list(_strokes(planned, scene))
-    for stroke in strokes:
-        _check_even(step, stroke)
-    reason = ""
-    for finer in _FINER:
-        for share in _ACCELERATIONS:
-            written = [_written(step, one, planned, scene, finer, share) for one in strokes]
-            if max(len(part.poses) for part in written) > _MOST:
-                break
-            reason, too_fast = _objection(back(list(written)), planned, strokes, scene)
-            if not reason:
-                return list(written)
-            if not too_fast:
-                break
-    raise RequestError(
-        StatusCode.INVALID_MOTION_PLAN, f"along {step.to_station}: no SPLINE keeps to it: {reason}"
-    )
-
-
-def _strokes(planned: JointTrajectory, scene: PlanningScene) -> Iterator[_Stroke]:
-    assert planned.velocities is not None  # as every planned movement has
-    rests = planned.times[~planned.velocities.any(axis=1)]
-    for begin, end in itertools.pairwise(rests):
-        count = max(int(np.ceil((end - begin) * _RATE)), 2) + 1
-        times = np.linspace(begin, end, count)
-        motion = planned.sample(times)
-        jacobian = scene.chain.jacobian(motion.q)[:, :3]
-        speed = np.linalg.norm(np.einsum("mij,mj->mi", jacobian, motion.qd), axis=1)
-        yield _Stroke(times, scene.chain.tcp_poses(motion.q)[:, :3, 3], speed)
-
-
-def _check_even(step: PlannedMovement, stroke: _Stroke) -> None:
-    share = stroke.speed / stroke.top
-    gain = np.abs(np.gradient(stroke.speed, stroke.times))
-    lost = (share > _RAMP) & (share < _EVEN)
-    level = lost & (gain < _LEVEL * gain.max())  # a ramp is level at its ends only
-    reached = np.flatnonzero(share >= 1.0 - SPEED_MAX)
-    if level.any() or share[reached[0] : reached[-1] + 1].min() < _EVEN:
-        raise RequestError(
-            StatusCode.INVALID_MOTION_PLAN,
-            f"along {step.to_station}: the tool's speed changes along the path; a SPLINE is "
-            "written with one",
-        )
-
-
-def _written(
-    step: PlannedMovement,
-    stroke: _Stroke,
-    planned: JointTrajectory,
-    scene: PlanningScene,
-    finer: int,
-    share: float,
-) -> WrittenPath:
-    along = stroke.along
-    count = max(int(np.ceil(along[-1] / _SPACING)), _FEWEST) * finer
-    times = np.interp(np.linspace(0.0, along[-1], count + 1)[1:], along, stroke.times)
-    times[-1] = stroke.times[-1]
-    poses = portable.matmul(
-        Arm(scene).flange(planned.sample(times).q), tool_in_flange(scene.cell.tcp)
-    )
-    acceleration = float(np.abs(np.gradient(stroke.speed, stroke.times)).max())
-    comment = f"along {step.to_station}: {along[-1]:.3f} m at {stroke.top:.3g} m/s"
-    return WrittenPath(comment, poses, stroke.top, acceleration * share)
-
-
-def _objection(
-    driven: list[JointTrajectory],
-    planned: JointTrajectory,
-    strokes: list[_Stroke],
-    scene: PlanningScene,
-) -> tuple[str, bool]:
-    """Why what is driven isn't the planned path at its speed ("": it is), and whether a lower
-    acceleration may help.
-    """
-    for one, stroke in zip(driven, strokes, strict=True):
-        (again,) = _strokes(one, scene)
-        share = again.top / stroke.top
-        if abs(share - 1.0) > SPEED_MAX:
-            return f"the tool's speed is {share:.3f} times what it should be", share < 1.0
-        along = stroke.along
-        times = np.interp(np.arange(0.0, along[-1] + _DENSE, _DENSE), along, stroke.times)
-        dense = planned.sample(times).q
-        found = cKDTree(scene.chain.tcp_poses(dense)[:, :3, 3]).query(again.places)
-        away = float(np.max(found[0]))
-        nearest = np.asarray(found[1])
-        if away > TOOL_MAX:
-            return f"the tool is {1e3 * away:.3g} mm off, {1e3 * TOOL_MAX:g} mm are allowed", False
-        joints = float(np.abs(one.sample(again.times).q - dense[nearest]).max())
-        if joints > JOINT_MAX:
-            return f"a joint is {joints:.4f} rad off, {JOINT_MAX:g} rad are allowed", False
-    return "", False
-
-
-def deviation_along(driven: JointTrajectory, planned: JointTrajectory) -> float:
-    """Largest difference of a joint [rad] from the nearest configuration of the planned
-    movement.
-    """
-    dense = planned.sample(
-        np.linspace(0.0, planned.duration, max(int(planned.duration * _RATE), 2) * 4)
-    ).q
-    at = driven.sample(np.linspace(0.0, driven.duration, max(int(driven.duration * _RATE), 2))).q
-    nearest = cKDTree(dense).query(at)[1]
-    return float(np.abs(at - dense[nearest]).max())
-
-
-def one_after_the_other(parts: list[JointTrajectory]) -> JointTrajectory:
-    """Movements that each begin where the one before ends, at rest, as one."""
-    first = parts[0]
-    begins = np.cumsum([0, *(int(part.times_ns[-1]) for part in parts[:-1])])
-    times = [part.times_ns[1:] + begin for part, begin in zip(parts, begins, strict=True)]
-
-    def column(name: str) -> FloatArray:
-        rows = [getattr(part, name) for part in parts]
-        return np.concatenate([rows[0][:1], *(row[1:] for row in rows)])
-
-    return JointTrajectory(
-        first.joint_names,
-        np.concatenate([first.times_ns[:1], *times]),
-        column("positions"),
-        column("velocities"),
-        column("accelerations"),
-    )
-
-
-# Programs and trajectories written as KRL, read back, driven by the controller's model and proved
-# again.
-#
-# A movement becomes a PTP_SPLINE through points of its trajectory with a TIME_BLOCK that gives each
-# its time. As many points are taken as the movement needs to stay certified and near to what was
-# planned. They are passed at the planned times as far as the limits allow.
-
-DEVIATION_MAX = 2e-3  # rad, of a joint from the planned movement
-_SPACING_EXPORT = 0.2  # s between points at first
-_POINTS_MIN = 6
-_POINTS_MAX = 400
-_SLOWINGS = 4  # per number of points
-_CLOSE = 1.001
-_ROUNDING = 1e-6  # grid steps
-# of the planned duration and energy
-_ENOUGH = 1.01
-_ENOUGH_J = 1.02
-_FINEST = 0.04  # s between points, where more of them no longer help
-_SAMPLES_PER_S = 250
-_ASKS = {"BUS_POWER_OFF": "AB", "HIBERNATION": "HIB", "STAND_ON_BRAKES": ""}
+_PAUSES_MAX = 255
+_IDS = 5  # in a line of the header
+_AXES = 6
+_Motion: TypeAlias = WrittenSpline | WrittenPath | WrittenMove
 
 
 @dataclass(frozen=True, eq=False)
 class KrlExport:
     """Texts of the program; the largest deviation [rad] of a joint from the plan, and the reports
-    of what was planned and of what the controller drives.
+    of what was planned and of what the controller drives, movements alone.
+
+    plc_table, plc_text: the pauses that the PLC spends in power modes, as CSV and as structured
+    text; "" where it spends none. seconds, joules: of the whole cycle with its pauses. steps: of
+    each step of the plan what the controller drives, as its comment in the source says.
     """
 
     source: str
@@ -328,238 +75,374 @@ class KrlExport:
     deviation: float
     planned: TrajectoryReport
     exported: TrajectoryReport
+    plc_table: str = ""
+    plc_text: str = ""
+    seconds: float = 0.0
+    joules: float = 0.0
+    steps: tuple[PlannedMovement, ...] = ()
 
 
 def export(
-    steps: Sequence[PlannedMovement], name: str, scene: PlanningScene, judge: Judge, charge: Charge
+    steps: Sequence[PlannedMovement],
+    name: str,
+    scene: PlanningScene,
+    judge: Judge,
+    times: TransitionTimes,
+    style: str,
+    around: Callable[[Followed], Surroundings],
 ) -> KrlExport:
-    """Write steps (movements with their points, and pauses) as program `name`; charge: of the
-    capacitor, as the program begins.
+    """Write steps (movements with their points, and pauses) as program `name`. around: what a
+    program that is read back moves among.
 
     Raises RequestError where a movement can't be written so that it stays certified, KrlError for
-    the name.
+    the name and the style.
     """
     moving = [step for step in steps if not step.is_pause]
     if not moving:
         raise RequestError(StatusCode.INVALID_MOTION_PLAN, "the program has no movement to export")
     check_name(name)
-    fitted = {id(step): _written_as(step, scene, judge) for step in moving}
-    parts = [part for step in steps for part in _parts(step, fitted)]
-    start = _points_of(moving[0]).positions[0]
-    header = [f"{scene.cell.name}: {len(moving)} movements, points and times as planned"]
-    from_home = bool(np.abs(start - scene.cell.machine_home).max() < STILL)
-    source, data = written(name, start, parts, attached(scene), header, from_home=from_home)
-    driven = (step.trajectory for step in _driven(source, data, scene) if step.moves)
-    after = []
-    deviation = 0.0
-    here = start
-    for step in steps:
-        if step.is_pause:
-            charge.stood(step, Pause(step.to_station, step.duration, "", here, judge.scene(step)))
-            continue
-        again = one_after_the_other(list(itertools.islice(driven, len(fitted[id(step)]))))
-        found = judge(again, step)
-        if not found.verification.certified:
-            raise RequestError(
-                StatusCode.INVALID_MOTION_PLAN,
-                f"{_called(step)} isn't certified as the controller would drive it: "
-                f"{found.verification.status.message}",
-            )
-        deviation = max(deviation, _deviation_of(step, fitted[id(step)], again))
-        moved = charge.moved(
-            replace(step, trajectory=again, report=found.report), found.energy, judge.scene(step)
+    return _Job(steps, name, scene, judge, times, check_style(style), around).done()
+
+
+@dataclass(frozen=True, eq=False)
+class _Again:
+    """A movement as the controller drives it."""
+
+    trajectory: JointTrajectory
+    deviation: float
+
+
+class _Job:
+    """One export."""
+
+    def __init__(
+        self,
+        steps: Sequence[PlannedMovement],
+        name: str,
+        scene: PlanningScene,
+        judge: Judge,
+        times: TransitionTimes,
+        style: Style,
+        around: Callable[[Followed], Surroundings],
+    ) -> None:
+        self._around = around
+        self._steps = steps
+        self._name = name
+        self._scene = scene
+        self._judge = judge
+        self._times = times
+        self._style = style
+        self._pauses = _plc_pauses(steps, times)
+        self._loads = _loads(steps, judge)
+        self._start = points_of(next(step for step in steps if not step.is_pause)).positions[0]
+        fitted = {id(one): self._fitted(one) for one in steps if not one.is_pause}
+        self._motions = {key: parts for key, (parts, _) in fitted.items()}
+        self._counts = {key: count for key, (_, count) in fitted.items()}
+
+    def done(self) -> KrlExport:
+        """The texts, read back and certified."""
+        texts = self._written([""] * len(self._steps), [])
+        driven = self._driven_again(texts)
+        after = self._costed(driven)
+        comments = [self._figures(k, one) for k, one in enumerate(after)]
+        texts = self._written(comments, self._header(after, texts))
+        moved = [one for one in after if not one.is_pause]
+        moving = [one for one in self._steps if not one.is_pause]
+        table, text = self._plc(texts)
+        return KrlExport(
+            texts.source,
+            texts.data,
+            max(one.deviation for one in driven.values()),
+            _together([one.report for one in moving]),
+            _together([one.report for one in moved]),
+            table,
+            text,
+            sum(one.duration for one in after),
+            sum(one.report.energy for one in after),
+            tuple(after),
         )
-        after.append(moved.report)
-        here = again.positions[-1]
-    return KrlExport(
-        source, data, deviation, _together([one.report for one in moving]), _together(after)
-    )
+
+    def _fitted(self, step: PlannedMovement) -> tuple[list[_Motion], int]:
+        """The motions of a movement, and how many times they come to rest."""
+        scene = self._judge.scene(step)
+        planned = points_of(step)
+        back = _read_back(planned.positions[0], scene, self._style)
+        parts: list[_Motion]
+        if step.kind == MovementKind.CARTESIAN:
+            if self._style == "krc2":
+                raise RequestError(
+                    StatusCode.INVALID_MOTION_PLAN,
+                    f"along {step.to_station}: a path of the tool is written as SPLINE, which a "
+                    "KR C2 hasn't: style kss8 or spline",
+                )
+            parts = list(fitted_path(step, planned, scene, back))
+        elif self._style == "spline":
+            parts = [fitted_spline(step, self._judge, back)]
+        else:
+            parts = list(fitted_moves(step, self._judge, back, self._style))
+        return parts, len(back(parts))
+
+    def _written(self, comments: Sequence[str], header: Sequence[str]) -> Texts:
+        carried = _carried(self._steps, self._loads)
+        parts = [
+            part
+            for step, comment, load in zip(self._steps, comments, carried, strict=True)
+            for part in self._parts(step, comment, load)
+        ]
+        from_home = bool(np.abs(self._start - self._scene.cell.machine_home).max() < STILL)
+        return written(
+            self._name,
+            self._start,
+            parts,
+            Attached(tool_in_flange(self._scene.cell.tcp), tuple(self._loads.values())),
+            header,
+            from_home=from_home,
+            numbers=_numbers(self._scene.cell),
+            style=self._style,
+        )
+
+    def _parts(self, step: PlannedMovement, comment: str, carried: int) -> list[Part]:
+        waits = WrittenSignals(wait_for=_signals(step.wait_for))
+        parts: list[Part] = [waits] if step.wait_for else []
+        if step.is_pause:
+            pause = self._pauses.get(id(step))
+            parts.append(WrittenPause(comment, step.duration, pause.number if pause else 0))
+        else:
+            first, *others = self._motions[id(step)]
+            parts += [replace(first, comment=comment), *others]
+        if step.attach or step.detach:
+            words = f"takes {step.attach}" if step.attach else f"leaves {step.detach}"
+            parts.append(WrittenHandling(words, bool(step.attach), carried))
+        if step.set_signals:
+            parts.append(WrittenSignals(set_signals=_signals(step.set_signals)))
+        return parts
+
+    def _driven_again(self, texts: Texts) -> dict[int, _Again]:
+        """Every movement of the whole program, driven as an import drives it."""
+        program = _followed(texts)
+        around = self._around(program)
+        driven = (
+            one.trajectory
+            for one in drive(program, around, self._scene.cell.machine_home)[0]
+            if one.moves
+        )
+        found = {}
+        for step in self._steps:
+            if step.is_pause:
+                continue
+            again = one_after_the_other(list(itertools.islice(driven, self._counts[id(step)])))
+            deviation = _deviation_of(step, self._motions[id(step)], again)
+            found[id(step)] = _Again(again, deviation)
+        return found
+
+    def _costed(self, driven: Mapping[int, _Again]) -> list[PlannedMovement]:
+        """The steps as they are driven: certified, with the capacitor's charge carried along.
+        Raises RequestError for one that isn't certified.
+        """
+        charge = Charge(self._times)
+        after = []
+        here = self._start
+        for step in self._steps:
+            scene = self._judge.scene(step)
+            if step.is_pause:
+                mode = self._pauses[id(step)].power_mode if id(step) in self._pauses else ""
+                pause = Pause(step.to_station, step.duration, mode, here, scene)
+                stood = charge.stood(spent(pause, self._times), pause)
+                after.append(replace(step, report=stood.report, power_mode=mode))
+                continue
+            again = driven[id(step)].trajectory
+            found = self._judge(again, step)
+            if not found.verification.certified:
+                raise RequestError(
+                    StatusCode.INVALID_MOTION_PLAN,
+                    f"{called(step)} isn't certified as the controller would drive it: "
+                    f"{found.verification.status.message}",
+                )
+            moved = replace(step, trajectory=again, report=found.report, duration=again.duration)
+            after.append(charge.moved(moved, found.energy, scene))
+            here = again.positions[-1]
+        return after
+
+    def _plc(self, texts: Texts) -> tuple[str, str]:
+        pauses = list(self._pauses.values())
+        if not pauses:
+            return "", ""
+        header = [
+            f"The PLC's part of {self._name}: it spends the program's pauses in power modes, in "
+            "EXT.",
+            "Power management by the bits AB and HIB, never together with PROFIenergy; times are "
+            "those that the pauses were planned with.",
+        ]
+        table = plc_table(self._name, pauses)
+        return table, structured_text(self._name, pauses, texts.numbers, header)
+
+    def _figures(self, k: int, step: PlannedMovement) -> str:
+        """The comment of the k-th step as it is driven: places, seconds, joules, clearance,
+        modes.
+        """
+        report = step.report
+        costs = f"{step.duration:.3f} s, {report.energy:.1f} J"
+        if step.is_pause:
+            pause = self._pauses.get(id(self._steps[k]))
+            rest = f"; {pause.sentence}" if pause else ""
+            return f"{k + 1} pause at {step.to_station or 'the start'}: {costs}{rest}"
+        near = report.min_clearance
+        clear = f", {1e3 * near:.1f} mm clear" if np.isfinite(near) else ""
+        return f"{k + 1} {called(step)}: {costs}{clear}"
+
+    def _header(self, after: Sequence[PlannedMovement], texts: Texts) -> list[str]:
+        cell = self._scene.cell
+        planned = _total(self._steps)
+        driven = _total(after)
+        moving = [one for one in after if not one.is_pause]
+        ids = list(dict.fromkeys(one.trajectory_id for one in moving if one.trajectory_id))
+        carried = ", ".join(
+            f"{_load_words(load)} ({held or 'empty'})" for held, load in self._loads.items()
+        )
+        tool = cell.tool.name if cell.tool is not None else "none"
+        margin = 1e3 * self._judge.margin
+        lost = (driven[0] - planned[0], driven[1] - planned[1])
+        lines = [
+            f"cell {cell.name}, robot {cell.robot.name}, tool {tool}, carried: {carried}",
+            f"{len(moving)} movements and {len(after) - len(moving)} pauses: {driven[0]:.2f} s, "
+            f"{driven[1]:.0f} J predicted at the mains, {margin:g} mm clear but for allowed "
+            "contacts",
+            f"style {self._style}: {lost[0]:+.2f} s and {lost[1]:+.0f} J against the plan's "
+            f"{planned[0]:.2f} s and {planned[1]:.0f} J",
+            "proved: clearance, limits and torque of each movement below, as a model of the "
+            "controller drives it at an override of 100 %",
+            "not proved: the way from where the robot stands to the first point; another override, "
+            "cell, tool or load",
+        ]
+        if cell_hash := next(
+            (one.report.cell_hash for one in self._steps if one.report.cell_hash), ""
+        ):
+            lines.append(f"planned in the cell of hash {cell_hash}")
+        lines += [
+            f"planned movements: {', '.join(ids[k : k + _IDS])}" for k in range(0, len(ids), _IDS)
+        ]
+        if texts.assumed:
+            lines.append("numbered here, for the cell file says none; adapt them in the data list:")
+            lines += [f"  {one}" for one in texts.assumed]
+        if texts.tools:
+            tools = ", ".join(map(str, texts.tools))
+            lines.append(f"sets TOOL_DATA and LOAD_DATA of the numbers {tools}, for inline forms")
+        lines += self._pause_lines()
+        return lines
+
+    def _pause_lines(self) -> list[str]:
+        if not self._pauses:
+            return []
+        return [
+            f"{len(self._pauses)} pauses are spent in power modes by the PLC in EXT, where it sets "
+            "IR_PLC;",
+            f"its part: {self._name}.plc.st, as a table {self._name}.plc.csv. Without it the "
+            "program waits,",
+            "on motors until the controller's own timer closes the brakes: joules of these pauses "
+            "hold with it only",
+        ]
+
+
+def _plc_pauses(steps: Sequence[PlannedMovement], times: TransitionTimes) -> dict[int, PlcPause]:
+    """Pauses that are spent in modes, by the id() of their steps; equal ones have one number.
+    Raises RequestError for too many.
+    """
+    found: dict[int, PlcPause] = {}
+    known: dict[tuple[object, ...], PlcPause] = {}
+    for step in steps:
+        if not step.is_pause:
+            continue
+        asked, wake_at = switch_times(step.power_mode, step.duration, times)
+        if not asked:
+            continue
+        modes = tuple(name for name, _ in asked)
+        at = tuple(seconds for _, seconds in asked)
+        key = (step.to_station, step.duration, modes)
+        if key not in known:
+            number = len(known) + 1
+            known[key] = PlcPause(number, step.to_station, step.duration, modes, at, wake_at)
+        found[id(step)] = known[key]
+    if len(known) > _PAUSES_MAX:
+        raise RequestError(
+            StatusCode.INVALID_MOTION_PLAN,
+            f"{len(known)} different pauses are spent in power modes: a program numbers at most "
+            f"{_PAUSES_MAX}",
+        )
+    return found
+
+
+def _loads(steps: Sequence[PlannedMovement], judge: Judge) -> dict[str, Payload]:
+    """What is carried in the program, by the part that is held, "" for none; the load at the start
+    is first.
+    """
+    found: dict[str, Payload] = {}
+    for step, held in zip(steps, _held(steps)[:-1], strict=True):
+        found.setdefault(held, payload_of(judge.scene(step).loads))
+    last = _held(steps)[-1]
+    found.setdefault(last, payload_of(judge.scene(steps[-1]).cell.loads(last)))
+    return found
+
+
+def _held(steps: Sequence[PlannedMovement]) -> list[str]:
+    """The part that is held while each step runs, and after the last one."""
+    found = [""]
+    for step in steps:
+        found.append(step.attach or ("" if step.detach else found[-1]))
+    return found
+
+
+def _carried(steps: Sequence[PlannedMovement], loads: Mapping[str, Payload]) -> list[int]:
+    """Which load is carried after each step."""
+    return [list(loads).index(held) for held in _held(steps)[1:]]
 
 
 def attached(scene: PlanningScene) -> Attached:
     """Tool and load of the scene as TOOL_DATA and LOAD_DATA give them, in KUKA's flange."""
-    cell: Cell = scene.cell
-    tool = cell.tool
-    if tool is None:
-        return Attached(tool_in_flange(cell.tcp), 0.0, np.zeros(3), np.zeros(3))
-    turn = tool_in_flange(np.eye(4))[:3, :3]
-    inertia = portable.matmul(turn, tool.inertia, turn.T)
-    return Attached(
-        tool_in_flange(cell.tcp),
-        tool.mass,
-        portable.matmul(turn, tool.com),
-        np.diag(inertia).copy(),
+    return Attached(tool_in_flange(scene.cell.tcp), (payload_of(scene.loads),))
+
+
+def _numbers(cell: Cell) -> Numbers:
+    return Numbers(
+        {signal.name: signal.output for signal in cell.signals},
+        {signal.name: signal.input for signal in cell.signals},
     )
 
 
-def _written_as(step: PlannedMovement, scene: PlanningScene, judge: Judge) -> list[Part]:
-    """The motions of a movement: a SPLINE for each stroke along a path, else one PTP_SPLINE."""
-    if step.kind != MovementKind.CARTESIAN:
-        return [_fitted(step, scene, judge)]
-    planned = _points_of(step)
+def _read_back(start: FloatArray, scene: PlanningScene, style: Style) -> ReadBack:
+    """Drives the parts of one movement alone, from `start` (n,)."""
 
-    def back(parts: list[Part]) -> list[JointTrajectory]:
-        source, data = written("M", planned.positions[0], parts, attached(scene), [])
-        return [step.trajectory for step in _driven(source, data, scene)]
+    def back(parts: Sequence[Part]) -> list[JointTrajectory]:
+        texts = written("M", start, parts, attached(scene), [], style=style)
+        driven = drive(_followed(texts), scene, scene.cell.machine_home)[0]
+        return [step.trajectory for step in driven]
 
-    return fitted_path(step, planned, scene, back)
+    return back
 
 
-def _deviation_of(step: PlannedMovement, parts: Sequence[Part], again: JointTrajectory) -> float:
-    planned = _points_of(step)
+def _followed(texts: Texts) -> Followed:
+    sources = [parse(texts.source, "export.src"), parse(texts.data, "export.dat")]
+    inputs = {texts.numbers[PLC_THERE]: False} if texts.numbers else {}
+    return follow(sources, np.zeros(_AXES), np.eye(4), inputs=inputs)
+
+
+def _deviation_of(step: PlannedMovement, parts: Sequence[_Motion], again: JointTrajectory) -> float:
+    planned = points_of(step)
     if isinstance(parts[0], WrittenSpline):
-        return _deviation(parts[0], again, planned)
+        return deviation_in_time(parts[0], again, planned)
     return deviation_along(again, planned)
 
 
-def _fitted(step: PlannedMovement, scene: PlanningScene, judge: Judge) -> WrittenSpline:
-    """The movement through as many points as it needs, doubled from `_SPACING`, to be certified,
-    near to the plan, and hardly slower or dearer.
-    """
-    planned = _points_of(step)
-    joules = judge(planned, step).report.energy
-    count = max(int(np.ceil(planned.duration / _SPACING_EXPORT)), _POINTS_MIN)
-    found: list[tuple[float, WrittenSpline]] = []
-    reason = ""
-    while count <= _POINTS_MAX:
-        fits, reason = _slowed(step, planned, count, scene, judge)
-        if fits is not None:
-            spline, spent = fits
-            longer = spline.seconds / planned.duration
-            more = spent / joules
-            found.append((longer + more, spline))
-            if longer <= _ENOUGH and more <= _ENOUGH_J:
-                return spline
-        if found and count * _FINEST > planned.duration:
-            break
-        count *= 2
-    if found:
-        return min(found, key=lambda one: one[0])[1]
-    raise RequestError(
-        StatusCode.INVALID_MOTION_PLAN,
-        f"{_called(step)} can't be written with {_POINTS_MAX} points: {reason}",
-    )
+def _load_words(load: Payload) -> str:
+    return f"{load.mass:.6g} kg"
 
 
-def _slowed(
-    step: PlannedMovement, planned: JointTrajectory, count: int, scene: PlanningScene, judge: Judge
-) -> tuple[tuple[WrittenSpline, float] | None, str]:
-    """The movement through `count` points, slowed until it is certified, and its joules; else None,
-    and the reason.
-    """
-    slower = 1.0
-    reason = ""
-    times = np.linspace(0.0, planned.duration, count + 1)
-    passed = passing_times(planned.sample(times).q, times, judge.scene(step))
-    for _ in range(_SLOWINGS):
-        spline = _spline(step, planned, passed * slower)
-        again = _read_back(spline, planned.positions[0], scene)
-        away = _deviation(spline, again, planned)
-        if away > DEVIATION_MAX:
-            return (
-                None,
-                f"with {count} points a joint is {away:.4f} rad off; {DEVIATION_MAX:g} rad are "
-                "allowed",
-            )
-        found = judge(again, step)
-        if found.verification.certified:
-            return (spline, found.report.energy), ""
-        reason = found.verification.status.message
-        needed = _needed(found.report)
-        if needed <= 1.0:  # no matter of time: the path is too near to something
-            break
-        slower *= needed * _CLOSE
-    return None, reason
-
-
-def _needed(report: TrajectoryReport) -> float:
-    """By how much the time has to grow for the limits of speed, acceleration, jerk and torque."""
-    ratios = (
-        report.velocity_ratio,
-        report.acceleration_ratio,
-        report.jerk_ratio,
-        report.torque_ratio,
-    )
-    roots = (1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 2.0)
-    return max(
-        float(portable.power(ratio.max(initial=0.0), root))
-        for ratio, root in zip(ratios, roots, strict=True)
-    )
-
-
-def _spline(step: PlannedMovement, planned: JointTrajectory, passed: FloatArray) -> WrittenSpline:
-    """Points at equal planned times, passed at shares of the times (M + 1,) s, the last one whole
-    steps of the grid after the start.
-    """
-    seconds = GRID_S * np.ceil(float(passed[-1]) / GRID_S - _ROUNDING)
-    report = step.report
-    comment = (
-        f"{_called(step)}: {seconds:.2f} s, planned {report.duration:.2f} s and "
-        f"{report.energy:.0f} J"
-    )
-    if np.isfinite(report.min_clearance):
-        comment += f", clearance {1e3 * report.min_clearance:.0f} mm"
-    points = planned.sample(np.linspace(0.0, planned.duration, len(passed))[1:]).q
-    return WrittenSpline(comment, points, 100.0 * np.diff(passed) / passed[-1], float(seconds))
-
-
-def _read_back(spline: WrittenSpline, start: FloatArray, scene: PlanningScene) -> JointTrajectory:
-    """The movement alone, as the controller's model drives it."""
-    source, data = written("M", start, [spline], attached(scene), [])
-    (step,) = _driven(source, data, scene)
-    return step.trajectory
-
-
-def _parts(step: PlannedMovement, fitted: dict[int, list[Part]]) -> list[Part]:
-    parts: list[Part] = [WrittenSignals(wait_for=_signals(step.wait_for))] if step.wait_for else []
-    if step.is_pause:
-        mode = step.power_mode or "STAND_ON_MOTORS"
-        parts.append(
-            WrittenPause(f"pause {step.duration:g} s: {mode}", step.duration, _ASKS.get(mode, ""))
-        )
-    else:
-        parts.extend(fitted[id(step)])
-    if step.set_signals:
-        parts.append(WrittenSignals(set_signals=_signals(step.set_signals)))
-    return parts
+def _total(steps: Sequence[PlannedMovement]) -> tuple[float, float]:
+    return sum(step.duration for step in steps), sum(step.report.energy for step in steps)
 
 
 def _signals(texts: Sequence[str]) -> tuple[tuple[str, bool], ...]:
     split = (text.partition("=") for text in texts)
     return tuple((name, value != "0") for name, _, value in split)
-
-
-def _driven(source: str, data: str, scene: PlanningScene) -> tuple[DrivenStep, ...]:
-    home = scene.cell.machine_home
-    program = follow(
-        [parse(source, "export.src"), parse(data, "export.dat")],
-        home,
-        tool_in_flange(scene.cell.tcp),
-    )
-    return drive(program, scene, home)[0]
-
-
-def _deviation(spline: WrittenSpline, driven: JointTrajectory, planned: JointTrajectory) -> float:
-    """Largest difference of a joint [rad], each point passed when the spline passes it."""
-    passed = np.concatenate([[0.0], np.cumsum(spline.shares)]) / spline.shares.sum()
-    share = np.linspace(0.0, 1.0, max(round(planned.duration * _SAMPLES_PER_S), 2))
-    meanwhile = np.clip(
-        PchipInterpolator(np.linspace(0.0, 1.0, len(passed)), passed)(share), 0.0, 1.0
-    )
-    away = driven.sample(meanwhile * driven.duration).q - planned.sample(share * planned.duration).q
-    return float(np.abs(away).max())
-
-
-def _points_of(step: PlannedMovement) -> JointTrajectory:
-    if step.trajectory is None:
-        raise RequestError(
-            StatusCode.INVALID_MOTION_PLAN, f"{_called(step)} has no points: get them by its id"
-        )
-    return step.trajectory
-
-
-def _called(step: PlannedMovement) -> str:
-    return f"{step.from_station or 'start'} -> {step.to_station or 'goal'}"
 
 
 def _together(reports: Sequence[TrajectoryReport]) -> TrajectoryReport:

@@ -2,7 +2,14 @@
 modes.
 """
 
-from ir_planner.program.pauses import AUTO, Charge, Pause, pause_by_itself
+from ir_planner.program.pauses import (
+    AUTO,
+    Charge,
+    Pause,
+    pause_by_itself,
+    spent,
+    switch_times,
+)
 from ir_planner.program.program import Outlook, outlook, plan_program
 from ir_planner.program.request import (
     ProgramPlan,
@@ -49,6 +56,8 @@ __all__ = [
     "pause_by_itself",
     "placed_steps",
     "plan_program",
+    "spent",
+    "switch_times",
     "unknown_searches",
     "with_doors",
     "with_intervals",

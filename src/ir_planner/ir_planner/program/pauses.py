@@ -244,6 +244,7 @@ def _mode_slope(mode: str, q: FloatArray, scene: PlanningScene) -> FloatArray:
 # Pauses of a program as they are sent, with the mode that they are spent in and what they cost.
 
 AUTO = "AUTO"
+_EXACTLY = 1e-9  # s: a pause may be as long as its modes need
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,6 +272,29 @@ def planned_pause(pause: Pause, times: TransitionTimes) -> PlannedMovement:
     elif not np.isfinite(_rested(pause, mode, rests)) and rests.cost((), pause.seconds)[1] > 0.0:
         mode = BRAKES
     return _spent(pause, mode, rests)
+
+
+def spent(pause: Pause, times: TransitionTimes) -> PlannedMovement:
+    """In the modes that somebody asked for; where nobody did, as the controller spends it by
+    itself.
+    """
+    return planned_pause(pause, times) if pause.requested else pause_by_itself(pause, times)
+
+
+def switch_times(
+    mode: str, seconds: float, times: TransitionTimes
+) -> tuple[tuple[tuple[str, float], ...], float]:
+    """The modes of a planned pause with the times [s] after its start at which each is asked for,
+    and when the robot is woken to be ready at its end; no modes: it stands on motors, or the pause
+    is too short.
+    """
+    asked: list[tuple[str, float]] = []
+    free = 0.0
+    for each in modes_of(mode):
+        asked.append((each.name, free))
+        free += times.enter(each.name) + times.minimum_stay(each.name)
+    wake_at = seconds - (times.leave(asked[-1][0]) if asked else 0.0)
+    return (tuple(asked), wake_at) if asked and wake_at >= free - _EXACTLY else ((), seconds)
 
 
 def pause_by_itself(pause: Pause, times: TransitionTimes) -> PlannedMovement:

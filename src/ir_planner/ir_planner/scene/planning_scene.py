@@ -112,6 +112,10 @@ _TURN = 2.0 * np.pi
 RUNNING = "STAND_ON_MOTORS"
 
 
+Stops = str | tuple[str, ...]
+"""A station or a path whose contacts are allowed, "" for none; several, each in its own zone."""
+
+
 def load_text(cell: Cell, held: str = "") -> str:
     """How the load is written: "gripper+part", "gripper", "none"."""
     names = [load.name for load in cell.loads(held)]
@@ -241,15 +245,15 @@ class PlanningScene:
         """What the drives' bus does with braking energy."""
         return DcBusParameters(self.power.dc_link_capacity_energy, self.drives.regeneration)
 
-    def thresholds(self, safety_distance: float, station: str = "") -> FloatArray:
+    def thresholds(self, safety_distance: float, station: Stops = "") -> FloatArray:
         """Distance (Z,) m that each pair must exceed: S_m, or what `station` allows the pair."""
         result = np.full(len(self.collision.pairs), safety_distance)
         for contact in self._contacts(station):
             for z in self._numbers_of(contact):
-                result[z] = min(safety_distance, contact.safety_distance)
+                result[z] = min(result[z], contact.safety_distance)
         return result
 
-    def allowed(self, station: str) -> BoolArray:
+    def allowed(self, station: Stops) -> BoolArray:
         """Which pairs (Z,) have a safety distance of their own at `station`; none for ""."""
         result = np.zeros(len(self.collision.pairs), dtype=bool)
         for contact in self._contacts(station):
@@ -269,7 +273,9 @@ class PlanningScene:
         b = contact.body_b
         return self._numbers.get((a, b), []) + self._numbers.get((b, a), [])
 
-    def _contacts(self, station: str) -> tuple[AllowedContact, ...]:
+    def _contacts(self, station: Stops) -> tuple[AllowedContact, ...]:
+        if not isinstance(station, str):
+            return tuple(contact for one in station for contact in self._contacts(one))
         if not station:
             return ()
         try:

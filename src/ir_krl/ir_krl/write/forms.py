@@ -1,0 +1,138 @@
+"""Inline forms: folds that WorkVisual and the pendant show, change and touch up."""
+
+from __future__ import annotations
+
+from ir_krl.run.values import frame
+from ir_krl.write.parts import Style, WrittenMove
+
+# The texts after ";%{" tell the editor which form it is; the lines below them are what the form
+# makes of its data, so that both say the same.
+
+_SPLINE_FORMS = "kukaroboter.basistech.inlineforms.movement.spline"
+_CHECK = "$COLLMON_TOL_PRO[1] = USE_CM_PRO_VALUES(0)"
+_TOP = 2.0  # m/s, of an LDAT
+
+
+class Forms:
+    """Appends inline forms to the lines of a routine and of its data list."""
+
+    def __init__(self, style: Style, lines: list[str], data: list[str]) -> None:
+        self._style = style
+        self._lines = lines
+        self._data = data
+        self._count = 0
+
+    def move(self, part: WrittenMove, tool: int) -> None:
+        """A motion with tool number `tool`, in base 0."""
+        self._count += 1
+        n = self._count
+        self._data += _declared(part, n, tool, self._style)
+        if part.comment:
+            self._lines.append(f"; {part.comment}")
+        if self._style == "krc2":
+            self._lines += _line_of_krc2(part, n, tool) if part.straight else _ptp(part, n, tool)
+        else:
+            self._lines += _slin(part, n, tool) if part.straight else _sptp(part, n, tool)
+        self._lines.append(";ENDFOLD")
+
+
+def _declared(part: WrittenMove, n: int, tool: int, style: Style) -> list[str]:
+    distance = part.rounded or 0.0
+    if part.straight:
+        shape = ",ORI_TYP #VAR" if style == "krc2" else ",ORI_TYP #VAR,CIRC_TYP #BASE,JERK_FAC 50.0"
+        motion = (
+            f"DECL LDAT LCPDAT{n}={{VEL {_TOP:.1f},ACC {part.acceleration}.0,"
+            f"APO_DIST {distance:.1f},APO_FAC 50.0{shape}}}"
+        )
+    else:
+        mode = "" if style == "krc2" else ",APO_MODE #CDIS,GEAR_JERK 50.0"
+        motion = (
+            f"DECL PDAT PPDAT{n}={{VEL 100.0,ACC {part.acceleration}.0,"
+            f"APO_DIST {distance:.1f}{mode}}}"
+        )
+    fields = ",".join(f"{name} {value:.6f}" for name, value in frame(part.pose).fields.items())
+    external = ",".join(f"E{k} 0.0" for k in range(1, 7))
+    position = f"{{{fields},S {part.status},T {part.turn},{external}}}"
+    form = f'{{TOOL_NO {tool},BASE_NO 0,IPO_FRAME #BASE,POINT2[] " "}}'
+    return [f"DECL E6POS XP{n}={position}", f"DECL FDAT FP{n}={form}", motion]
+
+
+def _title(word: str, part: WrittenMove, n: int, tool: int, unit: str, data: str) -> str:
+    cont = " CONT" if part.rounded else ""
+    return f";FOLD {word} P{n}{cont} Vel={part.velocity:g} {unit} {data} Tool[{tool}] Base[0]"
+
+
+def _spline_form(
+    command: str, part: WrittenMove, n: int, tool: int, unit: str, data: str
+) -> list[str]:
+    names = (
+        ("MoveDataName", "VelocityPath") if part.straight else ("MoveDataPtpName", "VelocityPtp")
+    )
+    values = {
+        "IlfProvider": _SPLINE_FORMS,
+        "Kuka.IsGlobalPoint": False,
+        "Kuka.PointName": f"P{n}",
+        "Kuka.BlendingEnabled": bool(part.rounded),
+        f"Kuka.{names[0]}": data,
+        f"Kuka.{names[1]}": f"{part.velocity:g}",
+        "IlfCommand": command,
+    }
+    return [
+        f"{_title(command, part, n, tool, unit, data)} ;%{{PE}}",
+        ";FOLD Parameters ;%{h}",
+        f";Params {'; '.join(f'{name}={value}' for name, value in values.items())}",
+        ";ENDFOLD",
+    ]
+
+
+def _frames(n: int) -> str:
+    return (
+        f"$TOOL = STOOL2(FP{n}), $BASE = SBASE(FP{n}.BASE_NO), "
+        f"$IPO_MODE = SIPO_MODE(FP{n}.IPO_FRAME), $LOAD = SLOAD(FP{n}.TOOL_NO)"
+    )
+
+
+def _sptp(part: WrittenMove, n: int, tool: int) -> list[str]:
+    return [
+        *_spline_form("SPTP", part, n, tool, "%", f"PDAT{n}"),
+        f"SPTP XP{n} WITH $VEL_AXIS[1] = SVEL_JOINT({part.velocity:g}), {_frames(n)}, "
+        f"$ACC_AXIS[1] = SACC_JOINT(PPDAT{n}), $APO = SAPO_PTP(PPDAT{n}), "
+        f"$GEAR_JERK[1] = SGEAR_JERK(PPDAT{n}), {_CHECK}{' C_SPL' if part.rounded else ''}",
+    ]
+
+
+def _slin(part: WrittenMove, n: int, tool: int) -> list[str]:
+    return [
+        *_spline_form("SLIN", part, n, tool, "m/s", f"CPDAT{n}"),
+        f"SLIN XP{n} WITH $VEL = SVEL_CP({part.velocity:g}, , LCPDAT{n}), {_frames(n)}, "
+        f"$ACC = SACC_CP(LCPDAT{n}), $ORI_TYPE = SORI_TYP(LCPDAT{n}), $APO = SAPO(LCPDAT{n}), "
+        f"$JERK = SJERK(LCPDAT{n}), {_CHECK}{' C_SPL' if part.rounded else ''}",
+    ]
+
+
+def _ptp(part: WrittenMove, n: int, tool: int) -> list[str]:
+    word = "C_PTP" if part.rounded else ""
+    title = _title("PTP", part, n, tool, "%", f"PDAT{n}")
+    return [
+        f"{title};%{{PE}}%R 5.4.27,%MKUKATPBASIS,%CMOVE,%VPTP,%P 1:PTP, 2:P{n}, 3:{word}, "
+        f"5:{part.velocity:g}, 7:PDAT{n}",
+        "$BWDSTART=FALSE",
+        f"PDAT_ACT=PPDAT{n}",
+        f"FDAT_ACT=FP{n}",
+        f"BAS(#PTP_PARAMS,{part.velocity:g})",
+        f"PTP XP{n} {word}".rstrip(),
+    ]
+
+
+def _line_of_krc2(part: WrittenMove, n: int, tool: int) -> list[str]:
+    word = "C_DIS" if part.rounded else ""
+    title = _title("LIN", part, n, tool, "m/s", f"CPDAT{n}")
+    return [
+        f"{title};%{{PE}}%R 5.4.27,%MKUKATPBASIS,%CMOVE,%VLIN,%P 1:LIN, 2:P{n}, 3:{word}, "
+        f"5:{part.velocity:g}, 7:CPDAT{n}",
+        "$BWDSTART=FALSE",
+        f"LDAT_ACT=LCPDAT{n}",
+        f"FDAT_ACT=FP{n}",
+        f"BAS(#CP_PARAMS,{part.velocity:g})",
+        f"LIN XP{n} {word}".rstrip(),
+    ]
