@@ -10,7 +10,6 @@ from ir_planner.krl.requests import (
     evaluate_krl,
     export_krl,
     one_movement,
-    surroundings,
 )
 from ir_planner.krl.splines import ToolMotion
 
@@ -26,6 +25,5 @@ __all__ = [
     "one_movement",
     "posture_at",
     "station_at",
-    "surroundings",
     "tool_in_flange",
 ]
