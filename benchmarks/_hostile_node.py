@@ -73,12 +73,16 @@ class Prey:
 
 
 @contextmanager
-def prey() -> Iterator[Prey]:
-    """A driver with the ideal robot, short transitions and Modbus."""
+def prey(**parameters: str | int) -> Iterator[Prey]:
+    """A driver with the ideal robot, short transitions and Modbus; parameters: more of it."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = int(free.getsockname()[1])
-    more = {"plc.startup_window": "0.0", "transitions.stand_on_brakes_leave": "0.01"}
+    more: dict[str, str | int] = {
+        "plc.startup_window": "0.0",
+        "transitions.stand_on_brakes_leave": "0.01",
+    }
+    more |= parameters
     with tempfile.TemporaryDirectory() as logs:
         os.environ["ROS_LOG_DIR"] = logs
         set_logger_level(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import socket
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import suppress
 from http.client import HTTPConnection, HTTPResponse
@@ -16,9 +17,10 @@ from ir_msgs_py.ros.testing import PATIENCE
 from ir_recorder.errors import LiveError
 from ir_recorder.live.server import (
     BITS,
+    MOST_ASKING,
     MOST_BODY,
-    MOST_CONNECTIONS,
     MOST_WAITING,
+    MOST_WATCHING,
     Answer,
     Command,
     Commands,
@@ -183,7 +185,7 @@ def test_events_begin_with_what_is_kept_and_go_on_for_several_browsers(cell: Cel
 
 def test_browsers_that_never_read_hold_up_nobody_and_too_many_are_refused(cell: Cell) -> None:
     dead = []
-    for _ in range(MOST_CONNECTIONS - 1):
+    for _ in range(MOST_WATCHING - 1):
         connection = socket.create_connection(("127.0.0.1", cell.server.port))
         connection.sendall(
             f"GET /events HTTP/1.1\r\nHost: 127.0.0.1:{cell.server.port}\r\n\r\n".encode()
@@ -191,11 +193,14 @@ def test_browsers_that_never_read_hold_up_nobody_and_too_many_are_refused(cell: 
         dead.append(connection)
     reader = events(cell.ask("GET", "/events"))
     next(reader)
+    assert cell.ask("GET", "/events").status == 503
     crowd = [socket.create_connection(("127.0.0.1", cell.server.port)) for _ in range(200)]
-    for connection in crowd:
+    for connection in crowd[:-MOST_ASKING]:
         connection.settimeout(60.0)
-        with suppress(ConnectionResetError):  # refused just as well
-            assert connection.recv(100).startswith(b"HTTP/1.1 503")
+        with suppress(ConnectionResetError):  # hung up on just as well
+            assert connection.recv(100) == b""
+    assert json.loads(cell.post().read())["done"]
+    for connection in crowd:
         connection.close()
     for k in range(50):
         cell.stream.add({"load": f"{k}" * 20_000})
@@ -206,6 +211,43 @@ def test_browsers_that_never_read_hold_up_nobody_and_too_many_are_refused(cell: 
         connection.close()
     cell.stream.add({"load": "after"})
     assert next(reader)[1][-1]["load"] == "after"
+
+
+def test_connections_that_drip_keep_no_button_out(cell: Cell) -> None:
+    """A byte now and then is no request: who takes too long is hung up on, however it does it."""
+    dripping = [
+        socket.create_connection(("127.0.0.1", cell.server.port), timeout=PATIENCE)
+        for _ in range(2 * MOST_ASKING)
+    ]
+    ended = 0.0
+    begun = time.monotonic()
+    while not ended and time.monotonic() - begun < PATIENCE:
+        assert json.loads(cell.post().read())["done"]
+        for connection in dripping:
+            with suppress(OSError):
+                connection.send(b"G")
+        ended = time.monotonic() if not cell.server.connections else 0.0
+        time.sleep(0.1)
+    assert ended
+    for connection in dripping:
+        connection.close()
+
+
+def test_a_stop_finds_a_place_among_waiting_requests_and_is_taken_first() -> None:
+    commands = Commands()
+    asked = [("ab", True)] * MOST_WAITING + [("emergency_stop", True)]
+    waiting = [threading.Thread(target=commands.press, args=each) for each in asked]
+    for thread in waiting:
+        thread.start()
+    while commands._queue.qsize() + commands._stops.qsize() < len(asked):
+        time.sleep(0.001)
+    taken = list(commands.take())
+    for command in taken:
+        command.answer(True, "set")
+    for thread in waiting:
+        thread.join()
+    assert len(taken) == len(asked)
+    assert taken[0].name == "emergency_stop"
 
 
 def test_a_port_that_is_taken_is_named_and_others_are_free(cell: Cell) -> None:

@@ -7,7 +7,8 @@ buttons.
     POST /press  {"name": "ab", "value": true}: a bit of the PLC, with the token
 
 It listens on 127.0.0.1 alone. Every connection has a thread that only reads what is kept, so a
-browser that is slow or dead costs its own connection and nothing else.
+browser that is slow or dead costs its own connection and nothing else. Those that watch have places
+of their own; among the others a new one always finds a place, so nobody keeps the stop button out.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ import json
 import queue
 import re
 import secrets
+import socket
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, fields
@@ -107,17 +110,14 @@ def live_page() -> str:
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("live.html"))
 
 
-MOST_CONNECTIONS = 32
-"""Browsers and their requests at a time. Each that watches costs a thread that wakes 20 times a
-second.
-"""
-PATIENCE = 5.0  # s: for a request to be sent, and for a browser to take what it is sent
+MOST_WATCHING = 32
+"""Browsers that watch; each costs a thread that wakes 20 times a second."""
+MOST_ASKING = 32
+"""Connections whose request is being sent or answered. One more takes the place of the oldest."""
+PATIENCE = 5.0  # s: for a request and its answer together, and for a browser to take an event
 SILENCE = 1.0  # s: then a comment is sent, and a browser that has gone is noticed
 MOST_BODY = 1_000  # bytes of a request
-_REFUSED_AT_ONCE = (
-    b"HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\nConnection: close\r\n\r\n"
-    b"too many browsers look at this cell; close one\n"
-)
+_CROWDED = "too many browsers look at this cell; close one"
 
 
 class Answer(NamedTuple):
@@ -185,39 +185,68 @@ class _Server(ThreadingHTTPServer):
 
     def __init__(self, *arguments: Any) -> None:
         self._places = threading.Lock()
-        self.connections = 0
+        self._asking: dict[Any, float] = {}  # when each came, the oldest first
+        self._watching: set[Any] = set()
         super().__init__(*arguments)
 
+    @property
+    def connections(self) -> int:
+        """Those that ask and those that watch."""
+        return len(self._asking) + len(self._watching)
+
     def process_request(self, request: Any, client_address: Any) -> None:
-        """A thread for the connection where one is free, else a short refusal."""
+        """A thread for the connection; where all places are taken, the oldest that asks goes."""
         with self._places:
-            free = self.connections < MOST_CONNECTIONS
-            self.connections += free
-        if free:
-            try:
-                super().process_request(request, client_address)
-            except BaseException:  # no thread could be started
-                self._leave()
-                raise
-            return
-        request.setblocking(False)
-        with suppress(OSError):  # it has gone, or doesn't read
-            request.send(_REFUSED_AT_ONCE)
-        self.shutdown_request(request)
+            if len(self._asking) >= MOST_ASKING:
+                _hang_up(next(iter(self._asking)))
+                del self._asking[next(iter(self._asking))]
+            self._asking[request] = time.monotonic()
+        try:
+            super().process_request(request, client_address)
+        except BaseException:  # no thread could be started
+            self._leave(request)
+            raise
+
+    def service_actions(self) -> None:
+        """Hang up on whoever takes too long, however often it sends a byte."""
+        latest = time.monotonic() - PATIENCE
+        with self._places:
+            for request in [each for each, came in self._asking.items() if came < latest]:
+                _hang_up(request)
+                del self._asking[request]
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
         """As the base class does it, and frees the place."""
         try:
             super().process_request_thread(request, client_address)
         finally:
-            self._leave()
+            self._leave(request)
 
-    def _leave(self) -> None:
+    def watch(self, request: Any) -> bool:
+        """Whether a place to watch from is free; then the connection has it."""
         with self._places:
-            self.connections -= 1
+            free = len(self._watching) < MOST_WATCHING
+            if free and self._asking.pop(request, 0.0):
+                self._watching.add(request)
+        return free
+
+    def keep(self, request: Any) -> None:
+        """A button was pressed: the connection stays until that is answered."""
+        with self._places:
+            self._asking.pop(request, None)
+
+    def _leave(self, request: Any) -> None:
+        with self._places:
+            self._asking.pop(request, None)
+            self._watching.discard(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A connection that broke is nobody's error."""
+
+
+def _hang_up(request: Any) -> None:
+    with suppress(OSError):  # it has gone by itself
+        request.shutdown(socket.SHUT_RDWR)
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -238,6 +267,8 @@ class _Handler(BaseHTTPRequestHandler):
             scene = self.server.scene()
             found = HTTPStatus.OK if scene else HTTPStatus.NOT_FOUND
             self._send(found, "application/json", scene or b"null")
+        elif self.path == "/events" and not self.server.watch(self.connection):
+            self._say(HTTPStatus.SERVICE_UNAVAILABLE, _CROWDED)
         elif self.path == "/events":
             self._events()
         else:
@@ -260,6 +291,7 @@ class _Handler(BaseHTTPRequestHandler):
         elif (command := _command(self.rfile.read(int(length)))) is None:
             self._say(HTTPStatus.BAD_REQUEST, 'a request is {"name": TEXT, "value": true or false}')
         else:
+            self.server.keep(self.connection)
             answer = self.server.press(*command)
             self._send(HTTPStatus.OK, "application/json", json.dumps(answer._asdict()).encode())
 
@@ -337,7 +369,8 @@ def _command(body: bytes) -> tuple[str, bool] | None:
 
 BITS = tuple(field.name for field in fields(PlcInputs) if field.name != "operating_mode")
 MOST_WAITING = 16
-"""s: a driver answers within 20 ms."""
+"""Requests of buttons; a driver answers each within 20 ms."""
+_STOP = "emergency_stop"
 
 
 _UNANSWERED = Answer(False, f"the driver has not answered within {PATIENCE:g} s")
@@ -364,10 +397,14 @@ class Command:
 
 
 class Commands:
-    """A short queue; `press` is called by browsers' threads, `take` by the node."""
+    """A short queue; `press` is called by browsers' threads, `take` by the node.
+
+    A press of the emergency stop always finds a place, and is taken first.
+    """
 
     def __init__(self) -> None:
         self._queue: queue.Queue[Command] = queue.Queue(MOST_WAITING)
+        self._stops: queue.Queue[Command] = queue.Queue()
 
     def press(self, name: str, value: bool) -> Answer:
         """Asks and waits; refuses what is no bit, and what comes faster than it is answered."""
@@ -375,15 +412,14 @@ class Commands:
             return Answer(False, f"{name[:60]!r} is no bit of the PLC: known are {', '.join(BITS)}")
         command = Command(name, value)
         try:
-            self._queue.put_nowait(command)
+            (self._stops if name == _STOP and value else self._queue).put_nowait(command)
         except queue.Full:
             return Answer(False, f"{MOST_WAITING} requests wait already")
         return command.wait()
 
     def take(self) -> Iterator[Command]:
         """What has been asked since the last time."""
-        while True:
-            try:
-                yield self._queue.get_nowait()
-            except queue.Empty:
-                return
+        for waiting in (self._stops, self._queue):
+            with suppress(queue.Empty):
+                while True:
+                    yield waiting.get_nowait()

@@ -1,0 +1,328 @@
+"""Stops on a real node, in random interleavings with two clients, a PLC and its service.
+
+    python benchmarks/_hostile_stops.py COUNT SEED
+
+Each episode sends goals (long ones to check, some by topic, some with a stamp ahead), writes bits,
+cancels, and presses the emergency stop by one of three ways somewhere in between. What was sent
+before a person recovers may not move a joint once the robot stands: goals turn axes 1 to 5, and
+only one that is sent after the recovery turns axis 6.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import socket
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+import numpy as np
+from _hostile_node import PRESS, RELEASE, Prey, prey
+from rclpy.action import ActionClient
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import UInt64
+from trajectory_msgs.msg import JointTrajectory as TrajectoryMsg
+
+from ir_msgs.action import ExecuteTrajectory
+from ir_msgs.msg import PlcInputs
+from ir_msgs.srv import Recover, SetPlcInput
+from ir_msgs_py import names
+from ir_msgs_py.errors import MsgsError
+from ir_msgs_py.modes import Mode
+from ir_msgs_py.ros.client import Client
+from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.ros.topics import ACTION_SERVICES
+from ir_msgs_py.trajectory import JointTrajectory
+
+NEW = 5  # axis of the goals that are sent after the recovery
+STILL = 1e-6  # rad
+ROLLS = 5.0  # s in which a stopped robot has to stand, on a busy machine
+PATIENCE = 30.0
+PLC = ("conf_mess", "drives_on", "drives_off", "move_enable", "ab", "end_rest", "aut")
+SHORT = {
+    "joint_state_rate": 100,
+    "transitions.bus_power_off_enter": "0.05",
+    "transitions.bus_power_off_leave": "0.05",
+    "transitions.bus_power_off_minimum_stay": "0.05",
+    "transitions.stand_on_brakes_enter": "0.02",
+    "transitions.stand_on_brakes_minimum_stay": "0.02",
+}
+
+
+class Cell:
+    """A driver with two clients; q: its last positions; moved: axes that have turned since `mark`.
+
+    home: where it stood first. goals: of the present episode, each with what calls a function
+    beside its client.
+    """
+
+    def __init__(self, driver: Prey, second: Client, modbus: socket.socket) -> None:
+        self.driver = driver
+        self.clients = (driver.client, second)
+        self.modbus = modbus
+        self.q: Any = None
+        self.home: Any = None
+        self.heard = 0
+        self._mark: Any = None
+        self.moved: set[int] = set()
+        self.goals: list[Any] = []
+        self.number = 0  # of the last stop
+        driver.client.subscribe(names.JOINT_STATES, JointState, self._hear)
+        driver.client.subscribe(names.STOP_NUMBER, UInt64, self._count)
+        self._actions = [
+            client._executor.run(lambda client=client: self._action(client))
+            for client in self.clients
+        ]
+        node = driver.client.node
+        run = driver.client._executor.run
+        self._plc = run(
+            lambda: node.create_publisher(PlcInputs, names.PLC_INPUTS, QoSProfile(depth=1000))
+        )
+        self._path = run(
+            lambda: node.create_publisher(TrajectoryMsg, names.COMMANDED_TRAJECTORY, 10)
+        )
+        ready = (lambda: self.q is not None, self._plc.get_subscription_count)
+        for each in (*ready, *(action.server_is_ready for action in self._actions)):
+            driver.client._executor.wait_until(each, PATIENCE)
+
+    @staticmethod
+    def _action(client: Client) -> ActionClient:
+        return ActionClient(
+            client.node, ExecuteTrajectory, names.EXECUTE_TRAJECTORY, **ACTION_SERVICES
+        )
+
+    def _hear(self, message: JointState) -> None:
+        q = np.array(message.position)
+        self.home = q if self.home is None else self.home
+        self.q = q
+        if self._mark is not None:
+            self.moved.update(np.flatnonzero(np.abs(q - self._mark) > STILL).tolist())
+        self.heard += 1
+
+    def _count(self, message: UInt64) -> None:
+        self.number = message.data
+
+    def mark(self) -> None:
+        """Note from here on which axes turn."""
+        self.moved = set()
+        self._mark = self.q
+
+    def stands(self) -> bool:
+        """Wait until the robot stands: as many messages as five frames of it say so."""
+        ends = time.monotonic() + ROLLS
+        while time.monotonic() < ends:
+            self.mark()
+            self.frames(6)
+            if not self.moved:
+                return True
+        return False
+
+    def frames(self, count: int) -> None:
+        """Wait for so many messages of positions."""
+        ends = self.heard + count
+        self.wait(lambda: self.heard >= ends)
+
+    def wait(self, condition: Callable[[], Any], seconds: float = PATIENCE) -> bool:
+        """Whether it holds within this time."""
+        return self.driver.client._executor.wait_until(condition, seconds)
+
+    def send(self, generator: random.Random, axis: int, *, plain: bool = False) -> None:
+        """A goal that turns one axis from where the robot is."""
+        points = 2 if plain else generator.choice((2, 2, 2, 500, 5_000))
+        seconds = generator.uniform(0.2, 1.0)
+        target = np.array(self.q)
+        target[axis] += 0.05 if target[axis] < self.home[axis] else -0.05
+        share = np.linspace(0.0, 1.0, points)[:, None]
+        positions = self.q + (share * share * (3.0 - 2.0 * share)) * (target - self.q)
+        rates = 6.0 * share * (1.0 - share) * (target - self.q) / seconds
+        times = 0.3 + seconds * share[:, 0]
+        message = trajectory_to_msg(
+            JointTrajectory.from_seconds(names.JOINT_NAMES, times, positions, rates)
+        )
+        sender = generator.choice((0, 1))
+        if not plain and generator.random() < 0.2:
+            self.driver.client._executor.run(lambda: self._path.publish(message))
+            return
+        if not plain and generator.random() < 0.2:
+            ahead = self.clients[sender].node.get_clock().now().nanoseconds + 400_000_000
+            message.header.stamp.sec, message.header.stamp.nanosec = divmod(ahead, 10**9)
+        goal = ExecuteTrajectory.Goal(trajectory=message)
+        run = self.clients[sender]._executor.run
+        self.goals.append((run, run(lambda: self._actions[sender].send_goal_async(goal))))
+
+    def cancel(self) -> None:
+        """Cancel a goal that was taken."""
+        for run, sent in self.goals:
+            if sent.done() and sent.result().accepted:
+                run(sent.result().cancel_goal_async)
+                return
+
+    def ended(self) -> list[int] | None:
+        """Codes of all goals once each has a result; None while one has not."""
+        codes: list[int] = []
+        for run, sent in self.goals:
+            if not self.wait(sent.done):
+                return None
+            if sent.result().accepted:
+                future = run(sent.result().get_result_async)
+                if not self.wait(future.done):
+                    return None
+                codes.append(int(future.result().result.error_code))
+        return codes
+
+    def write(self, name: str, value: bool) -> None:
+        """One bit by the service, which may refuse it."""
+        self.driver.client.call(names.SET_PLC_INPUT, SetPlcInput.Request(name=name, value=value))
+
+    def press(self, way: str, level: bool) -> None:
+        """The button, down or up."""
+        if way == "service":
+            self.write("emergency_stop", level)
+        elif way == "modbus":
+            self.modbus.sendall(PRESS if level else RELEASE)
+            self.modbus.recv(64)
+        else:
+            levels = PlcInputs(emergency_stop=level, move_enable=True)
+            self.driver.client._executor.run(lambda: self._plc.publish(levels))
+
+    def rest(self) -> None:
+        """All bits as they are without a PLC."""
+        self.write("ext", True)
+        levels = PlcInputs(move_enable=True)
+        self.driver.client._executor.run(lambda: self._plc.publish(levels))
+        self.write("emergency_stop", False)
+
+    def run(self) -> bool:
+        """Recover until the motors are on."""
+        for _ in range(100):
+            self.driver.client.call(names.RECOVER, Recover.Request())
+            del self.driver.modes[:]
+            self.wait(lambda: self.driver.modes)
+            if self.driver.modes[-1] == Mode.STAND_ON_BRAKES:
+                self.write("drives_on", True)
+                time.sleep(0.03)
+                self.write("drives_on", False)
+            if self.driver.modes[-1] == Mode.STAND_ON_MOTORS:
+                return True
+            time.sleep(0.02)
+        return False
+
+
+@contextmanager
+def cell() -> Iterator[Cell]:
+    """A driver with short ways between its modes."""
+    with (
+        prey(**SHORT) as driver,
+        Client(timeout=PATIENCE, node_name="second") as second,
+        socket.create_connection(("127.0.0.1", driver.port), timeout=PATIENCE) as modbus,
+    ):
+        yield Cell(driver, second, modbus)
+
+
+def _events(cell: Cell, generator: random.Random, bits: tuple[str, ...]) -> None:
+    """A few things that clients and PLC do, at random times."""
+    for _ in range(generator.randrange(1, 5)):
+        what = generator.choice(("goal", "goal", "bit", "bit", "cancel"))
+        if what == "goal":
+            cell.send(generator, generator.randrange(NEW))
+        elif what == "cancel":
+            cell.cancel()
+        else:
+            cell.write(generator.choice(bits), generator.random() < 0.6)
+        time.sleep(generator.choice((0.0, 0.0, 0.005, 0.025, 0.1)))
+
+
+class BrokenLawError(Exception):
+    """What an episode shows that must not be."""
+
+
+def _holds(law: bool, otherwise: str) -> None:
+    if not law:
+        raise BrokenLawError(otherwise)
+
+
+def episode(cell: Cell, generator: random.Random) -> None:
+    """Press, release and recover once, amid whatever comes; raises BrokenLawError."""
+    cell.goals = []
+    # one of the two that recover together, so that only a person does
+    bits = tuple(bit for bit in PLC if bit != generator.choice(("conf_mess", "drives_on")))
+    _press(cell, generator, bits)
+    if generator.random() < 0.7:
+        _events(cell, generator, bits)
+    time.sleep(generator.choice((0.0, 0.05, 0.2)))
+    _stands(cell, "while a stop is latched")
+    cell.rest()
+    if generator.random() < 0.3:
+        _events(cell, generator, ("move_enable",))
+        cell.write("move_enable", True)
+    time.sleep(0.025)
+    _stands(cell, "after the release")
+    _holds(cell.run(), f"no recovery: mode {cell.driver.modes[-1:]}")
+    cell.frames(generator.choice((5, 10, 40)))
+    _stands(cell, "after the recovery, by what came before")
+    _holds(cell.ended() is not None, "a goal has no result")
+    if generator.random() < 0.1:
+        _moves(cell, generator)
+
+
+def _press(cell: Cell, generator: random.Random, bits: tuple[str, ...]) -> None:
+    """Press the button amid whatever comes, until the robot stands."""
+    if generator.random() < 0.7:
+        _events(cell, generator, PLC)
+    way = generator.choice(("topic", "service", "modbus"))
+    known = cell.number
+    cell.press(way, True)
+    if generator.random() < 0.3:
+        cell.press(way, False)
+    if generator.random() < 0.5:
+        _events(cell, generator, bits)
+    _holds(cell.wait(lambda: cell.number > known), f"a press by {way} has no number")
+    _holds(cell.stands(), "the robot does not stand after a press")
+
+
+def _stands(cell: Cell, when: str) -> None:
+    _holds(not cell.moved, f"axes {sorted(cell.moved)} move {when}")
+
+
+def _moves(cell: Cell, generator: random.Random) -> None:
+    """A goal of after the recovery is driven, and it alone."""
+    cell.goals = []
+    cell.send(generator, NEW, plain=True)
+    codes = cell.ended()
+    _holds(codes == [0], f"a goal of after the recovery ends with {codes}")
+    _holds(cell.moved == {NEW}, f"axes {sorted(cell.moved)} move by a goal for axis {NEW}")
+
+
+def stops_row(count: int, seed: int) -> dict[str, Any]:
+    """Interleavings on a node, and how many of them broke the law."""
+    wrong = 0
+    began = time.monotonic()
+    with cell() as driven:
+        for k in range(count):
+            try:
+                episode(driven, random.Random(seed * 1_000_000 + k))
+            except (BrokenLawError, MsgsError, OSError) as error:
+                print(f"episode {k} of seed {seed}: {type(error).__name__}: {error}", flush=True)
+                wrong += 1
+                with suppress(MsgsError):
+                    driven.rest()
+                    driven.run()
+    seconds = time.monotonic() - began
+    load = os.getloadavg()[0]
+    return {
+        "case": "node stops",
+        "seed": seed,
+        "cases": count,
+        "wrong": wrong,
+        "s": seconds,
+        "load": load,
+    }
+
+
+if __name__ == "__main__":
+    print(json.dumps(stops_row(int(sys.argv[1]), int(sys.argv[2]))))
