@@ -15,6 +15,7 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64, String
 
 from ir_msgs_py import names
+from ir_recorder.errors import RecorderError
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.play.node import PlayNode
 from ir_recorder.play.playback import PlaySettings
@@ -57,6 +58,30 @@ def test_messages_arrive_in_order_and_latched_ones_later_too(
     ros_node.create_subscription(String, "/text", lambda m: texts.append(m.data), latched)
     wait_for(lambda: texts == ["latched"])
     player.stop()
+
+
+def test_a_time_that_clock_can_t_say_is_refused(ros_context: Any, tmp_path: Path) -> None:
+    session = RecordingSession(RecordingWriter(tmp_path / "far.mcap"), {}, START)
+    session.open_topic("/value", "std_msgs/msg/Float64", [QosOffer()])
+    session.message("/value", serialize_message(Float64()), 2**62)
+    far = read_raw(session.finish().path)
+    with pytest.raises(RecorderError, match="which /clock can't say"):
+        PlayNode(far, PlaySettings(), clock=True, context=ros_context)
+
+
+def test_playback_that_fails_says_so(
+    ros_context: Any, wait_for: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    player = PlayNode(recorded(tmp_path / "a.mcap"), PlaySettings(), delay=0.0, context=ros_context)
+
+    def publish(message: object) -> None:
+        raise OverflowError("timestamp too large")
+
+    monkeypatch.setattr(player, "_publish", publish)
+    player.start()
+    wait_for(lambda: not player.playing)
+    assert "timestamp too large" in player.failure
+    player.destroy_node()
 
 
 def test_a_loop_ends_when_it_is_asked_to(

@@ -9,7 +9,14 @@ import pytest
 
 from ir_recorder.errors import RecorderError
 from ir_recorder.play.node import press
-from ir_recorder.play.playback import DueMessage, Player, Playhead, PlaySettings, PlayState
+from ir_recorder.play.playback import (
+    DueMessage,
+    Player,
+    Playhead,
+    PlaySettings,
+    PlayState,
+    checked_delay,
+)
 
 MESSAGES = [(1_500_000_000, "/b", b"2"), (1_000_000_000, "/a", b"1"), (2_000_000_000, "/a", b"3")]
 
@@ -50,6 +57,26 @@ def test_a_loop_goes_on_until_it_is_stopped() -> None:
 
 def test_topics_can_be_chosen() -> None:
     assert [data for _, data in play(Clock(), topics=("/b",))] == [b"2"]
+
+
+def test_a_gap_of_any_length_is_waited_for_in_turns_of_an_hour() -> None:
+    """No thread can wait for 1e13 s at once."""
+    waits: list[float] = []
+
+    def wait(seconds: float) -> bool:
+        waits.append(seconds)
+        return len(waits) > 3
+
+    far = [(0, "/a", b"1"), (2**63, "/a", b"2")]
+    player = Player(lambda: 0.0, wait, lambda message: None)
+    assert player.play(far, PlaySettings(rate=0.001)) == 1
+    assert max(waits) == 3600.0
+
+
+@pytest.mark.parametrize("delay", [-1.0, math.nan, math.inf, 1e300])
+def test_a_delay_that_nobody_can_wait_for_is_refused(delay: float) -> None:
+    with pytest.raises(RecorderError, match="must be 0 to 3600 s"):
+        checked_delay(delay)
 
 
 def test_a_loop_over_nothing_ends() -> None:

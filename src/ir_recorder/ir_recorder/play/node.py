@@ -13,6 +13,7 @@ import sys
 import termios
 import threading
 import time
+import traceback
 import tty
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -34,7 +35,14 @@ from ir_recorder.arguments import play_parser, roots_of
 from ir_recorder.errors import RecorderError, SchemaError
 from ir_recorder.format.qos import offers_from_yaml
 from ir_recorder.format.schemas import SchemaLibrary
-from ir_recorder.play.playback import DueMessage, Player, Playhead, PlaySettings, is_command
+from ir_recorder.play.playback import (
+    DueMessage,
+    Player,
+    Playhead,
+    PlaySettings,
+    checked_delay,
+    is_command,
+)
 from ir_recorder.reading.mcap_file import RawChannel, RawRecording, read_raw
 from ir_values.errors import IrError, UnknownTypeError
 
@@ -92,6 +100,7 @@ def keys_of_terminal(pressed: Callable[[bytes], None]) -> Iterator[bool]:
 
 
 LOOK_PERIOD = 0.1  # s between two looks for a driver: less than discovery takes
+_CLOCK_NS = 2**31 * 1_000_000_000  # seconds of a message have 32 bits
 DEPTH = 1000  # messages per topic: 2 s of joint states while a subscriber is busy
 
 
@@ -125,8 +134,16 @@ class PlayNode(Node):
         times = [message[0] for message in self._messages]
         duration = (max(times) - min(times)) * 1e-9 if times else 0.0
         self.head = Playhead(time.monotonic, duration, settings.rate)
+        self._check_clock(max(times, default=0))
         self._thread = threading.Thread(target=self._play, name="ir_play", daemon=True)
         BoundedService(self, ControlPlayback, names.CONTROL_PLAYBACK, self._on_control)
+
+    def _check_clock(self, last_ns: int) -> None:
+        if self._ticks is not None and last_ns >= _CLOCK_NS:
+            raise RecorderError(
+                f"the recording ends {last_ns * 1e-9:.6g} s after 1970, which /clock can't say: "
+                f"at most {_CLOCK_NS * 1e-9:.10g} s; play it without --clock"
+            )
 
     def start(self) -> None:
         """Begins to play, after `delay` seconds in which subscribers find the publishers."""
@@ -228,7 +245,11 @@ class PlayNode(Node):
         player = Player(
             time.monotonic, self._wait, self._publish, tick, head=self.head, latched=self._latched
         )
-        self.published = player.play(self._messages, self._settings)
+        try:
+            self.published = player.play(self._messages, self._settings)
+        except Exception as error:  # whatever it was, not all was played
+            self.get_logger().error(traceback.format_exc())
+            self.failure = f"playback failed: {error!r}"
 
     def _refused(self) -> bool:
         """Whether playback ends because a driver would follow its commands; looks every
@@ -273,6 +294,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options = play_parser().parse_args(own_words("ir-play", everything))
         settings = PlaySettings(options.rate, options.loop, tuple(options.topics))
+        delay = checked_delay(options.delay)
         recording = read_raw(options.file, roots_of(options.roots))
     except (CommandLineError, RecorderError, IrError) as error:
         sys.stderr.write(f"ir-play: {error}\n")
@@ -283,7 +305,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     players: list[PlayNode] = []
 
     def start() -> PlayNode:
-        node = PlayNode(recording, settings, options.clock, options.delay)
+        node = PlayNode(recording, settings, options.clock, delay)
         players.append(node)
         node.start()
         return node
@@ -295,7 +317,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with keys_of_terminal(pressed) as terminal:
         if terminal:
             sys.stderr.write(f"{HELP}\n")
-        code = run_node("ir-play", start, everything, goes_on=lambda node: node.playing)
+        code = run_node(
+            "ir-play",
+            start,
+            everything,
+            goes_on=lambda node: node.playing,
+            refusals=(RecorderError,),
+        )
     for player in players:
         if player.failure:
             sys.stderr.write(f"ir-play: {player.failure}\n")

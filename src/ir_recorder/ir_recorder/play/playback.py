@@ -12,6 +12,8 @@ from fnmatch import fnmatchcase
 from ir_msgs_py import names
 from ir_recorder.errors import RecorderError
 
+_LONGEST = 3600.0  # s of one wait; a gap may be longer than a thread can wait
+
 # Topics that move a robot or a machine: playback leaves them out unless one is asked for by
 # name.
 
@@ -103,6 +105,13 @@ def checked_rate(rate: float) -> float:
     if not 0.001 <= rate <= 1000.0:
         raise RecorderError(f"rate is {rate:g}, must be 0.001 to 1000")
     return rate
+
+
+def checked_delay(delay: float) -> float:
+    """A delay [s] in the range; RecorderError for another."""
+    if not 0.0 <= delay <= _LONGEST:
+        raise RecorderError(f"delay is {delay:g} s, must be 0 to {_LONGEST:g} s")
+    return delay
 
 
 # Where playback stands: it goes on with the clock, at a rate, unless it is paused; and it may be
@@ -250,7 +259,7 @@ class Player:
                 self._next_tick = now + self._period
             if left <= 0.0:
                 return None if self._wait(0.0) else True
-            left = min(left, _PAUSED) if math.isinf(left) else left
+            left = _PAUSED if math.isinf(left) else min(left, _LONGEST)
             if self._tick is not None:
                 left = min(left, max(self._next_tick - now, 0.0))
             if self._wait(left):
