@@ -67,7 +67,7 @@ class Cell:
         self.modbus = modbus
         self.q: Any = None
         self.home: Any = None
-        self.heard = 0
+        self.heard = self.stamp = 0
         self._mark: Any = None
         self.moved: set[int] = set()
         self.goals: list[Any] = []
@@ -102,6 +102,7 @@ class Cell:
         self.q = q
         if self._mark is not None:
             self.moved.update(np.flatnonzero(np.abs(q - self._mark) > STILL).tolist())
+        self.stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
         self.heard += 1
 
     def _count(self, message: UInt64) -> None:
@@ -113,9 +114,11 @@ class Cell:
         self._mark = self.q
 
     def stands(self) -> bool:
-        """Wait until the robot stands: as many messages as five frames of it say so."""
+        """Wait until the robot stands: six messages of after this call say so."""
         ends = time.monotonic() + ROLLS
         while time.monotonic() < ends:
+            now = time.time_ns()
+            self.wait(lambda now=now: self.stamp >= now)
             self.mark()
             self.frames(6)
             if not self.moved:
