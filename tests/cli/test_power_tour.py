@@ -28,6 +28,7 @@ class FakeMeter:
     """
 
     def __init__(self, behind: float, step: float) -> None:
+        self.mode = PowerMode.STAND_ON_BRAKES
         now = SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=round(NOW * 1e9)))
         self.node = SimpleNamespace(get_clock=lambda: now)
         self._stamp = NOW - behind
@@ -42,7 +43,7 @@ class FakeMeter:
         """The next reading."""
         self.passed += EVERY
         self._stamp += self._step
-        state = PowerState(mode=PowerMode.STAND_ON_BRAKES)
+        state = PowerState(mode=self.mode)
         state.header.stamp.sec = int(self._stamp)
         state.header.stamp.nanosec = int(self._stamp % 1.0 * 1e9)
         self._take(state)
@@ -81,7 +82,7 @@ def test_a_meter_that_lags_behind_is_waited_for_as_long_as_it_goes_on(
     watched: Callable[[FakeMeter], PowerWatch],
 ) -> None:
     meter = FakeMeter(behind=3.0, step=0.02)
-    watched(meter).stay(0.1)
+    assert watched(meter).stays(PowerMode.STAND_ON_BRAKES, 0.1)
     assert meter.passed > PATIENCE  # 155 readings
 
 
@@ -93,6 +94,14 @@ def test_a_mode_that_does_not_come_is_waited_for_by_the_meter_s_time(
         waiting.wait_for_mode(PowerMode.HIBERNATION)
 
 
+def test_a_mode_that_the_controller_leaves_by_itself_has_not_stayed(
+    watched: Callable[[FakeMeter], PowerWatch],
+) -> None:
+    meter = FakeMeter(behind=0.0, step=0.01)
+    assert not watched(meter).stays(PowerMode.STAND_ON_MOTORS, 60.0)
+    assert meter.passed < PATIENCE
+
+
 def test_a_silent_meter_is_said_to_say_nothing() -> None:
     with pytest.raises(DemonstrationError, match="the mains meter says nothing"):
-        watch(FakeMeter(behind=0.0, step=0.1)).stay(0.1)
+        watch(FakeMeter(behind=0.0, step=0.1)).stays(PowerMode.STAND_ON_BRAKES, 0.1)

@@ -49,7 +49,7 @@ REST = {"ab": Mode.BUS_POWER_OFF, "hib": Mode.HIBERNATION, "drives_off": Mode.ST
 
 class FakeDriver(Node):
     """Keeps the driver's interfaces; modes change at once, a movement lasts as long as its
-    trajectory.
+    trajectory. tick: plant time between two readings of the meter [s].
     """
 
     def __init__(self, context):
@@ -57,6 +57,8 @@ class FakeDriver(Node):
         self.waiting = Waiting(self, period=0.002)
         self.mode = Mode.STAND_ON_MOTORS
         self.energy = 0.0
+        self.tick = 0.01
+        self.time = 1000.0
         self.log = []
         self.answer = ExecuteTrajectory.Result()
         self.meter = self.create_publisher(PowerState, "~/power_state", 100)
@@ -80,7 +82,10 @@ class FakeDriver(Node):
 
     def read_meter(self):
         self.energy += 4.0
-        self.meter.publish(PowerState(mode=self.mode, energy=self.energy, power=400.0))
+        self.time += self.tick
+        reading = PowerState(mode=self.mode, energy=self.energy, power=400.0)
+        reading.header.stamp = Time(sec=int(self.time), nanosec=int(self.time % 1 * 1e9))
+        self.meter.publish(reading)
 
     def set_plc_input(self, request, response):
         self.log.append(f"{request.name}={int(request.value)}")
@@ -356,6 +361,18 @@ def test_a_stop_while_a_program_waits_for_a_signal_ends_it_though_somebody_has_r
     assert "stop 1" in ended[0].status.message
 
 
+def test_a_pause_lasts_as_long_in_a_plant_that_lags(cell):
+    """A hundred readings of 2 ms of the plant, however fast they come."""
+    cell.driver.tick = 0.002
+    events = []
+    topic = "/ir_program_runner/program_state"
+    cell.executor.run(lambda: cell.test.create_subscription(ProgramState, topic, events.append, 10))
+    result = cell.run([pause(0.2)])
+    assert result.energy >= 100 * 4.0
+    assert result.duration >= 0.2
+    assert [int(event.header.stamp.sec) for event in events[:1]] == [1000]
+
+
 def test_a_stop_in_a_pause_on_brakes_ends_the_program_and_asks_for_no_motors(cell, wait_for):
     with cell.running([pause(60.0, "STAND_ON_BRAKES"), move()], wait_for) as ended:
         wait_for(lambda: "drives_off=1" in cell.driver.log)
@@ -547,15 +564,18 @@ def test_a_cancel_after_the_end_and_twice_is_harmless(cell, monkeypatch):
 
 
 class SimulatedTime:
-    """Publishes /clock twenty times faster than real time."""
+    """Publishes /clock twenty times faster than real time, by which the driver's meter goes."""
 
     def __init__(self, cell):
         self.now = 1000.0
+        self.driver = cell.driver
+        self.driver.tick = 0.0
         self.publisher = cell.test.create_publisher(Clock, "/clock", 10)
         cell.executor.run(lambda: cell.test.create_timer(0.005, self.tick))
 
     def tick(self):
         self.now += 0.1
+        self.driver.time = self.now
         self.publisher.publish(
             Clock(clock=Time(sec=int(self.now), nanosec=int(self.now % 1 * 1e9)))
         )

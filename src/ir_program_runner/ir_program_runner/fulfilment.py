@@ -30,6 +30,10 @@ class DriverPort(Protocol):
         """Energy at the mains by the meter's last reading [J]."""
 
     @property
+    def plant_time(self) -> float:
+        """Time of the plant by the meter's last reading [s]: on a busy machine it may lag."""
+
+    @property
     def stops(self) -> int | None:
         """Number of the driver's last stop, None where it is not known."""
 
@@ -69,15 +73,13 @@ class DriverPort(Protocol):
 class Ports:
     """The world of one program.
 
-    until: waits for a condition. now: time of the program [s]. fault: why no wait may go on, "" =
-    it may.
-    canceled: whether somebody asked to stop. The others do at once what they are called.
+    until: waits for a condition. fault: why no wait may go on, "" = it may. canceled: whether
+    somebody asked to stop. The others do at once what they are called.
     """
 
     driver: DriverPort
     machines: Machines
     until: Callable[[Callable[[], bool]], Awaitable[bool]]
-    now: Callable[[], float]
     fault: Callable[[], str]
     canceled: Callable[[], bool]
     begin: Callable[[int], None]
@@ -144,7 +146,9 @@ class Fulfilment:
             status, modes = await ports.driver.query_modes()
         else:
             status = await self._fulfil(request)
-        return ask.Outcome(ports.now(), ports.driver.mode, status, modes, ports.driver.energy)
+        return ask.Outcome(
+            ports.driver.plant_time, ports.driver.mode, status, modes, ports.driver.energy
+        )
 
     async def _fulfil(self, request: ask.Request) -> Status:  # noqa: C901, PLR0911
         ports = self._ports
@@ -172,13 +176,13 @@ class Fulfilment:
             case ask.WaitForMode(wanted, timeout):
                 return await self._wait(lambda: ports.driver.mode in wanted, timeout)
             case ask.WaitUntil(moment):
-                return await self._wait(lambda: ports.now() >= moment, float("inf"))
+                return await self._wait(lambda: ports.driver.plant_time >= moment, float("inf"))
         return Status.success()
 
     async def _wait(self, condition: Callable[[], bool], timeout: float) -> Status:
         """Wait for the condition; ends early on a cancel, a silent driver or a clock that jumps."""
         ports = self._ports
-        deadline = ports.now() + timeout
+        deadline = ports.driver.plant_time + timeout
 
         def over() -> bool:
             return (
@@ -186,7 +190,7 @@ class Fulfilment:
                 or self._stopped()
                 or ports.driver.silent
                 or bool(ports.fault())
-                or ports.now() >= deadline
+                or ports.driver.plant_time >= deadline
             )
 
         await ports.until(lambda: condition() or over())

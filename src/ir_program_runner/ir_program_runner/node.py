@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -25,7 +24,7 @@ from ir_msgs_py.plc import Signal, magic_packet, send_packet
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.conversions import status_to_msg
 from ir_msgs_py.ros.diagnostics import OK, WARN, Condition, Diagnostics
-from ir_msgs_py.ros.node_clients import DriverClient, PlannerClient
+from ir_msgs_py.ros.node_clients import DriverClient, PlannerClient, node_time
 from ir_msgs_py.ros.node_process import run_node
 from ir_msgs_py.ros.plan_conversions import planned_movement_from_msg
 from ir_msgs_py.ros.power_conversions import program_state_to_msg, signal_from_msg, signal_to_msg
@@ -164,13 +163,13 @@ class ProgramRunnerNode(Node):
             return self._end(
                 goal, ProgramResult(Status(StatusCode.INVALID_ROBOT_STATE, sentence), 0), 0.0, 0.0
             )
-        self._progress = progress = Progress(goal.request.program_id, (), self._now())
+        self._progress = progress = Progress(goal.request.program_id, (), self._driver.plant_time)
         try:
             status, movements = await self._fetch(goal.request)
             # a driver or a /clock that has just been started gets the time to be discovered
             patience = self._settings.links.value.response_timeout
             await self._waiting.until(self._driver_is_known, patience)
-            progress.started = self._now()
+            progress.started = self._driver.plant_time
             self._jump = ""
             energy = self._driver.energy
             result = ProgramResult(status, 0)
@@ -182,7 +181,8 @@ class ProgramRunnerNode(Node):
                 result = await self._run_steps(goal, program)
         finally:
             self._progress = None
-        return self._end(goal, result, self._now() - progress.started, self._driver.energy - energy)
+        duration = self._driver.plant_time - progress.started
+        return self._end(goal, result, duration, self._driver.energy - energy)
 
     def _driver_is_known(self) -> bool:
         """Whether the meter and the number of the last stop have been heard, and time passes."""
@@ -219,7 +219,6 @@ class ProgramRunnerNode(Node):
             driver=self._driver,
             machines=self._machines,
             until=self._waiting.until,
-            now=self._now,
             fault=lambda: self._jump,
             canceled=lambda: bool(goal.is_cancel_requested),
             begin=self._begin,
@@ -230,9 +229,8 @@ class ProgramRunnerNode(Node):
         )
 
     def _now(self) -> float:
-        """Time of the program [s]: /clock where that is used, else steady."""
-        clock = self.get_clock()
-        return clock.now().nanoseconds * 1e-9 if clock.ros_time_is_active else time.monotonic()
+        """Time of the machines [s]: they answer with or without a driver."""
+        return node_time(self)
 
     def _clock_jumped(self, jump: TimeJump) -> None:
         self._jump = f"the clock jumped back by {-jump.delta.nanoseconds * 1e-9:.3f} s"
@@ -284,9 +282,9 @@ class ProgramRunnerNode(Node):
         progress = self._progress
         assert progress is not None
         if step.event is Event.STARTED:
-            progress.step_started = self._now()
+            progress.step_started = self._driver.plant_time
         state = ProgramState(
-            stamp_ns=self.get_clock().now().nanoseconds,
+            stamp_ns=self._driver.stamp_ns or self.get_clock().now().nanoseconds,
             program_id=progress.program_id,
             index=step.index,
             total=progress.total,
@@ -309,7 +307,7 @@ class ProgramRunnerNode(Node):
                     movement=progress.index,
                     total=progress.total,
                     phase=progress.phase,
-                    remaining=progress.remaining(self._now()),
+                    remaining=progress.remaining(self._driver.plant_time),
                 )
             )
 

@@ -447,7 +447,7 @@ class Program:
 
 @dataclass
 class Progress:
-    """State of one run; times of a steady clock [s]."""
+    """State of one run; times of the plant [s]."""
 
     program_id: str
     movements: Sequence[PlannedMovement]

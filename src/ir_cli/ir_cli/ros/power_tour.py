@@ -38,16 +38,24 @@ class PowerWatch:
         """
         self._wait(lambda state: state.mode == mode, f"power mode {mode}")
 
-    def stay(self, seconds: float) -> None:
-        """Wait until the meter has measured for this long from now on.
+    def rest(self, mode: int, seconds: float) -> None:
+        """Wait for a mode, and that it stays for so long."""
+        self.wait_for_mode(mode)
+        self.stays(mode, seconds)
+
+    def stays(self, mode: int, seconds: float) -> bool:
+        """Wait until the meter has measured in this mode for so long from now on; False as soon as
+        it shows another: a controller that stands for long closes its brakes by itself.
 
         Its readings may arrive late: the node's clock is ahead of the last one then.
         """
         self._wait(lambda state: True, "the mains meter")
-        began = max(_seconds(self._last()), self._now())
+        end = max(_seconds(self._last()), self._now()) + seconds
         self._wait(
-            lambda state: _seconds(state) >= began + seconds, f"{seconds:g} s on the mains meter"
+            lambda state: state.mode != mode or _seconds(state) >= end,
+            f"{seconds:g} s on the mains meter",
         )
+        return self._last().mode == mode
 
     def _wait(self, condition: Callable[[PowerState], bool], what: str) -> None:
         """Until a reading meets the condition; DemonstrationError where the meter is silent for
@@ -103,23 +111,21 @@ def tour(
         progress(f"load {load}: on motors")
         motors_on(client, watch)
         client.ask("/" + names.SET_LOAD, SetLoad.Request(load=load))
-        watch.stay(stay)
+        while not watch.stays(PowerMode.STAND_ON_MOTORS, stay):
+            motors_on(client, watch)
         progress(f"load {load}: on brakes")
         set_bit(client, "drives_off", True)
-        watch.wait_for_mode(PowerMode.STAND_ON_BRAKES)
-        watch.stay(stay)
+        watch.rest(PowerMode.STAND_ON_BRAKES, stay)
         set_bit(client, "drives_off", False)
         motors_on(client, watch)
         progress(f"load {load}: drive bus off")
         set_bit(client, "ab", True)
-        watch.wait_for_mode(PowerMode.BUS_POWER_OFF)
-        watch.stay(stay)
+        watch.rest(PowerMode.BUS_POWER_OFF, stay)
         set_bit(client, "ab", False)
         watch.wait_for_mode(PowerMode.STAND_ON_MOTORS)
         progress(f"load {load}: hibernation")
         set_bit(client, "hib", True)
-        watch.wait_for_mode(PowerMode.HIBERNATION)
-        watch.stay(stay)
+        watch.rest(PowerMode.HIBERNATION, stay)
         wake()
         watch.wait_for_mode(PowerMode.STAND_ON_MOTORS)
         set_bit(client, "hib", False)

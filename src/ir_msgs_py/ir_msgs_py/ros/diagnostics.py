@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
@@ -80,12 +81,12 @@ class Diagnostics:
         self._lost: tuple[str, ...] = ()
         self._publisher = node.create_publisher(DiagnosticArray, names.DIAGNOSTICS, 10)
 
-    def publish(self, conditions: Iterable[Condition]) -> None:
-        """Publish these conditions in one message."""
+    def publish(self, conditions: Iterable[Condition], stamp: Time | None = None) -> None:
+        """Publish these conditions in one message; stamp: when they held, by default now."""
         namespace = self._node.get_namespace()
         said = [*conditions, *self._doubled(), *self._deaf()]
         message = DiagnosticArray(status=[_status(namespace, condition) for condition in said])
-        message.header.stamp = self._node.get_clock().now().to_msg()
+        message.header.stamp = stamp or self._node.get_clock().now().to_msg()
         self._publisher.publish(message)
 
     def _deaf(self) -> list[Condition]:

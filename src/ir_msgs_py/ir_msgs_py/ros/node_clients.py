@@ -27,7 +27,12 @@ from ir_msgs_py.announcements import ControllerTimers
 from ir_msgs_py.modes import OFF_THE_NETWORK, Mode, PowerMode
 from ir_msgs_py.names import STOPS_STATE
 from ir_msgs_py.report import PlannedMovement
-from ir_msgs_py.ros.conversions import status_from_msg, trajectory_from_msg, trajectory_to_msg
+from ir_msgs_py.ros.conversions import (
+    status_from_msg,
+    time_from_msg,
+    trajectory_from_msg,
+    trajectory_to_msg,
+)
 from ir_msgs_py.ros.plan_conversions import planned_movement_from_msg
 from ir_msgs_py.ros.power_conversions import controller_timers_from_msg, power_mode_from_msg
 from ir_msgs_py.ros.topics import ACTION_SERVICES, LATCHED, SERVICE, LatestMessage
@@ -40,6 +45,48 @@ _UNSEEN = 1.5
 """s without a look at the meter: nodes look once a second at least, so that this process was
 stopped.
 """
+_AHEAD = 2.0
+"""s by which stamps may be ahead of the time that has passed: a plant that lagged makes up for it,
+and a reading comes late on a busy machine. Beyond that somebody has set the clock.
+"""
+
+
+def node_time(node: Node) -> float:
+    """/clock where the node uses it, else a steady clock [s]."""
+    clock = node.get_clock()
+    return float(clock.now().nanoseconds) * 1e-9 if clock.ros_time_is_active else time.monotonic()
+
+
+class PlantTime:
+    """Seconds that have passed in the plant, by the stamps of its readings.
+
+    A plant that gets too little of the processor lags, and makes up for it at twice the speed: what
+    is to last so long in the plant is waited for in its time. Where stamps jump, or are none, the
+    time of `clock` passes.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self._came = 0.0
+        self._seconds: float | None = None
+        self.stamp_ns = 0
+
+    def hear(self, stamp_ns: int, age: float) -> None:
+        """Take the stamp of a reading that came `age` [s] ago."""
+        came = self._clock() - age
+        passed = came - self._came
+        stamped = (stamp_ns - self.stamp_ns) * 1e-9
+        believed = stamp_ns > 0 and 0.0 <= stamped <= 2.0 * passed + _AHEAD
+        if self._seconds is None:
+            self._seconds = 0.0
+        else:
+            self._seconds += stamped if believed else max(0.0, passed)
+        self._came = came
+        self.stamp_ns = stamp_ns
+
+    def __call__(self) -> float:
+        """Seconds since the first reading, 0 before."""
+        return self._seconds or 0.0
 
 
 class DriverClient:
@@ -72,6 +119,7 @@ class DriverClient:
         self._silence_timeout = silence_timeout
         self._cancel_timeout = cancel_timeout
         self._heard = self._looked = -float("inf")
+        self._time = PlantTime(lambda: node_time(node))
         self._plc = node.create_client(SetPlcInputSrv, f"{name}/set_plc_input", qos_profile=SERVICE)
         self._load = node.create_client(SetLoadSrv, f"{name}/set_load", qos_profile=SERVICE)
         self._modes = node.create_client(QueryModes, f"{name}/query_modes", qos_profile=SERVICE)
@@ -96,6 +144,18 @@ class DriverClient:
         """Energy [J] of the last reading."""
         self._read_meter()
         return self._energy
+
+    @property
+    def plant_time(self) -> float:
+        """Time of the plant [s] at the last reading, see `PlantTime`."""
+        self._read_meter()
+        return self._time()
+
+    @property
+    def stamp_ns(self) -> int:
+        """Stamp [ns] of the last reading, 0 before the first."""
+        self._read_meter()
+        return self._time.stamp_ns
 
     @property
     def silent(self) -> bool:
@@ -222,6 +282,7 @@ class DriverClient:
             return
         self._heard = time.monotonic() - reading.age
         self._energy = float(reading.message.energy)
+        self._time.hear(time_from_msg(reading.message.header.stamp), reading.age)
         if reading.message.mode != self._mode:
             self._mode = Mode(reading.message.mode)
 

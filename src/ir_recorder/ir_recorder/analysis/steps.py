@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -82,7 +83,7 @@ def executed_steps(recording: Recording) -> tuple[ExecutedStep, ...]:
         if ran is not None:
             late = max(0.0, last - ran[1]) if end else 0.0
             steps[-1:] = [_ended_at(step, ran[0]) for step in steps[-1:]]
-        start, stop = ran or (event.time - late, last - late)
+        start, stop = ran or (_begin_of(event, steps) - late, last - late)
         if ran is None and _unseen(
             event.movement
         ):  # its events are as far apart as the nodes' answers
@@ -115,6 +116,14 @@ def _ended_at(step: ExecutedStep, moves: float) -> ExecutedStep:
     if _unseen(step.movement):
         return replace(step, start=step.start - late, end=step.end - late)
     return step
+
+
+def _begin_of(event: ProgramEvent, before: Sequence[ExecutedStep]) -> float:
+    """When a step that isn't seen began [s]: not while the robot was still moving; the runner's
+    stamps are those of the meter, a reading old.
+    """
+    moving = before and not before[-1].movement.is_pause and before[-1].index == event.index - 1
+    return max(event.time, before[-1].end) if moving else event.time
 
 
 def _end_of(start: ProgramEvent, later: tuple[ProgramEvent, ...]) -> ProgramEvent | None:

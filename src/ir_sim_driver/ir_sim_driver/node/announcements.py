@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 import numpy as np
+from builtin_interfaces.msg import Time
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.time import Time
 from std_msgs.msg import String
 
 from ir_description import DescriptionError, cell_from_yaml
@@ -37,15 +36,21 @@ _CONTACTS = QoSProfile(depth=100)
 
 
 class Announcements:
-    """Of `driver`, by `node`; load_changed: called when the robot carries another load, and at the
-    start.
+    """Of `driver`, by `node`; now: time of the plant; load_changed: called when the robot carries
+    another load, and at the start.
 
     A cell is read beside everything else.
     """
 
-    def __init__(self, node: Node, driver: Driver, load_changed: Callable[[], None]) -> None:
-        self._node = node
+    def __init__(
+        self,
+        node: Node,
+        driver: Driver,
+        now: Callable[[], Time],
+        load_changed: Callable[[], None],
+    ) -> None:
         self._driver = driver
+        self._now = now
         self._load_changed = load_changed
         self._load: Carried | None = None
         self._cells = ThreadPoolExecutor(max_workers=1, thread_name_prefix="cells")
@@ -109,11 +114,6 @@ class Announcements:
     def _signalled(self, messages: Sequence[Signal]) -> None:
         for msg in messages:
             self._driver.cell_side.hear_signal(msg.name, bool(msg.value))
-
-    def _now(self) -> Any:
-        """Time of the plant, which may lag; before its first tick, of the clock."""
-        stamp = self._driver.stamp_ns
-        return Time(nanoseconds=stamp).to_msg() if stamp else self._node.get_clock().now().to_msg()
 
     def _heard(self, msg: CellState) -> None:
         self._offered.append(msg)

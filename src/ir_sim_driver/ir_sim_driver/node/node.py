@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
+from builtin_interfaces.msg import Time
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.action import CancelResponse
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -151,7 +152,7 @@ class SimDriver(Node):
         self._transforms = open_transforms(self, self._driver, self._configuration.node.publish_tf)
         if self._transforms is not None:
             self.create_timer(_TRANSFORMS_PERIOD, self._publish_transforms)
-        self._announcements = Announcements(self, self._driver, self._load_changed)
+        self._announcements = Announcements(self, self._driver, self.now_msg, self._load_changed)
 
     def _open_requests(self) -> None:
         self._actions = [self._serve_action(ExecuteTrajectory, names.EXECUTE_TRAJECTORY)]
@@ -230,9 +231,10 @@ class SimDriver(Node):
         )
         return lambda: self.destroy_timer(timer)
 
-    def now_msg(self) -> Any:
-        """Present time of the node's clock, as a message."""
-        return self.get_clock().now().to_msg()
+    def now_msg(self) -> Time:
+        """Time of the plant, which may lag; before its first tick, of the clock."""
+        stamp = self._driver.stamp_ns
+        return time_to_msg(stamp) if stamp else self.get_clock().now().to_msg()
 
     # the plant's thread
 
@@ -304,7 +306,8 @@ class SimDriver(Node):
         snapshot = self._driver.snapshot(self._plant.worst_lag, self._plant.lag)
         for notice in shortened(snapshot.notices, _LINES_MAX):
             self._log(notice)
-        self._diagnostics.publish(condition_of(entry, self._hardware) for entry in snapshot.entries)
+        conditions = (condition_of(entry, self._hardware) for entry in snapshot.entries)
+        self._diagnostics.publish(conditions, self.now_msg())
 
     def _log(self, notice: Notice) -> None:
         # a line of its own for each severity: rclpy lets a line log with one severity only

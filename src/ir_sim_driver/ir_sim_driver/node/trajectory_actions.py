@@ -318,7 +318,7 @@ class Executing(Protocol):
         """Identities of the subscriptions to a topic in the graph."""
 
     def now_msg(self) -> Any:
-        """Present time of the node's clock, as a message."""
+        """Time of the plant, as a message."""
 
 
 FEEDBACK_PERIOD = 0.05  # s: 20 Hz, enough for a person or a progress bar
