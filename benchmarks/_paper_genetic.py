@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,13 +23,17 @@ from _paper_result import (
 )
 from _regional_tasks import CELLS, TIME_VALUE, Task, scene_of_cell, tasks_of
 from _variants import variant
-from genetic import EDGES, searched, straight_is_free
 
 from ir_description import cell_to_yaml, load_cell
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Goal, Planner
+from ir_planner.checks.free_space import FreeSpace
+from ir_planner.request.context import Work
 from ir_planner.scene import PlanningScene
+from ir_planner.scene.planning_scene import movement_cost, path_cost
+from ir_planner.search.correction import Correction, corrected
 from ir_planner.search.genetic import Genetic
+from ir_planner.search.shortcuts import fewest_corners, pulled
 
 VARIANTS = 18  # of each cell and seed
 # tasks of each
@@ -42,6 +47,7 @@ PLANNING_S = 60.0
 PLANNERS = ("genetic", "tree", "")
 SURE = 95.0  # % of the solvable tasks
 DEFAULT = "default"
+EDGES = 60_000  # the planner's default budget
 SWEPT: dict[str, tuple[dict[str, Any], ...]] = {
     "shape": ({"shape": "spline"},),
     "vias": ({"vias": 1}, {"vias": 3}),
@@ -53,6 +59,59 @@ SWEPT: dict[str, tuple[dict[str, Any], ...]] = {
     "parting": ({"parting": 0.0},),
     "margin": ({"margin": 0.1}, {"margin": 10.0}),
 }
+
+
+@dataclass(frozen=True)
+class Search:
+    """One search: solved, ms, paths, W as a multiple of the straight movement's (nan: nothing),
+    work.
+    """
+
+    solved: bool
+    first_ms: float
+    all_ms: float
+    paths: int
+    raw: float
+    polished: float
+    work: int
+
+
+def space_of(task: Task) -> FreeSpace:
+    """Free space of a task with a budget of its own."""
+    budget = Work(EDGES, time.perf_counter() + 60.0, time.perf_counter)
+    return FreeSpace.of(task.scene, task.margin, budget)
+
+
+def straight_is_free(task: Task) -> bool:
+    """Whether there is nothing to correct."""
+    return bool(space_of(task).edges_free(task.start[None], task.goal[None])[0])
+
+
+def timed(task: Task, settings: Genetic, seed: int) -> tuple[Correction, float, FreeSpace]:
+    """A correction, its time in ms and the space it was charged to."""
+    space = space_of(task)
+    begin = time.process_time()
+    found = corrected(task.start, task.goal, space, settings, np.random.default_rng(seed))
+    return found, 1e3 * (time.process_time() - begin), space
+
+
+def searched(task: Task, settings: Genetic, seed: int) -> Search:
+    """One seed."""
+    _, first_ms, _ = timed(task, replace(settings, settle=0, paths=1), seed)
+    found, all_ms, space = timed(task, settings, seed)
+    work = space.work.iterations
+    weights = task.scene.weights
+    if not found.paths:
+        return Search(False, first_ms, all_ms, 0, np.nan, np.nan, work)
+    straight = float(movement_cost(weights, task.start, task.goal))
+    polished = [
+        pulled(fewest_corners(path, space, weights), space, weights) for path in found.paths
+    ]
+    cheapest = min(path_cost(weights, path) for path in polished)
+    raw = path_cost(weights, found.paths[0])
+    return Search(
+        True, first_ms, all_ms, len(found.paths), raw / straight, cheapest / straight, work
+    )
 
 
 def blocked(cell: str, seed: int, number: int) -> list[Task]:
