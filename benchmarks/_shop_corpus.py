@@ -25,7 +25,7 @@ from ir_krl import (
 )
 from ir_msgs_py.arrays import FloatArray
 from ir_planner import Planner
-from ir_planner.krl import tool_in_flange
+from ir_planner.krl import follow_krl, tool_in_flange
 from ir_planner.krl.execution import DrivenStep, drive
 from ir_planner.krl.export import attached
 
@@ -70,7 +70,7 @@ def read(path: Path, planner: Planner) -> tuple[Followed, tuple[DrivenStep, ...]
     files = [path, *([data] if (data := path.with_suffix(".dat")).exists() else []), *others]
     cell = planner.cell
     sources = [parse(one.read_text(encoding="utf-8"), one.name) for one in files]
-    program = follow(sources, cell.machine_home, tool_in_flange(cell.tcp), inputs=inputs)
+    program = follow_krl(planner, sources, inputs=inputs)
     return program, drive(program, planner.scene("none"), cell.machine_home)[0]
 
 

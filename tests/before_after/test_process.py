@@ -161,7 +161,9 @@ def test_a_visit_of_stations_alone_is_refused(
 
 def test_a_process_that_begins_in_motion_is_refused(planner: Planner) -> None:
     """The planner's paths begin at rest; without the process a saving would be claimed."""
-    lines = SEAM.replace("LIN_REL {Z -100}\n$OUT", "PTP_REL {A1 3} C_PTP C_DIS\nCONTINUE\n$OUT")
+    lines = SEAM.replace(
+        "LIN_REL {Z -100}\n$OUT", "$APO.CDIS=10\nPTP_REL {A1 3} C_DIS\nCONTINUE\n$OUT"
+    )
     with pytest.raises(RequestError, match="exact stops"):
         today_of_krl(evaluated(planner, lines))
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ir_cli.errors import InputError
-from ir_cli.krl import add_followed, followed, plc_pauses
+from ir_cli.krl import add_followed, followed, is_project, plc_pauses
 from ir_cli.output import (
     Columns,
     ProgressLine,
@@ -63,7 +63,8 @@ def add_compare(compare: argparse.ArgumentParser) -> None:
     """Arguments of `ir compare`."""
     add_cell(compare)
     words = (
-        "a KRL program (.src, then .dat), or a trace (.csv, .parquet, .mcap); none: PTP at 100 %%"
+        "a KRL program (.src, then .dat; a folder or .zip), or a trace (.csv, .parquet, .mcap); "
+        "none: PTP at 100 %%"
     )
     compare.add_argument("today", nargs="*", type=Path, metavar="TODAY", help=words)
     compare.add_argument(
@@ -128,7 +129,7 @@ def run_compare(arguments: argparse.Namespace) -> int:
 def _found(arguments: argparse.Namespace, planner: Planner, line: ProgressLine) -> BeforeAfter:
     options = options_of(arguments)
     process = _process(arguments.process)
-    endings = {path.suffix.lower() for path in arguments.today}
+    endings = {KRL[0] if is_project(path) else path.suffix.lower() for path in arguments.today}
     if not endings:
         stations: Sequence[str] = arguments.stations
         check_stations(stations, planner)
@@ -147,7 +148,7 @@ def _found(arguments: argparse.Namespace, planner: Planner, line: ProgressLine) 
         named = next(str(path) for path in arguments.today if path.suffix.lower() not in KRL)
         known = f"{', '.join(KRL)}, or one trace: {', '.join(TRACES)}"
         raise InputError(f"{named}: today's program is read from {known}")
-    program = followed(arguments.today, planner.cell, arguments)
+    program = followed(arguments.today, planner, arguments)
     pauses = plc_pauses(program, arguments)
     evaluated = evaluate_krl(
         planner, program, arguments.safety_distance, arguments.load, plc=pauses

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from ir_cli.errors import InputError
@@ -32,23 +33,28 @@ from ir_cli.planning import (
     planner_of,
     sentences,
 )
-from ir_description import Cell
-from ir_description.files import is_utf16
 from ir_krl import (
+    ARCHIVES,
+    BYTES_MAX,
     PLC_PAUSE,
     STYLES,
     Followed,
+    Note,
     PlcPause,
-    follow,
+    Source,
     parse,
     plc_input,
     read_plc_table,
+    read_project,
+    settings_of,
+    stubs,
+    text_of,
+    worst_first,
 )
 from ir_planner import Planner
-from ir_planner.krl import EvaluatedProgram, evaluate_krl, export_krl, tool_in_flange
+from ir_planner.krl import EvaluatedProgram, evaluate_krl, export_krl, follow_krl
 from ir_values.output_files import write_file
 
-BYTES_MAX = 4_000_000
 COLUMNS: Columns = {
     "lines": ("line", text),
     "from": ("from", text),
@@ -65,7 +71,11 @@ COLUMNS: Columns = {
 def add_import(read: argparse.ArgumentParser) -> None:
     """Arguments of `ir krl import`."""
     read.add_argument(
-        "files", nargs="+", type=Path, metavar="FILE", help=".src first, then .dat and subprograms"
+        "files",
+        nargs="+",
+        type=Path,
+        metavar="FILE",
+        help=".src first, then .dat and subprograms; or a folder or .zip of programs",
     )
     read.add_argument("--cell", default="demo", help="name of a bundled cell, or a file (demo)")
     add_followed(read)
@@ -96,22 +106,69 @@ def add_followed(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.csv",
         help="of KRL: table of the pauses that the PLC spends in power modes",
     )
-    passes = "of KRL: of a LOOP without EXIT (1)"
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="of KRL: what a variable holds, '$MODE_OP=#EX'; or a file of such lines; repeatable",
+    )
+    parser.add_argument(
+        "--stub",
+        type=Path,
+        metavar="FILE.src",
+        help="of KRL: write routines that the program calls and nobody gave, to fill in",
+    )
+    passes = "of KRL: of a loop that nothing known ends (1)"
     parser.add_argument("--loop-passes", type=int, default=1, metavar="N", help=passes)
 
 
-def followed(files: Sequence[Path], cell: Cell, arguments: argparse.Namespace) -> Followed:
+def followed(files: Sequence[Path], planner: Planner, arguments: argparse.Namespace) -> Followed:
     """The commands of the program in these files, as the options of `add_followed` say."""
-    sources = [parse(_text(path), path.name) for path in files]
+    sources, left_out = _sources(files, arguments.routine)
     inputs = {**plc_input(sources, there=arguments.plc is not None), **_inputs(arguments.input)}
-    return follow(
+    found = follow_krl(
+        planner,
         sources,
-        cell.machine_home,
-        tool_in_flange(cell.tcp),
         routine=arguments.routine,
         inputs=inputs,
         loop_passes=arguments.loop_passes,
+        settings=[_setting(one) for one in arguments.set],
     )
+    if arguments.stub is not None:
+        write_file(arguments.stub, stubs(found.unknown), new=True)
+    if found.unknown:
+        found = replace(found, notes=worst_first([*found.notes, *left_out]))
+    return found
+
+
+def _sources(files: Sequence[Path], routine: str) -> tuple[Sequence[Source], Sequence[Note]]:
+    """What the files hold: a project, or modules, each .src with the .dat that lies beside it."""
+    if len(files) == 1 and is_project(files[0]):
+        project = read_project(files[0])
+        return project.sources(project.main(routine))
+    beside = [data_beside(path) for path in files if path.suffix.lower() == ".src"]
+    extra = [path for path in beside if path is not None and path not in files]
+    return [parse(_text(path), path.name) for path in (*files, *extra)], ()
+
+
+def is_project(path: Path) -> bool:
+    """Whether a path is a folder or an archive of programs."""
+    return path.is_dir() or path.suffix.lower() in ARCHIVES
+
+
+def data_beside(source: Path) -> Path | None:
+    """The .dat of the module whose .src this is; None without one."""
+    if not source.parent.is_dir():
+        return None
+    found = (one for one in source.parent.iterdir() if one.stem == source.stem)
+    return next((one for one in found if one.suffix.lower() == ".dat"), None)
+
+
+def _setting(text: str) -> Source:
+    if "=" in text:
+        return settings_of([text])
+    return settings_of(_text(Path(text)).splitlines(), text)
 
 
 def plc_pauses(program: Followed, arguments: argparse.Namespace) -> dict[int, PlcPause]:
@@ -158,7 +215,7 @@ def run_import(arguments: argparse.Namespace) -> int:
     """Print what the program costs; exit code 1 where it violates a limit or the clearance."""
     with sentences():
         planner = planner_of(arguments.cell, arguments.power_parameters)
-        program = followed(arguments.files, planner.cell, arguments)
+        program = followed(arguments.files, planner, arguments)
         pauses = plc_pauses(program, arguments)
         found = evaluate_krl(
             planner, program, arguments.safety_distance, arguments.load, plc=pauses
@@ -329,18 +386,11 @@ def _comparison(compared: Row) -> list[str]:
 
 def _text(path: Path) -> str:
     try:
-        if path.stat().st_size > BYTES_MAX:
-            raise InputError(
-                f"{path} has {path.stat().st_size} bytes: at most {BYTES_MAX} are read"
-            )
-        content = path.read_bytes()
+        with path.open("rb") as file:
+            content = file.read(BYTES_MAX + 1)
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from error
-    if is_utf16(content):
-        raise InputError(
-            f"{path}:1: the file is UTF-16 text, must be UTF-8: save it with that encoding"
-        )
-    return content.decode("utf-8", errors="replace")
+    return text_of(content, str(path))
 
 
 def _inputs(texts: list[str]) -> dict[int, bool]:

@@ -8,11 +8,14 @@ What the motions mean for a robot among machines is `ir_planner.krl`'s.
 
 from ir_krl.errors import KrlError, KrlMotionError, KrlRunError, KrlSyntaxError, Place
 from ir_krl.language import Source, parse
+from ir_krl.project import ARCHIVES, BYTES_MAX, File, Project, read_project, text_of
 from ir_krl.run import (
     FRAME_NAMES,
     Blend,
     Command,
+    Effect,
     Followed,
+    Kinematics,
     Motion,
     Note,
     Payload,
@@ -20,12 +23,16 @@ from ir_krl.run import (
     SignalRange,
     Speeds,
     SplineBlock,
+    Stop,
     Target,
     TimeBlock,
+    UnknownRoutine,
     Wait,
     WaitFor,
     follow,
+    worst_first,
 )
+from ir_krl.settings import settings_of, stubs
 from ir_krl.write import (
     GRIP,
     NAME_MAX,
@@ -55,6 +62,8 @@ from ir_krl.write import (
 )
 
 __all__ = [
+    "ARCHIVES",
+    "BYTES_MAX",
     "FRAME_NAMES",
     "GRIP",
     "NAME_MAX",
@@ -65,7 +74,10 @@ __all__ = [
     "Attached",
     "Blend",
     "Command",
+    "Effect",
+    "File",
     "Followed",
+    "Kinematics",
     "KrlError",
     "KrlMotionError",
     "KrlRunError",
@@ -77,15 +89,18 @@ __all__ = [
     "Payload",
     "Place",
     "PlcPause",
+    "Project",
     "SetOutput",
     "SignalRange",
     "Source",
     "Speeds",
     "SplineBlock",
+    "Stop",
     "Style",
     "Target",
     "Texts",
     "TimeBlock",
+    "UnknownRoutine",
     "Wait",
     "WaitFor",
     "WrittenHandling",
@@ -101,6 +116,11 @@ __all__ = [
     "plc_input",
     "plc_table",
     "read_plc_table",
+    "read_project",
+    "settings_of",
     "structured_text",
+    "stubs",
+    "text_of",
+    "worst_first",
     "written",
 ]

@@ -46,16 +46,6 @@ _SPELLED = {  # what a user calls the parser's terminals
 _EXPECTED_MAX = 6  # alternatives that a sentence names
 # constructs of KRL that aren't read: named, so that nobody looks for a typing error
 _KNOWN_ELSEWHERE = {
-    "ANIN": "cyclic analog input",
-    "ANOUT": "analog output",
-    "ASYPTP": "asynchronous axes",
-    "CWRITE": "channels",
-    "CREAD": "channels",
-    "COPEN": "channels",
-    "CHANNEL": "channels",
-    "IMPORT": "variables of other modules",
-    "ON_ERROR_PROCEED": "what follows an error",
-    "CONFIRM": "messages",
     "STOP": "stops of a spline by a condition, outside of a SPLINE",
 }
 
@@ -96,13 +86,16 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class Routine:
-    """A DEF or DEFFCT: result is the type of its value, "" for a DEF; body is a tree `body`."""
+    """A DEF or DEFFCT: result is the type of its value, "" for a DEF; body is a tree `body`;
+    everywhere: it is GLOBAL, so that other files may call it.
+    """
 
     name: str
     parameters: tuple[Parameter, ...]
     body: Tree
     result: str
     file: str
+    everywhere: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,14 +164,19 @@ def _parser() -> Lark:
 
 
 def _routine(unit: Tree, file: str) -> Routine:
-    *head, parameters, body = unit.children
+    everywhere, *head, parameters, body = (one for one in unit.children if not _is_sizes(one))
     result, name = ("", *head) if unit.data == "routine" else head
     found = [_parameter(one) for one in parameters.children if one is not None]
-    return Routine(str(name), tuple(found), body, str(result), file)
+    return Routine(str(name), tuple(found), body, str(result), file, everywhere is not None)
+
+
+def _is_sizes(node: Any) -> bool:
+    """Whether a node is the size of an array: [16] of a type or of a parameter."""
+    return isinstance(node, Tree) and node.data == "sizes"
 
 
 def _parameter(tree: Tree) -> Parameter:
-    name, *direction = (str(token) for token in tree.children if token is not None)
+    name, *direction = (str(one) for one in tree.children if one and not _is_sizes(one))
     return Parameter(name, direction == ["OUT"])
 
 

@@ -10,21 +10,25 @@ from ir_krl.run.commands import (
     SetOutput,
     Speeds,
     SplineBlock,
+    Stop,
     Target,
     TimeBlock,
     Wait,
     WaitFor,
 )
-from ir_krl.run.control import Note
 from ir_krl.run.memory import SignalRange
-from ir_krl.run.program import Followed, follow
+from ir_krl.run.notes import Effect, Note, worst_first
+from ir_krl.run.program import Followed, UnknownRoutine, follow
+from ir_krl.run.standing import Kinematics
 from ir_krl.run.values import FRAME_NAMES
 
 __all__ = [
     "FRAME_NAMES",
     "Blend",
     "Command",
+    "Effect",
     "Followed",
+    "Kinematics",
     "Motion",
     "Note",
     "Payload",
@@ -32,9 +36,12 @@ __all__ = [
     "SignalRange",
     "Speeds",
     "SplineBlock",
+    "Stop",
     "Target",
     "TimeBlock",
+    "UnknownRoutine",
     "Wait",
     "WaitFor",
     "follow",
+    "worst_first",
 ]

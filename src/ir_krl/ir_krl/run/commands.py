@@ -52,13 +52,15 @@ class Speeds:
 
 @dataclass(frozen=True)
 class Blend:
-    """Approximate positioning: how (C_PTP, C_DIS, C_VEL, C_ORI, C_SPL), within `distance` [m] or
-    `share` of the motion, whichever the word asks for.
+    """Approximate positioning: how (C_PTP, C_DIS, C_VEL, C_ORI, C_SPL), within `distance` [m] of
+    the tool to the corner, inf where none bounds it, and `share` of half of each motion. onto: what
+    holds instead for a motion of the tool that follows an axis motion.
     """
 
     how: str
     distance: float
     share: float
+    onto: Blend | None = None
 
 
 @dataclass(frozen=True)
@@ -135,6 +137,16 @@ class WaitFor:
 
 
 @dataclass(frozen=True)
+class Stop:
+    """The advance run stops at `place`, for what `why` names: the motion before ends at rest,
+    whatever it says of approximate positioning.
+    """
+
+    why: str
+    place: Place
+
+
+@dataclass(frozen=True)
 class SetOutput:
     """A digital output is set; `pulse` [s] later it goes back, 0 = it stays. on_path: while the
     robot moves (by a TRIGGER, or after CONTINUE), so that it needn't stop.
@@ -147,4 +159,4 @@ class SetOutput:
     on_path: bool = False
 
 
-Command: TypeAlias = Motion | SplineBlock | Wait | WaitFor | SetOutput
+Command: TypeAlias = Motion | SplineBlock | Wait | WaitFor | SetOutput | Stop

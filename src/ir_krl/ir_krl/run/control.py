@@ -1,15 +1,17 @@
-"""Control structures: which statements run, how often; waiting."""
+"""Control structures: which statements run, how often; waiting; what stops the advance run."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from ir_krl.errors import KrlRunError, Place
 from ir_krl.language import Tree, Word, place_of
-from ir_krl.run.commands import Command, Wait, WaitFor
+from ir_krl.run.commands import Command, Motion, SplineBlock, Stop, Wait, WaitFor
 from ir_krl.run.expressions import Expressions
-from ir_krl.run.memory import Memory, Step
+from ir_krl.run.memory import INPUT, Memory, Signals, Step, Watched
+from ir_krl.run.notes import Effect, Note
 from ir_krl.run.values import Value, integer
 
 STATEMENTS_MAX = 200_000
@@ -17,17 +19,9 @@ STATEMENTS_MAX = 200_000
 ever.
 """
 WAIT_MAX = 604_800.0  # s
-
-
-@dataclass(frozen=True)
-class Note:
-    """Something a reader should know: what was assumed, or what isn't modelled."""
-
-    place: Place
-    text: str
-
-    def __str__(self) -> str:
-        return f"{self.place}: {self.text}"
+_ENDLESS = "give what ends it by --set or --input"
+Again = Callable[[], tuple[bool, bool]]
+"""Whether a loop goes on, and whether that hangs on nothing that is known."""
 
 
 class LoopExit(Exception):  # noqa: N818 - no error: a statement
@@ -35,10 +29,27 @@ class LoopExit(Exception):  # noqa: N818 - no error: a statement
 
 
 @dataclass
+class Jump(Exception):  # noqa: N818 - no error: a statement
+    """GOTO a label."""
+
+    label: str
+    place: Place
+
+
+@dataclass
 class Returned(Exception):  # noqa: N818 - no error: a statement
     """RETURN, with the value of a function."""
 
     value: Value | None
+
+
+@dataclass
+class _Turn:
+    """Jumps back to a label: how often, and how things stood when it was reached last."""
+
+    count: int
+    watched: Watched
+    guesses: int
 
 
 @dataclass
@@ -52,49 +63,110 @@ class Control:
     statements: int = 0
     continuing: bool = False  # CONTINUE was the statement before
     expressions: Expressions = field(init=False)
+    _signals: Signals = field(init=False)
+    _guessed_exits: int = 0  # times that an assumed value decided about an EXIT
+    _known: set[Note] = field(default_factory=set)
 
     def body(self, body: Tree) -> None:
-        """Run all statements of a body."""
-        for statement in body.children:
-            self.statements += 1
-            if self.statements > STATEMENTS_MAX:
-                raise KrlRunError(
-                    f"more than {STATEMENTS_MAX} statements: does a loop never end?",
-                    self.place(statement),
-                )
-            getattr(self, f"_{statement.data}")(statement)
-            self.continuing = statement.data == "continue_"
+        """Run all statements of a body; jumps to its labels are followed."""
+        turns: dict[str, _Turn] = {}
+        try:
+            self._statements(body, turns)
+        finally:
+            for turn in turns.values():
+                self.memory.forget(turn.watched)
+
+    def _statements(self, body: Tree, turns: dict[str, _Turn]) -> None:
+        at = 0
+        while at < len(body.children):
+            try:
+                self._statement(body.children[at])
+                at += 1
+            except Jump as jump:
+                target = _label_in(body, jump.label)
+                if target is None:
+                    raise
+                back = target <= at
+                again = not back or self._turns_back(body.children[target : at + 1], jump, turns)
+                at = target if again else at + 1
+
+    def _statement(self, statement: Tree) -> None:
+        self.statements += 1
+        self._check_budget(statement)
+        getattr(self, f"_{statement.data}")(statement)
+        self.continuing = statement.data == "continue_"
+
+    def _turns_back(self, between: Sequence[Tree], jump: Jump, turns: dict[str, _Turn]) -> bool:
+        """Whether a jump back is followed: not for ever, where nothing that is known ends it."""
+        turn = turns.get(jump.label)
+        if turn is None:
+            turn = turns[jump.label] = _Turn(0, self.memory.watch(), self.memory.guesses)
+        turn.count += 1
+        still = turn.count > 1 and not self.memory.changed(turn.watched)
+        guessed = self.memory.guesses > turn.guesses
+        bound = between[-1].data == "goto" and not any(_ways_out(one) for one in between[:-1])
+        if turn.count >= self.loop_passes and (still or guessed or bound):
+            self._left(jump.place, f"GOTO {jump.label}", turn.count)
+            return False
+        self.memory.forget(turn.watched)
+        turn.watched = self.memory.watch()
+        turn.guesses = self.memory.guesses
+        return True
 
     def place(self, tree: Tree | Word) -> Place:
         """Where a piece of the program stands."""
         return place_of(tree, self.expressions.file)
 
-    def note(self, tree: Tree | Word, text: str) -> None:
+    def note(self, tree: Tree | Word, text: str, effect: Effect = Effect.NONE) -> None:
         """Note once what a reader should know."""
-        self.note_at(self.place(tree), text)
+        self.note_at(self.place(tree), text, effect)
 
-    def note_at(self, place: Place, text: str) -> None:
+    def note_at(self, place: Place, text: str, effect: Effect = Effect.NONE) -> None:
         """The same of a place."""
-        note = Note(place, text)
-        if note not in self.notes:
+        note = Note(place, text, effect)
+        if note not in self._known:
+            self._known.add(note)
             self.notes.append(note)
+
+    def stop(self, place: Place, why: str) -> None:
+        """The advance run stops here, unless CONTINUE stands before: no corner is rounded."""
+        if not self.continuing and self._rounding:
+            self.commands.append(Stop(why, place))
+            self.note_at(place, f"{why} stops the advance run: the motion before ends at rest")
+
+    @property
+    def _rounding(self) -> bool:
+        """Whether the last motion is to be left for a next one that didn't come yet."""
+        for command in reversed(self.commands):
+            if isinstance(command, Motion | SplineBlock):
+                return command.blend is not None
+            if isinstance(command, Stop | Wait | WaitFor) or not command.on_path:
+                return False
+        return False
+
+    def _decided(self, tree: Tree, what: str) -> tuple[bool, bool]:
+        """A condition, and whether it hangs on an assumed value or on nothing at all."""
+        before = self.memory.guesses
+        holds = self.expressions.truth(tree, what)
+        self.continuing = False
+        return holds, self.memory.guesses > before or _constant(tree)
 
     def _if_(self, tree: Tree) -> None:
         condition, then, otherwise = tree.children
-        if self.expressions.truth(condition, "the condition of IF"):
+        holds, open_ = self._decided(condition, "the condition of IF")
+        if open_ and _leaves(tree):
+            self._guessed_exits += 1
+        if holds:
             self.body(then)
         elif otherwise is not None:
             self.body(otherwise)
 
     def _for_(self, tree: Tree) -> None:
         name, first, last, step, body = tree.children
-        value, end = (
-            integer(self.expressions.value(one), "a bound of FOR", self.place(one))
-            for one in (first, last)
-        )
+        value, end = (self.expressions.bound(one) for one in (first, last))
         by = 1 if step is None else integer(self.expressions.value(step), "STEP", self.place(step))
         if by == 0:
-            raise KrlRunError("STEP is 0", self.place(step))
+            raise KrlRunError("STEP is 0; it must be another number", self.place(step))
         path: tuple[Step, ...] = ((str(name), None),)
         try:
             while (value <= end) if by > 0 else (value >= end):
@@ -107,47 +179,85 @@ class Control:
 
     def _loop(self, tree: Tree) -> None:
         body = tree.children[0]
-        passes = None if _leaves(body) else self.loop_passes
-        try:
-            while passes is None or passes > 0:
-                self.body(body)
-                self._one_more(tree)
-                passes = None if passes is None else passes - 1
-        except LoopExit:
-            return
-        self.note(tree, f"LOOP without EXIT: followed {self.loop_passes} times")
+        endless = not _leaves(body)
+        self._repeated(tree, body, "LOOP", lambda: (True, endless))
 
     def _while_(self, tree: Tree) -> None:
         condition, body = tree.children
-        try:
-            while self.expressions.truth(condition, "the condition of WHILE"):
-                self.body(body)
-                self._one_more(tree)
-        except LoopExit:
-            pass
+        holds, _ = self._decided(condition, "the condition of WHILE")
+        if holds:
+            self._repeated(tree, body, "WHILE", self._again(condition, body, wanted=True))
 
     def _repeat(self, tree: Tree) -> None:
         body, condition = tree.children
+        self._repeated(tree, body, "REPEAT", self._again(condition, body, wanted=False))
+
+    def _again(self, condition: Tree, body: Tree, *, wanted: bool) -> Again:
+        """Asks whether a loop goes on, and whether that hangs on nothing that is known."""
+
+        def asked() -> tuple[bool, bool]:
+            holds, open_ = self._decided(condition, "the condition of a loop")
+            return holds is wanted, open_ and not (_constant(condition) and _leaves(body))
+
+        return asked
+
+    def _repeated(self, tree: Tree, body: Tree, word: str, again: Again) -> None:
+        """Passes of a loop while `again` says so. One that nothing known ends, since it hangs on
+        assumed values or leaves everything as it was, is left after `loop_passes`.
+        """
+        passes = 0
         try:
             while True:
-                self.body(body)
-                self._one_more(tree)
-                if self.expressions.truth(condition, "the condition of UNTIL"):
+                goes_on, settled = self._pass(tree, body, again)
+                passes += 1
+                if not goes_on:
                     return
+                if passes >= self.loop_passes and not settled:
+                    break
         except LoopExit:
-            pass
+            return
+        self._left(self.place(tree), word, passes)
+
+    def _pass(self, tree: Tree, body: Tree, again: Again) -> tuple[bool, bool]:
+        """One pass of a loop: whether it goes on, and whether something known may end it."""
+        exits = self._guessed_exits
+        watched = self.memory.watch()
+        try:
+            self.body(body)
+            self._one_more(tree)
+            goes_on, open_ = again()
+            still = not self.memory.changed(watched)
+        finally:
+            self.memory.forget(watched)
+        return goes_on, not (open_ or still or self._guessed_exits > exits)
+
+    def _left(self, place: Place, word: str, passes: int) -> None:
+        times = "once" if passes == 1 else f"{passes} times"
+        self.note_at(
+            place,
+            f"{word}: nothing that is known ends it, followed {times} (--loop-passes)",
+            Effect.MOTIONS,
+        )
 
     def _one_more(self, tree: Tree) -> None:
         """A pass of a loop counts as a statement: an empty loop ends too."""
         self.statements += 1
+        self._check_budget(tree)
+
+    def _check_budget(self, tree: Tree) -> None:
         if self.statements > STATEMENTS_MAX:
             raise KrlRunError(
-                f"more than {STATEMENTS_MAX} statements: does a loop never end?", self.place(tree)
+                f"more than {STATEMENTS_MAX} statements: does a loop never end? {_ENDLESS}",
+                self.place(tree),
             )
 
     def _switch(self, tree: Tree) -> None:
         subject, *cases, default = tree.children
+        before = self.memory.guesses
         value = self.expressions.value(subject)
+        self.continuing = False
+        if self.memory.guesses > before and _leaves(tree):
+            self._guessed_exits += 1
         for case in cases:
             *labels, body = case.children
             if any(self.expressions.value(label) == value for label in labels):
@@ -165,22 +275,24 @@ class Control:
         )
 
     def _halt(self, tree: Tree) -> None:
-        self.note(tree, "HALT waits for the operator: taken as no pause")
+        self.stop(self.place(tree), "HALT")
+        self.note(tree, "HALT waits for the operator: taken as no pause", Effect.TIMES)
 
     def _const_vel(self, tree: Tree) -> None:
         self.note(
             tree,
             "CONST_VEL isn't modelled: the tool accelerates and brakes within the range as well",
+            Effect.SPEEDS,
         )
 
     def _stop_when(self, tree: Tree) -> None:
-        self.note(tree, "STOP WHEN isn't followed: taken as not stopping")
+        self.note(tree, "STOP WHEN isn't followed: taken as not stopping", Effect.TIMES)
 
     def _continue_(self, tree: Tree) -> None:
         """Keeps the advance run going: an output that follows is set without a stop."""
 
     def _goto(self, tree: Tree) -> None:
-        raise KrlRunError(f"GOTO {tree.children[0]} isn't read", self.place(tree))
+        raise Jump(str(tree.children[0]), self.place(tree))
 
     def _label(self, tree: Tree) -> None:
         """A label alone does nothing."""
@@ -192,22 +304,50 @@ class Control:
                 f"WAIT SEC {seconds:g}: a wait is read up to {WAIT_MAX:g} s, a week",
                 self.place(tree),
             )
-        if seconds > 0.0:  # negative times are passed at once, as on the controller
+        if seconds > 0.0:
             self.commands.append(Wait(seconds, self.place(tree)))
+        else:  # passed at once, as on the controller; yet the advance run stops
+            self.stop(self.place(tree), f"WAIT SEC {seconds:g}")
 
     def _wait_for(self, tree: Tree) -> None:
-        self._check_names(tree.children[0])
-        self.commands.append(WaitFor(_written(tree.children[0]), self.place(tree)))
+        condition = tree.children[0]
+        self._check_names(condition)
+        for index, value in self._waited(condition, wanted=True):
+            self._signals.expected[index] = value
+        place = self.place(tree)
+        if self.continuing:
+            text = "WAIT FOR after CONTINUE: taken as fulfilled when it is reached"
+            self.note_at(place, text, Effect.TIMES)
+            return
+        self.commands.append(WaitFor(_written(condition), place))
+
+    def _waited(self, tree: Tree, *, wanted: bool) -> list[tuple[int, bool]]:
+        """Inputs that a condition which holds leaves no choice."""
+        match tree.data:
+            case "negated":
+                return self._waited(tree.children[1], wanted=not wanted)
+            case "joined" if str(tree.children[1]) == ("AND" if wanted else "OR"):
+                left, _, right = tree.children
+                return self._waited(left, wanted=wanted) + self._waited(right, wanted=wanted)
+            case "compared" if tree.children[2].data in ("true", "false"):
+                same = (str(tree.children[1]) == "==") is (tree.children[2].data == "true")
+                return self._waited(tree.children[0], wanted=wanted is same)
+            case "access":
+                (name, index), *rest = self.expressions.path(tree)
+                if name == INPUT and index is not None and not rest:
+                    return [(index[0], wanted)]
+        return []
 
     def _check_names(self, tree: Any) -> None:
-        """Raise KrlRunError for a name in a condition that nothing is known of."""
+        """Note a name in a condition that nothing is known of."""
         if isinstance(tree, Tree) and tree.data == "access":
             name = str(tree.children[0])
             signals = self.expressions.signals
             memory = self.memory
             declared = name in signals.aliases or name in signals.groups or memory.declared(name)
             if not declared and not name.startswith("$"):
-                raise KrlRunError(f"{name} isn't declared", self.place(tree))
+                text = f"{name} isn't declared in the files: the wait is taken as one that ends"
+                self.note(tree, text, Effect.TIMES)
         for child in tree.children if isinstance(tree, Tree) else ():
             self._check_names(child)
 
@@ -226,11 +366,41 @@ def _written(tree: Any) -> str:
     return (" " if tree.data == "negated" else "").join(parts)
 
 
+def _label_in(body: Tree, name: str) -> int | None:
+    """The place of a label among the statements of a body."""
+    labels = (k for k, one in enumerate(body.children) if one.data == "label")
+    return next((k for k in labels if str(body.children[k].children[0]) == name), None)
+
+
+def _constant(tree: Tree) -> bool:
+    """Whether an expression names nothing: WHILE TRUE, WHILE 1==1."""
+    if tree.data in ("access", "call"):
+        return False
+    return all(_constant(one) for one in tree.children if isinstance(one, Tree))
+
+
+def _ways_out(tree: Tree) -> bool:
+    """Whether a jump, a return or an exit stands in a statement."""
+    if tree.data in ("goto", "return_", "exit"):
+        return True
+    return any(_ways_out(one) for one in tree.children if isinstance(one, Tree))
+
+
 def _leaves(body: Tree) -> bool:
-    """Whether an EXIT of this loop stands in its body, not in a loop inside."""
+    """Whether a loop may be left from its body: by an EXIT that stands in no loop inside, by a jump
+    or by a RETURN.
+    """
     inner = ("loop", "for_", "while_", "repeat")
     return any(
-        child.data == "exit" or (child.data not in inner and _leaves(child))
+        child.data in ("exit", "goto", "return_")
+        or (_leaves(child) if child.data not in inner else _ways_far(child))
         for child in body.children
         if isinstance(child, Tree)
     )
+
+
+def _ways_far(tree: Tree) -> bool:
+    """Whether a jump or a return stands in a statement: an EXIT leaves the loop inside alone."""
+    if tree.data in ("goto", "return_"):
+        return True
+    return any(_ways_far(one) for one in tree.children if isinstance(one, Tree))

@@ -10,6 +10,7 @@ from typing import Any
 from ir_krl.errors import KrlRunError, Place
 from ir_krl.language import Tree, place_of
 from ir_krl.run.memory import SINGLE, Memory, Signals, Step
+from ir_krl.run.system import STOPS_ADVANCE
 from ir_krl.run.values import (
     FRAME_NAMES,
     INT_MAX,
@@ -27,6 +28,7 @@ from ir_krl.run.values import (
 )
 
 DIGITS_MAX = 12
+_BITS = 32  # of an INT
 _COMPARED: dict[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
     "<=": operator.le,
@@ -64,7 +66,8 @@ class Expressions:
 
     def truth(self, tree: Tree, what: str) -> bool:
         """TRUE or FALSE."""
-        return truth(self.value(tree), what, place_of(tree, self.file))
+        place = place_of(tree, self.file)
+        return truth(self.memory.guess(self.value(tree), False, place), what, place)
 
     def path(self, access: Tree) -> tuple[Step, ...]:
         """Names and indices of an access; a signal's name becomes what it stands for."""
@@ -78,10 +81,18 @@ class Expressions:
     def index(self, tree: Tree) -> tuple[int, ...] | None:
         """Whole numbers of an index; None for []."""
         place = place_of(tree, self.file)
+        guess = self.memory.guess
         found = tuple(
-            integer(self.value(one), "the index", place) for one in tree.children if one is not None
+            integer(guess(self.value(one), 1, place), "the index", place)
+            for one in tree.children
+            if one is not None
         )
         return found or None
+
+    def bound(self, tree: Tree) -> int:
+        """A bound of FOR; one pass is followed where it isn't known."""
+        place = place_of(tree, self.file)
+        return integer(self.memory.guess(self.value(tree), 1, place), "a bound of FOR", place)
 
     def _access(self, tree: Tree, place: Place) -> Value:
         path = self.path(tree)
@@ -90,6 +101,8 @@ class Expressions:
             return self.signals.group_value(name, place)
         if index is not None and name in SINGLE:
             return self.signals.read(name, index[0], place)
+        if name in STOPS_ADVANCE:
+            self.signals.stops(place, name)
         return self.memory.get(path, place)
 
     def _call(self, tree: Tree, place: Place) -> Value:
@@ -114,14 +127,16 @@ class Expressions:
         return str(tree.children[0])[1:-1]
 
     def _enum_value(self, tree: Tree, place: Place) -> Value:
-        return Symbol(str(tree.children[0])[1:])
+        return Symbol(str(tree.children[0])[1:].strip())
 
     def _bits(self, tree: Tree, place: Place) -> Value:
         text = str(tree.children[0])[1:-1]
         try:
-            return in_range(int(text[1:], 2 if text[0] == "B" else 16), place)
+            bits = int(text[1:], 2 if text[0] == "B" else 16)
         except ValueError:
             raise KrlRunError(f"'{text}' is no bit pattern", place) from None
+        signed = INT_MAX < bits < 1 << _BITS  # the highest bit is the sign
+        return in_range(bits - (1 << _BITS) if signed else bits, place)
 
     def _aggregate(self, tree: Tree, place: Place) -> Value:
         kind, *fields = tree.children
@@ -135,13 +150,14 @@ class Expressions:
 
     def _signed(self, tree: Tree, place: Place) -> Value:
         sign, operand = tree.children
-        value = self.value(operand)
+        value = self.memory.guess(self.value(operand), 0, place)
         number(value, "what follows the sign", place)
         return -value if sign == "-" else value  # type: ignore[operator]
 
     def _negated(self, tree: Tree, place: Place) -> Value:
         word, operand = tree.children
         value = self.value(operand)
+        value = self.memory.guess(value, 0 if word == "B_NOT" else False, place)
         if word == "B_NOT":
             return ~integer(value, "what B_NOT is applied to", place)
         return not truth(value, "what NOT is applied to", place)
@@ -165,7 +181,7 @@ class Expressions:
     def _numbers(self, left: Tree, right: Tree, sign: str) -> tuple[int | float, int | float]:
         values = []
         for side in (left, right):
-            value = self.value(side)
+            value = self.memory.guess(self.value(side), 0, place_of(side, self.file))
             number(value, f"an operand of {sign}", place_of(side, self.file))
             values.append(value)
         return values[0], values[1]  # type: ignore[return-value]
@@ -173,8 +189,9 @@ class Expressions:
     def _joined(self, tree: Tree, place: Place) -> Value:
         """AND, OR, EXOR of truth values; B_AND, B_OR, B_EXOR of the bits of whole numbers."""
         left, word, right = tree.children
-        a = self.value(left)
-        b = self.value(right)
+        otherwise: Value = 0 if word.startswith("B_") else False
+        a = self.memory.guess(self.value(left), otherwise, place)
+        b = self.memory.guess(self.value(right), otherwise, place)
         what = _LOGICAL[str(word).removeprefix("B_")]
         wanted = int if word.startswith("B_") else bool
         if type(a) is wanted and type(b) is wanted:
@@ -189,6 +206,7 @@ class Expressions:
         left, sign, right = tree.children
         a = self.value(left)
         b = self.value(right)
+        a, b = (self.memory.guess(one, _like(other), place) for one, other in ((a, b), (b, a)))
         if sign in ("==", "<>"):
             return (a == b) is (sign == "==")
         return _COMPARED[str(sign)](
@@ -204,3 +222,8 @@ class Expressions:
             rest = {name: value for name, value in b.fields.items() if name not in FRAME_NAMES}
             result = Structure({**result.fields, **rest}, b.kind or "FRAME")
         return result
+
+
+def _like(value: Value) -> Value:
+    """What an unknown value that is compared with this one is taken as."""
+    return False if isinstance(value, bool) else 0

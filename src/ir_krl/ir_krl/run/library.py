@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import TypeGuard
 
 from ir_description.poses import inverse
 from ir_krl.errors import KrlRunError, Place
-from ir_krl.run.memory import AXES, FULL, NULL, TOOL_ACCELERATION, Memory, Step, system_speeds
-from ir_krl.run.values import Array, Structure, Symbol, Value, frame, integer, kind_of, number, pose
+from ir_krl.run.memory import Memory, Step
+from ir_krl.run.notes import Effect
+from ir_krl.run.system import AXES, DEFAULTS, FULL, NULL, Assumption, all_axes
+from ir_krl.run.values import (
+    Array,
+    Structure,
+    Symbol,
+    Value,
+    copied,
+    frame,
+    integer,
+    kind_of,
+    number,
+    pose,
+)
 
 Arguments = list[Value | None]
 
@@ -23,15 +37,31 @@ WITHOUT_EFFECT = frozenset(
         "SET_CD_PARAMS",
         "SGEAR_JERK",
         "SJERK",
-        "SLOAD",
-        "SORI_TYP",
         "USE_CM_PRO_VALUES",
+        "ERR_CLEAR",
+        "SWRITE",
+        "SREAD",
+        "RESET_CD_PARAMS",
+        "STRCLEAR",
+        "STRADD",
+        "STRCOPY",
+        "SET_KRLMSG",
+        "SET_KRLDLG",
+        "CLEAR_KRLMSG",
+        "EXISTS_KRLMSG",
+        "EXISTS_KRLDLG",
+        "GET_MSGBUFFER",
     }
 )
-"""Called in nearly every program; neither the path nor the speeds of a motion follows from them
-here.
-"""
+"""Called in many programs; neither the path nor the speeds of a motion follows from them here."""
+STOPPING = frozenset({"CWRITE", "CREAD", "COPEN", "CCLOSE", "CIOCTL"})
+"""What speaks with other programs: the advance run stops, nothing moves."""
+CONTROLLERS = frozenset(
+    ("BAS", "BAS_EX", "IR_STOPM", "MSGLIB", "COLLMONLIB", "TM_BIB", "KRLMSG", "SPS", "CELL_TEACH")
+)
+"""Modules that come with a controller: what they are here counts, not their text in a folder."""
 
+_FAR = 1e6  # mm: bounds nothing
 _MATHEMATICS: dict[str, Callable[..., float]] = {
     "ABS": abs,
     "SQRT": math.sqrt,
@@ -48,18 +78,21 @@ class Library:
 
     def __init__(self, memory: Memory) -> None:
         self._memory = memory
+        self.chosen: dict[str, Assumption | None] = {}  # what is assumed of $TOOL and $BASE
         self._named: dict[str, Callable[[Arguments, Place], Value]] = {
             "BAS": self._bas,
             "SVEL_JOINT": self._all_axes("$VEL_AXIS"),
             "SACC_JOINT": self._joint_acceleration,
             "SVEL_CP": self._tool_velocity,
-            "SACC_CP": self._tool_acceleration,
-            "SAPO_PTP": self._approximation("CPTP"),
-            "SAPO": self._approximation("CDIS"),
+            "SACC_CP": self._path_acceleration,
+            "SAPO_PTP": self._axis_approximation,
+            "SAPO": lambda given, place: Structure({"CDIS": _component(given, "APO_DIST", place)}),
+            "SORI_TYP": lambda given, place: _field(given, "ORI_TYP", Symbol("VAR")),
+            "SLOAD": lambda given, place: self._load(_whole(given, "SLOAD", place)),
             "SIPO_MODE": lambda given, place: _first(given, "SIPO_MODE", place),
-            "STOOL2": lambda given, place: self._tool(_component(given, "TOOL_NO", place), place),
-            "STOOL": lambda given, place: self._tool(_whole(given, "STOOL", place), place),
-            "SBASE": lambda given, place: self._base(_whole(given, "SBASE", place), place),
+            "STOOL2": self._form_tool,
+            "STOOL": lambda given, place: self._tool(_whole(given, "STOOL", place)),
+            "SBASE": lambda given, place: self._base(_whole(given, "SBASE", place)),
             "VARSTATE": self._state,
             "INV_POS": lambda given, place: frame(
                 inverse(pose(_first(given, "INV_POS", place), "INV_POS", place))
@@ -68,11 +101,11 @@ class Library:
 
     def has(self, name: str) -> bool:
         """Whether the controller has a routine of this name."""
-        return name in self._named or name in _MATHEMATICS or name in WITHOUT_EFFECT
+        return name in self._named or name in _MATHEMATICS or name in WITHOUT_EFFECT | STOPPING
 
     def call(self, name: str, arguments: Arguments, place: Place) -> Value:
         """Its value; 0 where it has none. Raises KrlRunError."""
-        if name in WITHOUT_EFFECT:
+        if name in WITHOUT_EFFECT | STOPPING:
             return 0
         if name not in _MATHEMATICS:
             return self._named[name](arguments, place)
@@ -99,49 +132,151 @@ class Library:
 
         match command.name:
             case "INITMOV":
-                self._memory.shared.update(system_speeds())
+                self._initialised()
             case "PTP_PARAMS":
+                self._axis_data(place)
                 self._frames(place)
-                self._set("$ACC_AXIS", self._noted("PDAT_ACT", "ACC", FULL, place))
-                self._set("$APO.CPTP", self._noted("PDAT_ACT", "APO_DIST", 0.0, place))
                 self._set("$VEL_AXIS", amount())
             case "CP_PARAMS":
+                self._tool_data(place)
                 self._frames(place)
-                share = self._noted("LDAT_ACT", "ACC", FULL, place)
-                self._set("$ACC.CP", TOOL_ACCELERATION * share / FULL)
-                self._set("$APO.CDIS", self._noted("LDAT_ACT", "APO_DIST", 0.0, place))
-                self._set("$VEL.CP", amount())
+                self._tool_speed(amount())
+            case "PTP_DAT":
+                self._set("$VEL_AXIS", self._noted("PDAT_ACT", "VEL", FULL, place))
+                self._axis_data(place)
+            case "CP_DAT":
+                otherwise = self._default("DEF_VEL_CP")
+                self._tool_speed(self._noted("LDAT_ACT", "VEL", otherwise, place))
+                self._tool_data(place)
             case "VEL_PTP":
                 self._set("$VEL_AXIS", amount())
             case "ACC_PTP":
-                self._set("$ACC_AXIS", amount())
+                self._set("$ACC_AXIS", min(amount(), FULL))
             case "VEL_CP":
-                self._set("$VEL.CP", amount())
+                self._tool_speed(amount())
             case "ACC_CP":
-                self._set("$ACC.CP", TOOL_ACCELERATION * amount() / FULL)
+                self._tool_acceleration(amount())
             case "OV_PRO":
                 self._set("$OV_PRO", amount())
             case "FRAMES":
                 self._frames(place)
             case "TOOL":
-                self._set("$TOOL", self._tool(round(amount()), place))
+                self._take_tool(round(amount()))
             case "BASE":
-                self._set("$BASE", self._base(round(amount()), place))
-            case "PTP_DAT" | "CP_DAT" | "EX_BASE" | "OUT_SYNC" | "OUT_ASYNC" | "GROUP":
+                self._take_base(round(amount()))
+            case "EX_BASE" | "OUT_SYNC" | "OUT_ASYNC" | "GROUP" | "ACC_GLUE":
                 pass
             case other:
-                raise KrlRunError(f"BAS(#{other}) isn't known", place)
+                text = f"BAS(#{other}) isn't known: no effect assumed"
+                self._memory.noted(place, text, Effect.SPEEDS)
         return 0
 
+    def _default(self, name: str) -> float:
+        """A figure of $config.dat, which may be the program's own."""
+        value = self._memory.peek(name)
+        given = value if isinstance(value, int | float) else DEFAULTS[name]
+        return number(given, name, Place())
+
+    def _initialised(self) -> None:
+        """BAS(#INITMOV): speeds, approximation, tool 1, base 0 as $config.dat has them."""
+        memory = self._memory
+        memory.shared["$VEL_AXIS"] = all_axes(FULL)
+        memory.shared["$ACC_AXIS"] = all_axes(FULL)
+        velocity, acceleration, apo = (
+            {part: self._default(name) for part, name in parts}
+            for parts in (
+                (("CP", "DEF_VEL_CP"), ("ORI1", "DEF_VEL_ORI1"), ("ORI2", "DEF_VEL_ORI2")),
+                (("CP", "DEF_ACC_CP"), ("ORI1", "DEF_ACC_ORI1"), ("ORI2", "DEF_ACC_ORI2")),
+                tuple((part, f"DEF_APO_{part}") for part in ("CPTP", "CDIS", "CVEL", "CORI")),
+            )
+        )
+        self._set("$VEL", Structure(dict(velocity)))
+        self._set("$ACC", Structure(dict(acceleration)))
+        self._set("$APO", Structure(dict(apo)))
+        self._set("$ORI_TYPE", Symbol("VAR"))
+        self._set("$IPO_MODE", Symbol("BASE"))
+        self._set("$ADVANCE", round(self._default("DEF_ADVANCE")))
+        self._take_base(0)
+        self._set("$TOOL", self._tool(1))
+
+    def _axis_data(self, place: Place) -> None:
+        """What PDAT_ACT says of an axis motion: an APO_MODE #CDIS means mm, else per cent."""
+        self._set("$ACC_AXIS", min(self._noted("PDAT_ACT", "ACC", FULL, place), FULL))
+        distance = self._noted("PDAT_ACT", "APO_DIST", 0.0, place)
+        noted = self._own("PDAT_ACT", place)
+        if _holds(noted, "APO_MODE") and noted.fields["APO_MODE"] == Symbol("CDIS"):
+            self._set("$APO.CDIS", distance)
+        else:
+            self._set("$APO.CPTP", min(distance, FULL))
+
+    def _tool_data(self, place: Place) -> None:
+        """What LDAT_ACT says of a motion of the tool."""
+        self._tool_acceleration(self._noted("LDAT_ACT", "ACC", FULL, place))
+        self._set("$APO.CDIS", self._noted("LDAT_ACT", "APO_DIST", 0.0, place))
+        noted = self._own("LDAT_ACT", place)
+        self._set("$ORI_TYPE", _field([noted], "ORI_TYP", Symbol("VAR")))
+
+    def _own(self, name: str, place: Place) -> Value | None:
+        return self._memory.get(((name, None),), place) if self._memory.has(name) else None
+
+    def _tool_speed(self, velocity: float) -> None:
+        """$VEL.CP as BAS sets it [m/s]: no more than a controller takes."""
+        most = self._fastest(velocity)
+        self._set("$VEL.CP", min(velocity * self._default("DEF_VEL_FACT"), most))
+
+    def _fastest(self, otherwise: float) -> float:
+        """The most that $VEL_MA allows the tool [m/s]."""
+        known = self._memory.peek("$VEL_MA")
+        if not _holds(known, "CP"):
+            return otherwise
+        return number(known.fields["CP"], "$VEL_MA.CP", Place())
+
+    def _tool_acceleration(self, share: float) -> None:
+        """$ACC of the tool as BAS sets it, `share` [%] of the figures of $config.dat."""
+        for part, name in (
+            ("CP", "DEF_ACC_CP"),
+            ("ORI1", "DEF_ACC_ORI1"),
+            ("ORI2", "DEF_ACC_ORI2"),
+        ):
+            self._set(f"$ACC.{part}", self._default(name) * min(share, FULL) / FULL)
+
     def _frames(self, place: Place) -> None:
-        """Tool and base that the inline form's FDAT_ACT names."""
-        if self._memory.has("FDAT_ACT"):
-            self._set(
-                "$TOOL", self._tool(round(self._noted("FDAT_ACT", "TOOL_NO", 0.0, place)), place)
+        """Tool, load and base that the inline form's FDAT_ACT names."""
+        noted = self._own("FDAT_ACT", place)
+        if not isinstance(noted, Structure):
+            return
+        self._take_tool(round(self._noted("FDAT_ACT", "TOOL_NO", 0.0, place)))
+        self._take_base(round(self._noted("FDAT_ACT", "BASE_NO", 0.0, place)))
+        mode = noted.fields.get("IPO_FRAME", Symbol("BASE"))
+        if mode != Symbol("BASE"):
+            raise KrlRunError(
+                f"IPO_FRAME {kind_of(mode)}: a tool that stands in the cell isn't read, teach the "
+                "motion with the tool at the flange",
+                place,
             )
-            self._set(
-                "$BASE", self._base(round(self._noted("FDAT_ACT", "BASE_NO", 0.0, place)), place)
-            )
+
+    def _take_tool(self, index: int) -> None:
+        self._set("$TOOL", self._tool(index))
+        self._set("$LOAD", self._load(index))
+
+    def _take_base(self, index: int) -> None:
+        self._set("$BASE", self._base(index))
+
+    def _form_tool(self, arguments: Arguments, place: Place) -> Value:
+        return self._tool(round(_component(arguments, "TOOL_NO", place)))
+
+    def _tool(self, index: int) -> Value:
+        """TOOL_DATA of a number, the flange where that is 0."""
+        return self._frame("TOOL_DATA", index, "$TOOL")
+
+    def _base(self, index: int) -> Value:
+        """BASE_DATA of a number, the world where that is 0."""
+        return self._frame("BASE_DATA", index, "$BASE")
+
+    def _frame(self, name: str, index: int, used: str) -> Value:
+        value = self._memory.peek(name, index) if index > 0 else None
+        self.chosen[used] = self._memory.assumed.get(f"{name}[{index}]")
+        return Structure(dict(NULL)) if value is None else copied(value)
 
     def _noted(self, variable: str, component: str, otherwise: float, place: Place) -> float:
         """A number of what an inline form left in PDAT_ACT, LDAT_ACT or FDAT_ACT."""
@@ -153,6 +288,7 @@ class Library:
     def _set(self, name: str, value: Value) -> None:
         """A system variable; of an array of axes all of them."""
         variable, _, component = name.partition(".")
+        chosen = self.chosen.get(name)
         held = self._memory.shared.get(variable)
         if isinstance(held, Array):
             for j in range(1, AXES + 1):
@@ -162,6 +298,8 @@ class Library:
             ((variable, None), (component, None)) if component else ((variable, None),)
         )
         self._memory.set(path, value, Place())
+        if chosen is not None:
+            self._memory.assumed[name] = chosen
 
     def _state(self, arguments: Arguments, place: Place) -> Value:
         """VARSTATE("NAME"): whether a variable has a value."""
@@ -183,30 +321,41 @@ class Library:
         return applied
 
     def _joint_acceleration(self, arguments: Arguments, place: Place) -> Value:
-        share = _component(arguments, "ACC", place)
-        self._set("$ACC_AXIS", float(share))
-        return float(share)
+        share = min(_component(arguments, "ACC", place), FULL)
+        self._set("$ACC_AXIS", share)
+        return share
 
     def _tool_velocity(self, arguments: Arguments, place: Place) -> Value:
-        return Structure({"CP": number(_first(arguments, "SVEL_CP", place), "SVEL_CP", place)})
+        """SVEL_CP: the speed of the tool, and as much of the axes' as the form's data say."""
+        share = number(_field(arguments, "AXIS_VEL", FULL), "AXIS_VEL", place)
+        self._set("$VEL_AXIS", min(share, FULL))
+        speed = number(_first(arguments, "SVEL_CP", place), "SVEL_CP", place)
+        turning = self._default("DEF_VEL_ORIS")
+        return Structure({"CP": min(speed, self._fastest(speed)), "ORI1": turning})
 
-    def _tool_acceleration(self, arguments: Arguments, place: Place) -> Value:
-        return Structure({"CP": TOOL_ACCELERATION * _component(arguments, "ACC", place) / FULL})
+    def _path_acceleration(self, arguments: Arguments, place: Place) -> Value:
+        own = _component(arguments, "ACC", place)
+        percent = min(number(_field(arguments, "AXIS_ACC", own), "AXIS_ACC", place), FULL)
+        self._set("$ACC_AXIS", percent)
+        share = percent / FULL
+        turning = self._default("DEF_ACC_ORIS") * share
+        return Structure({"CP": self._default("DEF_ACC_CP") * share, "ORI1": turning})
 
-    def _approximation(self, component: str) -> Callable[[Arguments, Place], Value]:
-        return lambda arguments, place: Structure(
-            {component: float(_component(arguments, "APO_DIST", place))}
-        )
+    def _axis_approximation(self, arguments: Arguments, place: Place) -> Value:
+        """SAPO_PTP: millimetres, and a share of the motion where APO_MODE is #CPTP."""
+        distance = _component(arguments, "APO_DIST", place)
+        mode = _field(arguments, "APO_MODE", "")
+        if mode == Symbol("CPTP"):
+            return Structure({"CDIS": _FAR, "CPTP": distance})
+        share = FULL if mode else self._default("DEF_APO_CPTP")
+        return Structure({"CDIS": distance, "CPTP": share})
 
-    def _tool(self, index: int, place: Place) -> Value:
-        if index == 0:
-            return Structure(dict(NULL))
-        return self._memory.get((("TOOL_DATA", (index,)),), place)
-
-    def _base(self, index: int, place: Place) -> Value:
-        if index == 0:
-            return Structure(dict(NULL))
-        return self._memory.get((("BASE_DATA", (index,)),), place)
+    def _load(self, index: int) -> Value:
+        """LOAD_DATA of a tool; a mass of -1, as the machine data have it, where nothing is said."""
+        value = self._memory.peek("LOAD_DATA", index)
+        if index > 0 and _holds(value, "M"):
+            return copied(value)
+        return Structure({"M": -1.0}, "LOAD")
 
 
 def _given(value: Value | None, what: str, place: Place) -> Value:
@@ -223,11 +372,20 @@ def _whole(arguments: Arguments, what: str, place: Place) -> int:
     return integer(_first(arguments, what, place), f"the argument of {what}", place)
 
 
-def _component(arguments: Arguments, name: str, place: Place) -> int:
-    """A component of a form's data, such as TOOL_NO of an FDAT: the last argument that is a
-    structure.
-    """
-    for value in reversed(arguments):
-        if isinstance(value, Structure) and name in value.fields:
-            return integer(value.fields[name], name, place)
-    raise KrlRunError(f"no argument has a component {name}", place)
+def _field(arguments: Sequence[Value | None], name: str, otherwise: Value) -> Value:
+    """A component of a form's data (TOOL_NO of an FDAT), of the last argument that has it."""
+    has = (one.fields[name] for one in reversed(arguments) if _holds(one, name))
+    return next(has, otherwise)
+
+
+def _holds(value: Value | None, name: str) -> TypeGuard[Structure]:
+    return isinstance(value, Structure) and name in value.fields
+
+
+def _component(arguments: Arguments, name: str, place: Place) -> float:
+    """The same as a number. Raises KrlRunError where no argument has it."""
+    if not any(_holds(value, name) for value in arguments):
+        raise KrlRunError(
+            f"no argument has a component {name}: give the .dat with the form's data", place
+        )
+    return number(_field(arguments, name, 0.0), name, place)

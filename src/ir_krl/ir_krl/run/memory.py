@@ -1,114 +1,15 @@
-"""Memory of a running program: system variables, variables, inputs, outputs and timers."""
+"""Memory of a running program: variables, inputs, outputs and timers."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-
-import numpy as np
+from typing import Any
 
 from ir_krl.errors import KrlRunError, Place
-from ir_krl.run.values import FRAME_NAMES, Array, Structure, Value, copied, frame, integer, number
-from ir_msgs_py.arrays import FloatArray
-
-# What a controller brings along: system variables with the values they have at the start of a
-# program.
-
-AXES = 6
-FULL = 100.0  # %
-TOOL_VELOCITY = (
-    2.0  # m/s, assumed where a program sets no $VEL.CP: the usual value of the configuration file
-)
-TOOL_ACCELERATION = (
-    2.3  # m/s^2, likewise of $ACC.CP; what 100 % of an inline form's acceleration means
-)
-TURNING_VELOCITY = 200.0  # deg/s, likewise of $VEL.ORI1
-TURNING_ACCELERATION = 100.0  # deg/s^2, likewise of $ACC.ORI1
-TOOLS = 16  # numbers of TOOL_DATA
-BASES = 32  # numbers of BASE_DATA
-MODELLED = frozenset(
-    (
-        "$VEL_AXIS",
-        "$ACC_AXIS",
-        "$VEL",
-        "$ACC",
-        "$APO",
-        "$OV_PRO",
-        "$TOOL",
-        "$BASE",
-        "$OUT",
-        "$ORI_TYPE",
-    )
-)
-"""System variables that motions follow from."""
-HARMLESS = frozenset(
-    (
-        "$ADVANCE",
-        "$BWDSTART",
-        "$H_POS",
-        "$GEAR_JERK",
-        "$COLLMON_TOL_PRO",
-        "$CIRC_TYPE",
-        "$JERK",
-        "$IPO_MODE",
-        "$LOAD",
-    )
-)
-"""Set by nearly every program; nothing here follows from them."""
-STANDING = frozenset(("$POS_ACT", "$AXIS_ACT", "$POS_ACT_MES", "$AXIS_ACT_MEAS"))
-"""Where the robot stands: known when a program is driven, not when it is followed."""
-NULL: dict[str, Value] = dict.fromkeys(FRAME_NAMES, 0.0)
-
-
-def system_speeds() -> dict[str, Value]:
-    """Speeds, accelerations and approximation distances as BAS(#INITMOV) leaves them; override as
-    it is.
-    """
-    turning = {"ORI1": TURNING_VELOCITY, "ORI2": TURNING_VELOCITY}
-    turning_up = {"ORI1": TURNING_ACCELERATION, "ORI2": TURNING_ACCELERATION}
-    return {
-        "$VEL_AXIS": _all(FULL),
-        "$ACC_AXIS": _all(FULL),
-        "$VEL": Structure({"CP": TOOL_VELOCITY, **turning}),
-        "$ACC": Structure({"CP": TOOL_ACCELERATION, **turning_up}),
-        "$APO": Structure({"CPTP": 0.0, "CDIS": 0.0, "CORI": 0.0, "CVEL": 0.0}),
-    }
-
-
-def system_variables(home: FloatArray, tool: FloatArray) -> dict[str, Value]:
-    """Variables at the start: `home` (6,) [rad] is XHOME, `tool` (4, 4) [m] in the flange every
-    tool number whose data the program doesn't bring.
-    """
-    angles: dict[str, Value] = {
-        f"A{j + 1}": float(angle) for j, angle in enumerate(np.degrees(home))
-    }
-    tool_frame = frame(tool)
-    return {
-        **system_speeds(),
-        "$GEAR_JERK": _all(FULL),
-        "$OV_PRO": FULL,
-        "$ADVANCE": 3,
-        "$TOOL": tool_frame,
-        "$BASE": Structure(dict(NULL)),
-        "$NULLFRAME": Structure(dict(NULL)),
-        "$WORLD": Structure(dict(NULL)),
-        "$ROBROOT": Structure(dict(NULL)),
-        "TOOL_DATA": Array({(n,): tool_frame.copied() for n in range(1, TOOLS + 1)}),
-        "LOAD_DATA": Array({(n,): Structure({}, "LOAD") for n in range(1, TOOLS + 1)}),
-        "BASE_DATA": Array({(n,): Structure(dict(NULL)) for n in range(1, BASES + 1)}),
-        "XHOME": Structure(dict(angles), "E6AXIS"),
-        "$H_POS": Structure(dict(angles), "E6AXIS"),
-        "PDEFAULT": Structure({"VEL": FULL, "ACC": FULL, "APO_DIST": FULL}),
-        "FHOME": Structure({"TOOL_NO": 0, "BASE_NO": 0}),
-        "$STOPMESS": False,
-        "$BWDSTART": False,
-        "$OUT": Array(),
-    }
-
-
-def _all(value: float) -> Array:
-    return Array({(n,): value for n in range(1, AXES + 1)})
-
+from ir_krl.run.notes import Effect
+from ir_krl.run.system import Assumption
+from ir_krl.run.values import Array, Structure, Unknown, Value, copied, integer, number
 
 # Variables by name, as they stand while a program runs: of the routine that runs, of its module,
 # of all.
@@ -128,14 +29,25 @@ class Scope:
     names: set[str]
 
 
+Watched = dict[tuple[int, str], tuple[dict[str, Value], Value | None]]
+"""What variables held when they were set first, by the memory that holds them and their name."""
+Noted = Callable[[Place, str, Effect], None]
+"""Hears what is assumed: place, sentence, what it could change."""
+
+
 @dataclass
 class Memory:
     """`shared` holds what is known everywhere, `modules` the data lists by the names of their
     modules, `scopes` the calls that run. module: whose statements run; listed: all names that data
-    lists declare.
+    lists declare; assumed: values that the program didn't bring, by name or name[index]; noted:
+    hears of those that are used; guesses: how many were; watched: see `watch`.
     """
 
     shared: dict[str, Value]
+    assumed: dict[str, Assumption] = field(default_factory=dict)
+    noted: Noted = lambda place, text, effect: None
+    guesses: int = 0
+    watched: list[Watched] = field(default_factory=list)
     scopes: list[Scope] = field(default_factory=list)
     modules: dict[str, dict[str, Value]] = field(default_factory=dict)
     module: str = ""
@@ -157,12 +69,18 @@ class Memory:
         else:
             self.listed.add(name)
             home = self.shared if everywhere else self._own()
+        if isinstance(value, Array) and not value.elements:
+            held = home.get(name, self.shared.get(name))
+            value = held if isinstance(held, Array) else value  # a parameter, or the controller's
         if value is not None:
+            self._watch(home, name)
             home[name] = value
+            if not isinstance(value, Array):
+                self.assumed.pop(name, None)
 
     def has(self, name: str) -> bool:
         """Whether a variable of this name has a value."""
-        return name in self._home(name)
+        return not isinstance(self._home(name).get(name, Unknown(name)), Unknown)
 
     def declared(self, name: str) -> bool:
         """Whether a variable of this name is declared where statements run, with or without a
@@ -171,28 +89,85 @@ class Memory:
         own = self.scopes[-1].names if self.scopes else set()
         return self.has(name) or name in own or name in self.listed
 
+    def watch(self) -> Watched:
+        """From here on what is set is remembered, until `changed` is asked."""
+        self.watched.append({})
+        return self.watched[-1]
+
+    def forget(self, watched: Watched) -> None:
+        """Nothing more is remembered for a `watch`."""
+        self.watched = [one for one in self.watched if one is not watched]
+
+    def changed(self, watched: Watched) -> bool:
+        """Whether a variable that still exists holds something else than at `watch`."""
+        alive = {id(self.shared), *map(id, self.modules.values())}
+        alive |= {id(scope.values) for scope in self.scopes}
+        return any(
+            home.get(name) != before
+            for (holder, name), (home, before) in watched.items()
+            if holder in alive
+        )
+
+    def _watch(self, home: dict[str, Value], name: str) -> None:
+        for one in self.watched:
+            key = (id(home), name)
+            if key not in one:
+                before = home.get(name)
+                one[key] = (home, None if before is None else copied(before))
+
+    def hold(self, name: str, value: Value | None) -> None:
+        """A system variable that follows from what happens; it stays as it is where that isn't
+        known.
+        """
+        if value is not None:
+            self.shared[name] = value
+
+    def guess(self, value: Value, otherwise: Value, place: Place) -> Value:
+        """The value, or where there is none `otherwise`, which is said."""
+        if not isinstance(value, Unknown):
+            return value
+        self.guesses += 1
+        taken = "FALSE" if otherwise is False else otherwise
+        text = f"{value.name} has no value: taken as {taken}; --set '{value.name}=…'"
+        self.noted(place, text, Effect.MOTIONS)
+        return otherwise
+
+    def peek(self, name: str, index: int | None = None) -> Value | None:
+        """A value of all modules without a word about what is assumed; None without one."""
+        value = self.shared.get(name)
+        if index is None:
+            return value
+        return value.elements.get((index,)) if isinstance(value, Array) else None
+
+    def _guessed(self, name: str, index: tuple[int, ...] | None, place: Place) -> None:
+        """Say that a value which isn't the program's is used."""
+        if index is not None and len(index) == 1 and f"{name}[{index[0]}]" in self.assumed:
+            name = f"{name}[{index[0]}]"
+        if name in self.assumed:
+            self.guesses += 1
+            self.noted(place, self.assumed[name].text, self.assumed[name].effect)
+
     def get(self, path: tuple[Step, ...], place: Place) -> Value:
         """The value at a path such as XP1.X or BASE_DATA[2]. Raises KrlRunError."""
         (name, index), *rest = path
         home = self._home(name)
         if name not in home:
-            if name in STANDING:
-                raise KrlRunError(
-                    f"{name} is known on the controller only: a program that computes with it "
-                    "isn't read",
-                    place,
-                )
-            where = ": it is known on the controller only" if name.startswith("$") else ""
-            raise KrlRunError(f"{name} has no value{where}", place)
+            written = name if index is None else f"{name}[{', '.join(map(str, index))}]"
+            return Unknown(".".join([written, *(part for part, _ in rest)]))
+        self._guessed(name, index, place)
+        if home is not self.shared and home is self.modules.get(self._elsewhere(name)):
+            text = f"{name} is taken from the data list {self._elsewhere(name)}, it isn't GLOBAL"
+            self.noted(place, text, Effect.PLACES)
         value = _element(home[name], name, index, place)
         written = name if index is None else f"{name}[{', '.join(map(str, index))}]"
         for part, part_index in rest:
+            if isinstance(value, Unknown):
+                value = Unknown(f"{value.name}.{part}")
+                continue
             if not isinstance(value, Structure):
                 raise KrlRunError(f"{written} has no components", place)
-            if part not in value.fields:
-                raise KrlRunError(f"{written}.{part} has no value", place)
             written = f"{written}.{part}"
-            value = _element(value.fields[part], written, part_index, place)
+            value = _element(value.fields.get(part, Unknown(written)), written, part_index, place)
         return value
 
     def set(self, path: tuple[Step, ...], value: Value, place: Place) -> None:
@@ -201,27 +176,25 @@ class Memory:
         """
         (name, index), *rest = path
         home: dict[str, Value] = self._home(name)
+        self._watch(home, name)
+        if self.assumed:
+            self.assumed.pop(name, None)
+            if index is not None:
+                self.assumed.pop(f"{name}[{', '.join(map(str, index))}]", None)
         if not rest and index is None:
             home[name] = _merged(home.get(name), value)
             return
         holder = home
         for (part, part_index), following in zip(path, [*rest, None], strict=True):
+            elements: dict[Any, Value] = holder
+            key: Any = part
             if part_index is not None:
-                array = holder.setdefault(part, Array())
-                if not isinstance(array, Array):
-                    raise KrlRunError(f"{part} is no array", place)
-                if following is None:
-                    array.elements[part_index] = _merged(array.elements.get(part_index), value)
-                    return
-                inner = array.elements.setdefault(part_index, Structure({}))
-            elif following is None:
-                holder[part] = _merged(holder.get(part), value)
+                elements = _array_at(holder, part, place).elements
+                key = part_index
+            if following is None:
+                elements[key] = _merged(elements.get(key), value)
                 return
-            else:
-                inner = holder.setdefault(part, Structure({}))
-            if not isinstance(inner, Structure):
-                raise KrlRunError(f"{part} has no components", place)
-            holder = inner.fields
+            holder = _structure_at(elements, key, part, place).fields
 
     def _home(self, name: str) -> dict[str, Value]:
         """Where a variable is, or would be."""
@@ -231,12 +204,15 @@ class Memory:
             return self._own()
         if name in self.shared or name.startswith("$"):
             return self.shared
-        elsewhere = [
-            one for one in self.modules.values() if name in one
-        ]  # a data list of another name
+        elsewhere = self._elsewhere(name)
         if elsewhere:
-            return elsewhere[0]
+            return self.modules[elsewhere]
         return self.shared if self.scopes else self._own()
+
+    def _elsewhere(self, name: str) -> str:
+        """The one data list of another module that has a variable of this name, else ""."""
+        found = [module for module, one in self.modules.items() if name in one]
+        return found[0] if len(found) == 1 and found[0] != self.module else ""
 
     def _own(self) -> dict[str, Value]:
         return self.modules.setdefault(self.module, {})
@@ -261,14 +237,35 @@ def _merged(before: Value | None, value: Value) -> Value:
     return new
 
 
+def _array_at(holder: dict[str, Value], name: str, place: Place) -> Array:
+    """The array of a name, made where there is none. Raises KrlRunError."""
+    held = holder.get(name)
+    if held is None or isinstance(held, Unknown):
+        held = holder[name] = Array()
+    if not isinstance(held, Array):
+        raise KrlRunError(f"{name} is no array: leave out the index", place)
+    return held
+
+
+def _structure_at(elements: dict[Any, Value], key: Any, name: str, place: Place) -> Structure:
+    """The structure at a key, made where there is none. Raises KrlRunError."""
+    held = elements.get(key)
+    if held is None or isinstance(held, Unknown):
+        held = elements[key] = Structure({})
+    if not isinstance(held, Structure):
+        raise KrlRunError(f"{name} has no components", place)
+    return held
+
+
 def _element(value: Value, name: str, index: tuple[int, ...] | None, place: Place) -> Value:
     if index is None:
         return value
+    written = f"{name}[{', '.join(map(str, index))}]"
+    if isinstance(value, Unknown):
+        return Unknown(written)
     if not isinstance(value, Array):
-        raise KrlRunError(f"{name} is no array", place)
-    if index not in value.elements:
-        raise KrlRunError(f"{name}[{', '.join(map(str, index))}] has no value", place)
-    return value.elements[index]
+        raise KrlRunError(f"{name} is no array: leave out the index", place)
+    return value.elements.get(index, Unknown(written))
 
 
 # Inputs, outputs, flags and timers as a program reads them, single or as the number of a group.
@@ -300,35 +297,48 @@ class SignalRange:
 
 @dataclass
 class Signals:
-    """What is known of signals. inputs: what $IN[n] reads; noted: hears what is assumed, with its
-    place;
-    aliases and groups: what SIGNAL declares, by name.
+    """What is known of signals. inputs: what $IN[n] reads; noted: hears what is assumed; stops:
+    hears what stops the advance run; expected: inputs that a WAIT FOR has waited for; aliases and
+    groups: what SIGNAL declares, by name.
     """
 
     memory: Memory
     inputs: Mapping[int, bool]
-    noted: Callable[[Place, str], None]
+    noted: Noted
+    stops: Callable[[Place, str], None] = lambda place, name: None
+    expected: dict[int, bool] = field(default_factory=dict)
     aliases: dict[str, tuple[Step, ...]] = field(default_factory=dict)
     groups: dict[str, SignalRange] = field(default_factory=dict)
 
     def read(self, name: str, index: int, place: Place) -> bool:
-        """One signal or flag. Raises KrlRunError for an input that isn't given."""
+        """One signal or flag; what isn't known is FALSE. Raises KrlRunError."""
+        if name in (INPUT, OUTPUT):
+            self.stops(place, f"{name}[{index}]")
         if name == INPUT:
-            if index not in self.inputs:
-                raise KrlRunError(
-                    f"the value of $IN[{index}] decides something here and isn't given", place
-                )
-            return self.inputs[index]
+            return self._input(index, place)
         if name == TIMER_FLAG:
-            self.noted(place, f"$TIMER[{index}] stands still: no time passes for a timer")
+            self.memory.guesses += 1
+            text = f"$TIMER[{index}] stands still: no time passes for a timer"
+            self.noted(place, text, Effect.MOTIONS)
             return number(self._held(TIMER, index) or 0, f"$TIMER[{index}]", place) > 0.0
         held = self._held(name, index)
         if held is None:
-            self.noted(place, f"{name}[{index}] was never set: taken as FALSE")
+            self.memory.guesses += 1
+            self.noted(place, f"{name}[{index}] was never set: taken as FALSE", Effect.MOTIONS)
             return False
         if not isinstance(held, bool):
             raise KrlRunError(f"{name}[{index}] isn't TRUE or FALSE", place)
         return held
+
+    def _input(self, index: int, place: Place) -> bool:
+        if index in self.inputs:
+            return self.inputs[index]
+        if index in self.expected:
+            return self.expected[index]
+        self.memory.guesses += 1
+        text = f"$IN[{index}] isn't given: taken as FALSE; --input {index}=true"
+        self.noted(place, text, Effect.MOTIONS)
+        return False
 
     def group_value(self, name: str, place: Place) -> int:
         """The number of a group."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import partial
 from typing import TypeVar, get_args
 
@@ -22,23 +23,16 @@ from ir_krl.run.commands import (
 )
 from ir_krl.run.control import Control
 from ir_krl.run.expressions import Expressions
-from ir_krl.run.memory import (
-    AXES,
-    FULL,
-    HARMLESS,
-    MODELLED,
-    OUTPUT,
-    SIGNALS,
-    STANDING,
-    Memory,
-    Signals,
-)
+from ir_krl.run.memory import INPUT, OUTPUT, SIGNALS, Memory, Noted
+from ir_krl.run.notes import Effect
+from ir_krl.run.system import AXES, FULL, HARMLESS, MODELLED, STANDING, mode_variables
 from ir_krl.run.values import (
     AXIS_NAMES,
     EXTERNAL_NAMES,
     FRAME_NAMES,
     Structure,
     Symbol,
+    Unknown,
     Value,
     axes,
     components,
@@ -49,6 +43,7 @@ from ir_krl.run.values import (
     number,
     pose,
 )
+from ir_msgs_py.arrays import FloatArray
 
 # Assignments as statements: to variables, to outputs and to the groups of signals that name
 # them.
@@ -56,8 +51,6 @@ from ir_krl.run.values import (
 
 class Assigning(Control):
     """Sets values and outputs; what signals are called is known to `_signals`."""
-
-    _signals: Signals
 
     def _assignment(self, tree: Tree) -> None:
         access, expression = tree.children
@@ -73,13 +66,29 @@ class Assigning(Control):
                 raise KrlRunError(f"$OUT[{index[0]}] is set to {kind_of(value)}", where)
             self._set_output(index[0], value, where)
             return
+        if name == INPUT and index is not None:  # of --set, and of a simulation
+            self._signals.expected[index[0]] = value is True
+            return
+        self._check_effect(name, value, where)
+        self.memory.set(path, value, where)
+        for other, follows in mode_variables(name, value).items():
+            self.memory.set(((other, None),), follows, where)
+
+    def _check_effect(self, name: str, value: Value, where: Place) -> None:
+        """Note what isn't modelled of a system variable. Raises KrlRunError for a tool that stands
+        in the cell.
+        """
         if name == "$IPO_MODE" and value != Symbol("BASE"):
             raise KrlRunError(
-                f"$IPO_MODE {kind_of(value)}: a tool that stands in the cell isn't read", where
+                f"$IPO_MODE {kind_of(value)}: a tool that stands in the cell isn't read, teach the "
+                "motion with the tool at the flange",
+                where,
             )
+        if name == "$ORI_TYPE" and value not in (Symbol("VAR"), Symbol("CONSTANT")):
+            text = f"$ORI_TYPE {kind_of(value)}: the tool is turned evenly instead"
+            self.note_at(where, text, Effect.PLACES)
         if name.startswith("$") and name not in MODELLED and name not in HARMLESS:
-            self.note(tree, f"{name} isn't modelled")
-        self.memory.set(path, value, where)
+            self.note_at(where, f"{name} isn't modelled", _effect_of(name))
 
     def _set_output(self, number: float, level: bool, place: Place, pulse: float = 0.0) -> None:
         """Set a digital output. Raises KrlRunError for one that no controller has."""
@@ -90,6 +99,14 @@ class Assigning(Control):
         self.commands.append(SetOutput(int(number), level, place, pulse, self.continuing))
         if pulse == 0.0:
             self.memory.set(((OUTPUT, (int(number),)),), level, place)
+
+
+_MOVING = ("$CORR", "$SEN", "$TECH", "$SOFT", "$TRAFO", "$ASYNC", "$EX_KIN", "$JOINT_OFFSET")
+"""Beginnings of the names of system variables that change where a motion leads."""
+
+
+def _effect_of(name: str) -> Effect:
+    return Effect.PLACES if name.startswith(_MOVING) else Effect.SPEEDS
 
 
 # Motions of a program as commands: targets, speeds and approximation as the system variables
@@ -107,9 +124,7 @@ class Motions:
     assumptions.
     """
 
-    def __init__(
-        self, expressions: Expressions, memory: Memory, noted: Callable[[Place, str], None]
-    ) -> None:
+    def __init__(self, expressions: Expressions, memory: Memory, noted: Noted) -> None:
         self._expressions = expressions
         self._memory = memory
         self._noted = noted
@@ -138,9 +153,16 @@ class Motions:
             end = self.target(frames[0], relative, in_tool)
             angle = None
         if kind in ("lin", "circ", "spl") and end.axes is not None:
-            raise KrlRunError(f"{word} goes to a frame, not to axis angles", place)
+            raise KrlRunError(
+                f"{word} goes to a frame, not to axis angles: PTP goes to those", place
+            )
         blend = next(
-            (self.blend(child) for child in tree.children if _is(child, "approximation")), None
+            (
+                self.blend(child, axis=kind == "ptp")
+                for child in tree.children
+                if _is(child, "approximation")
+            ),
+            None,
         )
         payload = payload_of(self._memory.shared.get("$LOAD"), place)
         return Motion(
@@ -161,19 +183,20 @@ class Motions:
         if tree.data == "access" and str(tree.children[0]) in STANDING:
             return self._here(str(tree.children[0]), place)
         value = self._expressions.value(tree)
+        if isinstance(value, Unknown):
+            raise KrlRunError(value.refusal("a motion"), place)
         if not isinstance(value, Structure):
             raise KrlRunError(f"a motion can't go to {kind_of(value)}", place)
         self._check_components(value, relative, place)
-        base, tool = (
-            pose(self._memory.get(((name, None),), place), name, place)
-            for name in ("$BASE", "$TOOL")
-        )
+        base, tool = self.frames(place)
         name = str(tree.children[0]) if tree.data == "access" else ""
         if is_axis_value(value):
             return Target(axes(value, place), None, None, None, relative, in_tool, base, tool, name)
         frame = components(value, FRAME_NAMES, place)
         if not frame:
             raise KrlRunError(f"a motion can't go to {kind_of(value)}", place)
+        for variable in () if relative else ("$TOOL", "$BASE"):
+            self._memory.get(((variable, None),), place)  # says what is assumed of it
         status, turn = (
             integer(value.fields[part], part, place) if part in value.fields else None
             for part in ("S", "T")
@@ -181,23 +204,24 @@ class Motions:
         return Target(None, frame, status, turn, relative, in_tool, base, tool, name)
 
     def _check_components(self, value: Structure, relative: bool, place: Place) -> None:
-        """Raise KrlRunError for a component that no position has, and for an external axis that
-        moves.
-        """
+        """Raise KrlRunError for a component that no position has; note external axes."""
         unknown = next((name for name in value.fields if name not in _COMPONENTS), None)
         if unknown is not None:
             raise KrlRunError(f"{unknown} is no component of a position", place)
         for name, at in components(value, EXTERNAL_NAMES, place).items():
-            before = self._external.setdefault(name, 0.0 if relative else at)
-            if abs(at if relative else at - before) > _STANDS:
-                raise KrlRunError(
-                    f"{name} moves from {before:g} to {at:g}: external axes aren't read", place
-                )
-            if before != 0.0:
+            before = self._external.get(name, 0.0 if relative else at)
+            now = before + at if relative else at
+            self._external[name] = now
+            if abs(now - before) > _STANDS:
                 self._noted(
                     place,
-                    f"{name} stays at {before:g}: external axes are taken as part of the cell",
+                    f"{name} moves from {before:g} to {now:g}: external axes aren't modelled, the "
+                    "arm alone is driven",
+                    Effect.PLACES,
                 )
+            elif now != 0.0:
+                text = f"{name} stays at {now:g}: external axes are taken as part of the cell"
+                self._noted(place, text, Effect.PLACES)
 
     def _here(self, name: str, place: Place) -> Target:
         """Where the robot stands: PTP $AXIS_ACT, as programs begin."""
@@ -207,10 +231,13 @@ class Motions:
         else:
             axis = None
             frame = dict.fromkeys(FRAME_NAMES[:3], 0.0)
-        base, tool = (
-            pose(self._memory.get(((n, None),), place), n, place) for n in ("$BASE", "$TOOL")
-        )
-        return Target(axis, frame, None, None, True, False, base, tool, name)
+        return Target(axis, frame, None, None, True, False, *self.frames(place), name)
+
+    def frames(self, place: Place) -> tuple[FloatArray, FloatArray]:
+        """$BASE and $TOOL as poses (4, 4) [m]."""
+        found = ((name, self._memory.peek(name)) for name in ("$BASE", "$TOOL"))
+        base, tool = (pose(Structure({}) if one is None else one, n, place) for n, one in found)
+        return base, tool
 
     def speeds(self, place: Place) -> Speeds:
         """How fast the system variables say; each bounded by what a controller takes."""
@@ -228,17 +255,32 @@ class Motions:
             self._share("$OV_PRO", None, place),
         )
 
-    def blend(self, tree: Tree) -> Blend | None:
-        """Approximate positioning as the words of `tree` ask for it; None without a word."""
+    def blend(self, tree: Tree, *, axis: bool) -> Blend | None:
+        """Approximate positioning as the words of `tree` ask for it, of an axis motion or of one of
+        the tool; None without a word.
+        """
         words = [str(word) for word in tree.children]
         if not words:
             return None
         place = place_of(tree, self._expressions.file)
-        how = words[-1]  # C_PTP C_DIS: the second is how a CP motion follows
-        amount = self._number("$APO", _BLEND_WORDS[how], place)
+        found = self._blend(words[0], axis=axis, place=place)
+        if words[0] != "C_PTP":
+            return found
+        onto = words[1] if len(words) > 1 else "C_DIS"
+        return replace(found, onto=self._blend(onto, axis=False, place=place))
+
+    def _blend(self, how: str, *, axis: bool, place: Place) -> Blend:
+        """What one word asks for."""
+        amount = max(self._number("$APO", _BLEND_WORDS[how], place), 0.0)
+        if how in ("C_ORI", "C_VEL"):
+            text = f"{how} is driven as a share or a distance of the same figure"
+            self._noted(place, text, Effect.SPEEDS)
         if how in ("C_PTP", "C_VEL"):
-            return Blend(how, 0.0, min(max(amount, 0.0), FULL) / FULL)
-        return Blend(how, max(amount, 0.0) * _MM, 1.0)
+            return Blend(how, math.inf, min(amount, FULL) / FULL)
+        share = 1.0
+        if how == "C_SPL" and axis:
+            share = min(max(self._number("$APO", "CPTP", place), 0.0), FULL) / FULL
+        return Blend(how, amount * _MM, share)
 
     def _keeps_orientation(self) -> bool:
         return self._memory.shared.get("$ORI_TYPE") == Symbol("CONSTANT")
@@ -305,7 +347,9 @@ class Moving(Assigning):
         at = self.expressions.number(where, str(when))
         if str(when) not in ("DISTANCE", "PATH") or self.expressions.number(delay, "DELAY") != 0.0:
             self.note(
-                tree, "a TRIGGER acts at an end of its motion: path and delay aren't modelled"
+                tree,
+                "a TRIGGER acts at an end of its motion: path and delay aren't modelled",
+                Effect.TIMES,
             )
         self._triggers.append((at if str(when) == "DISTANCE" else 1.0, action))
 
@@ -313,8 +357,19 @@ class Moving(Assigning):
         due = self._triggers
         self._triggers = []
         self._act(action for at, action in due if at == 0.0)
-        self.commands.append(self._with_settings(tree, lambda: self._motions.motion(tree)))
+        built = self._with_settings(tree, lambda: self._motions.motion(tree))
+        self.commands.append(self._in_advance(built))
         self._act(action for at, action in due if at != 0.0)
+
+    def _in_advance(self, built: _Built) -> _Built:
+        """A motion as far as it is known in advance: $ADVANCE=0 rounds no corner."""
+        if self.memory.peek("$ADVANCE") != 0:
+            return built
+        self.continuing = False
+        self.stop(built.place, "$ADVANCE=0")
+        if built.blend is not None:
+            self.note_at(built.place, f"$ADVANCE=0: {built.blend.how} has no effect")
+        return replace(built, blend=None)
 
     def _act(self, actions: Iterable[Tree]) -> None:
         """What triggers do while the robot moves."""
@@ -331,7 +386,7 @@ class Moving(Assigning):
         """
         due = self._triggers
         self._triggers = []
-        block = self._with_settings(tree, lambda: self._block(tree))
+        block = self._in_advance(self._with_settings(tree, lambda: self._block(tree)))
         inside = self._triggers
         self._triggers = []
         self._act(action for at, action in due if at == 0.0)
@@ -354,13 +409,16 @@ class Moving(Assigning):
         if not assignments:
             return build()
         shared = self.memory.shared
-        before = {name: copied(value) for name, value in shared.items() if name.startswith("$")}
+        names = MODELLED | HARMLESS | {str(one.children[0].children[0]) for one in assignments}
+        before = {name: copied(shared[name]) for name in names if name in shared}
+        assumed = dict(self.memory.assumed)
         for assignment in assignments:
             self._assignment(assignment)
         built = build()
-        for name in [name for name in shared if name.startswith("$") and name not in before]:
-            del shared[name]
+        for name in names.difference(before):
+            shared.pop(name, None)
         shared.update(before)
+        self.memory.assumed = assumed
         return built
 
     def _block(self, tree: Tree) -> SplineBlock:
@@ -396,5 +454,5 @@ class Moving(Assigning):
         if not motions:
             raise KrlRunError("a spline block without motions", self.place(tree))
         axis = str(word) == "PTP_SPLINE"
-        blend = self._motions.blend(approximation)
+        blend = self._motions.blend(approximation, axis=axis)
         return SplineBlock(axis, tuple(motions), tuple(times), self.place(tree), blend)

@@ -10,12 +10,15 @@ from typing import Any
 from ir_krl.errors import KrlRunError, Place
 from ir_krl.language import Routine, Source, Tree, place_of
 from ir_krl.run.commands import Command
-from ir_krl.run.control import LoopExit, Note, Returned
+from ir_krl.run.control import Jump, LoopExit, Returned
 from ir_krl.run.expressions import Expressions
-from ir_krl.run.library import Library
-from ir_krl.run.memory import Memory, SignalRange, Signals, system_variables
+from ir_krl.run.library import CONTROLLERS, STOPPING, Library
+from ir_krl.run.memory import Memory, SignalRange, Signals
 from ir_krl.run.motions import Motions, Moving
-from ir_krl.run.values import Array, Value, copied, typed
+from ir_krl.run.notes import Effect, Note, worst_first
+from ir_krl.run.standing import AXES_NOW, PLACE_NOW, Kinematics, Standing
+from ir_krl.run.system import assumed_variables, system_variables
+from ir_krl.run.values import Array, Unknown, Value, copied, typed
 from ir_msgs_py.arrays import FloatArray
 
 # Routines of several files: those of the same file come first, as on the controller.
@@ -27,19 +30,19 @@ def module_of(file: str) -> str:
 
 
 class Routines:
-    """All routines of the sources. Raises KrlRunError where a file has two of one name, or two
-    files begin with one of the same name, which other files then can't call.
-    """
+    """All routines of the sources. Raises KrlRunError where a file has two of one name."""
 
     def __init__(self, sources: Sequence[Source]) -> None:
         self._found: dict[str, list[Routine]] = {}
-        leading = {source.routines[0] for source in sources if source.routines}
+        self._leading = {source.routines[0] for source in sources if source.routines}
         for source in sources:
             for one in source.routines:
                 others = self._found.setdefault(one.name, [])
-                if any(other.file == one.file or {other, one} <= leading for other in others):
-                    raise KrlRunError(f"{one.name} is defined twice", place_of(one.body, one.file))
-                others.insert(0 if one in leading else len(others), one)
+                if any(other.file == one.file for other in others):
+                    raise KrlRunError(
+                        f"{one.name} is defined twice: rename one", place_of(one.body, one.file)
+                    )
+                others.insert(0 if one in self._leading else len(others), one)
 
     @property
     def names(self) -> list[str]:
@@ -47,9 +50,18 @@ class Routines:
         return list(self._found)
 
     def named(self, name: str, file: str = "") -> Routine | None:
-        """The routine that a call in `file` means."""
+        """The routine that a call in `file` means: its own, one that begins a file, a GLOBAL one.
+        Raises KrlRunError where two files begin with one of this name.
+        """
         there = self._found.get(name, [])
-        return next((one for one in there if one.file == file), there[0] if there else None)
+        own = next((one for one in there if one.file == file), None)
+        if own is not None or not there:
+            return own
+        leading = [one for one in there if one in self._leading]
+        if len(leading) > 1:
+            files = " and ".join(one.file for one in leading[:2])
+            raise KrlRunError(f"{name} is defined twice, in {files}: give one of them")
+        return next(iter([*leading, *(one for one in there if one.everywhere)]), None)
 
 
 # Follows a program statement by statement; what reaches the controller is the list of its
@@ -58,20 +70,39 @@ class Routines:
 GLOBAL = "GLOBAL"
 CONFIGURATION = "$CONFIG"
 NESTED = "brackets, signs or blocks are nested too deeply"
+_UNMODELLED = {
+    "analog": "an analog signal",
+    "channel": "CHANNEL",
+    "confirm": "CONFIRM",
+    "error_proceed": "ON_ERROR_PROCEED",
+    "import": "IMPORT",
+}
 DEPTH_MAX = 60
 """Calls within calls."""
 
 
 @dataclass(frozen=True)
+class UnknownRoutine:
+    """A routine that is in no file: how many arguments it is called with, whether its value is
+    used.
+    """
+
+    name: str
+    arguments: int
+    function: bool
+
+
+@dataclass(frozen=True)
 class Followed:
-    """What a program does: its name, the commands in their order, what was assumed, and what its
-    SIGNAL declarations name.
+    """What a program does: its name, the commands in their order, what was assumed, the worst
+    first, what its SIGNAL declarations name, and routines that it calls and nobody gave.
     """
 
     name: str
     commands: tuple[Command, ...]
     notes: tuple[Note, ...]
     signals: Mapping[str, SignalRange] = field(default_factory=dict)
+    unknown: tuple[UnknownRoutine, ...] = ()
 
 
 def follow(
@@ -82,28 +113,39 @@ def follow(
     routine: str = "",
     inputs: Mapping[int, bool] | None = None,
     loop_passes: int = 1,
+    settings: Sequence[Source] = (),
+    kinematics: Kinematics | None = None,
 ) -> Followed:
     """Run `routine` (the first of the sources where "") without moving anything.
 
     home (6,) [rad] is XHOME; tool (4, 4) [m] stands for tools whose data the program doesn't bring.
-    inputs: what $IN[n] reads; one that isn't given and decides something is an error. A LOOP
-    without EXIT is run `loop_passes` times. Raises KrlRunError with the place.
+    inputs: what $IN[n] reads, FALSE where nothing is said. A loop that nothing known ends is run
+    `loop_passes` times. settings: data lists whose values count more than those of the sources
+    (`settings_of`). kinematics: of the robot, without it a program that computes with the place
+    where it stands may be refused. Raises KrlRunError with the place.
     """
     routines = Routines(sources)
-    name = routine.upper() or next(iter(routines.names), "")
-    first = routines.named(name)
+    leading = [one for source in sources for one in source.routines]
+    name = routine.upper() or (leading[0].name if leading else "")
+    first = routines.named(name, leading[0].file if leading else "")
     if first is None:
         there = ", ".join(routines.names[:8]) or "none"
         raise KrlRunError(f"there is no routine {name or 'at all'}; routines: {there}")
-    run = _Run(routines, Memory(system_variables(home, tool)), dict(inputs or {}), loop_passes)
+    memory = Memory(system_variables(home, tool), assumed_variables())
+    run = _Run(routines, memory, dict(inputs or {}), loop_passes)
+    run.standing = Standing(run.commands, home, kinematics)
     try:
         for source in sources:
             for body in source.data:
-                run.data(body, source.file)
+                run.data(body, source.file, lenient=module_of(source.file) != module_of(first.file))
+        for source in settings:
+            for body in source.data:
+                run.settings(body, source.file)
         run.routine(first, [], Place(first.file))
     except RecursionError:
         raise KrlRunError(NESTED, Place(run.expressions.file)) from None
-    return Followed(name, tuple(run.commands), tuple(run.notes), run.signals)
+    notes = worst_first(run.notes)
+    return Followed(name, tuple(run.commands), notes, run.signals, tuple(run.unknown.values()))
 
 
 class _Run(Moving):
@@ -113,9 +155,14 @@ class _Run(Moving):
         self, routines: Routines, memory: Memory, inputs: dict[int, bool], loop_passes: int
     ) -> None:
         super().__init__(memory, loop_passes)
+        memory.noted = self.note_at
         self._routines = routines
         self._library = Library(memory)
-        self._signals = Signals(memory, inputs, self.note_at)
+        self._signals = Signals(memory, inputs, self.note_at, self._stopped)
+        self.standing: Standing
+        self._running: list[Routine] = []
+        self.unknown: dict[str, UnknownRoutine] = {}
+        self._calling = False  # a call as a statement begins
         self.expressions = Expressions(memory, self._signals, self._called)
         self._motions = Motions(self.expressions, memory, self.note_at)
         self._triggers: list[tuple[float, Tree]] = []
@@ -125,10 +172,38 @@ class _Run(Moving):
         """What SIGNAL declarations name."""
         return self._signals.named
 
-    def data(self, body: Tree, file: str) -> None:
-        """Declarations and values of a data list."""
+    def data(self, body: Tree, file: str, *, lenient: bool = False) -> None:
+        """Declarations and values of a data list; lenient: what can't be read of it is noted."""
         self._at(file)
-        self.body(body)
+        if not lenient:
+            self.body(body)
+            return
+        for statement in body.children:
+            try:
+                self._statement(statement)
+            except KrlRunError as error:
+                self.note_at(error.place, f"left out: {error.reason}", Effect.PLACES)
+
+    def settings(self, body: Tree, file: str) -> None:
+        """Values that count more than those of the data lists."""
+        self._at(file)
+        for statement in body.children:
+            if statement.data != "assignment":
+                raise KrlRunError("a setting is NAME=VALUE", self.place(statement))
+            path = self.expressions.path(statement.children[0])
+            if len(path) == 1 and path[0][1] is None:
+                self.memory.shared.setdefault(path[0][0], 0)  # known everywhere
+            self._statement(statement)
+
+    def _stopped(self, place: Place, name: str) -> None:
+        """What stops the advance run is read: where the robot stands is known then."""
+        self.stop(place, name)
+        memory = self.memory
+        if name in AXES_NOW:
+            memory.hold(name, self.standing.axes())
+        elif name in PLACE_NOW:
+            base, tool = self._motions.frames(place)
+            memory.hold(name, self.standing.place(base, tool))
 
     def _at(self, file: str) -> None:
         """Statements of this file run from here on."""
@@ -140,27 +215,44 @@ class _Run(Moving):
         caller.
         """
         if len(self.memory.scopes) >= DEPTH_MAX:
-            raise KrlRunError(f"{routine.name} is the {DEPTH_MAX}th call within calls", place)
+            raise KrlRunError(
+                f"{routine.name} is the {DEPTH_MAX}th call within calls: give what ends them by "
+                "--set",
+                place,
+            )
         if len(arguments) > len(routine.parameters):
             raise KrlRunError(
                 f"{routine.name} takes {len(routine.parameters)} arguments, {len(arguments)} are "
-                "given",
+                "given: leave out the others",
                 place,
             )
+        if self._running.count(routine) >= self.loop_passes and not routine.parameters:
+            self._left(place, f"{routine.name} calls itself", self.loop_passes)
+            self.memory.enter({}, ())
+            return 0
         before = self.expressions.file
         named = zip(routine.parameters, arguments, strict=False)
         given = {one.name: copied(value) for one, value in named if value is not None}
         self.memory.enter(given, (one.name for one in routine.parameters))
         self._at(routine.file)
+        self._running.append(routine)
         try:
             self.body(routine.body)
         except Returned as returned:
             return 0 if returned.value is None else returned.value
         except LoopExit:
             raise KrlRunError(
-                "EXIT stands outside of a loop", place_of(routine.body, routine.file)
+                "EXIT stands outside of a loop: RETURN leaves a routine",
+                place_of(routine.body, routine.file),
+            ) from None
+        except Jump as jump:
+            raise KrlRunError(
+                f"there is no label {jump.label} around GOTO: put it in {routine.name}, outside of "
+                "loops and branches",
+                jump.place,
             ) from None
         finally:
+            self._running.pop()
             self._at(before)
         return 0
 
@@ -181,8 +273,18 @@ class _Run(Moving):
 
     _enumeration = _external = _structure
 
+    def _unmodelled(self, tree: Tree) -> None:
+        """A statement that moves nothing and isn't modelled."""
+        what = _UNMODELLED[tree.data]
+        self.note(tree, f"{what} isn't modelled: no motion assumed", Effect.NONE)
+
+    _analog = _confirm = _error_proceed = _channel = _import = _unmodelled
+
+    def _asynchronous(self, tree: Tree) -> None:
+        self.note(tree, "ASYPTP moves external axes alone: not driven", Effect.PLACES)
+
     def _signal(self, tree: Tree) -> None:
-        name, first, last = tree.children
+        name, first, last = (one for one in tree.children if one != GLOBAL)
         end = None if last is None else self.expressions.path(last)
         self._signals.declare(str(name), self.expressions.path(first), end, self.place(tree))
 
@@ -190,20 +292,31 @@ class _Run(Moving):
 
     def _call(self, tree: Tree) -> None:
         name, *arguments = tree.children
+        self._calling = True  # as a statement: no value is used
         self._called(str(name), arguments, self.place(tree))
 
     def _called(self, name: str, arguments: list[Any], place: Place) -> Value:
+        statement = self._calling
+        self._calling = False
         trees = [one.children[0] for one in arguments if one is not None]
         if trees == [None]:  # ROUTINE()
             trees = []
         if name == "PULSE":
             return self._pulse(trees, place)
-        routine = self._routines.named(name, self.expressions.file)
-        if routine is None and self._library.has(name):
+        try:
+            routine = self._routines.named(name, self.expressions.file)
+        except KrlRunError as error:
+            raise KrlRunError(error.reason, place) from None
+        controllers = routine is not None and module_of(routine.file) in CONTROLLERS
+        if self._library.has(name) and (routine is None or controllers):
+            if name in STOPPING:
+                self.stop(place, name)
             values = [None if one is None else self.expressions.value(one) for one in trees]
             return self._library.call(name, values, place)
+        if controllers:
+            return self.memory.shared.get(name, Unknown(name))  # of messages and the like
         if routine is None:
-            raise KrlRunError(f"there is no routine {name} in the files that are given", place)
+            return self._unknown(name, len(trees), place, function=not statement)
         values = [
             None if one is None else self._argument(one, k, routine) for k, one in enumerate(trees)
         ]
@@ -218,6 +331,19 @@ class _Run(Moving):
             ):
                 self.memory.set(self.expressions.path(tree), left[parameter.name], place)
         return result
+
+    def _unknown(self, name: str, arguments: int, place: Place, *, function: bool) -> Value:
+        """A routine that nobody gave: it moves nothing, and the advance run stops at it. Its value
+        must be set where one is used.
+        """
+        held = self.unknown.get(name)
+        most = max(arguments, held.arguments if held else 0)
+        used = function or (held is not None and held.function)
+        self.unknown[name] = UnknownRoutine(name, most, used)
+        text = f"{name} isn't in the files: no motion assumed (--stub writes one to fill in)"
+        self.note_at(place, text, Effect.MOTIONS)
+        self.stop(place, name)
+        return self.memory.shared.get(name, Unknown(name))
 
     def _argument(self, tree: Tree, k: int, routine: Routine) -> Value | None:
         """The value of an argument; one that only comes back needs none."""
@@ -242,7 +368,8 @@ class _Run(Moving):
     def _interrupt_declared(self, tree: Tree) -> None:
         call = tree.children[-1]
         if str(call.children[0]) != "IR_STOPM":
-            self.note(tree, f"the interrupt that calls {call.children[0]} isn't followed")
+            text = f"the interrupt that calls {call.children[0]} isn't followed"
+            self.note(tree, text, Effect.MOTIONS)
 
     def _interrupt_switched(self, tree: Tree) -> None:
         """Interrupts aren't followed: their declaration says so."""

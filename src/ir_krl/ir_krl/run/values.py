@@ -50,7 +50,28 @@ class Array:
         return Array({index: copied(value) for index, value in self.elements.items()}, self.kind)
 
 
-Value: TypeAlias = bool | int | float | str | Symbol | Structure | Array
+@dataclass(frozen=True)
+class Unknown:
+    """What a name holds that nobody has given a value; what a routine returns that nobody gave."""
+
+    name: str
+
+    @property
+    def remedy(self) -> str:
+        """What helps."""
+        if self.name.startswith("$"):
+            return f"it is known on the controller only, --set '{self.name}=…' gives one"
+        return f"give the file that sets it, or --set '{self.name}=…'"
+
+    def refusal(self, what: str) -> str:
+        """Why something that needs a value can't be done."""
+        return f"{self.name} has no value, and {what} needs one: {self.remedy}"
+
+    def __str__(self) -> str:
+        return f"{self.name}, which has no value: {self.remedy}"
+
+
+Value: TypeAlias = bool | int | float | str | Symbol | Structure | Array | Unknown
 
 
 def copied(value: Value) -> Value:
@@ -68,7 +89,8 @@ def in_range(value: int | float, place: Place) -> int | float:
     """
     if isinstance(value, int) and abs(value) > INT_MAX:
         raise KrlRunError(
-            f"an INT is at most {INT_MAX}; this one has {value.bit_length()} bits", place
+            f"an INT is at most {INT_MAX}; this one has {value.bit_length()} bits: make it a REAL",
+            place,
         )
     if isinstance(value, float) and not abs(value) <= REAL_MAX:
         raise KrlRunError(f"a REAL is at most {REAL_MAX:g}; this one is {value:g}", place)
@@ -77,6 +99,8 @@ def in_range(value: int | float, place: Place) -> int | float:
 
 def number(value: Value, what: str, place: Place) -> float:
     """An INT or a REAL as a float. Raises KrlRunError."""
+    if isinstance(value, Unknown):
+        raise KrlRunError(value.refusal(what), place)
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise KrlRunError(f"{what} is {kind_of(value)}, not a number", place)
     return float(value)
@@ -89,14 +113,18 @@ def integer(value: Value, what: str, place: Place) -> int:
 
 def truth(value: Value, what: str, place: Place) -> bool:
     """A BOOL. Raises KrlRunError."""
+    if isinstance(value, Unknown):
+        raise KrlRunError(value.refusal(what), place)
     if not isinstance(value, bool):
         raise KrlRunError(f"{what} is {kind_of(value)}, not TRUE or FALSE", place)
     return value
 
 
-def kind_of(value: Value) -> str:
+def kind_of(value: Value) -> str:  # noqa: PLR0911 - one of each kind
     """What a sentence calls the value."""
     match value:
+        case Unknown():
+            return str(value)
         case bool():
             return "TRUE" if value else "FALSE"
         case int() | float():
@@ -147,6 +175,8 @@ def pose(value: Value, what: str, place: Place) -> FloatArray:
     """The pose (4, 4) [m] of a FRAME, POS or E6POS; components that are missing are 0. Raises
     KrlRunError.
     """
+    if isinstance(value, Unknown):
+        raise KrlRunError(value.refusal(what), place)
     if not isinstance(value, Structure) or is_axis_value(value):
         raise KrlRunError(f"{what} is {kind_of(value)}, not a FRAME", place)
     found = components(value, FRAME_NAMES, place)

@@ -9,6 +9,7 @@ from ir_planner.krl.requests import (
     EvaluatedStep,
     evaluate_krl,
     export_krl,
+    follow_krl,
     one_movement,
 )
 from ir_planner.krl.splines import ToolMotion
@@ -22,6 +23,7 @@ __all__ = [
     "ToolMotion",
     "evaluate_krl",
     "export_krl",
+    "follow_krl",
     "one_movement",
     "posture_at",
     "station_at",

@@ -17,6 +17,8 @@ from ir_krl import (
     SetOutput,
     Speeds,
     SplineBlock,
+    Stop,
+    Target,
     Wait,
     WaitFor,
 )
@@ -55,6 +57,10 @@ def process_motions(commands: Sequence[Command]) -> frozenset[int]:
                 for motions in since.values():
                     motions.add(k)
     return frozenset(found)
+
+
+def _target_of(command: Motion | SplineBlock) -> Target:
+    return command.target if isinstance(command, Motion) else command.parts[-1].target
 
 
 # A KRL program as a KR C4 drives it: a trajectory from one standstill to the next, waits,
@@ -158,6 +164,8 @@ class _Drive:
                 self.finish()
                 self._stand(command.seconds, command.place, "")
                 self.around.stood(command.seconds)
+            case Stop():
+                self.finish()
             case WaitFor():
                 self.finish()
                 self._stand(0.0, command.place, command.condition)
@@ -255,8 +263,9 @@ class _Drive:
     ) -> None:
         share = 1.0 if self._blend is None and command.blend is None else _BLENDED_JERK
         made = move(curve, speeds, self.scene, command.place, least=least, jerk_share=share)
+        made = replace(made, tool=_target_of(command).tool)
         if self._moves and self._blend is not None:
-            steps = overlap(self._moves[-1], made, self._blend, self.scene)
+            steps = overlap(self._moves[-1], made, self._blend, self.arm)
             if steps > 0:
                 self._overlaps.append(steps)
             else:

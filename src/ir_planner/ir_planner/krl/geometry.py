@@ -122,6 +122,10 @@ class Arm:
         ]
         return found
 
+    def status_turn(self, q: FloatArray) -> tuple[int, int]:
+        """S and T of a configuration q (n,) [rad]."""
+        return status_turn(self.scene.chain, q)
+
     def configurations(self, poses: FloatArray, target: Target) -> list[FloatArray]:
         """All configurations (m, n) within the limits for each tool pose (N, 4, 4) in the target's
         base.

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -170,10 +170,13 @@ TORQUE = 0.98  # of the envelope: between samples it needs a little more
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """A curve and the law that drives it."""
+    """A curve and the law that drives it; tool: the pose (4, 4) [m] of what is led, in the
+    flange.
+    """
 
     curve: Curve
     law: TimeLaw
+    tool: FloatArray = field(default_factory=lambda: np.eye(4))
 
     def switches(self) -> IntArray:
         """Grid steps (M,) at which a trajectory needs points, ascending."""
@@ -287,20 +290,23 @@ def _excess(made: Move, limits: MotionLimits, scene: PlanningScene) -> float:
 
 _HALF = 0.5
 _TRIALS = 12
+_NEAR_SAMPLES = 129
 _SAMPLES_PER_S = 500
 _ROUNDING = 1.0 + 1e-9
 
 
-def overlap(before: Move, after: Move, blend: Blend, scene: PlanningScene) -> int:
+def overlap(before: Move, after: Move, blend: Blend, arm: Arm) -> int:
     """Grid steps that `after` may begin before `before` has ended; 0: it stops at the corner."""
+    onto = blend.onto if blend.onto is not None and after.curve.length > 0.0 else blend
     left = np.arange(before.law.ramp_down + 1)
     covered = 1.0 - before.law.at(before.law.total - left)[0]
     begun = np.arange(after.law.ramp_up + 1)
     reached = after.law.at(begun)[0]
     steps = min(
-        int(np.searchsorted(covered, _share(before, blend), side="right")) - 1,
-        int(np.searchsorted(reached, _share(after, blend), side="right")) - 1,
+        int(np.searchsorted(covered, _share(before, blend, arm, ends=True), side="right")) - 1,
+        int(np.searchsorted(reached, _share(after, onto, arm, ends=False), side="right")) - 1,
     )
+    scene = arm.scene
     names = scene.cell.robot.joint_names
     for _ in range(_TRIALS):
         if steps <= 0:
@@ -311,10 +317,32 @@ def overlap(before: Move, after: Move, blend: Blend, scene: PlanningScene) -> in
     return 0
 
 
-def _share(move: Move, blend: Blend) -> float:
-    """Of a move's s, that may lie in the blend."""
-    by_distance = blend.distance / move.curve.length if move.curve.length > 0.0 else 1.0
-    return _HALF * blend.share if blend.distance <= 0.0 else min(by_distance, _HALF)
+def _share(move: Move, blend: Blend, arm: Arm, *, ends: bool) -> float:
+    """Of a move's s, that may lie in the blend at its end or at its beginning."""
+    by_share = _HALF * blend.share
+    if not blend.distance < np.inf or by_share <= 0.0:
+        return by_share
+    if move.curve.length > 0.0:
+        return min(blend.distance / move.curve.length, by_share)
+    return min(_near(move, blend.distance, arm, ends=ends), by_share)
+
+
+def _near(move: Move, distance: float, arm: Arm, *, ends: bool) -> float:
+    """Share of the s of an axis motion in which its tool stays within `distance` [m] of its end, or
+    of its beginning.
+    """
+    share = np.linspace(0.0, _HALF, _NEAR_SAMPLES)
+    q = move.curve.at(1.0 - share if ends else share)[0]
+    places = portable.matmul(arm.flange(q), move.tool)[:, :3, 3]
+    away = np.linalg.norm(places - places[0], axis=1)
+    beyond = np.flatnonzero(away > distance)
+    if not len(beyond):
+        return _HALF
+    k = int(beyond[0])
+    if k == 0:
+        return 0.0
+    part = (distance - away[k - 1]) / (away[k] - away[k - 1])
+    return float(share[k - 1] + part * (share[k] - share[k - 1]))
 
 
 def _within(corner: JointTrajectory, scene: PlanningScene) -> bool:

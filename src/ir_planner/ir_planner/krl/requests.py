@@ -15,6 +15,8 @@ from ir_krl import (
     Place,
     PlcPause,
     SignalRange,
+    Source,
+    follow,
 )
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import TransitionTimes
@@ -26,6 +28,7 @@ from ir_planner.checks import Evaluation, evaluate_trajectory, total_report
 from ir_planner.errors import RequestError
 from ir_planner.krl.execution import DrivenStep, drive
 from ir_planner.krl.export import KrlExport, export
+from ir_planner.krl.geometry import Arm, tool_in_flange
 from ir_planner.krl.judged import judge_of
 from ir_planner.krl.places import posture_at, station_at
 from ir_planner.krl.surroundings import Surroundings, wires_of
@@ -172,6 +175,31 @@ def _evaluated(
 # What users ask: what a KRL program costs in the planner's cell, and a planned one as KRL.
 
 ASYNCHRONOUS = "asynchronous"
+
+
+def follow_krl(
+    planner: Planner,
+    sources: Sequence[Source],
+    *,
+    routine: str = "",
+    inputs: Mapping[int, bool] | None = None,
+    loop_passes: int = 1,
+    settings: Sequence[Source] = (),
+) -> Followed:
+    """A program followed as `ir_krl.follow` does, by the planner's robot: its home, its tool, where
+    its motions lead. Raises KrlError with the place.
+    """
+    cell = planner.cell
+    return follow(
+        sources,
+        cell.machine_home,
+        tool_in_flange(cell.tcp),
+        routine=routine,
+        inputs=inputs,
+        loop_passes=loop_passes,
+        settings=settings,
+        kinematics=Arm(planner.scene("")),
+    )
 
 
 def evaluate_krl(

@@ -372,4 +372,4 @@ def _speed(speeds: Speeds, length: float, turning: float) -> float:
 def _corner(blend: Blend | None, length: float) -> float:
     if blend is None:
         return 0.0
-    return min(blend.distance if blend.distance > 0.0 else 0.5 * blend.share * length, 0.5 * length)
+    return min(blend.distance, 0.5 * blend.share * length)

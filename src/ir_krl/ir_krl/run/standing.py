@@ -1,0 +1,117 @@
+"""Where the robot stands while a program is followed: $POS_ACT and $AXIS_ACT."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ir_description.poses import inverse, pose_of, rotation_from_abc
+from ir_krl.errors import Place
+from ir_krl.run.commands import Command, Motion, SplineBlock, Target
+from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES, Structure, Value, frame
+from ir_msgs_py.arrays import FloatArray
+
+_MM = 1e-3  # m
+AXES_NOW = ("$AXIS_ACT", "$AXIS_ACT_MEAS")
+PLACE_NOW = ("$POS_ACT", "$POS_ACT_MES")
+
+
+class Kinematics(Protocol):
+    """What of the robot decides where a motion ends."""
+
+    def flange(self, q: FloatArray) -> FloatArray:
+        """KUKA's flange (N, 4, 4) [m] in the robot's foot, of q (N, n) [rad]."""
+
+    def reached(self, target: Target, q: FloatArray, place: Place) -> FloatArray:
+        """The configuration (n,) that a motion from q (n,) to the target ends in."""
+
+    def status_turn(self, q: FloatArray) -> tuple[int, int]:
+        """S and T of q (n,)."""
+
+
+@dataclass
+class Standing:
+    """Where the commands so far have led from `home` (n,) [rad]."""
+
+    commands: Sequence[Command]
+    home: FloatArray
+    kinematics: Kinematics | None = None
+    _replayed: int = 0  # commands that `_q` stands behind
+    _q: FloatArray | None = None
+
+    def axes(self) -> Value | None:
+        """$AXIS_ACT; None where it isn't known."""
+        q = self._configuration()
+        if q is None:
+            return None
+        angles = dict(zip(AXIS_NAMES, map(float, np.degrees(q)), strict=True))
+        return Structure({**angles}, "E6AXIS")
+
+    def place(self, base: FloatArray, tool: FloatArray) -> Value | None:
+        """$POS_ACT with $BASE and $TOOL (4, 4) [m]; None where it isn't known."""
+        target = self._last()
+        if target is not None and _is_whole(target):
+            flange = _written(target)
+            known = {"S": target.status, "T": target.turn}
+            state: dict[str, Value] = {k: v for k, v in known.items() if v is not None}
+        else:
+            q = self._configuration()
+            if q is None or self.kinematics is None:
+                return None
+            flange = self.kinematics.flange(q[None])[0]
+            status, turn = self.kinematics.status_turn(q)
+            state = {"S": status, "T": turn}
+        found = frame(inverse(base) @ flange @ tool)
+        return Structure({**found.fields, **state}, "E6POS")
+
+    def _last(self) -> Target | None:
+        """Where the last motion leads; None before the first one, and where a circle ends by its
+        angle.
+        """
+        for command in reversed(self.commands):
+            if isinstance(command, Motion):
+                return None if command.angle is not None else command.target
+            if isinstance(command, SplineBlock):
+                return command.parts[-1].target
+        return None
+
+    def _configuration(self) -> FloatArray | None:
+        """Axes (n,) [rad], by the motions that were not looked at before."""
+        q = self.home if self._q is None else self._q
+        for command in self.commands[self._replayed :]:
+            for motion in _motions_of(command):
+                if motion.angle is not None:
+                    return None
+                if self.kinematics is not None:
+                    q = self.kinematics.reached(motion.target, q, motion.place)
+                elif motion.target.axes is None or motion.target.relative:
+                    return None
+                else:
+                    given = motion.target.axes
+                    q = np.array([given.get(n, q[j]) for j, n in enumerate(AXIS_NAMES)])
+        self._replayed = len(self.commands)
+        self._q = q
+        return q
+
+
+def _motions_of(command: Command) -> Sequence[Motion]:
+    if isinstance(command, SplineBlock):
+        return command.parts
+    return (command,) if isinstance(command, Motion) else ()
+
+
+def _is_whole(target: Target) -> bool:
+    """Whether a target says all of a frame."""
+    given = target.frame
+    return given is not None and not target.relative and len(given) == len(FRAME_NAMES)
+
+
+def _written(target: Target) -> FloatArray:
+    """The flange (4, 4) [m] in the foot at a target that says all of a frame."""
+    given = target.frame or {}
+    xyz = [_MM * given[name] for name in FRAME_NAMES[:3]]
+    pose = pose_of(xyz, rotation_from_abc([given[name] for name in FRAME_NAMES[3:]]))
+    return np.asarray(target.base @ pose @ inverse(target.tool))

@@ -1,0 +1,295 @@
+"""What a controller brings along: system variables, and data that every configuration has."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ir_krl.run.notes import Effect
+from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES, Array, Structure, Symbol, Value, frame
+from ir_msgs_py.arrays import FloatArray
+
+AXES = 6
+FULL = 100.0  # %
+TOOLS = 128  # numbers of TOOL_DATA and LOAD_DATA that a KR C4 has at most
+BASES = 128  # numbers of BASE_DATA
+MODELLED = frozenset(
+    (
+        "$VEL_AXIS",
+        "$ACC_AXIS",
+        "$VEL",
+        "$ACC",
+        "$APO",
+        "$OV_PRO",
+        "$TOOL",
+        "$BASE",
+        "$OUT",
+        "$ORI_TYPE",
+        "$ADVANCE",
+        "$LOAD",
+    )
+)
+"""System variables that motions follow from."""
+HARMLESS = frozenset(
+    (
+        "$BWDSTART",
+        "$H_POS",
+        "$GEAR_JERK",
+        "$COLLMON_TOL_PRO",
+        "$CIRC_TYPE",
+        "$JERK",
+        "$IPO_MODE",
+        "$ACT_TOOL",
+        "$ACT_BASE",
+        "$FLAG",
+        "$CYCFLAG",
+        "$TIMER",
+        "$TIMER_STOP",
+        "$LOOP_MSG",
+        "$LOOP_CONT",
+        "$MSG_T",
+        "$TORQMON",
+        "$TORQMON_DEF",
+        "$TORQMON_COM",
+        "$TORQMON_COM_DEF",
+        "$VEL_EXTAX",
+        "$ACC_EXTAX",
+        "$ERR",
+        "$SINGUL_POS",
+        "$ANOUT",
+        "$FCT_CALL",
+    )
+)
+"""Set by nearly every program; nothing here follows from them."""
+STANDING = frozenset(
+    (
+        "$POS_ACT",
+        "$AXIS_ACT",
+        "$POS_ACT_MES",
+        "$AXIS_ACT_MEAS",
+        "$POS_INT",
+        "$AXIS_INT",
+        "$POS_RET",
+        "$AXIS_RET",
+        "$POS_BACK",
+        "$AXIS_BACK",
+        "$POS_FOR",
+        "$AXIS_FOR",
+    )
+)
+"""Where the robot stands, or stood: known when a program is driven, not when it is followed."""
+STOPS_ADVANCE = STANDING | frozenset(
+    (
+        "$IN",
+        "$OUT",
+        "$ANIN",
+        "$ANOUT",
+        "$ALARM_STOP",
+        "$CURR_ACT",
+        "$DRIVES_OFF",
+        "$DRIVES_ON",
+        "$EM_STOP",
+        "$EXT",
+        "$AUT",
+        "$T1",
+        "$T2",
+        "$MODE_OP",
+        "$INPOSITION",
+        "$IN_HOME",
+        "$MOVE_ENABLE",
+        "$PERI_RDY",
+        "$POWER_FAIL",
+        "$ROB_STOPPED",
+        "$STOPMESS",
+        "$TORQUE_AXIS_ACT",
+        "$USER_SAF",
+        "$VEL_ACT",
+        "$VEL_AXIS_ACT",
+    )
+)
+"""System variables whose use stops the advance run: what is read is the state at that moment."""
+NULL: dict[str, Value] = dict.fromkeys(FRAME_NAMES, 0.0)
+DEFAULTS: dict[str, Value] = {
+    "DEF_ADVANCE": 3,
+    "DEF_VEL_PTP": 100,  # %
+    "DEF_ACC_PTP": 50,  # %
+    "DEF_ACC_SPTP": FULL,
+    "DEF_VEL_CP": 2.0,  # m/s
+    "DEF_VEL_ORI1": 200.0,  # deg/s
+    "DEF_VEL_ORI2": 200.0,
+    "DEF_VEL_ORIS": 200.0,
+    "DEF_VEL_FACT": 1.0,
+    "DEF_ACC_CP": 2.3,  # m/s^2
+    "DEF_ACC_ORI1": 100.0,  # deg/s^2
+    "DEF_ACC_ORI2": 100.0,
+    "DEF_ACC_ORIS": 200.0,
+    "DEF_APO_CPTP": 50,  # %
+    "DEF_APO_CDIS": 3.0,  # mm
+    "DEF_APO_CORI": 5.0,  # deg
+    "DEF_APO_CORIS": 80.0,
+    "DEF_APO_CVEL": 100,  # %
+    "DEF_CIRC_TYP": Symbol("BASE"),
+    "DEF_GEAR_JERK": 50.0,
+}
+"""Of the configuration file as a KR C4 is delivered with; a $config.dat that is given counts."""
+
+
+@dataclass(frozen=True)
+class Assumption:
+    """A value that the program doesn't bring: what is said of it where it is used."""
+
+    text: str
+    effect: Effect
+
+
+def _modes(mode: str) -> dict[str, Value]:
+    """What the operating mode T1, T2, AUT or EX makes of the variables that tell it."""
+    return {
+        "$MODE_OP": Symbol(mode),
+        "$T1": mode == "T1",
+        "$T2": mode == "T2",
+        "$AUT": mode == "AUT",
+        "$EXT": mode == "EX",
+    }
+
+
+SITUATION: dict[str, Value] = {
+    **_modes("AUT"),
+    "$ALARM_STOP": True,
+    "$CURR_ACT": Array({(n,): 0.0 for n in range(1, 2 * AXES + 1)}),
+    "$DATE": Structure(
+        {"CSEC": 0, "SEC": 0, "MIN": 0, "HOUR": 12, "DAY": 1, "MONTH": 1, "YEAR": 2020}
+    ),
+    "$DRIVES_OFF": False,
+    "$DRIVES_ON": True,
+    "$EM_STOP": False,
+    "$INPOSITION": True,
+    "$IN_HOME": True,
+    "$IN_HOME1": False,
+    "$IN_HOME2": False,
+    "$IN_HOME3": False,
+    "$IN_HOME4": False,
+    "$IN_HOME5": False,
+    "$I_O_ACT": True,
+    "$I_O_ACTCONF": True,
+    "$KCP_CONNECT": True,
+    "$MOVE_ENABLE": True,
+    "$NEAR_POSRET": True,
+    "$ON_PATH": True,
+    "$OV_ROB": FULL,
+    "$PERI_RDY": True,
+    "$POWER_FAIL": False,
+    "$PRO_ACT": True,
+    "$PRO_MODE": Symbol("GO"),
+    "$PRO_MODE1": Symbol("GO"),
+    "$PRO_MOVE": True,
+    "$PRO_STATE": Symbol("P_ACTIVE"),
+    "$PRO_STATE0": Symbol("P_ACTIVE"),
+    "$PRO_STATE1": Symbol("P_ACTIVE"),
+    "$ROB_CAL": True,
+    "$ROB_STOPPED": True,
+    "$ROBRUNTIME": 0,
+    "$SOFTPLCBOOL": Array({(n,): False for n in range(1, 1025)}),
+    "$SOFTPLCINT": Array({(n,): 0 for n in range(1, 1025)}),
+    "$SOFTPLCREAL": Array({(n,): 0.0 for n in range(1, 1025)}),
+    "$STOPMESS": False,
+    "$TORQUE_AXIS_ACT": Array({(n,): 0.0 for n in range(1, 2 * AXES + 1)}),
+    "$USER_SAF": True,
+    "$VEL_ACT": 0.0,
+}
+"""How a controller stands that runs its program in automatic mode, without a fault."""
+FACTS: dict[str, Value] = {
+    "$ADAP_ACC": Symbol("STEP1"),
+    "$EX_AX_NUM": 0,
+    "$KINCLASS": Symbol("STANDARD"),
+    "$NUM_AX": AXES,
+    "$TCP_IPO": True,
+    "$VEL_MA": Structure({"CP": 3.0, "ORI1": 400.0, "ORI2": 400.0}),
+    "$ERR": Structure({"NUMBER": 0}),
+    "$BWDSTART": False,
+    "$NULLFRAME": Structure(dict(NULL)),
+    "$WORLD": Structure(dict(NULL)),
+    "$ROBROOT": Structure(dict(NULL)),
+    "FALSE": False,
+    "TRUE": True,
+}
+"""Of every six-axis robot of this make that stands in the origin of its world."""
+
+
+def mode_variables(name: str, value: Value) -> dict[str, Value]:
+    """What follows for the other variables where one that tells the operating mode is set."""
+    if name == "$MODE_OP" and isinstance(value, Symbol):
+        return _modes(value.name)
+    told = {"$T1": "T1", "$T2": "T2", "$AUT": "AUT", "$EXT": "EX"}
+    return _modes(told[name]) if name in told and value is True else {}
+
+
+def system_variables(home: FloatArray, tool: FloatArray) -> dict[str, Value]:
+    """Variables at the start: `home` (6,) [rad] is XHOME, `tool` (4, 4) [m] in the flange every
+    tool number whose data the program doesn't bring.
+    """
+    angles: dict[str, Value] = {
+        name: float(angle) for name, angle in zip(AXIS_NAMES, np.degrees(home), strict=True)
+    }
+    tool_frame = frame(tool)
+    turning = {"ORI1": DEFAULTS["DEF_VEL_ORI1"], "ORI2": DEFAULTS["DEF_VEL_ORI2"]}
+    turning_up = {"ORI1": DEFAULTS["DEF_ACC_ORI1"], "ORI2": DEFAULTS["DEF_ACC_ORI2"]}
+    percent: dict[str, Value] = {"VEL": FULL, "ACC": FULL, "APO_DIST": FULL}
+    path: dict[str, Value] = {**percent, "VEL": 2.0, "APO_FAC": 50.0, "ORI_TYP": Symbol("VAR")}
+    return {
+        **DEFAULTS,
+        **SITUATION,
+        **FACTS,
+        "$VEL_AXIS": all_axes(FULL),
+        "$ACC_AXIS": all_axes(FULL),
+        "$VEL": Structure({"CP": DEFAULTS["DEF_VEL_CP"], **turning}),
+        "$ACC": Structure({"CP": DEFAULTS["DEF_ACC_CP"], **turning_up}),
+        "$APO": Structure({"CPTP": 0.0, "CDIS": 0.0, "CORI": 0.0, "CVEL": 0.0}),
+        "$GEAR_JERK": all_axes(FULL),
+        "$OV_PRO": FULL,
+        "$ADVANCE": 3,
+        "$TOOL": tool_frame,
+        "$BASE": Structure(dict(NULL)),
+        "$IPO_MODE": Symbol("BASE"),
+        "TOOL_DATA": Array({(n,): tool_frame.copied() for n in range(1, TOOLS + 1)}),
+        "LOAD_DATA": Array({(n,): Structure({}, "LOAD") for n in range(1, TOOLS + 1)}),
+        "BASE_DATA": Array({(n,): Structure(dict(NULL)) for n in range(1, BASES + 1)}),
+        "XHOME": Structure(dict(angles), "E6AXIS"),
+        "$H_POS": Structure(dict(angles), "E6AXIS"),
+        "PDEFAULT": Structure({**percent, "APO_MODE": Symbol("CDIS"), "GEAR_JERK": 50.0}, "PDAT"),
+        "LDEFAULT": Structure({**path, "AXIS_VEL": FULL, "AXIS_ACC": FULL}, "LDAT"),
+        "FHOME": Structure({"TOOL_NO": 1, "BASE_NO": 0, "IPO_FRAME": Symbol("BASE")}, "FDAT"),
+        "$OUT": Array(),
+    }
+
+
+def assumed_variables() -> dict[str, Assumption]:
+    """Those of `system_variables` that a controller may have otherwise, by name or name[index]."""
+    found = {
+        name: Assumption(f"{name} is taken as {_spelled(value)}: --set '{name}=…'", Effect.MOTIONS)
+        for name, value in SITUATION.items()
+    }
+    home = "isn't in the files: the cell's home"
+    found["XHOME"] = Assumption(f"XHOME {home}", Effect.PLACES)
+    found["$H_POS"] = Assumption(f"$H_POS {home}", Effect.PLACES)
+    found["$TOOL"] = Assumption("no $TOOL is chosen: the cell's tool", Effect.PLACES)
+    found["$BASE"] = Assumption("no $BASE is chosen: the robot's foot", Effect.PLACES)
+    for n in range(1, TOOLS + 1):
+        text = f"TOOL_DATA[{n}] isn't in the files: the cell's tool"
+        found[f"TOOL_DATA[{n}]"] = Assumption(text, Effect.PLACES)
+    for n in range(1, BASES + 1):
+        text = f"BASE_DATA[{n}] isn't in the files: the robot's foot"
+        found[f"BASE_DATA[{n}]"] = Assumption(text, Effect.PLACES)
+    return found
+
+
+def all_axes(value: float) -> Array:
+    """The same of every axis."""
+    return Array({(n,): value for n in range(1, AXES + 1)})
+
+
+def _spelled(value: Value) -> str:
+    if isinstance(value, bool):
+        return "TRUE" if value else "FALSE"
+    return str(value) if isinstance(value, int | float | str | Symbol) else "at rest"
