@@ -164,7 +164,7 @@ class Rungs:
         return self.rungs[rung]
 
     def rates(self, rung: int) -> Rates:
-        return Rates(0.0, 1.0) if rung == FASTEST else Rates(1.0, LADDER[rung])
+        return Rates(0.0, 1.0) if rung == FASTEST else Rates(1.0, 500.0 * LADDER[rung])
 
     def from_others(self, rung: int, known: dict[Part, Movement]) -> dict[Part, Movement]:
         self.asked[rung] = known[ACROSS_PART]

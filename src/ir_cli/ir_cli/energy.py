@@ -25,7 +25,14 @@ from ir_cli.planning import add_cell, planner_of, sentences
 from ir_description import load_cell, load_power_parameters, power_parameters_to_yaml
 from ir_recorder import analyse, read_recording
 from ir_recorder.analysis.indirect import agreement
-from ir_recorder.fit import Source, fit, fit_data, parameter_rows, write_fit_picture
+from ir_recorder.fit import (
+    Source,
+    fit,
+    fit_data,
+    parameter_rows,
+    source_cell,
+    write_fit_picture,
+)
 from ir_recorder.fit import sentences as fit_sentences
 from ir_recorder.report.files import write_output
 from ir_recorder.traces import read_mapping
@@ -166,7 +173,6 @@ def run_compare(arguments: argparse.Namespace) -> int:
 def run_fit(arguments: argparse.Namespace) -> int:
     """Fit, write the file and the picture, print what was found."""
     with sentences():
-        prior = load_power_parameters(arguments.power_parameters)
         cell = load_cell(arguments.cell) if arguments.cell else None
     motion = arguments.mapping
     meter = arguments.meter_mapping
@@ -178,6 +184,8 @@ def run_fit(arguments: argparse.Namespace) -> int:
         cell,
         arguments.load,
     )
+    with sentences():
+        prior = load_power_parameters(arguments.power_parameters, source_cell(source).robot)
     data = fit_data(source, prior)
     found = fit(data.samples, data.model, prior, arguments.name)
     page = power_parameters_to_yaml(found.parameters, f"fit on {arguments.motion.name}")
@@ -222,7 +230,7 @@ def run_excite(arguments: argparse.Namespace) -> int:
 
     with sentences():
         planner = planner_of(arguments.cell)
-        prior = load_power_parameters(arguments.power_parameters)
+        prior = load_power_parameters(arguments.power_parameters, planner.cell.robot)
         asked = ExcitationRequest(
             arguments.seconds,
             arguments.postures,

@@ -23,7 +23,6 @@ from ir_description import (
     Load,
     PowerParameters,
     load_cell,
-    load_power_data,
 )
 from ir_description.files import read_regular_file
 from ir_msgs_py.arrays import FloatArray
@@ -326,7 +325,7 @@ class ExcitationRequest:
 def plan_programme(planner: Planner, prior: PowerParameters, asked: ExcitationRequest) -> Programme:
     """The programme of a cell; CommandError where nothing in it can move."""
     cell = planner.cell
-    link = load_power_data(prior.controller).dc_link
+    link = cell.robot.controller.dc_link
     design = Design(PowerModel(cell.robot, link, cell.base_pose, prior), prior)
     loads = load_texts(planner)
     places = postures(planner, loads[-1], asked.margin, asked.postures, asked.seed)
@@ -339,7 +338,8 @@ def plan_programme(planner: Planner, prior: PowerParameters, asked: ExcitationRe
     if not pool:
         raise CommandError(f"no excursion from {len(places)} postures of {cell.name} is certified")
     held = {load: planner.scene(load).loads for load in loads}
-    modes = [mode for mode in MODES if mode != DEEP or asked.hibernate]
+    known = [mode for mode in MODES if mode in prior.modes]
+    modes = [mode for mode in known if mode != DEEP or asked.hibernate]
     for mode in modes:
         design.rest(mode, held[loads[0]], STAY, places[0])
     chosen = design.choose(pool, [design.of(each, held[each.load]) for each in pool], asked.seconds)

@@ -18,7 +18,7 @@ from ir_description import DescriptionError, UnknownNameError, load_cell
 from ir_krl import KrlError
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
-from ir_msgs_py.options import OBJECTIVES, PlanOptions
+from ir_msgs_py.options import OBJECTIVES, ROBOTS_TIME_VALUE, PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.savings import one_sided
 from ir_planner import Goal, Planner, PlannerSettings, RequestError, parse_goal
@@ -123,7 +123,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_margin(parser)
     parser.add_argument("--objective", choices=OBJECTIVES, default="time_and_energy")
     parser.add_argument(
-        "--time-value", type=float, default=500.0, metavar="W", help="worth of a second (500)"
+        "--time-value",
+        type=float,
+        default=ROBOTS_TIME_VALUE,
+        metavar="W",
+        help="worth of a second (the robot's own: ir robot check; 500 for the KR 210)",
     )
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument(

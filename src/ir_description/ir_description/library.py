@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from ir_description.cell import Cell
 from ir_description.files import (
     bundled_controller,
+    bundled_controllers,
     cell_errors,
     is_path,
     path_from_yaml,
@@ -104,12 +105,19 @@ def power_marks(name: str = "kr_c4") -> Mapping[str, str]:
     return load_power_data(name).marks
 
 
-def load_power_parameters(name_or_path: str = DATA_SHEET) -> PowerParameters:
-    """Return the parameters of a file by its path; "data_sheet" or "": those of the bundled
-    data.
+def load_power_parameters(
+    name_or_path: str = DATA_SHEET, robot: RobotModel | None = None
+) -> PowerParameters:
+    """Return the parameters of a file by its path; "data_sheet" or "": those of the data of the
+    robot, None: the bundled KR 210's. A file of a robot that is not bundled needs that robot.
     """
     if name_or_path in ("", DATA_SHEET):
-        return data_sheet()
+        return data_sheet() if robot is None else data_sheet_of(robot, robot.controller)
+    return power_parameters_of(read_power_parameters(name_or_path), name_or_path, robot)
+
+
+def read_power_parameters(name_or_path: str) -> str:
+    """Return the text of a file of power parameters, not yet understood."""
     if not is_path(name_or_path):
         raise UnknownNameError(
             "power parameters", name_or_path, (DATA_SHEET, "the path of a .yaml file")
@@ -118,16 +126,42 @@ def load_power_parameters(name_or_path: str = DATA_SHEET) -> PowerParameters:
         content = read_regular_file(Path(name_or_path), PARAMETER_BYTES_MAX)
     except InvalidValueError as error:
         raise RobotFileError(shown(name_or_path)[1:-1], 0, str(error)) from error
-    text = text_of(content, name_or_path, RobotFileError)
-    return power_parameters_from_yaml(text, name_or_path, data_sheet)
+    return text_of(content, name_or_path, RobotFileError)
+
+
+def power_parameters_of(text: str, source: str, robot: RobotModel | None) -> PowerParameters:
+    """Return the parameters that a text describes of a robot, or (None, or another robot's) of a
+    bundled one; errors name source and line.
+    """
+
+    def start(name: str, controller: str) -> PowerParameters:
+        if robot is None or (name in bundled_robots() and name != robot.name):
+            return data_sheet(name, controller)
+        if name != robot.name:
+            raise InvalidValueError(
+                f"its parameters are of robot {name}: the cell has {robot.name}"
+            )
+        if controller == robot.controller.name:
+            return data_sheet_of(robot, robot.controller)
+        if controller not in bundled_controllers():
+            raise InvalidValueError(
+                f"its parameters are of {name} with controller {controller}: the cell's has "
+                f"{robot.controller.name}"
+            )
+        return data_sheet_of(robot, load_power_data(controller))
+
+    return power_parameters_from_yaml(text, source, start)
 
 
 @cache
-def data_sheet(robot: str = "kr210_r2700_extra", controller: str = "kr_c4") -> PowerParameters:
-    """Return the parameters as the data of a bundled robot and controller have them, with the
-    deviations that their marks of confidence give.
+def data_sheet(robot: str = "kr210_r2700_extra", controller: str = "") -> PowerParameters:
+    """Return the parameters as the data of a bundled robot and controller ("": the robot's own)
+    have them, with the deviations that their marks of confidence give.
     """
-    return data_sheet_of(load_robot(robot), load_power_data(controller))
+    model = load_robot(robot)
+    if controller in ("", model.controller.name):
+        return data_sheet_of(model, model.controller)
+    return data_sheet_of(model, load_power_data(controller))
 
 
 def data_sheet_of(robot: RobotModel, power: PowerData) -> PowerParameters:

@@ -9,6 +9,8 @@ from ir_values.errors import InvalidValueError
 
 OBJECTIVES = ("movement_cost", "time", "energy", "time_and_energy")
 TIMINGS = ("synchronous", "asynchronous")
+ROBOTS_TIME_VALUE = -1.0
+"""The time_value of who leaves it to the robot: its price of a second follows from its drives."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,8 +19,8 @@ class PlanOptions:
 
     planner_id: "" = the node's portfolio. random_seed: draw a seed and echo it. max_iterations:
     budget in work, 0 = the node's default. planning_time: ceiling [s]. safety_distance: S_m [m].
-    time_value [W] in J = energy of the drives + time_value x T, without the base load. duration:
-    wanted [s], 0 = free. velocity_scaling, acceleration_scaling in (0, 1].
+    time_value [W] in J = energy of the drives + time_value x T, without the base load; -1: the
+    robot's own. duration: wanted [s], 0 = free. velocity_scaling, acceleration_scaling in (0, 1].
     load: load text, "" = what is attached. include_points: put the points into the answer.
     """
 
@@ -29,7 +31,7 @@ class PlanOptions:
     planning_time: float = 5.0
     safety_distance: float = 0.02
     objective: str = "time_and_energy"
-    time_value: float = 500.0
+    time_value: float = ROBOTS_TIME_VALUE
     duration: float = 0.0
     timing: str = "synchronous"
     velocity_scaling: float = 1.0
@@ -48,7 +50,10 @@ class PlanOptions:
             raise InvalidValueError(
                 f"planning_time is {planning_time:g} s: it must be more than 0 s"
             )
-        for name, unit in (("safety_distance", "m"), ("time_value", "W"), ("duration", "s")):
+        asked = [("safety_distance", "m"), ("time_value", "W"), ("duration", "s")]
+        if self.time_value == ROBOTS_TIME_VALUE:
+            asked.remove(("time_value", "W"))
+        for name, unit in asked:
             set_field(self, name, at_least(getattr(self, name), 0.0, name, unit))
         one_of(self.objective, OBJECTIVES, "objective")
         one_of(self.timing, TIMINGS, "timing")

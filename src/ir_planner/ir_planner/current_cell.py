@@ -4,7 +4,15 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from threading import Lock
 
-from ir_description import Cell, PowerData, cell_from_yaml, cell_hash, cell_in, load_cell
+from ir_description import (
+    Cell,
+    PowerData,
+    RobotModel,
+    cell_from_yaml,
+    cell_hash,
+    cell_in,
+    load_cell,
+)
 from ir_msgs_py.announcements import DATA, DRIVER, CarriedLoad, ControllerTimers, MachineState
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import TransitionTimes
@@ -73,15 +81,15 @@ def read_cell_here(cell_yaml: str, cell_file: str) -> Cell:
 class CurrentCell:
     """Holds one immutable cell after the other; a scene that was taken never changes.
 
-    heard: what the driver says. drives: asked for each scene, what is assumed of them. power: the
-    controller's figures, None: those of the cell's robot. Changes wait for each other, readers for
-    none: a cell is replaced when it is read and its models are built.
+    heard: what the driver says. drives: asked for each scene, what is assumed of those of a robot.
+    power: the controller's figures, None: those of the cell's robot. Changes wait for each other,
+    readers for none: a cell is replaced when it is read and its models are built.
     """
 
     def __init__(
         self,
         heard: Heard,
-        drives: Callable[[], Drives],
+        drives: Callable[[RobotModel], Drives],
         power: PowerData | None = None,
         read: ReadCell = read_cell_here,
     ) -> None:
@@ -167,18 +175,19 @@ class CurrentCell:
 
     def power(self, cell: Cell) -> PowerData:
         """The figures of a cell's controller as planned with, with the timer that counts."""
-        return self._heard.of(self._drives().power(self._power or cell.robot.controller))
+        return self._heard.of(self._drives(cell.robot).power(self._power or cell.robot.controller))
 
     def _key(self, load: str, cell: Cell) -> _Key:
         return (
             load,
             self._heard.doors(cell),
-            self._drives(),
+            self._drives(cell.robot),
             self.power(cell).motors_to_brakes_in_program,
         )
 
     def _scene_of(self, cell: Cell, load: str, doors: Doors) -> PlanningScene:
-        scene = scene_with(cell_in(cell, dict(doors)), load, self.power(cell), self._drives())
+        drives = self._drives(cell.robot)
+        scene = scene_with(cell_in(cell, dict(doors)), load, self.power(cell), drives)
         return replace(scene, cell_hash=self.hash_of(cell), doors=doors)
 
     def _replaced_by(self, cell: Cell) -> Cell:

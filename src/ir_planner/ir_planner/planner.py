@@ -149,7 +149,9 @@ class Planner:
         self.clock = clock
         self.settings = settings or PlannerSettings()
         self.heard = Heard(lambda: self.settings.transitions)
-        self._current = CurrentCell(self.heard, lambda: self.settings.drives, power, read_cell)
+        self._current = CurrentCell(
+            self.heard, lambda robot: self.settings.drives(robot), power, read_cell
+        )
         megabytes = self.settings.stored_megabytes
         self.trajectories = trajectory_store(self.settings.stored_trajectories, megabytes)
         self.programs = program_store(self.settings.stored_programs, megabytes)

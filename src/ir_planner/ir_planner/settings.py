@@ -2,10 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from typing import cast
 
-from ir_description import load_power_parameters
+from ir_description import (
+    DATA_SHEET,
+    RobotModel,
+    power_parameters_of,
+    read_power_parameters,
+)
 from ir_kernels.power import Regeneration
 from ir_msgs_py.modes import TransitionTimes
 from ir_planner.configurations import InteractionSettings
@@ -14,6 +19,8 @@ from ir_planner.search import Search, registered
 from ir_planner.service import ModifiedGa
 from ir_values.files import FileRoots
 from ir_values.settings import check_settings, setting, stage
+
+_FILES = 64  # of power parameters that are remembered
 
 
 @dataclass(frozen=True)
@@ -104,13 +111,21 @@ class PlannerSettings:
         """The folders below which set_cell reads files."""
         return FileRoots.of(self.roots)
 
-    @property
-    def drives(self) -> Drives:
-        """What is assumed of the drives. Raises DescriptionError for parameters that can't be
-        read.
+    def drives(self, robot: RobotModel) -> Drives:
+        """What is assumed of a robot's drives. Raises DescriptionError for parameters that can't be
+        read, or are those of a robot that is neither this one nor bundled.
         """
-        parameters = _parameters(self.power_parameters) if self.power_parameters else None
+        parameters = None
+        if self.power_parameters not in ("", DATA_SHEET):
+            text = power_parameters_text(self.power_parameters)
+            parameters = _parameters(text, self.power_parameters, robot)
         return Drives(cast(Regeneration, self.regeneration), self.torque_reserve, parameters)
 
+    def read(self) -> None:
+        """Read the file of power parameters, which is needed no more from now on."""
+        if self.power_parameters not in ("", DATA_SHEET):
+            power_parameters_text(self.power_parameters)
 
-_parameters = cache(load_power_parameters)  # a file is read once
+
+power_parameters_text = lru_cache(_FILES)(read_power_parameters)  # a file is read once
+_parameters = lru_cache(_FILES)(power_parameters_of)

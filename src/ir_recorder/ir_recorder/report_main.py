@@ -9,7 +9,12 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from ir_description import DescriptionError, PowerParameters, load_power_parameters
+from ir_description import (
+    DescriptionError,
+    PowerParameters,
+    cell_from_yaml,
+    load_power_parameters,
+)
 from ir_recorder.analysis import Analysis, analyse, findings
 from ir_recorder.analysis.meter import with_meter
 from ir_recorder.arguments import add_roots, roots_of
@@ -82,12 +87,12 @@ def run(options: argparse.Namespace) -> int:
 def _analyses(options: argparse.Namespace, roots: FileRoots) -> list[Analysis]:
     """The recordings asked for; one of a folder that can't be read is named and left out."""
     analyses = []
-    parameters = _parameters(options.power_parameters)
     for path, named in _paths(options.files, roots):
         try:
             recording = read_recording(path, roots, namespace=options.namespace)
             if not named and is_further_part(path, recording.fact(contents.PART)):
                 continue  # its first file has given all
+            parameters = _parameters(options.power_parameters, recording)
             analysis = analyse(_metered(recording, options, roots), parameters)
         except ReadError as error:
             if named:
@@ -125,9 +130,14 @@ def _paths(files: Sequence[str], roots: FileRoots) -> list[tuple[Path, bool]]:
     return paths
 
 
-def _parameters(path: str) -> PowerParameters | None:
+def _parameters(path: str, recording: Recording) -> PowerParameters | None:
+    """Those of a file, of the robot of the recording's cell where it carries one."""
+    if not path:
+        return None
     try:
-        return load_power_parameters(path) if path else None
+        carried = recording.cell_yaml
+        robot = cell_from_yaml(carried, "the attached cell").robot if carried else None
+        return load_power_parameters(path, robot)
     except DescriptionError as error:
         raise RecorderError(str(error)) from error
 

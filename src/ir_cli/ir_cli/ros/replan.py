@@ -161,7 +161,7 @@ class RecordedPlanner:
             file.write(text)
         try:
             settings = _with(settings, {"power_parameters": file.name})
-            _ = settings.drives  # read now, and once
+            settings.read()
             return settings
         finally:
             Path(file.name).unlink()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -54,6 +55,9 @@ class Counterbalance:
 
 
 _NOT_IN_DATA = ("iron_loss", "inverter_loss", "gear_loss", "idle_loss")
+
+
+_TIME_SHARE = 8.94e-3  # of the drives' peak power: 500 W of the KR 210 R2700 extra's 55.9 kW
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,6 +165,18 @@ class RobotModel:
     def n(self) -> int:
         """Number of joints."""
         return len(self.joint_names)
+
+    @cached_property
+    def peak_watts(self) -> float:
+        """W of all drives together at peak torque and full speed: the size of a robot's powers."""
+        return float((self.envelope_torque[:, 0] * self.velocity_max).sum())
+
+    @cached_property
+    def time_value(self) -> float:
+        """W that a second is worth where a request does not say: a share of `peak_watts`, in two
+        digits; 500 W for the KR 210 R2700 extra.
+        """
+        return float(f"{_TIME_SHARE * self.peak_watts:.2g}")
 
     def _check_signs(self) -> None:
         positive = ("velocity_max", "acceleration_max", "jerk_max", "link_mass", "gear_ratio")

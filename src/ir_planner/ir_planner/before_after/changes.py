@@ -26,7 +26,10 @@ def peak_interval(steps: Sequence[PlannedMovement], request: ProgramRequest) -> 
         if step.trajectory is None or step.report.peak_power < _NEAR * peak:
             continue
         scene = scene_with(
-            request.cell, step.load or "none", request.power, request.settings.drives
+            request.cell,
+            step.load or "none",
+            request.power,
+            request.settings.drives(request.cell.robot),
         )
         if scene.parameters is None:
             continue
@@ -116,7 +119,7 @@ def side_of(
     name: str, cycle_time: float, program: Costed, request: ProgramRequest, saved: Saving
 ) -> Side:
     """A side with the intervals of its energies and its power over time."""
-    parameters = request.settings.drives.parameters
+    parameters = request.settings.drives(request.cell.robot).parameters
     steps = tuple(
         replace(step, report=replace(step.report, energy_low=within.low, energy_high=within.high))
         for step, added in zip(program.steps, program.added, strict=True)
@@ -185,7 +188,10 @@ def _power(
         joules = spent[-1]
         if step.trajectory is not None:
             scene = scene_with(
-                request.cell, step.load or "none", request.power, request.settings.drives
+                request.cell,
+                step.load or "none",
+                request.power,
+                request.settings.drives(request.cell.robot),
             )
             energy = movement_energy(step.trajectory, scene)
             shares = np.cumsum(energy.watts) * (step.report.energy / max(energy.watts.sum(), 1e-9))

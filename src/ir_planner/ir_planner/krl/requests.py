@@ -263,9 +263,7 @@ def export_krl(
             "synchronous",
         )
     scene = planner.scene("")
-    judge = judge_of(
-        movements, planner.cell, scene.power, planner.settings.drives, chosen.safety_distance
-    )
+    judge = judge_of(movements, planner.cell, scene.power, scene.drives, chosen.safety_distance)
     try:
         return export(
             movements,

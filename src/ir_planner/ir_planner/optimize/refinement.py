@@ -129,7 +129,7 @@ EXACT = Effort(
 
 Near = Callable[[Movement, Context], Movement | None]  # by descent from a known movement
 # W: what a second is worth at first, and by how much less or more then
-_FIRST = 16_000.0
+_FIRST = 32.0  # times the price of a second
 _STEP = 4.0
 _DESCENTS = 5
 _ENOUGH = 0.985  # of the duration: slower would save little more than stretching does
@@ -142,7 +142,7 @@ def within_duration(fastest: Movement, context: Context, near: Near) -> Movement
     requested = context.options.duration
     best = None
     known = fastest
-    value = _FIRST
+    value = _FIRST * context.scene.cell.robot.time_value
     late = 0.0
     early = 0.0
     for _ in range(_DESCENTS):

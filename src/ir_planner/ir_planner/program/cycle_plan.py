@@ -13,7 +13,7 @@ from ir_planner.program.choice import Choice, Found, Steps
 from ir_planner.program.movements import rates_of
 from ir_planner.program.request import Progress, StageError
 from ir_planner.program.station_graph import Chain, Part
-from ir_planner.program.time_values import FASTEST, LADDER, Point, SlowDown, TimeValues, slow_downs
+from ir_planner.program.time_values import FASTEST, Point, SlowDown, TimeValues, slow_downs
 from ir_planner.request import DURATION_MAX
 from ir_planner.timing import Movement
 
@@ -231,7 +231,7 @@ def timed_choice(  # noqa: C901
             second = _tried(other, seconds, standing, rung)
             best = second if second.energy < first.energy else first
         if rung != FASTEST:
-            bound = max(bound, best.bound(other.chain, LADDER[rung], seconds))
+            bound = max(bound, best.bound(other.chain, choice.ladder.rates(rung).second, seconds))
     if best.timed is None:
         best = _fastest(best, seconds, standing, progress)
     if best.timed is None:

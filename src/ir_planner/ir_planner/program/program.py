@@ -249,7 +249,7 @@ def prepared(request: ProgramRequest, journal: Journal) -> tuple[Route, Context]
     check_searches(cell, [placed.step for placed in steps], request.settings.searches)
     settings = request.settings
     bare = request.options.load == NO_LOAD
-    scenes = Scenes(cell, request.power, settings.drives, bare)
+    scenes = Scenes(cell, request.power, settings.drives(cell.robot), bare)
     context = Context(scenes.of(cell.parts_at_start()), request.options, journal)
     if request.cycle_time > 0.0 and request.options.objective == "energy":
         context = at_the_mains(context)

@@ -48,7 +48,9 @@ class Spreads:
     def _scene(self, load: str) -> PlanningScene:
         if load not in self._scenes:
             r = self._request
-            self._scenes[load] = scene_with(r.cell, load or "none", r.power, r.settings.drives)
+            self._scenes[load] = scene_with(
+                r.cell, load or "none", r.power, r.settings.drives(r.cell.robot)
+            )
         return self._scenes[load]
 
     def _moved(self, step: PlannedMovement) -> FloatArray:

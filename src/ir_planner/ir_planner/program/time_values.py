@@ -22,15 +22,18 @@ from ir_planner.timing import Movement
 # Along service lines, which hardly change with the value, they are those of the searched rungs,
 # slowed down.
 
-_LEAST = 250.0  # W: a second less of moving and more of waiting on brakes saves more than that
+# times the robot's price of a second: a second less of moving and more of waiting on brakes saves
+# more than that
+_LEAST = 0.5
 # between two rungs: a mixture of neighbours is within about a percent of the rung between
 _STEP = float(np.sqrt(2.0))
-# up to 181 kW: from 22 kW on movements are within a percent of the fastest, but a cycle just above
-# the shortest lies there, and the last of that percent costs more than anything before
+# up to 362 times (a KR 210: 181 kW): from 45 times on movements are within a percent of the
+# fastest, but a cycle just above the shortest lies there, and the last of that percent costs more
+# than anything before
 _RUNGS = 20
 LADDER = tuple(float(_LEAST * portable.power(_STEP, k)) for k in range(_RUNGS))
 FASTEST = _RUNGS  # the rung on which time alone counts
-_MIDDLE = 8  # 4 kW
+_MIDDLE = 8  # 8 times: 4 kW
 _REACH = 3.01  # rungs: paths change little over three times the value, and above the middle
 _SAME = 1e-6  # rungs
 
@@ -54,7 +57,8 @@ class Ladder:
         self.improvement = improvement
         self._rungs: dict[tuple[int, int], Movements] = {}
         rates = rates_of(own.context)
-        value = rates.second / rates.joule if rates.joule else np.inf
+        price = own.context.scene.cell.robot.time_value
+        value = rates.second / rates.joule / price if rates.joule else np.inf
         searched = own.context.options.objective != "movement_cost"
         place = (
             float((portable.log(value) - portable.log(_LEAST)) / portable.log(_STEP))
@@ -94,7 +98,10 @@ class Ladder:
         own = self.own.context
         if rung == FASTEST:
             return own.asking("time")
-        asked = replace(own.asking("time_and_energy").options, time_value=LADDER[rung])
+        robot = own.scene.cell.robot
+        asked = replace(
+            own.asking("time_and_energy").options, time_value=LADDER[rung] * robot.time_value
+        )
         return replace(own, options=asked)
 
     def rates(self, rung: int) -> Rates:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.options import ROBOTS_TIME_VALUE, PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import extremes
@@ -57,7 +57,8 @@ def checked_options(options: PlanOptions) -> tuple[PlanOptions, str]:
     else).
     """
     safety_distance(options.safety_distance)
-    bounded(options.time_value, 0.0, TIME_VALUE_MAX, "time_value", "W")
+    if options.time_value != ROBOTS_TIME_VALUE:
+        bounded(options.time_value, 0.0, TIME_VALUE_MAX, "time_value", "W")
     if options.duration != 0.0:  # 0: free
         bounded(options.duration, DURATION_MIN, DURATION_MAX, "duration", "s")
     bounded(options.velocity_scaling, SCALING_MIN, 1.0, "velocity_scaling")

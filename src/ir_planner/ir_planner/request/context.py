@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.options import ROBOTS_TIME_VALUE, PlanOptions
 from ir_msgs_py.report import PlanningInfo, PlanningStage, Rejection
 from ir_msgs_py.search_log import ConfigurationLog, SearchLog, stage_of
 from ir_planner.errors import CancelledError
@@ -132,7 +132,8 @@ def noted(info: PlanningInfo, note: str, about: str = "options") -> PlanningInfo
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """scene: where the robot moves. options: as they were checked. journal: what happened so far;
+    """scene: where the robot moves. options: as they were checked, with the robot's own price of a
+    second where none was given. journal: what happened so far;
     it counts the work. station: whose allowed contacts hold in its zone; "": nobody's.
     """
 
@@ -140,6 +141,11 @@ class Context:
     options: PlanOptions
     journal: Journal
     station: str = ""
+
+    def __post_init__(self) -> None:
+        if self.options.time_value == ROBOTS_TIME_VALUE:
+            options = replace(self.options, time_value=self.scene.cell.robot.time_value)
+            object.__setattr__(self, "options", options)
 
     @staticmethod
     def of(scene: PlanningScene, options: PlanOptions, work: Work, station: str = "") -> "Context":

@@ -35,8 +35,7 @@ _BOUND_STEP = 10e-3  # s: of a bound that is about right
 # of a movement that is short, or lasts long
 _FEWEST_STEPS = 100
 _MOST_STEPS = 5000
-_DRIVES_WATTS = 2000.0  # about what the drives of such an arm take while it moves
-_TIME_WATTS = 2000.0  # what a second is worth where time is all that counts
+_USUAL_WATTS = 4.0  # times the price of a second: about what the drives of an arm take in motion
 _BESIDE = 5e-3  # weight of what breaks ties
 
 Consumed = TrajectoryReport | Consumption
@@ -94,15 +93,16 @@ def objective_weights(context: Context, path: FloatArray) -> ObjectiveWeights:
     """
     options = context.options
     scene = context.scene
+    watts = _USUAL_WATTS * scene.cell.robot.time_value
     still = np.zeros(len(scene.weights))
     if options.duration > 0.0 or options.objective == "energy":
-        return ObjectiveWeights(1.0, 0.0, still, _DRIVES_WATTS)
+        return ObjectiveWeights(1.0, 0.0, still, watts)
     if options.objective == "time":
-        return ObjectiveWeights(_BESIDE, _TIME_WATTS, still, _TIME_WATTS)
+        return ObjectiveWeights(_BESIDE, watts, still, watts)
     if options.objective == "movement_cost":  # in watts for a path of a second
-        travel = scene.weights * (_TIME_WATTS / max(path_cost(scene.weights, path), 1e-9))
-        return ObjectiveWeights(0.0, 10.0 * _BESIDE * _TIME_WATTS, travel, _TIME_WATTS)
-    return ObjectiveWeights(1.0, options.time_value, still, _DRIVES_WATTS + options.time_value)
+        travel = scene.weights * (watts / max(path_cost(scene.weights, path), 1e-9))
+        return ObjectiveWeights(0.0, 10.0 * _BESIDE * watts, travel, watts)
+    return ObjectiveWeights(1.0, options.time_value, still, watts + options.time_value)
 
 
 def coarse_step(trajectory: JointTrajectory) -> float:

@@ -183,11 +183,11 @@ class _Optimization:
         searches: Searches,
     ) -> None:
         self.scene = scene
-        self.options = options
         self.searches = searches
         self.path = path_of(original, scene)
         self.journal = Journal(work, options.seed, planner_id="descent")
         self.context = Context(scene, options, self.journal, _station_at(self.path[[0, -1]], scene))
+        self.options = self.context.options
         self.space = FreeSpace.of(scene, options.safety_distance, work, self.context.station)
         self.descents = Descents(self.context)
         self.rerouting = False

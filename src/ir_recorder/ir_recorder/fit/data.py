@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -133,13 +134,25 @@ class Source:
     cell: Cell | None = None
     load: str = ""
 
+    @cached_property
+    def recording(self) -> Recording | None:
+        """The recording that the motion is from, read once; None for other files."""
+        return read_recording(self.motion) if self.motion.suffix.lower() == ".mcap" else None
+
+
+def source_cell(source: Source) -> Cell:
+    """The cell that is given, else the one that the recording carries; RecorderError where there
+    is none.
+    """
+    return source.cell or attached_cell(source.recording)
+
 
 def fit_data(source: Source, prior: PowerParameters) -> FitData:
     """Read all of a source and lay it on one grid; ReadError, RecorderError or RecorderError as a
     sentence.
     """
-    recording = read_recording(source.motion) if source.motion.suffix.lower() == ".mcap" else None
-    cell = source.cell or attached_cell(recording)
+    recording = source.recording
+    cell = source_cell(source)
     _check_load(cell, source.load)
     if recording is not None:
         traces = recorded_traces(recording)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import yaml
@@ -13,7 +12,7 @@ from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.task import Future
 
-from ir_description import DescriptionError, load_power_parameters
+from ir_description import DescriptionError, read_power_parameters
 from ir_msgs.srv import GetCell
 from ir_msgs_py import names
 from ir_msgs_py.status import StatusCode
@@ -136,12 +135,11 @@ class ParameterRequests:
         return take
 
     def _attach_power_parameters(self, path: str) -> None:
-        """The file of power parameters that a node names, where it is one and can be read here."""
+        """The file of power parameters that a node names, where it can be read here."""
         if not path:
             return
         try:
-            load_power_parameters(path)
-            self._attach(POWER_PARAMETERS, Path(path).read_text(encoding="utf-8"))
+            self._attach(POWER_PARAMETERS, read_power_parameters(path))
         except (DescriptionError, OSError):
             return  # on another machine: its name is in the parameters
 

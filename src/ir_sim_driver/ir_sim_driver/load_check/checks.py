@@ -117,7 +117,7 @@ class LoadChecks:
     ) -> None:
         own = settings.parameters not in ("", DATA_SHEET)
         sheet = data_sheet_of(cell.robot, cell.robot.controller)
-        parameters = load_power_parameters(settings.parameters) if own else sheet
+        parameters = load_power_parameters(settings.parameters, cell.robot) if own else sheet
         self._settings = settings
         self._notices = notices
         self._robot = Uncertainty(cell.robot, parameters, cell.robot.marks, cell.base_pose)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ir_kernels.collision import FREE
-from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.options import ROBOTS_TIME_VALUE, PlanOptions
 from ir_msgs_py.report import PlanningInfo, TrajectoryReport
 from ir_planner import Goal, MovementPlan, Planner, PlannerError
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
@@ -91,6 +91,8 @@ def one_run(
     """Figures of the run: seconds, joules, metres; NaN where nothing was certified."""
     start, goal = tasks_of(planner.cell)[entry.task]
     scene = planner.scene(entry.load)
+    own = settings.time_value == ROBOTS_TIME_VALUE
+    price = scene.cell.robot.time_value if own else settings.time_value
     ends = np.stack([start, goal])
     margin = _margin(scene, ends, settings.safety_distance)
     best = None
@@ -120,11 +122,11 @@ def one_run(
         if not (plan.status.ok and plan.report.certified):
             said = plan.status.message
             continue
-        J = cost_of(plan.report, settings.time_value)
+        J = cost_of(plan.report, price)
         at = clock() - begin
         if at > settings.seconds:
             said = f"the answer came after {at:.3g} s, over seconds {settings.seconds:g}"
-        elif best is None or cost_of(best.report, settings.time_value) > J:
+        elif best is None or cost_of(best.report, price) > J:
             best = plan
             progress.append([round(at, 6), J])
     row: Row = {
@@ -133,7 +135,7 @@ def one_run(
         "free_ptp": free_ptp(scene, ends, margin),
     }
     row |= {"safety_distance_m": margin, "first_path_s": first_path, "total_s": clock() - begin}
-    return row | _figures(best, progress, settings.time_value) | {"message": "" if best else said}
+    return row | _figures(best, progress, price) | {"message": "" if best else said}
 
 
 def _options(

@@ -13,7 +13,7 @@ import yaml
 
 from ir_description import Cell, DescriptionError, cell_hash, is_path, load_cell, load_power_data
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.options import TIMINGS
+from ir_msgs_py.options import ROBOTS_TIME_VALUE, TIMINGS
 from ir_planner import PlannerError
 from ir_planner.scene import scene_with
 from ir_planner.search import SEARCHES
@@ -76,7 +76,7 @@ requests: 0                  # per run at most; 0: as many as the seconds hold
 max_iterations: 0            # work of the first request of a run; 0: the planner's default
 further_iterations: 100000000   # of its other requests, for who can make better answers of it; 0: the same
 safety_distance: 0.02        # m; less where an end of the task is nearer
-time_value: 500.0            # W in J = energy of the drives + time_value x T
+time_value: 500.0            # W in J = energy of the drives + time_value x T; left out: each robot's own
 hang_after: 60.0             # s of the wall beyond `seconds` after which a run is cut
 """  # noqa: E501
 
@@ -96,7 +96,7 @@ class ArenaSettings:
     max_iterations: int = 0
     further_iterations: int = 100_000_000
     safety_distance: float = 0.02
-    time_value: float = 500.0
+    time_value: float = ROBOTS_TIME_VALUE
     hang_after: float = 60.0
 
     def __post_init__(self) -> None:
@@ -104,7 +104,8 @@ class ArenaSettings:
             _check_names(name, getattr(self, name), may_be_empty=name == "tasks")
         checked_known("planners", self.planners, (PORTFOLIO, *SEARCHES))
         checked_known("timings", self.timings, TIMINGS)
-        checked_numbers(self, _WHOLE, _REAL)
+        priced = self.time_value != ROBOTS_TIME_VALUE
+        checked_numbers(self, _WHOLE, (*_REAL, _PRICE) if priced else _REAL)
         wanted = [name for name in self.planners if name in SEARCHES and needs_ompl(SEARCHES[name])]
         if wanted and missing():
             raise SettingsError(f"planners: {', '.join(wanted)}: {missing()}")
@@ -147,9 +148,9 @@ _WHOLE = (
 _REAL = (
     ("seconds", 0.01, 86_400.0),
     ("safety_distance", 0.0, 1.0),
-    ("time_value", 0.0, 1e6),
     ("hang_after", 1.0, 86_400.0),
 )
+_PRICE = ("time_value", 0.0, 1e6)
 
 
 def read_settings(path: str | Path) -> ArenaSettings:

@@ -285,7 +285,7 @@ class Maker:
             safety_distance=budget["safety_distance"],
             time_value=budget["time_value"],
         )
-        power = settings.drives.power(cell.robot.controller)
+        power = settings.drives(cell.robot).power(cell.robot.controller)
         stations = tuple(budget["stations"])
         return ProgramRequest(cell, power, stations, cell.park, options, cycle_time, settings)
 

@@ -11,6 +11,7 @@ from typing import Any, TypeAlias, TypeVar
 
 from ir_description import Cell, DescriptionError, load_cell
 from ir_description.cell import POSTURES
+from ir_msgs_py.options import ROBOTS_TIME_VALUE
 from ir_studies.errors import SettingsError
 from ir_studies.layout.placement import (
     JOINTS,
@@ -60,7 +61,7 @@ seed: 0                      # of the placements that are looked at
 plans: 0                     # placements that are planned in full, at most; 0: as many as could be the best
 margin: 0.01                 # share of the cost by which a placement may be better than its bound says
 
-time_value: 500.0            # W in J = energy of the drives + time_value x T, without a cycle time
+time_value: 500.0            # W in J = energy of the drives + time_value x T, without a cycle time; left out: the robot's own
 safety_distance: 0.02        # m
 max_iterations: 0            # work of a plan; 0: the planner's default
 hang_after: 600.0            # s after which a job is cut
@@ -97,12 +98,14 @@ class LayoutSettings:
     seed: int = 0
     plans: int = 0
     margin: float = 0.01
-    time_value: float = 500.0
+    time_value: float = ROBOTS_TIME_VALUE
     safety_distance: float = 0.02
     max_iterations: int = 0
     hang_after: float = 600.0
 
     def __post_init__(self) -> None:
+        if self.time_value == ROBOTS_TIME_VALUE:
+            object.__setattr__(self, "time_value", _cell(self.cell).robot.time_value)
         checked_numbers(self, _WHOLE, _REAL)
         if self.method not in METHODS:
             raise SettingsError(f"method is {self.method!r:.60}: known are {', '.join(METHODS)}")
