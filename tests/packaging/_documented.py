@@ -27,7 +27,7 @@ NOT_RUN = {
     r"(study layout layout|study statistics statistics|study arena arena).yaml -o "
     r".*": "minutes: tests/studies",
     r"study arena --quick": "two minutes: tests/cli/test_arena_command.py, tests/studies",
-    r"energy fit (run\.mcap|joints\.csv) "
+    r"energy fit (run\.mcap|joints\.csv|run_1\.csv) "
     r".*": "needs a meter: tests/recorder/test_measuring_page.py",
     r"energy excite .*": "takes minutes: tests/recorder/test_measuring_page.py, shorter",
     r"energy (drive|fit) "

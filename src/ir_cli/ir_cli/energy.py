@@ -26,10 +26,14 @@ from ir_description import load_cell, load_power_parameters, power_parameters_to
 from ir_recorder import analyse, read_recording
 from ir_recorder.analysis.indirect import agreement
 from ir_recorder.fit import (
+    BY,
+    Estimate,
     Source,
-    fit,
     fit_data,
+    left_out,
+    left_out_rows,
     parameter_rows,
+    recommendation,
     source_cell,
     write_fit_picture,
 )
@@ -56,6 +60,15 @@ FITTED: Columns = {
     "unit": ("", text),
     "determined": ("determined", lambda own: "yes" if own else "no"),
 }
+LEFT_OUT: Columns = {
+    "part": ("left out", text),
+    "method": ("predicted by", text),
+    "count": ("energies", number(0)),
+    "rms": ("W rms", number(2)),
+    "median": ("median %", number(2, 100.0)),
+    "largest": ("largest %", number(2, 100.0)),
+    "covered": ("in 90 %", lambda own: "" if own is None else str(own)),
+}
 PARAMETERS_START = b"format: ir_description/power_parameters/"
 
 
@@ -81,9 +94,25 @@ def add_drive(drive: argparse.ArgumentParser) -> None:
 def add_fit(fitted: argparse.ArgumentParser) -> None:
     """Arguments of `ir energy fit`."""
     fitted.add_argument(
-        "motion", type=Path, metavar="RECORDING", help="a recording, or CSV of the joints"
+        "motion",
+        type=Path,
+        nargs="+",
+        metavar="RECORDING",
+        help="recordings, or CSV of the joints; one fit of all",
     )
-    fitted.add_argument("--meter", type=Path, metavar="FILE", help="CSV of a power meter beside it")
+    fitted.add_argument(
+        "--meter",
+        type=Path,
+        action="append",
+        metavar="FILE",
+        help="CSV of a power meter beside each of them, in their order",
+    )
+    fitted.add_argument(
+        "--by",
+        choices=BY,
+        default="",
+        help="what is explained: watts, the motors' torques or currents, both (watts if there are)",
+    )
     fitted.add_argument(
         "--mapping", type=Path, metavar="FILE", help="what the columns of the joints mean"
     )
@@ -176,24 +205,35 @@ def run_fit(arguments: argparse.Namespace) -> int:
         cell = load_cell(arguments.cell) if arguments.cell else None
     motion = arguments.mapping
     meter = arguments.meter_mapping
-    source = Source(
-        arguments.motion,
-        arguments.meter,
-        read_mapping(motion) if motion else None,
-        read_mapping(meter) if meter else None,
-        cell,
-        arguments.load,
-    )
+    meters = arguments.meter or [None] * len(arguments.motion)
+    if len(meters) != len(arguments.motion):
+        raise InputError(
+            f"--meter is there {len(meters)} times, there are {len(arguments.motion)} recordings"
+        )
+    sources = [
+        Source(
+            path,
+            beside,
+            read_mapping(motion) if motion else None,
+            read_mapping(meter) if meter else None,
+            cell,
+            arguments.load,
+        )
+        for path, beside in zip(arguments.motion, meters, strict=True)
+    ]
     with sentences():
-        prior = load_power_parameters(arguments.power_parameters, source_cell(source).robot)
-    data = fit_data(source, prior)
-    found = fit(data.samples, data.model, prior, arguments.name)
-    page = power_parameters_to_yaml(found.parameters, f"fit on {arguments.motion.name}")
+        prior = load_power_parameters(arguments.power_parameters, source_cell(sources[0]).robot)
+    data = fit_data(sources, prior, arguments.by)
+    estimate = Estimate(data.recordings, data.names, data.model, prior, motors=data.motors)
+    found = estimate.result(arguments.name)
+    unseen = left_out(estimate)
+    named = ", ".join(path.name for path in arguments.motion)[:300]
+    page = power_parameters_to_yaml(found.parameters, f"fit on {named}")
     arguments.output.parent.mkdir(parents=True, exist_ok=True)
     written = [write_output(arguments.output, page.encode(), PARAMETERS_START, ANYWHERE)]
     if arguments.picture:
         written.append(write_fit_picture(found, prior, arguments.picture))
-    said = (*data.notes, *fit_sentences(found))
+    said = (*data.notes, *fit_sentences(found), recommendation(unseen))
     rows = parameter_rows(found, prior)
     if arguments.json:
         listed = [asdict(each) for each in found.movements]
@@ -201,12 +241,15 @@ def run_fit(arguments: argparse.Namespace) -> int:
             {
                 "parameters": rows,
                 "movements": listed,
+                "left_out": left_out_rows(unseen),
                 "sentences": said,
                 "files": [str(path) for path in written],
             }
         )
         return 0
     print_table(rows, FITTED)
+    sys.stdout.write("\n")
+    print_table(left_out_rows(unseen), LEFT_OUT)
     sys.stdout.write("".join(f"{sentence}\n" for sentence in said))
     sys.stdout.write("".join(f"{path}\n" for path in written))
     return 0

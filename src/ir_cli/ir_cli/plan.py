@@ -33,7 +33,9 @@ from ir_cli.planning import (
     planner_of,
     predicted,
     sentences,
+    supply,
 )
+from ir_description import Cell
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
 from ir_planner import Planner, ProgramPlan
@@ -129,7 +131,7 @@ def run_plan(arguments: argparse.Namespace) -> int:
         print_csv(rows)
     else:
         print_table(rows, COLUMNS)
-        sys.stdout.write("\n".join(sentences_of(plan)) + f"{said}\n")
+        sys.stdout.write("\n".join(sentences_of(plan, planner.cell)) + f"{said}\n")
     return 0
 
 
@@ -214,7 +216,7 @@ def totals_of(plan: ProgramPlan) -> Row:
     }
 
 
-def sentences_of(plan: ProgramPlan) -> list[str]:
+def sentences_of(plan: ProgramPlan, cell: Cell) -> list[str]:
     """The totals for people, and what is saved."""
     totals = totals_of(plan)
     standing = totals["seconds"] - totals["moving_seconds"]
@@ -224,7 +226,7 @@ def sentences_of(plan: ProgramPlan) -> list[str]:
     lines = [
         f"movements {totals['moving_seconds']:.2f} s {totals['moving_joules'] / 1e3:.2f} kJ, "
         f"pauses {standing:.2f} s {waiting / 1e3:.2f} kJ",
-        f"cycle {totals['seconds']:.2f} s, {energy} from the mains, predicted: "
+        f"cycle {totals['seconds']:.2f} s, {energy} {supply(cell)}, predicted: "
         f"{predicted(plan.report)}; {proof if totals['certified'] else 'NOT certified'}",
     ]
     if plan.status.message:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from ir_cli.errors import CommandError, InputError, nearest, unknown_name
 from ir_cli.output import Row
-from ir_description import DescriptionError, UnknownNameError, load_cell
+from ir_description import Cell, DescriptionError, UnknownNameError, load_cell
 from ir_krl import KrlError
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import InvalidValueError
@@ -189,7 +189,14 @@ def predicted(report: TrajectoryReport) -> str:
     return f"90 % interval {within} by {report.power_parameters}{f', {why}' if why else ''}"
 
 
-def sentence_of(report: TrajectoryReport) -> str:
+def supply(cell: Cell) -> str:
+    """Where joules are counted: without watts of a controller they are those of drives and tool."""
+    power = cell.robot.controller
+    counted = power.has_table or power.modes[0].controller_watts > 0.0
+    return "from the mains" if counted else "at the drives, no controller counted"
+
+
+def sentence_of(report: TrajectoryReport, cell: Cell) -> str:
     """The same for people."""
     near = report.closest
     pair = (
@@ -207,7 +214,7 @@ def sentence_of(report: TrajectoryReport) -> str:
         )
     )
     return (
-        f"{report.duration:.3f} s, {report.energy:.0f} J from the mains, predicted "
+        f"{report.duration:.3f} s, {report.energy:.0f} J {supply(cell)}, predicted "
         f"({predicted(report)}), "
         f"at most {report.peak_power / 1e3:.1f} kW\n"
         f"clearance {report.min_clearance * 1e3:.1f} mm{pair}; uses {100.0 * used:.0f} % of a "

@@ -83,6 +83,7 @@ def remarks_on(robot: RobotModel) -> tuple[Remark, ...]:
         *_torque(robot),
         *_speed(robot),
         *_controller(robot),
+        *_wrist(robot),
         *_marks(robot),
     ]
     order = ("error", "warning", "note")
@@ -195,6 +196,15 @@ def _controller(robot: RobotModel) -> Iterator[Remark]:
     yield Remark(
         "note", "controller", f"without a table of power modes, pauses stay on motors; {counted}"
     )
+
+
+def _wrist(robot: RobotModel) -> Iterator[Remark]:
+    if robot.coupled:
+        yield Remark(
+            "warning",
+            "wrist_coupling",
+            "is counted by ir energy fit; plans and the simulated robot leave it out",
+        )
 
 
 def _marks(robot: RobotModel) -> Iterator[Remark]:

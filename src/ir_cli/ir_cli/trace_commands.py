@@ -57,7 +57,7 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
         listed = [{"what": v.what, "seconds": v.time, "sentence": v.sentence} for v in violations]
         print_json({**figures_of(found.report), **measured_figures(known), "violations": listed})
     else:
-        sys.stdout.write(sentence_of(found.report) + "\n")
+        sys.stdout.write(sentence_of(found.report, planner.cell) + "\n")
         if known is not None:
             sys.stdout.write("\n".join(known.sentences) + "\n")
         if verification.violation is not None:
@@ -113,7 +113,7 @@ def run_optimize(arguments: argparse.Namespace) -> int:
         before = {**figures_of(found.before), **measured_figures(known)}
         print_json({"before": before, "after": figures_of(found.after)})
         return 0
-    said = [f"before: {sentence_of(found.before)}"]
+    said = [f"before: {sentence_of(found.before, planner.cell)}"]
     said += known.sentences if known is not None else ()
-    sys.stdout.write("\n".join([*said, f"after: {sentence_of(found.after)}"]) + "\n")
+    sys.stdout.write("\n".join([*said, f"after: {sentence_of(found.after, planner.cell)}"]) + "\n")
     return 0

@@ -185,7 +185,7 @@ class PlanWorker:
             if not plan.status.ok:
                 return Planned(None, failure=plan.status.message)
             return Planned(
-                motion_of(plan.movements, cell, planner.scene), tuple(sentences_of(plan)[:2])
+                motion_of(plan.movements, cell, planner.scene), tuple(sentences_of(plan, cell)[:2])
             )
         movements = []
         failures = []

@@ -59,6 +59,7 @@ _DRIVE_KEYS = (
     "copper_loss_w_per_nm2",
     "envelope_rad_s_nm",
 )
+_COUPLING = "wrist_coupling"  # of drives, where there is any
 
 
 def robot_from_yaml(text: str, source: str = "<text>", folder: Path | None = None) -> RobotModel:
@@ -126,7 +127,7 @@ def _robot(root: Item) -> RobotModel:
     joints = top["joints"].table(_JOINT_KEYS, ("rotation_abc_deg",))
     joint_names = tuple(item.name() for item in joints["names"].list(1, 16))
     n = len(joint_names)
-    drives = top["drives"].table(_DRIVE_KEYS)
+    drives = top["drives"].table(_DRIVE_KEYS, (_COUPLING,))
     links = [_link(item) for item in top["links"].list(n + 1, n + 1)]
     link_names = tuple(name for name, *_ in links)
     capsules = tuple(_capsule(item, link_names) for item in top["capsules"].list(0, 200))
@@ -163,6 +164,7 @@ def _robot(root: Item) -> RobotModel:
             machine_home=np.radians(_row(top, "machine_home_deg", n, -3600)),
             rated_payload=figure(top["rated_payload_kg"]).number(0, 1e4, "kg", above=True),
             title=top["title"].text(64) if "title" in top else "",
+            motor_turns=_motor_turns(drives, n),
         )
 
 
@@ -176,11 +178,12 @@ def _read_joints(top: Table) -> None:
 
 
 def _read_drives(top: Table) -> None:
-    drives = top["drives"].table(_DRIVE_KEYS)
+    drives = top["drives"].table(_DRIVE_KEYS, (_COUPLING,))
     n = len(figure(drives["gear_ratio"]).list(1, 16))
     for key in _DRIVE_KEYS[:-1]:
         _row(drives, key, n)
     _envelope(drives, n, _row(drives, "gear_ratio", n))
+    _motor_turns(drives, n)
 
 
 def _read_capsules(top: Table) -> None:
@@ -206,6 +209,23 @@ def inertia_matrix(entries: Sequence[float] | FloatArray) -> FloatArray:
 
 def _row(table: Table, key: str, n: int, low: float = 0.0) -> FloatArray:
     return figure(table[key]).numbers(n, low, BIG)
+
+
+def _motor_turns(drives: Table, n: int) -> FloatArray:
+    """What a radian of each joint turns each motor (n, n), by rows of motor, joint and share."""
+    turns = np.eye(n)
+    if _COUPLING not in drives:
+        return turns
+    value = figure(drives[_COUPLING])
+    for motor, joint, share in value.rows(3, -10.0, 16.0, count=(1, n)):
+        if motor not in range(1, n + 1) or joint not in range(1, n + 1) or motor == joint:
+            value.fail(
+                f"couples motor {motor:g} with axis {joint:g}: two different axes of 1 to {n}"
+            )
+        turns[int(motor) - 1, int(joint) - 1] = share
+    if np.linalg.matrix_rank(turns) < n:
+        value.fail("couples the axes so that motors do not determine them")
+    return turns
 
 
 def _origins(joints: Table, n: int) -> FloatArray:

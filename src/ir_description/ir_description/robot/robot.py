@@ -82,7 +82,8 @@ class RobotModel:
     machine_home (n,) rad: the posture of Table II. rated_payload kg: tool and part together.
     title: maker and model, for people. controller: its power figures. marks: how sure each figure
     is, H, M or L, by its place in the file. document: the robot file as text; "" for a bundled
-    robot: its name is enough.
+    robot: its name is enough. motor_turns (n, n): what a radian of each joint turns each motor,
+    seen at the motor's own joint; not the identity where the axes of a wrist are coupled.
     """
 
     name: str
@@ -119,12 +120,15 @@ class RobotModel:
     controller: PowerData = field(default_factory=without_table, repr=False)
     marks: Mapping[str, str] = field(default_factory=dict, repr=False)
     document: str = field(default="", repr=False)
+    motor_turns: FloatArray = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
 
     def __post_init__(self) -> None:
         n = len(self.joint_names)
         for name in _NOT_IN_DATA:
             if len(getattr(self, name)) == 0:
                 object.__setattr__(self, name, np.zeros(n))
+        if self.motor_turns.size == 0:
+            object.__setattr__(self, "motor_turns", np.eye(n))
         shapes: dict[str, tuple[int | None, ...]] = {
             "joint_axis": (n, 3),
             "position_min": (n,),
@@ -146,6 +150,7 @@ class RobotModel:
             "envelope_speed": (n, None),
             "envelope_torque": (n, None),
             "machine_home": (n,),
+            "motor_turns": (n, n),
         }
         for name, shape in shapes.items():
             object.__setattr__(self, name, frozen(getattr(self, name), shape, name))
@@ -165,6 +170,11 @@ class RobotModel:
     def n(self) -> int:
         """Number of joints."""
         return len(self.joint_names)
+
+    @cached_property
+    def coupled(self) -> bool:
+        """Whether a motor turns with another joint than its own."""
+        return not np.array_equal(self.motor_turns, np.eye(self.n))
 
     @cached_property
     def peak_watts(self) -> float:

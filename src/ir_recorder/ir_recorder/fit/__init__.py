@@ -1,18 +1,35 @@
-"""Power parameters fitted to a power meter, with what the data say of each."""
+"""Power parameters fitted to a meter or to the motors, and what the data say of each."""
 
-from ir_recorder.fit.data import FitData, Source, fit_data, source_cell
-from ir_recorder.fit.estimate import Fit, FittedMovement, fit
-from ir_recorder.fit.presentation import parameter_rows, sentences, write_fit_picture
+from ir_recorder.fit.data import BY, FitData, Source, fit_data, source_cell
+from ir_recorder.fit.estimate import Estimate, Fit, FittedMovement, fit
+from ir_recorder.fit.left_out import (
+    LeftOut,
+    left_out,
+    median_error,
+    plain_torques,
+    recommendation,
+    shaft_work,
+)
+from ir_recorder.fit.presentation import left_out_rows, parameter_rows, sentences, write_fit_picture
 
 __all__ = [
+    "BY",
+    "Estimate",
     "Fit",
     "FitData",
     "FittedMovement",
+    "LeftOut",
     "Source",
     "fit",
     "fit_data",
+    "left_out",
+    "left_out_rows",
+    "median_error",
     "parameter_rows",
+    "plain_torques",
+    "recommendation",
     "sentences",
+    "shaft_work",
     "source_cell",
     "write_fit_picture",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -14,12 +14,12 @@ from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_recorder.analysis.loads import LoadTimeline, carried, load_timeline, normal
 from ir_recorder.errors import RecorderError
 from ir_recorder.measure import PowerModel, Samples, samples_of
-from ir_recorder.measure.samples import LoadRuns
+from ir_recorder.measure.samples import STEP, LoadRuns
 from ir_recorder.reading.reader import read_recording
 from ir_recorder.reading.recording import Recording
 from ir_recorder.traces import Trace, TraceMapping, clock_offset, read_traces
 from ir_recorder.traces.reader import recorded_traces
-from ir_recorder.traces.trace import LOAD
+from ir_recorder.traces.trace import CURRENT, EFFORT, LOAD
 from ir_values.arrays import BoolArray, FloatArray
 from ir_values.errors import InvalidValueError
 
@@ -91,6 +91,41 @@ def check_readings(meter: Trace) -> None:
         )
 
 
+_TURN = 2.0 * np.pi
+_NO_END = 0.05  # rad less than a turn: a joint of such a range has no end
+
+
+def without_turns(joints: Trace, robot: RobotModel) -> tuple[Trace, list[str]]:
+    """The trace with joints that have no end followed through their jumps of a turn, and brought
+    back by whole turns to what the robot file calls their range; a sentence for each.
+    """
+    columns = dict(joints.columns)
+    said = []
+    for name, low, high in zip(
+        robot.joint_names, robot.position_min, robot.position_max, strict=True
+    ):
+        if high - low < _TURN - _NO_END:
+            continue
+        q = columns[name]
+        known = np.isfinite(q)
+        if not known.any():
+            continue
+        followed = q.copy()
+        followed[known] = np.unwrap(q[known])
+        lowest, highest = float(np.nanmin(followed)), float(np.nanmax(followed))
+        turns = 0
+        if not low - _BEYOND <= lowest <= highest <= high + _BEYOND:
+            turns = round((0.5 * (lowest + highest) - 0.5 * (low + high)) / _TURN)
+        columns[name] = followed - turns * _TURN
+        jumps = int(np.count_nonzero(np.abs(np.diff(q[known])) > np.pi))
+        if turns or jumps:
+            said.append(
+                f"{joints.source}: {name} brought back by {turns} turns, {jumps} jumps of a turn "
+                "followed"
+            )
+    return replace(joints, columns=columns) if said else joints, said
+
+
 def check_range(source: str, robot: RobotModel, q: FloatArray) -> None:
     """RecorderError where positions (N, n) [rad] lie beyond what the robot can reach."""
     beyond = np.fmax(robot.position_min - q, q - robot.position_max)
@@ -111,13 +146,15 @@ def check_range(source: str, robot: RobotModel, q: FloatArray) -> None:
 
 @dataclass(frozen=True, eq=False)
 class FitData:
-    """Samples with watts, the model of their robot, and sentences on how they were laid
-    together.
+    """Recordings, by name, the model of their robot, and sentences on how they were laid
+    together. motors: whether the fit has to rest on what the controllers say of their motors.
     """
 
-    samples: Samples
+    recordings: tuple[Samples, ...]
+    names: tuple[str, ...]
     model: PowerModel
     notes: tuple[str, ...]
+    motors: bool
 
 
 @dataclass(frozen=True)
@@ -147,10 +184,37 @@ def source_cell(source: Source) -> Cell:
     return source.cell or attached_cell(source.recording)
 
 
-def fit_data(source: Source, prior: PowerParameters) -> FitData:
-    """Read all of a source and lay it on one grid; ReadError, RecorderError or RecorderError as a
-    sentence.
+BY = ("meter", "motors", "both")
+"""What a fit explains: watts, torques or currents of the motors, or both."""
+
+
+def fit_data(sources: Source | Sequence[Source], prior: PowerParameters, by: str = "") -> FitData:
+    """Read all sources and lay each on a grid; ReadError or RecorderError as a sentence. by: one of
+    BY; "": the meter, and the motors where there is no meter.
     """
+    given = (sources,) if isinstance(sources, Source) else tuple(sources)
+    cells = [source_cell(each) for each in given]
+    if strange := [cell.robot.name for cell in cells if cell.robot.name != prior.robot]:
+        raise RecorderError(f"one fit is of one robot, there is {strange[0]} beside {prior.robot}")
+    cell = cells[0]
+    model = PowerModel(cell.robot, cell.robot.controller.dc_link, cell.base_pose, prior)
+    runs = [_run(each, prior, model, by) for each in given]
+    motors = by in BY[1:]
+    if not by:
+        motors = not any(np.isfinite(samples.watts).any() for samples, _ in runs)
+    if by == BY[1]:
+        runs = [(replace(samples, watts=np.full(len(samples), np.nan)), n) for samples, n in runs]
+    if motors and len({samples.currents for samples, _ in runs}) > 1:
+        raise RecorderError("some recordings have torques, others currents: fit them one by one")
+    notes = [note for _, own in runs for note in own]
+    names = tuple(each.motion.stem for each in given)
+    return FitData(tuple(samples for samples, _ in runs), names, model, tuple(notes), motors)
+
+
+def _run(
+    source: Source, prior: PowerParameters, model: PowerModel, by: str
+) -> tuple[Samples, list[str]]:
+    """A source on one grid, and sentences on how it was laid there."""
     recording = source.recording
     cell = source_cell(source)
     _check_load(cell, source.load)
@@ -163,12 +227,12 @@ def fit_data(source: Source, prior: PowerParameters) -> FitData:
     if source.load or not runs:
         runs = [(-np.inf, np.inf, carried(cell, source.load))]
     joints = _with(traces, cell.robot.joint_names)
+    joints, turned = without_turns(joints, cell.robot)
     positions = joints.joints(cell.robot.joint_names)
     assert positions is not None  # the trace was chosen for them
     check_range(joints.source, cell.robot, positions)
     meter = _metered(traces)
-    model = PowerModel(cell.robot, cell.robot.controller.dc_link, cell.base_pose, prior)
-    notes = [problem for trace in traces for problem in trace.problems]
+    notes = [*(problem for trace in traces for problem in trace.problems), *turned]
     if source.meter is not None:
         mapping = source.meter_mapping or TraceMapping()
         outer = _metered(read_traces(source.meter, mapping, cell.robot.joint_names))
@@ -178,14 +242,28 @@ def fit_data(source: Source, prior: PowerParameters) -> FitData:
             outer, note = _aligned(joints, meter, outer, prior, model, runs)
             notes.append(note)
         meter = outer
-    if meter is None:
-        raise RecorderError(
-            f"{source.motion}: there is neither a column power nor energy; name the meter's file"
-        )
-    check_readings(meter)
     names = cell.robot.joint_names
-    modes = prior.modes
-    return FitData(samples_of(joints, meter, names, modes, runs), model, tuple(notes))
+    said = joints.joints(names, EFFORT) is not None or joints.joints(names, CURRENT) is not None
+    if (by in BY[1:] or meter is None) and not said:
+        what = "" if by in BY[1:] else "neither a column power nor energy, and "
+        raise RecorderError(
+            f"{source.motion}: there is {what}no column {names[0]}{EFFORT} nor "
+            f"{names[0]}{CURRENT}; name the meter's file"
+        )
+    if meter is not None and by != BY[1]:
+        check_readings(meter)
+    notes += _gaps(joints)
+    return samples_of(joints, meter, names, prior.modes, runs), notes
+
+
+def _gaps(joints: Trace) -> list[str]:
+    """What is lost of a recording, and how it is laid on the grid."""
+    gaps = joints.gaps()
+    lost = sum(length for _, length in gaps)
+    said = [f"{joints.source}: a row every {joints.period:.3g} s, laid on a grid of {STEP:g} s"]
+    if gaps:
+        said.append(f"{joints.source}: {len(gaps)} gaps, {lost:.2f} s in all, are not used")
+    return said
 
 
 def _written_loads(cell: Cell, trace: Trace) -> list[tuple[float, float, tuple[Load, ...]]]:

@@ -1,4 +1,6 @@
-"""Power parameters from a power meter: regularised least squares with physical bounds."""
+"""Power parameters from a power meter, from the motors' torques or currents, or from both:
+regularised least squares with physical bounds.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +12,23 @@ from scipy.optimize import lsq_linear
 
 from ir_description import PowerParameters, physical_bounds
 from ir_recorder.errors import RecorderError
+from ir_recorder.fit.channels import (
+    FRICTION,
+    WINDOW,
+    Channel,
+    Meter,
+    Motors,
+    Run,
+    by_window,
+    open_prior,
+    runs_of,
+)
 from ir_recorder.fit.data import check_determined, check_explained
 from ir_recorder.measure import PowerModel, Samples, movements
-from ir_values.arrays import BoolArray, FloatArray
+from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 # What a fit needs of matrices and residuals: windows, correlation, inverses.
 
-WINDOW = 5  # samples whose mean is one residual: 50 ms
 _SHORTEST_REST = 0.3  # s
 
 
@@ -29,14 +41,6 @@ def rests(samples: Samples) -> list[tuple[int, int]]:
     return [
         (a, b) for a, b in edges.reshape(-1, 2).tolist() if (b - a) * samples.step >= _SHORTEST_REST
     ]
-
-
-def by_window(values: FloatArray) -> FloatArray:
-    """Means (M // WINDOW, ...) of consecutive samples (M, ...)."""
-    count = len(values) // WINDOW
-    return np.asarray(
-        values[: count * WINDOW].reshape(count, WINDOW, *values.shape[1:]).mean(axis=1)
-    )
 
 
 def safe(deviation: FloatArray) -> FloatArray:
@@ -115,58 +119,70 @@ def fold_of(window: int, windows: int) -> int:
 def widening(
     slopes: FloatArray,
     residual: FloatArray,
+    fold: IntArray,
     pull: FloatArray,
     deviation: FloatArray,
     stretches: Sequence[Stretch],
 ) -> float:
-    """The least factor, 1 or more, on the variance of the noise; slopes (W, P) and residual (W,)
-    are weighted by it, pull (P, P) is the prior's precision, deviation (P,) its deviations.
+    """The least factor, 1 or more, on the variance of the noise that explains the stretches, else
+    the likeliest; slopes (R, P) and residual (R,)
+    are weighted by it, fold (R,) says what is left out together, pull (P, P) is the prior's
+    precision, deviation (P,) its deviations.
     """
-    fold = np.array([fold_of(window, len(residual)) for window in range(len(residual))])
     parts = [
         (own.T @ own, own.T @ residual[fold == k])
         for k in range(FOLDS)
         for own in (slopes[fold == k],)
     ]
     whole = np.sum([information for information, _ in parts], axis=0)
-    factor = 1.0
+    factor = best = 1.0
+    least = np.inf
     while factor < _MOST:
         errors = []
+        variances = []
         for k, (information, pulled) in enumerate(parts):
             without = inverse((whole - information) / factor + pull, deviation)
             shift = without @ pulled / factor
-            errors += [
-                (each.missing + each.slope @ shift) ** 2
-                / (each.slope @ without @ each.slope + each.white)
-                for each in stretches
-                if each.fold == k
-            ]
-        if not errors or np.mean(errors) <= 1.0:
-            break
+            own = [each for each in stretches if each.fold == k]
+            errors += [(each.missing + each.slope @ shift) ** 2 for each in own]
+            variances += [each.slope @ without @ each.slope + each.white for each in own]
+        ratios = np.divide(errors, variances)
+        if not errors or ratios.mean() <= 1.0:
+            return factor
+        unlikely = float((ratios + np.log(variances)).mean())
+        if unlikely < least:
+            best = factor
+            least = unlikely
         factor *= _RATIO
-    return factor
+    return best  # no noise explains them: the factor under which they are likeliest
 
 
-# Power parameters from a power meter: regularised least squares with physical bounds, by Gauss
-# and Newton.
+# Parameters by Gauss and Newton.
 #
 # The prior pulls what the data say little about towards the data sheet. The forward model runs
 # the DC link, so its switch and its capacitor are in every step. Residuals of neighbouring
 # instants hang together; they count as the fewer independent ones that their autocorrelation
 # leaves, standing and moving apart from each other.
+#
+# How far friction may be from the data sheet is not known beforehand: of several widths of its
+# prior that one is taken by which what is left out is predicted best.
 
 DETERMINED = 0.8  # of the deviation before: what is left of it after the fit, at most
-LEAST_WATTS = 0.5  # noise of a residual, at least: the resolution of meters
 SOFTNESS = (
     10.0,
     2.0,
     0.3,
 )  # J: of the DC link, where the descent begins; its kinks make local minima
+FRICTION_SCALES = (1.0, 3.0, 10.0, 30.0)  # times the deviation of friction before any measurement
+_WIDER = 0.98  # of the error of what is left out: with more, a wider prior is not taken
 _ROUNDS = 30
 _SHARES = (1.0, 0.5, 0.25, 0.1, 0.03, 0.01)  # of a step: the DC link makes kinks
 _DONE = 1e-4  # of a deviation: the largest change of a last step
+_SCALED = 3  # times that the scale of friction is chosen, each with the noise of the one before
 _REWEIGHTED = 3  # times that the noise is estimated anew
-_SHORTEST = 100  # residuals that a fit needs
+_SHORTEST = 100  # windows that a fit needs
+_FIRST_WATTS = 50.0
+_FIRST_SHARE = 0.1  # of the largest effort of an axis
 
 
 @dataclass(frozen=True)
@@ -186,9 +202,11 @@ class FittedMovement:
 class Fit:
     """What was found. parameters: with covariance; determined (P,): which of them the data
     determine; the others are as before. movements: residuals. time (W,) s, measured, before, after
-    (W,) W: of windows. noise [W]: of a window at rest and in motion, with how many windows one
-    independent residual takes.
+    (W,) W: of windows with watts. noise [W]: of a window at rest and in motion (NaN without a
+    meter), torque_noise (n,) of each axis, in what the controller says (none without).
     inflation: of the noise, so that the covariance explains the residuals of movements and rests.
+    friction_scale: times the deviation of friction before. offsets (n,) Nm and scales (n,) A/Nm of
+    the motors, where these were fitted.
     """
 
     parameters: PowerParameters
@@ -199,8 +217,11 @@ class Fit:
     before: FloatArray
     after: FloatArray
     noise: tuple[float, float]
-    correlated: tuple[float, float]
+    torque_noise: tuple[float, ...]
     inflation: float
+    friction_scale: float
+    offsets: tuple[float, ...]
+    scales: tuple[float, ...]
 
     @property
     def kept(self) -> tuple[str, ...]:
@@ -212,190 +233,389 @@ class Fit:
         )
 
 
-def fit(samples: Samples, model: PowerModel, prior: PowerParameters, name: str = "fit") -> Fit:
-    """Fit the parameters of `model` to the watts of the samples. RecorderError where they hold too
-    little.
+def fit(
+    recordings: Samples | Sequence[Samples],
+    model: PowerModel,
+    prior: PowerParameters,
+    name: str = "fit",
+    *,
+    motors: bool = False,
+) -> Fit:
+    """The parameters that explain the recordings best, pulled towards the prior. motors: by the
+    motors' torques or currents too; alone where no recording has watts. RecorderError where there
+    is too little, or what no parameters explain.
     """
-    return _Estimate(samples, model, prior).result(name)
+    given = [recordings] if isinstance(recordings, Samples) else list(recordings)
+    return Estimate(given, [""] * len(given), model, prior, motors=motors).result(name)
 
 
-class _Estimate:
-    def __init__(self, samples: Samples, model: PowerModel, prior: PowerParameters) -> None:
-        usable = samples.known & np.isfinite(samples.watts)
-        self._windows = np.flatnonzero(by_window(usable.astype(float)) > 1.0 - 1e-9)
-        if len(self._windows) < _SHORTEST:
+class Estimate:
+    """A fit at work: its recordings and channels, and the parameters of any part of them."""
+
+    def __init__(
+        self,
+        recordings: Sequence[Samples],
+        names: Sequence[str],
+        model: PowerModel,
+        prior: PowerParameters,
+        *,
+        motors: bool = False,
+    ) -> None:
+        self.model = model
+        self.runs = runs_of(recordings, names, model)
+        self.motors = Motors(self.runs, model) if motors else None
+        extra = 0 if self.motors is None else 2 * self.motors.n
+        meter = Meter(self.runs, model, extra)
+        self.meter = meter if len(meter.window) else None
+        channels = (self.meter, self.motors)
+        self._channels: list[Channel] = [each for each in channels if each is not None]
+        self._check_length(recordings)
+        self.prior = open_prior(prior, self.meter)
+        self.given = prior
+        own = (np.zeros(0), np.zeros(0))
+        if self.motors is not None:
+            own = self.motors.own_prior(self.prior.mean)
+        self._before = np.concatenate([self.prior.mean, own[0]])
+        self.deviation = np.concatenate([self.prior.deviation, own[1]])
+        low, high = physical_bounds(prior.names)
+        self._low = np.concatenate([low, np.full(extra, -np.inf)])
+        self._high = np.concatenate([high, np.full(extra, np.inf)])
+        self._measured = np.concatenate([each.measured for each in self._channels])
+        self.window = np.concatenate([each.window for each in self._channels])
+        firsts = np.cumsum([0, *(len(each.least) for each in self._channels)])
+        groups = zip(self._channels, firsts[:-1], strict=True)
+        self._group = np.concatenate([each.group + first for each, first in groups])
+        self._least = np.concatenate([each.least for each in self._channels])
+        self._friction_scale = 1.0
+        self._set_pull()
+
+    def _check_length(self, recordings: Sequence[Samples]) -> None:
+        windows = max((len(np.unique(each.window)) for each in self._channels), default=0)
+        if windows < _SHORTEST:
+            step = recordings[0].step
+            what = "torques" if self.meter is None and self.motors is not None else "watts"
             raise RecorderError(
-                f"{len(self._windows) * WINDOW * samples.step:.1f} s have watts, motion, mode "
-                f"and load at once, at least {_SHORTEST * WINDOW * samples.step:.1f} s are needed"
+                f"{windows * WINDOW * step:.1f} s have {what}, motion, mode "
+                f"and load at once, at least {_SHORTEST * WINDOW * step:.1f} s are needed"
             )
-        self._samples = samples
-        self._model = model
-        self._prior = prior
-        self._prepared = model.prepare(samples)
-        self._watts = self._reduced(samples.watts)
-        self._moving = self._reduced(samples.moving.astype(float)) > 0.0
-        self._low, self._high = physical_bounds(prior.names)
-        values, vectors = np.linalg.eigh(scaled(prior))
+
+    def _set_pull(self) -> None:
+        """What whitens the parameters, (P + E, P + E), with friction as wide as its scale says."""
+        count = len(self.prior.names)
+        wide = np.ones(len(self._before))
+        for term in FRICTION:
+            wide[self.prior.places(term)] = self._friction_scale
+        values, vectors = np.linalg.eigh(scaled(self.prior))
         if values.min() <= 1e-9:
             raise RecorderError("the covariance of the prior is singular")
-        self._pull = (vectors / np.sqrt(values)).T / safe(
-            prior.deviation
-        )  # (P, P): whitens the parameters
-        self._free = prior.deviation > 0.0
+        root = np.eye(len(self._before))
+        root[:count, :count] = (vectors / np.sqrt(values)).T
+        self._wide = self.deviation * wide
+        self._pull = root / safe(self._wide)
+        self._free = self._wide > 0.0
 
     def result(self, name: str) -> Fit:
         """Both noises and the parameters in turn, then with the noise that explains what was left
         out, and once more with what is not determined as before.
         """
-        noise = (50.0, 50.0)
-        correlated = (1.0, 1.0)
-        mean = self._prior.mean.copy()
-        for softness in SOFTNESS:
-            mean, _ = self._solve(mean, self._weight(noise, correlated), self._free, softness)
-        for _ in range(_REWEIGHTED):
-            mean, _ = self._solve(mean, self._weight(noise, correlated), self._free)
-            noise, correlated = self._noise(mean)
-        weight = self._weight(noise, correlated)
-        mean, _ = self._solve(mean, weight, self._free)
-        inflation = self._widening(mean, weight)
-        weight = weight / np.sqrt(inflation)
-        mean, precision = self._solve(mean, weight, self._free)
-        left = np.sqrt(np.diag(inverse(precision, self._prior.deviation))) / safe(
-            self._prior.deviation
-        )
+        weight = 1.0 / self._first_noise()[self._group]
+        x = self._before.copy()
+        for softness in SOFTNESS if self.meter is not None else ():
+            x, _ = self.solve(x, weight, self._free, softness)
+        x, weight, noise = self._reweighted(x, weight)
+        for _ in range(_SCALED if self.meter is not None else 1):
+            before = self._friction_scale
+            self._friction_scale = self._chosen_scale(x, weight)
+            self._set_pull()
+            if self._friction_scale == before:
+                break
+            x, weight, noise = self._reweighted(x, weight)
+        x, _ = self.solve(x, weight, self._free)
+        inflation = 1.0
+        if self.meter is not None:
+            inflation = self._widening(x, weight)
+            weight = weight / np.sqrt(inflation)
+        x, precision = self.solve(x, weight, self._free)
+        left = np.sqrt(np.diag(inverse(precision, self._wide))) / safe(self._wide)
         determined = np.asarray(self._free & (left < DETERMINED))
-        check_explained(
-            self._watts, self._reduced(self._model.watts(mean, self._prepared)), self._moving
-        )
-        check_determined(determined, self._moving, WINDOW * self._samples.step)
-        mean, precision = self._solve(mean, weight, determined)
-        covariance = inverse(precision, self._prior.deviation)
-        sources = np.where(determined, "fit", self._prior.sources)
+        count = len(self.prior.names)
+        if self.meter is not None:
+            moving = self.meter.group > 0
+            check_explained(self.meter.measured, self.meter.predicted(x, 0.0)[0], moving)
+        seconds = WINDOW * self.runs[0].samples.step
+        check_determined(determined[:count], self._moving(), seconds)
+        if self.meter is not None:
+            x, precision = self.solve(x, weight, determined | (np.arange(len(x)) >= count))
+        self.found = x
+        self.weight = weight
+        self.covariance = inverse(precision, self._wide)
+        if self.meter is None:
+            inflation = self._torque_widening(x, weight)
+            least = np.minimum(inflation * np.diag(self.covariance), self._wide**2)
+            factor = np.sqrt(least / safe(np.diag(self.covariance)))
+            self.covariance = self.covariance * np.outer(factor, factor)
+        return self._fit(name, determined[:count], noise, inflation)
+
+    def _fit(self, name: str, determined: BoolArray, noise: FloatArray, inflation: float) -> Fit:
+        count = len(self.prior.names)
+        mean = self.found[:count]
+        covariance = self.covariance[:count, :count]
+        sources = np.where(determined, "fit", self.prior.sources)
         found = replace(
-            self._prior,
+            self.given,
             name=name,
             mean=mean,
             covariance=0.5 * (covariance + covariance.T),
             sources=tuple(str(source) for source in sources),
         )
-        before, after = (
-            self._model.watts(each, self._prepared) for each in (self._prior.mean, mean)
-        )
+        none = np.zeros(0)
+        time = measured = before = after = none
+        moves: tuple[FittedMovement, ...] = ()
+        if self.meter is not None:
+            time, measured = self.meter.time(), self.meter.measured
+            before, after = (
+                self.meter.predicted(np.concatenate([each, self.found[count:]]), 0.0)[0]
+                for each in (self.prior.mean, mean)
+            )
+            moves = self._movements(self.prior.mean, mean)
+        meters = 2 if self.meter is not None else 0
+        n = len(self.prior.joints)
+        extra = self.found[count:]
         return Fit(
             found,
             determined,
-            self._movements(before, after),
-            self._reduced(self._samples.time),
-            self._watts,
-            self._reduced(before),
-            self._reduced(after),
-            noise,
-            correlated,
+            moves,
+            time,
+            measured,
+            before,
+            after,
+            (float(noise[0]), float(noise[1])) if meters else (np.nan, np.nan),
+            tuple(noise[meters:].tolist()),
             inflation,
+            self._friction_scale,
+            tuple(extra[:n].tolist()),
+            tuple(extra[n:].tolist()),
         )
 
-    def _reduced(self, values: FloatArray) -> FloatArray:
-        return np.asarray(by_window(values)[self._windows])
+    def _first_noise(self) -> FloatArray:
+        first = [
+            np.full(2, _FIRST_WATTS) if each is self.meter else _FIRST_SHARE * each.least * 1e3
+            for each in self._channels
+        ]
+        return np.concatenate(first)
 
-    def _weight(self, noise: tuple[float, float], correlated: tuple[float, float]) -> FloatArray:
-        """One over the deviation (W,) [W] with which a window counts."""
-        rest, moving = (n * np.sqrt(c) for n, c in zip(noise, correlated, strict=True))
-        return np.asarray(1.0 / np.where(self._moving, moving, rest))
+    def _reweighted(
+        self, x: FloatArray, weight: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Parameters and noise in turn: both, and the weights that the noise gives."""
+        noise = self._least
+        for _ in range(_REWEIGHTED):
+            x, _ = self.solve(x, weight, self._free)
+            noise, correlated = self._noise(x)
+            if self.meter is None:  # all axes alike: what an axis lacks is bias, not noise
+                correlated = np.ones(len(noise))
+            weight = 1.0 / (noise * np.sqrt(correlated))[self._group]
+        return x, weight, noise
 
-    def _solve(
+    def solve(
         self, start: FloatArray, weight: FloatArray, free: BoolArray, softness: float = 0.0
     ) -> tuple[FloatArray, FloatArray]:
         """The parameters of least cost with those that are not free as in the prior; and the
-        precision (P, P).
+        precision. weight (R,): of the rows, 0 for those that are left out.
         """
-        mean = np.where(free, start, self._prior.mean)
-        cost, residual, slopes = self._at(mean, weight, softness)
+        x = np.where(free, start, self._before)
+        cost, residual, slopes = self._at(x, weight, softness)
         for _ in range(_ROUNDS):
-            step = self._step(mean, residual, slopes, free)
+            step = self._step(x, residual, slopes, free)
             for share in _SHARES:
-                trial = np.clip(mean + share * step, self._low, self._high)
+                trial = np.clip(x + share * step, self._low, self._high)
                 better = self._at(trial, weight, softness)
                 if better[0] <= cost:
                     break
             else:
                 break
-            moved = np.abs((trial - mean) / safe(self._prior.deviation)).max()
-            mean = trial
+            moved = np.abs((trial - x) / safe(self._wide)).max()
+            x = trial
             (cost, residual, slopes) = better
             if moved < _DONE:
                 break
-        return mean, slopes.T @ slopes + self._pull.T @ self._pull
+        return x, slopes.T @ slopes + self._pull.T @ self._pull
+
+    def rows(self, x: FloatArray, softness: float = 0.0) -> tuple[FloatArray, FloatArray]:
+        """What the rows miss (R,), and the slopes (R, P + E) of what is predicted."""
+        parts = [each.predicted(x, softness) for each in self._channels]
+        predicted = np.concatenate([each for each, _ in parts])
+        return self._measured - predicted, np.concatenate([each for _, each in parts])
 
     def _at(
-        self, mean: FloatArray, weight: FloatArray, softness: float
+        self, x: FloatArray, weight: FloatArray, softness: float
     ) -> tuple[float, FloatArray, FloatArray]:
-        """Cost, weighted residuals (W,) and their slopes (W, P)."""
-        watts, slopes = self._model.watts_and_slopes(mean, self._prepared, softness)
-        residual = weight * (self._watts - self._reduced(watts))
-        weighted = weight[:, None] * by_window(slopes)[self._windows]
-        pulled = self._pull @ (mean - self._prior.mean)
-        return float(residual @ residual + pulled @ pulled), residual, weighted
+        """Cost, weighted residuals (R,) and their slopes (R, P + E)."""
+        missing, slopes = self.rows(x, softness)
+        residual = weight * missing
+        pulled = self._pull @ (x - self._before)
+        cost = float(residual @ residual + pulled @ pulled)
+        return cost, residual, weight[:, None] * slopes
 
     def _step(
-        self, mean: FloatArray, residual: FloatArray, slopes: FloatArray, free: BoolArray
+        self, x: FloatArray, residual: FloatArray, slopes: FloatArray, free: BoolArray
     ) -> FloatArray:
         """The step of Gauss and Newton within the bounds; zero for what is not free."""
-        scale = safe(self._prior.deviation)[free]
+        scale = safe(self._wide)[free]
         reduced = np.asarray(
             np.linalg.qr(np.column_stack([slopes[:, free] * scale, residual]), mode="r")
         )
         matrix = np.concatenate([reduced[:, :-1], self._pull[:, free] * scale])
-        target = np.concatenate([reduced[:, -1], self._pull @ (self._prior.mean - mean)])
-        low, high = ((bound - mean)[free] / scale for bound in (self._low, self._high))
+        target = np.concatenate([reduced[:, -1], self._pull @ (self._before - x)])
+        low, high = ((bound - x)[free] / scale for bound in (self._low, self._high))
         solved = lsq_linear(matrix, target, (np.minimum(low, -1e-12), np.maximum(high, 1e-12)))
-        step = np.zeros(len(mean))
+        step = np.zeros(len(x))
         step[free] = solved.x * scale
         return step
 
-    def _noise(self, mean: FloatArray) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Deviation of a residual [W], and residuals per independent one: at rest, and moving."""
-        residual = self._watts - self._reduced(self._model.watts(mean, self._prepared))
-        noise = []
-        correlated = []
-        for rows in (~self._moving, self._moving):
-            own = residual[rows]
-            noise.append(
-                max(float(np.sqrt(np.mean(own**2))), LEAST_WATTS) if len(own) else LEAST_WATTS
-            )
-            correlated.append(correlation_length(own))
-        return (noise[0], noise[1]), (correlated[0], correlated[1])
+    def _noise(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Deviation of a residual of each group, and residuals per independent one."""
+        missing, _ = self.rows(x)
+        noise = self._least.copy()
+        correlated = np.ones(len(noise))
+        for k in range(len(noise)):
+            own = missing[self._group == k]
+            if len(own):
+                noise[k] = max(float(np.sqrt(np.mean(own**2))), self._least[k])
+            correlated[k] = correlation_length(own)
+        return noise, correlated
+
+    def _folds(self) -> IntArray:
+        """Which part of all the data each row (R,) belongs to: consecutive ones."""
+        known, place = np.unique(self.window, return_inverse=True)
+        return np.minimum(place * FOLDS // max(len(known), 1), FOLDS - 1)
+
+    def _chosen_scale(self, x: FloatArray, weight: FloatArray) -> float:
+        """The scale of friction's deviation by which what is left out is predicted best."""
+        if self.motors is not None:
+            return FRICTION_SCALES[-1]  # torques show it axis by axis: it is open
+        fold = self._folds()
+        best = FRICTION_SCALES[0]
+        least = np.inf
+        for scale in FRICTION_SCALES:
+            self._friction_scale = scale
+            self._set_pull()
+            x, _ = self.solve(x, weight, self._free)
+            _, residual, slopes = self._at(x, weight, 0.0)
+            error = self._left_out_error(residual, slopes, fold)
+            if error < _WIDER * least:
+                best = scale
+                least = error
+        return best
+
+    def _left_out_error(self, residual: FloatArray, slopes: FloatArray, fold: IntArray) -> float:
+        """Sum of squares of weighted residuals (R,), each of a fit without its fold, to first
+        order.
+        """
+        whole = slopes.T @ slopes + self._pull.T @ self._pull
+        total = 0.0
+        for k in range(FOLDS):
+            own = slopes[fold == k]
+            if not len(own):
+                continue
+            without = inverse(whole - own.T @ own, self._wide)
+            left = residual[fold == k] + own @ (without @ (own.T @ residual[fold == k]))
+            total += float(left @ left)
+        return total
+
+    def _torque_widening(self, x: FloatArray, weight: FloatArray) -> float:
+        """How much less than they seem to the rows of torques say: neighbours share what the model
+        lacks, and what is left out is missed by more.
+        """
+        _, residual, slopes = self._at(x, weight, 0.0)
+        left_out = self._left_out_error(residual, slopes, self._folds())
+        missed = left_out / max(float(residual @ residual), 1e-12)
+        return max(missed, 1.0) * float(self._noise(x)[1].mean())
+
+    def _moving(self) -> BoolArray:
+        moving = [by_window(run.samples.moving.astype(float)) > 0.0 for run in self.runs]
+        windows = np.unique(self.window)
+        return np.asarray(np.concatenate(moving)[windows])
 
     def _movements(self, before: FloatArray, after: FloatArray) -> tuple[FittedMovement, ...]:
-        step = self._samples.step
-        watts = self._samples.watts
-        return tuple(
-            FittedMovement(
-                float(self._samples.time[first]),
-                (behind - first) * step,
-                *(float(step * each[first:behind].sum()) for each in (watts, before, after)),
-            )
-            for first, behind in movements(self._samples)
-            if np.isfinite(watts[first:behind]).all()
-        )
+        assert self.meter is not None  # asked before
+        found = []
+        pairs = zip(self.meter.watts(before), self.meter.watts(after), strict=True)
+        for run, predicted in zip(self.runs, pairs, strict=True):
+            samples = run.samples
+            powers = (samples.watts, *predicted)
+            found += [
+                FittedMovement(
+                    float(samples.time[first]),
+                    (behind - first) * samples.step,
+                    *(float(samples.step * each[first:behind].sum()) for each in powers),
+                )
+                for first, behind in movements(samples)
+                if np.isfinite(samples.watts[first:behind]).all()
+            ]
+        return tuple(found)
 
-    def _widening(self, mean: FloatArray, weight: FloatArray) -> float:
+    def _widening(self, x: FloatArray, weight: FloatArray) -> float:
         """The factor on the noise that the residual energies of movements and rests take."""
-        watts, slopes = self._model.watts_and_slopes(mean, self._prepared)
-        missing = self._samples.watts - watts
-        step = WINDOW
-        residual = self._watts - self._reduced(watts)
-        moved = residual[self._moving]
-        white = 0.5 * float(np.mean(np.diff(moved) ** 2)) if len(moved) > 1 else 0.0
-        stretches = [
-            Stretch(
-                fold_of(int(np.searchsorted(self._windows, (a + b) // 2 // step)), len(residual)),
-                float(missing[a:b].sum()),
-                slopes[a:b].sum(axis=0),
-                white * step * (b - a),
-            )
-            for a, b in (*movements(self._samples), *rests(self._samples))
-            if np.isfinite(missing[a:b]).all()
-        ]
-        weighted = weight[:, None] * by_window(slopes)[self._windows]
+        missing, slopes = self.rows(x)
+        fold = self._folds()
+        stretches: list[Stretch] = []
+        for run in self.runs:
+            inside = run.samples
+            spans = [*movements(inside), *rests(inside)]
+            for first, behind in spans:
+                stretches += self._stretches(run, (first, behind), missing, slopes, fold)
         pull = self._pull.T @ self._pull
-        return widening(weighted, weight * residual, pull, self._prior.deviation, stretches)
+        whole = weight[:, None] * slopes
+        return widening(whole, weight * missing, fold, pull, self._wide, stretches)
+
+    def _stretches(
+        self,
+        run: Run,
+        span: tuple[int, int],
+        missing: FloatArray,
+        slopes: FloatArray,
+        fold: IntArray,
+    ) -> list[Stretch]:
+        """What a movement or a rest misses: its energy at the mains, and the work of its motors."""
+        first, last = run.first + span[0] // WINDOW, run.first + span[1] // WINDOW
+        found = []
+        begin = 0
+        for channel in self._channels:
+            count = len(channel.measured)
+            within = (channel.window >= first) & (channel.window < last)
+            rows = begin + np.flatnonzero(within)
+            begin += count
+            if not len(rows):
+                continue
+            by = np.full(len(rows), float(WINDOW))
+            if isinstance(channel, Motors):
+                by = WINDOW * channel.speed.T.ravel()[within]
+            white = self._white(channel, missing[begin - count : begin])[channel.group[within]]
+            found += [
+                Stretch(
+                    int(np.median(fold[rows[part]])),
+                    float(by[part] @ missing[rows[part]]),
+                    by[part] @ slopes[rows[part]],
+                    float((by[part] ** 2 * white[part]).sum()),
+                )
+                for part in self._within_folds(fold[rows], channel.window[within])
+            ]
+        return [each for each in found if each.white > 0.0]
+
+    def _within_folds(self, fold: IntArray, window: IntArray) -> list[IntArray]:
+        """The rows (R,) of a stretch; of one that is longer than a fold those of each fold."""
+        longest = len(np.unique(self.window)) // FOLDS
+        if int(np.ptp(window)) <= longest:
+            return [np.arange(len(fold))]
+        return [np.flatnonzero(fold == k) for k in np.unique(fold)]
+
+    @staticmethod
+    def _white(channel: Channel, missing: FloatArray) -> FloatArray:
+        """Variance of each group that neighbours do not share."""
+        found = channel.least**2 * 1e-6
+        for k in range(len(found)):
+            own = missing[channel.group == k]
+            if len(own) > 1:
+                found[k] += 0.5 * float(np.mean(np.diff(own) ** 2))
+        return found

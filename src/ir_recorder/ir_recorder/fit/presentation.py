@@ -12,6 +12,7 @@ import numpy as np
 from ir_description import PowerParameters, parameter_unit
 from ir_recorder.errors import RecorderError
 from ir_recorder.fit.estimate import Fit, FittedMovement
+from ir_recorder.fit.left_out import LeftOut
 from ir_recorder.report.files import write_output
 from ir_recorder.report.picture import PICTURE_START
 from ir_values.files import ANYWHERE
@@ -23,9 +24,24 @@ def sentences(found: Fit) -> tuple[str, ...]:
     """The findings for people, one sentence each."""
     own = int(found.determined.sum())
     lines = [f"{own} of {len(found.determined)} parameters are determined by the data"]
+    metered = bool(len(found.measured))
     if found.kept:
+        kept = "kept at the prior, because the data say" if metered else "the data say"
+        lines.append(f"{kept} little of them: {', '.join(found.kept)}")
+    if found.friction_scale > 1.0:
         lines.append(
-            f"kept at the prior, because the data say little of them: {', '.join(found.kept)}"
+            f"friction may lie {found.friction_scale:g} times farther from the data sheet than its "
+            "marks say: so what is left out is predicted best"
+            if metered
+            else "friction is open: torques show it axis by axis"
+        )
+    if not metered:
+        noise = ", ".join(f"{each:.3g}" for each in found.torque_noise)
+        unit = "A" if any(each != 1.0 for each in found.scales) else "Nm"
+        return (
+            *lines,
+            f"motors over 50 ms are off by {noise} {unit} (rms, by axis)",
+            "there are no watts in these data: losses of drives and controller stay as before",
         )
     if not found.movements:
         lines.append(
@@ -54,6 +70,25 @@ def sentences(found: Fit) -> tuple[str, ...]:
 def _share(movements: Sequence[FittedMovement], field: str) -> str:
     shares = np.array([abs(getattr(each, field) / each.measured - 1.0) for each in movements])
     return f"{100.0 * np.median(shares):.1f} % and {100.0 * shares.max():.1f} %"
+
+
+def left_out_rows(found: Sequence[LeftOut]) -> list[dict[str, object]]:
+    """One row per part and method: what was left out, and how it is predicted."""
+    rows: list[dict[str, object]] = []
+    for each in found:
+        sizes = np.abs(each.errors) if each.errors else np.array([np.nan])
+        rows.append(
+            {
+                "part": each.part,
+                "method": each.method,
+                "count": len(each.errors),
+                "rms": each.rms,
+                "median": float(np.median(sizes)),
+                "largest": float(sizes.max()),
+                "covered": each.covered,
+            }
+        )
+    return rows
 
 
 def parameter_rows(found: Fit, prior: PowerParameters) -> list[dict[str, object]]:

@@ -135,12 +135,13 @@ _BUS_UP = ("STAND_ON_MOTORS", "STAND_ON_BRAKES")  # modes in which the drive bus
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """Samples with the torques of their bodies; tool_watts (M,) W of the tool by its
-    declaration.
+    """Samples with the torques of their bodies and the speeds (M, n) of their motors, both as seen
+    at the joints; tool_watts (M,) W of the tool by its declaration.
     """
 
     samples: Samples
     torques: ArmTorques
+    speed: FloatArray
     tool_watts: FloatArray
 
 
@@ -190,7 +191,13 @@ class PowerModel:
                 part[rows] = each
             watts[rows] = sum(load.watts_always for load in loads)
             watts[rows & bus_up] += sum(load.watts_drive_bus for load in loads)
-        return Prepared(samples, ArmTorques(*parts), watts)
+        if self._robot.coupled:
+            turns = self._robot.motor_turns
+            links, held, _, spring = (part @ np.linalg.inv(turns) for part in parts)
+            rotors = (motion[2] @ turns.T) * self._robot.reflected_inertia
+            arm = ArmTorques(links, held, rotors, spring)
+            return Prepared(samples, arm, motion[1] @ turns.T, watts)
+        return Prepared(samples, ArmTorques(*parts), motion[1], watts)
 
     def watts(self, mean: FloatArray, prepared: Prepared) -> FloatArray:
         """Predicted W (M,) at the mains for parameters `mean` (P,)."""
@@ -225,25 +232,63 @@ class PowerModel:
         watts += self._one(mean, "drives_watts") * samples.motors
         return np.asarray(watts + self._one(mean, "tool_watts") * prepared.tool_watts)
 
+    def torque(self, mean: FloatArray, prepared: Prepared) -> FloatArray:
+        """Predicted Nm (M, n) of the motors, as seen at the joints."""
+        return self._torque(mean, prepared)[2]
+
+    def torque_slopes(self, mean: FloatArray, prepared: Prepared) -> FloatArray:
+        """Derivatives (M, n, P) of these torques by all parameters."""
+        of = self.layout.places
+        n = self._robot.n
+        through, side, _ = self._torque(mean, prepared)
+        slopes = np.zeros((*through.shape, len(mean)))
+        axis = np.arange(n)
+        for term, values in (
+            ("viscous", prepared.speed),
+            ("coulomb", side),
+            ("gear", np.abs(through) * side),
+        ):
+            slopes[:, axis, of(term).start + axis] = values
+        by_body = 1.0 + mean[of("gear")] * np.sign(through) * side
+        for name, body in self._bodies_of(prepared):
+            slopes[:, :, self.layout.index(name)] = by_body * body
+        return slopes
+
+    @staticmethod
+    def _bodies_of(prepared: Prepared) -> tuple[tuple[str, FloatArray], ...]:
+        """What each factor of inertia or mass weighs, (M, n) Nm."""
+        arm = prepared.torques
+        return (
+            ("link_mass", arm.links),
+            ("load_mass", arm.loads),
+            ("rotor_inertia", arm.rotors),
+            ("counterbalance", -arm.counterbalance),
+        )
+
+    def _torque(
+        self, mean: FloatArray, prepared: Prepared
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Torque (M, n) through the gears, side of the friction, and torque of the motors."""
+        of = self.layout.places
+        viscous, coulomb, gear = (mean[of(term)] for term in ("viscous", "coulomb", "gear"))
+        qd = prepared.speed
+        through = np.asarray(
+            sum(self._one(mean, name) * body for name, body in self._bodies_of(prepared))
+        )
+        side = np.tanh(qd / STILL)
+        return through, side, through + viscous * qd + (coulomb + gear * np.abs(through)) * side
+
     def _wanted(
         self, mean: FloatArray, prepared: Prepared, slopes: FloatArray | None
     ) -> FloatArray:
         """W (M,) that the axes together take from the link; fills `slopes` (M, P) where given."""
         of = self.layout.places
-        viscous, coulomb, copper, iron, inverter, gear = (
-            mean[of(term)] for term in ("viscous", "coulomb", "copper", "iron", "inverter", "gear")
+        copper, iron, inverter, gear = (
+            mean[of(term)] for term in ("copper", "iron", "inverter", "gear")
         )
-        arm = prepared.torques
-        qd = np.where(prepared.samples.known[:, None], prepared.samples.qd, 0.0)
+        qd = prepared.speed
         on = prepared.samples.motors[:, None]
-        through = (
-            self._one(mean, "link_mass") * arm.links
-            + self._one(mean, "load_mass") * arm.loads
-            + self._one(mean, "rotor_inertia") * arm.rotors
-            - self._one(mean, "counterbalance") * arm.counterbalance
-        )
-        side = np.tanh(qd / STILL)
-        torque = through + viscous * qd + (coulomb + gear * np.abs(through)) * side
+        through, side, torque = self._torque(mean, prepared)
         motor = torque / self._ratio
         axes = torque * qd + copper * motor**2 + inverter * np.abs(motor) + iron * qd**2
         if slopes is not None:
@@ -255,12 +300,7 @@ class PowerModel:
             slopes[:, of("inverter")] = on * np.abs(motor)
             slopes[:, of("iron")] = on * qd**2
             by_body = by_torque * (1.0 + gear * np.sign(through) * side)
-            for name, body in (
-                ("link_mass", arm.links),
-                ("load_mass", arm.loads),
-                ("rotor_inertia", arm.rotors),
-                ("counterbalance", -arm.counterbalance),
-            ):
+            for name, body in self._bodies_of(prepared):
                 slopes[:, self.layout.index(name)] = (by_body * body).sum(axis=1)
             slopes[:, self.layout.index(IDLE)] = prepared.samples.motors
         return np.asarray((on * axes).sum(axis=1) + self._one(mean, IDLE) * prepared.samples.motors)

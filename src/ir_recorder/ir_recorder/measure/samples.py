@@ -12,7 +12,15 @@ from ir_description import Load
 from ir_msgs_py.modes import REST_MODES, Mode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.errors import RecorderError
-from ir_recorder.traces.trace import GAP_FACTOR, MODE, Trace, mean_power, resampled
+from ir_recorder.traces.trace import (
+    CURRENT,
+    EFFORT,
+    GAP_FACTOR,
+    MODE,
+    Trace,
+    mean_power,
+    resampled,
+)
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 # What a robot did, sample by sample on one grid: motion, mode, load and, where there is a meter,
@@ -29,7 +37,8 @@ class Samples:
     time (M,) s: middles of the steps. q, qd, qdd (M, n). mode (M,): place in the names of modes,
     UNKNOWN in transitions and where nobody knows; load (M,): place in `loads`, UNKNOWN as well.
     watts (M,): mean at the mains, NaN where it wasn't measured. motors (M,): whether the drives are
-    on.
+    on. effort (M, n): what the controller says of its motors, Nm at the joints, or A (currents);
+    None where it says nothing.
     """
 
     step: float
@@ -42,6 +51,8 @@ class Samples:
     motors: BoolArray
     watts: FloatArray
     loads: tuple[tuple[Load, ...], ...]
+    effort: FloatArray | None = None
+    currents: bool = False
 
     @property
     def known(self) -> BoolArray:
@@ -64,7 +75,7 @@ class Samples:
         arrays = {
             field.name: getattr(self, field.name)[rows]
             for field in fields(self)
-            if field.name not in ("step", "loads")
+            if isinstance(getattr(self, field.name), np.ndarray)
         }
         return replace(self, **arrays)
 
@@ -187,7 +198,34 @@ def samples_of(
         watts = mean_power(meter.time, energy, edges)
         for start, length in meter.gaps():
             watts[(edges[1:] > start) & (edges[:-1] < start + length)] = np.nan
-    return Samples(step, middles, q, qd, qdd, mode, load, motors, watts, held)
+    effort, currents = _effort(joints, joint_names, edges)
+    return Samples(step, middles, q, qd, qdd, mode, load, motors, watts, held, effort, currents)
+
+
+def _effort(
+    joints: Trace, names: Sequence[str], edges: FloatArray
+) -> tuple[FloatArray | None, bool]:
+    """Means (M, n) between edges (M + 1,) of the torques of the motors, else of their currents
+    (True); None where neither was recorded. NaN in gaps.
+    """
+    torque = joints.joints(names, EFFORT)
+    current = joints.joints(names, CURRENT) if torque is None else None
+    values = torque if current is None else current
+    if values is None:
+        return None, False
+    known = np.where(np.isfinite(values), values, 0.0)
+    steps = np.diff(joints.time)[:, None]
+    count = np.concatenate(
+        [np.zeros((1, len(names))), np.cumsum(0.5 * (known[1:] + known[:-1]) * steps, axis=0)]
+    )
+    sums = np.column_stack([np.interp(edges, joints.time, each) for each in count.T])
+    means = np.diff(sums, axis=0) / np.diff(edges)[:, None]
+    for start, length in joints.gaps():
+        means[(edges[1:] > start) & (edges[:-1] < start + length)] = np.nan
+    lost = ~np.isfinite(values).all(axis=1)
+    if lost.any():
+        means[np.interp(0.5 * (edges[1:] + edges[:-1]), joints.time, lost) > 0.0] = np.nan
+    return means, current is not None
 
 
 def planned_samples(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -14,6 +14,7 @@ from ir_description import DescriptionFileError
 from ir_description.files import plain_yaml
 from ir_recorder.errors import RecorderError
 from ir_recorder.traces.trace import TIME
+from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError
 
 # Headings of columns as people write them: "power [kW]", "time_ms", "joint_a1 (deg)"; all become
@@ -81,15 +82,19 @@ def parsed(heading: str, where: str) -> tuple[str, float]:
 # the row before, or: sample
 
 FORMAT = "ir_trace/1"
+_MOST_FACTORS = 4  # of a product: voltage, current, share
 _KEYS = ("format", "columns", "clock_offset", "power_is")
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a file: its heading, and what its values are multiplied by."""
+    """A column of a file: its heading, and what its values are multiplied by; or the product of
+    several, each with its own factor.
+    """
 
     heading: str
     factor: float = 1.0
+    others: tuple[Column, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -136,10 +141,28 @@ def _columns(path: Path, tree: Any) -> Mapping[str, Column]:
 
 def _column(where: str, tree: Any) -> Column:
     if isinstance(tree, str):
-        return Column(tree)
+        return Column(tree, _in_heading(tree))
+    if isinstance(tree, dict) and set(tree) == {"product"}:
+        parts = tree["product"]
+        if not isinstance(parts, list) or not 2 <= len(parts) <= _MOST_FACTORS:
+            raise RecorderError(
+                f"{where[:200]}: product must be a list of 2 to {_MOST_FACTORS} columns"
+            )
+        first, *others = (_column(where, each) for each in parts)
+        return replace(first, others=tuple(others))
     if not isinstance(tree, dict) or not set(tree) <= {"column", "unit"} or "column" not in tree:
-        raise RecorderError(f"{where[:200]}: must be {{column: heading, unit: unit}}")
-    return Column(str(tree["column"]), factor(str(tree["unit"]), where) if "unit" in tree else 1.0)
+        raise RecorderError(
+            f"{where[:200]}: must be {{column: heading, unit: unit}} or {{product: [.., ..]}}"
+        )
+    heading = str(tree["column"])
+    given = "unit" in tree
+    return Column(heading, factor(str(tree["unit"]), where) if given else _in_heading(heading))
+
+
+def _in_heading(heading: str) -> float:
+    """What the unit in a heading's brackets means; 1 where there is none that is known."""
+    found = _BRACKETS.match(heading.strip())
+    return FACTORS.get(found["unit"].lower(), 1.0) if found else 1.0
 
 
 def _offset(path: Path, tree: Mapping[str, Any]) -> float:
@@ -164,7 +187,7 @@ def chosen(
     of a name.
     """
     places: dict[str, tuple[int, float]] = {}
-    for name, column in mapping.columns.items():
+    for name, column in _all_columns(mapping):
         if column.heading not in headings:
             raise RecorderError(
                 f"{where}: there is no column {column.heading[:80]!r}, {_known(headings)}"
@@ -182,6 +205,26 @@ def chosen(
     if TIME not in places:
         raise RecorderError(f"{where}: there is no column time, {_known(headings)}")
     return places
+
+
+_TIMES = " x "  # between the name of a product and the number of its factor
+
+
+def _all_columns(mapping: TraceMapping) -> Iterator[tuple[str, Column]]:
+    """Every column of a mapping, the further ones of a product by names of their own."""
+    for name, column in mapping.columns.items():
+        yield name, column
+        for number, other in enumerate(column.others):
+            yield f"{name}{_TIMES}{number}", other
+
+
+def multiplied(columns: Mapping[str, FloatArray], mapping: TraceMapping) -> dict[str, FloatArray]:
+    """Columns with the factors of every product multiplied into it."""
+    found = dict(columns)
+    for name, column in mapping.columns.items():
+        for number in range(len(column.others)):
+            found[name] = found[name] * found.pop(f"{name}{_TIMES}{number}")
+    return found
 
 
 def _named(heading: str, where: str, wanted: Wanted) -> tuple[str, float]:

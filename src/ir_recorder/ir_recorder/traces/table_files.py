@@ -17,7 +17,7 @@ from typing import Any, TextIO
 import numpy as np
 
 from ir_recorder.errors import RecorderError
-from ir_recorder.traces.columns import TraceMapping, Wanted, chosen
+from ir_recorder.traces.columns import TraceMapping, Wanted, chosen, multiplied
 from ir_recorder.traces.trace import LOAD, MODE, TIME, Trace
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
@@ -155,6 +155,7 @@ class _Reader:
             lines = [np.concatenate(lines)[kept]]
         time = columns.pop(TIME)
         self._check_time(time, lines)
+        columns = multiplied(columns, self._mapping)
         texts_of = MappingProxyType(spoken)
         problems = tuple(self._problems)
         sampled = self._mapping.sampled
@@ -279,6 +280,7 @@ def read_parquet(path: Path, wanted: Wanted, mapping: TraceMapping) -> Trace:
         else:
             columns[name] = scale * _numbers(path, column, name)
     time = columns.pop(TIME)
+    columns = multiplied(columns, mapping)
     return Trace(
         str(path), time, MappingProxyType(columns), MappingProxyType(texts), sampled=mapping.sampled
     )

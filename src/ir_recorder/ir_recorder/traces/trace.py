@@ -22,8 +22,9 @@ MODE = "mode"  # name of a power mode
 LOAD = "load"  # what is attached: "gripper+part", "none"
 VELOCITY = "_velocity"
 ACCELERATION = "_acceleration"
-EFFORT = "_effort"
-ENDINGS = ("", VELOCITY, ACCELERATION, EFFORT)  # of a joint's columns
+EFFORT = "_effort"  # Nm of the motor, at the joint
+CURRENT = "_current"  # A of the motor
+ENDINGS = ("", VELOCITY, ACCELERATION, EFFORT, CURRENT)  # of a joint's columns
 GAP_FACTOR = 4.0  # a step so many times longer than the usual one is a gap
 
 

@@ -1,0 +1,285 @@
+"""How far are the joules on real robots, fitted on a part of a recording and held against the rest?
+
+    python benchmarks/measured.py [DIR] [--seeds N] [--quick] [--json FILE] [--page docs/energy.md]
+
+DIR holds public recordings that a user has fetched (docs/energy.md names them; none is in the
+repository). What is not there is left out, and said. Without DIR: simulated plants, as
+`truth.py --only fit`. --page writes the table into the page's chapter "Measured".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from _measured_robots import kr300_r2500, tx40, ur3e
+from _results import Claim, at_most, command_line, finish, line_of
+from _truth_section import Asked
+
+from ir_description import Load, PowerParameters, RobotModel, data_sheet_of
+from ir_msgs_py.arrays import FloatArray
+from ir_recorder.fit import Estimate, LeftOut, left_out, median_error, plain_torques, shaft_work
+from ir_recorder.fit.data import without_turns
+from ir_recorder.measure import PowerModel, Samples, samples_of
+from ir_recorder.traces import Trace, read_traces
+
+UR3E = "ur3e_rad.csv"
+KR300 = "kr300_r2500_ultra_{}.csv"
+RUNS = "ABC"
+TX40 = ("pos_read_data.csv", "curr_data.csv", "tx40_mdh_modified.urdf")
+TX40_STEP = 2e-4  # s
+TX40_THINNED = 10  # rows averaged to one: 2 ms
+PAYLOAD = 150.0  # kg: of the KR 300's recordings, not stated there
+OPEN = 0.3  # deviation of a payload that nobody stated
+LAST = 3  # parts of the TX40's recording; the last one is predicted
+START = "<!-- measured -->"
+END = "<!-- end -->"
+
+
+@dataclass(frozen=True)
+class Row:
+    """A data set: what was held against what, by the fit, the data sheet and a regression."""
+
+    data: str
+    figure: str
+    fit: float
+    sheet: float
+    regression: float
+
+    def words(self) -> dict[str, Any]:
+        """For a table."""
+        return {
+            "data": self.data,
+            "figure": self.figure,
+            "fit": self.fit,
+            "data sheet": self.sheet,
+            "regression": self.regression,
+        }
+
+
+def main() -> None:
+    """Run what there is, and print it."""
+    parser = command_line(__doc__, (), 20, "3 plants, the recordings as always")
+    parser.add_argument("folder", nargs="?", type=Path, metavar="DIR")
+    parser.add_argument("--page", type=Path, help="page whose chapter is written")
+    asked = parser.parse_args()
+    rows: list[dict[str, Any]] = []
+    claims: list[Claim] = []
+    if asked.folder is None:
+        from _truth_fit import measured
+
+        seeds = min(asked.seeds, 3) if asked.quick else asked.seeds
+        found = measured(Asked(("demo",), seeds, asked.quick))
+        rows, claims = list(found.rows), list(found.claims)
+    else:
+        table: list[Row] = []
+        for own, held in _sets(asked.folder):
+            table += own
+            claims += held
+        rows = [row.words() for row in table]
+        if asked.page is not None:
+            _write(asked.page, table)
+    for row in rows:
+        print(line_of(row))
+    finish(asked.json, rows, claims)
+
+
+def _sets(folder: Path) -> Iterator[tuple[list[Row], list[Claim]]]:
+    """Every data set that the folder has."""
+    if (folder / UR3E).is_file():
+        yield _ur3e(folder)
+    else:
+        print(f"left out: {UR3E} is not in {folder}")
+    if all((folder / KR300.format(run)).is_file() for run in RUNS):
+        yield _kr300(folder, "payload 150 kg", 0.01)
+        yield _kr300(folder, "payload fitted", OPEN)
+    else:
+        print(f"left out: {KR300.format('*')} are not in {folder}")
+    if all((folder / name).is_file() for name in TX40):
+        yield _tx40(folder)
+    else:
+        print(f"left out: {', '.join(TX40)} are not in {folder}")
+
+
+def _model(robot: RobotModel) -> tuple[PowerModel, PowerParameters]:
+    prior = data_sheet_of(robot, robot.controller)
+    return PowerModel(robot, robot.controller.dc_link, np.eye(4), prior), prior
+
+
+def _samples(
+    trace: Trace, robot: RobotModel, prior: PowerParameters, loads: Sequence[Load], metered: bool
+) -> Samples:
+    trace, _ = without_turns(trace, robot)
+    runs = [(-np.inf, np.inf, tuple(loads))]
+    names = robot.joint_names
+    return samples_of(trace, trace if metered else None, names, prior.modes, runs)
+
+
+def _held(mass: float, ahead: float) -> Load:
+    """A payload so far ahead of the last joint [m], in the direction of its axis."""
+    return Load("payload", "part", mass, np.array([ahead, 0.0, 0.0]), 0.02 * mass * np.eye(3))
+
+
+def _ur3e(folder: Path) -> tuple[list[Row], list[Claim]]:
+    """Bus power of a UR3e, in four consecutive parts, each left out once."""
+    robot = ur3e()
+    model, prior = _model(robot)
+    (trace,) = read_traces(folder / UR3E, None, robot.joint_names)
+    part = Load("payload", "part", 1.07, np.array([0.0, 0.0, 0.05]), 0.002 * np.eye(3))
+    samples = _samples(trace, robot, prior, [part], metered=True)
+    estimate = Estimate([samples], ["UR3e"], model, prior)
+    estimate.result("ur3e")
+    found = left_out(estimate)
+    median, largest, rms = (
+        Row("UR3e, 14 movements", name, *(own(found, m) for m in METHODS))
+        for name, own in (
+            ("energy, median %", lambda rows, m: 100.0 * median_error(rows, m)),
+            ("energy, largest %", _largest),
+            ("power, W rms", _rms),
+        )
+    )
+    own = [row for row in found if row.method == METHODS[0]]
+    inside = sum(row.covered or 0 for row in own)
+    count = sum(len(row.errors) for row in own)
+    covered = Row("UR3e, 14 movements", f"of {count} in the 90 % interval", inside, np.nan, np.nan)
+    claims = [
+        at_most("UR3e: energy of a movement left out, median", median.fit, "%", 0.65),
+        at_most("UR3e: energy of a movement left out, largest", largest.fit, "%", 4.7),
+        at_most("UR3e: power left out, rms", rms.fit, "W", 1.58),
+        at_most("UR3e: median beside the regression's", median.fit / median.regression, "", 1.0),
+    ]
+    return [median, largest, rms, covered], claims
+
+
+METHODS = ("fit", "data sheet", "regression")
+
+
+def _largest(rows: Sequence[LeftOut], method: str) -> float:
+    return 100.0 * max(abs(e) for row in rows if row.method == method for e in row.errors)
+
+
+def _rms(rows: Sequence[LeftOut], method: str) -> float:
+    return float(np.sqrt(np.mean([row.rms**2 for row in rows if row.method == method])))
+
+
+def _kr300(folder: Path, what: str, deviation: float) -> tuple[list[Row], list[Claim]]:
+    """Work of a KR 300's motors, every split of its three runs into known and unknown ones."""
+    robot = kr300_r2500()
+    model, sheet = _model(robot)
+    covariance = sheet.covariance.copy()
+    covariance[sheet.index("load_mass"), sheet.index("load_mass")] = deviation**2
+    prior = replace(sheet, covariance=covariance)
+    load = _held(PAYLOAD, 0.34)
+    runs = {}
+    for run in RUNS:
+        (trace,) = read_traces(folder / KR300.format(run), None, robot.joint_names)
+        runs[run] = _samples(trace, robot, prior, [load], metered=False)
+    rows = []
+    for known in ("A", "B", "C", "AB", "AC", "BC"):
+        estimate = Estimate([runs[r] for r in known], list(known), model, prior, motors=True)
+        estimate.result("kr300")
+        for run in (each for each in RUNS if each not in known):
+            both = [*known, run]
+            whole = Estimate([runs[r] for r in both], both, model, prior, motors=True)
+            rows.append(_split(estimate, whole, f"KR 300, {what}", f"{known} to {run}"))
+    worst = max(abs(row.fit) for row in rows)
+    better = max(abs(row.fit) - abs(row.sheet) for row in rows)
+    return rows, [
+        at_most(f"KR 300, {what}: work of the motors of an unknown run, worst", worst, "%", 3.0),
+        at_most(f"KR 300, {what}: beside the data sheet, worst", better, "%", 0.0),
+    ]
+
+
+def _split(known: Estimate, whole: Estimate, data: str, name: str) -> Row:
+    """The last recording of `whole` predicted by what `known` found, as work in % off."""
+    motors = whole.motors
+    assert motors is not None  # asked for
+    n = motors.n
+    rows = len(motors.window) // n
+    inside = motors.window[:rows] >= whole.runs[-1].first
+    count = len(whole.prior.names)
+    extra = np.concatenate([np.zeros(n), motors.scales(whole.prior.mean)])
+    table = motors.measured.reshape(n, rows).T
+    speed = motors.speed
+
+    def off(predicted: FloatArray) -> float:
+        own = shaft_work(predicted[inside], speed[inside])
+        return 100.0 * (own / shaft_work(table[inside], speed[inside]) - 1.0)
+
+    def at(x: FloatArray) -> FloatArray:
+        return motors.predicted(x, 0.0)[0].reshape(n, rows).T
+
+    plain = plain_torques(whole, inside)
+    sheet = np.concatenate([whole.prior.mean[:count], extra])
+    return Row(data, f"work, {name}, %", off(at(known.found)), off(at(sheet)), off(plain))
+
+
+def _tx40(folder: Path) -> tuple[list[Row], list[Claim]]:
+    """Work of a TX40's motors: its last third by a fit on the rest, with the coupling of its wrist
+    and without.
+    """
+    rows = []
+    for what, robot in (("with the coupling", tx40(folder)), ("without", _uncoupled(tx40(folder)))):
+        model, prior = _model(robot)
+        trace = _tx40_trace(folder, robot)
+        samples = _samples(trace, robot, prior, (), metered=False)
+        ends = np.linspace(samples.time[0], samples.time[-1] + samples.step, LAST + 1)
+        first, last = samples.part(ends[0], ends[-2]), samples.part(ends[-2], ends[-1])
+        known = Estimate([first], ["first"], model, prior, motors=True)
+        known.result("tx40")
+        whole = Estimate([first, last], ["first", "last"], model, prior, motors=True)
+        rows.append(_split(known, whole, f"TX40, {what}", "two thirds to the last"))
+    name = "TX40: work of the motors in the last third"
+    return rows, [at_most(name, abs(rows[0].fit), "%", 1.5)]
+
+
+def _uncoupled(robot: RobotModel) -> RobotModel:
+    return replace(robot, motor_turns=np.eye(robot.n))
+
+
+def _tx40_trace(folder: Path, robot: RobotModel) -> Trace:
+    """Joint positions and torques of the motors, as seen at their own joints."""
+    motors, torques = (np.loadtxt(folder / name, delimiter=",", skiprows=1) for name in TX40[:2])
+    signs = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0])
+    ratio = robot.gear_ratio * signs
+    turns = np.eye(6)
+    turns[5, 4] = 1.0  # whatever the model is told: this is how the arm stands
+    q = (motors / ratio) @ np.linalg.inv(turns).T
+    q += np.array([0.0, -np.pi / 2, np.pi / 2, 0.0, 0.0, 0.0])
+    effort = torques * ratio
+    if not robot.coupled:
+        effort = effort @ turns
+    thinned = len(q) // TX40_THINNED * TX40_THINNED
+    q, effort = (each[:thinned].reshape(-1, TX40_THINNED, 6).mean(axis=1) for each in (q, effort))
+    time = (np.arange(len(q)) + 0.5) * TX40_STEP * TX40_THINNED
+    columns = {}
+    for k, name in enumerate(robot.joint_names):
+        columns[name] = q[:, k].copy()
+        columns[f"{name}_effort"] = effort[:, k].copy()
+    return Trace("TX40", time, columns)
+
+
+def _write(page: Path, table: Sequence[Row]) -> None:
+    """Put the table between the marks of a page."""
+    heads = ("recording", "figure", "fit", "data sheet", "regression")
+    lines = [f"| {' | '.join(heads)} |", f"|{' --- |' * len(heads)}"]
+    lines += [
+        f"| {row.data} | {row.figure} | {_figure(row.fit)} | {_figure(row.sheet)} | "
+        f"{_figure(row.regression)} |"
+        for row in table
+    ]
+    text = page.read_text(encoding="utf-8")
+    before, _, rest = text.partition(START)
+    _, _, after = rest.partition(END)
+    page.write_text("\n".join([before + START, *lines, END]) + after, encoding="utf-8")
+
+
+def _figure(value: float) -> str:
+    return "–" if np.isnan(value) else f"{value:.3g}" if value != int(value) else f"{value:.0f}"
+
+
+if __name__ == "__main__":
+    main()

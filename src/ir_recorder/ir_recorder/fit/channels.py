@@ -1,0 +1,201 @@
+"""What a fit explains: the watts of a meter, and what a controller says of its motors.
+
+Both are means over windows of 50 ms; each window of a meter, and each axis of each window of the
+motors, is a row. Rows of one group share a noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from ir_description import PowerParameters
+from ir_recorder.measure import PowerModel, Samples
+from ir_recorder.measure.power_model import Prepared
+from ir_values.arrays import BoolArray, FloatArray, IntArray
+
+WINDOW = 5  # samples whose mean is one residual: 50 ms
+LEAST_WATTS = 0.5  # noise of a residual, at least: the resolution of meters
+_LEAST_SHARE = 1e-3  # of the largest effort of an axis: the resolution of controllers
+_OFFSET = 0.02  # of the largest effort: what a sensor or a centre of mass may add to an axis
+
+
+def by_window(values: FloatArray) -> FloatArray:
+    """Means (M // WINDOW, ...) of consecutive samples (M, ...)."""
+    count = len(values) // WINDOW
+    return np.asarray(
+        values[: count * WINDOW].reshape(count, WINDOW, *values.shape[1:]).mean(axis=1)
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One recording: its name, its samples, and these prepared for the model; first: the number of
+    its first window among those of all recordings.
+    """
+
+    name: str
+    samples: Samples
+    prepared: Prepared
+    first: int
+
+    def whole(self, usable: BoolArray) -> IntArray:
+        """Numbers of the windows all of whose samples (M,) are usable."""
+        return np.flatnonzero(by_window(usable.astype(float)) > 1.0 - 1e-9)
+
+
+def runs_of(
+    recordings: Sequence[Samples], names: Sequence[str], model: PowerModel
+) -> tuple[Run, ...]:
+    """The recordings with their places one behind another."""
+    runs: list[Run] = []
+    first = 0
+    for samples, name in zip(recordings, names, strict=True):
+        runs.append(Run(name, samples, model.prepare(samples), first))
+        first += len(samples) // WINDOW
+    return tuple(runs)
+
+
+class Channel(Protocol):
+    """measured (R,); window (R,): the number of each row's window; group (R,): whose noise it
+    shares; least: of each group's noise.
+    """
+
+    measured: FloatArray
+    window: IntArray
+    group: IntArray
+    least: FloatArray
+
+    def predicted(self, x: FloatArray, softness: float) -> tuple[FloatArray, FloatArray]:
+        """Rows (R,) for parameters x (P + E,), and their slopes (R, P + E)."""
+
+
+class Meter:
+    """Watts at the mains; groups: at rest, and in motion."""
+
+    def __init__(self, runs: Sequence[Run], model: PowerModel, extra: int) -> None:
+        self._runs = runs
+        self._model = model
+        self._extra = extra
+        self._rows = [run.whole(run.samples.known & np.isfinite(run.samples.watts)) for run in runs]
+        self.measured = self.reduced([run.samples.watts for run in runs])
+        moving = self.reduced([run.samples.moving.astype(float) for run in runs]) > 0.0
+        self.group = moving.astype(int)
+        self.window = np.concatenate(
+            [run.first + rows for run, rows in zip(runs, self._rows, strict=True)]
+        )
+        self.least = np.full(2, LEAST_WATTS)
+
+    def predicted(self, x: FloatArray, softness: float) -> tuple[FloatArray, FloatArray]:
+        """Watts (R,) and their slopes (R, P + E)."""
+        mean = x[: len(x) - self._extra]
+        found = [self._model.watts_and_slopes(mean, run.prepared, softness) for run in self._runs]
+        slopes = self.reduced([each for _, each in found])
+        none = np.zeros((len(slopes), self._extra))
+        return self.reduced([watts for watts, _ in found]), np.hstack([slopes, none])
+
+    def watts(self, mean: FloatArray) -> list[FloatArray]:
+        """Watts (M,) of every sample of each recording."""
+        return [self._model.watts(mean, run.prepared) for run in self._runs]
+
+    def time(self) -> FloatArray:
+        """Seconds (R,) of the rows on their recordings' clocks."""
+        return self.reduced([run.samples.time for run in self._runs])
+
+    def reduced(self, values: Sequence[FloatArray]) -> FloatArray:
+        """Means over the rows of values (M, ...) of each recording."""
+        parts = [by_window(each)[rows] for each, rows in zip(values, self._rows, strict=True)]
+        return np.concatenate(parts)
+
+
+class Motors:
+    """Torques of the motors as seen at the joints, or their currents; one group per axis.
+
+    The last 2 n values of x are an offset per axis in Nm (of a sensor, or of a centre of mass) and,
+    per axis, units of what the controller says per Nm: 1 for torques.
+    """
+
+    def __init__(self, runs: Sequence[Run], model: PowerModel) -> None:
+        self._runs = runs
+        self._model = model
+        self.n = len(model.layout.joints)
+        self._rows = []
+        for run in runs:
+            effort = run.samples.effort
+            assert effort is not None  # asked before
+            known = run.samples.known & run.samples.motors & np.isfinite(effort).all(axis=1)
+            self._rows.append(run.whole(known))
+        efforts = [run.samples.effort for run in runs if run.samples.effort is not None]
+        self._table = self.reduced(efforts)  # (W, n)
+        self.speed = self.reduced([run.prepared.speed for run in runs])
+        self.measured = self._table.T.ravel()
+        windows = np.concatenate(
+            [run.first + rows for run, rows in zip(runs, self._rows, strict=True)]
+        )
+        self.window = np.tile(windows, self.n)
+        self.group = np.repeat(np.arange(self.n), len(windows))
+        self.largest = np.maximum(np.abs(self._table).max(axis=0, initial=0.0), 1e-9)
+        self.least = _LEAST_SHARE * self.largest
+
+    @property
+    def currents(self) -> bool:
+        """Whether amperes were recorded, not torques."""
+        return self._runs[0].samples.currents
+
+    def scales(self, mean: FloatArray) -> FloatArray:
+        """Amperes per Nm (n,) that fit the torques of parameters `mean` best; 1 for torques."""
+        if not self.currents:
+            return np.ones(self.n)
+        torque = self.reduced([self._model.torque(mean, run.prepared) for run in self._runs])
+        power = np.maximum((torque**2).sum(axis=0), 1e-12)
+        return np.asarray((torque * self._table).sum(axis=0) / power)
+
+    def own_prior(self, mean: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Values and deviations (2 n,) of offsets and scales before the fit."""
+        scales = self.scales(mean)
+        size = np.where(scales == 0.0, 1.0, np.abs(scales))
+        spread = 0.5 * size if self.currents else np.zeros(self.n)
+        return (
+            np.concatenate([np.zeros(self.n), scales]),
+            np.concatenate([_OFFSET * self.largest / size, spread]),
+        )
+
+    def predicted(self, x: FloatArray, softness: float) -> tuple[FloatArray, FloatArray]:
+        """Efforts (R,) and their slopes (R, P + E)."""
+        count = len(x) - 2 * self.n
+        mean, offset, scale = np.split(x, [count, count + self.n])
+        torque = self.reduced([self._model.torque(mean, run.prepared) for run in self._runs])
+        parts = [self._model.torque_slopes(mean, run.prepared) for run in self._runs]
+        slopes = np.zeros((*torque.shape, len(x)))
+        slopes[:, :, :count] = self.reduced(parts) * scale[None, :, None]
+        axis = np.arange(self.n)
+        slopes[:, axis, count + axis] = scale
+        slopes[:, axis, count + self.n + axis] = torque + offset
+        rows = slopes.transpose(1, 0, 2).reshape(-1, len(x))
+        return ((torque + offset) * scale).T.ravel(), rows
+
+    def reduced(self, values: Sequence[FloatArray]) -> FloatArray:
+        """Means over the rows of values (M, ...) of each recording."""
+        parts = [by_window(each)[rows] for each, rows in zip(values, self._rows, strict=True)]
+        return np.concatenate(parts)
+
+
+FRICTION = ("viscous", "coulomb")
+
+
+def open_prior(prior: PowerParameters, meter: Meter | None) -> PowerParameters:
+    """The prior of a fit: where nobody knows what a controller draws at rest (`controller: none`),
+    its watts are open, so that a meter finds them.
+    """
+    names = [f"watts.{mode}" for mode in prior.modes]
+    open_ones = [k for k in map(prior.index, names) if prior.deviation[k] == prior.mean[k] == 0.0]
+    if meter is None or not len(meter.measured) or not open_ones:
+        return prior
+    level = max(float(np.median(meter.measured)), 10.0 * LEAST_WATTS)
+    covariance = prior.covariance.copy()
+    for k in open_ones:
+        covariance[k, k] = level**2
+    return replace(prior, covariance=covariance)

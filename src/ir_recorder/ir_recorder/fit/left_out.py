@@ -1,0 +1,265 @@
+"""What a fit is worth on what it has not seen, beside the data sheet and a plain regression.
+
+Each part is left out once: a recording, or a quarter where there is one alone. The data sheet is
+given what it can't know, the watts at rest of a controller without a table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ir_recorder.fit.channels import WINDOW, Motors, Run
+from ir_recorder.fit.estimate import Estimate
+from ir_recorder.measure import movements
+from ir_values.arrays import BoolArray, FloatArray, IntArray
+
+QUARTERS = 4  # parts of a single recording
+METHODS = ("fit", "data sheet", "regression")
+_NINETY = 1.645  # standard deviations
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """How a method predicts what it has not seen. part: what was left out; method: one of METHODS;
+    rms: of the watts, NaN without a meter; errors: of the energy of each movement, or (without a
+    meter) of the motors' work, shares; covered: how many of these lie in the 90 % interval, None
+    for a method without one.
+    """
+
+    part: str
+    method: str
+    rms: float
+    errors: tuple[float, ...]
+    covered: int | None
+
+
+def left_out(estimate: Estimate) -> tuple[LeftOut, ...]:
+    """Every part by every method, after a fit (`Estimate.result`)."""
+    parts = _parts(estimate)
+    if estimate.meter is not None:
+        return _metered(estimate, parts)
+    return _worked(estimate, parts)
+
+
+def recommendation(rows: Sequence[LeftOut]) -> str:
+    """Which of fit and data sheet to plan with, as a sentence with both medians."""
+    medians = {name: 100.0 * median_error(rows, name) for name in METHODS}
+    fitted, sheet, regression = (medians[name] for name in METHODS)
+    said = (
+        f"what was left out is predicted within {fitted:.1f} % (median) by the fit, {sheet:.1f} % "
+        f"by the data sheet, {regression:.1f} % by a plain regression"
+    )
+    if fitted > sheet:
+        return f"{said}: plan with the data sheet, this fit is worse on this robot"
+    return f"{said}: plan with the fit"
+
+
+def median_error(rows: Sequence[LeftOut], method: str) -> float:
+    """The median size of all errors of a method, a share; NaN without any."""
+    errors = [abs(each) for row in rows if row.method == method for each in row.errors]
+    return float(np.median(errors)) if errors else np.nan
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A name, and which rows of the fit and windows of all recordings belong to it."""
+
+    name: str
+    windows: IntArray
+
+
+def _parts(estimate: Estimate) -> list[_Part]:
+    known = np.unique(estimate.window)
+    if len(estimate.runs) > 1:
+        return [
+            _Part(run.name, known[(known >= run.first) & (known < _end(run))])
+            for run in estimate.runs
+        ]
+    shares = np.array_split(known, QUARTERS)
+    return [_Part(f"part {k} of {QUARTERS}", share) for k, share in enumerate(shares, 1)]
+
+
+def _end(run: Run) -> int:
+    return run.first + len(run.samples) // WINDOW
+
+
+def _without(estimate: Estimate, part: _Part) -> tuple[FloatArray, FloatArray]:
+    """Parameters and covariance of a fit that has not seen a part."""
+    weight = np.where(np.isin(estimate.window, part.windows), 0.0, estimate.weight)
+    x, precision = estimate.solve(estimate.found, weight, estimate.deviation > 0.0)
+    return x, np.asarray(np.linalg.pinv(precision, hermitian=True))
+
+
+def _metered(estimate: Estimate, parts: Sequence[_Part]) -> tuple[LeftOut, ...]:
+    assert estimate.meter is not None  # asked before
+    found = []
+    count = len(estimate.prior.names)
+    features = [_features(estimate, run) for run in estimate.runs]
+    sheet = estimate.meter.watts(estimate.prior.mean)
+    open_rest = bool((estimate.prior.deviation != estimate.given.deviation).any())
+    for part in parts:
+        x, covariance = _without(estimate, part)
+        own = estimate.meter.watts(x[:count])
+        train = [_rows(run, part, inside=False) for run in estimate.runs]
+        coefficients = _solved(
+            np.concatenate([each[rows] for each, rows in zip(features, train, strict=True)]),
+            np.concatenate(
+                [run.samples.watts[rows] for run, rows in zip(estimate.runs, train, strict=True)]
+            ),
+        )
+        plain = [each @ coefficients for each in features]
+        level = 0.0
+        if open_rest:
+            level = float(
+                np.mean(
+                    np.concatenate(
+                        [
+                            (run.samples.watts - watts)[rows]
+                            for run, watts, rows in zip(estimate.runs, sheet, train, strict=True)
+                        ]
+                    )
+                )
+            )
+        raised = [watts + level for watts in sheet]
+        for method, predicted in zip(METHODS, (own, raised, plain), strict=True):
+            rows = [_rows(run, part, inside=True) for run in estimate.runs]
+            missing = np.concatenate(
+                [
+                    (run.samples.watts - watts)[inside]
+                    for run, watts, inside in zip(estimate.runs, predicted, rows, strict=True)
+                ]
+            )
+            errors, covered = _energies(
+                estimate, part, predicted, covariance if method == METHODS[0] else None, x
+            )
+            windows = missing[: len(missing) // WINDOW * WINDOW].reshape(-1, WINDOW).mean(axis=1)
+            rms = float(np.sqrt(np.mean(windows**2))) if len(windows) else np.nan
+            found.append(LeftOut(part.name, method, rms, tuple(errors), covered))
+    return tuple(found)
+
+
+def _rows(run: Run, part: _Part, *, inside: bool) -> IntArray:
+    """Samples of a recording that have watts and belong to a part, or (not inside) do not."""
+    window = run.first + np.arange(len(run.samples)) // WINDOW
+    usable = run.samples.known & np.isfinite(run.samples.watts)
+    return np.flatnonzero(usable & (np.isin(window, part.windows) == inside))
+
+
+def _energies(
+    estimate: Estimate,
+    part: _Part,
+    predicted: Sequence[FloatArray],
+    covariance: FloatArray | None,
+    x: FloatArray,
+) -> tuple[list[float], int | None]:
+    """Errors of the energies of the part's movements, and how many intervals hold them."""
+    errors = []
+    covered = 0
+    _, slopes = estimate.rows(x)
+    for run, watts in zip(estimate.runs, predicted, strict=True):
+        samples = run.samples
+        for first, behind in movements(samples):
+            energy = float(samples.watts[first:behind].sum())
+            middle = run.first + (first + behind) // 2 // WINDOW
+            if middle not in part.windows or not energy > 0.0:
+                continue
+            off = float(watts[first:behind].sum()) - energy
+            errors.append(off / energy)
+            if covariance is not None:
+                begin, end = run.first + first // WINDOW, run.first + behind // WINDOW
+                rows = (estimate.window >= begin) & (estimate.window < end)
+                rows &= np.arange(len(rows)) < len(estimate.meter.measured)  # type: ignore[union-attr]
+                slope = WINDOW * slopes[rows].sum(axis=0)
+                deviation = np.sqrt(
+                    slope @ covariance @ slope
+                    + WINDOW**2 * (1.0 / estimate.weight[rows] ** 2).sum()
+                )
+                covered += abs(off) <= _NINETY * deviation
+    return errors, covered if covariance is not None else None
+
+
+def _features(estimate: Estimate, run: Run) -> FloatArray:
+    """What a regression of the watts takes (M, K): per axis torque of the bodies times speed, its
+    square, size and square of the speed, acceleration times speed; and a level for each mode.
+    """
+    samples = run.samples
+    known = samples.known[:, None]
+    qd = run.prepared.speed
+    qdd = np.where(known, samples.qdd, 0.0)
+    arm = run.prepared.torques
+    torque = arm.links + arm.loads + arm.rotors - arm.counterbalance
+    modes = samples.mode[:, None] == np.arange(len(estimate.prior.modes))
+    return np.hstack([torque * qd, torque**2, np.abs(qd), qd**2, qdd * qd, modes])
+
+
+def _solved(features: FloatArray, measured: FloatArray) -> FloatArray:
+    """Least squares of columns of one size."""
+    size = np.sqrt((features**2).mean(axis=0))
+    size[size == 0.0] = 1.0
+    return np.asarray(np.linalg.lstsq(features / size, measured, rcond=1e-9)[0] / size)
+
+
+def _worked(estimate: Estimate, parts: Sequence[_Part]) -> tuple[LeftOut, ...]:
+    motors = estimate.motors
+    assert motors is not None  # asked before
+    n = motors.n
+    rows = len(motors.window) // n
+    window = motors.window[:rows]
+    speed = motors.speed
+    start = np.concatenate([estimate.prior.mean, np.zeros(n), motors.scales(estimate.prior.mean)])
+    sheet = motors.predicted(start, 0.0)[0].reshape(n, rows).T
+    measured = motors.measured.reshape(n, rows).T
+    found = []
+    for part in parts:
+        x, _ = _without(estimate, part)
+        own = motors.predicted(x, 0.0)[0].reshape(n, rows).T
+        inside = np.isin(window, part.windows)
+        plain = plain_torques(estimate, inside)
+        work = shaft_work(measured[inside], speed[inside])
+        for method, predicted in zip(METHODS, (own, sheet, plain), strict=True):
+            error = shaft_work(predicted[inside], speed[inside]) / work - 1.0
+            found.append(LeftOut(part.name, method, np.nan, (error,), None))
+    return tuple(found)
+
+
+def plain_torques(estimate: Estimate, unseen: BoolArray) -> FloatArray:
+    """Torques (W, n) by a regression per axis on the bodies' torque of the data sheet, speed, its
+    side, acceleration and a constant, which has not seen some of the windows (W,).
+    """
+    motors = estimate.motors
+    assert motors is not None  # asked before
+    bodies, regressors = _torque_features(estimate, motors)
+    rows = len(bodies)
+    measured = motors.measured.reshape(motors.n, rows).T
+    plain = np.empty_like(measured)
+    for j in range(motors.n):
+        columns = np.column_stack(
+            [bodies[:, j], *(each[:, j] for each in regressors), np.ones(rows)]
+        )
+        plain[:, j] = columns @ _solved(columns[~unseen], measured[~unseen, j])
+    return plain
+
+
+def shaft_work(torque: FloatArray, speed: FloatArray) -> float:
+    """What the motors give, by torques and speeds (W, n): the sum of all that is positive, axis by
+    axis.
+    """
+    return float(np.maximum(torque * speed, 0.0).sum())
+
+
+def _torque_features(
+    estimate: Estimate, motors: Motors
+) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+    """Per axis (W, n): the bodies' torque by the data sheet; speed, its side and acceleration."""
+    mean = estimate.prior.mean.copy()
+    for term in ("viscous", "coulomb", "gear"):
+        mean[estimate.prior.places(term)] = 0.0
+    sides = [np.tanh(run.prepared.speed / 1e-3) for run in estimate.runs]
+    turns = [np.where(run.samples.known[:, None], run.samples.qdd, 0.0) for run in estimate.runs]
+    return (
+        motors.reduced([estimate.model.torque(mean, run.prepared) for run in estimate.runs]),
+        (motors.speed, motors.reduced(sides), motors.reduced(turns)),
+    )

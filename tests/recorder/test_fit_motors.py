@@ -1,0 +1,155 @@
+"""Fits by what a controller says of its motors, over several recordings, and their worth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ir_description import PowerParameters, RobotModel, data_sheet_of, load_robot
+from ir_recorder.errors import RecorderError
+from ir_recorder.fit import Estimate, LeftOut, fit, left_out, recommendation, shaft_work
+from ir_recorder.fit.data import without_turns
+from ir_recorder.measure import PowerModel, Samples
+from ir_recorder.measure.arm import arm_torques
+from ir_recorder.traces import Trace
+
+STEP = 0.01
+ROBOTS = ("ur10e", "kr6_r900_2")
+
+
+def moved(robot: RobotModel, seed: int, seconds: float = 12.0) -> Samples:
+    """A sum of sines about home."""
+    rng = np.random.default_rng(seed)
+    time = (np.arange(int(seconds / STEP)) + 0.5) * STEP
+    speed = rng.uniform(0.5, 2.5, (3, robot.n))
+    size = rng.uniform(0.1, 0.35, (3, robot.n))
+    phase = rng.uniform(0.0, 6.0, (3, robot.n))
+    angle = speed * time[:, None, None] + phase
+    q = robot.machine_home + (size * np.sin(angle)).sum(axis=1)
+    qd = (size * speed * np.cos(angle)).sum(axis=1)
+    qdd = -(size * speed**2 * np.sin(angle)).sum(axis=1)
+    n = len(time)
+    none = np.zeros(n, int)
+    on = np.ones(n, bool)
+    return Samples(STEP, time, q, qd, qdd, none, none, on, np.full(n, np.nan), ((),))
+
+
+def model_of(robot: RobotModel) -> tuple[PowerModel, PowerParameters]:
+    prior = data_sheet_of(robot, robot.controller)
+    return PowerModel(robot, robot.controller.dc_link, np.eye(4), prior), prior
+
+
+def truth_of(prior: PowerParameters, seed: int) -> np.ndarray:
+    """Friction 0.4 to 2.5 times the data sheet's: far beyond what its marks allow."""
+    rng = np.random.default_rng(seed)
+    mean = prior.mean.copy()
+    for term in ("viscous", "coulomb"):
+        places = prior.places(term)
+        mean[places] *= np.exp(rng.uniform(np.log(0.4), np.log(2.5), places.stop - places.start))
+    return mean
+
+
+def told(samples: Samples, model: PowerModel, mean: np.ndarray, gains: object = 1.0) -> Samples:
+    torque = model.torque(mean, model.prepare(samples))
+    noise = np.random.default_rng(1).normal(0.0, 0.01 * np.abs(torque).max(axis=0), torque.shape)
+    return replace(samples, effort=(torque + noise) * gains, currents=gains != 1.0)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_friction_is_found_from_torques_without_a_meter(name: str) -> None:
+    robot = load_robot(name)
+    model, prior = model_of(robot)
+    truth = truth_of(prior, 4)
+    runs = [told(moved(robot, seed), model, truth) for seed in (1, 2)]
+    found = fit(runs, model, prior, motors=True)
+    unknown = moved(robot, 3)
+    prepared = model.prepare(unknown)
+    true, own, sheet = (
+        shaft_work(model.torque(mean, prepared), prepared.speed)
+        for mean in (truth, found.parameters.mean, prior.mean)
+    )
+    assert abs(own / true - 1.0) < 0.01 < abs(sheet / true - 1.0)
+    assert len(found.measured) == 0
+
+
+def test_currents_give_the_gains_of_the_motors_too() -> None:
+    robot = load_robot("ur10e")
+    model, prior = model_of(robot)
+    truth = truth_of(prior, 5)
+    gains = np.array([0.1, 0.1, 0.11, 0.2, 0.21, 0.2])
+    runs = []
+    for seed in (1, 2):
+        run = told(moved(robot, seed), model, truth)
+        assert run.effort is not None
+        runs.append(replace(run, effort=run.effort * gains, currents=True))
+    found = fit(runs, model, prior, motors=True)
+    assert found.scales[:3] == pytest.approx(gains[:3], rel=0.15)  # masses are known to 10 %
+
+
+def test_every_recording_is_left_out_once_and_the_fit_is_recommended_where_it_is_better() -> None:
+    robot = load_robot("kr6_r900_2")
+    model, prior = model_of(robot)
+    runs = [told(moved(robot, seed), model, truth_of(prior, 6)) for seed in (1, 2, 3)]
+    estimate = Estimate(runs, ["a", "b", "c"], model, prior, motors=True)
+    estimate.result("x")
+    rows = left_out(estimate)
+    assert [(row.part, row.method) for row in rows if row.method == "fit"] == [
+        (name, "fit") for name in "abc"
+    ]
+    assert "plan with the fit" in recommendation(rows)
+
+
+def test_a_fit_that_is_worse_recommends_the_data_sheet() -> None:
+    def of(method: str, error: float) -> LeftOut:
+        return LeftOut("a", method, 1.0, (error,), None)
+
+    rows = [of("fit", 0.05), of("data sheet", -0.02), of("regression", 0.03)]
+    assert "plan with the data sheet" in recommendation(rows)
+
+
+def test_coupled_motors_give_the_power_that_the_joints_take() -> None:
+    """Whatever turns what, the power of all motors is that of all joints."""
+    turns = np.eye(6)
+    turns[5, 4] = 1.0
+    turns[4, 3] = -0.4
+    robot = replace(load_robot("kr6_r900_2"), motor_turns=turns)
+    model, _ = model_of(robot)
+    samples = moved(robot, 7)
+    prepared = model.prepare(samples)
+    motors = ((prepared.torques.links - prepared.torques.counterbalance) * prepared.speed).sum(1)
+    own = arm_torques(robot, (), np.eye(4), np.stack([samples.q, samples.qd, samples.qdd]))
+    assert np.abs(motors - (own.links * samples.qd).sum(axis=1)).max() < 1e-8
+    assert np.abs(prepared.speed - samples.qd)[:, 5].max() > 0.1
+
+
+def joints(robot: RobotModel, q: np.ndarray) -> Trace:
+    columns: dict[str, np.ndarray] = {
+        name: q[:, k].copy() for k, name in enumerate(robot.joint_names)
+    }
+    return Trace("run.csv", np.arange(len(q)) * 0.01, columns)
+
+
+@pytest.mark.parametrize("turns", [-2, 1, 3])
+def test_a_joint_without_an_end_is_brought_back_and_its_jumps_are_followed(turns: int) -> None:
+    robot = load_robot("ur10e")
+    q = moved(robot, 8).q
+    beyond = q.copy()
+    beyond[:, 5] = (q[:, 5] + np.pi) % (2.0 * np.pi) - np.pi + 2.0 * np.pi * turns
+    back, said = without_turns(joints(robot, beyond), robot)
+    found = back.columns[robot.joint_names[5]]
+    assert np.abs(np.diff(found)).max() < 0.2
+    off = (found - q[:, 5]) / (2.0 * np.pi)
+    assert np.abs(off - np.round(off)).max() < 1e-9
+    assert robot.position_min[5] - 0.2 <= found.min() <= found.max() <= robot.position_max[5] + 0.2
+    assert turns in (-2, 1) or "brought back by" in said[0]
+
+
+def test_too_little_is_refused_with_what_there_is() -> None:
+    robot = load_robot("ur10e")
+    model, prior = model_of(robot)
+    short: Sequence[Samples] = [told(moved(robot, 1, 2.0), model, prior.mean)]
+    with pytest.raises(RecorderError, match=r"2\.0 s have torques"):
+        fit(short, model, prior, motors=True)
