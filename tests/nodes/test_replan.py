@@ -14,6 +14,7 @@ from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
+from ir_cli.ros import replan
 from ir_cli.ros.replan import (
     Comparison,
     RecordedPlanner,
@@ -33,6 +34,8 @@ from ir_msgs_py import names
 from ir_planner.node.node import PlannerNode
 from ir_recorder.node.recorder import RecorderNode
 from ir_recorder.reading.mcap_file import RawRecording, read_raw
+from ir_recorder.recording import RecordingSession, RecordingWriter
+from ir_recorder.recording.arithmetic import arithmetic
 from ir_recorder.recording.settings import RecorderSettings
 
 STATE = np.array([0.3, -1.4, 1.5, 0.1, 0.4, -0.2]) + 1e-4 / 3.0
@@ -146,3 +149,14 @@ def test_answers_that_cannot_be_the_same_are_not_compared() -> None:
     assert not all_equal(found)
     assert "1 not compared" in sentence_of(found, [])
     assert sentence_of(found, ["numpy 1.0 there, 2.0 here"]).endswith("numpy 1.0 there, 2.0 here")
+
+
+def test_a_recording_of_another_arithmetic_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = RecordingSession(RecordingWriter(tmp_path / "a.mcap"), {}, 5)
+    raw = read_raw(session.finish().path)
+    assert RecordedPlanner(raw).differences() == []
+    monkeypatch.setattr(replan, "arithmetic", lambda: "abacus")
+    (difference,) = RecordedPlanner(raw).differences()
+    assert difference.startswith(f"arithmetic {arithmetic()} there, abacus here")

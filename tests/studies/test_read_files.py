@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from ir_description import Task, cell_to_yaml, load_cell
+from ir_recorder.recording.arithmetic import arithmetic
 from ir_studies import FolderError, Means, WorkerError, run_arena
 from ir_studies.arena import ArenaSettings
 from ir_studies.arena.one_run import maker as arena_maker
@@ -18,7 +19,7 @@ from ir_studies.statistics.movements import maker as statistics_maker
 from ir_studies.work import fingerprint
 from ir_studies.work.results import digest_of_tasks, refuse_others, task_digests
 
-PROBE = "from ir_studies.work.fingerprint import arithmetic; print(arithmetic())"
+PROBE = "from ir_recorder.recording.arithmetic import arithmetic; print(arithmetic())"
 
 
 def test_a_task_with_another_goal_is_refused_and_a_new_one_is_taken(
@@ -82,4 +83,4 @@ def test_an_old_processor_has_the_same_arithmetic() -> None:
         return done.stdout.decode().strip()
 
     older = said(OPENBLAS_CORETYPE="Nehalem", NPY_DISABLE_CPU_FEATURES="X86_V4")
-    assert older == fingerprint.arithmetic()
+    assert older == arithmetic()

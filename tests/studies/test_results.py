@@ -47,8 +47,23 @@ def test_a_file_that_ends_anywhere_goes_on_with_its_whole_lines(
         for number in range(3):
             if str(number) not in left:
                 results.add(Job(str(number)), {"outcome": "answered", "text": "\r\x85\u2028"})
-    assert len(left) == max(cut.count(b"\n") - 2, 0)
+    assert len(left) == max(cut.count(b"\n") - 3, 0)
     assert (folder / NAME).read_bytes() == content
+
+
+def test_results_that_were_computed_with_others_are_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    filled(tmp_path)
+    with opened(tmp_path) as results:
+        assert results.remark == ""
+        monkeypatch.setattr("ir_studies.work.results.computed_with", lambda kind: "an abacus")
+        assert results.remark == ""
+        results.add(Job("late"), {"outcome": "answered"})
+        assert "an abacus" in results.remark
+    with opened(tmp_path) as results:
+        assert "an abacus" in results.remark
+        assert len(results.rows) == 4
 
 
 @pytest.mark.parametrize(

@@ -41,6 +41,7 @@ from ir_recorder.arguments import add_roots, roots_of
 from ir_recorder.errors import ReadError
 from ir_recorder.format import contents
 from ir_recorder.reading.mcap_file import RawRecording, chosen_namespace, read_raw
+from ir_recorder.recording.arithmetic import arithmetic
 from ir_recorder.recording.session import PACKAGES, data_of_cell, installed_version
 
 # The recorded planner: cell, settings, changes and requests.
@@ -137,14 +138,18 @@ class RecordedPlanner:
         return list(zip(channel.log_time.tolist(), channel.messages, strict=True))
 
     def differences(self) -> list[str]:
-        """What is other here than where it was recorded: versions, and data of robot and
-        controller.
+        """What is other here than where it was recorded: versions, arithmetic, and data of robot
+        and controller.
         """
         found = []
         for entry in self._raw.fact(contents.PACKAGES).split(", "):
             name, _, version = entry.partition(" ")
             if name in PACKAGES and version != (here := installed_version(name)):
                 found.append(f"{name} {version} there, {here} here")
+        numbers = self._raw.fact(contents.ARITHMETIC)
+        if numbers not in ("", here := arithmetic()):
+            why = "another architecture or compiler, or the NumPy reference"
+            found.append(f"arithmetic {numbers} there, {here} here ({why})")
         for name, text in data_of_cell(self.cell_yaml).items():
             recorded = self._raw.attachment(name)
             if recorded is not None and recorded.decode(errors="replace") != text:

@@ -24,6 +24,7 @@ STARTED: Final = "started_ns"  # node clock at the start [ns]
 PACKAGES: Final = (
     "packages"  # fact: versions of the project's packages and of those that decide numbers
 )
+ARITHMETIC: Final = "arithmetic"  # fact: digest of numbers whose bits may differ elsewhere
 RECORDING: Final = "recording"  # of a recording in several files: the same in all of them
 PART: Final = "part"  # which of them, from 0
 REPEATED: Final = "repeated"  # JSON: messages by topic that a part has again at its begin
@@ -32,6 +33,7 @@ OWN_FACTS: Final = (
     VERSION,
     STARTED,
     PACKAGES,
+    ARITHMETIC,
     RECORDING,
     PART,
     REPEATED,

@@ -15,6 +15,7 @@ from ir_recorder.errors import LostFileError, PathError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import Split, part_facts, part_path
 from ir_recorder.format.qos import QosOffer
+from ir_recorder.recording.arithmetic import arithmetic
 from ir_recorder.recording.writer import RecordingSummary, RecordingWriter, checked_path
 
 # What a further file of a recording repeats, so that it can be read alone.
@@ -139,6 +140,7 @@ class RecordingSession:
             contents.VERSION: installed_version("ir_recorder"),
             contents.STARTED: str(time),
             contents.PACKAGES: ", ".join(f"{name} {installed_version(name)}" for name in PACKAGES),
+            contents.ARITHMETIC: arithmetic(),
         }
         self._facts = {**own, **facts}
         self._head()

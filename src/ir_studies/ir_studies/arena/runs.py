@@ -30,15 +30,17 @@ _COLUMNS = (
 
 @dataclass(frozen=True)
 class Finished:
-    """Runs in the order of the settings, and the files that were written."""
+    """Runs in the order of the settings, the files that were written, and what to know of them."""
 
     runs: tuple[Run, ...]
     files: tuple[Path, ...]
+    remark: str = ""
 
     @property
     def summary(self) -> str:
         """How many were solved, in a sentence."""
-        return f"{sum(run.solved for run in self.runs)} of {len(self.runs)} runs solved"
+        said = f"{sum(run.solved for run in self.runs)} of {len(self.runs)} runs solved"
+        return f"{said}. {self.remark}" if self.remark else said
 
     @property
     def summed_up(self) -> str:
@@ -87,7 +89,7 @@ def run_arena(
             written = write_outputs(
                 runs, settings, Path(folder), len(wanted) - len(runs), parquet=parquet
             )
-            return Finished(runs, (*written, kept))
+            return Finished(runs, (*written, kept), results.remark)
 
         with _written_when_stopped(write), means.makers(task) as makers:
             for made, (job, row) in enumerate(makers.rows(missing), 1):

@@ -27,11 +27,13 @@ class Layouts:
     finals: list[tuple[Final, ...]]
     files: tuple[Path, ...]
     table: str
+    remark: str = ""
 
     @property
     def summary(self) -> str:
         """What follows, in a few sentences."""
-        return " ".join(sentences(self.known, self.finals, self.settings))
+        said = sentences(self.known, self.finals, self.settings)
+        return " ".join([*said, self.remark]).rstrip()
 
 
 def run_layout(settings: LayoutSettings, folder: str | Path, means: Means | None = None) -> Layouts:
@@ -60,5 +62,6 @@ def run_layout(settings: LayoutSettings, folder: str | Path, means: Means | None
             known = Search(settings, results.rows, made).run()
             made(final_jobs(known, settings), "error bars of the best", "")
         best = finals(known, settings, results.rows)
+        remark = results.remark
     files, table = write_outputs(known, best, settings, cell, into)
-    return Layouts(settings, tuple(known), best, files, table)
+    return Layouts(settings, tuple(known), best, files, table, remark)

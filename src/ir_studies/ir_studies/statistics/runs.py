@@ -21,11 +21,13 @@ class Finished:
     rows: tuple[Row, ...]
     findings: Findings
     files: tuple[Path, ...]
+    remark: str = ""
 
     @property
     def summary(self) -> str:
         """Counts, the table of comparisons with intervals, and notes, as text."""
-        return summary_of(self.findings, self.settings)
+        said = summary_of(self.findings, self.settings)
+        return f"{said}\n{self.remark}" if self.remark else said
 
     @property
     def summed_up(self) -> str:
@@ -52,8 +54,10 @@ def run_statistics(
                 done += 1
                 means.progress(_words(row), done, len(jobs), "")
         rows = tuple(results.rows[key] for key in jobs)
+        remark = results.remark
     found = findings_of(rows)
-    return Finished(settings, rows, found, write_outputs(rows, found, settings, Path(folder)))
+    files = write_outputs(rows, found, settings, Path(folder))
+    return Finished(settings, rows, found, files, remark)
 
 
 def _words(row: Row) -> str:

@@ -18,6 +18,7 @@ from typing import Any
 
 from ir_description import Cell, Task
 from ir_studies.errors import FolderError, WorkerError
+from ir_studies.work.fingerprint import computed_with
 from ir_studies.work.job import Job, Row
 
 # Files that every worker reads, known by their digests.
@@ -76,6 +77,7 @@ class Results:
         settings.
         """
         self.rows: dict[str, Row] = {}
+        self._made: list[str] = []  # with what the rows of the file were computed
         self.path = folder / NAME
         self._kind = kind
         self._budget = json.loads(json.dumps(dict(budget)))
@@ -114,6 +116,7 @@ class Results:
         rows = [self._row(number, line) for number, line in enumerate(lines[1:], start=2)]
         self.rows = {row["key"]: row for row in rows if "key" in row}
         known = dict(pair for row in rows for pair in row.get("cells", {}).items())
+        self._made = [str(row["made_with"]) for row in rows if "made_with" in row]
         self._check(found, known, cells)
         self._file.truncate(len(whole))
         self._file.seek(len(whole))
@@ -153,9 +156,22 @@ class Results:
 
     def add(self, job: Job, row: Row) -> None:
         """Keep a row: it is on the disk when this returns."""
+        here = computed_with(self._kind)
+        if self._made[-1:] != [here]:
+            self._made.append(here)
+            self._write({"made_with": here})
         kept: Row = {"key": job.key, **row}
         self.rows[job.key] = kept
         self._write(kept)
+
+    @property
+    def remark(self) -> str:
+        """What to know of rows that were not all computed with the same, "" where they were."""
+        made = list(dict.fromkeys(self._made))
+        if len(made) < 2:
+            return ""
+        said = "; ".join(made)
+        return f"The results were not all computed with the same and may differ by that: {said}."
 
     def _write(self, line: object) -> None:
         try:
