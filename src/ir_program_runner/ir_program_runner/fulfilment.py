@@ -83,6 +83,7 @@ class Ports:
     fault: Callable[[], str]
     canceled: Callable[[], bool]
     begin: Callable[[int], None]
+    done: Callable[[], None]
     announce: Callable[[ask.Announce], None]
     announce_phase: Callable[[str], None]
     set_signal: Callable[[Signal], None]
@@ -155,6 +156,8 @@ class Fulfilment:
         match request:
             case ask.Begin(index):
                 ports.begin(index)
+            case ask.Done():
+                ports.done()
             case ask.Announce():
                 ports.announce(request)
             case ask.Phase(text):

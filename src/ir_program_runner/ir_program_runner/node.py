@@ -222,6 +222,7 @@ class ProgramRunnerNode(Node):
             fault=lambda: self._jump,
             canceled=lambda: bool(goal.is_cancel_requested),
             begin=self._begin,
+            done=self._done,
             announce=self._announce,
             announce_phase=lambda text: self._announce_phase(goal, text),
             set_signal=self._set_signal,
@@ -278,13 +279,18 @@ class ProgramRunnerNode(Node):
         assert self._progress is not None
         self._progress.begin(index)
 
+    def _done(self) -> None:
+        assert self._progress is not None
+        self._progress.step_done_ns = self._driver.stamp_ns
+
     def _announce(self, step: Announce) -> None:
         progress = self._progress
         assert progress is not None
         if step.event is Event.STARTED:
             progress.step_started = self._driver.plant_time
+        stamp = progress.step_done_ns if step.event is Event.ENDED else self._driver.stamp_ns
         state = ProgramState(
-            stamp_ns=self._driver.stamp_ns or self.get_clock().now().nanoseconds,
+            stamp_ns=stamp or self.get_clock().now().nanoseconds,
             program_id=progress.program_id,
             index=step.index,
             total=progress.total,

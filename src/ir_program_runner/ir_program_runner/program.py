@@ -21,6 +21,7 @@ from ir_program_runner.requests import (
     Announce,
     AskModes,
     Begin,
+    Done,
     Drive,
     Outcome,
     Phase,
@@ -391,8 +392,8 @@ class Program:
             need((yield SetPlcInput(bit, False)))
 
     def _step(self, index: int, movement: PlannedMovement) -> Generator[Request, Outcome, str]:
-        """Do one step; it counts as started when its signals are there: waiting is no part of its
-        energy.
+        """Do one step; it counts as started when its signals are there and as ended before its load
+        and signals follow: waiting for answers is no part of its energy.
         """
         note = ""
         yield Begin(index)
@@ -412,6 +413,7 @@ class Program:
             need(
                 (yield Drive(movement.trajectory, *planned, station_of(movement), movement.states))
             )
+        yield Done()
         yield from self._carry(load_after(movement))
         for text in movement.set_signals:
             need((yield SetSignal(Signal.parse(text))))
@@ -447,7 +449,9 @@ class Program:
 
 @dataclass
 class Progress:
-    """State of one run; times of the plant [s]."""
+    """State of one run; times of the plant [s]; step_done_ns: stamp of the end of the step, 0 while
+    it goes on.
+    """
 
     program_id: str
     movements: Sequence[PlannedMovement]
@@ -455,6 +459,7 @@ class Progress:
     index: int = 0
     phase: str = ""
     step_started: float | None = None
+    step_done_ns: int = 0
 
     @property
     def total(self) -> int:
@@ -465,6 +470,7 @@ class Progress:
         """Step `index` is the next one; it may still wait for its signals."""
         self.index = index
         self.step_started = None
+        self.step_done_ns = 0
 
     def remaining(self, now: float) -> float:
         """Planned seconds until the program ends; a step that takes longer counts as nothing

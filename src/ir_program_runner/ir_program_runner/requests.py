@@ -25,6 +25,11 @@ class Begin:
 
 
 @dataclass(frozen=True)
+class Done:
+    """The motion or pause of the step is over: its load and its signals follow."""
+
+
+@dataclass(frozen=True)
 class Announce:
     """Announce that step `index` started, ended, failed or was canceled."""
 
@@ -111,6 +116,7 @@ class SendWakePacket:
 
 Request = (
     Begin
+    | Done
     | Announce
     | Phase
     | WaitForSignals
