@@ -50,7 +50,7 @@ check: setup-tests ## ruff, mypy --strict and dead code
 processors: setup-tests ## are answers the same bytes on other processors? ARGS='--tests' also runs tests as they would
 	@$(BIN)/python tools/processors.py $(ARGS)
 
-sanitize: setup-tests ## the compiled core under the address and undefined-behaviour sanitizers
+sanitize: setup-tests ## the compiled core under the sanitizers of addresses, undefined behaviour and threads
 	@PYTHON=$(CURDIR)/$(BIN)/python src/ir_kernels/sanitize.sh $(ARGS)
 
 # compare.py needs another checkout: it has a target of its own.

@@ -31,13 +31,11 @@ OPTIMISE = [
     "-fno-trapping-math",
     "-ffp-contract=off",  # the same sums and products in every build, whether it has FMA or not
 ]
-SANITIZE = [
-    "-O1",
-    "-g1",
-    "-fsanitize=address,undefined",
-    "-fno-sanitize-recover=undefined",
-    "-fno-omit-frame-pointer",
-]
+# by what IR_KERNELS_SANITIZE says
+SANITIZE = {
+    "address": ["-fsanitize=address,undefined", "-fno-sanitize-recover=undefined"],
+    "thread": ["-fsanitize=thread"],
+}
 # What GCC may use on its own under -march=native, as preprocessor name -> name of
 # __builtin_cpu_supports.
 FEATURES = {
@@ -142,9 +140,11 @@ class BuildVariants(build_ext):
             ext.extra_compile_args += ["-march=native"]
         elif X86:
             ext.extra_compile_args += ["-march=x86-64", "-mtune=generic"]
-        if os.environ.get("IR_KERNELS_SANITIZE"):
-            ext.extra_compile_args += SANITIZE
-            ext.extra_link_args += SANITIZE
+        sanitizer = os.environ.get("IR_KERNELS_SANITIZE", "")
+        if sanitizer:
+            options = ["-O1", "-g1", "-fno-omit-frame-pointer", *SANITIZE[sanitizer]]
+            ext.extra_compile_args += options
+            ext.extra_link_args += options
         elif sys.platform == "linux":
             ext.extra_link_args += ["-Wl,--strip-all"]
         ext.define_macros = [*ext.define_macros, ("IR_NATIVE_FEATURES", f'"{",".join(features)}"')]
