@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ir_krl.errors import KrlRunError, Place
@@ -20,8 +20,8 @@ ever.
 """
 WAIT_MAX = 604_800.0  # s
 _ENDLESS = "give what ends it by --set or --input"
-Again = Callable[[], tuple[bool, bool]]
-"""Whether a loop goes on, and whether that hangs on nothing that is known."""
+Again = Callable[[], tuple[bool, bool | None]]
+"""Whether a loop goes on, and whether that hangs on nothing that is known; None: on its exits."""
 
 
 class LoopExit(Exception):  # noqa: N818 - no error: a statement
@@ -30,10 +30,11 @@ class LoopExit(Exception):  # noqa: N818 - no error: a statement
 
 @dataclass
 class Jump(Exception):  # noqa: N818 - no error: a statement
-    """GOTO a label."""
+    """GOTO a label. known: a branch around it was taken by values that are known."""
 
     label: str
     place: Place
+    known: bool = False
 
 
 @dataclass
@@ -49,7 +50,7 @@ class _Turn:
 
     count: int
     watched: Watched
-    guesses: int
+    exits: int
 
 
 @dataclass
@@ -64,8 +65,10 @@ class Control:
     continuing: bool = False  # CONTINUE was the statement before
     expressions: Expressions = field(init=False)
     _signals: Signals = field(init=False)
-    _guessed_exits: int = 0  # times that an assumed value decided about an EXIT
-    _known: set[Note] = field(default_factory=set)
+    _guessed_exits: int = 0  # times that an assumed value decided about leaving a loop
+    _known_exits: int = 0  # and a known one
+    _said: dict[tuple[str, Effect], int] = field(default_factory=dict)  # where among the notes
+    _places: dict[int, set[Place]] = field(default_factory=dict)  # of a note that is said again
 
     def body(self, body: Tree) -> None:
         """Run all statements of a body; jumps to its labels are followed."""
@@ -100,17 +103,17 @@ class Control:
         """Whether a jump back is followed: not for ever, where nothing that is known ends it."""
         turn = turns.get(jump.label)
         if turn is None:
-            turn = turns[jump.label] = _Turn(0, self.memory.watch(), self.memory.guesses)
+            turn = turns[jump.label] = _Turn(0, self.memory.watch(), self._guessed_exits)
         turn.count += 1
         still = turn.count > 1 and not self.memory.changed(turn.watched)
-        guessed = self.memory.guesses > turn.guesses
-        bound = between[-1].data == "goto" and not any(_ways_out(one) for one in between[:-1])
-        if turn.count >= self.loop_passes and (still or guessed or bound):
+        bound = not any(_ways_out(one) for one in between[:-1])
+        open_ = not jump.known and (bound or self._guessed_exits > turn.exits)
+        if turn.count >= self.loop_passes and (still or open_):
             self._left(jump.place, f"GOTO {jump.label}", turn.count)
             return False
         self.memory.forget(turn.watched)
         turn.watched = self.memory.watch()
-        turn.guesses = self.memory.guesses
+        turn.exits = self._guessed_exits
         return True
 
     def place(self, tree: Tree | Word) -> Place:
@@ -123,16 +126,21 @@ class Control:
 
     def note_at(self, place: Place, text: str, effect: Effect = Effect.NONE) -> None:
         """The same of a place."""
-        note = Note(place, text, effect)
-        if note not in self._known:
-            self._known.add(note)
-            self.notes.append(note)
+        at = self._said.setdefault((text, effect), len(self.notes))
+        if at == len(self.notes):
+            self.notes.append(Note(place, text, effect))
+        elif place not in self._places.setdefault(at, {self.notes[at].place}):
+            self._places[at].add(place)
+            self.notes[at] = replace(self.notes[at], places=len(self._places[at]))
 
-    def stop(self, place: Place, why: str) -> None:
-        """The advance run stops here, unless CONTINUE stands before: no corner is rounded."""
+    def stop(self, place: Place, why: str, *, assumed: bool = False) -> None:
+        """The advance run stops here, unless CONTINUE stands before: no corner is rounded. assumed:
+        a note says so already.
+        """
         if not self.continuing and self._rounding:
             self.commands.append(Stop(why, place))
-            self.note_at(place, f"{why} stops the advance run: the motion before ends at rest")
+            if not assumed:
+                self.note_at(place, f"{why} stops the advance run: the motion before ends at rest")
 
     @property
     def _rounding(self) -> bool:
@@ -154,12 +162,24 @@ class Control:
     def _if_(self, tree: Tree) -> None:
         condition, then, otherwise = tree.children
         holds, open_ = self._decided(condition, "the condition of IF")
-        if open_ and _leaves(tree):
-            self._guessed_exits += 1
-        if holds:
-            self.body(then)
-        elif otherwise is not None:
-            self.body(otherwise)
+        self._count_exits(tree, open_=open_)
+        chosen = then if holds else otherwise
+        if chosen is not None:
+            self._branch(chosen, open_=open_)
+
+    def _branch(self, body: Tree, *, open_: bool) -> None:
+        """A branch that a condition has chosen; open_: by an assumed value, or by none."""
+        try:
+            self.body(body)
+        except Jump as jump:
+            jump.known = jump.known or not open_
+            raise
+
+    def _count_exits(self, tree: Tree, *, open_: bool) -> None:
+        """Count a condition that decides whether a loop is left."""
+        if _leaves(tree):
+            self._guessed_exits += open_
+            self._known_exits += not open_
 
     def _for_(self, tree: Tree) -> None:
         name, first, last, step, body = tree.children
@@ -179,8 +199,8 @@ class Control:
 
     def _loop(self, tree: Tree) -> None:
         body = tree.children[0]
-        endless = not _leaves(body)
-        self._repeated(tree, body, "LOOP", lambda: (True, endless))
+        open_ = None if _leaves(body) else True
+        self._repeated(tree, body, "LOOP", lambda: (True, open_))
 
     def _while_(self, tree: Tree) -> None:
         condition, body = tree.children
@@ -194,10 +214,11 @@ class Control:
 
     def _again(self, condition: Tree, body: Tree, *, wanted: bool) -> Again:
         """Asks whether a loop goes on, and whether that hangs on nothing that is known."""
+        exits = _constant(condition) and _leaves(body)
 
-        def asked() -> tuple[bool, bool]:
+        def asked() -> tuple[bool, bool | None]:
             holds, open_ = self._decided(condition, "the condition of a loop")
-            return holds is wanted, open_ and not (_constant(condition) and _leaves(body))
+            return holds is wanted, None if exits else open_
 
         return asked
 
@@ -220,7 +241,8 @@ class Control:
 
     def _pass(self, tree: Tree, body: Tree, again: Again) -> tuple[bool, bool]:
         """One pass of a loop: whether it goes on, and whether something known may end it."""
-        exits = self._guessed_exits
+        guessed = self._guessed_exits
+        known = self._known_exits
         watched = self.memory.watch()
         try:
             self.body(body)
@@ -229,7 +251,9 @@ class Control:
             still = not self.memory.changed(watched)
         finally:
             self.memory.forget(watched)
-        return goes_on, not (open_ or still or self._guessed_exits > exits)
+        if open_ is None:
+            open_ = self._guessed_exits > guessed and self._known_exits == known
+        return goes_on, not (open_ or still)
 
     def _left(self, place: Place, word: str, passes: int) -> None:
         times = "once" if passes == 1 else f"{passes} times"
@@ -256,15 +280,15 @@ class Control:
         before = self.memory.guesses
         value = self.expressions.value(subject)
         self.continuing = False
-        if self.memory.guesses > before and _leaves(tree):
-            self._guessed_exits += 1
+        open_ = self.memory.guesses > before
+        self._count_exits(tree, open_=open_)
         for case in cases:
             *labels, body = case.children
             if any(self.expressions.value(label) == value for label in labels):
-                self.body(body)
+                self._branch(body, open_=open_)
                 return
         if default is not None:
-            self.body(default.children[0])
+            self._branch(default.children[0], open_=open_)
 
     def _exit(self, tree: Tree) -> None:
         raise LoopExit

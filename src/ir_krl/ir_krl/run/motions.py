@@ -25,7 +25,7 @@ from ir_krl.run.control import Control
 from ir_krl.run.expressions import Expressions
 from ir_krl.run.memory import INPUT, OUTPUT, SIGNALS, Memory, Noted
 from ir_krl.run.notes import Effect
-from ir_krl.run.system import AXES, FULL, HARMLESS, MODELLED, STANDING, mode_variables
+from ir_krl.run.system import AXES, FULL, HARMLESS, MODELLED, SITUATION, STANDING, mode_variables
 from ir_krl.run.values import (
     AXIS_NAMES,
     EXTERNAL_NAMES,
@@ -87,7 +87,8 @@ class Assigning(Control):
         if name == "$ORI_TYPE" and value not in (Symbol("VAR"), Symbol("CONSTANT")):
             text = f"$ORI_TYPE {kind_of(value)}: the tool is turned evenly instead"
             self.note_at(where, text, Effect.PLACES)
-        if name.startswith("$") and name not in MODELLED and name not in HARMLESS:
+        known = MODELLED | HARMLESS | SITUATION.keys()
+        if name.startswith("$") and name not in known:
             self.note_at(where, f"{name} isn't modelled", _effect_of(name))
 
     def _set_output(self, number: float, level: bool, place: Place, pulse: float = 0.0) -> None:

@@ -30,14 +30,18 @@ _COULD_CHANGE = {
 
 @dataclass(frozen=True)
 class Note:
-    """Something a reader should know: what was assumed, or what isn't modelled, and its effect."""
+    """Something a reader should know: what was assumed, or what isn't modelled, and its effect;
+    places: in how many of the program, of which `place` is the first.
+    """
 
     place: Place
     text: str
     effect: Effect = Effect.NONE
+    places: int = 1
 
     def __str__(self) -> str:
         said = f"{self.place}: {self.text}" if str(self.place) else self.text
+        said += f", at {self.places} places" if self.places > 1 else ""
         change = _COULD_CHANGE[self.effect]
         return f"{said} (could change {change})" if change else said
 

@@ -190,9 +190,13 @@ class _Run(Moving):
         for statement in body.children:
             if statement.data != "assignment":
                 raise KrlRunError("a setting is NAME=VALUE", self.place(statement))
-            path = self.expressions.path(statement.children[0])
-            if len(path) == 1 and path[0][1] is None:
-                self.memory.shared.setdefault(path[0][0], 0)  # known everywhere
+            (name, index), *rest = self.expressions.path(statement.children[0])
+            if index is None and not rest:
+                self.memory.shared.setdefault(name, Unknown(name))  # known everywhere
+            for module in [one for one, held in self.memory.modules.items() if name in held]:
+                self.memory.module = module
+                self._statement(statement)
+            self._at(file)
             self._statement(statement)
 
     def _stopped(self, place: Place, name: str) -> None:
@@ -340,9 +344,11 @@ class _Run(Moving):
         most = max(arguments, held.arguments if held else 0)
         used = function or (held is not None and held.function)
         self.unknown[name] = UnknownRoutine(name, most, used)
-        text = f"{name} isn't in the files: no motion assumed (--stub writes one to fill in)"
+        text = (
+            f"{name} isn't in the files: no motion and a stop of the advance run assumed (--stub)"
+        )
         self.note_at(place, text, Effect.MOTIONS)
-        self.stop(place, name)
+        self.stop(place, name, assumed=True)
         return self.memory.shared.get(name, Unknown(name))
 
     def _argument(self, tree: Tree, k: int, routine: Routine) -> Value | None:

@@ -1,0 +1,330 @@
+"""What a program doesn't bring is assumed, said with what it could change, and can be set."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ir_cli.main import main
+from ir_krl import (
+    Effect,
+    Followed,
+    KrlError,
+    Motion,
+    SetOutput,
+    Wait,
+    follow,
+    parse,
+    read_project,
+    settings_of,
+    stubs,
+)
+from ir_planner import Planner
+from ir_planner.krl import follow_krl
+
+Follow = Callable[..., Followed]
+
+
+def angles(program: Followed) -> list[float]:
+    """A1 [deg] of the motions."""
+    motions = [one for one in program.commands if isinstance(one, Motion)]
+    return [round(float(np.degrees((one.target.axes or {}).get("A1", 0.0))), 6) for one in motions]
+
+
+def texts(program: Followed) -> list[str]:
+    return [note.text for note in program.notes if note.effect > Effect.NONE]
+
+
+ASSUMED = {
+    "a routine of a technology package": (
+        "USERSPOT(#INIT)",
+        "USERSPOT isn't in the files: no motion and a stop of the advance run assumed (--stub)",
+        Effect.MOTIONS,
+    ),
+    "the operating mode": (
+        "IF $T1 THEN\nENDIF",
+        "$T1 is taken as FALSE: --set '$T1=…'",
+        Effect.MOTIONS,
+    ),
+    "an input": (
+        "IF $IN[4] THEN\nENDIF",
+        "$IN[4] isn't given: taken as FALSE; --input 4=true",
+        Effect.MOTIONS,
+    ),
+    "an output": (
+        "IF $OUT[4] THEN\nENDIF",
+        "$OUT[4] was never set: taken as FALSE",
+        Effect.MOTIONS,
+    ),
+    "a variable that decides": (
+        "IF READY THEN\nENDIF",
+        "READY has no value: taken as FALSE; --set 'READY=…'",
+        Effect.MOTIONS,
+    ),
+    "a tool": (
+        "FDAT_ACT={TOOL_NO 14,BASE_NO 0}\nBAS(#FRAMES)\nPTP {X 1,Y 2,Z 3,A 0,B 90,C 0}",
+        "TOOL_DATA[14] isn't in the files: the cell's tool",
+        Effect.PLACES,
+    ),
+    "a base": (
+        "FDAT_ACT={TOOL_NO 0,BASE_NO 5}\nBAS(#FRAMES)\nPTP {X 1,Y 2,Z 3,A 0,B 90,C 0}",
+        "BASE_DATA[5] isn't in the files: the robot's foot",
+        Effect.PLACES,
+    ),
+    "a base by hand": (
+        "$BASE=BASE_DATA[5]",
+        "BASE_DATA[5] isn't in the files: the robot's foot",
+        Effect.PLACES,
+    ),
+    "home": ("PTP XHOME", "XHOME isn't in the files: the cell's home", Effect.PLACES),
+    "an external axis": (
+        "PTP {A1 0,E1 500}\nPTP {A1 10,E1 600}",
+        "E1 moves from 500 to 600: external axes aren't modelled, the arm alone is driven",
+        Effect.PLACES,
+    ),
+    "an interrupt": (
+        "INTERRUPT DECL 3 WHEN $IN[1] DO FAULT( )",
+        "the interrupt that calls FAULT isn't followed",
+        Effect.MOTIONS,
+    ),
+    "a system variable that is set": ("$SEN_PINT[1]=2", "$SEN_PINT isn't modelled", Effect.PLACES),
+    "a name that is waited for": (
+        "WAIT FOR PART_THERE",
+        "PART_THERE isn't declared in the files: the wait is taken as one that ends",
+        Effect.TIMES,
+    ),
+    "an unknown command of BAS": (
+        "BAS(#NOBODY,1)",
+        "BAS(#NOBODY) isn't known: no effect assumed",
+        Effect.SPEEDS,
+    ),
+    "a halt": ("HALT", "HALT waits for the operator: taken as no pause", Effect.TIMES),
+}
+
+
+@pytest.mark.parametrize("name", ASSUMED)
+def test_an_assumption_is_said_with_what_it_could_change(name: str, followed: Follow) -> None:
+    lines, text, effect = ASSUMED[name]
+    found = [note for note in followed(lines).notes if note.text == text]
+    assert [note.effect for note in found] == [effect]
+    assert found[0].place.line >= 2
+    assert "could change" in str(found[0])
+
+
+def test_the_worst_assumption_comes_first_and_is_said_once(followed: Follow) -> None:
+    lines = "PTP XHOME\nHALT\nDECL INT I\nFOR I=1 TO 3\nH50(I)\nENDFOR\nH50(9)\nHALT\n$SINT_X=1"
+    notes = followed(lines).notes
+    assert [note.effect for note in notes] == sorted((n.effect for n in notes), reverse=True)
+    assert [note.places for note in notes if "H50" in note.text] == [2]
+    assert "at 2 places" in str(notes[0])
+
+
+def test_nothing_is_assumed_of_what_a_program_brings(followed: Follow) -> None:
+    lines = (
+        "XHOME={A1 0,A2 -90,A3 90,A4 0,A5 0,A6 0}\nTOOL_DATA[1]={X 0,Y 0,Z 10,A 0,B 0,C 0}\n"
+        "BASE_DATA[2]={X 5,Y 0,Z 0,A 0,B 0,C 0}\n$OUT[3]=FALSE\nREADY=TRUE\n$MODE_OP=#EX\n"
+        "BAS(#INITMOV,0)\nPTP XHOME\nFDAT_ACT={TOOL_NO 1,BASE_NO 2}\nBAS(#FRAMES)\n"
+        "IF READY AND NOT $OUT[3] AND ($MODE_OP==#EX) AND $EXT THEN\n"
+        "PTP {X 1,Y 2,Z 3,A 0,B 90,C 0}\nENDIF"
+    )
+    assert texts(followed(lines)) == []
+
+
+@pytest.mark.parametrize(
+    ("setting", "moves"), [("$MODE_OP=#EX", [2.0]), ("$T1=TRUE", [1.0]), ("$T2=FALSE", [])]
+)
+def test_settings_decide(setting: str, moves: list[float]) -> None:
+    text = (
+        "DEF K( )\nIF $T1 OR $T2 THEN\nPTP {A1 1}\nENDIF\n"
+        "IF $MODE_OP==#EX THEN\nPTP {A1 2}\nENDIF\nEND\n"
+    )
+    program = follow(
+        [parse(text, "k.src")], np.zeros(6), np.eye(4), settings=[settings_of([setting])]
+    )
+    assert angles(program) == moves
+
+
+def test_a_setting_counts_more_than_a_data_list(followed: Follow) -> None:
+    chosen = [settings_of(["; half", "", "N=2", "$IN[3]=TRUE"], "half.txt")]
+    lines = "IF $IN[3] THEN\nWAIT SEC N\nENDIF"
+    (wait,) = followed(lines, "DECL INT N=8", settings=chosen).commands
+    assert isinstance(wait, Wait)
+    assert wait.seconds == 2.0
+    with pytest.raises(KrlError, match=r"half.txt: 'N 2' is no NAME=VALUE"):
+        settings_of(["N 2"], "half.txt")
+
+
+def test_the_value_of_an_unknown_routine_can_be_set(followed: Follow) -> None:
+    lines = "IF KIND( )==3 THEN\nWAIT SEC 3\nENDIF"
+    assert followed(lines).commands == ()
+    (wait,) = followed(lines, settings=[settings_of(["KIND=3"])]).commands
+    assert isinstance(wait, Wait)
+
+
+def test_stubs_are_written_for_what_nobody_gave(followed: Follow) -> None:
+    lines = "H50(1,2)\nH50(1)\nIF KIND(4)==3 THEN\nENDIF"
+    written = stubs(followed(lines).unknown)
+    again = follow(
+        [parse(f"DEF T( )\n{lines}\nEND\n", "t.src"), parse(written, "stubs.src")],
+        np.zeros(6),
+        np.eye(4),
+    )
+    assert again.unknown == ()
+    assert texts(again) == []
+
+
+def test_an_input_that_was_waited_for_is_as_it_was_waited_for(followed: Follow) -> None:
+    waited = "WAIT FOR $IN[1] AND NOT ($IN[2] OR ($IN[3]==TRUE)) AND ($IN[4]<>FALSE)"
+    lines = f"{waited}\nIF $IN[1] AND NOT $IN[2] AND NOT $IN[3] AND $IN[4] THEN\nWAIT SEC 1\nENDIF"
+    program = followed(lines)
+    assert isinstance(program.commands[-1], Wait)
+    assert texts(program) == []
+
+
+LOOPS = {  # what is followed of loops: motions by A1
+    "an input ends it": ("WHILE NOT $IN[1]\nPTP {A1 1}\nENDWHILE", [1.0]),
+    "an input that isn't there": ("REPEAT\nPTP {A1 1}\nUNTIL $IN[1]", [1.0]),
+    "the operator ends it": ("LOOP\nPTP {A1 1}\nENDLOOP", [1.0]),
+    "WHILE TRUE": ("WHILE TRUE\nPTP {A1 1}\nENDWHILE", [1.0]),
+    "an exit by an input": ("LOOP\nPTP {A1 1}\nIF $IN[1] THEN\nEXIT\nENDIF\nENDLOOP", [1.0]),
+    "a count ends it": (
+        "N=0\nWHILE TRUE\nN=N+1\nPTP {A1 N}\nIF N==3 THEN\nEXIT\nENDIF\nENDWHILE",
+        [1.0, 2.0, 3.0],
+    ),
+    "a count, beside an input": (
+        "N=0\nWHILE N<3\nN=N+1\nIF $IN[1] THEN\nRETURN\nENDIF\nPTP {A1 N}\nENDWHILE",
+        [1.0, 2.0, 3.0],
+    ),
+    "nothing changes": ("N=1\nREPEAT\nPTP {A1 N}\nUNTIL N>1", [1.0]),
+    "a jump back for ever": ("TOP:\nPTP {A1 1}\nGOTO TOP", [1.0]),
+    "a jump back by an input": ("TOP:\nPTP {A1 1}\nIF NOT $IN[1] THEN\nGOTO TOP\nENDIF", [1.0]),
+    "a jump back that counts": (
+        "N=0\nTOP:\nN=N+1\nPTP {A1 N}\nIF N<3 THEN\nGOTO TOP\nENDIF\nPTP {A1 9}",
+        [1.0, 2.0, 3.0, 9.0],
+    ),
+    "a jump back that counts, beside an input": (
+        "N=0\nTOP:\nN=N+1\nIF $IN[1] THEN\nGOTO ENDS\nENDIF\nPTP {A1 N}\nIF N<3 THEN\nGOTO TOP\n"
+        "ENDIF\nENDS:",
+        [1.0, 2.0, 3.0],
+    ),
+    "jumps forward": ("PTP {A1 1}\nGOTO DONE\nPTP {A1 2}\nDONE:\nPTP {A1 3}", [1.0, 3.0]),
+    "a jump out of branches": (
+        "FOR I=1 TO 5\nPTP {A1 I}\nIF I==2 THEN\nGOTO DONE\nENDIF\nENDFOR\nDONE:\nPTP {A1 9}",
+        [1.0, 2.0, 9.0],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_loops_and_jumps_are_followed_as_far_as_they_are_known(name: str, followed: Follow) -> None:
+    lines, expected = LOOPS[name]
+    assert angles(followed(lines)) == expected
+
+
+def test_arrays_arrive_as_parameters(followed: Follow) -> None:
+    text = (
+        "DEF T( )\nE6AXIS WAY[2]\nWAY[1]={A1 10}\nWAY[2]={A1 20}\nDRIVE(WAY[],2)\nEND\n"
+        "DEF DRIVE(P[]:OUT,N:IN)\nE6AXIS P[]\nINT N,I\nFOR I=1 TO N\nPTP P[I]\nENDFOR\nEND\n"
+    )
+    assert angles(follow([parse(text, "t.src")], np.zeros(6), np.eye(4))) == [10.0, 20.0]
+
+
+def test_where_the_robot_stands_is_known(planner: Planner) -> None:
+    """$POS_ACT and $AXIS_ACT are where the last motion has led, in $BASE and $TOOL."""
+    lines = (
+        "PTP {A1 20,A2 -80,A3 90,A4 0,A5 40,A6 0}\nP=$POS_ACT\nQ=$AXIS_ACT\n"
+        "P.Z=P.Z+100\nQ.A1=Q.A1+5\nLIN P\nPTP Q\n"
+    )
+    program = follow_krl(planner, [parse(f"DEF T( )\n{lines}END\n", "t.src")])
+    first, line, back = (one for one in program.commands if isinstance(one, Motion))
+    assert first.target.axes is not None
+    assert back.target.axes is not None
+    assert back.target.axes["A1"] == pytest.approx(np.radians(25.0))
+    assert line.target.frame is not None
+    chain = planner.scene("none").chain
+    q = np.array([first.target.axes[f"A{k}"] for k in range(1, 7)])
+    tcp = chain.tcp_poses(q[None])[0, :3, 3]
+    foot = chain.base_pose
+    there = foot[:3, :3].T @ (tcp - foot[:3, 3])
+    found = [line.target.frame[name] for name in "XYZ"]
+    assert found == pytest.approx([*(1e3 * there[:2]), 1e3 * there[2] + 100.0], abs=1e-3)
+
+
+def project(folder: Path) -> Path:
+    """A robot's folder as a controller keeps it, with a copy of a module that isn't meant."""
+    files = {
+        "KRC/R1/Program/cell1/main.src": "DEF MAIN( )\nPTP XP1\nPICK( )\nDONE=TRUE\nEND\n",
+        "KRC/R1/Program/cell1/main.dat": "DEFDAT MAIN\nE6AXIS XP1={A1 7}\nENDDAT\n",
+        "KRC/R1/Program/cell1/pick.src": "DEF PICK( )\nPTP {A1 8}\nWAIT SEC GAP\nEND\n",
+        "KRC/R1/Program/old/pick.src": "DEF PICK( )\nPTP {A1 80}\nEND\n",
+        "KRC/R1/Program/old/broken.src": "DEF BROKEN( )\nPTP {A1\nEND\n",
+        "KRC/R1/System/$config.dat": "DEFDAT $CONFIG\nDECL REAL GAP=0.5\nENDDAT\n",
+        "KRC/R1/System/bas.src": "DEF BAS(C:IN,V:IN)\nPTP {A1 99}\nEND\n",
+        "KRC/R1/Mada/$machine.dat": "DEFDAT $MACHINE\nWHAT EVER THIS IS\nENDDAT\n",
+    }
+    for name, text in files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    return folder
+
+
+@pytest.mark.parametrize("archived", [False, True])
+def test_the_modules_of_a_project_are_one_program(tmp_path: Path, archived: bool) -> None:
+    path = project(tmp_path / "robot")
+    if archived:
+        path = tmp_path / "robot.zip"
+        with zipfile.ZipFile(path, "w") as archive:
+            for one in sorted((tmp_path / "robot").rglob("*.*")):
+                archive.write(one, one.relative_to(tmp_path / "robot"))
+    found = read_project(path)
+    sources, left_out = found.sources(found.main("MAIN"))
+    program = follow(sources, np.zeros(6), np.eye(4))
+    assert angles(program) == [7.0, 8.0]
+    assert [one.seconds for one in program.commands if isinstance(one, Wait)] == [0.5]
+    assert ["broken.src:2:" in str(note) for note in left_out] == [True]
+
+
+def test_a_folder_names_its_programs_and_its_robots(tmp_path: Path) -> None:
+    path = project(tmp_path / "robot")
+    with pytest.raises(KrlError, match=r"2 programs: give --routine or one of .*broken.src"):
+        read_project(path).main()
+    (path / "KRC/R1/Program/old/broken.src").unlink()
+    assert read_project(path).main().module == "MAIN"
+    (path / "KRC/R2/Program").mkdir(parents=True)
+    (path / "KRC/R2/Program/other.src").write_text("DEF OTHER( )\nEND\n", encoding="utf-8")
+    with pytest.raises(KrlError, match="programs of 2 robots: R1, R2; give the folder of one"):
+        read_project(path)
+
+
+def test_import_takes_a_folder_and_says_what_it_assumed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = project(tmp_path / "robot")
+    source = path / "KRC/R1/Program/cell1/pick.src"
+    source.write_text("DEF PICK( )\nPTP {A1 8}\nIF WARM THEN\nGLUE(1)\nENDIF\nEND\n", "utf-8")
+    stub = tmp_path / "stub.src"
+    command = ["krl", "import", str(path), "--cell", "open", "--routine", "main"]
+    assert main([*command, "--set", "WARM=TRUE", "--stub", str(stub)]) == 0
+    said = capsys.readouterr().out
+    assert "GLUE isn't in the files: no motion" in said
+    assert "broken.src:2:" in said
+    assert "GLOBAL DEF GLUE(A1:IN)" in stub.read_text("utf-8")
+    assert main(command) == 0
+    assert "WARM has no value: taken as FALSE" in capsys.readouterr().out
+
+
+def test_a_module_brings_the_data_that_lie_beside_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = project(tmp_path / "robot") / "KRC/R1/Program/cell1"
+    assert main(["krl", "import", str(path / "main.src"), "--cell", "open"]) == 0
+    assert "MAIN: " in capsys.readouterr().out
+
+
+def test_outputs_of_an_unknown_routine_are_none(followed: Follow) -> None:
+    assert not any(isinstance(one, SetOutput) for one in followed("GRIP(TRUE)").commands)
