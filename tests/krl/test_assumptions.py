@@ -65,6 +65,11 @@ ASSUMED = {
         "READY has no value: taken as FALSE; --set 'READY=…'",
         Effect.MOTIONS,
     ),
+    "a variable that chooses a case": (
+        "SWITCH STEP_NO\nCASE 1\nENDSWITCH",
+        "STEP_NO has no value: taken as 0; --set 'STEP_NO=…'",
+        Effect.MOTIONS,
+    ),
     "a tool": (
         "FDAT_ACT={TOOL_NO 14,BASE_NO 0}\nBAS(#FRAMES)\nPTP {X 1,Y 2,Z 3,A 0,B 90,C 0}",
         "TOOL_DATA[14] isn't in the files: the cell's tool",
@@ -101,6 +106,26 @@ ASSUMED = {
         "BAS(#NOBODY,1)",
         "BAS(#NOBODY) isn't known: no effect assumed",
         Effect.SPEEDS,
+    ),
+    "when a trigger acts": (
+        "TRIGGER WHEN PATH=-20 DELAY=0 DO $OUT[1]=TRUE\nPTP {A1 1}",
+        "a TRIGGER acts at an end of its motion: path and delay aren't modelled",
+        Effect.TIMES,
+    ),
+    "where it stands at first": (
+        "SPTP $AXIS_ACT\nIF $AXIS_ACT.A1>5 THEN\nENDIF",
+        "$AXIS_ACT is read before the first motion: the robot stands in the cell's home",
+        Effect.PLACES,
+    ),
+    "how the tool turns": (
+        "LDAT_ACT={VEL 1,ACC 100,APO_DIST 0,ORI_TYP #JOINT}\nBAS(#CP_DAT)\nLIN_REL {X 1}",
+        "$ORI_TYPE #JOINT: the tool is turned evenly instead",
+        Effect.PLACES,
+    ),
+    "how the tool turns on a circle": (
+        "$CIRC_TYPE=#PATH\nCIRC_REL {X 1,Y 1},{X 2}",
+        "$CIRC_TYPE #PATH: the tool is turned evenly in the base instead",
+        Effect.PLACES,
     ),
     "a halt": ("HALT", "HALT waits for the operator: taken as no pause", Effect.TIMES),
 }
@@ -210,6 +235,15 @@ LOOPS = {  # what is followed of loops: motions by A1
         "N=0\nTOP:\nN=N+1\nIF $IN[1] THEN\nGOTO ENDS\nENDIF\nPTP {A1 N}\nIF N<3 THEN\nGOTO TOP\n"
         "ENDIF\nENDS:",
         [1.0, 2.0, 3.0],
+    ),
+    "nothing stands behind a loop that nothing leaves": (
+        "LOOP\nPTP {A1 1}\nENDLOOP\nPTP {A1 2}",
+        [1.0],
+    ),
+    "nor behind a jump back": ("TOP:\nPTP {A1 1}\nGOTO TOP\nPTP {A1 2}", [1.0]),
+    "what stands behind a loop that an input ends": (
+        "LOOP\nPTP {A1 1}\nIF $IN[1] THEN\nEXIT\nENDIF\nENDLOOP\nPTP {A1 2}",
+        [1.0, 2.0],
     ),
     "jumps forward": ("PTP {A1 1}\nGOTO DONE\nPTP {A1 2}\nDONE:\nPTP {A1 3}", [1.0, 3.0]),
     "a jump out of branches": (

@@ -28,6 +28,10 @@ class LoopExit(Exception):  # noqa: N818 - no error: a statement
     """EXIT."""
 
 
+class Endless(Exception):  # noqa: N818 - no error: nothing follows
+    """A loop that nothing leaves: what stands behind it is never reached."""
+
+
 @dataclass
 class Jump(Exception):  # noqa: N818 - no error: a statement
     """GOTO a label. known: a branch around it was taken by values that are known."""
@@ -110,6 +114,8 @@ class Control:
         open_ = not jump.known and (bound or self._guessed_exits > turn.exits)
         if turn.count >= self.loop_passes and (still or open_):
             self._left(jump.place, f"GOTO {jump.label}", turn.count)
+            if bound and between[-1].data == "goto":
+                raise Endless
             return False
         self.memory.forget(turn.watched)
         turn.watched = self.memory.watch()
@@ -238,6 +244,10 @@ class Control:
         except LoopExit:
             return
         self._left(self.place(tree), word, passes)
+        if not _leaves(body) and all(
+            _constant(one) for one in tree.children if one is not body and isinstance(one, Tree)
+        ):
+            raise Endless
 
     def _pass(self, tree: Tree, body: Tree, again: Again) -> tuple[bool, bool]:
         """One pass of a loop: whether it goes on, and whether something known may end it."""
@@ -278,7 +288,7 @@ class Control:
     def _switch(self, tree: Tree) -> None:
         subject, *cases, default = tree.children
         before = self.memory.guesses
-        value = self.expressions.value(subject)
+        value = self.memory.guess(self.expressions.value(subject), 0, self.place(tree))
         self.continuing = False
         open_ = self.memory.guesses > before
         self._count_exits(tree, open_=open_)

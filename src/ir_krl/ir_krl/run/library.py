@@ -195,6 +195,7 @@ class Library:
         self._set("$APO", Structure(dict(apo)))
         self._set("$ORI_TYPE", Symbol("VAR"))
         self._set("$IPO_MODE", Symbol("BASE"))
+        self._set("$CIRC_TYPE", self._memory.peek("DEF_CIRC_TYP") or Symbol("BASE"))
         self._set("$ADVANCE", round(self._default("DEF_ADVANCE")))
         self._take_base(0)
         self._set("$TOOL", self._tool(1))
@@ -215,6 +216,7 @@ class Library:
         self._set("$APO.CDIS", self._noted("LDAT_ACT", "APO_DIST", 0.0, place))
         noted = self._own("LDAT_ACT", place)
         self._set("$ORI_TYPE", _field([noted], "ORI_TYP", Symbol("VAR")))
+        self._set("$CIRC_TYPE", _field([noted], "CIRC_TYP", Symbol("BASE")))
 
     def _own(self, name: str, place: Place) -> Value | None:
         return self._memory.get(((name, None),), place) if self._memory.has(name) else None

@@ -58,10 +58,12 @@ class Assigning(Control):
         value = self.expressions.value(expression)
         (name, index), where = path[0], self.place(tree)
         if name in self._signals.groups and index is None:
+            value = self.memory.guess(value, 0, where)
             for number, level in self._signals.group_bits(name, value, where):
                 self._set_output(number, level, where)
             return
         if name == OUTPUT and index is not None:
+            value = self.memory.guess(value, False, where)
             if not isinstance(value, bool):
                 raise KrlRunError(f"$OUT[{index[0]}] is set to {kind_of(value)}", where)
             self._set_output(index[0], value, where)
@@ -84,9 +86,6 @@ class Assigning(Control):
                 "motion with the tool at the flange",
                 where,
             )
-        if name == "$ORI_TYPE" and value not in (Symbol("VAR"), Symbol("CONSTANT")):
-            text = f"$ORI_TYPE {kind_of(value)}: the tool is turned evenly instead"
-            self.note_at(where, text, Effect.PLACES)
         known = MODELLED | HARMLESS | SITUATION.keys()
         if name.startswith("$") and name not in known:
             self.note_at(where, f"{name} isn't modelled", _effect_of(name))
@@ -157,6 +156,8 @@ class Motions:
             raise KrlRunError(
                 f"{word} goes to a frame, not to axis angles: PTP goes to those", place
             )
+        if kind != "ptp":
+            self._note_orientation(kind, place)
         blend = next(
             (
                 self.blend(child, axis=kind == "ptp")
@@ -283,6 +284,17 @@ class Motions:
             share = min(max(self._number("$APO", "CPTP", place), 0.0), FULL) / FULL
         return Blend(how, amount * _MM, share)
 
+    def _note_orientation(self, kind: Kind, place: Place) -> None:
+        """Note where the tool turns otherwise than evenly in the base."""
+        orientation = self._memory.peek("$ORI_TYPE")
+        if orientation not in (None, Symbol("VAR"), Symbol("CONSTANT")):
+            text = f"$ORI_TYPE {kind_of(orientation)}: the tool is turned evenly instead"
+            self._noted(place, text, Effect.PLACES)
+        circle = self._memory.peek("$CIRC_TYPE")
+        if kind == "circ" and circle not in (None, Symbol("BASE")):
+            text = f"$CIRC_TYPE {kind_of(circle)}: the tool is turned evenly in the base instead"
+            self._noted(place, text, Effect.PLACES)
+
     def _keeps_orientation(self) -> bool:
         return self._memory.shared.get("$ORI_TYPE") == Symbol("CONSTANT")
 
@@ -346,7 +358,8 @@ class Moving(Assigning):
     def _trigger(self, tree: Tree) -> None:
         when, where, delay, action = tree.children[0], *tree.children[1:4]
         at = self.expressions.number(where, str(when))
-        if str(when) not in ("DISTANCE", "PATH") or self.expressions.number(delay, "DELAY") != 0.0:
+        shifted = at != 0.0 if str(when) == "PATH" else str(when) != "DISTANCE"
+        if shifted or self.expressions.number(delay, "DELAY") != 0.0:
             self.note(
                 tree,
                 "a TRIGGER acts at an end of its motion: path and delay aren't modelled",

@@ -10,7 +10,7 @@ from typing import Any
 from ir_krl.errors import KrlRunError, Place
 from ir_krl.language import Routine, Source, Tree, place_of
 from ir_krl.run.commands import Command
-from ir_krl.run.control import Jump, LoopExit, Returned
+from ir_krl.run.control import Endless, Jump, LoopExit, Returned
 from ir_krl.run.expressions import Expressions
 from ir_krl.run.library import CONTROLLERS, STOPPING, Library
 from ir_krl.run.memory import Memory, SignalRange, Signals
@@ -142,6 +142,8 @@ def follow(
             for body in source.data:
                 run.settings(body, source.file)
         run.routine(first, [], Place(first.file))
+    except Endless:
+        pass  # a note says so
     except RecursionError:
         raise KrlRunError(NESTED, Place(run.expressions.file)) from None
     notes = worst_first(run.notes)
@@ -203,6 +205,10 @@ class _Run(Moving):
         """What stops the advance run is read: where the robot stands is known then."""
         self.stop(place, name)
         memory = self.memory
+        if name in (*AXES_NOW, *PLACE_NOW) and not self.standing.moved:
+            memory.guesses += 1
+            text = f"{name} is read before the first motion: the robot stands in the cell's home"
+            self.note_at(place, text, Effect.PLACES)
         if name in AXES_NOW:
             memory.hold(name, self.standing.axes())
         elif name in PLACE_NOW:
@@ -232,8 +238,7 @@ class _Run(Moving):
             )
         if self._running.count(routine) >= self.loop_passes and not routine.parameters:
             self._left(place, f"{routine.name} calls itself", self.loop_passes)
-            self.memory.enter({}, ())
-            return 0
+            raise Endless
         before = self.expressions.file
         named = zip(routine.parameters, arguments, strict=False)
         given = {one.name: copied(value) for one, value in named if value is not None}

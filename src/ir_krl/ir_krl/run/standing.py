@@ -42,6 +42,14 @@ class Standing:
     _replayed: int = 0  # commands that `_q` stands behind
     _q: FloatArray | None = None
 
+    @property
+    def moved(self) -> bool:
+        """Whether a motion to a place of its own was among the commands: before, it stands where it
+        is assumed to.
+        """
+        parts = (part for command in self.commands for part in _motions_of(command))
+        return any(not part.target.relative for part in parts)
+
     def axes(self) -> Value | None:
         """$AXIS_ACT; None where it isn't known."""
         q = self._configuration()
