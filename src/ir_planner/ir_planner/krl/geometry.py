@@ -148,12 +148,19 @@ class Arm:
         pose = self.pose(target, self.tool_pose(target, q))
         found = self.configurations(pose[None], target)[0]
         if len(found) == 0:
-            raise KrlMotionError(f"{_called(target)}{_spelled(pose)} is out of reach", place)
+            raise KrlMotionError(
+                f"{_called(target)}{_spelled(pose)} is out of reach: do $BASE and $TOOL fit the "
+                "cell?",
+                place,
+            )
         fits = found[meeting(self.scene.chain, found, target.status, target.turn)]
         if len(fits) == 0:
+            alike = found[meeting(self.scene.chain, found, target.status, None)]
+            alike = alike if len(alike) else found
+            status, turn = self.status_turn(alike[np.argmin(np.abs(alike - q).max(axis=1))])
             raise KrlMotionError(
                 f"{_called(target)}no configuration within the limits has S {target.status}, T "
-                f"{target.turn}",
+                f"{target.turn}: the nearest one has S {status}, T {turn}, write that or teach it",
                 place,
             )
         return np.asarray(fits[np.argmin(np.abs(fits - q).max(axis=1))])
