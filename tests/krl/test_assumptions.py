@@ -259,6 +259,14 @@ def test_loops_and_jumps_are_followed_as_far_as_they_are_known(name: str, follow
     assert angles(followed(lines)) == expected
 
 
+def test_a_program_initialises_itself_where_it_isnt_on_its_path_yet(followed: Follow) -> None:
+    lines = "CONTINUE\nIF NOT $ON_PATH THEN\nBAS(#INITMOV,0)\nENDIF\nPTP {A1 1} C_PTP\nPTP {A1 2}"
+    first, _ = followed(lines).commands
+    assert isinstance(first, Motion)
+    assert first.blend is not None
+    assert first.blend.share == 0.5
+
+
 def test_arrays_arrive_as_parameters(followed: Follow) -> None:
     text = (
         "DEF T( )\nE6AXIS WAY[2]\nWAY[1]={A1 10}\nWAY[2]={A1 20}\nDRIVE(WAY[],2)\nEND\n"

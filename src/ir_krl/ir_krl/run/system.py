@@ -176,7 +176,7 @@ SITUATION: dict[str, Value] = {
     "$KCP_CONNECT": True,
     "$MOVE_ENABLE": True,
     "$NEAR_POSRET": True,
-    "$ON_PATH": True,
+    "$ON_PATH": False,  # at the start, where programs ask for it
     "$OV_ROB": FULL,
     "$PERI_RDY": True,
     "$POWER_FAIL": False,
@@ -198,7 +198,7 @@ SITUATION: dict[str, Value] = {
     "$USER_SAF": True,
     "$VEL_ACT": 0.0,
 }
-"""How a controller stands that runs its program in automatic mode, without a fault."""
+"""How a controller stands that starts its program in automatic mode, without a fault."""
 FACTS: dict[str, Value] = {
     "$ADAP_ACC": Symbol("STEP1"),
     "$EX_AX_NUM": 0,
