@@ -107,6 +107,11 @@ ASSUMED = {
         "BAS(#NOBODY) isn't known: no effect assumed",
         Effect.SPEEDS,
     ),
+    "how far corners are rounded": (
+        "PTP {A1 1} C_PTP\nPTP {A1 2}",
+        "no $APO is set: as BAS(#INITMOV) sets it, 50 % and 3 mm",
+        Effect.SPEEDS,
+    ),
     "when a trigger acts": (
         "TRIGGER WHEN PATH=-20 DELAY=0 DO $OUT[1]=TRUE\nPTP {A1 1}",
         "a TRIGGER acts at an end of its motion: path and delay aren't modelled",

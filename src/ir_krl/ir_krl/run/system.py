@@ -245,7 +245,7 @@ def system_variables(home: FloatArray, tool: FloatArray) -> dict[str, Value]:
         "$ACC_AXIS": all_axes(FULL),
         "$VEL": Structure({"CP": DEFAULTS["DEF_VEL_CP"], **turning}),
         "$ACC": Structure({"CP": DEFAULTS["DEF_ACC_CP"], **turning_up}),
-        "$APO": Structure({"CPTP": 0.0, "CDIS": 0.0, "CORI": 0.0, "CVEL": 0.0}),
+        "$APO": Structure({p: DEFAULTS[f"DEF_APO_{p}"] for p in ("CPTP", "CDIS", "CORI", "CVEL")}),
         "$GEAR_JERK": all_axes(FULL),
         "$OV_PRO": FULL,
         "$ADVANCE": 3,
@@ -273,6 +273,8 @@ def assumed_variables() -> dict[str, Assumption]:
     home = "isn't in the files: the cell's home"
     found["XHOME"] = Assumption(f"XHOME {home}", Effect.PLACES)
     found["$H_POS"] = Assumption(f"$H_POS {home}", Effect.PLACES)
+    apo = "no $APO is set: as BAS(#INITMOV) sets it, 50 % and 3 mm"
+    found["$APO"] = Assumption(apo, Effect.SPEEDS)
     found["$TOOL"] = Assumption("no $TOOL is chosen: the cell's tool", Effect.PLACES)
     found["$BASE"] = Assumption("no $BASE is chosen: the robot's foot", Effect.PLACES)
     for n in range(1, TOOLS + 1):
