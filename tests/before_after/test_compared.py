@@ -4,13 +4,18 @@ draws.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from ir_description import ProgramStep
 from ir_msgs_py.savings import BeforeAfter
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner, RequestError
 from ir_planner.before_after import Stretch, Today, before_after, before_after_common
+from ir_planner.before_after.today_steps import asked_program
+from ir_planner.krl import station_at
 
 
 def test_all_programs_make_the_same_stops_and_pauses(compared: BeforeAfter) -> None:
@@ -135,3 +140,22 @@ def test_a_program_that_goes_nowhere_is_a_sentence(planner: Planner) -> None:
     nothing = Today("still", "trace", home, (Stretch(None, home, 5.0),))
     with pytest.raises(RequestError, match="still has no movement"):
         before_after(planner, nothing)
+
+
+def test_a_cells_program_that_begins_in_a_posture_is_todays_that_starts_there(
+    planner: Planner,
+) -> None:
+    """The first PTP HOME only leads onto the path, so that no step of today's matched it."""
+    plan = planner.plan_program(stations=("p1", "home"), start=planner.cell.machine_home)
+    moves = [step.trajectory for step in plan.movements if step.trajectory is not None]
+    scene = planner.scene("")
+    ends = [one.positions[-1] for one in moves]
+    stretches = tuple(
+        Stretch(one, end, one.duration, works=bool(station_at(scene, end)))
+        for one, end in zip(moves, ends, strict=True)
+    )
+    today = Today("own", "trace", planner.cell.machine_home, stretches)
+    stops = (ProgramStep("STATION", "p1"), ProgramStep("POSTURE", "home"))
+    for program in (stops, (ProgramStep("POSTURE", "home"), *stops)):
+        asked = asked_program(today, replace(scene, cell=replace(scene.cell, program=program)))
+        assert "parts and signals at the stops are those of the cell's own program" in asked.notes

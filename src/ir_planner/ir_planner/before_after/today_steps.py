@@ -86,7 +86,7 @@ def asked_program(today: Today, scene: PlanningScene) -> AskedProgram:
         steps = _with_signals(steps)
         notes = ["parts and signals at the stops are those of the program's own outputs and waits"]
     else:
-        steps, notes = _handled(steps, scene.cell)
+        steps, notes = _handled(steps, scene.cell, posture_at(scene, today.start))
     cell = replace(stops.cell(), program=tuple(step.step for step in steps))
     return AskedProgram(cell, tuple(steps), (*stops.notes(), *notes))
 
@@ -119,9 +119,13 @@ def _with_signals(steps: list[Asked]) -> list[Asked]:
     return result
 
 
-def _handled(steps: list[Asked], cell: Cell) -> tuple[list[Asked], list[str]]:
-    """The steps with what the cell's program handles at its stops, where it makes the same ones."""
+def _handled(steps: list[Asked], cell: Cell, start: str) -> tuple[list[Asked], list[str]]:
+    """The steps with what the cell's program handles at its stops, where it makes the same ones; a
+    program that only begins in the posture `start` begins where today's does.
+    """
     own = [step for step in cell.program if step.kind != "PAUSE"]
+    if own and own[0] == ProgramStep("POSTURE", start):
+        own = own[1:]
     stopping = [step.step for step in steps if step.step.kind != "PAUSE"]
     if not own or [s.target for s in own] != [s.target for s in stopping]:
         held = cell.tool.name if cell.tool is not None else "nothing"
@@ -213,7 +217,7 @@ def costed_steps(asked: tuple[Asked, ...], request: ProgramRequest) -> tuple[Pla
     times = request.settings.transitions
     steps = tuple(step.step for step in asked)
     placed = placed_steps(cell, steps, cell.parts_at_start(), request.doors)
-    scenes = Scenes(cell, request.power, request.settings.drives(cell.robot))
+    scenes = Scenes(cell, request.power, request.settings.drives)
     costing = _Costing(request, Charge(times))
     here = ""
     for step, at in zip(asked, placed, strict=True):
