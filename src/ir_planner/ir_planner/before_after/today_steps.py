@@ -217,7 +217,7 @@ def costed_steps(asked: tuple[Asked, ...], request: ProgramRequest) -> tuple[Pla
     times = request.settings.transitions
     steps = tuple(step.step for step in asked)
     placed = placed_steps(cell, steps, cell.parts_at_start(), request.doors)
-    scenes = Scenes(cell, request.power, request.settings.drives)
+    scenes = Scenes(cell, request.power, request.settings.drives(cell.robot))
     costing = _Costing(request, Charge(times))
     here = ""
     for step, at in zip(asked, placed, strict=True):

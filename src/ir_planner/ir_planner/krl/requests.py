@@ -233,7 +233,7 @@ def surroundings(planner: Planner, program: Followed, load: str = "") -> Surroun
     """What a program moves among in the planner's cell. Raises RequestError."""
     asked = planner.scene(load)
     cell = planner.cell
-    scenes = Scenes(cell, asked.power, planner.settings.drives)
+    scenes = Scenes(cell, asked.power, planner.settings.drives(cell.robot))
     doors = planner.heard.doors(cell)
     wires = wires_of(cell, program.signals)
     around = Surroundings(scenes, wires, station_at, cell.parts_at_start(), doors)
