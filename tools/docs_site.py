@@ -19,7 +19,16 @@ from ir_cli.commands import COMMANDS, GROUPS
 
 ROOT = Path(__file__).resolve().parent.parent
 STAGE = ROOT / "out" / "site_source"
-PACKAGES = ("ir_planner", "ir_description", "ir_msgs_py", "ir_kernels", "ir_krl", "ir_recorder")
+WORKER = Path(__file__).with_name("iframe-worker.js")  # instead of one from the network
+PACKAGES = (
+    "ir_planner",
+    "ir_description",
+    "ir_msgs_py",
+    "ir_kernels",
+    "ir_krl",
+    "ir_recorder",
+    "ir_values",
+)
 _LINK = re.compile(r"\]\(([^)\s#]+)")
 _CODE = re.compile(r"^```.*?^```|`[^`\n]*`", re.DOTALL | re.MULTILINE)
 
@@ -38,6 +47,7 @@ def stage(folder: Path) -> None:
     for name in PACKAGES:
         (reference / f"{name}.md").write_text(f"# {name}\n\n::: {name}\n", "utf-8")
     (reference / "commands.md").write_text(command_page(), "utf-8")
+    shutil.copy(WORKER, folder / WORKER.name)
 
 
 def _linked(page: Path) -> Iterator[Path]:

@@ -30,13 +30,30 @@ def searches() -> str:
     return "\n".join(rows) + "\n"
 
 
-def table(node: str) -> Iterator[str]:
-    """Lines of the table of a node's parameters."""
+ADVANCED = """## Advanced
+
+Settings of one stage: its searches, gains, tolerances and times. The defaults fit; they are for
+studies of the stage, and for controllers whose times were measured.
+"""
+
+
+def rows(node: str) -> Iterator[str]:
+    """Lines of the table of a node's parameters, the head first."""
     for k, (prefix, make) in enumerate(NODE_SETTINGS[node]):
         lines = settings_table(make(), prefix.removeprefix(FIXED)).splitlines()
         yield from () if k else lines[:2]
         for line in lines[2:]:
             yield f"{line[:-2]} Fixed at start. |" if prefix.startswith(FIXED) else line
+
+
+def tables(mark: str, advanced: bool) -> Iterator[str]:
+    """Sections of the nodes: settings of a stage (their names have a dot) or of the whole node."""
+    for node in NODE_SETTINGS:
+        head, rule, *lines = rows(node)
+        shown = [line for line in lines if ("." in line.split("`")[1]) is advanced]
+        if shown:
+            yield f"{mark} {node}\n"
+            yield "\n".join([head, rule, *shown]) + "\n"
 
 
 def page() -> str:
@@ -47,8 +64,7 @@ def page() -> str:
         "An empty `planner_id` is the portfolio; a name selects one search.\n",
         searches(),
     ]
-    for node in NODE_SETTINGS:
-        parts += [f"## {node}\n", "\n".join(table(node)) + "\n"]
+    parts += [*tables("##", False), ADVANCED, *tables("###", True)]
     return "\n".join(parts)
 
 

@@ -39,7 +39,8 @@ def test_the_page_lists_what_the_node_declares(name: str, ros_node: Node) -> Non
     declared = {
         each: ros_node.describe_parameter(each) for each in set(ros_node._parameters) - before
     }
-    section = PAGE.read_text("utf-8").partition(f"## {name}\n")[2].partition("\n## ")[0]
+    text = PAGE.read_text("utf-8")
+    section = "".join(re.findall(rf"^##+ {name}\n(.*?)(?=^##|\Z)", text, re.MULTILINE | re.DOTALL))
     rows = dict(re.findall(r"^\| `([\w.]+)` \|(.*)$", section, re.MULTILINE))
     assert set(rows) == set(declared)
     fixed = {each for each, row in rows.items() if row.endswith("Fixed at start. |")}

@@ -68,7 +68,7 @@ def test_the_readme_names_the_two_commands_and_starts_the_nodes_first() -> None:
     assert "make test" in README
     _, service_calls, _ = blocks("bash")
     assert service_calls.startswith(START)
-    assert len(commands()) >= 17
+    assert len(commands()) >= 14
 
 
 def test_what_needs_no_ros_runs_before_anything_is_started(tmp_path: Path) -> None:
