@@ -1,4 +1,4 @@
-"""What the parts of `benchmarks/kernels.py` share: a row, the clock, and the paper's load."""
+"""Rows of `benchmarks/kernels.py`: a row, the clock, and the paper's load."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an experiment on a claim of the paper answers: statements with intervals, and a verdict for
+"""Answers of an experiment on a claim of the paper: statements with intervals, and a verdict for
 each.
 
 A statement names a figure and the bound from which on the paper is right. It holds where the whole

@@ -1,4 +1,4 @@
-"""What the paper says against other planners: KPIECE's cells, RRT among many zones."""
+"""The paper's claims against other planners: KPIECE's cells, RRT among many zones."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""What a task of the regional benchmark measured, as a row of table and JSON, and what all tasks
-claim.
+"""Figures of a task of the regional benchmark, as a row of table and JSON, and the claims of all
+tasks.
 """
 
 from __future__ import annotations

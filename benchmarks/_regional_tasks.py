@@ -1,6 +1,4 @@
-"""What the regional benchmark asks: every task of the cells, there and back, and what its answers
-cost.
-"""
+"""Tasks of the regional benchmark: all of the cells, there and back, with the cost of answers."""
 
 from __future__ import annotations
 

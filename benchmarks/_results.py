@@ -1,6 +1,4 @@
-"""What every benchmark shares: its command line, and rows, claims, machine and commit at its
-end.
-"""
+"""Command line of every benchmark, and rows, claims, machine and commit at its end."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""What positions alone are worth: motions of known energy, sampled with noise, and the stated
-bound.
-"""
+"""Worth of positions alone: motions of known energy, sampled with noise, and the stated bound."""
 
 from __future__ import annotations
 

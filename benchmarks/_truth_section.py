@@ -1,4 +1,4 @@
-"""What a section of `truth.py`, a module `_truth_NAME.py`, is asked and what it answers."""
+"""Sections of `truth.py`: modules `_truth_NAME.py` with one question each."""
 
 from __future__ import annotations
 

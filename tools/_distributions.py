@@ -1,4 +1,4 @@
-"""What the virtual environment .venv holds, and what is missing of what it should hold."""
+"""Contents of the virtual environment .venv, and what is missing of it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the scripts that draw pictures for the documentation share."""
+"""Shared parts of the scripts that draw pictures for the documentation."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""What every robot behind the controller must do: the contract of `Backend`, for each registered
-one.
-"""
+"""The contract of `Backend`, for each registered robot behind the controller."""
 
 from __future__ import annotations
 

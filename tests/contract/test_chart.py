@@ -1,6 +1,4 @@
-"""What every chart and table of the report must do: the contract of `Chart`, for each registered
-one.
-"""
+"""The contract of `Chart`, for each registered chart and table of the report."""
 
 from __future__ import annotations
 

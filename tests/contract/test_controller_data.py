@@ -1,4 +1,4 @@
-"""What every controller's power table must be: modes from shallow to deep, times, bits, measured
+"""The contract of a controller's power table: modes from shallow to deep, times, bits, measured
 watts.
 """
 

@@ -1,6 +1,4 @@
-"""What every search for exit paths must do: the contract of `ExitSearch`, for each registered
-one.
-"""
+"""The contract of `ExitSearch`, for each registered search for exit paths."""
 
 from __future__ import annotations
 

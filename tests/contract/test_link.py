@@ -1,6 +1,4 @@
-"""What every link between PLC and controller must do: the contract of `Link`, for each registered
-one.
-"""
+"""The contract of `Link`, for each registered link between PLC and controller."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""What every power mode to rest in must have beside its row: the contract of the table
-`ir_msgs_py.modes`.
-"""
+"""The contract of the table `ir_msgs_py.modes`, for each power mode to rest in."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""What every bundled robot must be: the contract of a robot's data, from kinematics to a driven
-movement.
-"""
+"""The contract of a robot's data, from kinematics to a driven movement, for each bundled robot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every search for free paths must do: the contract of `Search`, for each registered one."""
+"""The contract of `Search`, for each registered search for free paths."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""What the kernels need to know of a robot, a load and a body: structural types, and the checks at
-the door.
+"""Data of a robot, a load and a body for the kernels: structural types, and their checks.
 
 Any object with these attributes serves (ir_description's dataclasses do). Lengths in m, angles in
 rad, masses in kg. Links are counted 0..n: link 0 is the base, link i is moved by joint i (1..n);

@@ -1,5 +1,4 @@
-"""What the dynamics need to know of a robot: the packed, checked arrays that both builds of the
-kernels read.
+"""Data of a robot's dynamics: the packed, checked arrays that both builds of the kernels read.
 
 Loads are lumped into the last link here, so that a robot with its tool and part costs as much as
 one without.

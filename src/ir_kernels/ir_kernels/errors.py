@@ -1,4 +1,4 @@
-"""What the kernels refuse, and why.
+"""Errors of the kernels.
 
 KernelError
 └── InputError (also a ValueError): an argument has the wrong shape, type or value; the message

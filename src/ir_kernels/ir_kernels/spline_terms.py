@@ -1,4 +1,4 @@
-"""What a motion along a spline is judged by: bounds, costs and thresholds, checked once."""
+"""Terms of the cost of a motion along a spline: bounds, weights and thresholds, checked once."""
 
 from dataclasses import dataclass
 

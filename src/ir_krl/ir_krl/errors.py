@@ -1,4 +1,4 @@
-"""What can go wrong with a KRL program: always with the file, the line and the column."""
+"""Errors in a KRL program, each with the file, the line and the column."""
 
 from __future__ import annotations
 

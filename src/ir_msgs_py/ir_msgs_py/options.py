@@ -1,4 +1,4 @@
-"""What a planning request may choose, with the defaults of ir_msgs/PlanOptions."""
+"""Options of a planning request, with the defaults of ir_msgs/PlanOptions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a request ended: a code, a sentence and who says it.
+"""Status of a request: a code, a sentence and its source.
 
 The numbers are those of moveit_msgs/MoveItErrorCodes, so that a client of MoveIt reads them without
 a table.

@@ -1,4 +1,4 @@
-"""What can go wrong in the planner, as one tree.
+"""Errors of the planner, as one tree.
 
 PlannerError
 ├── RequestError         a request that makes no sense: status code and a sentence with value, bound

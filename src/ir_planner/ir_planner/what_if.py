@@ -1,4 +1,4 @@
-"""What a program would cost if something were different: values in, a table out.
+"""Costs of a program if something were different: values in, a table out.
 
     table = what_if("demo", {"mass gear": [10, 20, 40], "cycle_time": [0, 120]}, workers=2)
 

@@ -1,4 +1,4 @@
-"""What can go wrong with a program, as one tree.
+"""Errors of a program that runs, as one tree.
 
 RunnerError
 ├── ProgramError         a program that must not be started; carries its status code

@@ -1,4 +1,4 @@
-"""What a program asks of the world, one request at a time, and what the world answers.
+"""Requests of a program to driver, planner and machines, one at a time, and their answers.
 
 The program never waits, sends or looks at a clock itself: it yields a request and is sent an
 Outcome.

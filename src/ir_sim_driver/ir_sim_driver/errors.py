@@ -1,4 +1,4 @@
-"""What can go wrong in the driver, as one tree.
+"""Errors of the driver, as one tree.
 
 DriverError
 ├── SettingsError (ValueError)        a setting out of its range

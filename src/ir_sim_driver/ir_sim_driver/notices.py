@@ -1,4 +1,4 @@
-"""What the driver reports to a person: sentences kept in order until they are taken."""
+"""Notices of the driver to a person: sentences kept in order until they are taken."""
 
 from __future__ import annotations
 

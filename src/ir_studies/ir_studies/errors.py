@@ -1,4 +1,4 @@
-"""What can go wrong with studies, as one tree.
+"""Errors of studies, as one tree.
 
 StudyError
 ├── SettingsError  a settings file makes no sense: the key, its value, and what it may be

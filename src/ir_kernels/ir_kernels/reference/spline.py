@@ -1,5 +1,5 @@
-"""What a motion along a uniform cubic B-spline costs, with its derivatives: the oracle of the
-compiled core.
+"""Cost of a motion along a uniform cubic B-spline, with its derivatives: the oracle of the compiled
+core.
 
 Each interval between knots is sampled at the middles of SAMPLES equal parts. There the drives are
 looked at (torque, speed, power) and the clearance; accelerations at the knots, jerks between them

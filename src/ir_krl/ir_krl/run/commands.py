@@ -1,4 +1,4 @@
-"""What a program asks of the controller, in the order in which it does: motions, waits, outputs."""
+"""Commands of a program to the controller, in their order: motions, waits, outputs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a written program consists of: motions, pauses, signals, and what is taken and left."""
+"""Parts of a written program: motions, pauses, signals, and what is taken and left."""
 
 from __future__ import annotations
 

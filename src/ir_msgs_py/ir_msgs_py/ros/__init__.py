@@ -1,1 +1,1 @@
-"""What needs rclpy: conversions, parameters, a client for scripts and fixtures for tests."""
+"""Parts that need rclpy: conversions, parameters, a client for scripts, fixtures for tests."""

@@ -1,4 +1,4 @@
-"""What a node says of itself on /diagnostics, one bounded line each.
+"""Diagnostics of a node on /diagnostics, one bounded line each.
 
 The names carry the node's namespace, so that cells are kept apart.
 """

@@ -1,4 +1,4 @@
-"""Who can see and reach the nodes: nobody outside this host, unless somebody chose otherwise.
+"""Reach of the nodes in a network: this host alone, unless another choice was made.
 
 IR_NETWORK chooses, whatever starts the node:
 

@@ -1,4 +1,4 @@
-"""What RViz and Foxglove see of a cell: its bodies, zones and stations, and the path of the last
+"""Shapes of a cell for RViz and Foxglove: its bodies, zones and stations, and the path of the last
 movement.
 """
 

@@ -1,5 +1,5 @@
-"""What holds along a trajectory, for every instant of its interpolant: limits by exact extremes of
-the polynomials, torque by guaranteed bounds, clearance by a certificate. The first violation of
+"""Verification of a trajectory at every instant of its interpolant: limits by exact extremes of the
+polynomials, torque by guaranteed bounds, clearance by a certificate. The first violation of
 every kind is named with place, limit and excess.
 """
 

@@ -1,4 +1,4 @@
-"""What more work buys: one program first, then better ones while work is left.
+"""More work on a program: one program first, then better ones while work is left.
 
 The first program is looked for with the same effort whatever the request allows, so that a request
 with more work knows everything that one with less knows. Then the chain is chosen again with more

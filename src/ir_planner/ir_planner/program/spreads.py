@@ -1,5 +1,4 @@
-"""What the uncertainty of the power parameters leaves open of a program's joules, and of what it
-saves.
+"""Spread of a program's joules and savings by the uncertainty of the power parameters.
 
 Every step, movement or pause, is followed over the same drawn robots, so sums and differences have
 intervals of their own.

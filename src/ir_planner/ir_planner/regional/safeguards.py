@@ -1,5 +1,4 @@
-"""What an answer is compared with before it is given, so that no other request would have found a
-better one.
+"""Comparisons before an answer is given, so that no other request would have found a better one.
 
 The baseline movement is a candidate of every answer of the default portfolio. A requested duration
 is met by the cheapest movement of free duration too, and where nothing else is left by the fastest

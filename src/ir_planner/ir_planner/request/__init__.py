@@ -1,6 +1,4 @@
-"""What a request asks for and what its answer says about itself: bounds, goals, counted work, the
-journal.
-"""
+"""Requests and the record of their answers: bounds, goals, counted work, the journal."""
 
 from ir_planner.request.bounds import (
     DURATION_MAX,

@@ -1,4 +1,4 @@
-"""What every stage of one request needs to know, as one value."""
+"""Context of one request: what every stage needs to know, as one value."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator

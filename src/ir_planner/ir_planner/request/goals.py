@@ -1,5 +1,4 @@
-"""What a person types as a goal: a station, a posture, joint values in degrees, or a pose of the
-tcp.
+"""Goals as people type them: a station, a posture, joint values in degrees, or a pose of the tcp.
 
 "lathe" | "park" | "home" | "A1 0 A2 -90 A3 90 A4 0 A5 0 A6 0" | "X 1.8 Y 0 Z 1.2 A 0 B 90 C 0" (m
 and degrees, KUKA's A, B, C: Z-Y'-X'').

@@ -1,4 +1,4 @@
-"""What a request plans in: the cell, what the robot holds, their models, bounds of motion, the cost
+"""The scene of a request: the cell, what the robot holds, their models, bounds of motion, the cost
 W.
 """
 

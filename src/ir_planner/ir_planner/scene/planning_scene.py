@@ -1,4 +1,4 @@
-"""What one request plans in: the cell as it stands, what the robot holds, and the models of both.
+"""The scene of one request: the cell as it stands, what the robot holds, and the models of both.
 Never changed.
 
 A request takes its snapshot once; a cell that changes meanwhile does not reach it.

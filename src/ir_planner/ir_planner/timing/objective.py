@@ -1,4 +1,4 @@
-"""What a movement is judged by, and the stretch of its duration that serves it best.
+"""Objective of a movement, and the stretch of its duration that serves it best.
 
 movement_cost: W of eq. (9); time: T; energy: E_drive, what the drives take from the mains;
 time_and_energy: J = E_drive + time_value x T. What controller and tool always draw is in neither:

@@ -1,5 +1,4 @@
-"""What a sample of independent values says: intervals of mean and median, chance, and where they
-are too few.
+"""Intervals of a sample of independent values: mean and median, chance, and where they are too few.
 
 Differences of pairs are far from normal: most are near zero, a few large. Student's t then leaves
 out a mean that few carry, Hall's transformation of t by the sample's skewness (J. R. Statist. Soc.

@@ -1,4 +1,4 @@
-"""What was attached when: from the driver's diagnostics and from the program's steps."""
+"""Loads over time: from the driver's diagnostics and from the program's steps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the program did: every movement and pause with the times at which it really ran."""
+"""Steps of the program: every movement and pause with the times at which it really ran."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a recording file holds beside its messages: schemas, quality of service, names of
+"""Contents of a recording file beside its messages: schemas, quality of service, names of
 attachments.
 """
 

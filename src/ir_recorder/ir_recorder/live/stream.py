@@ -1,4 +1,4 @@
-"""What the nodes said lately, as records that many browsers read, each as fast as it can.
+"""Records of what the nodes said lately, which many browsers read, each as fast as it can.
 
 A record holds the time and what has changed since the record before. Nothing waits for a reader:
 the newest records are kept, and who falls behind starts anew with them.

@@ -1,6 +1,4 @@
-"""What a recording holds, as typed values on one time axis. Times are seconds since the first
-message.
-"""
+"""A recording as typed values on one time axis. Times are seconds since the first message."""
 
 from __future__ import annotations
 

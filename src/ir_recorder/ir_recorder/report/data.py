@@ -1,4 +1,4 @@
-"""What the page's scripts need, as one JSON text."""
+"""Data of the page's scripts, as one JSON text."""
 
 from __future__ import annotations
 

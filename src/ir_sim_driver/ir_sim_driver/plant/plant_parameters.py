@@ -1,4 +1,4 @@
-"""What a plant is made of: its robot, drives, gears, DC link and standing watts, as figures of its
+"""Parameters of a plant: its robot, drives, gears, DC link and standing watts, as figures of its
 own.
 
 `nominal` has the figures of the data and none of the terms that the data do not know. Formulas and
