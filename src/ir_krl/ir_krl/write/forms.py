@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ir_krl.run.values import frame
+from ir_krl.write.figures import frame_text
 from ir_krl.write.parts import Style, WrittenMove
 
 # The texts after ";%{" tell the editor which form it is; the lines below them are what the form
@@ -37,20 +37,19 @@ class Forms:
 
 
 def _declared(part: WrittenMove, n: int, tool: int, style: Style) -> list[str]:
-    distance = part.rounded or 0.0
     if part.straight:
         shape = ",ORI_TYP #VAR" if style == "krc2" else ",ORI_TYP #VAR,CIRC_TYP #BASE,JERK_FAC 50.0"
         motion = (
             f"DECL LDAT LCPDAT{n}={{VEL {_TOP:.1f},ACC {part.acceleration}.0,"
-            f"APO_DIST {distance:.1f},APO_FAC 50.0{shape}}}"
+            f"APO_DIST {part.rounded:.1f},APO_FAC 50.0{shape}}}"
         )
     else:
         mode = "" if style == "krc2" else ",APO_MODE #CDIS,GEAR_JERK 50.0"
         motion = (
             f"DECL PDAT PPDAT{n}={{VEL 100.0,ACC {part.acceleration}.0,"
-            f"APO_DIST {distance:.1f}{mode}}}"
+            f"APO_DIST {part.rounded:.1f}{mode}}}"
         )
-    fields = ",".join(f"{name} {value:.6f}" for name, value in frame(part.pose).fields.items())
+    fields = frame_text(part.pose, 6)
     external = ",".join(f"E{k} 0.0" for k in range(1, 7))
     position = f"{{{fields},S {part.status},T {part.turn},{external}}}"
     form = f'{{TOOL_NO {tool},BASE_NO 0,IPO_FRAME #BASE,POINT2[] " "}}'
@@ -95,7 +94,7 @@ def _frames(n: int) -> str:
 def _sptp(part: WrittenMove, n: int, tool: int) -> list[str]:
     return [
         *_spline_form("SPTP", part, n, tool, "%", f"PDAT{n}"),
-        f"SPTP XP{n} WITH $VEL_AXIS[1] = SVEL_JOINT({part.velocity:g}), {_frames(n)}, "
+        f"SPTP XP{n} WITH $VEL_AXIS[1] = SVEL_JOINT({part.velocity:.1f}), {_frames(n)}, "
         f"$ACC_AXIS[1] = SACC_JOINT(PPDAT{n}), $APO = SAPO_PTP(PPDAT{n}), "
         f"$GEAR_JERK[1] = SGEAR_JERK(PPDAT{n}), {_CHECK}{' C_SPL' if part.rounded else ''}",
     ]

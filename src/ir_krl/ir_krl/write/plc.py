@@ -57,9 +57,9 @@ def plc_table(program: str, pauses: Sequence[PlcPause]) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
     for one in pauses:
-        asked = DEEPER.join(f"{at:g}" for at in one.asked_at)
-        row = (one.number, one.place, f"{one.seconds:.6g}", one.power_mode, asked)
-        writer.writerow((program, *row, f"{one.wake_at:.6g}"))
+        asked = DEEPER.join(f"{at:.9g}" for at in one.asked_at)
+        row = (one.number, one.place, f"{one.seconds:.9g}", one.power_mode, asked)
+        writer.writerow((program, *row, f"{one.wake_at:.9g}"))
     return text.getvalue()
 
 
@@ -70,7 +70,7 @@ def read_plc_table(text: str, file: str) -> dict[int, PlcPause]:
     missing = [name for name in COLUMNS if name not in heads]
     if missing:
         raise KrlError(
-            f"column {missing[0]} is missing: a PLC table has {', '.join(COLUMNS)}", Place(file, 1)
+            f"column {missing[0]} is missing: a PLC table has {', '.join(COLUMNS)}", Place(file, 1, 1)
         )
     found: dict[int, PlcPause] = {}
     for line, row in enumerate(rows, start=2):

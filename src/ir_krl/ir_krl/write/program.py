@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_krl.errors import Place
 from ir_krl.run.commands import Payload
-from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES, components, frame
+from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES
+from ir_krl.write.figures import decimal, frame_text
 from ir_krl.write.forms import Forms
 from ir_krl.write.names import INPUT, OUTPUT, Numbers, Wiring, check_name
 from ir_krl.write.parts import (
@@ -215,7 +215,8 @@ class _Body:
         self._movements += 1
         names = [f"XM{self._movements}_{k + 1}" for k in range(len(part.poses))]
         self.points += [
-            f"DECL E6POS {n}={_pose(pose)}" for n, pose in zip(names, part.poses, strict=True)
+            f"DECL E6POS {n}={{{frame_text(pose, 7)}}}"
+            for n, pose in zip(names, part.poses, strict=True)
         ]
         self.lines += [
             f"; {part.comment}",
@@ -254,33 +255,17 @@ class _Body:
         return self.wiring.output(GRIP)
 
 
-def _decimal(value: float, digits: int) -> str:
-    """A number without the sign of a zero."""
-    text = f"{value:.{digits}f}"
-    return text.removeprefix("-") if not text.strip("-0.") else text
-
-
 def _truth(on: bool) -> str:
     return "TRUE" if on else "FALSE"
 
 
 def _axes(q: FloatArray) -> str:
     angles = zip(AXIS_NAMES, np.degrees(q), strict=True)
-    return "{" + ",".join(f"{name} {_decimal(angle, 7)}" for name, angle in angles) + "}"
-
-
-def _pose(pose: FloatArray) -> str:
-    return "{" + ",".join(f"{name} {_decimal(value, 7)}" for name, value in _components(pose)) + "}"
+    return "{" + ",".join(f"{name} {decimal(angle, 7)}" for name, angle in angles) + "}"
 
 
 def _tool(tool: FloatArray) -> str:
-    fields = ",".join(f"{name} {_decimal(value, 4)}" for name, value in _components(tool))
-    return f"DECL FRAME IR_TOOL={{{fields}}}"
-
-
-def _components(transform: FloatArray) -> list[tuple[str, float]]:
-    fields = components(frame(transform), FRAME_NAMES, Place())
-    return list(fields.items())
+    return f"DECL FRAME IR_TOOL={{{frame_text(tool, 4)}}}"
 
 
 def _load_name(k: int) -> str:
@@ -291,6 +276,6 @@ def _load(k: int, load: Payload) -> str:
     places = [1e3 * metres for metres in load.centre]
     centre = zip(FRAME_NAMES, (*places, *load.angles), strict=True)
     about = zip(FRAME_NAMES[:3], load.inertia, strict=True)
-    cm = ",".join(f"{name} {_decimal(value, 3)}" for name, value in centre)
-    j = ",".join(f"{name} {_decimal(value, 4)}" for name, value in about)
+    cm = ",".join(f"{name} {decimal(value, 3)}" for name, value in centre)
+    j = ",".join(f"{name} {decimal(value, 4)}" for name, value in about)
     return f"DECL LOAD {_load_name(k)}={{M {load.mass:.3f},CM {{{cm}}},J {{{j}}}}}"

@@ -1,13 +1,14 @@
 """Movements written as inline forms: lines of the tool, or of the axes through a few points."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from ir_kernels import portable
 from ir_krl import KrlError, Style, WrittenMove
-from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -18,12 +19,12 @@ from ir_planner.krl.strokes import one_after_the_other
 from ir_planner.scene import PlanningScene
 
 # Inline forms can't keep a planned spline. What they keep is that nothing is touched: as few points
-# of the planned movement are taken as the chain of motions needs to be certified again, rounded
-# where that is certified, with exact stops where it isn't. Then it is slowed to the planned time,
-# where it is quicker and that costs less.
+# of the planned movement are taken as the chain of motions needs to be certified again: wherever it
+# comes too near to something, one more. It is driven through, with exact stops where that isn't
+# certified. Then it is slowed to the planned time, where it is quicker and that costs less.
 
-_AWAY = (np.inf, 0.4, 0.2, 0.1, 0.05, 0.025)  # rad, of a joint from the chain of axis motions
-_SAMPLES = 400
+_SAMPLES = 800
+_POINTS_MAX = 40
 _ROUNDED = 0.45  # share of the way to a neighbouring point within which a point is rounded
 _TRIALS = 3
 _QUICKER = 0.98
@@ -32,10 +33,16 @@ _SERVICE = (MovementKind.SERVICE_ENTRY, MovementKind.SERVICE_EXIT)
 
 
 @dataclass(frozen=True, eq=False)
-class _Found:
+class _Driven:
+    """A chain and what becomes of it; reason: why it isn't certified, "" where it is; violation:
+    where it comes too near to something [rad] (n,), None: something else is wrong, everywhere.
+    """
+
     moves: list[WrittenMove]
-    seconds: float
-    joules: float
+    seconds: float = 0.0
+    joules: float = 0.0
+    reason: str = ""
+    violation: FloatArray | None = None
 
 
 def fitted_moves(
@@ -43,60 +50,64 @@ def fitted_moves(
 ) -> list[WrittenMove]:
     """The forms of a movement. Raises RequestError where no chain of them is certified."""
     planned = points_of(step)
-    reason = ""
-    for moves in _chains(step, planned, judge.scene(step), style):
-        found, why = _judged(moves, step, judge, back)
-        if found is not None:
-            return _slowed(found, step, planned, judge, back).moves
-        reason = reason or why
+    scene = judge.scene(step)
+    q = planned.sample(np.linspace(0.0, planned.duration, _SAMPLES)).q
+    reasons = []
+    if step.kind in _SERVICE:
+        line = [replace(one, velocity=_TOP) for one in _through(q[[-1]], scene, straight=True)]
+        driven = _judged(line, step, judge, back)
+        if not driven.reason:
+            return _slowed(driven, step, planned, judge, back).moves
+    for through in (True, False):
+        driven = _refined(q, step, judge, back, style, through=through)
+        if not driven.reason:
+            return _slowed(driven, step, planned, judge, back).moves
+        reasons.append(driven.reason)
     raise RequestError(
         StatusCode.INVALID_MOTION_PLAN,
-        f"{called(step)} can't be written in style {style}: {reason}; style spline keeps the plan",
+        f"{called(step)} can't be written in style {style} with {_POINTS_MAX} points: "
+        f"{reasons[-1]}; style spline keeps the plan",
     )
 
 
-def _chains(
-    step: PlannedMovement, planned: JointTrajectory, scene: PlanningScene, style: Style
-) -> Iterator[list[WrittenMove]]:
-    """Chains of motions, the simplest first."""
-    q = planned.sample(np.linspace(0.0, planned.duration, _SAMPLES)).q
-    if step.kind in _SERVICE:
-        yield [replace(one, velocity=_TOP) for one in _through(q[[-1]], scene, straight=True)]
-    tried = 0
-    for away in _AWAY:
-        vias = _kept(q, away)
-        if len(vias) == tried:
-            continue
-        tried = len(vias)
-        moves = _through(q[vias], scene)
-        if len(moves) > 1:
-            yield _rounded(moves, q[0], scene, style)
-        yield moves
+def _refined(
+    q: FloatArray,
+    step: PlannedMovement,
+    judge: Judge,
+    back: ReadBack,
+    style: Style,
+    *,
+    through: bool,
+) -> _Driven:
+    """The chain of fewest points of q (N, n) that is certified, driven through or with stops."""
+    scene = judge.scene(step)
+    rows = [0, len(q) - 1]
+    while True:
+        moves = _through(q[rows[1:]], scene)
+        if through and len(moves) > 1:
+            moves = _rounded(moves, q[0], scene, style)
+        driven = _judged(moves, step, judge, back)
+        if not driven.reason or len(rows) > _POINTS_MAX:
+            return driven
+        if driven.violation is None:
+            more = max((_between(q, *span) for span in pairwise(rows)), key=lambda one: one[1])[0]
+        else:
+            row = int(np.abs(q - driven.violation).max(axis=1).argmin())
+            k = int(np.clip(np.searchsorted(rows, row, side="right"), 1, len(rows) - 1))
+            more = _between(q, rows[k - 1], rows[k])[0]
+        if more in rows:
+            return driven
+        rows = sorted([*rows, more])
 
 
-def _kept(q: FloatArray, away: float) -> IntArray:
-    """Rows of q (N, n) so that lines between them keep within `away` of all, the last included."""
-    kept = {0, len(q) - 1}
-    spans = [(0, len(q) - 1)]
-    while spans:
-        first, last = spans.pop()
-        if last - first < 2 or not np.isfinite(away):
-            continue
-        share = np.linspace(0.0, 1.0, last - first + 1)[:, None]
-        off = _off_the_line(q[first : last + 1], share)
-        k = int(off.argmax())
-        if off[k] > away:
-            kept.add(first + k)
-            spans += [(first, first + k), (first + k, last)]
-    return np.array(sorted(kept)[1:])
-
-
-def _off_the_line(q: FloatArray, share: FloatArray) -> FloatArray:
-    """Distance (M,) of configurations from the line between the first and the last, wherever on
-    it.
-    """
-    fine = q[0] + np.linspace(0.0, 1.0, len(share))[:, None] * (q[-1] - q[0])
-    return np.asarray(np.abs(q[:, None] - fine[None]).max(axis=2).min(axis=1))
+def _between(q: FloatArray, first: int, last: int) -> tuple[int, float]:
+    """The row of q (N, n) farthest from the line between two others, and how far [rad]."""
+    if last - first < 2:
+        return first, 0.0
+    line = q[first] + np.linspace(0.0, 1.0, last - first + 1)[:, None] * (q[last] - q[first])
+    off = np.abs(q[first : last + 1, None] - line[None]).max(axis=2).min(axis=1)
+    farthest = first + int(off.argmax())
+    return (farthest if first < farthest < last else (first + last) // 2), float(off.max())
 
 
 def _through(q: FloatArray, scene: PlanningScene, straight: bool = False) -> list[WrittenMove]:
@@ -125,20 +136,23 @@ def _rounded(
 
 def _judged(
     moves: list[WrittenMove], step: PlannedMovement, judge: Judge, back: ReadBack
-) -> tuple[_Found | None, str]:
+) -> _Driven:
     try:
         again = one_after_the_other(back(moves))
     except KrlError as error:
-        return None, error.reason
+        return _Driven(moves, reason=error.reason)
     found = judge(again, step)
-    if not found.verification.certified:
-        return None, found.verification.status.message
-    return _Found(moves, again.duration, found.report.energy), ""
+    violation = found.verification.violation
+    if violation is None:
+        return _Driven(moves, again.duration, found.report.energy)
+    near = violation.what == "clearance"
+    at = again.sample([violation.time]).q[0] if near else None
+    return _Driven(moves, reason=violation.sentence, violation=at)
 
 
 def _slowed(
-    found: _Found, step: PlannedMovement, planned: JointTrajectory, judge: Judge, back: ReadBack
-) -> _Found:
+    found: _Driven, step: PlannedMovement, planned: JointTrajectory, judge: Judge, back: ReadBack
+) -> _Driven:
     """The same motions at the planned time, where they are quicker, and that costs less."""
     best = found
     share = 1.0
@@ -147,8 +161,8 @@ def _slowed(
         if seconds > _QUICKER * planned.duration:
             break
         share *= seconds / planned.duration
-        slower, _why = _judged([_at(one, share) for one in found.moves], step, judge, back)
-        if slower is None:
+        slower = _judged([_at(one, share) for one in found.moves], step, judge, back)
+        if slower.reason:
             break
         seconds = slower.seconds
         best = slower if slower.joules < best.joules else best
