@@ -68,6 +68,9 @@ class SignalNames:
 
 # Which $OUT and $IN a signal has: the cell's numbers, else the lowest that nobody has.
 
+NUMBER_MAX = 8192
+WIDTHS = {"IR_PAUSE": 8}
+"""Outputs of a program's own that are a group, and how many they are."""
 OUTPUT = "$OUT"
 INPUT = "$IN"
 
@@ -116,6 +119,7 @@ class Wiring:
         if key not in self._declared:
             given = self._given[kind].get(signal.upper(), 0)
             first = given or self._free(kind, count)
+            self._check_alone(kind, signal, first, count)
             if any(a[0] == name for k, a in self._declared.items() if k[0] != kind):
                 name = self._names.of(f"{signal}_{'in' if kind == INPUT else 'out'}")
             self._declared[key] = (name, first, count)
@@ -123,8 +127,24 @@ class Wiring:
                 self.assumed.append(f"{name} {kind}[{first}]")
         return self._declared[key][0]
 
+    def _check_alone(self, kind: str, signal: str, first: int, count: int) -> None:
+        """Raise KrlError for a group whose numbers another signal has, or that no controller
+        has.
+        """
+        numbers = range(first, first + count)
+        for name, number in self._given[kind].items():
+            if number in numbers and name != signal.upper():
+                raise KrlError(
+                    f"{signal} takes {kind}[{first}] to {kind}[{numbers[-1]}], but {name} has "
+                    f"{kind}[{number}]: give one of them another number in the cell file"
+                )
+        if numbers[-1] > NUMBER_MAX:
+            raise KrlError(f"{signal}: {kind}[{numbers[-1]}] is above {NUMBER_MAX}")
+
     def _free(self, kind: str, count: int) -> int:
-        taken = set(self._given[kind].values())
+        taken: set[int] = set()
+        for name, number in self._given[kind].items():
+            taken |= set(range(number, number + WIDTHS.get(name, 1)))
         for (other, _), (_, first, width) in self._declared.items():
             taken |= set(range(first, first + width)) if other == kind else set()
         first = 1

@@ -70,7 +70,8 @@ def read_plc_table(text: str, file: str) -> dict[int, PlcPause]:
     missing = [name for name in COLUMNS if name not in heads]
     if missing:
         raise KrlError(
-            f"column {missing[0]} is missing: a PLC table has {', '.join(COLUMNS)}", Place(file, 1, 1)
+            f"column {missing[0]} is missing: a PLC table has {', '.join(COLUMNS)}",
+            Place(file, 1, 1),
         )
     found: dict[int, PlcPause] = {}
     for line, row in enumerate(rows, start=2):

@@ -11,7 +11,7 @@ from ir_krl.run.commands import Payload
 from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES
 from ir_krl.write.figures import decimal, frame_text
 from ir_krl.write.forms import Forms
-from ir_krl.write.names import INPUT, OUTPUT, Numbers, Wiring, check_name
+from ir_krl.write.names import INPUT, OUTPUT, WIDTHS, Numbers, Wiring, check_name
 from ir_krl.write.parts import (
     Attached,
     Part,
@@ -35,7 +35,6 @@ PLC_DONE = "IR_DONE"
 """The input that says that a pause is over and the drives are ready."""
 START_SPEED = 10
 """% of the axes' speed, on the way from wherever the robot stands."""
-_PAUSE_BITS = 8
 _HIGHEST_TOOL = 16  # of TOOL_DATA: inline forms name tools by number, from here downwards
 
 
@@ -237,7 +236,7 @@ class _Body:
         self._rests = True
         there = self.wiring.own(INPUT, PLC_THERE)
         done = self.wiring.own(INPUT, PLC_DONE)
-        asked = self.wiring.own(OUTPUT, PLC_PAUSE, _PAUSE_BITS)
+        asked = self.wiring.own(OUTPUT, PLC_PAUSE, WIDTHS[PLC_PAUSE])
         self.lines += [
             f";FOLD {part.comment}",
             f"IF {there} THEN",

@@ -154,6 +154,8 @@ def fill_export(response: Any, export: KrlExport) -> None:
     """export_program."""
     response.text = export.source
     response.data = export.data
+    response.plc_table = export.plc_table
+    response.plc_text = export.plc_text
     response.deviation = export.deviation
     response.planned = report_to_msg(export.planned)
     response.exported = report_to_msg(export.exported)

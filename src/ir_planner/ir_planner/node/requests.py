@@ -304,7 +304,9 @@ class Requests:
             movements = self.planner.programs.get(request.program_id).movements
         else:
             movements = one_movement(self.planner, request.trajectory_id)
-        fill_export(response, export_krl(self.planner, movements, request.name))
+        fill_export(
+            response, export_krl(self.planner, movements, request.name, style=request.style)
+        )
         return Status.success()
 
     def evaluate_trajectory(self, request: Any, response: Any) -> Status:
