@@ -51,6 +51,6 @@ def test_doors_are_as_the_signals_before_a_movement_have_them(
         kind=MovementKind.PAUSE, to_station="lathe_work", duration=0.1, set_signals=asked
     )
     steps = (pause, replace(step, wait_for=awaited))
-    judge = judge_of(steps, planner.cell, planner.scene("").power, planner.settings.drives, 0.02)
+    judge = judge_of(steps, planner.cell, planner.scene("").power, planner.scene("").drives, 0.02)
     assert step.trajectory is not None
     assert judge(step.trajectory, steps[1]).verification.certified is certified
