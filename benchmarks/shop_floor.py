@@ -132,7 +132,7 @@ def second_opinion(
     kHz.
     """
     scenes = scenes_of(
-        plan.movements, planner.cell, planner.scene("").power, planner.settings.drives
+        plan.movements, planner.cell, planner.scene("").power, planner.scene("").drives
     )
     moving = [(s, scene) for s, scene in zip(plan.movements, scenes, strict=True) if not s.is_pause]
     left = np.inf
