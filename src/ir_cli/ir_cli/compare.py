@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ir_cli.errors import InputError
-from ir_cli.krl import add_followed, followed, is_project, plc_pauses
+from ir_cli.krl import UR, add_followed, followed, is_project, plc_pauses
 from ir_cli.output import (
     Columns,
     ProgressLine,
@@ -38,7 +38,7 @@ from ir_planner import Planner
 from ir_planner.before_after import before_after, before_after_common, today_of_krl
 from ir_planner.krl import evaluate_krl
 
-KRL = (".src", ".dat", ".sub")
+KRL = (".src", ".dat", ".sub", UR)
 TRACES = (".csv", ".txt", ".parquet", ".mcap")
 COLUMNS: Columns = {
     "program": ("program", text),

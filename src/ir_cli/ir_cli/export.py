@@ -15,6 +15,6 @@ def add_export(export: argparse.ArgumentParser) -> None:
 
 def run_export(arguments: argparse.Namespace) -> int:
     """Write the file that its ending names."""
-    if arguments.output.suffix.lower() == ".src":
+    if arguments.output.suffix.lower() in (".src", krl.UR):
         return krl.run_export(arguments)
     return cell_worlds.run_export(arguments)

@@ -38,6 +38,7 @@ from ir_krl import (
     BYTES_MAX,
     PLC_PAUSE,
     STYLES,
+    URSCRIPT,
     Followed,
     Note,
     PlcPause,
@@ -52,9 +53,11 @@ from ir_krl import (
     worst_first,
 )
 from ir_planner import Planner
-from ir_planner.krl import EvaluatedProgram, evaluate_krl, export_krl, follow_krl
+from ir_planner.krl import EvaluatedProgram, evaluate_krl, export_krl, follow_krl, follow_ur
 from ir_values.output_files import write_file
 
+UR = ".script"
+"""Ending of a UR's programs."""
 COLUMNS: Columns = {
     "lines": ("line", text),
     "from": ("from", text),
@@ -125,6 +128,10 @@ def add_followed(parser: argparse.ArgumentParser) -> None:
 
 def followed(files: Sequence[Path], planner: Planner, arguments: argparse.Namespace) -> Followed:
     """The commands of the program in these files, as the options of `add_followed` say."""
+    if files[0].suffix.lower() == UR:
+        if len(files) > 1:
+            raise InputError(f"{files[1]}: a script of a UR is one file")
+        return follow_ur(planner, _text(files[0]), files[0].name)
     sources, left_out = _sources(files, arguments.routine)
     inputs = {**plc_input(sources, there=arguments.plc is not None), **_inputs(arguments.input)}
     found = follow_krl(
@@ -242,8 +249,9 @@ def run_import(arguments: argparse.Namespace) -> int:
 def run_export(arguments: argparse.Namespace) -> int:
     """Plan, write both files, say what it costs as the controller would drive it."""
     source = arguments.output
-    if source.suffix.lower() != ".src":
-        raise InputError(f"{source.name} must end in .src")
+    if source.suffix.lower() not in (".src", UR):
+        raise InputError(f"{source.name} must end in .src, or in {UR} for a UR")
+    style = URSCRIPT if source.suffix.lower() == UR else arguments.style
     data = source.with_suffix(".dat")
     table = source.with_suffix(".plc.csv")
     text = source.with_suffix(".plc.st")
@@ -265,8 +273,9 @@ def run_export(arguments: argparse.Namespace) -> int:
         )
         if not plan.status.ok:
             return failed(plan.status.message)
-        written = export_krl(planner, plan.movements, source.stem, options, arguments.style)
-    write_file(data, written.data, new=True)
+        written = export_krl(planner, plan.movements, source.stem, options, style)
+    if written.data:
+        write_file(data, written.data, new=True)
     if written.plc_table:
         write_file(table, written.plc_table, new=True)
         write_file(text, written.plc_text, new=True)
@@ -274,8 +283,8 @@ def run_export(arguments: argparse.Namespace) -> int:
     planned = written.planned
     driven = written.exported
     sys.stdout.write(
-        f"{source} and {data.name}: {driven.duration:.2f} s, {driven.energy:.0f} J moving, at "
-        "least "
+        f"{source}{f' and {data.name}' if written.data else ''}: {driven.duration:.2f} s, "
+        f"{driven.energy:.0f} J moving, at least "
         f"{1e3 * driven.min_clearance:.1f} mm clear as the controller drives it, certified\n"
         f"planned: {planned.duration:.2f} s, {planned.energy:.0f} J; "
         f"joints at most {written.deviation:.2g} rad apart\n"

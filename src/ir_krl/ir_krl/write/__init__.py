@@ -3,6 +3,7 @@
 from ir_krl.write.names import NAME_MAX, Numbers, SignalNames, Wiring, check_name
 from ir_krl.write.parts import (
     STYLES,
+    URSCRIPT,
     Attached,
     Part,
     Style,
@@ -24,6 +25,7 @@ __all__ = [
     "PLC_PAUSE",
     "PLC_THERE",
     "STYLES",
+    "URSCRIPT",
     "Attached",
     "Numbers",
     "Part",

@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
+
+import numpy as np
 
 from ir_krl.errors import KrlError
 from ir_krl.run.commands import Payload
 from ir_msgs_py.arrays import FloatArray
 
-Style = Literal["spline", "kss8", "krc2"]
+Style = Literal["spline", "kss8", "krc2", "urscript"]
 STYLES: tuple[Style, ...] = ("spline", "kss8", "krc2")
-"""How motions are written: PTP_SPLINE blocks, or inline forms of KSS 8.3 or of the KR C2."""
+"""How motions are written in KRL: PTP_SPLINE blocks, or inline forms of KSS 8.3 or the KR C2."""
+URSCRIPT: Style = "urscript"
+"""The style of another make: moves of a UR."""
 
 
 def check_style(style: str) -> Style:
     """The style of that name. Raises KrlError."""
-    for known in STYLES:
+    for known in (*STYLES, URSCRIPT):
         if style == known:
             return known
-    raise KrlError(f"style is {style[:20]!r}: known are {', '.join(STYLES)}")
+    raise KrlError(f"style is {style[:20]!r}: known are {', '.join((*STYLES, URSCRIPT))}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +53,7 @@ class WrittenPath:
 @dataclass(frozen=True, eq=False)
 class WrittenMove:
     """An inline form to `pose` (4, 4) [m] of the tool in the robot's foot, with its status and
-    turn.
+    turn, at `joints` (n,) [rad].
 
     straight: a line of the tool, else of the axes; velocity: [m/s], else [%]; acceleration [%];
     rounded: how far around its end it is left for the next motion, [mm] (krc2, not straight: [%]),
@@ -64,6 +68,7 @@ class WrittenMove:
     velocity: float
     acceleration: int = 100
     rounded: float = 0.0
+    joints: FloatArray = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)

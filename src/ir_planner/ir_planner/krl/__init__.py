@@ -10,6 +10,7 @@ from ir_planner.krl.requests import (
     evaluate_krl,
     export_krl,
     follow_krl,
+    follow_ur,
     one_movement,
 )
 from ir_planner.krl.splines import ToolMotion
@@ -24,6 +25,7 @@ __all__ = [
     "evaluate_krl",
     "export_krl",
     "follow_krl",
+    "follow_ur",
     "one_movement",
     "posture_at",
     "station_at",

@@ -9,7 +9,6 @@ import numpy as np
 
 from ir_description import Cell
 from ir_krl import (
-    PLC_THERE,
     Attached,
     Followed,
     Numbers,
@@ -26,11 +25,8 @@ from ir_krl import (
     WrittenSpline,
     check_name,
     check_style,
-    follow,
-    parse,
     plc_table,
     structured_text,
-    written,
 )
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import TransitionTimes
@@ -43,6 +39,7 @@ from ir_planner.krl.execution import drive
 from ir_planner.krl.geometry import tool_in_flange
 from ir_planner.krl.inline_moves import fitted_moves
 from ir_planner.krl.judged import Judge, ReadBack, called, points_of
+from ir_planner.krl.makes import Make, make_of
 from ir_planner.krl.strokes import deviation_along, fitted_path, one_after_the_other
 from ir_planner.krl.surroundings import Surroundings, payload_of
 from ir_planner.krl.timed_splines import DEVIATION_MAX, deviation_in_time, fitted_spline
@@ -56,7 +53,6 @@ __all__ = ["DEVIATION_MAX", "KrlExport", "attached", "export"]
 
 _PAUSES_MAX = 255
 _IDS = 5  # in a line of the header
-_AXES = 6
 _Motion: TypeAlias = WrittenSpline | WrittenPath | WrittenMove
 
 
@@ -132,6 +128,7 @@ class _Job:
         self._judge = judge
         self._times = times
         self._style = style
+        self._make = make_of(style, scene)
         self._pauses = _plc_pauses(steps, times)
         self._loads = _loads(steps, judge)
         self._start = points_of(next(step for step in steps if not step.is_pause)).positions[0]
@@ -166,14 +163,14 @@ class _Job:
         """The motions of a movement, and how many times they come to rest."""
         scene = self._judge.scene(step)
         planned = points_of(step)
-        back = _read_back(planned.positions[0], scene, self._style)
+        back = _read_back(planned.positions[0], scene, self._make)
         parts: list[_Motion]
         if step.kind == MovementKind.CARTESIAN:
-            if self._style == "krc2":
+            if self._style in ("krc2", "urscript"):
                 raise RequestError(
                     StatusCode.INVALID_MOTION_PLAN,
-                    f"along {step.to_station}: a path of the tool is written as SPLINE, which a "
-                    "KR C2 hasn't: style kss8 or spline",
+                    f"along {step.to_station}: a path of the tool is written as SPLINE, which "
+                    f"{self._style} hasn't: style kss8 or spline",
                 )
             parts = list(fitted_path(step, planned, scene, back))
         elif self._style == "spline":
@@ -190,7 +187,7 @@ class _Job:
             for part in self._parts(step, comment, load)
         ]
         from_home = bool(np.abs(self._start - self._scene.cell.machine_home).max() < STILL)
-        return written(
+        return self._make.written(
             self._name,
             self._start,
             parts,
@@ -198,7 +195,6 @@ class _Job:
             header,
             from_home=from_home,
             numbers=_numbers(self._scene.cell),
-            style=self._style,
         )
 
     def _parts(self, step: PlannedMovement, comment: str, carried: int) -> list[Part]:
@@ -219,7 +215,7 @@ class _Job:
 
     def _driven_again(self, texts: Texts) -> dict[int, _Again]:
         """Every movement of the whole program, driven as an import drives it."""
-        program = _followed(texts)
+        program = self._make.followed(texts, self._scene)
         around = self._around(program)
         driven = (
             one.trajectory
@@ -408,21 +404,16 @@ def _numbers(cell: Cell) -> Numbers:
     )
 
 
-def _read_back(start: FloatArray, scene: PlanningScene, style: Style) -> ReadBack:
+def _read_back(start: FloatArray, scene: PlanningScene, make: Make) -> ReadBack:
     """Drives the parts of one movement alone, from `start` (n,)."""
 
     def back(parts: Sequence[Part]) -> list[JointTrajectory]:
-        texts = written("M", start, parts, attached(scene), [], style=style)
-        driven = drive(_followed(texts), scene, scene.cell.machine_home)[0]
+        carried = attached(scene)
+        texts = make.written("M", start, parts, carried, [], from_home=False, numbers=Numbers())
+        driven = drive(make.followed(texts, scene), scene, scene.cell.machine_home)[0]
         return [step.trajectory for step in driven]
 
     return back
-
-
-def _followed(texts: Texts) -> Followed:
-    sources = [parse(texts.source, "export.src"), parse(texts.data, "export.dat")]
-    inputs = {texts.numbers[PLC_THERE]: False} if texts.numbers else {}
-    return follow(sources, np.zeros(_AXES), np.eye(4), inputs=inputs)
 
 
 def _deviation_of(step: PlannedMovement, parts: Sequence[_Motion], again: JointTrajectory) -> float:

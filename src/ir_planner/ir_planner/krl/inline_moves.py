@@ -114,8 +114,8 @@ def _through(q: FloatArray, scene: PlanningScene, straight: bool = False) -> lis
     poses = portable.matmul(Arm(scene).flange(q), tool_in_flange(scene.cell.tcp))
     marks = [status_turn(scene.chain, row) for row in q]
     return [
-        WrittenMove("", pose, *mark, straight=straight, velocity=100)
-        for pose, mark in zip(poses, marks, strict=True)
+        WrittenMove("", pose, *mark, straight=straight, velocity=100, joints=row)
+        for pose, mark, row in zip(poses, marks, q, strict=True)
     ]
 
 

@@ -18,6 +18,7 @@ from ir_krl import (
     Source,
     follow,
 )
+from ir_krl.urscript import follow_urscript
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import TransitionTimes
 from ir_msgs_py.options import PlanOptions
@@ -30,6 +31,7 @@ from ir_planner.krl.execution import DrivenStep, drive
 from ir_planner.krl.export import KrlExport, export
 from ir_planner.krl.geometry import Arm, tool_in_flange
 from ir_planner.krl.judged import judge_of
+from ir_planner.krl.makes import joint_limits
 from ir_planner.krl.places import posture_at, station_at
 from ir_planner.krl.surroundings import Surroundings, wires_of
 from ir_planner.planner import Planner
@@ -202,6 +204,12 @@ def follow_krl(
     )
 
 
+def follow_ur(planner: Planner, text: str, file: str) -> Followed:
+    """A URScript followed by the planner's robot. Raises KrlError with the place."""
+    scene = planner.scene("")
+    return follow_urscript(text, file, tool_in_flange(planner.cell.tcp), joint_limits(scene))
+
+
 def evaluate_krl(
     planner: Planner,
     program: Followed,
@@ -253,7 +261,7 @@ def export_krl(
     again.
 
     options: those that were planned with; style: "spline", which keeps the plan, or inline forms of
-    "kss8" or "krc2". Raises RequestError where that can't be.
+    "kss8" or "krc2", or "urscript". Raises RequestError where that can't be.
     """
     chosen = options or PlanOptions()
     if chosen.timing == ASYNCHRONOUS:
