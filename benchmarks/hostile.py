@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 from _hostile_floods import floods
 from _hostile_node import attack
+from _hostile_stops import stops_row
 from _results import Claim, add_ending, at_least, at_most, finish, line_of
 
 from ir_description import load_cell
@@ -205,6 +206,8 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
         at_most(
             "interleavings that break the law of stops", total("interleavings", "wrong"), "", 0
         ),
+        at_least("interleavings of stops on a node", total("node stops", "cases"), "", 10_000),
+        at_most("of them that break the law of stops", total("node stops", "wrong"), "", 0),
         at_most("presses under floods lost", total("press", "lost"), "", 0),
         at_most("presses under floods, p99.9", latest, "ms", 50.0),
         at_most("memory after a flood, of before", kept, "%", 120.0),
@@ -248,6 +251,7 @@ def main() -> None:
         show(row)
     for row in attack(200, 12) if given.quick else attack(5_000, 334):
         show(row)
+    show(stops_row(50, FIRST_SEED) if given.quick else stops_row(10_000, FIRST_SEED))
     for row in floods(20) if given.quick else floods(1_000):
         show(row)
     finish(given.json, rows, claims_of(rows))

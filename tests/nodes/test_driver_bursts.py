@@ -5,6 +5,7 @@ answered.
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, cast
@@ -14,12 +15,16 @@ import rclpy
 from rclpy.action import ActionClient
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import PlcInputs, PowerMode, PowerState
-from ir_msgs.srv import QueryModes, SetPlcInput
+from ir_msgs.srv import QueryModes, Recover, SetPlcInput
+from ir_msgs_py import names
 from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.ros.topics import ACTION_SERVICES, REQUESTS_WAITING, SERVICE
+from ir_msgs_py.status import StatusCode
 from ir_sim_driver.node import SimDriver
 from ir_sim_driver.node.command_topics import PlcTopic
 from ir_sim_driver.node.trajectory_actions import Executions
@@ -100,6 +105,78 @@ def test_a_press_does_not_come_behind_old_levels_nor_with_a_mode_that_is_none(
     assert not taken[-1].emergency_stop
     assert driver.pressed == [{"emergency_stop": True}]
     assert "99" in driver.said[0]
+
+
+def test_what_waits_for_a_busy_node_while_a_stop_is_latched_moves_nothing_after_the_recovery(
+    ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any
+) -> None:
+    """By action and topic; the executor takes neither before the recovery."""
+    positions: list[Any] = []
+    busy, done = threading.Event(), threading.Event()
+    server = BackgroundExecutor(ros_context)
+    parameters = {"cell": "open", "backend": "ideal", "wake_port": 0, "plc.startup_window": 0.0}
+    overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+    try:
+        server.add_node(SimDriver(context=ros_context, parameter_overrides=overrides))
+        ros_executor.run(
+            lambda: ros_node.create_subscription(
+                JointState, "/joint_states", lambda msg: positions.append(msg.position), 100
+            )
+        )
+        name = "/ir_sim_driver/execute_trajectory"
+        client, press, recover, topic = ros_executor.run(
+            lambda: (
+                ActionClient(ros_node, ExecuteTrajectory, name, **ACTION_SERVICES),
+                ros_node.create_client(SetPlcInput, "/ir_sim_driver/set_plc_input"),
+                ros_node.create_client(Recover, "/ir_sim_driver/recover"),
+                ros_node.create_publisher(JointTrajectory, "/ir_sim_driver/joint_trajectory", 10),
+            )
+        )
+        for ready in (client.server_is_ready, press.service_is_ready, recover.service_is_ready):
+            wait_for(ready, what="the driver is there")
+        wait_for(lambda: positions and topic.get_subscription_count(), what="the driver is heard")
+
+        def call(service: Any, request: Any) -> Any:
+            future = ros_executor.run(lambda: service.call_async(request))
+            wait_for(future.done, what="the driver answers beside its executor")
+            return future.result()
+
+        def hold() -> None:
+            busy.set()
+            done.wait(60.0)
+
+        start = list(positions[-1])
+        path = JointTrajectory(joint_names=list(names.JOINT_NAMES))
+        point = JointTrajectoryPoint(positions=[start[0] + 0.1, *start[1:]], velocities=[0.0] * 6)
+        point.time_from_start.sec = 1
+        path.points = [point]
+        holding = threading.Thread(target=lambda: server.run(hold))
+        holding.start()
+        busy.wait(60.0)
+        for level in (True, False):
+            call(press, SetPlcInput.Request(name="emergency_stop", value=level))
+        sent = ros_executor.run(
+            lambda: client.send_goal_async(ExecuteTrajectory.Goal(trajectory=path))
+        )
+        ros_executor.run(lambda: topic.publish(path))
+        wait_for(lambda: topic.wait_for_all_acked(), what="both have come")
+        wait_for(
+            lambda: call(recover, Recover.Request()).status.code == StatusCode.SUCCESS,
+            what="the robot recovers",
+        )
+        done.set()
+        holding.join()
+        wait_for(sent.done, what="the goal is taken")
+        result = ros_executor.run(sent.result().get_result_async)
+        wait_for(result.done, what="the goal ends")
+        heard = len(positions)
+        wait_for(lambda: len(positions) > heard + 500, what="a second passes")
+        client.destroy()
+    finally:
+        done.set()
+        server.close()
+    assert result.result().result.error_code == -1
+    assert max(abs(each[0] - start[0]) for each in positions) < 0.01
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -267,6 +268,7 @@ def _patient(plain: type) -> type:
 
 
 _MAKING = threading.Lock()
+_EARLY = 1000  # goals that are taken before the executor looks
 
 
 @contextmanager
@@ -288,10 +290,13 @@ class PatientActionServer(ActionServer):
     """An ActionServer whose responses reach clients that are discovered late, that survives those
     that have gone, and whose requests for goals a subclass may see first.
 
-    Where rclpy's insides are missing, `goal_class` and `goal_came` are not called.
+    Where rclpy's insides are missing, `goal_class` and `goal_came` are not called, and
+    `take_waiting` takes nothing.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
+        self._taking = threading.Lock()
+        self._early: deque[tuple[Any, Any]] = deque()  # goals that `take_waiting` took
         with _patient_handles():
             super().__init__(*arguments, **options)
 
@@ -302,17 +307,61 @@ class PatientActionServer(ActionServer):
     def goal_came(self, request_id: Any, request: Any) -> None:
         """Look at a request for a goal before it is accepted."""
 
+    def take_waiting(self, most: int) -> bool:
+        """Let `goal_came` see the goals that wait for the executor now, from any thread; the
+        executor accepts and executes them later. Whether all have been seen, and none is just being
+        taken.
+        """
+        for _ in range(most):
+            if len(self._early) >= _EARLY or not self._taking.acquire(blocking=False):
+                return False
+            try:
+                goal = self._take_goal()
+            finally:
+                self._taking.release()
+            if goal is None:
+                return True
+            self._early.append(goal)
+            self._go_on()
+        return False
+
+    def _go_on(self) -> None:
+        """Let the executor look at the goals that were taken early."""
+        executor = part(part(self, "_node"), "executor")
+        if executor is not None:
+            executor.wake()
+
+    def is_ready(self, wait_set: Any) -> bool:
+        """Whether there is anything to take."""
+        ready: bool = super().is_ready(wait_set)
+        return ready or bool(self._early)
+
     def take_data(self) -> dict[str, Any]:
         """Take what has come, goals by `goal_class`."""
-        goal = None
-        take = part(part(self, "_handle"), "take_goal_request")
-        lock = part(self, "_lock")
-        if take is not None and lock is not None and part(self, "_is_goal_request_ready"):
-            self._is_goal_request_ready = False
-            with lock:
-                goal = take(self.goal_class())
+        goal = self._early.popleft() if self._early else None
+        if self._takes_goals() and part(self, "_is_goal_request_ready"):
+            self._is_goal_request_ready = False  # where another is taken first, it comes again
+            if goal is None:
+                with self._taking:
+                    goal = self._take_goal()
+        if self._early:
+            self._go_on()
         data: dict[str, Any] = super().take_data()
-        if goal is not None and all(goal):
+        if goal is not None:
             data["goal"] = goal
-            self.goal_came(*goal)
         return data
+
+    def _takes_goals(self) -> bool:
+        take = part(part(self, "_handle"), "take_goal_request")
+        return take is not None and part(self, "_lock") is not None
+
+    def _take_goal(self) -> tuple[Any, Any] | None:
+        """The next request for a goal with its identity, seen by `goal_came`."""
+        if not self._takes_goals():
+            return None
+        with self._lock:
+            goal = self._handle.take_goal_request(self.goal_class())
+        if not all(goal):
+            return None
+        self.goal_came(*goal)
+        return goal[0], goal[1]

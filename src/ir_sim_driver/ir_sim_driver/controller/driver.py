@@ -281,6 +281,11 @@ class Driver:
         with self._lock:
             return self._simulation.executor.active
 
+    @property
+    def stopped(self) -> bool:
+        """Whether a stop is latched."""
+        return self._simulation.stopped
+
     # -- requests; each raises RequestRefusedError, also while the controller is off the network
     # -------------
 

@@ -44,7 +44,7 @@ from ir_values.errors import IrError
 # cells or other services. Messages are taken as bytes; a flood of the same levels is read once.
 
 _PERIOD = 0.004  # s between two looks while nothing comes
-_TURN = 64  # messages or requests that one look takes: 2 ms of the thread
+TURN = 64  # messages or requests that one look takes: 2 ms of the thread
 _KEPT_LEVELS = 256  # messages whose levels are remembered
 _PRESS_QUALITY = tuple(
     QoSProfile(depth=BURST, durability=durability)
@@ -111,7 +111,7 @@ class PlcTopic:
         """Take what has come; the number of messages."""
         came: list[tuple[int, bytes, bool]] = []
         for subscription, latching in zip(self._subscriptions, (True, False), strict=True):
-            for _ in range(_TURN if subscription is not None else 0):
+            for _ in range(TURN if subscription is not None else 0):
                 taken = take_bytes(subscription)
                 if taken is None:
                     break
@@ -193,7 +193,7 @@ class PolledService:
 
     def poll(self) -> int:
         """Answer what has come; the number of requests."""
-        for count in range(_TURN):
+        for count in range(TURN):
             taken = take_request(self._service) if self._polled else None
             if taken is None:
                 return count
@@ -208,7 +208,7 @@ class PolledService:
                 named = Status(status.code, status.message, self._source)
                 response.status = status_to_msg(named)
             self._answers.submit(self._send, answered, response, header)
-        return _TURN
+        return TURN
 
     def _send(self, answered: Callable[[Any], None], response: Any, header: Any) -> None:
         try:
@@ -239,7 +239,20 @@ class TrajectoryTopic:
         self._driver = driver
         self._reader = TrajectoryReader()
         topic = names.COMMANDED_TRAJECTORY
-        node.create_subscription(JointTrajectory, topic, self._take, 10, raw=True)
+        self._subscription = node.create_subscription(
+            JointTrajectory, topic, self._take, 10, raw=True
+        )
+
+    def take_waiting(self, most: int) -> bool:
+        """Take what waits for the executor now, from any thread; whether that was all."""
+        if not can_take_messages(self._subscription):
+            return True
+        for _ in range(most):
+            taken = take_bytes(self._subscription)
+            if taken is None:
+                return True
+            self._take(taken[0])
+        return False
 
     def _take(self, message: bytes) -> None:
         most = self._driver.max_points

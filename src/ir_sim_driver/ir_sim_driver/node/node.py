@@ -32,6 +32,7 @@ from ir_sim_driver.controller import Driver, Joints, Simulation, make_simulation
 from ir_sim_driver.errors import DriverError, LinkError, TrajectoryRefusedError
 from ir_sim_driver.node.announcements import Announcements
 from ir_sim_driver.node.command_topics import (
+    TURN,
     CommandThread,
     PlcTopic,
     PolledService,
@@ -161,10 +162,11 @@ class SimDriver(Node):
                 self._serve_action(FollowJointTrajectory, names.FOLLOW_JOINT_TRAJECTORY)
             )
         answers = Services(self._driver, self.get_name(), self._announcements.look)
+        recoveries = PolledService(self, Recover, names.RECOVER, answers.recover)
         self._presses = CommandThread(
             PlcTopic(self, self._driver).poll,
             PolledService(self, SetPlcInput, names.SET_PLC_INPUT, answers.set_plc_input).poll,
-            PolledService(self, Recover, names.RECOVER, answers.recover).poll,
+            lambda: recoveries.poll() if self._refuse_waiting() else 0,
         )
         self._presses.start()
         BoundedService(self, StartPause, names.START_PAUSE, answers.start_pause)
@@ -194,6 +196,15 @@ class SimDriver(Node):
         executions.admission_of = server.admission_of
         executions.client_of = server.client_of
         return server
+
+    def _refuse_waiting(self) -> bool:
+        """While a stop is latched, take goals that wait for a busy executor, so that they are
+        refused and none is left for after the recovery. Whether none waits.
+        """
+        if not self._driver.stopped:
+            return True
+        takers = (*self._actions, self._trajectory_topic)
+        return all(taker.take_waiting(TURN) for taker in takers)
 
     def _admit(self, points: int, size: int) -> Admission:
         """Ask the driver for a goal of so many points and bytes."""

@@ -270,7 +270,7 @@ class BoundedActionServer(RecordedActionServer):
         """Note who has sent the goal, and what the driver said of it."""
         key = bytes(request.goal_id.uuid)
         while len(self._clients) >= _CLIENTS_KEPT:  # of goals that rclpy has not accepted
-            del self._clients[next(iter(self._clients))]
+            self._clients.pop(next(iter(self._clients)), None)
         self._clients[key] = participant_of(request_id)
         if self._counted.admission != Admission():
             self._admissions[key] = self._counted.admission
