@@ -51,7 +51,8 @@ NEAR = 1e-3  # rad: a configuration that was found is one of the complete set
 
 
 DEFAULT = "as read"
-LITERAL = "(5) literal"
+PRINTED = "(5) as printed"
+GAIN = "(5) by metres"
 FREE = "no set-back"
 UNIFORM = "(1) uniform"
 SWEPT = "no Newton finish"
@@ -59,10 +60,12 @@ FREE_SWEPT = "no Newton finish, no set-back"
 _SWEEPS = InteractionSettings(newton_steps=0, sweeps=MANY_SWEEPS, finish_every=8, xi=COARSE)
 READINGS = {
     DEFAULT: InteractionSettings(),
-    LITERAL: InteractionSettings(set_back="literal"),
+    PRINTED: InteractionSettings(set_back="printed"),
+    GAIN: InteractionSettings(set_back="gain"),
     FREE: InteractionSettings(set_back="none"),
     SWEPT: _SWEEPS,
-    "no Newton finish, (5) literal": replace(_SWEEPS, set_back="literal"),
+    "no Newton finish, (5) as printed": replace(_SWEEPS, set_back="printed"),
+    "no Newton finish, (5) by metres": replace(_SWEEPS, set_back="gain"),
     FREE_SWEPT: replace(_SWEEPS, set_back="none"),
     UNIFORM: InteractionSettings(distribution="uniform"),
 }
@@ -76,7 +79,7 @@ def measure(seed: int, quick: bool) -> list[Row]:
     cells, variants, more = (CELLS[:2], QUICK_VARIANTS, 0) if quick else (CELLS, VARIANTS, MORE)
     whole = {place.scene.cell.name for place in places(cells, seed, variants)}
     for number, place in enumerate(places(cells, seed, variants + more)):
-        for name in READINGS if place.scene.cell.name in whole else (DEFAULT, LITERAL):
+        for name in READINGS if place.scene.cell.name in whole else (DEFAULT, PRINTED):
             rng = np.random.default_rng([seed, number])
             found = tried(place, READINGS[name], rng, QUICK_STARTS if quick else STARTS)
             rows.append(place.words | {"reading": name} | found)
@@ -200,7 +203,7 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
 "stations", *sure, len(default), "stations", "%", FOUND),
         more("the set-back of (5) lets more starts end free", DEFAULT, FREE),
         more("the same where no Newton finishes it", SWEPT, FREE_SWEPT),
-        more("(5) as read, a secant, does better than as printed", DEFAULT, LITERAL),
+        more("(5) as read, a secant, does better than as printed", DEFAULT, PRINTED),
         more("Newton's finish lets more starts arrive", DEFAULT, SWEPT),
         more("the normal distribution of (1) does better than a uniform one", DEFAULT, UNIFORM),
         more(several, SWEPT, FREE_SWEPT, "chance of a free one", lambda row: chance_of(row, starts)),  # noqa: E501

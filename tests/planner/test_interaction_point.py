@@ -13,8 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_planner.configurations.ccd_search import (
-    LITERAL,
+    GAIN,
     NONE,
+    PRINTED,
     SECANT,
     InteractionSettings,
     descend,
@@ -106,12 +107,23 @@ def test_a_search_ends_when_its_work_is_spent(scene_of: Callable[[str], Planning
     assert budget.iterations == 30
 
 
-def test_the_literal_step_is_the_gain_in_metres_and_hardly_moves_where_bodies_touch() -> None:
+def test_the_gain_in_metres_hardly_moves_where_bodies_touch() -> None:
     threshold = np.array([0.02])
-    far = shares_back(np.array([[0.4]]), np.array([[-0.1]]), threshold, LITERAL, 0.05)
-    touching = shares_back(np.array([[0.0201]]), np.array([[0.0199]]), threshold, LITERAL, 0.05)
+    far = shares_back(np.array([[0.4]]), np.array([[-0.1]]), threshold, GAIN, 0.05)
+    touching = shares_back(np.array([[0.0201]]), np.array([[0.0199]]), threshold, GAIN, 0.05)
     assert far[0] == pytest.approx(0.5)
     assert touching[0] == pytest.approx(0.0002)
+
+
+@given(before=st.floats(0.021, 2.0), after=st.floats(-2.0, 0.02))
+def test_eq_5_as_printed_goes_back_by_the_ratio_of_the_distances(
+    before: float, after: float
+) -> None:
+    """-(d'/d) of the step: nothing at touch, farther in where bodies overlap, at most a step."""
+    share = shares_back(np.array([[before]]), np.array([[after]]), np.array([0.02]), PRINTED, 0.05)[
+        0
+    ]
+    assert share == pytest.approx(max(after / before, -1.0), abs=1e-12)
 
 
 def test_what_collided_before_the_step_is_not_set_back() -> None:
@@ -119,7 +131,7 @@ def test_what_collided_before_the_step_is_not_set_back() -> None:
     assert share[0] == 0.0
 
 
-@pytest.mark.parametrize("set_back", [SECANT, LITERAL, NONE])
+@pytest.mark.parametrize("set_back", [SECANT, PRINTED, GAIN, NONE])
 @pytest.mark.parametrize(
     ("cell", "station"), [("cnc_door", "cncL"), ("deep_box", "bin"), ("deep_box", "tun")]
 )

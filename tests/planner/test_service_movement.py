@@ -24,7 +24,14 @@ from ir_planner.program.program import ProgramRequest, plan_program
 from ir_planner.request.context import Context, Journal, Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.service.exit import Exit, WorkArea
-from ir_planner.service.modified_ga import ModifiedGa, accumulated_mass, step_weights, withdraw
+from ir_planner.service.modified_ga import (
+    ExitPopulation,
+    ModifiedGa,
+    _Walker,
+    accumulated_mass,
+    step_weights,
+    withdraw,
+)
 from ir_planner.service.service_movement import ServicePlan, ServiceRequest, plan_service
 from ir_planner.service.withdrawals import exit_searches, withdrawal
 
@@ -107,6 +114,49 @@ def test_the_modified_ga_leaves_over_certified_steps_while_d_grows(
         total = problem.area.total_distance(path)
         assert total[-1] > total[0]
         assert problem.area.zone_distance(path[-1:])[0] > 0.02
+
+
+@pytest.mark.parametrize("stuck", [False, True])
+@pytest.mark.parametrize("weighting", ["literal", "inverse"])
+def test_eq_7_as_printed_draws_normal_steps_around_the_mean(
+    weighting: str, stuck: bool, demo_scene: PlanningScene
+) -> None:
+    """Judge: moments of (q' - q) / W over many offspring: mu = step D / D_0 and sigma; after a
+    collision 0 and 1 rad, for every joint alike and no two of them correlated.
+    """
+    problem = problem_at(demo_scene, "lathe_work", a_budget())
+    chosen = ModifiedGa(reading="printed", weighting=weighting)
+    walker = _Walker(problem, chosen, np.random.default_rng(3))
+    sigma = 1.0 if stuck else 0.2
+    parents = ExitPopulation(
+        problem.interaction[None],
+        np.array([1.7 * walker.first_total]),
+        np.array([sigma]),
+        np.zeros((1, 6)),
+        np.zeros(1, dtype=np.int64),
+        np.array([stuck]),
+    )
+    count = 20_000
+    q = walker._as_printed(parents, np.zeros(count, dtype=np.int64))
+    load = sum(load.mass for load in demo_scene.loads)
+    drawn = (q - problem.interaction) / step_weights(
+        demo_scene.cell.robot.link_mass, load, weighting
+    )
+    unsure = 5.0 * sigma / np.sqrt(count)
+    assert drawn.mean(axis=0) == pytest.approx(0.0 if stuck else 1.7 * chosen.step, abs=unsure)
+    assert drawn.std(axis=0) == pytest.approx(sigma, rel=0.03)
+    assert np.corrcoef(drawn.T) == pytest.approx(np.eye(6), abs=0.05)
+
+
+@pytest.mark.parametrize(("cell", "station"), IN_ZONES)
+def test_eq_7_as_printed_leaves_over_certified_steps_or_says_why_not(
+    cell: str, station: str, scene_of: SceneOf
+) -> None:
+    problem = problem_at(scene_of(cell), station, a_budget())
+    walk = withdraw(problem, ModifiedGa(reading="printed"), np.random.default_rng(1), 1)
+    for path in walk.paths:
+        assert problem.inside.edges_free(path[:-1], path[1:]).all()
+    assert walk.paths or sum(walk.rejected.values()) > 0
 
 
 def test_a_walk_whose_candidates_all_collide_ends_without_a_path(demo_scene: PlanningScene) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 from typing import Any
 
 import _paper_blocked
@@ -101,31 +100,22 @@ def test_every_reading_of_the_descent_is_asked_for_what_its_name_says(
     normal = "truncated_normal"
     assert dict(zip(_paper_ccd.READINGS, asked, strict=True)) == {
         "as read": ("secant", normal, True),
-        "(5) literal": ("literal", normal, True),
+        "(5) as printed": ("printed", normal, True),
+        "(5) by metres": ("gain", normal, True),
         "no set-back": ("none", normal, True),
         "no Newton finish": ("secant", normal, False),
-        "no Newton finish, (5) literal": ("literal", normal, False),
+        "no Newton finish, (5) as printed": ("printed", normal, False),
+        "no Newton finish, (5) by metres": ("gain", normal, False),
         "no Newton finish, no set-back": ("none", normal, False),
         "(1) uniform": ("secant", "uniform", True),
     }
-
-
-def test_the_printed_mean_is_the_weight_times_d_and_has_no_direction() -> None:
-    walker = object.__new__(_paper_withdrawal.PrintedMean)
-    # type: ignore[assignment]
-    walker.settings = SimpleNamespace(step=0.12)
-    walker.first_total = 2.0
-    walker.W = np.array([2.0, 1.0, 1.0, 1.0, 0.5, 0.5])
-    parents = SimpleNamespace(total=np.array([2.0, 4.0]), q=np.zeros((2, 6)))
-    mean = walker._mean(parents)  # type: ignore[arg-type]
-    assert mean == pytest.approx(np.outer([0.12, 0.24], walker.W))
 
 
 def test_readings_of_the_withdrawal_differ_in_what_their_names_say() -> None:
     for name, reading in _paper_withdrawal.READINGS.items():
         assert (reading.changed.get("weighting") == "inverse") == ("inverse" in name)
         assert ("step" in reading.changed) == ("no drift" in name)
-        assert reading.printed == ("as printed" in name)
+        assert (reading.changed.get("reading") == "printed") == ("as printed" in name)
         assert reading.tree == ("trees" in name)
         assert reading.line == ("line" in name)
 

@@ -19,14 +19,16 @@ from ir_msgs_py.settings import check_settings, setting
 from ir_planner.request import Work
 from ir_planner.scene import PlanningScene
 
-# The set-back of a joint that ends in collision, eqs. (4) and (5). As printed the step of eq. (5)
-# has the wrong unit and vanishes where bodies touch. Read as a secant it is the share of the step
-# that is lost where the distance, taken as linear, falls to S_m. The literal reading keeps the gain
-# of distance in metres as the factor.
+# The set-back of a joint that ends in collision, eqs. (4) and (5). As printed a joint goes back by
+# d'/d of its step: nothing where bodies touch, and farther in where they overlap. Read as a secant
+# it is the share of the step that is lost where the distance, taken as linear, falls to S_m. A
+# third reading takes the gain of distance in metres as the factor.
 
 SECANT = "secant"
-LITERAL = "literal"
+PRINTED = "printed"
+GAIN = "gain"
 NONE = "none"
+_LEAST_DISTANCE = 1e-9  # m: a step from touch on has no share
 
 
 def increments(before: FloatArray, after: FloatArray) -> FloatArray:
@@ -37,22 +39,26 @@ def increments(before: FloatArray, after: FloatArray) -> FloatArray:
 def shares_back(
     before: FloatArray, after: FloatArray, threshold: FloatArray, reading: str, overshoot: float
 ) -> FloatArray:
-    """Eq. (5): which share (P,) of its last step each start's joint is set back, in [0, 1].
+    """Eq. (5): which share (P,) of its last step each start's joint is set back, in [-1, 1].
 
     `before`, `after` (P, Z) m; `threshold` (Z,) m, S_m or what the station allows. Only pairs that
     were free and no longer are count: setting back can't repair what was in collision before the
-    step. secant: (S_m - d') / (d - d') (1 + overshoot) of the worst pair; literal: |dd_z| of it in
-    metres.
+    step. Of the worst pair: secant: (S_m - d') / (d - d') (1 + overshoot); printed: d' / d, less
+    than zero where bodies overlap; gain: |dd_z| in metres. 0 where no pair counts.
     """
-    result = np.zeros(len(after))
     row, z = np.nonzero((after <= threshold) & (before > threshold))
-    lost = -increments(before[row, z], after[row, z])
+    start = before[row, z]
+    end = after[row, z]
     if reading == SECANT:
-        share = np.maximum((threshold[z] - after[row, z]) / lost * (1.0 + overshoot), overshoot)
+        lost = -increments(start, end)
+        share = np.maximum((threshold[z] - end) / lost * (1.0 + overshoot), overshoot)
+    elif reading == PRINTED:
+        share = np.maximum(end / np.maximum(start, _LEAST_DISTANCE), -1.0)
     else:
-        share = lost
+        share = -increments(start, end)
+    result = np.full(len(after), -np.inf)
     np.maximum.at(result, row, np.minimum(share, 1.0))
-    return result
+    return np.where(np.isfinite(result), result, 0.0)
 
 
 @dataclass(frozen=True)
@@ -67,9 +73,9 @@ class InteractionSettings:
     )
     set_back: str = setting(
         "secant",
-        "How eq. 5 sets a joint back: secant (until the distance is S_m), literal (by the gain "
-        "in m), or none: collisions are sorted out at the pose.",
-        choices=("secant", "literal", "none"),
+        "How eq. 5 sets a joint back: secant (until the distance is S_m), printed (by d'/d of the "
+        "step), gain (by the distance lost, in m), or none: collisions are sorted out at the pose.",
+        choices=("secant", "printed", "gain", "none"),
     )
     overshoot: float = setting(
         0.05, "eps of eq. 5: how much farther than the secant says.", minimum=0.0, maximum=1.0
@@ -267,7 +273,7 @@ class _Descent:
             share = shares_back(
                 start, end, self.threshold, self.settings.set_back, self.settings.overshoot
             )
-            back = share > 0.0
+            back = ((end <= self.threshold) & (start > self.threshold)).any(axis=1)
             rows = rows[back]
             share = share[back]
             if len(rows) == 0:
@@ -275,7 +281,8 @@ class _Descent:
             blocked[rows] = np.argmin(end[back] - self.threshold, axis=1)
             step = q[rows, i] - old[rows]
             last = attempt == self.settings.repairs
-            q[rows, i] = old[rows] if last else q[rows, i] - share * step
+            moved = old[rows] if last else q[rows, i] - share * step
+            q[rows, i] = np.minimum(np.maximum(moved, self.low[i]), self.high[i])
             after[rows] = start[back] if last else self.scene.collision.distances(q[rows])
         return q, after, blocked
 

@@ -25,7 +25,7 @@ from ir_planner.service.exit import Exit, ExitsFound, WalkRecord
 @dataclass(eq=False)
 class ExitPopulation:
     """Configurations (N, n) with D (N,), spread (N,) rad, the step (N, n) that led here, index of
-    their node.
+    their node; stuck (N,): all of their offspring collided.
     """
 
     q: FloatArray
@@ -33,12 +33,11 @@ class ExitPopulation:
     sigma: FloatArray
     step: FloatArray
     node: IntArray
+    stuck: BoolArray
 
     def of(self, rows: IntArray) -> "ExitPopulation":
         """Those of the `rows` (M,)."""
-        return ExitPopulation(
-            self.q[rows], self.total[rows], self.sigma[rows], self.step[rows], self.node[rows]
-        )
+        return ExitPopulation(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
     def __len__(self) -> int:
         return len(self.q)
@@ -89,6 +88,8 @@ _WIDEST = 1.3  # and grows at most so, where D was lost
 # of the first step: mean steps grow with D between them
 _MEAN_LEAST = 0.25
 _MEAN_MOST = 4.0
+GUIDED = "guided"
+PRINTED = "printed"
 _PER_PARENT = 3  # offspring of one configuration that may survive: several directions stay alive
 _FEWEST_OFFSPRING = 4  # of one configuration, however large the population
 _SMALLEST_D = 1e-3  # m: gains of D are relative to at least this
@@ -102,6 +103,12 @@ class ModifiedGa:
         "literal",
         "W of eq. 7: literal (proportional to the mass from the tool to the joint) or inverse.",
         choices=("literal", "inverse"),
+    )
+    reading: str = setting(
+        GUIDED,
+        "How eq. 7 draws: guided (towards the exit, steps of several decades) or printed (q_i + "
+        "W_i n_i, n_i ~ N(mu, sigma), mu proportional to D; after a collision N(0, 1 rad)).",
+        choices=(GUIDED, PRINTED),
     )
     population: int = setting(16, "Configurations in the population.", minimum=2, maximum=1000)
     offspring: int = setting(6, "Perturbed copies of each configuration.", minimum=1, maximum=1000)
@@ -206,6 +213,7 @@ class _Walker:
             np.array([self.settings.spread]),
             np.zeros((1, n)),
             np.zeros(1, dtype=np.int64),
+            np.zeros(1, dtype=bool),
         )
         for _ in range(self.settings.generations):
             if len(population) == 0 or self.inside.work.exhausted or len(self.walk.paths) >= wanted:
@@ -228,15 +236,8 @@ class _Walker:
     def _next(self, parents: ExitPopulation, offspring: int) -> ExitPopulation:
         """One generation: perturb, drop, rank, certify, keep the best."""
         owner = np.repeat(np.arange(len(parents)), offspring)
-        mean = self._mean(parents)
-        spread = parents.sigma[owner] * portable.power(
-            10.0, self.rng.uniform(-self.settings.spread_decades, 0.0, len(owner))
-        )
-        noise = spread[:, None] * self.rng.standard_normal((len(owner), parents.q.shape[1]))
-        away = self.rng.random(len(owner))[
-            :, None
-        ]  # part of the mean: short steps survive where it is tight
-        q = parents.q[owner] + mean[owner] * away + self.W * noise
+        perturb = self._as_printed if self.settings.reading == PRINTED else self._guided
+        q = perturb(parents, owner)
         self.walk.candidates += len(q)
         q, owner, collided = self._free(q, owner, len(parents))
         total = self.area.total_distance(q)
@@ -252,9 +253,33 @@ class _Walker:
         if len(stuck):  # all of its offspring collide, or all steps do: look 1 rad around it
             stay = parents.of(stuck)
             wide = np.full(len(stuck), self.settings.collision_spread)
-            again = ExitPopulation(stay.q, stay.total, wide, stay.step * 0.0, stay.node)
+            again = ExitPopulation(
+                stay.q, stay.total, wide, stay.step * 0.0, stay.node, np.ones_like(stuck, bool)
+            )
             children = joined(children, again)
         return children
+
+    def _as_printed(self, parents: ExitPopulation, owner: IntArray) -> FloatArray:
+        """q_i + W_i n_i (M, n), n_i ~ N(mu, sigma): mu is proportional to D, the same for every
+        joint and without a direction; after a collision it is 0 and sigma 1 rad, around q_i.
+        """
+        per_metre = self.settings.step / self.first_total
+        mean = np.where(parents.stuck, 0.0, per_metre * parents.total)
+        noise = self.rng.standard_normal((len(owner), parents.q.shape[1]))
+        drawn = mean[owner][:, None] + parents.sigma[owner][:, None] * noise
+        return parents.q[owner] + self.W * drawn
+
+    def _guided(self, parents: ExitPopulation, owner: IntArray) -> FloatArray:
+        """Offspring (M, n) with a mean that is not weighted, parts of it, and spreads of several
+        decades: short steps survive where it is tight.
+        """
+        mean = self._mean(parents)
+        spread = parents.sigma[owner] * portable.power(
+            10.0, self.rng.uniform(-self.settings.spread_decades, 0.0, len(owner))
+        )
+        noise = spread[:, None] * self.rng.standard_normal((len(owner), parents.q.shape[1]))
+        away = self.rng.random(len(owner))[:, None]
+        return parents.q[owner] + mean[owner] * away + self.W * noise
 
     def _mean(self, parents: ExitPopulation) -> FloatArray:
         """Mean steps (N, n): where the last step went, and straight out along the tool; longer as D
@@ -346,7 +371,8 @@ class _Walker:
         node = np.arange(len(self.nodes), len(self.nodes) + len(q))
         self.nodes.extend(q)
         self.parents.extend(parents.node[owner].tolist())
-        return ExitPopulation(q, total, sigma, q - parents.q[owner], node)
+        fresh = np.zeros(len(q), dtype=bool)
+        return ExitPopulation(q, total, sigma, q - parents.q[owner], node, fresh)
 
     def _finished(self, children: ExitPopulation) -> ExitPopulation:
         """Take those out of the population that have left the zone; they count where D grew."""
