@@ -237,10 +237,10 @@ def follows(statements: Sequence[Statement]) -> str:
         f"{by_weights:.2f} times their processor time; the drift {drift.value:+.1f} points and "
         f"{by_drift:.2f} times the time without; as read against as printed "
         f"{printed.value:+.1f} points and {by_mean:.2f} times the time. Against two trees: "
-        f"{trees.value:+.1f} points, {by_trees:.2f} times the time, {cost.value:.2f} times the W: {price}, and "
-        f"{speed}. Against the straight line: {line.value:+.1f} points. Where every search "
-        "leaves, success can't set readings apart, but their times can. The planner asks (7) "
-        "first, and trees where it finds nothing."
+        f"{trees.value:+.1f} points, {by_trees:.2f} times the time, {cost.value:.2f} times the W: "
+        f"{price}, and {speed}. Against the straight line: {line.value:+.1f} points. Where every "
+        "search leaves, success can't set readings apart, but their times can. The planner asks "
+        "(7) first, and trees where it finds nothing."
     )
 
 
