@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_description import LIMIT_TOLERANCE
 from ir_kernels.collision import MinDistance
 from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.report import DistancePair
@@ -57,8 +58,8 @@ def asked_states(scene: PlanningScene, q: FloatArray, margin: float, station: st
             f"states has {len(q)} states: it must be 1 to {STATES_MAX}",
         )
     robot = scene.cell.robot
-    low = robot.position_min - 1e-9
-    high = robot.position_max + 1e-9
+    low = robot.position_min - LIMIT_TOLERANCE
+    high = robot.position_max + LIMIT_TOLERANCE
     bad = np.flatnonzero(~((q >= low) & (q <= high)).all(axis=1))
     if len(bad):
         within_limits(q[bad[0]], scene.cell, f"states[{bad[0]}]", StatusCode.INVALID_ROBOT_STATE)

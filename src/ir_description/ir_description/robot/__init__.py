@@ -25,6 +25,7 @@ from ir_description.robot.power_parameters import (
     prior,
 )
 from ir_description.robot.robot import (
+    LIMIT_TOLERANCE,
     MASS_MAX,
     TOOL0,
     Counterbalance,
@@ -40,6 +41,7 @@ __all__ = [
     "AXIS_UNITS",
     "DATA_SHEET",
     "IDLE",
+    "LIMIT_TOLERANCE",
     "MASS_MAX",
     "NO_TABLE",
     "RELATIVE_DEVIATION",

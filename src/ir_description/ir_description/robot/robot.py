@@ -243,6 +243,8 @@ class RobotModel:
 
 # A load of the flange: the tool, or a part that the tool holds.
 
+LIMIT_TOLERANCE = 1e-4
+"""rad beyond a position limit that count as at it: what encoders and held axes leave."""
 MASS_MAX = 2000.0
 """Largest mass [kg] a load may claim; what the robot carries is limited by
 RobotModel.rated_payload.

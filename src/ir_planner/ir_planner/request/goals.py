@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_description import Cell
+from ir_description import LIMIT_TOLERANCE, Cell
 from ir_description.poses import rotation_from_abc
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError, UnknownNameError
@@ -105,8 +105,8 @@ def _pose(values: list[float]) -> FloatArray:
 
 
 def within_limits(q: FloatArray, cell: Cell, what: str, code: StatusCode) -> FloatArray:
-    """Joint values (n,) rad within the robot's limits; else RequestError with joint, value and
-    bounds in degrees.
+    """Joint values (n,) rad within the robot's limits; those at most LIMIT_TOLERANCE beyond one are
+    at it. RequestError with joint, value, bounds and excess in degrees for others.
     """
     robot = cell.robot
     for i, value in enumerate(q):
@@ -116,11 +116,13 @@ def within_limits(q: FloatArray, cell: Cell, what: str, code: StatusCode) -> Flo
             raise RequestError(
                 code, f"{what}: {robot.joint_names[i]} is {value}: it must be finite"
             )
-        if not low - 1e-9 <= value <= high + 1e-9:
+        excess = max(float(value) - high, low - float(value))
+        if excess > LIMIT_TOLERANCE:
             raise RequestError(
                 code,
                 f"{what}: {robot.joint_names[i]} is {_angle(float(value))}: it must be in "
-                f"[{math.degrees(low):g}, {math.degrees(high):g}] deg",
+                f"[{math.degrees(low):g}, {math.degrees(high):g}] deg, exceeded by "
+                f"{_angle(excess)}",
             )
     return np.clip(q, robot.position_min, robot.position_max)
 

@@ -7,7 +7,7 @@ violates a limit or a clearance is named with the first violation.
 """
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -54,7 +54,7 @@ def plan_through(
     Given times keep their proportions and are stretched where limits ask for it. Raises
     RequestError.
     """
-    _check_points(reference, scene)
+    reference = _within(reference, scene)
     context = Context.of(scene, options, work)
     if options.planner_id:
         sentence = (
@@ -83,7 +83,8 @@ def plan_through(
     return MovementPlan(status, info, movement.report, movement.trajectory, reference.points)
 
 
-def _check_points(reference: Reference, scene: PlanningScene) -> None:
+def _within(reference: Reference, scene: PlanningScene) -> Reference:
+    """The reference with its points within the limits; RequestError for what can't be driven."""
     if len(reference.points) > POINTS_MAX:
         raise RequestError(
             StatusCode.INVALID_MOTION_PLAN,
@@ -91,8 +92,11 @@ def _check_points(reference: Reference, scene: PlanningScene) -> None:
         )
     if reference.times is not None:
         bounded(float(reference.times[-1]), 0.0, DURATION_MAX, "time of the last point", "s")
-    for k, q in enumerate(reference.points):
+    points = [
         within_limits(q, scene.cell, f"point {k}", StatusCode.INVALID_MOTION_PLAN)
+        for k, q in enumerate(reference.points)
+    ]
+    return replace(reference, points=np.array(points))
 
 
 def _followed(reference: Reference, context: Context) -> Movement:

@@ -8,6 +8,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from ir_description import LIMIT_TOLERANCE
 from ir_msgs_py.announcements import Contact
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.load_check import LoadFinding
@@ -222,7 +223,11 @@ class ExecutionSettings:
         10.0, "How far in the future a header stamp may lie.", unit="s", minimum=0.0, maximum=3600.0
     )
     position_slack: float = setting(
-        1e-6, "By how much a position limit may be exceeded.", unit="rad", minimum=0.0, maximum=0.01
+        LIMIT_TOLERANCE,
+        "By how much a position limit may be exceeded.",
+        unit="rad",
+        minimum=0.0,
+        maximum=0.01,
     )
     limit_slack: float = setting(
         1e-3,
