@@ -188,7 +188,7 @@ def straight(
 # meter and a model, say of the parameters beyond their prior.
 
 WINDOW = 0.05  # s
-NOISE = 60.0  # W of a window in motion: what fits leave
+NOISE = 0.12  # of the price of a second [W], 60 W of a KR 210: what fits leave in motion
 REST = 0.6  # s beside each movement
 IDENTIFIED = 0.8  # of the deviation before: at most so much is left
 
@@ -219,6 +219,7 @@ class Design:
     def __init__(self, model: PowerModel, prior: PowerParameters) -> None:
         self._model = model
         self._prior = prior
+        self._noise = NOISE * model.robot.time_value
         self._free = prior.deviation > 0.0
         self._scale = np.where(self._free, prior.deviation, 0.0)
         self._information = np.eye(len(self._scale))  # in deviations of the prior
@@ -229,7 +230,7 @@ class Design:
         for trajectory in (excursion.out, excursion.back):
             samples = planned_samples(trajectory, loads, self._prior.modes)
             _, slopes = self._model.watts_and_slopes(self._prior.mean, self._model.prepare(samples))
-            scaled = slopes * self._scale / NOISE
+            scaled = slopes * self._scale / self._noise
             total += scaled.T @ scaled * (samples.step / WINDOW)
         return np.asarray(total)
 
@@ -268,7 +269,7 @@ class Design:
             still[self._prior.index("drives_watts")] = still[self._prior.index(IDLE)] = 1.0
         scaled = still * self._scale
         self._information = (
-            self._information + np.outer(scaled, scaled) * seconds / WINDOW / NOISE**2
+            self._information + np.outer(scaled, scaled) * seconds / WINDOW / self._noise**2
         )
 
     def identified(self) -> Identified:

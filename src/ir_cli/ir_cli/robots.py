@@ -84,6 +84,11 @@ def remarks_on(robot: RobotModel) -> tuple[Remark, ...]:
         *_speed(robot),
         *_controller(robot),
         *_wrist(robot),
+        Remark(
+            "note",
+            "time_value",
+            f"a second is worth {robot.time_value:g} W where a request does not say",
+        ),
         *_marks(robot),
     ]
     order = ("error", "warning", "note")

@@ -147,7 +147,7 @@ class Prepared:
 
 class PowerModel:
     """Watts of one robot; `layout` names the parameters, the vectors of which the methods take;
-    `bodies` computes torques at motion (3, N, n) as `arm_torques` does.
+    `bodies` computes torques at motion (3, N, n) as `arm_torques` does. robot: whose watts.
     """
 
     def __init__(
@@ -162,7 +162,7 @@ class PowerModel:
             raise RecorderError(
                 f"power parameters are of {layout.robot}, the robot is {robot.name}"
             )
-        self._robot = robot
+        self.robot = robot
         self._link = link
         self._pose = base_pose
         self.layout = layout
@@ -175,8 +175,8 @@ class PowerModel:
         """
         known = samples.known[:, None]
         motion = np.where(known, [samples.q, samples.qd, samples.qdd], 0.0)
-        motion[0] = np.where(known, samples.q, self._robot.machine_home)
-        parts = [np.zeros((len(samples), self._robot.n)) for _ in range(4)]
+        motion[0] = np.where(known, samples.q, self.robot.machine_home)
+        parts = [np.zeros((len(samples), self.robot.n)) for _ in range(4)]
         watts = np.zeros(len(samples))
         bus_up = np.isin(
             samples.mode, [k for k, mode in enumerate(self.layout.modes) if mode in _BUS_UP]
@@ -184,17 +184,17 @@ class PowerModel:
         for k in np.unique(samples.load):
             rows = samples.load == k
             loads = samples.loads[k] if k >= 0 else ()
-            own = self._bodies(self._robot, loads, self._pose, motion[:, rows])
+            own = self._bodies(self.robot, loads, self._pose, motion[:, rows])
             for part, each in zip(
                 parts, (own.links, own.loads, own.rotors, own.counterbalance), strict=True
             ):
                 part[rows] = each
             watts[rows] = sum(load.watts_always for load in loads)
             watts[rows & bus_up] += sum(load.watts_drive_bus for load in loads)
-        if self._robot.coupled:
-            turns = self._robot.motor_turns
+        if self.robot.coupled:
+            turns = self.robot.motor_turns
             links, held, _, spring = (part @ np.linalg.inv(turns) for part in parts)
-            rotors = (motion[2] @ turns.T) * self._robot.reflected_inertia
+            rotors = (motion[2] @ turns.T) * self.robot.reflected_inertia
             arm = ArmTorques(links, held, rotors, spring)
             return Prepared(samples, arm, motion[1] @ turns.T, watts)
         return Prepared(samples, ArmTorques(*parts), motion[1], watts)
@@ -239,7 +239,7 @@ class PowerModel:
     def torque_slopes(self, mean: FloatArray, prepared: Prepared) -> FloatArray:
         """Derivatives (M, n, P) of these torques by all parameters."""
         of = self.layout.places
-        n = self._robot.n
+        n = self.robot.n
         through, side, _ = self._torque(mean, prepared)
         slopes = np.zeros((*through.shape, len(mean)))
         axis = np.arange(n)

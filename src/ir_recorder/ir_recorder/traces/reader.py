@@ -15,6 +15,7 @@ from ir_msgs_py.names import JOINT_NAMES
 from ir_recorder.errors import RecorderError
 from ir_recorder.reading.reader import read_recording
 from ir_recorder.reading.recording import JointSeries, PowerSeries, Recording
+from ir_recorder.traces.bag_files import read_bag
 from ir_recorder.traces.columns import TraceMapping, Wanted
 from ir_recorder.traces.table_files import read_csv, read_parquet
 from ir_recorder.traces.trace import (
@@ -97,7 +98,7 @@ def read_traces(
     mapping: TraceMapping | None = None,
     joint_names: Sequence[str] = JOINT_NAMES,
 ) -> tuple[Trace, ...]:
-    """The traces of a file by its ending (.csv, .txt, .parquet, .mcap): one, or those of a
+    """The traces of a file by its ending (.csv, .txt, .parquet, .mcap, .db3): one, or those of a
     recording.
 
     Without a mapping the columns that are read are `time`, `power`, `energy`, `mode`, `load`, and
@@ -112,9 +113,11 @@ def read_traces(
         return (_shifted(read_csv(path, wanted, mapping), mapping),)
     if ending == ".parquet":
         return (_shifted(read_parquet(path, wanted, mapping), mapping),)
+    if ending == ".db3":
+        return (_shifted(read_bag(path), mapping),)
     if ending == ".mcap":
         return tuple(_shifted(trace, mapping) for trace in recorded_traces(read_recording(path)))
-    raise RecorderError(f"{path}: traces are read from .csv, .parquet and .mcap")
+    raise RecorderError(f"{path}: traces are read from .csv, .parquet, .mcap and .db3")
 
 
 def column_names(joint_names: Sequence[str]) -> frozenset[str]:

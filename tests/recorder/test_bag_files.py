@@ -1,0 +1,63 @@
+"""Joint states of a ROS 2 bag in SQLite are read as those of any trace."""
+
+from __future__ import annotations
+
+import sqlite3
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builtin_interfaces.msg import Time
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from ir_recorder.errors import RecorderError
+from ir_recorder.traces import read_traces
+
+NAMES = ("joint_a1", "joint_a2")
+
+
+def bag(path: Path, messages: list[JointState], kind: str = "sensor_msgs/msg/JointState") -> Path:
+    with sqlite3.connect(path) as file:
+        file.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT)")
+        columns = "id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB"
+        file.execute(f"CREATE TABLE messages({columns})")
+        file.execute("INSERT INTO topics VALUES (1, '/joint_states', ?)", (kind,))
+        rows = [(k, 1, 10**9 + k, serialize_message(each)) for k, each in enumerate(messages)]
+        file.executemany("INSERT INTO messages VALUES (?, ?, ?, ?)", rows)
+    return path
+
+
+def states(count: int) -> list[JointState]:
+    return [
+        JointState(
+            header=Header(stamp=Time(sec=5, nanosec=10_000_000 * k)),
+            name=list(NAMES),
+            position=[0.1 * k, -0.2 * k],
+            effort=[1.0 * k, 2.0],
+        )
+        for k in range(count)
+    ]
+
+
+def test_positions_and_efforts_are_read_by_the_stamps(tmp_path: Path) -> None:
+    (trace,) = read_traces(bag(tmp_path / "run.db3", states(20)), None, NAMES)
+    assert trace.time == pytest.approx(0.01 * np.arange(20))
+    assert trace.columns["joint_a2"] == pytest.approx(-0.2 * np.arange(20))
+    assert trace.columns["joint_a1_effort"] == pytest.approx(np.arange(20))
+    assert "joint_a1_velocity" not in trace.columns
+
+
+def test_what_has_no_joint_states_or_is_no_bag_is_refused(tmp_path: Path) -> None:
+    other = bag(tmp_path / "other.db3", states(3), "std_msgs/msg/String")
+    with pytest.raises(RecorderError, match="there are no messages of sensor_msgs"):
+        read_traces(other, None, NAMES)
+    text = tmp_path / "text.db3"
+    text.write_text("time,joint_a1\n")
+    with pytest.raises(RecorderError, match="can't be read as a bag"):
+        read_traces(text, None, NAMES)
+    mixed = states(4)
+    mixed[2].name = ["joint_a2", "joint_a1"]
+    with pytest.raises(RecorderError, match="name other joints"):
+        read_traces(bag(tmp_path / "mixed.db3", mixed), None, NAMES)
