@@ -360,6 +360,10 @@ class Estimate:
         count = len(self.prior.names)
         mean = self.found[:count]
         covariance = self.covariance[:count, :count]
+        known = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        kept = np.minimum(self.prior.deviation / safe(known), 1.0)  # what is kept is as certain
+        factor = np.where(determined, 1.0, kept)
+        covariance = covariance * np.outer(factor, factor)
         sources = np.where(determined, "fit", self.prior.sources)
         found = replace(
             self.given,
