@@ -498,6 +498,8 @@ class Estimate:
         """The scale of friction's deviation by which what is left out is predicted best."""
         if self.motors is not None:
             return FRICTION_SCALES[-1]  # torques show it axis by axis: it is open
+        if sum(len(movements(run.samples)) for run in self.runs) < FOLDS:
+            return FRICTION_SCALES[0]  # too few to leave any out
         fold = self._folds()
         best = FRICTION_SCALES[0]
         least = np.inf
