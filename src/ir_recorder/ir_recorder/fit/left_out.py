@@ -109,6 +109,7 @@ def _metered(estimate: Estimate, parts: Sequence[_Part]) -> tuple[LeftOut, ...]:
             np.concatenate(
                 [run.samples.watts[rows] for run, rows in zip(estimate.runs, train, strict=True)]
             ),
+            np.concatenate(features),
         )
         plain = [each @ coefficients for each in features]
         level = 0.0
@@ -195,11 +196,19 @@ def _features(estimate: Estimate, run: Run) -> FloatArray:
     return np.hstack([torque * qd, torque**2, np.abs(qd), qd**2, qdd * qd, modes])
 
 
-def _solved(features: FloatArray, measured: FloatArray) -> FloatArray:
-    """Least squares of columns of one size."""
-    size = np.sqrt((features**2).mean(axis=0))
-    size[size == 0.0] = 1.0
-    return np.asarray(np.linalg.lstsq(features / size, measured, rcond=1e-9)[0] / size)
+_SEEN = 0.01  # of a feature's size: with less of it nothing is learnt of it
+
+
+def _solved(features: FloatArray, measured: FloatArray, whole: FloatArray) -> FloatArray:
+    """Least squares of columns of one size; 0 for those of which the data show next to nothing
+    beside the whole (N, K).
+    """
+    size = np.sqrt((whole**2).mean(axis=0))
+    seen = np.sqrt((features**2).mean(axis=0)) > _SEEN * size
+    found = np.zeros(features.shape[1])
+    scaled = features[:, seen] / size[seen]
+    found[seen] = np.linalg.lstsq(scaled, measured, rcond=1e-6)[0] / size[seen]
+    return found
 
 
 def _worked(estimate: Estimate, parts: Sequence[_Part]) -> tuple[LeftOut, ...]:
@@ -239,7 +248,7 @@ def plain_torques(estimate: Estimate, unseen: BoolArray) -> FloatArray:
         columns = np.column_stack(
             [bodies[:, j], *(each[:, j] for each in regressors), np.ones(rows)]
         )
-        plain[:, j] = columns @ _solved(columns[~unseen], measured[~unseen, j])
+        plain[:, j] = columns @ _solved(columns[~unseen], measured[~unseen, j], columns)
     return plain
 
 
