@@ -137,7 +137,9 @@ class Chains:
         cell = planner.cell
         settings = planner.settings
         steps = placed_steps(cell, steps_of(cell, stations), cell.parts_at_start())
-        scenes = Scenes(cell, planner.scene().power, settings.drives, options.load == NO_LOAD)
+        scenes = Scenes(
+            cell, planner.scene().power, settings.drives(cell.robot), options.load == NO_LOAD
+        )
         route = Route.over(steps, scenes)
         context = Context(
             scenes.of(cell.parts_at_start()), options, _journal(planner, options, len(stations))
