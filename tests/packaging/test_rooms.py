@@ -16,7 +16,7 @@ SRC = Path(__file__).resolve().parents[2] / "src"
 # package.
 ROOMS = {
     "ir_planner": (
-        "errors", "presentation", "curves", "scene", "request", "checks", "configurations", "timing", "search", "optimize",  # noqa: E501
+        "errors", "presentation", "cycle", "curves", "scene", "request", "checks", "configurations", "timing", "search", "optimize",  # noqa: E501
         "cartesian", "regional", "trajectories", "service", "settings", "program", "store",
         "current_cell", "certificates", "state_queries", "waiting_postures", "planner", "krl",
         "before_after", "what_if", "node",

@@ -254,6 +254,14 @@ COMMANDS = (
         ("arena",),
     ),
     Command(
+        "study cells",
+        "ir_cli.studies:add_cells",
+        "robotic cells of the public benchmark: the cheapest cycle, with a proven gap",
+        "Finds order, places, speeds and power modes of the robots of a cell for least energy in "
+        "its cycle; instances are those of the generator of robotic cells of CTU in Prague.",
+        "ir study cells FILE.xml",
+    ),
+    Command(
         "ros up",
         "ir_cli.ros.up:add_up",
         "start planner, driver, runner and recorder until Ctrl-C",

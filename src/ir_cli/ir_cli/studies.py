@@ -1,19 +1,21 @@
-"""Studies at the command line: `ir study layout`, `statistics` and `arena`."""
+"""Studies at the command line: `ir study layout`, `statistics`, `arena` and `cells`."""
 
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import TypeVar
 
 from ir_cli.errors import InputError
-from ir_cli.output import ProgressLine, print_json
+from ir_cli.output import ProgressLine, print_json, table
 from ir_studies import KINDS, Means, read_settings, read_study, run_arena
 from ir_studies.arena import EXAMPLE, ArenaSettings, arena_settings
+from ir_studies.cells import CellAnswer, hurried, read_instances, solve_cell
 from ir_studies.work import MOST_WORKERS
 
 # Options and progress of all studies.
@@ -179,3 +181,76 @@ def asked(arguments: argparse.Namespace) -> tuple[ArenaSettings, str]:
     settings = read_settings(arguments.settings) if named else arena_settings(EXAMPLE, str)
     folder = _QUICK_FOLDER if arguments.output == _FOLDER else str(arguments.output)
     return replace(settings, seeds=1, seconds=_QUICK_S), folder
+
+
+# Robotic cells of the public benchmark.
+
+_CELL_S = 120.0  # of processor time per instance
+_HURRIED_S = 20.0  # the same for what it is compared with
+_HURRIED_GAP = 1e-3
+
+
+def add_cells(cells: argparse.ArgumentParser) -> None:
+    """Arguments of `ir study cells`."""
+    cells.add_argument("file", metavar="FILE.xml", help="instances of the public benchmark")
+    words = f"of processor time per instance, at most ({_CELL_S:g})"
+    cells.add_argument("--seconds", type=float, default=_CELL_S, metavar="S", help=words)
+    cells.add_argument("--json", action="store_true", help="print the schedules as JSON")
+    cells.set_defaults(run=run_cells)
+
+
+def run_cells(arguments: argparse.Namespace) -> int:
+    """Solve every instance; exit code 1 where one has no schedule."""
+    if not arguments.seconds > 0.0:
+        raise InputError(f"--seconds is {arguments.seconds:g}, must be positive")
+    answers = []
+    compared = []
+    instances = read_instances(arguments.file)
+    with ProgressLine() as line:
+        for k, instance in enumerate(instances):
+            line.show(instance.name, k, len(instances), 0.0)
+            answers.append(solve_cell(instance, arguments.seconds))
+            compared.append(solve_cell(hurried(instance), _HURRIED_S, _HURRIED_GAP))
+    if arguments.json:
+        print_json(
+            {"instances": [_cell_values(*each) for each in zip(answers, compared, strict=True)]}
+        )
+    else:
+        rows = [_cell_row(*each) for each in zip(answers, compared, strict=True)]
+        header = ("instance", "robots", "cycle s", "energy J", "gap %", "saving %", "processor s")
+        sys.stdout.write(f"{table(header, rows)}\n")
+    return int(any(answer.schedule is None for answer in answers))
+
+
+def _saving(answer: CellAnswer, fastest: CellAnswer) -> float:
+    """How much less [%] than all movements fastest and motors on in every wait; nan: unknown."""
+    if answer.schedule is None or fastest.schedule is None:
+        return math.nan
+    return 100.0 * (1.0 - answer.energy / fastest.energy)
+
+
+def _cell_row(answer: CellAnswer, fastest: CellAnswer) -> tuple[str, ...]:
+    instance = answer.instance
+    begin = (instance.name, str(len(instance.robots)), f"{instance.cycle:.2f}")
+    if answer.schedule is None:
+        why = "impossible" if answer.is_impossible else "none found"
+        return (*begin, why, "-", "-", f"{answer.seconds:.1f}")
+    saving = _saving(answer, fastest)
+    shown = "-" if math.isnan(saving) else f"{saving:.1f}"
+    seconds = f"{answer.seconds:.1f}"
+    return (*begin, f"{answer.energy:.3f}", f"{100.0 * answer.gap:.3f}", shown, seconds)
+
+
+def _cell_values(answer: CellAnswer, fastest: CellAnswer) -> dict[str, object]:
+    robots = answer.schedule.robots if answer.schedule else ()
+    return {
+        "name": answer.instance.name,
+        "cycle_s": answer.instance.cycle,
+        "energy_j": answer.energy,
+        "bound_j": answer.bound,
+        "gap_percent": 100.0 * answer.gap,
+        "fastest_j": fastest.energy,
+        "saving_percent": _saving(answer, fastest),
+        "processor_s": answer.seconds,
+        "robots": [[asdict(done) for done in robot] for robot in robots],
+    }

@@ -1,0 +1,20 @@
+"""Robotic cells of the public benchmark: read, and solved to a proven gap.
+
+for instance in read_instances("cells.xml"):
+    answer = solve_cell(instance)
+    print(answer.energy, answer.gap)
+"""
+
+from ir_studies.cells.instance import Instance, Schedule
+from ir_studies.cells.solution import CellAnswer, hurried, solve_cell
+from ir_studies.cells.xml_file import read_instances, written
+
+__all__ = [
+    "CellAnswer",
+    "Instance",
+    "Schedule",
+    "hurried",
+    "read_instances",
+    "solve_cell",
+    "written",
+]

@@ -1,0 +1,600 @@
+"""The cell as a mixed-integer linear program.
+
+A robot's clock begins when it leaves the stop that closes its cycle. Each movement and each range
+of a stay has a duration of its own, zero unless chosen; starts flow along the hops with their
+movements, so orders need no large constants. Energies of movements are bounded by tangents, added
+where a solution is. Robots differ by the phase of their clocks; two activities that exclude each
+other are separated by a whole number of cycles.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from ir_planner.cycle import LinearProgram
+from ir_studies.cells.instance import (
+    Done,
+    Hop,
+    Instance,
+    Lag,
+    Movement,
+    Range,
+    Robot,
+    Schedule,
+    Stop,
+    stay_ranges,
+)
+from ir_values import FloatArray
+
+_FIRST_TANGENTS = 5
+_SLACK = 1e-7  # s, of bounds that were derived
+_SAME = 1e-7  # of a curve: a tangent that close is there already
+
+
+@dataclass(frozen=True)
+class _Moving:
+    """Variables of a movement."""
+
+    hop: Hop
+    movement: Movement
+    on: int
+    duration: int
+    energy: int
+    most: float
+
+
+@dataclass(frozen=True)
+class _Staying:
+    """Variables of a stay at a place in a range of durations."""
+
+    stop: Stop
+    place: int
+    range: Range
+    on: int
+    duration: int
+
+
+@dataclass
+class _Clock:
+    """A robot: earliest and latest starts on its clock [s], and its variables."""
+
+    robot: Robot
+    phase: int = -1
+    phase_low: float = 0.0
+    phase_high: float = 0.0
+    start: dict[int, int] = field(default_factory=dict)  # of a stop
+    leave: dict[int, int] = field(default_factory=dict)  # of a hop, zero unless it is done
+    begins: dict[int, tuple[float, float]] = field(default_factory=dict)
+    ends: dict[int, tuple[float, float]] = field(default_factory=dict)
+
+
+Terms = dict[int, float]
+
+
+class CellModel:
+    """Variables and rows of an instance."""
+
+    def __init__(self, instance: Instance) -> None:
+        self.instance = instance
+        self.program = LinearProgram()
+        self.moving: list[_Moving] = []
+        self.staying: list[_Staying] = []
+        self.separations: dict[tuple[int, int], int] = {}
+        self._tangents: dict[int, list[float]] = {}
+        self._clocks = [self._clock(robot) for robot in instance.robots]
+        self._stops = {s.number: s for robot in instance.robots for s in robot.stops}
+        self._hops = {h.number: h for robot in instance.robots for h in robot.hops}
+        self._moves_of: dict[int, list[_Moving]] = {}
+        self._stays_of: dict[int, list[_Staying]] = {}
+        for clock in self._clocks:
+            self._choices(clock)
+            self._flows(clock)
+        bindings = self._bindings()
+        self._phases(bindings)
+        for event, lag in bindings:
+            self._lag(event, lag)
+        self._fits()
+        self._conflicts()
+        for moving in self.moving:
+            self._first_tangents(moving)
+
+    # Bounds on each clock.
+
+    def _clock(self, robot: Robot) -> _Clock:
+        cycle = self.instance.cycle
+        closing = robot.closing.number
+        stays = {stop.number: stop.least for stop in robot.stops}
+        quickest = {hop.number: min(m.curve.least for m in hop.movements) for hop in robot.hops}
+        clock = _Clock(robot)
+        must = _before(robot)
+        first = _distances(robot, stays, quickest, forward=True)
+        last = _distances(robot, stays, quickest, forward=False)
+        entering = {
+            stop.number: min(
+                (quickest[hop.number] for hop in robot.hops if hop.end == stop.number),
+                default=math.inf,
+            )
+            for stop in robot.stops
+        }
+        for stop in robot.stops:
+            v = stop.number
+            before = sum(stays[w] + entering[w] for w in must if v in must[w]) + entering[v]
+            after = sum(stays[w] + entering[w] for w in must[v])
+            low = max(first[v], before)
+            rest = 0.0 if v == closing else max(last[v], after)
+            high = cycle - stays[v] - rest
+            clock.begins[v] = (low, high)
+            clock.ends[v] = (low + stays[v], high + stays[v])
+        for hop in robot.hops:
+            low = 0.0 if hop.start == closing else clock.ends[hop.start][0]
+            high = 0.0 if hop.start == closing else clock.begins[hop.end][1] - quickest[hop.number]
+            clock.begins[hop.number] = (low, high)
+            clock.ends[hop.number] = (low + quickest[hop.number], clock.begins[hop.end][1])
+        return clock
+
+    # One robot.
+
+    def _choices(self, clock: _Clock) -> None:
+        p = self.program
+        for hop in clock.robot.hops:
+            room = clock.ends[hop.number][1] - clock.begins[hop.number][0]
+            for movement in hop.movements:
+                curve = movement.curve
+                most = min(curve.most, room + _SLACK)
+                if most < curve.least:
+                    continue
+                on = p.binary()
+                moving = _Moving(
+                    hop, movement, on, p.variable(), p.variable(-math.inf, cost=1.0), most
+                )
+                p.row({moving.duration: 1.0, on: -curve.least}, low=0.0)
+                p.row({moving.duration: 1.0, on: -most}, high=0.0)
+                self.moving.append(moving)
+                self._moves_of.setdefault(hop.number, []).append(moving)
+        for stop in clock.robot.stops:
+            room = self.instance.cycle if stop.closes else clock.ends[stop.number][1]
+            for place in stop.places:
+                for each in stay_ranges(stop, place, clock.robot.modes):
+                    most = min(each.most, room - clock.begins[stop.number][0] + _SLACK)
+                    if most < each.least:
+                        continue
+                    on = p.binary()
+                    duration = p.variable(cost=each.power)
+                    p.row({duration: 1.0, on: -each.least}, low=0.0)
+                    p.row({duration: 1.0, on: -most}, high=0.0)
+                    staying = _Staying(stop, place.number, each, on, duration)
+                    self.staying.append(staying)
+                    self._stays_of.setdefault(stop.number, []).append(staying)
+
+    def _flows(self, clock: _Clock) -> None:
+        p = self.program
+        cycle = self.instance.cycle
+        closing = clock.robot.closing.number
+        for stop in clock.robot.stops:
+            clock.start[stop.number] = p.variable(*clock.begins[stop.number])
+        for hop in clock.robot.hops:
+            if hop.start == closing:
+                continue
+            low, high = clock.begins[hop.number]
+            leave = p.variable(0.0, max(high, 0.0))
+            clock.leave[hop.number] = leave
+            on = self._on(hop.number)
+            p.row({leave: 1.0} | dict.fromkeys(on, -low), low=0.0)
+            p.row({leave: 1.0} | dict.fromkeys(on, -high), high=0.0)
+        for stop in clock.robot.stops:
+            v = stop.number
+            for place in stop.places:
+                here = {s.on: -1.0 for s in self._stays_of.get(v, ()) if s.place == place.number}
+                for end in ("start", "end"):
+                    hops = {
+                        m.on: 1.0
+                        for hop in clock.robot.hops
+                        if getattr(hop, end) == v
+                        for m in self._moves_of.get(hop.number, ())
+                        if getattr(m.movement, end) == place.point
+                    }
+                    p.row(hops | here, low=0.0, high=0.0)
+            p.row({s.on: 1.0 for s in self._stays_of.get(v, ())}, low=1.0, high=1.0)
+            self._in_time(clock, stop, -cycle if v == closing else 0.0)
+
+    def _in_time(self, clock: _Clock, stop: Stop, rest: float) -> None:
+        """Movements end when a stop begins, and begin when it ends."""
+        v = stop.number
+        arrive: Terms = {clock.start[v]: -1.0}
+        depart: Terms = {clock.start[v]: -1.0}
+        depart |= {s.duration: -1.0 for s in self._stays_of.get(v, ())}
+        for hop in clock.robot.hops:
+            if hop.end == v:
+                arrive |= {m.duration: 1.0 for m in self._moves_of.get(hop.number, ())}
+                if hop.number in clock.leave:
+                    arrive[clock.leave[hop.number]] = 1.0
+            if hop.start == v and hop.number in clock.leave:
+                depart[clock.leave[hop.number]] = 1.0
+        self.program.row(arrive, low=0.0, high=0.0)
+        self.program.row(depart, low=rest, high=rest)
+
+    def _on(self, activity: int) -> list[int]:
+        return [m.on for m in self._moves_of.get(activity, ())]
+
+    # Robots against each other.
+
+    def _bindings(self) -> list[tuple[_Event, Lag]]:
+        """Lags with the event that they begin at: all hops of a stop together are its end."""
+        found = []
+        groups: dict[tuple[int, int, float, int], set[int]] = {}
+        for lag in self.instance.lags:
+            hop = self._hops.get(lag.earlier)
+            if hop is None:
+                found.append((_Event(start_of=lag.earlier), lag))
+            else:
+                key = (hop.start, lag.later, lag.length, lag.height)
+                groups.setdefault(key, set()).add(hop.number)
+        for (stop, later, length, height), hops in groups.items():
+            robot = self.instance.robots[self.instance.robot_of[stop]]
+            leaving = {hop.number for hop in robot.hops if hop.start == stop}
+            events = (
+                [_Event(end_of=stop)]
+                if hops == leaving
+                else [_Event(start_of=hop) for hop in sorted(hops)]
+            )
+            found += [(event, Lag(min(hops), later, length, height)) for event in events]
+        return found
+
+    def _phases(self, bindings: list[tuple[_Event, Lag]]) -> None:
+        """Ranges of the phases: as the lags leave them, a cycle where nothing binds them."""
+        cycle = self.instance.cycle
+        count = len(self._clocks)
+        linked = self._distances_of_phases(bindings)
+        apart = self._apart
+        heights = max((abs(lag.height) for lag in self.instance.lags), default=0)
+        far = cycle * (count + heights)
+        for k, clock in enumerate(self._clocks):
+            roots = [r for r in range(k) if linked[r][k]]
+            if roots:
+                base = self._clocks[roots[0]]
+                clock.phase_low = max(base.phase_low - apart[k][roots[0]], base.phase_low - far)
+                clock.phase_high = min(base.phase_high + apart[roots[0]][k], base.phase_high + far)
+                clock.phase_high = max(clock.phase_high, clock.phase_low)
+            elif k > 0:
+                clock.phase_high = cycle
+            clock.phase = self.program.variable(clock.phase_low, clock.phase_high)
+        for i in range(count):
+            for j in range(count):
+                if i != j and math.isfinite(apart[i][j]):
+                    self.program.row(
+                        {self._clocks[j].phase: 1.0, self._clocks[i].phase: -1.0}, high=apart[i][j]
+                    )
+
+    def _distances_of_phases(self, bindings: list[tuple[_Event, Lag]]) -> list[list[bool]]:
+        """The largest differences of phases, and which robots lags connect at all."""
+        cycle = self.instance.cycle
+        count = len(self._clocks)
+        apart = [[0.0 if i == j else math.inf for j in range(count)] for i in range(count)]
+        linked = [[False] * count for _ in range(count)]
+        for event, lag in bindings:
+            i = self.instance.robot_of[lag.earlier]
+            j = self.instance.robot_of[lag.later]
+            linked[i][j] = linked[j][i] = True
+            if i == j or self._conditions(event) or self._conditions(_Event(lag.later)):
+                continue
+            # phase_i - phase_j <= late_j - early_i - length + height * cycle
+            most = self._clocks[j].begins[lag.later][1] - self._times(event)[0]
+            apart[j][i] = min(apart[j][i], most - lag.length + lag.height * cycle)
+        for k, i, j in itertools.product(range(count), repeat=3):
+            apart[i][j] = min(apart[i][j], apart[i][k] + apart[k][j])
+            linked[i][j] = linked[i][j] or (linked[i][k] and linked[k][j])
+        self._apart = apart
+        return linked
+
+    def _conditions(self, event: _Event) -> list[int]:
+        """What must be on, one of them, for an event to take place; nothing: it always does."""
+        hop = self._hops.get(event.start_of)
+        if hop is None:
+            return []
+        robot = self.instance.robots[self.instance.robot_of[hop.number]]
+        if sum(other.start == hop.start for other in robot.hops) == 1:
+            return []
+        return self._on(hop.number)
+
+    def _times(self, event: _Event) -> tuple[float, float]:
+        """Earliest and latest time of an event on its robot's clock."""
+        if event.start_of >= 0:
+            return self._clock_of(event.start_of).begins[event.start_of]
+        if self._stops[event.end_of].closes:
+            return 0.0, 0.0
+        return self._clock_of(event.end_of).ends[event.end_of]
+
+    def _moment(self, event: _Event) -> Terms:
+        """Terms of an event's time; of a hop that isn't done only its robot's phase."""
+        if event.end_of < 0:
+            clock = self._clock_of(event.start_of)
+            started = clock.start if event.start_of in self._stops else clock.leave
+            terms: Terms = {clock.phase: 1.0}
+            if event.start_of in started:
+                terms[started[event.start_of]] = 1.0
+            return terms
+        clock = self._clock_of(event.end_of)
+        if self._stops[event.end_of].closes:
+            return {clock.phase: 1.0}
+        terms = {clock.phase: 1.0, clock.start[event.end_of]: 1.0}
+        return terms | {s.duration: 1.0 for s in self._stays_of.get(event.end_of, ())}
+
+    def _lag(self, event: _Event, lag: Lag) -> None:
+        """later - earlier >= bound, less `spare` for each of the two that doesn't take place."""
+        other = _Event(start_of=lag.later)
+        terms = _sum(self._moment(other), self._moment(event), -1.0)
+        bound = lag.length - lag.height * self.instance.cycle
+        low = 0.0 if self._conditions(other) else self._times(other)[0]
+        low += self._clock_of(lag.later).phase_low
+        high = self._clock_of(lag.earlier).phase_high + self._times(event)[1]
+        spare = max(high - low + bound, 0.0)
+        for each in (event, other):
+            conditions = self._conditions(each)
+            terms = _sum(terms, dict.fromkeys(conditions, spare), -1.0)
+            bound -= spare if conditions else 0.0
+        self.program.row(terms, low=bound)
+
+    def _clock_of(self, activity: int) -> _Clock:
+        return self._clocks[self.instance.robot_of[activity]]
+
+    def _fits(self) -> None:
+        for handover in self.instance.handovers:
+            for side in (0, 1):
+                here = handover.stops[side]
+                there = handover.stops[1 - side]
+                for place in self._stops[here].places:
+                    fitting = {
+                        pair[1 - side] for pair in handover.pairs if pair[side] == place.number
+                    }
+                    terms = {
+                        s.on: 1.0 for s in self._stays_of.get(here, ()) if s.place == place.number
+                    }
+                    for s in self._stays_of.get(there, ()):
+                        if s.place in fitting:
+                            terms[s.on] = terms.get(s.on, 0.0) - 1.0
+                    self.program.row(terms, high=0.0)
+
+    def _conflicts(self) -> None:
+        grouped: dict[tuple[int, int], set[tuple[int, int]]] = {}
+        for conflict in self.instance.conflicts:
+            (a, g), (b, h) = conflict.first, conflict.second
+            if self.instance.robot_of[a] == self.instance.robot_of[b]:
+                continue
+            if a > b:
+                (a, g), (b, h) = (b, h), (a, g)
+            grouped.setdefault((a, b), set()).add((g, h))
+        for (a, b), modes in sorted(grouped.items()):
+            self._separate(a, b, modes)
+
+    def _separate(self, a: int, b: int, modes: set[tuple[int, int]]) -> None:
+        """Where both choices are taken: end of a <= start of b + k cycles, and end of that b <=
+        start of the next a.
+        """
+        cycle = self.instance.cycle
+        first = self._interval(a)
+        second = self._interval(b)
+        # start b - end a in [low, high]; start a - end b in [low_2, high_2]
+        i = self.instance.robot_of[a]
+        j = self.instance.robot_of[b]
+        phases = (
+            max(self._clocks[j].phase_low - self._clocks[i].phase_high, -self._apart[j][i]),
+            min(self._clocks[j].phase_high - self._clocks[i].phase_low, self._apart[i][j]),
+        )
+        start_a, end_a = self._clocks[i].begins[a], self._clocks[i].ends[a]
+        start_b, end_b = self._clocks[j].begins[b], self._clocks[j].ends[b]
+        end_a = (end_a[0], cycle) if self._closes(a) else end_a
+        end_b = (end_b[0], cycle) if self._closes(b) else end_b
+        later = (phases[0] + start_b[0] - end_a[1], phases[1] + start_b[1] - end_a[0])
+        earlier = (start_a[0] - end_b[1] - phases[1], start_a[1] - end_b[0] - phases[0])
+        low = math.ceil((-later[1] - _SLACK) / cycle)
+        high = math.floor((earlier[1] + cycle + _SLACK) / cycle)
+        sides = self._rows_of_conflict(a, b, modes)
+        if low > high:
+            for one, others in sides:
+                self.program.row(dict.fromkeys([*one, *others], 1.0), high=1.0)
+            return
+        k = self.program.variable(low, high, whole=True)
+        self.separations[a, b] = k
+        spare = self._longest(a) + self._longest(b)
+        start_to_end = _sum(_sum(second[0], first[1], -1.0), {k: cycle}, 1.0)
+        end_to_start = _sum(_sum(first[0], second[1], -1.0), {k: -cycle}, 1.0)
+        for one, others in sides:
+            on = dict.fromkeys([*one, *others], spare)
+            self.program.row(_sum(start_to_end, on, -1.0), low=-2.0 * spare + first[3] - second[2])
+            low_2 = -cycle - 2.0 * spare + second[3] - first[2]
+            self.program.row(_sum(end_to_start, on, -1.0), low=low_2)
+
+    def _longest(self, activity: int) -> float:
+        if activity in self._stops:
+            return max((s.range.most for s in self._stays_of.get(activity, ())), default=0.0)
+        return max((m.most for m in self._moves_of.get(activity, ())), default=0.0)
+
+    def _closes(self, activity: int) -> bool:
+        return activity in self._stops and self._stops[activity].closes
+
+    def _rows_of_conflict(
+        self, a: int, b: int, modes: set[tuple[int, int]]
+    ) -> list[tuple[list[int], list[int]]]:
+        """Choices that exclude each other, as few rows as one side needs."""
+        by_first: dict[int, set[int]] = {}
+        by_second: dict[int, set[int]] = {}
+        for g, h in modes:
+            by_first.setdefault(g, set()).add(h)
+            by_second.setdefault(h, set()).add(g)
+        rows = []
+        if len(by_first) <= len(by_second):
+            pairs: Iterable[tuple[set[int], set[int]]] = [({g}, hs) for g, hs in by_first.items()]
+        else:
+            pairs = [(gs, {h}) for h, gs in by_second.items()]
+        for gs, hs in pairs:
+            one = [k for g in sorted(gs) for k in self._chosen(a, g)]
+            others = [k for h in sorted(hs) for k in self._chosen(b, h)]
+            if one and others:
+                rows.append((one, others))
+        return rows
+
+    def _chosen(self, activity: int, choice: int) -> list[int]:
+        if activity in self._stops:
+            return [s.on for s in self._stays_of.get(activity, ()) if s.place == choice]
+        return [m.on for m in self._moves_of.get(activity, ()) if m.movement.number == choice]
+
+    def _interval(self, activity: int) -> tuple[Terms, Terms, float, float]:
+        """Start and end as terms and constants; a hop that isn't done lies at its earliest time."""
+        clock = self._clock_of(activity)
+        start: Terms = {clock.phase: 1.0}
+        if activity in self._stops:
+            start[clock.start[activity]] = 1.0
+            stays = {s.duration: 1.0 for s in self._stays_of.get(activity, ())}
+            return start, start | stays, 0.0, 0.0
+        if activity in clock.leave:
+            start[clock.leave[activity]] = 1.0
+        end = start | {m.duration: 1.0 for m in self._moves_of.get(activity, ())}
+        early = clock.begins[activity][0]
+        early_end = clock.ends[activity][0]
+        on = self._on(activity)
+        start = start | dict.fromkeys(on, -early)
+        return start, end | dict.fromkeys(on, -early_end), early, early_end
+
+    # Tangents.
+
+    def _first_tangents(self, moving: _Moving) -> None:
+        curve = moving.movement.curve
+        low, high = curve.least, moving.most
+        ratio = (high / low) ** (1.0 / max(_FIRST_TANGENTS - 1, 1))
+        points = [low * ratio**k for k in range(_FIRST_TANGENTS)]
+        points.append(min(max(curve.cheapest(), low), high))
+        for duration in sorted(points):
+            self._tangent(moving, duration)
+
+    def _tangent(self, moving: _Moving, duration: float) -> None:
+        slope, zero = moving.movement.curve.tangent(duration)
+        self.program.row({moving.energy: 1.0, moving.duration: -slope, moving.on: -zero}, low=0.0)
+
+    def refine(self, values: FloatArray, close: float) -> int:
+        """Add tangents where a solution's energy is more than `close` below the curve; how many."""
+        added = 0
+        for moving in self.moving:
+            on = float(values[moving.on])
+            if on < 1e-3:
+                continue
+            curve = moving.movement.curve
+            duration = min(max(float(values[moving.duration]) / on, curve.least), moving.most)
+            slope, zero = curve.tangent(duration)
+            if (slope * duration + zero) * on - float(values[moving.energy]) > close * on:
+                self._tangent(moving, duration)
+                added += 1
+        return added
+
+    # Answers.
+
+    def wholes_within(self, robots: set[int]) -> list[int]:
+        """Whole variables of some robots, and of what keeps them apart from each other."""
+        owner = self.instance.robot_of
+        found = [m.on for m in self.moving if owner[m.hop.number] in robots]
+        found += [s.on for s in self.staying if owner[s.stop.number] in robots]
+        apart = self.separations.items()
+        return found + [k for (a, b), k in apart if {owner[a], owner[b]} <= robots]
+
+    def wholes_outside(self, robots: set[int]) -> list[int]:
+        """All other whole variables."""
+        within = set(self.wholes_within(robots))
+        return [k for k, whole in enumerate(self.program.whole) if whole and k not in within]
+
+    def choices(self, values: FloatArray) -> dict[int, float]:
+        """What is decided by a solution: whole variables, rounded."""
+        return {k: float(round(values[k])) for k, whole in enumerate(self.program.whole) if whole}
+
+    def schedule(self, values: FloatArray) -> Schedule:
+        """The schedule of a solution, with energies by the curves themselves."""
+        moves = {m.hop.start: m for m in self.moving if values[m.on] > 0.5}
+        stays = {s.stop.number: s for s in self.staying if values[s.on] > 0.5}
+        shift = min(float(values[clock.phase]) for clock in self._clocks)
+        robots = []
+        for clock in self._clocks:
+            time = float(values[clock.phase]) - shift
+            done: list[Done] = []
+            at = clock.robot.closing.number
+            for _ in clock.robot.stops:
+                moving = moves[at]
+                at = moving.hop.number
+                curve = moving.movement.curve
+                took = float(min(max(values[moving.duration], curve.least), curve.most))
+                done.append(
+                    Done(
+                        moving.hop.number,
+                        moving.movement.number,
+                        -1,
+                        time,
+                        took,
+                        curve.energy(took),
+                    )
+                )
+                time += took
+                at = moving.hop.end
+                stay = stays[at]
+                took = float(values[stay.duration])
+                done.append(
+                    Done(at, stay.place, stay.range.mode, time, took, stay.range.power * took)
+                )
+                time += took
+            robots.append(tuple(done))
+        return Schedule(tuple(robots))
+
+
+@dataclass(frozen=True)
+class _Event:
+    """A point in time: the start of an activity or the end of a stop."""
+
+    start_of: int = -1
+    end_of: int = -1
+
+
+def _sum(terms: Mapping[int, float], more: Mapping[int, float], factor: float) -> Terms:
+    """terms + factor * more."""
+    result = dict(terms)
+    for key, value in more.items():
+        result[key] = result.get(key, 0.0) + factor * value
+    return result
+
+
+def _distances(
+    robot: Robot, stays: Mapping[int, float], quickest: Mapping[int, float], *, forward: bool
+) -> dict[int, float]:
+    """Least time from the begin of the cycle to the start of each stop; backward from the end of
+    each stop to the end of the cycle.
+    """
+    closing = robot.closing.number
+    found = {stop.number: math.inf for stop in robot.stops}
+    for _ in range(len(robot.stops) + 1):
+        for hop in robot.hops:
+            tail, head = (hop.start, hop.end) if forward else (hop.end, hop.start)
+            begin = 0.0 if tail == closing and forward else found[tail] + stays[tail]
+            if tail == closing and not forward:
+                begin = stays[closing]
+            found[head] = min(found[head], begin + quickest[hop.number])
+    return found
+
+
+def _before(robot: Robot) -> dict[int, set[int]]:
+    """By stop: stops that are surely passed after it, the closing one included."""
+    closing = robot.closing.number
+    after: dict[int, set[int]] = {}
+    for stop in robot.stops:
+        v = stop.number
+        if v == closing:
+            after[v] = set()
+            continue
+        # What is reached from the begin without passing v may come before it.
+        seen = {closing}
+        stack = [closing]
+        while stack:
+            at = stack.pop()
+            for hop in robot.hops:
+                if hop.start == at and hop.end not in seen and hop.end not in (v, closing):
+                    seen.add(hop.end)
+                    stack.append(hop.end)
+        after[v] = {other.number for other in robot.stops} - seen - {v} | {closing}
+    return after

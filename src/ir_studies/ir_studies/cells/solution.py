@@ -1,0 +1,219 @@
+"""The schedule of least energy of a cell, with a proven gap.
+
+Rounds of the whole model: solve, hold what was decided, take the durations of least energy, add
+tangents there, and again until the bound meets the energy. Cells of many robots first get a
+schedule robot by robot: two at a time are decided while the others are relaxed, then neighbours
+are decided anew.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ir_studies.cells.instance import Instance, Robot, Schedule
+from ir_studies.cells.model import CellModel
+from ir_values import FloatArray
+
+PROVED = 1e-6
+"""Relative difference of energy and bound from which on a schedule counts as proved."""
+
+_MANY = 4  # robots, from which on they are decided one after the other first
+_ROOT_ROUNDS = 8
+_MOST_ROUNDS = 30
+_CLOSE = 2e-9  # of the energy: what a tangent may miss a curve by
+_COARSE = 2e-6  # the same before anything is decided
+_PART_GAP = 2e-3  # of a part of the cell
+_PART_SHARE = 0.1  # of the seconds, for one part
+
+
+@dataclass(frozen=True)
+class CellAnswer:
+    """schedule: None where none was found; bound [J]: no schedule needs less, inf: there is none;
+    seconds: of processor time.
+    """
+
+    instance: Instance
+    schedule: Schedule | None
+    bound: float
+    seconds: float
+
+    @property
+    def energy(self) -> float:
+        """Energy of a cycle [J]; inf without a schedule."""
+        return self.schedule.energy if self.schedule else np.inf
+
+    @property
+    def is_impossible(self) -> bool:
+        """Whether it is proved that there is no schedule."""
+        return self.bound == np.inf
+
+    @property
+    def gap(self) -> float:
+        """How far the energy may be above the least, as a share of it; 0: proved."""
+        if self.schedule is None:
+            return np.inf
+        gap = (self.energy - self.bound) / self.energy
+        return 0.0 if gap <= PROVED else gap
+
+
+def solve_cell(instance: Instance, seconds: float = 120.0, gap: float = PROVED) -> CellAnswer:
+    """The cheapest schedule found in `seconds` of processor time, or as soon as it is within `gap`
+    (a share of its energy).
+    """
+    return _Search(instance, seconds, gap).run()
+
+
+def after(seconds: float) -> Callable[[], bool]:
+    """Whether so much processor time has passed from now on, however busy the machine is."""
+    end = time.process_time() + seconds
+    return lambda: time.process_time() > end
+
+
+def hurried(instance: Instance) -> Instance:
+    """Every robot by itself, with all movements as fast as they can be and waits in the mode that
+    is always open: what a saving is compared with.
+    """
+    robots = tuple(_hurried(robot) for robot in instance.robots)
+    return replace(instance, robots=robots, lags=(), handovers=(), conflicts=())
+
+
+def _hurried(robot: Robot) -> Robot:
+    hops = tuple(
+        replace(
+            hop,
+            movements=tuple(
+                replace(m, curve=replace(m.curve, most=m.curve.least)) for m in hop.movements
+            ),
+        )
+        for hop in robot.hops
+    )
+    awake = min(robot.modes, key=lambda mode: (robot.modes[mode], mode))
+    return replace(robot, hops=hops, modes={awake: robot.modes[awake]})
+
+
+class _Search:
+    def __init__(self, instance: Instance, seconds: float, gap: float) -> None:
+        self._begun = time.process_time()
+        self._end = self._begun + seconds
+        self._seconds = seconds
+        self._gap = gap
+        self._model = CellModel(instance)
+        self._instance = instance
+        self._bound = 0.0
+        self._best: Schedule | None = None
+        self._point: FloatArray | None = None
+
+    @property
+    def _left(self) -> float:
+        return self._end - time.process_time()
+
+    def run(self) -> CellAnswer:
+        """Everything, in turn."""
+        self._root()
+        if self._bound < np.inf and len(self._instance.robots) >= _MANY:
+            self._one_after_the_other()
+        rounds = 0
+        while self._left > 0.0 and not self._done and rounds < _MOST_ROUNDS:
+            self._whole()
+            rounds += 1
+        spent = time.process_time() - self._begun
+        return CellAnswer(self._instance, self._best, self._bound, spent)
+
+    @property
+    def _done(self) -> bool:
+        if self._best is None:
+            return self._bound == np.inf
+        energy = self._best.energy
+        return energy - self._bound <= self._gap * energy
+
+    def _root(self) -> None:
+        for _ in range(_ROOT_ROUNDS):
+            answer = self._model.program.relaxed()
+            self._bound = max(self._bound, answer.bound)
+            if answer.values is None or not self._model.refine(
+                answer.values, _COARSE * answer.cost
+            ):
+                return
+
+    def _whole(self) -> None:
+        """One round of the whole model."""
+        answer = self._model.program.solve(
+            start=self._point, stopped=after(self._left), gap=min(self._gap, PROVED) / 10.0
+        )
+        self._bound = max(self._bound, answer.bound)
+        if answer.values is not None:
+            self._hold(answer.values)
+
+    def _hold(self, values: FloatArray) -> bool:
+        """Durations of least energy for what a point decides; whether there are any."""
+        fixed = self._model.choices(values)
+        for _ in range(_MOST_ROUNDS):
+            answer = self._model.program.relaxed(fixed)
+            if answer.values is None:
+                return False
+            values = answer.values
+            if not self._model.refine(values, _CLOSE * abs(answer.cost)):
+                break
+        schedule = self._model.schedule(values)
+        if self._best is None or schedule.energy < self._best.energy:
+            self._best = schedule
+            self._point = values
+        return True
+
+    # Many robots.
+
+    def _one_after_the_other(self) -> None:
+        for together in (2, 3):
+            if self._relax_and_fix(together):
+                break
+        else:
+            return
+        count = len(self._instance.robots)
+        gains = True
+        while gains and self._left > 0.5 * self._seconds and not self._done:
+            before = self._best.energy if self._best else np.inf
+            for first in range(count):
+                self._anew({first, (first + 1) % count})
+            gains = self._best is not None and self._best.energy < before * (1.0 - 1e-5)
+
+    def _relax_and_fix(self, together: int) -> bool:
+        """Decide robots in turn, the next ones with them, the rest relaxed."""
+        model = self._model
+        robots = len(self._instance.robots)
+        fixed: dict[int, float] = {}
+        values: FloatArray | None = None
+        for first in range(robots - together + 1):
+            last = first + together == robots
+            decided = set(range(first + together))
+            answer = model.program.solve(
+                fixed=fixed,
+                loose=[] if last else model.wholes_outside(decided),
+                stopped=after(min(self._left, self._seconds * _PART_SHARE * together / 2.0)),
+                gap=_PART_GAP,
+            )
+            if answer.values is None:
+                return False
+            values = answer.values
+            for index in model.wholes_within(set(range(first + 1))):
+                fixed[index] = float(round(values[index]))
+        return values is not None and self._hold(values)
+
+    def _anew(self, robots: set[int]) -> None:
+        """Decide some robots again while the others keep to what they do."""
+        if self._point is None or self._left <= 0.0:
+            return
+        model = self._model
+        others = set(range(len(self._instance.robots))) - robots
+        fixed = {index: float(round(self._point[index])) for index in model.wholes_within(others)}
+        answer = model.program.solve(
+            fixed=fixed,
+            start=self._point,
+            stopped=after(min(self._left, self._seconds * _PART_SHARE)),
+            gap=_PART_GAP / 10.0,
+        )
+        if answer.values is not None:
+            self._hold(answer.values)
