@@ -69,7 +69,7 @@ def asked_states(scene: PlanningScene, q: FloatArray, margin: float, station: st
     there = near.pair >= 0
     kept = np.zeros(len(q))
     kept[there] = threshold[near.pair[there]]
-    allowed = scene.allowed(station)
+    allowed = scene.own_distance(station)
     smallest = scene.collision.min_distance(q).distance if allowed.any() else near.distance
     valid = ~there | (near.distance > kept - PROOF_TOLERANCE)
     return StatesCheck(valid, smallest, _pairs(near, scene, allowed))

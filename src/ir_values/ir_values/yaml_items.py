@@ -155,6 +155,10 @@ class Item:
         """Whether this is a single value."""
         return isinstance(self._content, Scalar)
 
+    def is_table(self) -> bool:
+        """Whether this is a mapping."""
+        return isinstance(self._content, dict)
+
     def text(self, length: int = 200) -> str:
         """Return one line of text of 1 to `length` printable characters."""
         scalar = self._scalar("text")

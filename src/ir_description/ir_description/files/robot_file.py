@@ -13,7 +13,7 @@ import numpy as np
 
 from ir_description.files.power_file import controller_document, figure, marks_of, read_controller
 from ir_description.poses import rotation_from_abc
-from ir_description.robot import Counterbalance, RobotModel, without_table
+from ir_description.robot import Counterbalance, ReducedDistance, RobotModel, without_table
 from ir_description.shapes import Capsule
 from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError, RobotFileError
@@ -131,6 +131,7 @@ def _robot(root: Item) -> RobotModel:
     links = [_link(item) for item in top["links"].list(n + 1, n + 1)]
     link_names = tuple(name for name, *_ in links)
     capsules = tuple(_capsule(item, link_names) for item in top["capsules"].list(0, 200))
+    pairs = [_pair(item) for item in top["self_pairs"].list(0, 1000)]
     gear_ratio = _row(drives, "gear_ratio", n)
     speed, torque = _envelope(drives, n, gear_ratio)
     with root.blamed():
@@ -157,7 +158,8 @@ def _robot(root: Item) -> RobotModel:
             envelope_torque=torque,
             counterbalance=_counterbalance(top.get("counterbalance"), joint_names),
             capsules=capsules,
-            self_pairs=tuple(_pair(item) for item in top["self_pairs"].list(0, 1000)),
+            self_pairs=tuple(pair for pair, _ in pairs),
+            reduced_distances=tuple(reduced for _, reduced in pairs if reduced is not None),
             load_self_capsules=tuple(
                 item.name() for item in top["load_self_capsules"].list(0, 200)
             ),
@@ -258,9 +260,16 @@ def _capsule(item: Item, link_names: tuple[str, ...]) -> Capsule:
     )
 
 
-def _pair(item: Item) -> tuple[str, str]:
-    first, second = item.list(2, 2)
-    return first.name(), second.name()
+def _pair(item: Item) -> tuple[tuple[str, str], ReducedDistance | None]:
+    """`[a, b]`, or `{pair: [a, b], safety_distance_m: .., reason: ..}`."""
+    if not item.is_table():
+        first, second = item.list(2, 2)
+        return (first.name(), second.name()), None
+    table = item.table(("pair", "safety_distance_m", "reason"))
+    first, second = table["pair"].list(2, 2)
+    pair = first.name(), second.name()
+    distance = table["safety_distance_m"].number(-1, 1, "m")
+    return pair, ReducedDistance(*pair, distance, table["reason"].text(400))
 
 
 def _envelope(drives: Table, n: int, gear_ratio: FloatArray) -> tuple[FloatArray, FloatArray]:

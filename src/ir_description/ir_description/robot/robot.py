@@ -54,6 +54,17 @@ class Counterbalance:
             object.__setattr__(self, name, value)
 
 
+class ReducedDistance(NamedTuple):
+    """A self pair of capsules that are near by construction: what they keep [m] instead of the
+    safety distance, where that is larger; below 0 they may overlap so far. reason: why, for people.
+    """
+
+    first: str
+    second: str
+    distance: float
+    reason: str
+
+
 _NOT_IN_DATA = ("iron_loss", "inverter_loss", "gear_loss", "idle_loss")
 
 
@@ -77,7 +88,7 @@ class RobotModel:
     (speed[k], torque[k+1]) and stays at the last value. It bounds the total torque, rotor inertia
     and friction included.
     capsules: of the links, without tool. self_pairs: names of the robot's own capsules that can
-    touch.
+    touch. reduced_distances: those of them that keep a distance of their own.
     load_self_capsules: robot capsules that every capsule of a load is checked against.
     machine_home (n,) rad: the posture of Table II. rated_payload kg: tool and part together.
     title: maker and model, for people. controller: its power figures. marks: how sure each figure
@@ -121,6 +132,7 @@ class RobotModel:
     marks: Mapping[str, str] = field(default_factory=dict, repr=False)
     document: str = field(default="", repr=False)
     motor_turns: FloatArray = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
+    reduced_distances: tuple[ReducedDistance, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         n = len(self.joint_names)
@@ -234,6 +246,13 @@ class RobotModel:
             if name not in names:
                 raise InvalidValueError(
                     f"self pairs name the capsule {name}, known are {', '.join(names)}"
+                )
+        pairs = {frozenset(pair) for pair in self.self_pairs}
+        for reduced in self.reduced_distances:
+            if frozenset(reduced[:2]) not in pairs:
+                raise InvalidValueError(
+                    f"{reduced.first} and {reduced.second} have a distance of their own and are no "
+                    "self pair"
                 )
         if self.counterbalance is not None and not 0 <= self.counterbalance.joint < n:
             raise InvalidValueError(
@@ -349,4 +368,4 @@ def moving_frames(robot: RobotModel, link_poses: FloatArray) -> tuple[FramePose,
     )
 
 
-__all__ = ["Capsule", "Counterbalance", "RobotModel"]
+__all__ = ["Capsule", "Counterbalance", "ReducedDistance", "RobotModel"]

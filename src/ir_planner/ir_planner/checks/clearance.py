@@ -30,8 +30,8 @@ _PROOFS = 12
 
 @dataclass(frozen=True, eq=False)
 class ClearanceProfile:
-    """times (N,) s and distances (N,) m of the nearest pair without an allowed contact (inf: no
-    pair).
+    """times (N,) s and distances (N,) m of the nearest pair without a safety distance of its
+    own (inf: no pair).
 
     bound [m]: proved, no distance at any instant is smaller; it lies 1e-5 m below the smallest one
     found. smallest: that pair where it is nearest (None: no pair), and when. contacts: the pairs
@@ -86,7 +86,7 @@ def nearest_pairs(
     if len(order) == 0:
         return ()
     near = scene.collision.witnesses(np.repeat(q[None], len(order), axis=0), order)
-    allowed = scene.allowed(station)
+    allowed = scene.own_distance(station)
     return tuple(_pair(scene, near, row, bool(allowed[z])) for row, z in enumerate(order))
 
 
@@ -101,7 +101,7 @@ def clearance_profile(
     count = int(np.clip(np.ceil(span / _STEP), _FEWEST, _MOST)) + 1
     times = np.linspace(begin, begin + span, count)
     q = motion_at(trajectory, times).q
-    allowed = scene.allowed(station)
+    allowed = scene.own_distance(station)
     offset = np.where(allowed, -np.inf, 0.0)
     near = scene.collision.min_distance(q, offset)
     lowest = _nearest_between(trajectory, scene, offset, times, near.distance)

@@ -262,7 +262,7 @@ def _violation(
     scene: PlanningScene,
     station: Stops,
 ) -> Violation:
-    pair = pair_value(scene, q, z, bool(scene.allowed(station)[z]))
+    pair = pair_value(scene, q, z, bool(scene.own_distance(station)[z]))
     kept = float(threshold[z]) + PROOF_TOLERANCE
     excess = kept - pair.distance
     k = segment_at(trajectory, interval[1])

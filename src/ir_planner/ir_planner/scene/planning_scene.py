@@ -246,18 +246,34 @@ class PlanningScene:
         return DcBusParameters(self.power.dc_link_capacity_energy, self.drives.regeneration)
 
     def thresholds(self, safety_distance: float, station: Stops = "") -> FloatArray:
-        """Distance (Z,) m that each pair must exceed: S_m, or what `station` allows the pair."""
-        result = np.full(len(self.collision.pairs), safety_distance)
+        """Distance (Z,) m that each pair must exceed: S_m, less where the robot's data have the
+        pair near by construction, or what `station` allows the pair.
+        """
+        result = np.minimum(safety_distance, self._reduced)
         for contact in self._contacts(station):
-            for z in self._numbers_of(contact):
+            for z in self._numbers_of(contact.body_a, contact.body_b):
                 result[z] = min(result[z], contact.safety_distance)
         return result
 
+    @cached_property
+    def _reduced(self) -> FloatArray:
+        """What pairs (Z,) keep at most: less than infinity where they are near by construction."""
+        result = np.full(len(self.collision.pairs), np.inf)
+        for first, second, distance, _ in self.cell.robot.reduced_distances:
+            result[self._numbers_of(first, second)] = distance
+        return result
+
+    def own_distance(self, station: Stops) -> BoolArray:
+        """Which pairs (Z,) have a safety distance of their own at `station`: those that it allows,
+        and those that are near by construction of the robot.
+        """
+        return self.allowed(station) | np.isfinite(self._reduced)
+
     def allowed(self, station: Stops) -> BoolArray:
-        """Which pairs (Z,) have a safety distance of their own at `station`; none for ""."""
+        """Which pairs (Z,) may touch at `station`; none for ""."""
         result = np.zeros(len(self.collision.pairs), dtype=bool)
         for contact in self._contacts(station):
-            result[self._numbers_of(contact)] = True
+            result[self._numbers_of(contact.body_a, contact.body_b)] = True
         return result
 
     @cached_property
@@ -268,9 +284,7 @@ class PlanningScene:
             numbers.setdefault((body_a, body_b), []).append(z)
         return numbers
 
-    def _numbers_of(self, contact: AllowedContact) -> list[int]:
-        a = contact.body_a
-        b = contact.body_b
+    def _numbers_of(self, a: str, b: str) -> list[int]:
         return self._numbers.get((a, b), []) + self._numbers.get((b, a), [])
 
     def _contacts(self, station: Stops) -> tuple[AllowedContact, ...]:

@@ -124,10 +124,14 @@ def _stride(time: FloatArray) -> int:
 
 
 def allowed_pairs(cell: Cell, movement: PlannedMovement, model: CollisionModel) -> FloatArray:
-    """Own safety distance (Z,) of pairs that the step's stations allow to touch, NaN for all
-    others.
+    """Own safety distance (Z,) of pairs that the step's stations allow to touch, or that are near
+    by construction of the robot; NaN for all others.
     """
     own = np.full(len(model.pairs), np.nan)
+    for first, second, distance, _ in cell.robot.reduced_distances:
+        for z, pair in enumerate(model.pairs):
+            if {pair.body_a, pair.body_b} == {first, second}:
+                own[z] = distance
     ends = (movement.from_station, movement.to_station)
     for station in cell.stations:
         if station.name in ends:

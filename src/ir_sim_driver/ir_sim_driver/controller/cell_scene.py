@@ -247,7 +247,22 @@ class ContactScene:
         there = {*(capsule.name for capsule in self.capsules), *(body.name for body in bodies)}
         ignored = tuple(pair for pair in cell.ignored_pairs if there.issuperset(pair))
         self.model = CollisionModel(chain, self.capsules, bodies, own, ignored)
-        self.touching: FloatArray = np.full(len(self.model.pairs), -TOUCH)
+        self.touching: FloatArray = self._touching()
+
+    def _touching(self) -> FloatArray:
+        """Distances (Z,) that count as touching: capsules that overlap by construction touch where
+        they do so deeper than plans go, and by what the robot may be off its path.
+        """
+        result = np.full(len(self.model.pairs), -TOUCH)
+        reduced = {
+            frozenset((first, second)): distance
+            for first, second, distance, _ in self.cell.robot.reduced_distances
+            if distance < ALLOWED_DEPTH
+        }
+        for z, (_, a, b) in enumerate(self.model.pairs if reduced else ()):
+            if frozenset((a, b)) in reduced:
+                result[z] = min(-TOUCH, reduced[frozenset((a, b))] - ALLOWED_DEPTH)
+        return result
 
     @classmethod
     def of(
