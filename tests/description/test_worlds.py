@@ -97,6 +97,123 @@ def test_what_moves_or_is_elsewhere_is_left_out_by_name(
     assert "model://sun" in err
 
 
+def test_a_mesh_that_cannot_be_read_is_named_and_the_rest_is_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bad = "<model name='shelf'><link><collision><geometry><mesh><uri>shelf.dae</uri></mesh></geometry></collision></link></model>"  # noqa: E501
+    path = tmp_path / "world.sdf"
+    path.write_text(
+        f"<sdf><world><model name='table'><link>{BOX}</link></model>{bad}</world></sdf>"
+    )
+    assert main(["cell", "import", str(path)]) == 0
+    out, err = capsys.readouterr()
+    assert [machine.name for machine in cell_from_yaml(out).equipment] == ["table"]
+    assert "left out: body" in err
+    assert "shelf.dae" in err
+    assert "# left out: body" in out
+
+
+def test_a_world_of_visuals_is_no_empty_cell(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "world.sdf"
+    seen = BOX.replace("collision", "visual")
+    path.write_text(
+        f"<sdf><world><model name='table'><link name='l'>{seen}</link></model></world></sdf>"
+    )
+    assert main(["cell", "import", str(path)]) == 2
+    assert "link l of model table: it has no collision shape" in capsys.readouterr().err
+    assert main(["cell", "import", str(path), "--visuals"]) == 0
+    assert len(cell_from_yaml(capsys.readouterr().out).equipment) == 1
+
+
+def test_included_and_nested_models_are_read_where_they_stand(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "table").mkdir()
+    (tmp_path / "table" / "model.sdf").write_text(
+        f"<sdf><model name='t'><link>{BOX}</link></model></sdf>"
+    )
+    path = tmp_path / "world.sdf"
+    path.write_text(
+        "<sdf><world><include><uri>model://table</uri><name>left</name><pose>1 0 0 0 0 0</pose>"
+        "</include><model name='outer'><pose>0 2 0 0 0 0</pose><model name='inner'>"
+        f"<pose>0 0 3 0 0 0</pose><link>{BOX}</link></model></model></world></sdf>"
+    )
+    assert main(["cell", "import", str(path)]) == 0
+    found = cell_from_yaml(capsys.readouterr().out).equipment
+    places = {machine.name: machine.pose[:3, 3].tolist() for machine in found}
+    assert places == {"left": [1.0, 0.0, 0.0], "inner": [0.0, 2.0, 3.0]}
+
+
+SCENE = """cell+
+* table
+1 0 0
+0 0 0 1
+2
+box
+1 2 0.5
+0 0 0.25
+0 0 0 1
+0 0 0 0
+cylinder
+0.1 0.6
+0 0 0.8
+0 0 0 1
+0 0 0 0
+0
+* wedge
+0 0 0
+0 0 0 1
+1
+mesh
+4 4
+0 0 0
+1 0 0
+0 1 0
+0 0 1
+0 2 1
+0 1 3
+1 2 3
+0 3 2
+0 0 2
+0 0 0 1
+0 0 0 0
+0
+.
+"""
+
+
+def test_a_scene_of_moveit_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "cell.scene"
+    path.write_text(SCENE)
+    assert main(["cell", "import", str(path)]) == 0
+    table, wedge = cell_from_yaml(capsys.readouterr().out).equipment
+    assert [body.kind for body in table.bodies] == ["box", "cylinder"]
+    assert table.bodies[1].size.tolist() == [0.1, 0.6, 0.0]
+    assert table.pose[:3, 3].tolist() == [1.0, 0.0, 0.0]
+    assert wedge.bodies[0].kind == "mesh"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("box\n", "boxx\n", "line 6 of the scene is 'boxx'"),
+        ("1 2 0.5", "1 nan 0.5", "line 7 of the scene is '1 nan 0.5'"),
+        ("0 3 2\n", "0 3 9\n", "names corners beyond its 4"),
+        (".\n", "", "ends after line 34"),
+    ],
+)
+def test_a_scene_that_is_none_is_a_sentence_with_its_line(
+    old: str, new: str, sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "cell.scene"
+    head, _, tail = SCENE.rpartition(old)
+    path.write_text(head + new + tail)
+    assert main(["cell", "import", str(path)]) == 2
+    assert sentence in capsys.readouterr().err
+
+
 def test_the_glb_holds_every_body_where_it_stands(tmp_path: Path) -> None:
     import trimesh
 

@@ -20,6 +20,7 @@ from ir_description.cell import shape_register, zone_around
 from ir_description.files.solid_mesh import PIECES, PIECES_MAX, UNITS, SolidReader, pieces_of
 from ir_description.files.worlds import WRITERS, read_world
 from ir_recorder.report.shapes import body_mesh
+from ir_values.errors import one_line
 from ir_values.output_files import write_file
 
 _Z_UP = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
@@ -92,7 +93,7 @@ def _container(text: bytes, binary: bytes) -> bytes:
     return struct.pack("<III", _MAGIC, _VERSION, 12 + len(chunks)) + chunks
 
 
-WORLDS = (".sdf", ".world", ".urdf")
+WORLDS = (".sdf", ".world", ".urdf", ".scene")
 
 
 def add_export(command: argparse.ArgumentParser) -> None:
@@ -135,11 +136,11 @@ def run_export(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def run_world(path: Path, robot_name: str) -> int:
-    """Print a cell with the machines of a world; what was left out on stderr."""
+def run_world(path: Path, robot_name: str, visuals: bool) -> int:
+    """Print a cell with the machines of a world; what was left out at its head and on stderr."""
     with sentences():
         robot = robot_named(robot_name)
-        world = read_world(path, shape_register(robot))
+        world = read_world(path, shape_register(robot), visuals=visuals)
         try:
             cell = Cell(
                 name=world.name,
@@ -160,7 +161,8 @@ def run_world(path: Path, robot_name: str) -> int:
             )
         except InvalidValueError as error:
             raise InputError(f"{path.name}: {error}") from error
-    sys.stdout.write(cell_to_yaml(cell))
+    head = "".join(f"# left out: {one_line(each)}\n" for each in world.left_out)
+    sys.stdout.write(head + cell_to_yaml(cell))
     for each in world.left_out:
         sys.stderr.write(f"ir: left out: {each}\n")
     return 0
@@ -172,7 +174,7 @@ _NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
 def add_import(command: argparse.ArgumentParser) -> None:
     """Arguments of `ir cell import`."""
     command.add_argument(
-        "file", metavar="FILE", help="a mesh: .stl, .obj, .glb, .gltf; a world: .sdf, .urdf"
+        "file", metavar="FILE", help="a mesh: .stl, .obj, .glb, .gltf; a world: .sdf, .urdf, .scene"
     )
     command.add_argument("--unit", choices=tuple(UNITS), help="of a mesh; never guessed")
     command.add_argument(
@@ -181,6 +183,8 @@ def add_import(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--robot", default="kr210_r2700_extra", metavar="ROBOT", help="of a world's cell"
     )
+    words = "take the visual shapes of links of a world that have no collision shape"
+    command.add_argument("--visuals", action="store_true", help=words)
     command.add_argument("--json", action="store_true", help="print the answer as JSON")
     command.set_defaults(run=run_import)
 
@@ -189,7 +193,7 @@ def run_import(arguments: argparse.Namespace) -> int:
     """Divide the mesh and print its line, or print the cell of a world."""
     path = Path(arguments.file)
     if path.suffix.lower() in WORLDS:
-        return run_world(path, arguments.robot)
+        return run_world(path, arguments.robot, arguments.visuals)
     if arguments.unit is None:
         raise InputError(f"say the unit of {path.name[:60]!a}: --unit {' or '.join(UNITS)}")
     with sentences():

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ir_description.files.collada import triangles_from_collada
 from ir_description.files.mesh import (
     BYTES_MAX,
     CELL_TRIANGLES_MAX,
@@ -54,13 +55,17 @@ class SolidMesh:
     content: bytes
 
 
-def read_solid(folder: Path, name: str) -> SolidMesh:
-    """The mesh of a file beside the cell file. Raises InvalidValueError."""
-    path = mesh_path(folder, name, SUFFIXES)
+def read_solid(folder: Path, name: str, suffixes: tuple[str, ...] = SUFFIXES) -> SolidMesh:
+    """The mesh of a file beside the cell file; a Collada file's is in metres. Raises
+    InvalidValueError.
+    """
+    path = mesh_path(folder, name, suffixes)
     content = read_regular_file(path, BYTES_MAX)
     suffix = path.suffix.lower()
     if suffix == ".stl":
         triangles = triangles_from_stl(content)
+    elif suffix == ".dae":
+        triangles = triangles_from_collada(content)
     elif suffix == ".obj":
         triangles = triangles_from_obj(content)
     else:

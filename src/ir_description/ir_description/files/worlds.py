@@ -1,22 +1,25 @@
-"""Worlds in SDF or URDF: the machines of one are read, those of a cell are written.
+"""Worlds in SDF, URDF or MoveIt's .scene: the machines of one are read, those of a cell are
+written.
 
-Read are static models and links, their collision shapes, and the meshes beside the file.
+Read are static models and links, their collision shapes, the meshes beside the file, and the models
+below its folder that it includes. What can't be read is left out and named.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree as Xml
 
 import numpy as np
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 from ir_description.cell import Cell, Equipment, NameRegister
 from ir_description.files.mesh import is_closed
-from ir_description.files.solid_mesh import PIECES, piece_names, pieces_of, read_solid
+from ir_description.files.moveit_scene import SceneObject, scene_objects
+from ir_description.files.solid_mesh import PIECES, SUFFIXES, piece_names, pieces_of, read_solid
 from ir_description.poses import abc_from_rotation, composed, pose_of, rotation_from_abc
 from ir_description.shapes import Body
 from ir_values.arrays import FloatArray
@@ -26,6 +29,7 @@ from ir_values.files import read_regular_file
 BYTES_MAX = 8_000_000
 BODIES_MAX = 10_000
 _NO_NAME = re.compile(r"[^A-Za-z0-9_.-]+")
+_DEPTH = 20  # of models in models
 _CONVEX = 1e-6  # share of the volume by which a hull may be larger
 
 
@@ -47,55 +51,147 @@ class World:
     left_out: tuple[str, ...]
 
 
-def read_world(path: Path, taken: NameRegister) -> World:
-    """Read an .sdf, .world or .urdf file; taken: names of bodies that are given already.
+def read_world(path: Path, taken: NameRegister, *, visuals: bool = False) -> World:
+    """Read an .sdf, .world, .urdf or .scene file; taken: names of bodies that are given already;
+    visuals: whether links without a collision shape take what people see of them.
 
-    Raises InvalidValueError. Nothing outside the file's folder is opened.
+    Raises InvalidValueError, also where no body can be read. Nothing outside the file's folder is
+    opened.
     """
     try:
         text = read_regular_file(path, BYTES_MAX).decode("utf-8")
-        if "<!DOCTYPE" in text or "<!ENTITY" in text:
-            raise InvalidValueError("the file defines entities: they are not read")
+    except UnicodeDecodeError as error:
+        raise InvalidValueError(f"this is no text: {shown(str(error), 120)}") from error
+    reader = _Reader(path.parent, taken, visuals)
+    try:
+        if path.suffix.lower() == ".scene":
+            name, objects = scene_objects(text)
+            machines = tuple(reader.scene(objects))
+        else:
+            root = _document(text)
+            machines = tuple((reader.sdf if root.tag == "sdf" else reader.urdf)(root))
+            world = root.find("world") if root.tag == "sdf" else root
+            name = (world.get("name") if world is not None else None) or path.stem
+    except (ValueError, KeyError) as error:
+        raise InvalidValueError(f"a value is missing or wrong: {error}") from error
+    if not machines:
+        said = "; ".join(reader.left_out) or "it has none"
+        raise InvalidValueError(f"no body of the world can be read: {said}")
+    return World(_plain(name), machines, tuple(reader.left_out))
+
+
+def _document(text: str) -> Xml.Element:
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise InvalidValueError("the file defines entities: they are not read")
+    try:
         root = Xml.fromstring(text)
-    except (Xml.ParseError, UnicodeDecodeError) as error:
+    except Xml.ParseError as error:
         raise InvalidValueError(f"this is not XML: {shown(str(error), 120)}") from error
     if root.tag not in ("sdf", "robot"):
         raise InvalidValueError(f"the document is {shown(root.tag)}, must be sdf or robot (URDF)")
-    reader = _Reader(path.parent, taken)
-    try:
-        machines = tuple((reader.sdf if root.tag == "sdf" else reader.urdf)(root))
-    except (ValueError, KeyError) as error:
-        raise InvalidValueError(f"a value is missing or wrong: {error}") from error
-    world = root.find("world") if root.tag == "sdf" else root
-    name = (world.get("name") if world is not None else None) or path.stem
-    return World(_plain(name), machines, tuple(reader.left_out))
+    return root
 
 
 class _Reader:
     """One reading."""
 
-    def __init__(self, folder: Path, taken: NameRegister) -> None:
+    def __init__(self, folder: Path, taken: NameRegister, visuals: bool) -> None:
         self._folder = folder
+        self._models = folder
+        self._visuals = visuals
         self._taken = taken
         self._names: set[str] = set()
         self.left_out: list[str] = []
 
     def sdf(self, root: Xml.Element) -> Iterator[WorldMachine]:
         world = root.find("world")
-        for include in (root if world is None else world).findall("include"):
-            self.left_out.append(f"include {shown(include.findtext('uri') or '')}: merge it first")
-        for model in (root if world is None else world).findall("model"):
-            name = _plain(model.get("name") or "model")
+        yield from self._sdf_models(root if world is None else world, np.eye(4), 0)
+
+    def _sdf_models(
+        self, parent: Xml.Element, pose: FloatArray, depth: int
+    ) -> Iterator[WorldMachine]:
+        """Models in a world or a model at a pose (4, 4), included ones among them."""
+        for include in parent.findall("include"):
+            yield from self._included(include, pose, depth)
+        for model in parent.findall("model"):
+            yield from self._sdf_model(model, composed(pose, _sdf_pose(model)), depth)
+
+    def _sdf_model(
+        self, model: Xml.Element, pose: FloatArray, depth: int
+    ) -> Iterator[WorldMachine]:
+        name = _plain(model.get("name") or "model")
+        if any(joint.get("type") != "fixed" for joint in model.findall("joint")):
+            self.left_out.append(f"model {name}: it has joints that move")
+            return
+        bodies = list[Body]()
+        for link in model.findall("link"):
+            for place in self._places(link, f"link {link.get('name') or ''} of model {name}"):
+                at = composed(_sdf_pose(link), _sdf_pose(place))
+                bodies += self._bodies(name, place, at)
+        if bodies:
+            yield WorldMachine(name, pose, tuple(bodies))
+        yield from self._sdf_models(model, pose, depth + 1)
+
+    def _included(
+        self, include: Xml.Element, pose: FloatArray, depth: int
+    ) -> Iterator[WorldMachine]:
+        """The model of a folder below the world's own: model://NAME, or its path."""
+        uri = (include.findtext("uri") or "").strip()
+        named = uri.partition("://")[2] if "://" in uri else uri
+        folders = [self._folder / named, self._folder / "models" / named]
+        found = [
+            file
+            for folder in folders
+            for file in (folder / "model.sdf", folder)
+            if file.is_file() and file.resolve().is_relative_to(self._folder.resolve())
+        ]
+        if not found or depth > _DEPTH:
+            self.left_out.append(
+                f"include {shown(uri)}: there is no {named or 'model'}/model.sdf in the world's "
+                "folder or its models/: put it there, or merge it"
+            )
+            return
+        text = read_regular_file(found[0], BYTES_MAX).decode("utf-8", errors="replace")
+        outer = self._models
+        self._models = found[0].parent
+        for model in _document(text).findall("model"):
+            given = include.findtext("name")
+            if given:
+                model.set("name", given.strip())
+            own = include if include.find("pose") is not None else model
+            yield from self._sdf_model(model, composed(pose, _sdf_pose(own)), depth + 1)
+        self._models = outer
+
+    def _places(self, link: Xml.Element, what: str) -> list[Xml.Element]:
+        """The collision shapes of a link; of one that has none, its visual ones where asked."""
+        places = link.findall("collision")
+        seen = link.findall("visual")
+        if places or not seen:
+            return places
+        if self._visuals:
+            return seen
+        self.left_out.append(
+            f"{what}: it has no collision shape, but {len(seen)} visual ones (--visuals takes them)"
+        )
+        return []
+
+    def scene(self, objects: Iterable[SceneObject]) -> Iterator[WorldMachine]:
+        """Objects of a MoveIt scene."""
+        for each in objects:
+            name = _plain(each.name)
             bodies = list[Body]()
-            if any(joint.get("type") != "fixed" for joint in model.findall("joint")):
-                self.left_out.append(f"model {name}: it has joints that move")
-                continue
-            for link in model.findall("link"):
-                for place in link.findall("collision"):
-                    pose = composed(_sdf_pose(link), _sdf_pose(place))
-                    bodies += self._bodies(name, place, pose)
+            for shape in each.shapes:
+                own = self._name(name, name)
+                size = np.zeros(3)
+                size[: len(shape.size)] = shape.size[:3]
+                if shape.kind == "mesh":
+                    bodies += self._pieces(own, shape.triangles, shape.pose)
+                elif shape.kind in ("cone", "plane"):
+                    self.left_out.append(f"{own}: its shape is {shape.kind}")
+                else:
+                    bodies.append(Body(own, shape.kind, shape.pose, size))  # type: ignore[arg-type]
             if bodies:
-                yield WorldMachine(name, _sdf_pose(model), tuple(bodies))
+                yield WorldMachine(name, each.pose, tuple(bodies))
 
     def urdf(self, root: Xml.Element) -> Iterator[WorldMachine]:
         above = {}
@@ -123,7 +219,7 @@ class _Reader:
                     f"link {_plain(name)}: a joint above it moves, or there is no root"
                 )
                 continue
-            places = link.findall("collision")
+            places = self._places(link, f"link {_plain(name)}")
             bodies = [each for p in places for each in self._bodies(_plain(name), p, _urdf_pose(p))]
             if bodies:
                 yield WorldMachine(_plain(name), pose, tuple(bodies))
@@ -140,10 +236,7 @@ class _Reader:
             )
             return []
         if shape.tag == "mesh":
-            vertices = self._mesh(shape)
-            names = piece_names(name, len(vertices))
-            pairs = zip(names, vertices, strict=True)
-            return [Body(piece, "mesh", pose, np.zeros(3), each) for piece, each in pairs]
+            return self._mesh(name, shape, pose)
         size = np.zeros(3)
         if shape.tag == "box":
             size[:] = _row(_value(shape, "size"), 3)
@@ -152,17 +245,53 @@ class _Reader:
             size[1] = 0.0 if shape.tag == "sphere" else float(_value(shape, "length"))
         return [Body(name, shape.tag, pose, size)]  # type: ignore[arg-type]
 
-    def _mesh(self, shape: Xml.Element) -> tuple[FloatArray, ...]:
-        """A convex mesh as it is, another one in pieces; both formats are in metres."""
+    def _mesh(self, name: str, shape: Xml.Element, pose: FloatArray) -> list[Body]:
+        """A mesh in metres, as it is or in pieces; one that can't be read is left out."""
         file = _value(shape, "uri" if shape.find("uri") is not None else "filename")
         given = shape.get("scale") or shape.findtext("scale") or "1 1 1"
-        triangles = read_solid(self._folder, file).triangles * _row(given, 3)
+        scale = _row(given, 3)
+        try:
+            triangles = read_solid(*self._place_of(file), (*SUFFIXES, ".dae")).triangles
+        except InvalidValueError as error:
+            self.left_out.append(f"{name}: {error}")
+            return []
+        return self._pieces(name, triangles * scale, pose)
+
+    def _place_of(self, file: str) -> tuple[Path, str]:
+        """The folder in which a mesh must lie, and its name there."""
+        if file.startswith("model://"):
+            name, _, rest = file.removeprefix("model://").partition("/")
+            for home in (self._folder / name, self._folder / "models" / name):
+                if (home / rest).is_file() or home == self._models:
+                    return home, rest
+        return self._models, file
+
+    def _pieces(self, name: str, triangles: FloatArray, pose: FloatArray) -> list[Body]:
+        """A convex mesh as it is, another one in pieces, an open one as its hull, with a note."""
         points = np.unique(triangles.reshape(-1, 3), axis=0)
-        hull = ConvexHull(points)
+        try:
+            hull = ConvexHull(points)
+        except (QhullError, ValueError):
+            self.left_out.append(f"{name}: its mesh spans no volume")
+            return []
+        whole = points[np.sort(hull.vertices)]
         volume = float(np.linalg.det(triangles).sum()) / 6.0
         if is_closed(triangles) and volume >= (1.0 - _CONVEX) * hull.volume:
-            return (points[np.sort(hull.vertices)],)
-        return pieces_of(triangles, PIECES).vertices
+            vertices: tuple[FloatArray, ...] = (whole,)
+        else:
+            try:
+                vertices = pieces_of(triangles, PIECES).vertices
+            except InvalidValueError as error:
+                self.left_out.append(
+                    f"gaps of {name}: it is filled to its convex hull of {hull.volume:.3g} m^3, "
+                    f"because {error}"
+                )
+                vertices = (whole,)
+        names = piece_names(name, len(vertices))
+        return [
+            Body(piece, "mesh", pose, np.zeros(3), each)
+            for piece, each in zip(names, vertices, strict=True)
+        ]
 
     def _name(self, machine: str, name: str) -> str:
         """A name that no other body has."""
