@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ir_cli.main import main
-from ir_cli.robots import remarks_on
+from ir_cli.robot_remarks import remarks_on
 from ir_description import load_cell, load_robot, robot_named, robot_urdf
 from ir_kernels import Chain, DynamicsModel
 
@@ -142,7 +142,7 @@ def test_seven_axes_are_refused_with_their_names(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     urdf = robot_urdf(load_robot("ur10e")).replace(
-        'name="flange_joint" type="fixed"', 'name="axis_7" type="revolute"'
+        'name="flange_joint" type="fixed"', 'name="axis_7" type="continuous"'
     )
     (tmp_path / "robot.urdf").write_text(urdf)
     (tmp_path / "drives.yaml").write_text(sheet("ur10e"))
@@ -151,29 +151,27 @@ def test_seven_axes_are_refused_with_their_names(
     assert "has 7 axes (shoulder_pan_joint, " in capsys.readouterr().err
 
 
-def test_a_urdf_without_torques_needs_them_in_the_sheet(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_torques_that_a_urdf_does_not_have_are_estimated_unless_the_sheet_has_them(
+    tmp_path: Path,
 ) -> None:
     urdf = re.sub(r'effort="[^"]*"', 'effort="0"', robot_urdf(load_robot("kr6_r900_2")))
     (tmp_path / "robot.urdf").write_text(urdf)
     (tmp_path / "drives.yaml").write_text(sheet("kr6_r900_2"))
     arguments = ["--urdf", str(tmp_path / "robot.urdf"), "--drives", str(tmp_path / "drives.yaml")]
     out = str(tmp_path / "out.yaml")
-    assert main(["robot", "new", *arguments, "-o", out]) == 2
-    assert (
-        "gear_peak_torque_nm is unknown and the URDF has no effort limit for joint_a1"
-        in capsys.readouterr().err
-    )
+    assert main(["robot", "new", *arguments, "-o", out]) == 0
+    assert robot_named(out).marks["drives.gear_peak_torque_nm"] == "L"
     known = "{value: [335, 261, 138, 43, 46, 23], source: test, confidence: M}"
     (tmp_path / "drives.yaml").write_text(sheet("kr6_r900_2", gear_peak_torque_nm=known))
     assert main(["robot", "new", *arguments, "-o", out]) == 0
+    assert robot_named(out).marks["drives.gear_peak_torque_nm"] == "M"
 
 
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
         ("<robot", '<!DOCTYPE r [<!ENTITY a "b">]><robot', "defines entities"),
-        ("<link", "<xacro:macro/><link", "expand it first"),
+        ("<link", "<xacro:macro/><link", "xacro can't expand it"),
         ("</robot>", "", "this is not XML"),
     ],
 )

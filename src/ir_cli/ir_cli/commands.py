@@ -157,9 +157,10 @@ COMMANDS = (
     Command(
         "robot new",
         "ir_cli.robots:add_new",
-        "a robot file from a URDF and a sheet of drive figures",
-        "Writes a robot file from a URDF and a sheet of drive figures, with fitted capsules.",
-        "ir robot new --urdf arm.urdf --drives drives.yaml -o robot.yaml",
+        "a robot file from a URDF or xacro file",
+        "Writes a robot file from a URDF, with fitted capsules, what the URDF lacks estimated, and "
+        "a free posture; it is read back and checked first.",
+        "ir robot new arm.urdf --payload 20 --mass 250",
     ),
     Command(
         "robot check",

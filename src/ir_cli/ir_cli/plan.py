@@ -5,10 +5,12 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
+import time
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
+from ir_cli.errors import InputError
 from ir_cli.output import (
     Columns,
     ProgressLine,
@@ -38,7 +40,7 @@ from ir_cli.planning import (
 from ir_description import Cell
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
-from ir_planner import Planner, ProgramPlan
+from ir_planner import Planner, PlannerSettings, ProgramPlan
 from ir_planner.before_after import assumed_doors
 from ir_values.files import ANYWHERE
 
@@ -63,7 +65,9 @@ COLUMNS: Columns = {
 
 def add_plan(plan: argparse.ArgumentParser) -> None:
     """Arguments of `ir plan`."""
-    add_cell(plan)
+    add_cell(plan, optional=True)
+    words = "a first movement of a robot on an empty floor, instead of a cell: a robot file"
+    plan.add_argument("--robot", default="", metavar="ROBOT", help=words)
     plan.add_argument(
         "--stations", nargs="+", default=[], metavar="NAME", help="visit these instead"
     )
@@ -102,7 +106,7 @@ def _output(text: str) -> Path:
 def run_plan(arguments: argparse.Namespace) -> int:
     """Plan and print; exit code 1 where nothing is found."""
     with sentences(), ProgressLine() as line:
-        planner = planner_of(arguments.cell, arguments.power_parameters)
+        planner = _planner(arguments)
         stations = tuple(arguments.stations)
         check_stations(stations, planner)
         start = configuration_of(arguments.start, planner, arguments.safety_distance)
@@ -117,7 +121,7 @@ def run_plan(arguments: argparse.Namespace) -> int:
         )
     for page in (each for each in arguments.output if each.suffix == ".html"):
         _page(page, arguments, plan, planner, options)
-    notes = assumed_doors(planner.cell)
+    notes = (*assumed_doors(planner.cell), *_near_by_construction(planner))
     said = "".join(f"\nnote: {note}" for note in notes)
     if not plan.status.ok:
         return failed(plan.status.message + said)
@@ -133,6 +137,32 @@ def run_plan(arguments: argparse.Namespace) -> int:
         print_table(rows, COLUMNS)
         sys.stdout.write("\n".join(sentences_of(plan, planner.cell)) + f"{said}\n")
     return 0
+
+
+def _planner(arguments: argparse.Namespace) -> Planner:
+    """A planner of the cell, or of a first cell of the robot."""
+    if bool(arguments.cell) == bool(arguments.robot):
+        raise InputError("give a CELL, or --robot ROBOT for a first movement without one")
+    if arguments.cell:
+        return planner_of(arguments.cell, arguments.power_parameters)
+    from ir_cli.first_cell import first_cell
+
+    settings = PlannerSettings(power_parameters=arguments.power_parameters)
+    planner = Planner(clock=time.monotonic, settings=settings)
+    planner.set_cell(first_cell(arguments.robot))
+    return planner
+
+
+def _near_by_construction(planner: Planner) -> tuple[str, ...]:
+    """That pairs of the robot keep less than the safety distance, where some do."""
+    reduced = planner.cell.robot.reduced_distances
+    if not reduced:
+        return ()
+    least = 1e3 * min(each.distance for each in reduced)
+    return (
+        f"{len(reduced)} pairs of the robot that are near by construction keep distances of their "
+        f"own, {least:.0f} mm at least (below 0: capsules overlap): ir robot check lists them",
+    )
 
 
 def _record(

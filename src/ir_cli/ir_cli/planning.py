@@ -95,11 +95,10 @@ def configuration_of(text: str, planner: Planner, margin: float, load: str = "")
     return answer.solutions[0].q
 
 
-def add_cell(parser: argparse.ArgumentParser) -> None:
+def add_cell(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
     """The first argument of every command here."""
-    parser.add_argument(
-        "cell", metavar="CELL", help="a cell file, or the name of a bundled cell: demo"
-    )
+    words = "a cell file, or the name of a bundled cell: demo"
+    parser.add_argument("cell", metavar="CELL", nargs="?" if optional else None, help=words)
 
 
 def add_parameters(parser: argparse.ArgumentParser) -> None:

@@ -1,211 +1,195 @@
-"""`ir robot new`: a robot file from a URDF and a sheet of drive figures."""
+"""`ir robot new`: a robot file from a URDF and what is known of its drives."""
 
 from __future__ import annotations
 
-import itertools
+import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
-from typing import NamedTuple
 
 import numpy as np
 
 from ir_cli.errors import CommandError, InputError
-from ir_description import Capsule, DescriptionError, InvalidValueError, RobotFileError
-from ir_description.files import read_regular_file, text_of
+from ir_cli.home_posture import Postures
+from ir_cli.robot_remarks import remarks_on
+from ir_cli.robot_shapes import Pairs, Shapes, capsules_of, kept_sentence, pairs_of
+from ir_description import DescriptionError, InvalidValueError, RobotFileError, RobotModel
+from ir_description.files import read_regular_file, robot_from_yaml, text_of
 from ir_description.files.making import (
     DriveSheet,
+    LinkBody,
+    Meshes,
     UrdfArm,
+    Value,
     drive_sheet,
-    fitted,
+    estimated_sheet,
+    expanded,
+    link_bodies,
+    link_names,
     robot_text,
     urdf_arm,
+    with_home,
+    with_masses,
 )
-from ir_description.files.making.robot_text import link_names
-from ir_description.files.making.urdf_arm import UrdfShape
-from ir_description.files.mesh import read_stl
-from ir_kernels import Chain, CollisionModel
 from ir_msgs_py.arrays import FloatArray
 from ir_values.output_files import write_file
-
-# Capsules from the collision shapes of the URDF, and the pairs of them that can touch.
-
-SAMPLES = 2000  # configurations in which pairs are tried
-ALWAYS = 0.9  # of them: what touches so often is built so
-SAME = 1e-3  # m: a distance that changes less is one of the build, not of the posture
-AROUND = 24  # corners of a circle
-ON_SPHERE = 300
-
-
-class Shapes(NamedTuple):
-    """Capsules of a robot, and a sentence for each that says how well it fits."""
-
-    capsules: tuple[Capsule, ...]
-    sentences: tuple[str, ...]
-
-
-def capsules_of(arm: UrdfArm, sheet: DriveSheet, names: tuple[str, ...], folder: Path) -> Shapes:
-    """Fitted to the shapes of each link; without any, from its joint to the next with the sheet's
-    radius.
-    """
-    capsules = []
-    sentences = []
-    for k, link in enumerate(arm.links):
-        to = arm.origin[k] if k < len(arm.origin) else np.zeros(3)
-        if link.shapes:
-            triangles = np.concatenate([_triangles(shape, folder) for shape in link.shapes])
-            for n, fit in enumerate(fitted(triangles, to)):
-                name = f"{names[k]}_{n}"
-                capsules.append(Capsule(name=name, link=k, p0=fit.p0, p1=fit.p1, radius=fit.radius))
-                size = f"radius {1e3 * fit.radius:.0f} mm"
-                sentences.append(
-                    f"{name}: {size}, stands out {1e3 * fit.overhang:.0f} mm from the shape at most"
-                )
-        elif sheet.radii is not None:
-            radius = float(sheet.radii[k])
-            capsules.append(
-                Capsule(name=f"{names[k]}_0", link=k, p0=np.zeros(3), p1=to, radius=radius)
-            )
-            sentences.append(
-                f"{names[k]}_0: no shape; radius {1e3 * radius:.0f} mm along its axis, an estimate"
-            )
-        else:
-            raise CommandError(
-                f"link {link.name} has no collision shape: give capsule_radius_m in the drive sheet"
-            )
-    return Shapes(tuple(capsules), tuple(sentences))
-
-
-def touching_pairs(
-    arm: UrdfArm, capsules: tuple[Capsule, ...], low: FloatArray, high: FloatArray
-) -> list[tuple[str, str]]:
-    """Pairs of capsules of links that are no neighbours, but for those that touch in nearly every
-    posture, or whose distance hardly changes; low, high (6,) rad.
-    """
-    origins = np.tile(np.eye(4), (len(arm.origin), 1, 1))
-    origins[:, :3, 3] = arm.origin
-    origins[-1, :3, :3] = arm.flange
-    chain = Chain(SimpleNamespace(joint_origin=origins, joint_axis=arm.axis))
-    far = [
-        (a.name, b.name) for a, b in itertools.combinations(capsules, 2) if abs(a.link - b.link) > 1
-    ]
-    model = CollisionModel(chain, capsules, (), far)
-    q = np.random.default_rng(0).uniform(low, high, (SAMPLES, len(low)))
-    distance = model.distances(q)
-    touching = (distance <= 0.0).mean(axis=0)
-    moving = np.ptp(distance, axis=0) > SAME
-    known = {frozenset((pair.body_a, pair.body_b)): z for z, pair in enumerate(model.pairs)}
-    return [pair for pair in far if touching[z := known[frozenset(pair)]] < ALWAYS and moving[z]]
-
-
-def _triangles(shape: UrdfShape, folder: Path) -> FloatArray:
-    """Triangles (T, 3, 3) of a shape in its link."""
-    if shape.kind == "mesh":
-        points = _mesh(shape.file, folder) * shape.size
-    else:
-        points = _hull_triangles(
-            {"box": _box, "cylinder": _cylinder, "sphere": _sphere}[shape.kind](shape.size)
-        )
-    return np.asarray(points @ shape.pose[:3, :3].T + shape.pose[:3, 3])
-
-
-def _mesh(name: str, folder: Path) -> FloatArray:
-    path = next((path for path in _places(name, folder) if path.is_file()), None)
-    if path is None:
-        raise CommandError(f"mesh {name} is not found in {folder} or above it (--packages FOLDER)")
-    if path.suffix.lower() == ".stl":
-        try:
-            return read_stl(path)
-        except InvalidValueError as error:
-            raise CommandError(f"{path}: {error}") from error
-    try:
-        import trimesh
-    except ImportError as error:
-        raise CommandError(f"{path.name} is no STL file: pip install trimesh reads it") from error
-    return np.array(trimesh.load_mesh(path).triangles, dtype=np.float64)
-
-
-def _places(name: str, folder: Path) -> Iterator[Path]:
-    """Where a mesh may be: package://NAME/REST below a folder called NAME, or below this one or one
-    above.
-    """
-    rest = name.removeprefix("package://").removeprefix("file://")
-    yield Path(rest) if Path(rest).is_absolute() else folder / rest
-    inner = rest.partition("/")[2]
-    for above in (folder, *folder.resolve().parents):
-        yield above / rest
-        yield above / inner
-
-
-def _hull_triangles(points: FloatArray) -> FloatArray:
-    from scipy.spatial import ConvexHull
-
-    return np.asarray(points[ConvexHull(points).simplices])
-
-
-def _box(size: FloatArray) -> FloatArray:
-    return np.array(list(itertools.product(*((-s / 2, s / 2) for s in size))))
-
-
-def _cylinder(size: FloatArray) -> FloatArray:
-    turn = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
-    radius = size[0] / np.cos(np.pi / AROUND)  # the polygon encloses the circle
-    rim = np.stack([radius * np.cos(turn), radius * np.sin(turn), np.zeros(AROUND)], axis=1)
-    up = np.array([0.0, 0.0, size[1] / 2.0])
-    return np.concatenate([rim + up, rim - up])
-
-
-def _sphere(size: FloatArray) -> FloatArray:
-    k = np.arange(ON_SPHERE) + 0.5
-    height = 1.0 - 2.0 * k / ON_SPHERE
-    turn = np.pi * (1.0 + np.sqrt(5.0)) * k
-    flat = np.sqrt(1.0 - height**2)
-    return np.asarray(
-        size[0] * 1.02 * np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1)
-    )
-
 
 BYTES_MAX = 8_000_000
 
 
-def write_robot(urdf: Path, drives: Path, tip: str, packages: Path | None, out: Path) -> None:
-    """Write the robot file, and say how well its capsules fit. Raises CommandError."""
+@dataclass(frozen=True)
+class RobotSource:
+    """What a robot file is made from: a URDF or xacro file, a drive sheet or a payload [kg], the
+    mass [kg] of the arm; tip: link at the flange ("": found); without: links that are left out;
+    packages: a folder below which packages lie.
+    """
+
+    urdf: Path
+    drives: Path | None = None
+    payload: float | None = None
+    mass: float | None = None
+    tip: str = ""
+    without: tuple[str, ...] = ()
+    packages: Path | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class MadeRobot:
+    """A robot file as text, read back as `robot`, and sentences on how it was made."""
+
+    text: str
+    robot: RobotModel
+    arm: UrdfArm
+    bodies: tuple[tuple[LinkBody, ...], ...]
+    shapes: Shapes
+    pairs: Pairs
+    notes: tuple[str, ...]
+
+
+def made_robot(source: RobotSource) -> MadeRobot:
+    """The robot of a URDF. Raises InputError with the place and the remedy."""
     try:
-        arm = urdf_arm(_text(urdf), str(urdf), tip)
-        sheet = drive_sheet(_text(drives), str(drives), arm)
-    except (DescriptionError, InvalidValueError) as error:
+        return _made(source)
+    except RobotFileError as error:
         raise InputError(str(error)) from error
-    shapes = capsules_of(arm, sheet, link_names(arm, sheet), packages or urdf.parent)
+    except (DescriptionError, InvalidValueError) as error:
+        place = "" if str(source.urdf) in str(error) else f"{source.urdf}: "
+        raise InputError(f"{place}{error}") from error
+
+
+def _made(source: RobotSource) -> MadeRobot:
+    urdf = source.urdf
+    arm = urdf_arm(_urdf_text(source), str(urdf), source.tip, source.without)
+    meshes = Meshes(urdf.parent, source.packages)
+    bodies = tuple(tuple(link_bodies(link.shapes, meshes)) for link in arm.links)
+    if not any(bodies):
+        raise RobotFileError(str(urdf), 0, "no link has a body: there is nothing to keep clear")
+    arm, masses = with_masses(arm, bodies, source.mass)
+    sheet = _sheet(source, arm)
+    names = link_names(arm, sheet)
+    shapes = capsules_of(arm, bodies, names, sheet.radii)
     low, high = (np.radians(sheet.values[f"position_{end}_deg"].numbers) for end in ("min", "max"))
-    pairs = touching_pairs(arm, shapes.capsules, low, high)
-    try:
-        write_file(
-            out, robot_text(arm, sheet, shapes.capsules, pairs, _comments(urdf, drives, shapes))
+    pairs = pairs_of(arm, shapes.capsules, bodies, low, high)
+    notes = [*arm.notes, *meshes.notes, *masses, *sheet.notes]
+    if "machine_home_deg" not in sheet.values:
+        sheet = with_home(sheet, _home(arm, sheet, shapes, pairs, (low, high)))
+    text = robot_text(
+        arm, sheet, shapes.capsules, pairs.pairs, pairs.reduced, _comments(source, shapes, notes)
+    )
+    robot = robot_from_yaml(text, f"the robot made from {urdf}", _folder(source))
+    return MadeRobot(text, robot, arm, bodies, shapes, pairs, tuple(notes))
+
+
+def _home(
+    arm: UrdfArm,
+    sheet: DriveSheet,
+    shapes: Shapes,
+    pairs: Pairs,
+    limits: tuple[FloatArray, FloatArray],
+) -> Value:
+    peak = np.minimum(
+        sheet.values["gear_peak_torque_nm"].numbers,
+        sheet.values["motor_peak_torque_nm"].numbers * sheet.values["gear_ratio"].numbers,
+    )
+    payload = float(sheet.values["rated_payload_kg"].numbers)
+    found = Postures(arm, shapes.capsules, pairs, limits, peak, payload).home()
+    home = np.asarray(np.round(np.degrees(found), 3), dtype=np.float64)
+    return Value(home, "search", "M", "free of itself, above the floor, and held with the payload")
+
+
+def _sheet(source: RobotSource, arm: UrdfArm) -> DriveSheet:
+    if source.drives is not None:
+        return drive_sheet(_text(source.drives), str(source.drives), arm)
+    if source.payload is None:
+        raise InputError(
+            f"{source.urdf}: a URDF does not say what the robot may carry: give --payload KG, or a "
+            "drive sheet with --drives FILE (ir robot new --template prints an empty one)"
         )
+    name = re.sub(r"[^A-Za-z0-9_.-]+", "_", source.urdf.name.partition(".")[0]).lstrip(
+        "0123456789_.-"
+    )
+    return estimated_sheet(name[:64] or "robot", arm.name[:64], source.payload, arm)
+
+
+def _urdf_text(source: RobotSource) -> str:
+    text = _text(source.urdf)
+    if source.urdf.suffix == ".xacro" or "<xacro:" in text:
+        return expanded(source.urdf, source.packages)
+    return text
+
+
+def _folder(source: RobotSource) -> Path:
+    """Where a controller's file of the sheet lies."""
+    return (source.drives or source.urdf).parent
+
+
+def write_robot(source: RobotSource, out: Path) -> None:
+    """Write the robot file, and say how well it fits. Raises InputError, CommandError."""
+    made = made_robot(source)
+    errors = [each for each in remarks_on(made.robot) if each.severity == "error"]
+    if errors:
+        said = "; ".join(f"{each.subject}: {each.sentence}" for each in errors)
+        raise CommandError(f"{source.urdf}: {out} is not written, nothing could be planned: {said}")
+    try:
+        write_file(out, made.text)
     except OSError as error:
         raise CommandError(f"{out} can't be written: {error.strerror}") from error
-    _say(out, arm, sheet, shapes, len(pairs))
+    _say(out, made)
 
 
-def _comments(urdf: Path, drives: Path, shapes: Shapes) -> list[str]:
-    return [
-        f"Written from {urdf.name} and {drives.name}. Frames: parallel to the base at q = 0, the "
+def _comments(source: RobotSource, shapes: Shapes, notes: Sequence[str]) -> list[str]:
+    sheet = f" and {source.drives.name}" if source.drives else ""
+    lines = [
+        f"Written from {source.urdf.name}{sheet}. Frames: parallel to the base at q = 0, the "
         "last at the",
         "flange with x out. Capsules, and how far they stand out from what they enclose:",
         *(f"  {sentence}" for sentence in shapes.sentences),
     ]
+    if notes:
+        lines += ["Read otherwise than it stands there, or estimated:", *(f"  {n}" for n in notes)]
+    return [line.replace("\n", " ") for line in lines]
 
 
-def _say(out: Path, arm: UrdfArm, sheet: DriveSheet, shapes: Shapes, pairs: int) -> None:
-    guessed = sorted(key for key, value in sheet.values.items() if value.confidence == "L")
-    sys.stdout.write("\n".join(shapes.sentences) + "\n")
-    sys.stdout.write(f"{pairs} pairs of capsules can touch\n")
-    if guessed:
-        sys.stdout.write(f"estimated: {', '.join(guessed)}\n")
-    sys.stdout.write(
-        f"{out}: robot {sheet.name} of {len(arm.joints)} axes; next: ir robot check {out}\n"
+def _say(out: Path, made: MadeRobot) -> None:
+    robot = made.robot
+    lines = [*made.shapes.sentences]
+    lines += [f"note: {note}" for note in made.notes]
+    bodies = sum(map(len, made.bodies))
+    lines.append(
+        f"{bodies} bodies of the URDF in {len(robot.capsules)} capsules; "
+        f"{len(robot.self_pairs)} pairs of them can touch, neighbours are left out"
     )
+    lines += [kept_sentence(each) for each in made.pairs.reduced]
+    guessed = sorted({p.rpartition(".")[2] for p, mark in robot.marks.items() if mark == "L"})
+    if guessed:
+        lines.append(f"estimated (confidence L): {', '.join(guessed)}")
+    lines.append(f"home: {np.round(np.degrees(robot.machine_home), 3).tolist()} deg")
+    lines.append(
+        f"{out}: robot {robot.name} of {robot.n} axes; next: ir robot check {out}, "
+        f"ir plan --robot {out}"
+    )
+    sys.stdout.write("\n".join(lines) + "\n")
 
 
 def _text(path: Path) -> str:

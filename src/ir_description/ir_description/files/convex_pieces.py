@@ -91,12 +91,10 @@ class _Solid:
         there = self._triangles[self._owner[nearest]]
         inside = winding(self._triangles, centres) > 0.5
         candidates = range(_NEIGHBOURS)
-        to_mesh = np.min([_point_triangle(centres, there[:, k]) for k in candidates], axis=0)
+        to_mesh = np.min([point_triangle(centres, there[:, k]) for k in candidates], axis=0)
         distance = np.where(inside, 0.0, to_mesh)
         # the distance to a triangle is convex: over another one it is largest in a corner
-        corners = [
-            [_point_triangle(parts[:, c], there[:, k]) for c in range(3)] for k in candidates
-        ]
+        corners = [[point_triangle(parts[:, c], there[:, k]) for c in range(3)] for k in candidates]
         worst = np.minimum(distance + radius, np.max(corners, axis=1).min(axis=0))
         deep = inside & (np.asarray(samples)[:, 0] - self._step >= radius)
         return distance, np.where(deep, 0.0, worst)
@@ -134,7 +132,7 @@ def _longest(triangles: FloatArray) -> FloatArray:
     return longest
 
 
-def _point_triangle(points: FloatArray, triangles: FloatArray) -> FloatArray:
+def point_triangle(points: FloatArray, triangles: FloatArray) -> FloatArray:
     """Distance (N,) of each point (N, 3) from its triangle (N, 3, 3)."""
     a = triangles[:, 0]
     b = triangles[:, 1]

@@ -1,16 +1,39 @@
-"""A robot file from a URDF and a sheet of drive figures."""
+"""A robot file from a URDF and what is known of its drives."""
 
-from ir_description.files.making.capsule_fit import CapsuleFit, fitted
-from ir_description.files.making.robot_text import TEMPLATE, DriveSheet, drive_sheet, robot_text
+from ir_description.files.making.capsule_fit import CapsuleFit, encloses, fitted
+from ir_description.files.making.estimates import holding_torques, with_masses
+from ir_description.files.making.link_bodies import LinkBody, Meshes, link_bodies
+from ir_description.files.making.robot_text import (
+    TEMPLATE,
+    DriveSheet,
+    Value,
+    drive_sheet,
+    estimated_sheet,
+    link_names,
+    robot_text,
+    with_home,
+)
 from ir_description.files.making.urdf_arm import UrdfArm, urdf_arm
+from ir_description.files.making.xacro_file import expanded
 
 __all__ = [
     "TEMPLATE",
     "CapsuleFit",
     "DriveSheet",
+    "LinkBody",
+    "Meshes",
     "UrdfArm",
+    "Value",
     "drive_sheet",
+    "encloses",
+    "estimated_sheet",
+    "expanded",
     "fitted",
+    "holding_torques",
+    "link_bodies",
+    "link_names",
     "robot_text",
     "urdf_arm",
+    "with_home",
+    "with_masses",
 ]

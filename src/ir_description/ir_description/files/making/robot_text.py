@@ -5,16 +5,18 @@ touch.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from importlib.resources import files
 
 import numpy as np
 
+from ir_description.files.making.estimates import WORTH, peak_torques, usual_speeds
 from ir_description.files.making.urdf_arm import AXES, UrdfArm
 from ir_description.files.power_file import figure
 from ir_description.files.robot_file import FORMAT
 from ir_description.poses import abc_from_rotation
+from ir_description.robot import ReducedDistance
 from ir_description.shapes import Capsule
 from ir_values.arrays import FloatArray
 from ir_values.errors import RobotFileError
@@ -66,9 +68,10 @@ class DriveSheet:
     controller: Node | None
     counterbalance: Node | None
     radii: FloatArray | None
+    notes: tuple[str, ...] = ()
 
 
-_KEYS = ("format", "name", "rated_payload_kg", "machine_home_deg")
+_KEYS = ("format", "name", "rated_payload_kg")
 _ROWS = {
     "position_min_deg": ("deg", -3600.0),
     "position_max_deg": ("deg", -3600.0),
@@ -84,6 +87,7 @@ _ROWS = {
     "copper_loss_w_per_nm2": ("W/Nm^2", 0.0),
 }
 _OPTIONAL = (
+    "machine_home_deg",
     "title",
     "joint_names",
     "link_names",
@@ -105,12 +109,13 @@ def drive_sheet(text: str, source: str, arm: UrdfArm) -> DriveSheet:
     known["rated_payload_kg"] = _value(
         top["rated_payload_kg"], lambda item: item.number(0, 1e4, "kg", above=True)
     )
-    known["machine_home_deg"] = _value(
-        top["machine_home_deg"], lambda item: item.numbers(AXES, -3600, 3600, "deg")
-    )
+    if "machine_home_deg" in top and not _unknown(top["machine_home_deg"]):
+        known["machine_home_deg"] = _value(
+            top["machine_home_deg"], lambda item: item.numbers(AXES, -3600, 3600, "deg")
+        )
     if "envelope_rad_s_nm" in top and not _unknown(top["envelope_rad_s_nm"]):
         known["envelope_rad_s_nm"] = _value(top["envelope_rad_s_nm"], _envelope)
-    _complete(known, arm, source)
+    notes = _complete(known, arm, source)
     radii = (
         top["capsule_radius_m"].numbers(AXES + 1, 0, 100, "m", above=True)
         if "capsule_radius_m" in top
@@ -125,7 +130,20 @@ def drive_sheet(text: str, source: str, arm: UrdfArm) -> DriveSheet:
         controller=top["controller"].node if "controller" in top else None,
         counterbalance=top["counterbalance"].node if "counterbalance" in top else None,
         radii=radii,
+        notes=notes,
     )
+
+
+def estimated_sheet(name: str, title: str, payload: float, arm: UrdfArm) -> DriveSheet:
+    """The sheet of an arm of which only its payload [kg] is known."""
+    known = {"rated_payload_kg": Value(np.array(payload), "stated", "M")}
+    notes = _complete(known, arm, arm.name)
+    return DriveSheet(name, title, (), (), known, None, None, None, notes)
+
+
+def with_home(sheet: DriveSheet, home: Value) -> DriveSheet:
+    """The sheet with a machine home [deg]."""
+    return replace(sheet, values={**sheet.values, "machine_home_deg": home})
 
 
 def _unknown(item: Item) -> bool:
@@ -155,35 +173,37 @@ def _names(top: Table, key: str, count: int) -> tuple[str, ...]:
     return tuple(item.name() for item in top[key].list(count, count)) if key in top else ()
 
 
-def _complete(known: dict[str, Value], arm: UrdfArm, source: str) -> None:
-    """Take from the URDF what it has, and estimate the rest."""
-
-    def taken(key: str, numbers: list[float], what: str) -> None:
-        if key in known:
-            return
-        if not all(numbers):
-            joint = arm.joints[[bool(n) for n in numbers].index(False)].name
-            raise RobotFileError(
-                source, 0, f"{key} is unknown and the URDF has no {what} for {joint}"
-            )
-        known[key] = Value(np.array(numbers), "URDF", "M")
+def _complete(known: dict[str, Value], arm: UrdfArm, source: str) -> tuple[str, ...]:
+    """Take from the URDF what it has, and estimate the rest; sentences on what it has and was not
+    taken. Raises RobotFileError for ranges that are none.
+    """
 
     def estimated(key: str, numbers: FloatArray, note: str) -> None:
         known.setdefault(key, Value(np.asarray(numbers), "estimate", "L", note))
 
-    turning = [joint.kind == "continuous" for joint in arm.joints]
-    ends = [
-        (-360.0, 360.0) if turn else tuple(np.degrees([joint.lower, joint.upper]))
-        for joint, turn in zip(arm.joints, turning, strict=True)
-    ]
-    known.setdefault("position_min_deg", Value(np.array([low for low, _ in ends]), "URDF", "M"))
-    known.setdefault("position_max_deg", Value(np.array([high for _, high in ends]), "URDF", "M"))
-    taken(
-        "velocity_deg_s",
-        [float(np.degrees(joint.velocity)) for joint in arm.joints],
-        "velocity limit",
-    )
-    taken("gear_peak_torque_nm", [joint.effort for joint in arm.joints], "effort limit")
+    ends = np.array([_range(joint.kind, joint.lower, joint.upper) for joint in arm.joints])
+    known.setdefault("position_min_deg", Value(ends[:, 0], "URDF", "M"))
+    known.setdefault("position_max_deg", Value(ends[:, 1], "URDF", "M"))
+    low = known["position_min_deg"].numbers
+    high = known["position_max_deg"].numbers
+    if not (low < high).all():
+        k = int(np.argmin(low < high))
+        raise RobotFileError(
+            source,
+            0,
+            f"joint {arm.joints[k].name} may turn from {low[k]:g} to {high[k]:g} deg: "
+            "position_min_deg must be below position_max_deg",
+        )
+    notes = []
+    speeds = np.degrees([joint.velocity for joint in arm.joints])
+    if speeds.all():
+        known.setdefault("velocity_deg_s", Value(speeds, "URDF", "M"))
+    else:
+        usual = np.where(speeds > 0.0, speeds, usual_speeds(arm.reach))
+        estimated("velocity_deg_s", usual, "usual for the reach where the URDF has none")
+    if "gear_peak_torque_nm" not in known:
+        known["gear_peak_torque_nm"], note = _torques(known, arm)
+        notes += note
     speed = np.radians(known["velocity_deg_s"].numbers)
     peak = known["gear_peak_torque_nm"].numbers
     estimated("acceleration_rad_s2", speed / RAMP, f"full speed in {RAMP:g} s")
@@ -222,9 +242,35 @@ def _complete(known: dict[str, Value], arm: UrdfArm, source: str) -> None:
         np.array(pairs),
         "peak torque to 62 % of full speed, half of it at full speed",
     )
+    return tuple(notes)
+
+
+def _range(kind: str, lower: float, upper: float) -> tuple[float, float]:
+    """deg; an endless joint turns once to both sides."""
+    endless = kind == "continuous" and not lower < upper
+    return (-360.0, 360.0) if endless else (float(np.degrees(lower)), float(np.degrees(upper)))
+
+
+def _torques(known: Mapping[str, Value], arm: UrdfArm) -> tuple[Value, list[str]]:
+    """Peak torques: the efforts of the URDF where these can be meant, else estimates."""
+    low, high = (np.radians(known[f"position_{end}_deg"].numbers) for end in ("min", "max"))
+    peak, held = peak_torques(arm, low, high, float(known["rated_payload_kg"].numbers))
+    effort = np.array([joint.effort for joint in arm.joints])
+    meant = (effort >= WORTH[0] * held) & (effort <= WORTH[1] * peak) & (effort > 0.0)
+    if meant.all():
+        return Value(effort, "URDF", "M"), []
+    notes = [
+        f"effort of {joint.name} is {joint.effort:g} Nm in the URDF, holding arm and payload needs "
+        f"{need:.3g} Nm: {estimate:.3g} Nm are taken"
+        for joint, need, estimate, good in zip(arm.joints, held, peak, meant, strict=True)
+        if joint.effort > 0.0 and not good
+    ]
+    note = "1.5 times what holds arm and payload where the URDF has none that can be meant"
+    return Value(np.where(meant, effort, peak), "estimate", "L", note), notes
 
 
 _DIGITS = 11  # significant ones: more than any figure has, fewer than rounding spoils
+_ALL_DIGITS = 17  # of an axis, whose length must be 1 to 1e-12
 _JOINT_ROWS = (
     "position_min_deg",
     "position_max_deg",
@@ -249,10 +295,11 @@ def robot_text(
     sheet: DriveSheet,
     capsules: Sequence[Capsule],
     self_pairs: Iterable[tuple[str, str]],
+    reduced: Iterable[ReducedDistance] = (),
     comments: Iterable[str] = (),
 ) -> str:
     """The robot file; `comments` stand at its top."""
-    return "\n".join(_lines(arm, sheet, capsules, self_pairs, comments)) + "\n"
+    return "\n".join(_lines(arm, sheet, capsules, self_pairs, reduced, comments)) + "\n"
 
 
 def _lines(
@@ -260,6 +307,7 @@ def _lines(
     sheet: DriveSheet,
     capsules: Sequence[Capsule],
     self_pairs: Iterable[tuple[str, str]],
+    reduced: Iterable[ReducedDistance],
     comments: Iterable[str],
 ) -> Iterator[str]:
     links = link_names(arm, sheet)
@@ -283,7 +331,7 @@ def _lines(
             "  rotation_abc_deg: "
             f"{_figure(Value(angles, 'URDF', 'H', 'x of the flange points out'))}"
         )
-    yield f"  axis: {_figure(Value(arm.axis, 'URDF', 'H'))}"
+    yield f"  axis: {_figure(Value(arm.axis, 'URDF', 'H'), _ALL_DIGITS)}"
     yield from (f"  {key}: {_figure(sheet.values[key])}" for key in _JOINT_ROWS)
     yield "drives:"
     yield from (f"  {key}: {_figure(sheet.values[key])}" for key in _DRIVE_ROWS)
@@ -292,9 +340,10 @@ def _lines(
         J = link.inertia
         entries = np.array([J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]])
         yield f"  - name: {name}"
-        yield f"    mass_kg: {_figure(Value(np.array(link.mass), 'URDF', 'M'))}"
-        yield f"    com_m: {_figure(Value(link.com, 'URDF', 'M'))}"
-        yield f"    inertia_kgm2: {_figure(Value(entries, 'URDF', 'M'))}"
+        whence = ("estimate", "L", link.estimate) if link.estimate else ("URDF", "M")
+        yield f"    mass_kg: {_figure(Value(np.array(link.mass), *whence))}"
+        yield f"    com_m: {_figure(Value(link.com, *whence))}"
+        yield f"    inertia_kgm2: {_figure(Value(entries, *whence))}"
     yield from _written("counterbalance", sheet.counterbalance)
     yield "capsules:"
     for capsule in capsules:
@@ -302,7 +351,15 @@ def _lines(
         yield f"  - {{name: {capsule.name}, link: {links[capsule.link]}, {ends}}}"
     pairs = list(self_pairs)
     yield "self_pairs:" if pairs else "self_pairs: []"
-    yield from (f"  - [{a}, {b}]" for a, b in pairs)
+    own = {frozenset(each[:2]): each for each in reduced}
+    for pair in pairs:
+        listed = f"[{pair[0]}, {pair[1]}]"
+        each = own.get(frozenset(pair))
+        if each is None:
+            yield f"  - {listed}"
+        else:
+            distance = f"safety_distance_m: {_flow(each.distance)}"
+            yield f"  - {{pair: {listed}, {distance}, reason: {json.dumps(each.reason)}}}"
     last = len(links) - 1
     loaded = [capsule.name for capsule in capsules if capsule.link < last - 1]
     yield f"load_self_capsules: [{', '.join(loaded)}]"
@@ -324,20 +381,20 @@ def _written(key: str, node: Node | None) -> Iterator[str]:
         yield from (f"  {line}" for line in lines)
 
 
-def _figure(value: Value) -> str:
+def _figure(value: Value, digits: int = _DIGITS) -> str:
     note = f", note: {json.dumps(value.note)}" if value.note else ""
-    own = _flow(value.numbers)
+    own = _flow(value.numbers, digits)
     return (
         f"{{value: {own}, source: {json.dumps(value.source)}, confidence: "
         f"{value.confidence}{note}}}"
     )
 
 
-def _flow(values: FloatArray | float) -> str:
-    return json.dumps(_rounded(np.asarray(values, dtype=np.float64).tolist()))
+def _flow(values: FloatArray | float, digits: int = _DIGITS) -> str:
+    return json.dumps(_rounded(np.asarray(values, dtype=np.float64).tolist(), digits))
 
 
-def _rounded(values: object) -> object:
+def _rounded(values: object, digits: int) -> object:
     if isinstance(values, list):
-        return [_rounded(value) for value in values]
-    return float(f"{values:.{_DIGITS}g}") + 0.0
+        return [_rounded(value, digits) for value in values]
+    return float(f"{values:.{digits}g}") + 0.0

@@ -1,206 +1,99 @@
 """The six axes of a URDF, in frames parallel to the base at q = 0 and a flange whose x points out.
 
-Fixed joints disappear: what they carry belongs to the link that carries them. A tool frame (tool0,
-flange) says where the flange is and how it is turned.
+Fixed joints disappear: what they carry belongs to the link that carries them. So does what hangs on
+a moving joint that leads to no flange (fingers, a linkage): it stands for everywhere that this
+joint can move it. A tool frame (tool0, flange) says where the flange is and how it is turned.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from ir_description.files.robot_file import inertia_matrix
-from ir_description.poses import rotation_from_abc
+from ir_description.files.making.urdf_tree import (
+    UrdfJoint,
+    UrdfLink,
+    UrdfShape,
+    UrdfTree,
+    urdf_tree,
+)
 from ir_description.robot import TOOL0
 from ir_values.arrays import FloatArray
 from ir_values.errors import RobotFileError, listed, shown
 
-# The part of URDF that says how an arm is built: links with masses and shapes, joints with limits.
-
+AXES = 6
 MOVING = ("revolute", "continuous")
+TIPS = ("flange", "tool0")
 EXACT = 2e-5
 """Entries of a rotation miss 0 or 1 by so much where angles were written with five digits."""
+SAID = 1e-9  # m: rounding that moves points by less is not worth a sentence
+_BODY = 0.5  # m: how far bodies reach beyond the frames of an arm, for a bound of rounding
 
 
 @dataclass(frozen=True, eq=False)
-class UrdfShape:
-    """A collision shape: kind ("mesh", "box", "cylinder", "sphere"), its pose (4, 4) in its link,
-    size (3,) [m] (box: edges; cylinder: radius, length; mesh: scale), and the file of a mesh.
+class SideMotion:
+    """A joint beside the planned axes: `pose` (4, 4) of its frame in the link that carries it,
+    `axis` (3,) in it, "revolute" or "prismatic", from `lower` to `upper` [rad or m].
     """
 
+    joint: str
     kind: str
     pose: FloatArray
-    size: FloatArray
-    file: str = ""
+    axis: FloatArray
+    lower: float
+    upper: float
+
+    def at(self, value: float) -> FloatArray:
+        """The pose (4, 4) of what the joint carries at a value, in the link that carries it."""
+        step = np.eye(4)
+        if self.kind == "prismatic":
+            step[:3, 3] = value * self.axis
+        else:
+            step[:3, :3] = _turn(self.axis, value)
+        return np.asarray(self.pose @ step)
 
 
 @dataclass(frozen=True, eq=False)
-class UrdfLink:
-    """mass [kg] (0: none is given), com (3,) [m], inertia (3, 3) [kg m^2] about it, in the link's
-    frame.
+class PlacedShape:
+    """A collision shape in the frame of its planned link: its `shape`, and the `motions`, inner
+    first, of joints beside the planned axes that move it.
+    """
+
+    shape: UrdfShape
+    motions: tuple[SideMotion, ...] = ()
+
+    def moved(self, pose: FloatArray) -> PlacedShape:
+        """The same re-expressed by the pose (4, 4) of its frame in another one."""
+        if not self.motions:
+            return replace(self, shape=replace(self.shape, pose=pose @ self.shape.pose))
+        *inner, last = self.motions
+        return replace(self, motions=(*inner, replace(last, pose=pose @ last.pose)))
+
+
+@dataclass(frozen=True, eq=False)
+class ArmLink:
+    """A link with everything that belongs to it, in its frame: mass [kg] (0: the URDF gives none),
+    com (3,) [m], inertia (3, 3) [kg m^2] about it; estimate: whence these are where not from the
+    URDF.
     """
 
     name: str
     mass: float
     com: FloatArray
     inertia: FloatArray
-    shapes: tuple[UrdfShape, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class UrdfJoint:
-    """A joint, the pose (4, 4) of its frame in the parent link, limits [rad, rad/s, Nm], 0: not
-    given.
-    """
-
-    name: str
-    kind: str
-    parent: str
-    child: str
-    pose: FloatArray
-    axis: FloatArray
-    lower: float
-    upper: float
-    velocity: float
-    effort: float
-
-
-@dataclass(frozen=True)
-class UrdfTree:
-    """A robot: its links and joints by name; joints by the link that they carry."""
-
-    name: str
-    links: dict[str, UrdfLink]
-    above: dict[str, UrdfJoint]
-
-
-def urdf_tree(text: str, source: str) -> UrdfTree:
-    """Read a URDF. Raises RobotFileError."""
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise RobotFileError(source, 0, "the URDF defines entities: they are not read")
-    if "<xacro:" in text:
-        raise RobotFileError(
-            source, 0, "this is a xacro file: expand it first (xacro FILE > robot.urdf)"
-        )
-    try:
-        root = Xml.fromstring(text)
-    except Xml.ParseError as error:
-        raise RobotFileError(source, error.position[0], f"this is not XML: {error}") from error
-    if root.tag != "robot":
-        raise RobotFileError(source, 0, f"the document is {shown(root.tag)}, must be 'robot'")
-    try:
-        links = {link.name: link for link in map(_link, root.findall("link"))}
-        joints = [_joint(element) for element in root.findall("joint")]
-    except (ValueError, KeyError) as error:
-        raise RobotFileError(source, 0, f"a value is missing or no number: {error}") from error
-    for joint in joints:
-        for name in (joint.parent, joint.child):
-            if name not in links:
-                raise RobotFileError(
-                    source, 0, f"joint {joint.name} names the link {shown(name)}: {listed(links)}"
-                )
-    return UrdfTree(root.get("name") or "robot", links, {joint.child: joint for joint in joints})
-
-
-def _link(element: Xml.Element) -> UrdfLink:
-    name = element.attrib["name"]
-    inertial = element.find("inertial")
-    shapes = tuple(
-        shape for one in element.findall("collision") if (shape := _shape(one)) is not None
-    )
-    if inertial is None:
-        return UrdfLink(name, 0.0, np.zeros(3), np.zeros((3, 3)), shapes)
-    pose = _origin(inertial)
-    mass = inertial.find("mass")
-    inertia = inertial.find("inertia")
-    keys = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-    entries = [float(inertia.get(key, "0")) if inertia is not None else 0.0 for key in keys]
-    about = pose[:3, :3] @ inertia_matrix(entries) @ pose[:3, :3].T
-    return UrdfLink(
-        name, float(mass.attrib["value"]) if mass is not None else 0.0, pose[:3, 3], about, shapes
-    )
-
-
-def _joint(element: Xml.Element) -> UrdfJoint:
-    axis = element.find("axis")
-    limit = element.find("limit")
-    direction = (
-        _numbers(axis.get("xyz", "1 0 0")) if axis is not None else np.array([1.0, 0.0, 0.0])
-    )
-    parent = element.find("parent")
-    child = element.find("child")
-    if parent is None or child is None:
-        raise ValueError(f"joint {element.attrib['name']} has no parent or no child")
-    values = [float(limit.get(key, "0")) if limit is not None else 0.0 for key in _LIMITS]
-    length = float(np.linalg.norm(direction))
-    if not length > 0.0:
-        raise ValueError(f"the axis of joint {element.attrib['name']} has no length")
-    return UrdfJoint(
-        element.attrib["name"],
-        element.attrib["type"],
-        parent.attrib["link"],
-        child.attrib["link"],
-        _origin(element),
-        direction / length,
-        *values,
-    )
-
-
-_LIMITS = ("lower", "upper", "velocity", "effort")
-
-
-def _shape(element: Xml.Element) -> UrdfShape | None:
-    geometry = element.find("geometry")
-    for one in () if geometry is None else geometry:
-        pose = _origin(element)
-        if one.tag == "mesh":
-            return UrdfShape(
-                "mesh", pose, _numbers(one.get("scale", "1 1 1")), one.attrib["filename"]
-            )
-        if one.tag == "box":
-            return UrdfShape("box", pose, _numbers(one.attrib["size"]))
-        if one.tag == "cylinder":
-            size = np.array([float(one.attrib["radius"]), float(one.attrib["length"]), 0.0])
-            return UrdfShape("cylinder", pose, size)
-        if one.tag == "sphere":
-            return UrdfShape("sphere", pose, np.array([float(one.attrib["radius"]), 0.0, 0.0]))
-    return None
-
-
-def _origin(element: Xml.Element) -> FloatArray:
-    """The pose (4, 4) of an element's origin; angles written with few digits are taken as right
-    angles.
-    """
-    pose = np.eye(4)
-    origin = element.find("origin")
-    if origin is not None:
-        roll, pitch, yaw = np.degrees(_numbers(origin.get("rpy", "0 0 0")))
-        R = rotation_from_abc((yaw, pitch, roll))
-        near = np.round(R)
-        pose[:3, :3] = near if np.abs(R - near).max() < EXACT else R
-        pose[:3, 3] = _numbers(origin.get("xyz", "0 0 0"))
-    return pose
-
-
-def _numbers(text: str) -> FloatArray:
-    values = np.array([float(word) for word in text.split()])
-    if values.shape != (3,) or not np.isfinite(values).all():
-        raise ValueError(f"{shown(text)} must be three finite numbers")
-    return values
-
-
-AXES = 6
-TIPS = ("flange", "tool0")
-_ON_AXIS = 1e-6  # m: by which a flange may lie beside axis 6
+    shapes: tuple[PlacedShape, ...]
+    estimate: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class UrdfArm:
     """joints: the moving ones; origin (6, 3) [m] of each in the frame of the link before, axis (6,
     3) in its own; flange (3, 3): the last frame in the base at q = 0. links: 7, in these frames.
+    rounding [m]: by which right angles that were written with few digits move any point, at most.
+    notes: what was read otherwise than it stands there, in words.
     """
 
     name: str
@@ -208,22 +101,90 @@ class UrdfArm:
     origin: FloatArray
     axis: FloatArray
     flange: FloatArray
-    links: tuple[UrdfLink, ...]
+    links: tuple[ArmLink, ...]
+    rounding: float = 0.0
+    notes: tuple[str, ...] = ()
+
+    @property
+    def joint_origin(self) -> FloatArray:
+        """Poses (6, 4, 4) of the joints' frames, as kinematics take them."""
+        origins = np.tile(np.eye(4), (len(self.origin), 1, 1))
+        origins[:, :3, 3] = self.origin
+        origins[-1, :3, :3] = self.flange
+        return origins
+
+    @property
+    def joint_axis(self) -> FloatArray:
+        """Axes (6, 3)."""
+        return self.axis
+
+    @property
+    def reach(self) -> float:
+        """Sum of the distances from joint to joint, without the first [m]."""
+        return float(np.linalg.norm(self.origin[1:], axis=1).sum())
 
 
-def urdf_arm(text: str, source: str, tip: str = "") -> UrdfArm:
+def urdf_arm(text: str, source: str, tip: str = "", without: Collection[str] = ()) -> UrdfArm:
     """The arm from the base to a link `tip` ("": flange, tool0 or the link that ends the longest
-    chain).
+    chain); without: links that are left out with all that they carry.
 
     Raises RobotFileError where it has not six turning axes.
     """
-    tree = urdf_tree(text, source)
-    path = _path(tree, _tip(tree, tip, source))
+    read = urdf_tree(text, source)
+    path, rounding = _right_angles(_path(read, _tip(read, tip, source), source))
+    moving = _axes(path, source)
+    tree = replace(read, above={**read.above, **{joint.child: joint for joint in path}})
+    base = path[0].parent
+    placed = _placed(tree.path(base), path)
+    frames = _frames(path, moving, placed)
+    planned = {joint.name for joint in (*tree.path(base), *path)}
+    gathering = _Gathering(tree, source, without, planned)
+    links = []
+    names = [base, *(joint.child for joint in moving)]
+    for name, group, frame in zip(names, _groups(path, tree.path(base)), frames, strict=True):
+        inverse = np.linalg.inv(frame)
+        links.append(gathering.link(name, group, [inverse @ placed[each] for each in group]))
+    origin = np.array([b[:3, 3] - a[:3, 3] for a, b in pairwise(frames)])
+    turned = [
+        frame[:3, :3].T @ placed[joint.child][:3, :3] @ joint.axis
+        for joint, frame in zip(moving, frames[1:], strict=True)
+    ]
+    axis = _snapped(np.array(turned))
+    rounding += _BODY * float(np.abs(axis - np.array(turned)).sum())
+    notes = [*read.notes, *_below_base(tree.path(base)), *gathering.notes]
+    if rounding > SAID:
+        notes.append(
+            "angles written with few digits are taken as right angles: that moves a point of the "
+            f"arm by at most {1e6 * rounding:.2g} um, by which all capsules are wider"
+        )
+    return UrdfArm(
+        tree.name,
+        tuple(moving),
+        origin,
+        axis / np.linalg.norm(axis, axis=1, keepdims=True),
+        frames[-1][:3, :3],
+        tuple(links),
+        rounding if rounding > SAID else 0.0,
+        tuple(notes),
+    )
+
+
+def _axes(path: Sequence[UrdfJoint], source: str) -> list[UrdfJoint]:
+    """The moving joints of a path; six free turning ones, else RobotFileError."""
     moving = [joint for joint in path if joint.kind != "fixed"]
     for joint in moving:
         if joint.kind not in MOVING:
             raise RobotFileError(
-                source, 0, f"joint {joint.name} is {joint.kind}: only turning axes are planned"
+                source,
+                joint.line,
+                f"joint {joint.name} is {joint.kind}: only turning axes are planned",
+            )
+        if joint.mimic:
+            raise RobotFileError(
+                source,
+                joint.line,
+                f"joint {joint.name} mimics {joint.mimic}: it is no axis of its own, and arms of "
+                "six free axes are planned; see --tip",
             )
     if len(moving) != AXES:
         names = listed(joint.name for joint in moving)
@@ -232,22 +193,15 @@ def urdf_arm(text: str, source: str, tip: str = "") -> UrdfArm:
             0,
             f"the arm has {len(moving)} axes ({names}): arms of six axes are planned; see --tip",
         )
-    placed = _placed(path)
-    frames = _frames(path, moving, placed)
-    links = [
-        _gathered(tree, joint.child if joint else path[0].parent, frame, placed, source)
-        for joint, frame in zip([None, *moving], frames, strict=True)
-    ]
-    origin = np.array([b[:3, 3] - a[:3, 3] for a, b in pairwise(frames)])
-    axis = np.array(
-        [
-            frame[:3, :3].T @ placed[joint.child][:3, :3] @ joint.axis
-            for joint, frame in zip(moving, frames[1:], strict=True)
-        ]
-    )
-    return UrdfArm(
-        tree.name, tuple(moving), origin, _snapped(axis), frames[-1][:3, :3], tuple(links)
-    )
+    for joint in moving:
+        if joint.kind == "revolute" and not joint.lower < joint.upper:
+            raise RobotFileError(
+                source,
+                joint.line,
+                f"joint {joint.name} may turn from {joint.lower:g} to {joint.upper:g} rad: lower "
+                "must be below upper",
+            )
+    return moving
 
 
 def _tip(tree: UrdfTree, tip: str, source: str) -> str:
@@ -256,30 +210,76 @@ def _tip(tree: UrdfTree, tip: str, source: str) -> str:
             source, 0, f"link {shown(tip)} is unknown; known are {listed(tree.links)}"
         )
     known = [name for suffix in TIPS for name in tree.links if name.endswith(suffix)]
-    return tip or (known[0] if known else max(tree.links, key=lambda name: len(_path(tree, name))))
+    six = [name for name in known if _turning(tree, name) == AXES]
+    return tip or (six or known or [max(tree.links, key=lambda name: _turning(tree, name))])[0]
 
 
-def _path(tree: UrdfTree, tip: str) -> list[UrdfJoint]:
+def _turning(tree: UrdfTree, name: str) -> int:
+    return sum(joint.kind in MOVING for joint in tree.path(name))
+
+
+def _path(tree: UrdfTree, tip: str, source: str) -> list[UrdfJoint]:
     """The joints from the base to a link; a first link called world is not the base."""
-    path: list[UrdfJoint] = []
-    while tip in tree.above and len(path) <= len(tree.links):
-        path.insert(0, tree.above[tip])
-        tip = path[0].parent
+    path = tree.path(tip)
     if path and path[0].kind == "fixed" and path[0].parent == "world":
         path = path[1:]
+    if not path:
+        raise RobotFileError(source, 0, f"no joint leads to link {tip}: see --tip")
     return path
 
 
-def _placed(path: list[UrdfJoint]) -> dict[str, FloatArray]:
-    """Pose (4, 4) in the base at q = 0 of every link along the path."""
+def _right_angles(path: Sequence[UrdfJoint]) -> tuple[list[UrdfJoint], float]:
+    """The path with right angles where few digits miss them, and by how much that moves points."""
+    beyond = np.cumsum([float(np.linalg.norm(joint.pose[:3, 3])) for joint in reversed(path)])
+    moved = 0.0
+    result = []
+    for joint, far in zip(path, beyond[::-1], strict=True):
+        R = joint.pose[:3, :3]
+        near = np.round(R)
+        if 0.0 < np.abs(R - near).max() < EXACT:
+            moved += (far + _BODY) * float(np.linalg.norm(R - near))
+            pose = joint.pose.copy()
+            pose[:3, :3] = near
+            joint = replace(joint, pose=pose)  # the same joint, squared
+        result.append(joint)
+    return result, moved
+
+
+def _groups(path: Sequence[UrdfJoint], before: Sequence[UrdfJoint]) -> list[list[str]]:
+    """Names of the links along the path that each planned link consists of; what is below the
+    base belongs to it.
+    """
+    groups = [[*(joint.parent for joint in before), path[0].parent]]
+    for joint in path:
+        if joint.kind == "fixed":
+            groups[-1].append(joint.child)
+        else:
+            groups.append([joint.child])
+    return groups
+
+
+def _placed(before: Sequence[UrdfJoint], path: Sequence[UrdfJoint]) -> dict[str, FloatArray]:
+    """Pose (4, 4) in the base at q = 0 of every link along the path, and of those before it."""
     placed = {path[0].parent: np.eye(4)}
+    for joint in reversed(before):
+        placed[joint.parent] = placed[joint.child] @ np.linalg.inv(joint.pose)
     for joint in path:
         placed[joint.child] = placed[joint.parent] @ joint.pose
     return placed
 
 
+def _below_base(before: Sequence[UrdfJoint]) -> Iterator[str]:
+    for joint in before:
+        if not np.allclose(joint.pose, np.eye(4), atol=1e-9):
+            x, y, z = joint.pose[:3, 3] + 0.0
+            yield (
+                f"joint {joint.name} places {joint.child} at ({x:g}, {y:g}, {z:g}) m in "
+                f"{joint.parent}: a cell says where its robot stands (base)"
+            )
+
+
 def _frames(
-    path: list[UrdfJoint], moving: list[UrdfJoint], placed: dict[str, FloatArray]
+    path: Sequence[UrdfJoint], moving: Sequence[UrdfJoint], placed: dict[str, FloatArray]
 ) -> list[FloatArray]:
     """Poses (4, 4) of the 7 frames in the base: where the joints are, the last where the flange
     is.
@@ -309,41 +309,118 @@ def _snapped(values: FloatArray) -> FloatArray:
     return np.asarray(np.where(np.abs(values - near) < EXACT, near, values))
 
 
-def _gathered(
-    tree: UrdfTree, name: str, frame: FloatArray, placed: dict[str, FloatArray], source: str
-) -> UrdfLink:
-    """A link with everything that is fixed to it, in its frame (4, 4 in the base at q = 0)."""
-    pose = placed[name]
-    parts = list(_fixed(tree, name, np.linalg.inv(frame) @ pose))
-    mass = sum(part.mass for part in parts)
+_Part = tuple[UrdfLink, tuple[PlacedShape, ...]]
+"""A link of the URDF, its mass and its shapes in the frame of another one."""
+
+
+class _Gathering:
+    """What belongs to each planned link; no body is left out but those of `without`."""
+
+    def __init__(
+        self, tree: UrdfTree, source: str, without: Collection[str], planned: set[str]
+    ) -> None:
+        self._tree = tree
+        self._source = source
+        self._without = without
+        self._planned = planned
+        self.notes: list[str] = []
+        for name in without:
+            if name not in tree.links:
+                raise RobotFileError(
+                    source, 0, f"link {shown(name)} is unknown; known are {listed(tree.links)}"
+                )
+
+    def link(self, name: str, names: Sequence[str], poses: Sequence[FloatArray]) -> ArmLink:
+        """The links `names` with everything beside the path that they carry, from their poses (4,
+        4) in the planned link.
+        """
+        parts = [
+            _moved(part, pose)
+            for each, pose in zip(names, poses, strict=True)
+            for part in self._carried(each)
+        ]
+        return _joined(name, parts)
+
+    def _carried(self, name: str) -> Iterator[_Part]:
+        """A link, and what it carries beside the path, in its frame."""
+        if name in self._without:
+            bodies = sum(len(link.shapes) for link in self._below(name))
+            self.notes.append(f"link {name} is left out as asked, with {bodies} bodies")
+            return
+        link = self._tree.links[name]
+        yield link, tuple(PlacedShape(shape) for shape in link.shapes)
+        for joint in self._tree.below(name):
+            if joint.name in self._planned:
+                continue
+            found = list(self._carried(joint.child))
+            if joint.kind == "fixed":
+                yield from (_moved(part, joint.pose) for part in found)
+            else:
+                motion = self._motion(joint)
+                self._say(joint, motion, sum(len(shapes) for _, shapes in found))
+                yield from (_moving(part, motion) for part in found)
+
+    def _say(self, joint: UrdfJoint, motion: SideMotion, bodies: int) -> None:
+        unit = "m" if motion.kind == "prismatic" else "rad"
+        if bodies:
+            self.notes.append(
+                f"joint {joint.name} ({joint.kind}) leads to no flange and is not planned: its "
+                f"{bodies} {'body fills' if bodies == 1 else 'bodies fill'} everything between "
+                f"{motion.lower:.4g} and {motion.upper:.4g} {unit}, masses stand in its middle"
+            )
+
+    def _motion(self, joint: UrdfJoint) -> SideMotion:
+        if joint.kind in ("floating", "planar"):
+            raise RobotFileError(
+                self._source,
+                joint.line,
+                f"joint {joint.name} is {joint.kind}: what it carries may be anywhere; "
+                f"--without {joint.child} leaves that out",
+            )
+        lower, upper = joint.lower, joint.upper
+        endless = joint.kind == "continuous" and not lower < upper
+        if endless or (joint.kind != "prismatic" and upper - lower > 2.0 * np.pi):
+            lower, upper = -np.pi, np.pi
+        kind = "prismatic" if joint.kind == "prismatic" else "revolute"
+        return SideMotion(joint.name, kind, joint.pose, joint.axis, lower, upper)
+
+    def _below(self, name: str) -> Iterator[UrdfLink]:
+        yield self._tree.links[name]
+        for joint in self._tree.below(name):
+            yield from self._below(joint.child)
+
+
+def _moved(part: _Part, pose: FloatArray) -> _Part:
+    """A part re-expressed by the pose (4, 4) of its frame."""
+    link, shapes = part
+    R = pose[:3, :3]
+    own = replace(link, com=R @ link.com + pose[:3, 3], inertia=R @ link.inertia @ R.T)
+    return own, tuple(shape.moved(pose) for shape in shapes)
+
+
+def _moving(part: _Part, motion: SideMotion) -> _Part:
+    """A part that a joint beside the path moves, in the link that carries the joint."""
+    middle = motion.at(0.5 * (motion.lower + motion.upper))
+    own, _ = _moved(part, middle)
+    _, shapes = part
+    return own, tuple(replace(shape, motions=(*shape.motions, motion)) for shape in shapes)
+
+
+def _joined(name: str, parts: Sequence[tuple[UrdfLink, tuple[PlacedShape, ...]]]) -> ArmLink:
+    """Mass, centre and inertia of several links as of one."""
+    shapes = tuple(shape for _, own in parts for shape in own)
+    mass = sum(part.mass for part, _ in parts)
     if not mass > 0.0:
-        raise RobotFileError(source, 0, f"link {name} has no mass: give it an <inertial>")
-    com = sum((part.mass * part.com for part in parts), np.zeros(3)) / mass
+        return ArmLink(name, 0.0, np.zeros(3), np.zeros((3, 3)), shapes)
+    com = sum((part.mass * part.com for part, _ in parts), np.zeros(3)) / mass
     inertia = np.zeros((3, 3))
-    for part in parts:
+    for part, _ in parts:
         d = part.com - com
         inertia += part.inertia + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
-    return UrdfLink(
-        name, mass, com, inertia, tuple(shape for part in parts for shape in part.shapes)
-    )
+    return ArmLink(name, mass, com, inertia, shapes)
 
 
-def _fixed(tree: UrdfTree, name: str, pose: FloatArray) -> list[UrdfLink]:
-    """A link and those fixed to it, moved by the pose (4, 4) of the link."""
-    link = tree.links[name]
-    R = pose[:3, :3]
-    shapes = tuple(_moved(shape, pose) for shape in link.shapes)
-    own = replace(
-        link, com=R @ link.com + pose[:3, 3], inertia=R @ link.inertia @ R.T, shapes=shapes
-    )
-    below = [
-        joint for joint in tree.above.values() if joint.parent == name and joint.kind == "fixed"
-    ]
-    return [
-        own,
-        *(part for joint in below for part in _fixed(tree, joint.child, pose @ joint.pose)),
-    ]
-
-
-def _moved(shape: UrdfShape, pose: FloatArray) -> UrdfShape:
-    return replace(shape, pose=pose @ shape.pose)
+def _turn(axis: FloatArray, angle: float) -> FloatArray:
+    x, y, z = axis
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K))

@@ -1,0 +1,119 @@
+"""A machine home for a robot that has none: free, above the floor, and held without effort."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ir_cli.robot_shapes import SAFETY, Pairs
+from ir_description import Capsule, InvalidValueError
+from ir_description.files.making import UrdfArm, holding_torques
+from ir_kernels import Chain, CollisionModel
+from ir_msgs_py.arrays import BoolArray, FloatArray
+
+USUAL = (
+    (0, 0, 0, 0, 0, 0),
+    (0, 0, 0, 0, 30, 0),
+    (0, -90, 90, 0, 0, 0),
+    (0, -90, 90, 0, 30, 0),
+    (0, 0, 0, 0, -30, 0),
+    (0, -90, -90, -90, 90, 0),
+    (0, -90, 90, -90, -90, 0),
+    (0, -30, 60, 0, 30, 0),
+    (0, 30, -60, 0, -30, 0),
+)
+"""deg: postures in which arms are usually drawn or parked."""
+CLEAR = 0.01  # m more than the safety distance
+ABOVE = 0.05  # m above the plane on which the base stands
+HELD = 0.7  # of the peak torque
+_INSIDE = np.radians(2.0)  # from both ends of an axis
+_TRIED = 4000
+
+
+class Postures:
+    """Which postures of an arm are free and can be held."""
+
+    def __init__(
+        self,
+        arm: UrdfArm,
+        capsules: tuple[Capsule, ...],
+        pairs: Pairs,
+        limits: tuple[FloatArray, FloatArray],
+        peak: FloatArray,
+        payload: float,
+    ) -> None:
+        self._arm = arm
+        self._chain = Chain(arm)
+        self._capsules = capsules
+        self._model = CollisionModel(self._chain, capsules, (), pairs.pairs)
+        own = {frozenset(each[:2]): each.distance for each in pairs.reduced}
+        self._kept = np.array(
+            [min(SAFETY, own.get(frozenset((a, b)), SAFETY)) for _, a, b in self._model.pairs]
+        )
+        self._room = np.where(self._kept < SAFETY, 0.0, CLEAR)
+        self._low, self._high = limits
+        self._peak = peak
+        self._payload = payload
+
+    def home(self) -> FloatArray:
+        """The first (6,) [rad] that is free and held. Raises InvalidValueError where none is."""
+        for q in self._candidates():
+            good = self._free(q) & self._above_floor(q) & self._held(q)
+            if good.any():
+                return np.asarray(q[int(np.argmax(good))])
+        raise InvalidValueError(self._reason())
+
+    def _candidates(self) -> Iterator[FloatArray]:
+        inside = np.minimum(_INSIDE, 0.25 * (self._high - self._low))
+        low = self._low + inside
+        high = self._high - inside
+        middle = 0.5 * (low + high)
+        yield np.clip(np.radians([*USUAL]), low, high)
+        yield middle[None]
+        drawn = np.random.default_rng(0).uniform(low, high, (_TRIED, len(low)))
+        yield drawn[np.argsort(np.abs(drawn - middle).max(axis=1), kind="stable")]
+
+    def _free(self, q: FloatArray) -> BoolArray:
+        return np.asarray((self._model.distances(q) > self._kept + self._room).all(axis=1))
+
+    def _above_floor(self, q: FloatArray) -> BoolArray:
+        poses = self._chain.link_poses(q)
+        lowest = np.full(len(q), np.inf)
+        for capsule in (each for each in self._capsules if each.link > 0):
+            for end in (capsule.p0, capsule.p1):
+                pose = poses[:, capsule.link]
+                height = pose[:, 2, :3] @ end + pose[:, 2, 3] - capsule.radius
+                lowest = np.minimum(lowest, height)
+        return lowest > min(ABOVE, self._highest_floor())
+
+    def _highest_floor(self) -> float:
+        """What link 1 leaves above the floor wherever the arm stands, less than ABOVE."""
+        own = [each for each in self._capsules if each.link == 1]
+        z = self._arm.origin[0][2]
+        heights = [min(each.p0[2], each.p1[2]) + z - each.radius for each in own]
+        return min(heights, default=ABOVE) - 1e-6
+
+    def _held(self, q: FloatArray) -> BoolArray:
+        torque = np.abs(holding_torques(self._arm, q, self._payload))
+        return np.asarray((torque < HELD * self._peak).all(axis=1))
+
+    def _reason(self) -> str:
+        """Why no posture will do."""
+        *_, drawn = self._candidates()
+        distance = self._model.distances(drawn) - self._kept - self._room
+        far = (distance > 0.0).mean(axis=0)
+        counts = {
+            "free of itself": self._free(drawn),
+            "above the floor": self._above_floor(drawn),
+            "held by its drives": self._held(drawn),
+        }
+        shares = ", ".join(f"{100.0 * good.mean():.0f} % {name}" for name, good in counts.items())
+        worst = ""
+        if len(far) and far.min() < 1.0:
+            pair = self._model.pairs[int(np.argmin(far))]
+            worst = f"; nearest most often: {pair.body_a} and {pair.body_b}"
+        return (
+            f"no machine home was found: of {_TRIED} postures are {shares}{worst}; give "
+            "machine_home_deg or gear_peak_torque_nm in a drive sheet (ir robot new --template)"
+        )

@@ -1,0 +1,409 @@
+"""URDF as a tree: links with masses and collision shapes, joints with limits, each with its line.
+
+Every shape is read or refused with its line: a body that is left out without a word would make
+every proof of clearance wrong.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from xml.etree import ElementTree as Xml
+from xml.parsers import expat
+
+import numpy as np
+
+from ir_description.files.robot_file import inertia_matrix
+from ir_description.poses import rotation_from_abc
+from ir_values.arrays import FloatArray
+from ir_values.errors import RobotFileError, listed, shown
+
+KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+LENGTH_MAX = 100.0
+"""Largest length [m] of a robot: beyond, the unit is hardly meant."""
+_LINKS_MAX = 1000
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,63}")
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfShape:
+    """A collision shape of a link.
+
+    kind: "mesh", "box", "cylinder", "sphere", "capsule". pose (4, 4) in its link. size (3,) [m]:
+    box: edges; cylinder: radius, length; capsule: radius, length between the centres of its ends;
+    mesh: scale. file: of a mesh. link, line: where it stands. visual: whether the link has no
+    collision shape and this is what people see of it.
+    """
+
+    kind: str
+    pose: FloatArray
+    size: FloatArray
+    file: str = ""
+    link: str = ""
+    line: int = 0
+    visual: bool = False
+
+    @property
+    def place(self) -> str:
+        """For people: which shape of which link."""
+        what = f"{self.kind} {self.file}" if self.file else self.kind
+        return f"{what} of link {self.link} (line {self.line})"
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfLink:
+    """mass [kg] (0: none is given), com (3,) [m], inertia (3, 3) [kg m^2] about it, in the link's
+    frame.
+    """
+
+    name: str
+    mass: float
+    com: FloatArray
+    inertia: FloatArray
+    shapes: tuple[UrdfShape, ...]
+    line: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfJoint:
+    """A joint, the pose (4, 4) of its frame in the parent link, limits [rad or m, rad/s, Nm], 0:
+    not given. mimic: the joint that it follows, "" for none.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    pose: FloatArray
+    axis: FloatArray
+    lower: float
+    upper: float
+    velocity: float
+    effort: float
+    mimic: str = ""
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class UrdfTree:
+    """A robot: its links and joints by name; joints by the link that they carry. notes: what was
+    read otherwise than it stands there, in words.
+    """
+
+    name: str
+    links: dict[str, UrdfLink]
+    above: dict[str, UrdfJoint]
+    notes: tuple[str, ...] = field(default=())
+
+    def below(self, name: str) -> list[UrdfJoint]:
+        """Joints that a link carries, in the order of the file."""
+        return [joint for joint in self.above.values() if joint.parent == name]
+
+    def path(self, name: str) -> list[UrdfJoint]:
+        """The joints from the root to a link."""
+        path: list[UrdfJoint] = []
+        while name in self.above:
+            path.insert(0, self.above[name])
+            name = path[0].parent
+        return path
+
+
+def urdf_tree(text: str, source: str) -> UrdfTree:
+    """Read a URDF. Raises RobotFileError with the line of what is wrong."""
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise RobotFileError(source, 0, "the URDF defines entities: they are not read")
+    if "<xacro:" in text:
+        raise RobotFileError(
+            source, 0, "this is a xacro file: expand it first (xacro FILE > robot.urdf)"
+        )
+    try:
+        root = _parsed(text)
+    except expat.ExpatError as error:
+        raise RobotFileError(source, error.lineno, f"this is not XML: {error}") from error
+    if root.tag != "robot":
+        raise RobotFileError(source, 0, f"the document is {shown(root.tag)}, must be 'robot'")
+    try:
+        return _Reader().tree(root)
+    except _UrdfError as error:
+        raise RobotFileError(source, error.line, str(error)) from error
+
+
+class _UrdfError(Exception):
+    """What is wrong, and on which line."""
+
+    def __init__(self, element: Xml.Element, sentence: str) -> None:
+        super().__init__(sentence)
+        self.line = getattr(element, "line", 0)
+
+
+class _Element(Xml.Element):
+    """An element that knows its line."""
+
+    line = 0
+
+
+def _parsed(text: str) -> Xml.Element:
+    """The document; elements know their lines."""
+    builder = Xml.TreeBuilder(element_factory=_Element)
+    parser = expat.ParserCreate()
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        element = builder.start(tag, attributes)
+        element.line = parser.CurrentLineNumber  # type: ignore[attr-defined]  # of _Element
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = builder.end
+    parser.CharacterDataHandler = builder.data
+    parser.Parse(text.encode(), True)
+    return builder.close()
+
+
+class _Reader:
+    """One reading."""
+
+    def __init__(self) -> None:
+        self._notes: list[str] = []
+
+    def tree(self, root: Xml.Element) -> UrdfTree:
+        elements = root.findall("link")
+        if len(elements) > _LINKS_MAX:
+            raise _UrdfError(elements[-1], f"there are {len(elements)} links, must be at most 1000")
+        links: dict[str, UrdfLink] = {}
+        for element in elements:
+            link = self._link(element)
+            if link.name in links:
+                raise _UrdfError(element, f"link {link.name} is there twice")
+            links[link.name] = link
+        joints: dict[str, UrdfJoint] = {}
+        above: dict[str, UrdfJoint] = {}
+        for element in root.findall("joint"):
+            joint = self._joint(element)
+            for name in (joint.parent, joint.child):
+                if name not in links:
+                    known = listed(links)
+                    raise _UrdfError(
+                        element, f"joint {joint.name} names the link {shown(name)}: {known}"
+                    )
+            if joint.name in joints:
+                raise _UrdfError(element, f"joint {joint.name} is there twice")
+            if joint.child in above:
+                both = f"{above[joint.child].name} and {joint.name}"
+                raise _UrdfError(element, f"link {joint.child} is carried by two joints, {both}")
+            joints[joint.name] = joint
+            above[joint.child] = joint
+        _check_tree(root, links, above)
+        return UrdfTree(root.get("name") or "robot", links, above, tuple(self._notes))
+
+    def _link(self, element: Xml.Element) -> UrdfLink:
+        name = _name(element, "link")
+        shapes = [self._shape(one, name) for one in element.findall("collision")]
+        if not shapes:
+            shapes = [self._shape(one, name) for one in element.findall("visual")]
+            if shapes:
+                self._notes.append(
+                    f"link {name} has no collision shape: its {len(shapes)} visual ones are taken"
+                )
+        line = getattr(element, "line", 0)
+        inertial = element.find("inertial")
+        if inertial is None:
+            return UrdfLink(name, 0.0, np.zeros(3), np.zeros((3, 3)), tuple(shapes), line)
+        pose = _origin(inertial, f"the <inertial> of link {name}")
+        mass = inertial.find("mass")
+        inertia = inertial.find("inertia")
+        keys = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+        entries = [
+            _number(inertia, key, f"inertia of link {name}", "0") if inertia is not None else 0.0
+            for key in keys
+        ]
+        about = pose[:3, :3] @ inertia_matrix(entries) @ pose[:3, :3].T
+        weight = _number(mass, "value", f"mass of link {name}") if mass is not None else 0.0
+        if weight < 0.0 or weight > 1e5:
+            raise _UrdfError(
+                inertial, f"link {name} weighs {weight:g} kg, must be from 0 to 100000 kg"
+            )
+        return UrdfLink(name, weight, pose[:3, 3], about, tuple(shapes), line)
+
+    def _joint(self, element: Xml.Element) -> UrdfJoint:
+        name = _name(element, "joint")
+        kind = element.get("type", "")
+        if kind not in KINDS:
+            raise _UrdfError(
+                element, f"joint {name} is of type {shown(kind)}: {listed(KINDS)} are known"
+            )
+        ends: list[str] = []
+        for end in ("parent", "child"):
+            place = element.find(end)
+            if place is None or not place.get("link"):
+                raise _UrdfError(element, f"joint {name} has no {end}")
+            ends.append(place.get("link", ""))
+        mimic = element.find("mimic")
+        followed = "" if mimic is None else mimic.get("joint", "") or "another joint"
+        lower, upper, velocity, effort = self._limits(element, name, kind)
+        return UrdfJoint(
+            name,
+            kind,
+            ends[0],
+            ends[1],
+            _origin(element, f"joint {name}"),
+            _axis(element, name),
+            lower,
+            upper,
+            velocity,
+            effort,
+            followed,
+            getattr(element, "line", 0),
+        )
+
+    def _limits(self, element: Xml.Element, name: str, kind: str) -> list[float]:
+        """lower, upper, velocity, effort; 0 where the file has none."""
+        limit = element.find("limit")
+        if limit is None:
+            if kind in ("revolute", "prismatic"):
+                raise _UrdfError(element, f"joint {name} is {kind} and has no <limit>")
+            return [0.0, 0.0, 0.0, 0.0]
+        keys = ("lower", "upper", "velocity", "effort")
+        values = [_number(limit, key, f"limit of joint {name}", "0") for key in keys]
+        unit = "m" if kind == "prismatic" else "rad"
+        span = f"joint {name} may turn from {values[0]:g} to {values[1]:g} {unit}"
+        if kind in ("revolute", "prismatic") and not values[0] < values[1]:
+            raise _UrdfError(limit, f"{span}: lower must be below upper")
+        for key, value in zip(keys[2:], values[2:], strict=True):
+            if value < 0.0:
+                raise _UrdfError(limit, f"{key} of joint {name} is {value:g}, must not be negative")
+        if kind == "continuous" and values[0] < values[1]:
+            self._notes.append(
+                f"{span} and is continuous: its limits are kept (make it revolute to say so)"
+            )
+        return values
+
+    def _shape(self, element: Xml.Element, link: str) -> UrdfShape:
+        """The shape of a <collision> or <visual>. Raises _UrdfError where it isn't known."""
+        geometry = element.find("geometry")
+        shapes = [] if geometry is None else list(geometry)
+        line = getattr(element, "line", 0)
+        what = f"a <{element.tag}> of link {link}"
+        if len(shapes) != 1:
+            raise _UrdfError(element, f"{what} has {len(shapes)} shapes, must have one")
+        (one,) = shapes
+        if one.tag not in _SIZES:
+            raise _UrdfError(
+                one, f"{what} is a {shown(one.tag)}: {listed(_SIZES)} are read; replace it by these"
+            )
+        size = np.zeros(3)
+        file = ""
+        if one.tag == "mesh":
+            size[:] = _row(one, "scale", what, "1 1 1")
+            file = one.get("filename", "")
+            if not file or not size.all():
+                raise _UrdfError(one, f"{what} is a mesh without a filename, or of scale 0")
+        elif one.tag == "box":
+            size[:] = _row(one, "size", what)
+        else:
+            lengths = [_number(one, key, what) for key in _SIZES[one.tag]]
+            size[: len(lengths)] = lengths
+        if one.tag != "mesh":
+            used = 3 if one.tag == "box" else len(_SIZES[one.tag])
+            least = size[:1] if one.tag == "capsule" else size[:used]
+            if (least <= 0.0).any() or (size < 0.0).any() or (size > LENGTH_MAX).any():
+                raise _UrdfError(
+                    one,
+                    f"{what} is a {one.tag} of {', '.join(f'{s:g}' for s in size[:used])} m: "
+                    f"lengths must be above 0 and at most {LENGTH_MAX:g} m",
+                )
+        visual = element.tag == "visual"
+        return UrdfShape(one.tag, _origin(element, what), size, file, link, line, visual)
+
+
+_SIZES: Mapping[str, tuple[str, ...]] = {
+    "mesh": (),
+    "box": ("size",),
+    "cylinder": ("radius", "length"),
+    "sphere": ("radius",),
+    "capsule": ("radius", "length"),
+}
+
+
+def _check_tree(
+    root: Xml.Element, links: Mapping[str, UrdfLink], above: Mapping[str, UrdfJoint]
+) -> None:
+    if not links:
+        raise _UrdfError(root, "the robot has no link")
+    roots = [name for name in links if name not in above]
+    if len(roots) > 1:
+        raise _UrdfError(
+            root, f"the links {listed(roots)} hang on no joint: one of them must carry the others"
+        )
+    for name in links:
+        at = name
+        seen = set[str]()
+        while at in above:
+            if at in seen:
+                raise _UrdfError(root, f"link {name} carries itself: its joints form a ring")
+            seen.add(at)
+            at = above[at].parent
+
+
+def _name(element: Xml.Element, what: str) -> str:
+    name = element.get("name", "")
+    if not _NAME.fullmatch(name):
+        raise _UrdfError(
+            element,
+            f"a {what} is called {shown(name)}: rename it with a letter first, then letters, "
+            "digits, _ . or -, at most 64",
+        )
+    return name
+
+
+def _axis(element: Xml.Element, name: str) -> FloatArray:
+    axis = element.find("axis")
+    direction = (
+        _row(axis, "xyz", f"the axis of joint {name}", "1 0 0")
+        if axis is not None
+        else np.array([1.0, 0.0, 0.0])
+    )
+    length = float(np.linalg.norm(direction))
+    if not length > 0.0:
+        raise _UrdfError(element, f"the axis of joint {name} has no length")
+    return direction / length
+
+
+def _origin(element: Xml.Element, what: str) -> FloatArray:
+    """The pose (4, 4) of an element's origin."""
+    pose = np.eye(4)
+    origin = element.find("origin")
+    if origin is not None:
+        roll, pitch, yaw = np.degrees(_row(origin, "rpy", what, "0 0 0"))
+        pose[:3, :3] = rotation_from_abc((yaw, pitch, roll))
+        pose[:3, 3] = _row(origin, "xyz", what, "0 0 0")
+        if np.abs(pose[:3, 3]).max() > LENGTH_MAX:
+            raise _UrdfError(
+                origin, f"{what} is {np.abs(pose[:3, 3]).max():g} m away: is its unit another?"
+            )
+    return pose
+
+
+def _number(element: Xml.Element, key: str, what: str, missing: str | None = None) -> float:
+    text = element.get(key, missing)
+    if text is None:
+        raise _UrdfError(element, f"{what} has no {key}")
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise _UrdfError(element, f"{key} of {what} is {shown(text)}, must be a finite number")
+    return value
+
+
+def _row(element: Xml.Element, key: str, what: str, missing: str | None = None) -> FloatArray:
+    text = element.get(key, missing)
+    if text is None:
+        raise _UrdfError(element, f"{what} has no {key}")
+    try:
+        values = np.array([float(word) for word in text.split()])
+    except ValueError:
+        values = np.zeros(0)
+    if values.shape != (3,) or not np.isfinite(values).all():
+        raise _UrdfError(element, f"{key} of {what} is {shown(text)}, must be three finite numbers")
+    return values

@@ -1,0 +1,72 @@
+"""xacro files expanded to URDF by the package of that name, in a process of its own: their
+expressions are Python.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
+
+from ir_description.files.making.link_bodies import Meshes
+from ir_values.errors import InvalidValueError, one_line
+
+PROGRAM = f"from {__name__} import main; main()"
+SECONDS = 60
+MEMORY_BYTES = 2_000_000_000
+_FINDS_FROM = "ament_index_python.packages"
+
+
+def expanded(path: Path, packages: Path | None) -> str:
+    """The URDF that a xacro file describes, with the defaults of its arguments; packages: a folder
+    below which $(find NAME) looks beside those above the file. Raises InvalidValueError.
+    """
+    if find_spec("xacro") is None:
+        raise InvalidValueError(
+            f"{path}: a xacro file is expanded by the package xacro, which is missing: pip install "
+            "xacro, or expand it elsewhere (xacro FILE > robot.urdf)"
+        )
+    given = json.dumps([str(path.resolve()), str(packages.resolve()) if packages else ""])
+    found = subprocess.run(
+        [sys.executable, "-c", PROGRAM], input=given.encode(), capture_output=True
+    )
+    if found.returncode != 0:
+        lines = found.stderr.decode(errors="replace").strip().splitlines()
+        said = one_line(lines[-1] if lines else f"code {found.returncode}", 300)
+        raise InvalidValueError(f"{path}: xacro can't expand it: {said}")
+    return found.stdout.decode()
+
+
+def main() -> None:
+    """Read the names of a file and a folder from standard input, and write the URDF."""
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    file, packages = json.loads(sys.stdin.buffer.read())
+    homes = Meshes(Path(file).parent, Path(packages) if packages else None)
+
+    def share(name: str) -> str:
+        home = homes.package(name)
+        if home is None:
+            raise LookupError(
+                f"package {name} is not found; --packages FOLDER names a folder below which it lies"
+            )
+        return str(home)
+
+    # xacro asks ROS's index of packages, which isn't installed everywhere
+    index = ModuleType(_FINDS_FROM)
+    index.get_package_share_directory = share  # type: ignore[attr-defined]
+    top = ModuleType(_FINDS_FROM.partition(".")[0])
+    top.packages = index  # type: ignore[attr-defined]
+    sys.modules[top.__name__] = top
+    sys.modules[_FINDS_FROM] = index
+    import xacro
+
+    try:
+        document = xacro.process_file(file)
+    except Exception as error:  # of xacro and of the file's own expressions, of any kind
+        sys.exit(f"{type(error).__name__}: {error}")
+    sys.stdout.write(document.toprettyxml(indent=" "))

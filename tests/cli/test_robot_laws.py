@@ -1,0 +1,173 @@
+"""A robot made from a URDF against Pinocchio and Coal, which read the same file: where it is, how
+far its links are apart, and that a first movement of it is certified.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ir_cli.main import main
+from ir_cli.robot_from_urdf import RobotSource, made_robot
+from ir_kernels import Chain, CollisionModel
+
+pinocchio = pytest.importorskip("pinocchio")
+coal = pytest.importorskip("coal")
+
+KINEMATICS = 1e-9  # m and entries of a rotation
+TOUCH = 1e-6  # m: what the judge's distances are off by
+AXES = ("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0", "1 0 0")
+PLACES = ("0 0 0.4", "0.25 0.05 0.1", "0 0 0.7", "0.2 0 0.1", "0.5 0 0", "0.15 0 0")
+
+
+def urdf(seed: int) -> str:
+    """A six-axis arm with turned frames, two bodies of drawn kinds a link, and no masses."""
+    draw = np.random.default_rng(seed)
+    names = ["base_link", *(f"link_{k}" for k in range(1, 7))]
+    turn = np.eye(3)  # of the frame of each link against the base at q = 0
+    lines = ['<robot name="drawn">']
+    for k, name in enumerate(names):
+        to = np.array((*PLACES, "0.1 0 0")[k].split(), dtype=float)
+        bodies = []
+        for share in (0.15, 0.6):
+            at = " ".join(f"{x:.17g}" for x in turn.T @ (share * to))
+            bodies.append(
+                f'<collision><origin xyz="{at}"/><geometry>{shape(draw)}</geometry></collision>'
+            )
+        lines.append(f'<link name="{name}">{"".join(bodies)}</link>')
+        if k < 6:
+            other = draw.choice([0, 1, 2])
+            step = np.roll(np.eye(3), int(other), axis=0)
+            at = " ".join(f"{x:.17g}" for x in turn.T @ to)
+            rpy = ((0, 0, 0), (np.pi / 2, 0, np.pi / 2), (-np.pi / 2, -np.pi / 2, 0))[other]
+            step = rotation(*rpy)
+            turn = turn @ step
+            axis = " ".join(f"{x:.17g}" for x in turn.T @ np.array(AXES[k].split(), dtype=float))
+            angles = " ".join(f"{x:.17g}" for x in rpy)
+            lines.append(
+                f'<joint name="joint_{k + 1}" type="revolute"><parent link="{name}"/>'
+                f'<child link="{names[k + 1]}"/><origin xyz="{at}" rpy="{angles}"/>'
+                f'<axis xyz="{axis}"/>'
+                '<limit lower="-2.4" upper="2.4" effort="0" velocity="2"/></joint>'
+            )
+    return "\n".join([*lines, "</robot>"])
+
+
+def shape(draw: np.random.Generator) -> str:
+    a, b, c = (f"{x:.4f}" for x in draw.uniform(0.03, 0.08, 3))
+    return draw.choice(
+        [
+            f'<box size="{a} {b} {c}"/>',
+            f'<cylinder radius="{a}" length="{b}"/>',
+            f'<sphere radius="{a}"/>',
+        ]
+    )
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
+    return np.asarray(pinocchio.rpy.rpyToMatrix(roll, pitch, yaw))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_drawn_urdf_is_where_pinocchio_has_it_and_never_farther_apart(
+    seed: int, tmp_path: Path
+) -> None:
+    path = tmp_path / "drawn.urdf"
+    path.write_text(urdf(seed))
+    made = made_robot(RobotSource(path, payload=5.0, mass=60.0))
+    model = pinocchio.buildModelFromUrdf(str(path))
+    shapes = pinocchio.buildGeomFromUrdf(model, str(path), pinocchio.GeometryType.COLLISION)
+    data = model.createData()
+    placed = shapes.createData()
+    chain = Chain(made.robot)
+    q = np.random.default_rng(seed).uniform(-2.4, 2.4, (40, 6))
+    poses = chain.link_poses(q)
+    far = [
+        (a.name, b.name)
+        for a, b in itertools.combinations(made.robot.capsules, 2)
+        if a.link != b.link
+    ]
+    ours = CollisionModel(chain, made.robot.capsules, (), far)
+    distance = ours.distances(q)
+    link = {capsule.name: capsule.link for capsule in made.robot.capsules}
+    said = overhangs(made.shapes.sentences)
+    bodies = [[g for g in shapes.geometryObjects if g.parentJoint == k] for k in range(7)]
+    assert [len(each) for each in bodies] == [len(each) for each in made.bodies]
+    for n, row in enumerate(q):
+        pinocchio.forwardKinematics(model, data, row)
+        pinocchio.updateGeometryPlacements(model, data, shapes, placed, row)
+        zero = model.createData()
+        pinocchio.forwardKinematics(model, zero, np.zeros(6))
+        for k in range(1, 7):
+            turned = data.oMi[k].rotation @ zero.oMi[k].rotation.T
+            own = poses[n, k, :3, :3] @ chain.link_poses(np.zeros((1, 6)))[0, k, :3, :3].T
+            assert np.abs(own - turned).max() < KINEMATICS
+            if k < 6:
+                assert np.abs(poses[n, k, :3, 3] - data.oMi[k].translation).max() < KINEMATICS
+        for one, other in itertools.combinations(range(7), 2):
+            least = min(
+                coal_distance(shapes, placed, a, b) for a in bodies[one] for b in bodies[other]
+            )
+            near = [
+                (distance[n, z], said[a] + said[b])
+                for z, (_, a, b) in enumerate(ours.pairs)
+                if {link[a], link[b]} == {one, other}
+            ]
+            below, slack = min(near)
+            if least > 0.0:
+                assert below <= least + TOUCH
+                assert least - max(below, 0.0) <= slack + TOUCH
+
+
+def coal_distance(shapes: object, placed: object, a: object, b: object) -> float:
+    i = shapes.getGeometryId(a.name)  # type: ignore[attr-defined]
+    j = shapes.getGeometryId(b.name)  # type: ignore[attr-defined]
+    result = coal.DistanceResult()
+    one, other = (
+        coal.Transform3s(placed.oMg[k].rotation, placed.oMg[k].translation) for k in (i, j)
+    )  # type: ignore[attr-defined]
+    return float(
+        coal.distance(a.geometry, one, b.geometry, other, coal.DistanceRequest(), result)  # type: ignore[attr-defined]
+    )
+
+
+def overhangs(sentences: tuple[str, ...]) -> dict[str, float]:
+    """What the command says: name of a capsule, and how far [m] it stands out, rounded up."""
+    found = {}
+    for sentence in sentences:
+        name, _, rest = sentence.partition(":")
+        stated = rest.partition("stands out ")[2].partition(" mm")[0]
+        found[name] = 1e-3 * (float(stated) + 0.5) if stated else 0.0
+    return found
+
+
+def test_one_command_leads_to_a_certified_movement(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("drawn.urdf").write_text(urdf(3))
+    assert main(["robot", "new", "drawn.urdf", "--payload", "5", "--mass", "60"]) == 0
+    said = capsys.readouterr().out
+    assert "14 bodies of the URDF in" in said
+    assert "estimated (confidence L)" in said
+    assert main(["plan", "--robot", "drawn", "--json"]) == 0
+    plan = json.loads(capsys.readouterr().out)
+    assert plan["certified"]
+    assert 0.0 < plan["joules_low"] < plan["joules"] < plan["joules_high"]
+
+
+def test_nothing_is_written_where_nothing_could_be_planned(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "drawn.urdf"
+    path.write_text(urdf(3))
+    out = tmp_path / "out.yaml"
+    assert main(["robot", "new", str(path), "-o", str(out)]) == 2
+    assert "give --payload KG" in capsys.readouterr().err
+    assert main(["robot", "new", str(path), "--payload", "nan", "-o", str(out)]) == 2
+    assert main(["robot", "new", str(path), "--payload", "5", "--mass", "-1", "-o", str(out)]) == 2
+    assert not out.exists()
