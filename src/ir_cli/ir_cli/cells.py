@@ -25,6 +25,7 @@ from ir_cli.output import (
     text,
 )
 from ir_cli.planning import add_cell
+from ir_cli.robot_shapes import floor_below
 from ir_description import (
     Cell,
     CellFileError,
@@ -40,6 +41,7 @@ from ir_description import (
     load_cell,
     robot_named,
 )
+from ir_kernels import Chain
 from ir_values.files import inside
 from ir_values.output_files import write_file
 
@@ -52,7 +54,7 @@ TEXT = """\
 format: ir_cell/1
 name: {name}
 robot: {robot}
-home_deg: {home}    # machine home, A1 to A6
+{base}home_deg: {home}    # machine home, A1 to A6
 park_deg: {home}    # where the program begins
 tool:    # what is always on the flange; its capsules enclose it, in the frame of the flange, x outwards
   name: gripper
@@ -104,10 +106,13 @@ def cell_text(name: str, robot: str, model: RobotModel) -> str:
     reach = float(np.linalg.norm(model.joint_origin[1:, :3, 3], axis=1).sum())
     height = _cm(0.2 * reach)
     tool = _cm(0.08 * reach)
+    foot = -floor_below(Chain(model), model.capsules)
+    why = "a pedestal: capsules of link 1 reach below its foot"
     edge = _cm(0.25 * reach)
     return TEXT.format(
         name="".join(c if c.isalnum() or c in "_.-" else "_" for c in name),
         robot=robot,
+        base=f"base: {{xyz: [0, 0, {foot:g}]}}    # {why}\n" if foot else "",
         home=f"[{', '.join(f'{angle + 0.0:g}' for angle in np.round(np.degrees(model.machine_home), 3))}]",  # noqa: E501
         mass=round(0.2 * model.rated_payload, 1),
         tool=tool,

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ir_cli.errors import CommandError, InputError, unknown_name
-from ir_cli.robot_shapes import SAFETY
+from ir_cli.robot_shapes import SAFETY, floor_below, lowest_points
 from ir_description import Cell, RobotModel, UnknownNameError, is_path, robot_named
 from ir_description.files import read_cell
 from ir_kernels import Chain, CollisionModel
@@ -17,6 +17,7 @@ TEXT = """\
 format: ir_cell/1
 name: first
 robot: {robot}
+base: {{xyz: [0, 0, {foot}]}}
 home_deg: {home}
 park_deg: {park}
 program: [{{posture: home}}, {{posture: park}}]
@@ -25,7 +26,8 @@ _STEP = np.radians((60.0, 20.0, -20.0, 40.0, 30.0, 60.0))
 _SHARES = (1.0, 0.7, 0.5, 0.35, 0.25)
 _SIGNS = ((1, 1, 1, 1, 1, 1), (1, -1, 1, 1, 1, 1), (1, 1, -1, 1, -1, 1), (-1, -1, -1, 1, -1, 1))
 _INSIDE = 1e-3  # rad from both ends of an axis
-_ROOM = 0.01  # m above what is kept
+_ROOM = 1e-3  # m above what is kept
+_DRAWN = 2000  # postures within 1 rad of machine home
 
 
 def first_cell(robot: str) -> Cell:
@@ -41,6 +43,7 @@ def first_cell(robot: str) -> Cell:
         raise InputError(unknown_name("robot", robot[:80], error.known, "ir robot list")) from error
     text = TEXT.format(
         robot=Path(name).name if is_path(name) else name,
+        foot=-floor_below(Chain(model), model.capsules),
         home=np.degrees(model.machine_home).tolist(),
         park=np.degrees(second_posture(model)).tolist(),
     )
@@ -53,27 +56,19 @@ def second_posture(robot: RobotModel) -> FloatArray:
     model = CollisionModel(chain, robot.capsules, (), robot.self_pairs)
     own = {frozenset(each[:2]): each.distance for each in robot.reduced_distances}
     kept = np.array([min(SAFETY, own.get(frozenset((a, b)), SAFETY)) for _, a, b in model.pairs])
-    kept += np.where(kept < SAFETY, 0.0, _ROOM)
+    reduced = np.array([frozenset((a, b)) in own for _, a, b in model.pairs], dtype=bool)
+    kept += np.where(reduced, 0.0, _ROOM)
     steps = np.array([share * _STEP * sign for share in _SHARES for sign in _SIGNS])
+    drawn = np.random.default_rng(0).uniform(-1.0, 1.0, (_DRAWN, robot.n))
     low = robot.position_min + _INSIDE
     high = robot.position_max - _INSIDE
-    q = np.clip(robot.machine_home + steps, low, high)
-    good = (model.distances(q) > kept).all(axis=1) & (_lowest(robot, chain, q) > SAFETY + _ROOM)
+    q = np.clip(robot.machine_home + np.concatenate([steps, drawn]), low, high)
+    others = [each for each in robot.capsules if each.link > 1]
+    above = lowest_points(chain, q, others) > floor_below(chain, robot.capsules) + SAFETY + _ROOM
+    good = (model.distances(q) > kept).all(axis=1) & above
     if not good.any():
         raise CommandError(
             f"robot {robot.name} has no free posture near its machine home to move to: choose "
             "another machine_home_deg"
         )
     return np.asarray(q[int(np.argmax(good))])
-
-
-def _lowest(robot: RobotModel, chain: Chain, q: FloatArray) -> FloatArray:
-    """Height (N,) [m] of the lowest point of what moves above the floor."""
-    poses = chain.link_poses(q)
-    heights = [
-        poses[:, each.link, 2, :3] @ end + poses[:, each.link, 2, 3] - each.radius
-        for each in robot.capsules
-        if each.link > 1
-        for end in (each.p0, each.p1)
-    ]
-    return np.min(heights, axis=0, initial=np.inf)

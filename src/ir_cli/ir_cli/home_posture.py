@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ir_cli.robot_shapes import SAFETY, Pairs
+from ir_cli.robot_shapes import SAFETY, Pairs, floor_below, lowest_points
 from ir_description import Capsule, InvalidValueError
 from ir_description.files.making import UrdfArm, holding_torques
 from ir_kernels import Chain, CollisionModel
@@ -24,8 +24,9 @@ USUAL = (
     (0, 30, -60, 0, -30, 0),
 )
 """deg: postures in which arms are usually drawn or parked."""
-CLEAR = 0.01  # m more than the safety distance
-ABOVE = 0.05  # m above the plane on which the base stands
+CLEAR = 0.01  # m more than the safety distance, where there is such a posture
+LEAST = 1e-4  # m
+ABOVE = 0.05  # m above the floor
 HELD = 0.7  # of the peak torque
 _INSIDE = np.radians(2.0)  # from both ends of an axis
 _TRIED = 4000
@@ -51,17 +52,21 @@ class Postures:
         self._kept = np.array(
             [min(SAFETY, own.get(frozenset((a, b)), SAFETY)) for _, a, b in self._model.pairs]
         )
-        self._room = np.where(self._kept < SAFETY, 0.0, CLEAR)
+        self._reduced = np.array(
+            [frozenset((a, b)) in own for _, a, b in self._model.pairs], dtype=bool
+        )
+        self._floor = floor_below(self._chain, capsules)
         self._low, self._high = limits
         self._peak = peak
         self._payload = payload
 
     def home(self) -> FloatArray:
         """The first (6,) [rad] that is free and held. Raises InvalidValueError where none is."""
-        for q in self._candidates():
-            good = self._free(q) & self._above_floor(q) & self._held(q)
-            if good.any():
-                return np.asarray(q[int(np.argmax(good))])
+        for room in (CLEAR, LEAST):
+            for q in self._candidates():
+                good = self._free(q, room) & self._above_floor(q) & self._held(q)
+                if good.any():
+                    return np.asarray(q[int(np.argmax(good))])
         raise InvalidValueError(self._reason())
 
     def _candidates(self) -> Iterator[FloatArray]:
@@ -74,25 +79,14 @@ class Postures:
         drawn = np.random.default_rng(0).uniform(low, high, (_TRIED, len(low)))
         yield drawn[np.argsort(np.abs(drawn - middle).max(axis=1), kind="stable")]
 
-    def _free(self, q: FloatArray) -> BoolArray:
-        return np.asarray((self._model.distances(q) > self._kept + self._room).all(axis=1))
+    def _free(self, q: FloatArray, room: float) -> BoolArray:
+        wanted = self._kept + np.where(self._reduced, 0.0, room)
+        return np.asarray((self._model.distances(q) > wanted).all(axis=1))
 
     def _above_floor(self, q: FloatArray) -> BoolArray:
-        poses = self._chain.link_poses(q)
-        lowest = np.full(len(q), np.inf)
-        for capsule in (each for each in self._capsules if each.link > 0):
-            for end in (capsule.p0, capsule.p1):
-                pose = poses[:, capsule.link]
-                height = pose[:, 2, :3] @ end + pose[:, 2, 3] - capsule.radius
-                lowest = np.minimum(lowest, height)
-        return lowest > min(ABOVE, self._highest_floor())
-
-    def _highest_floor(self) -> float:
-        """What link 1 leaves above the floor wherever the arm stands, less than ABOVE."""
-        own = [each for each in self._capsules if each.link == 1]
-        z = self._arm.origin[0][2]
-        heights = [min(each.p0[2], each.p1[2]) + z - each.radius for each in own]
-        return min(heights, default=ABOVE) - 1e-6
+        """Whether the links after the first stay above the floor (N,)."""
+        others = [each for each in self._capsules if each.link > 1]
+        return np.asarray(lowest_points(self._chain, q, others) > self._floor + ABOVE)
 
     def _held(self, q: FloatArray) -> BoolArray:
         torque = np.abs(holding_torques(self._arm, q, self._payload))
@@ -101,10 +95,10 @@ class Postures:
     def _reason(self) -> str:
         """Why no posture will do."""
         *_, drawn = self._candidates()
-        distance = self._model.distances(drawn) - self._kept - self._room
+        distance = self._model.distances(drawn) - self._kept
         far = (distance > 0.0).mean(axis=0)
         counts = {
-            "free of itself": self._free(drawn),
+            "free of itself": self._free(drawn, LEAST),
             "above the floor": self._above_floor(drawn),
             "held by its drives": self._held(drawn),
         }

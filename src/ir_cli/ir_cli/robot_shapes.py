@@ -87,6 +87,33 @@ def _without_body(
     return [fit], ["no shape in the URDF: along its axis, an estimate"]
 
 
+FLOOR_ROOM = 0.03
+"""m that link 1 stays above the floor: more than the safety distance of a request."""
+_TURNS = 24  # of axis 1
+
+
+def floor_below(chain: Chain, capsules: Sequence[Capsule]) -> float:
+    """Height [m] of the floor below the foot of an arm, rounded down to cm: 0, or less where
+    capsules of link 1, which stand out from it, reach below the foot.
+    """
+    q = np.zeros((_TURNS, chain.n))
+    q[:, 0] = np.linspace(-np.pi, np.pi, _TURNS)
+    first = [each for each in capsules if each.link == 1]
+    lowest = float(lowest_points(chain, q, first).min())
+    return 0.0 if lowest >= FLOOR_ROOM else float(np.floor(100.0 * (lowest - FLOOR_ROOM))) / 100.0
+
+
+def lowest_points(chain: Chain, q: FloatArray, capsules: Sequence[Capsule]) -> FloatArray:
+    """Height (N,) [m] of the lowest point of capsules in postures q (N, 6); inf without any."""
+    poses = chain.link_poses(q)
+    heights = [
+        poses[:, each.link, 2, :3] @ end + poses[:, each.link, 2, 3] - each.radius
+        for each in capsules
+        for end in (each.p0, each.p1)
+    ]
+    return np.asarray(np.min(heights, axis=0)) if heights else np.full(len(q), np.inf)
+
+
 # Which pairs can touch. Neighbours are left out: their bodies meet at the joint. Others that are
 # near in many postures are near by construction: they keep a distance of their own, so that
 # capsules that are wider than the bodies leave the robot its work.

@@ -35,8 +35,9 @@ def expanded(path: Path, packages: Path | None) -> str:
         [sys.executable, "-c", PROGRAM], input=given.encode(), capture_output=True
     )
     if found.returncode != 0:
-        lines = found.stderr.decode(errors="replace").strip().splitlines()
-        said = one_line(lines[-1] if lines else f"code {found.returncode}", 300)
+        text = found.stderr.decode(errors="replace").strip()
+        said = one_line(text.partition("Traceback")[0] or text.splitlines()[-1] if text else "")
+        said = said[:300] or f"code {found.returncode}"
         raise InvalidValueError(f"{path}: xacro can't expand it: {said}")
     return found.stdout.decode()
 
@@ -51,7 +52,7 @@ def main() -> None:
     def share(name: str) -> str:
         home = homes.package(name)
         if home is None:
-            raise LookupError(
+            sys.exit(
                 f"package {name} is not found; --packages FOLDER names a folder below which it lies"
             )
         return str(home)
