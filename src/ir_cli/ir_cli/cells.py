@@ -107,7 +107,7 @@ def cell_text(name: str, robot: str, model: RobotModel) -> str:
     height = _cm(0.2 * reach)
     tool = _cm(0.08 * reach)
     foot = -floor_below(Chain(model), model.capsules)
-    why = "a pedestal: capsules of link 1 reach below its foot"
+    why = "a pedestal: capsules of the arm reach below its foot"
     edge = _cm(0.25 * reach)
     return TEXT.format(
         name="".join(c if c.isalnum() or c in "_.-" else "_" for c in name),

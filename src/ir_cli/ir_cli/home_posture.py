@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ir_cli.robot_shapes import SAFETY, Pairs, floor_below, lowest_points
+from ir_cli.robot_shapes import FLOOR_ROOM, SAFETY, Pairs, floor_below, lowest_points
 from ir_description import Capsule, InvalidValueError
 from ir_description.files.making import UrdfArm, holding_torques
 from ir_kernels import Chain, CollisionModel
@@ -26,7 +26,6 @@ USUAL = (
 """deg: postures in which arms are usually drawn or parked."""
 CLEAR = 0.01  # m more than the safety distance, where there is such a posture
 LEAST = 1e-4  # m
-ABOVE = 0.05  # m above the floor
 HELD = 0.7  # of the peak torque
 _INSIDE = np.radians(2.0)  # from both ends of an axis
 _TRIED = 4000
@@ -86,7 +85,7 @@ class Postures:
     def _above_floor(self, q: FloatArray) -> BoolArray:
         """Whether the links after the first stay above the floor (N,)."""
         others = [each for each in self._capsules if each.link > 1]
-        return np.asarray(lowest_points(self._chain, q, others) > self._floor + ABOVE)
+        return np.asarray(lowest_points(self._chain, q, others) > self._floor + FLOOR_ROOM - LEAST)
 
     def _held(self, q: FloatArray) -> BoolArray:
         torque = np.abs(holding_torques(self._arm, q, self._payload))

@@ -88,18 +88,22 @@ def _without_body(
 
 
 FLOOR_ROOM = 0.03
-"""m that link 1 stays above the floor: more than the safety distance of a request."""
-_TURNS = 24  # of axis 1
+"""m that moving links stay above the floor: more than the safety distance of a request."""
+_TURNS = 24  # of axes 1 and 2
 
 
 def floor_below(chain: Chain, capsules: Sequence[Capsule]) -> float:
     """Height [m] of the floor below the foot of an arm, rounded down to cm: 0, or less where
-    capsules of link 1, which stand out from it, reach below the foot.
+    capsules of links 1 and 2, which stand out from these, reach below the foot wherever they turn.
     """
-    q = np.zeros((_TURNS, chain.n))
-    q[:, 0] = np.linspace(-np.pi, np.pi, _TURNS)
-    first = [each for each in capsules if each.link == 1]
-    lowest = float(lowest_points(chain, q, first).min())
+    angles = np.linspace(-np.pi, np.pi, _TURNS)
+    q = np.zeros((_TURNS * _TURNS, chain.n))
+    q[:, 0] = np.repeat(angles, _TURNS)
+    q[:, 1] = np.tile(angles, _TURNS)
+    first, second = (
+        lowest_points(chain, q, [each for each in capsules if each.link == link]) for link in (1, 2)
+    )
+    lowest = min(float(first.min()), float(second.max()))
     return 0.0 if lowest >= FLOOR_ROOM else float(np.floor(100.0 * (lowest - FLOOR_ROOM))) / 100.0
 
 
@@ -161,32 +165,43 @@ def pairs_of(
     distance = model.distances(q)
     link = {capsule.name: capsule.link for capsule in capsules}
     shapes = _Bodies(bodies, chain)
-    reduced = []
+    groups: dict[tuple[int, int], list[int]] = {}
     for z, pair in enumerate(model.pairs):
-        near = float((distance[:, z] <= SAFETY).mean())
-        if near > NEAR:
-            own = _own_distance(
-                distance[:, z], near, q, shapes, link[pair.body_a], link[pair.body_b]
-            )
-            reduced.append(ReducedDistance(pair.body_a, pair.body_b, *own))
+        if float((distance[:, z] <= SAFETY).mean()) > NEAR:
+            groups.setdefault((link[pair.body_a], link[pair.body_b]), []).append(z)
+    reduced = []
+    for (one, other), near in groups.items():
+        apart = shapes.apart(q[:_BODY_POSTURES], one, other)
+        own = [_own_distance(distance[:, z], apart) for z in near]
+        together = (distance[:, near] > [kept for kept, _ in own]).all(axis=1).mean()
+        if together < _LEFT:  # each leaves enough, all together do not
+            own = [_own_distance(distance[:, z], apart, told_apart=False) for z in near]
+        reduced += [
+            ReducedDistance(model.pairs[z].body_a, model.pairs[z].body_b, *each)
+            for z, each in zip(near, own, strict=True)
+        ]
     return Pairs(tuple(far), tuple(reduced))
 
 
 def _own_distance(
-    distance: FloatArray, near: float, q: FloatArray, shapes: _Bodies, one: int, other: int
+    distance: FloatArray, apart: FloatArray, *, told_apart: bool = True
 ) -> tuple[float, str]:
-    """What a pair that is near in a share of the postures q keeps, and the reason."""
-    often = f"nearer than {1e3 * SAFETY:g} mm in {100.0 * near:.0f} % of {len(q)} postures"
-    taken = np.argsort(distance[:_BODY_POSTURES], kind="stable")
-    free = shapes.apart(q[:_BODY_POSTURES], one, other)[taken]  # by rising distance of the capsules
-    meeting = free <= 0.0
+    """What a pair with these distances in postures (N,) keeps, and the reason; apart: lower bounds
+    of the distance of the bodies in the first of them; told_apart: whether postures in which bodies
+    are free are told from others by the distance of the capsules.
+    """
+    near = 100.0 * float((distance <= SAFETY).mean())
+    often = f"nearer than {1e3 * SAFETY:g} mm in {near:.0f} % of {len(distance)} postures"
+    taken = np.argsort(distance[: len(apart)], kind="stable")
+    free = apart[taken]  # by rising distance of the capsules
+    meeting = (free <= 0.0) & (distance[taken] <= 0.0)
     first = int(np.flatnonzero(meeting)[-1]) + 1 if meeting.any() else 0
     left = len(taken) - first
-    if left >= _LEFT * len(taken):
+    if told_apart and left >= _LEFT * len(taken):
         kept = min(float(distance[taken[first]]) - ROOM, SAFETY)
-        apart = 1e3 * float(free[first:].min())
+        least = 1e3 * max(float(free[first:].min()), 0.0)
         return kept, often if kept >= 0.0 else (
-            f"{often}; where the capsules overlap by less, the bodies of the URDF stay {apart:.0f} "
+            f"{often}; where the capsules overlap by less, the bodies of the URDF stay {least:.0f} "
             f"mm apart or more in the {left} postures that were looked at"
         )
     kept = min(float(np.quantile(distance, _DEEPEST)) - ROOM, SAFETY)
