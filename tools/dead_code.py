@@ -29,6 +29,8 @@ KNOWN = (
     ("src/ir_msgs_py/ir_msgs_py/ros/*", "*_range clock_callback _*goal_request*", "its attributes"),
     ("src/ir_*/ir_*/node/*", "_*", "rclpy keeps an entity as long as its node refers to it"),
     ("src/ir_planner/ir_planner/node/answers.py", "*", "fields of messages"),
+    ("src/ir_description/ir_description/files/making/urdf_tree.py", "*Handler", "of expat"),
+    ("src/ir_description/ir_description/files/making/xacro_file.py", "get_*", "xacro asks it"),
     ("src/ir_kernels/setup.py", "extra_*", "the interface of setuptools"),
     ("src/ir_kernels/ir_kernels/limits.py", "time_of_*", "fields of a kernel's result, in order"),
     ("src/ir_msgs_py/ir_msgs_py/modes.py", "*_*", "settings read by their names"),

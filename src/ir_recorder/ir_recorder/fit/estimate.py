@@ -109,13 +109,6 @@ class Stretch:
     white: float
 
 
-def fold_of(window: int, windows: int) -> int:
-    """The part of a recording that window number `window` of so many belongs to: consecutive
-    ones.
-    """
-    return min(window * FOLDS // max(windows, 1), FOLDS - 1)
-
-
 def widening(
     slopes: FloatArray,
     residual: FloatArray,

@@ -203,7 +203,10 @@ class SimDriver(Node):
         """
         if not self._driver.stopped:
             return True
-        takers = (*self._actions, self._trajectory_topic)
+        takers: list[BoundedActionServer | TrajectoryTopic] = [
+            *self._actions,
+            self._trajectory_topic,
+        ]
         return all(taker.take_waiting(TURN) for taker in takers)
 
     def _admit(self, points: int, size: int) -> Admission:

@@ -28,11 +28,6 @@ class EnergyCurve:
         """What the movement needs [J] in a duration [s]."""
         return float(sum(c * duration**p for p, c in self.terms))
 
-    @property
-    def is_convex(self) -> bool:
-        """Whether every term is convex, so that tangents meet the curve."""
-        return all(_bends_up(p, c) for p, c in self.terms)
-
     def tangent(self, duration: float) -> tuple[float, float]:
         """Slope [W] and value at zero [J] of a line that is nowhere above the curve."""
         slope = 0.0

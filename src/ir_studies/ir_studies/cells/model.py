@@ -83,7 +83,6 @@ class CellModel:
         self.moving: list[_Moving] = []
         self.staying: list[_Staying] = []
         self.separations: dict[tuple[int, int], int] = {}
-        self._tangents: dict[int, list[float]] = {}
         self._clocks = [self._clock(robot) for robot in instance.robots]
         self._stops = {s.number: s for robot in instance.robots for s in robot.stops}
         self._hops = {h.number: h for robot in instance.robots for h in robot.hops}
