@@ -146,7 +146,7 @@ class Chains:
         )
         searches = exit_searches(settings.withdrawal)
         layers = layers_of(route, start, context, searches, lambda *_: None)
-        return Chains(planner, route, options, layers, known)
+        return Chains(planner, route, context.options, layers, known)
 
     @property
     def count(self) -> float:

@@ -96,7 +96,7 @@ def test_a_coarse_solution_less_its_margin_is_below_the_planner_s_movement(
     cell: str, scene_of: Callable[[str], PlanningScene]
 ) -> None:
     scene = scene_of(cell)
-    options = PlanOptions()
+    options = PlanOptions(time_value=500.0)
     coarse = CoarseCost(asked(scene, options), Rates(1.0, options.time_value))
     postures = np.array([scene.cell.park, scene.cell.machine_home])
     turned = postures + np.radians([60.0, 0.0, 0.0, 0.0, 0.0, 0.0])

@@ -254,7 +254,7 @@ def test_the_chain_is_the_cheapest_of_all_that_the_planner_can_move_along(
     stations = ("infeed_pick", "gauge_measure")
     plan = planned(demo_cell, power, *stations)
     assert plan.status.ok, plan.status.message
-    options = PlanOptions(planning_time=60.0)
+    options = PlanOptions(planning_time=60.0, time_value=500.0)
 
     def cost(report: TrajectoryReport) -> float:
         return report.energy - report.base_energy + options.time_value * report.duration
@@ -263,7 +263,7 @@ def test_the_chain_is_the_cheapest_of_all_that_the_planner_can_move_along(
         return Context(scene, options, Journal(Work(10**7, np.inf, lambda: 0.0), 0))
 
     steps = placed_steps(demo_cell, steps_of(demo_cell, stations), demo_cell.parts_at_start())
-    scenes = Scenes(demo_cell, power, PlannerSettings().drives)
+    scenes = Scenes(demo_cell, power, PlannerSettings().drives(demo_cell.robot))
     route = Route.over(steps, scenes)
     home = np.array(demo_cell.machine_home)
     layers = layers_of(route, home, asked(route.arriving(0)), EXIT_SEARCHES, no_progress)
@@ -296,13 +296,15 @@ def test_with_movement_cost_the_chain_is_the_shortest_path_of_eq_9(
 ) -> None:
     plan = planned(demo_cell, power, "gauge_measure", "park", objective="movement_cost")
     assert plan.status.ok, plan.status.message
-    scene = scene_with(demo_cell, load_text(demo_cell), power, PlannerSettings().drives)
+    scene = scene_with(
+        demo_cell, load_text(demo_cell), power, PlannerSettings().drives(demo_cell.robot)
+    )
     home = np.array(demo_cell.machine_home)
     park = np.array(demo_cell.park)
     steps = placed_steps(
         demo_cell, steps_of(demo_cell, ("gauge_measure",)), demo_cell.parts_at_start()
     )
-    route = Route.over(steps, Scenes(demo_cell, power, PlannerSettings().drives))
+    route = Route.over(steps, Scenes(demo_cell, power, PlannerSettings().drives(demo_cell.robot)))
     context = Context(scene, PlanOptions(), Journal(Work(10**7, np.inf, lambda: 0.0), 0))
     nodes = layers_of(route, home, context, EXIT_SEARCHES, no_progress)[1]
     costs = [

@@ -96,7 +96,7 @@ def test_refined_is_better_than_the_same_path_in_straight_steps(
     path = np.radians(
         [[0, -125, 120, 0, 80, 0], [40, -100, 100, 20, 60, 0], [70, -90, 80, 0, 40, 30]]
     )
-    options = PlanOptions(objective=objective, safety_distance=0.0)
+    options = PlanOptions(objective=objective, safety_distance=0.0, time_value=500.0)
     refined = movement_over(path, Context.of(demo_scene, options, unhurried()))
     straight = straight_steps(path, Context.of(demo_scene, options, unhurried()))
     assert refined.violation is None
