@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import re
 import zipfile
+import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -126,7 +127,14 @@ class Project:
         """
         found = []
         notes = []
-        for file in _nearest(self.files, main):
+        nearest = _nearest(self.files, main)
+        names = {(one.module, one.path.suffix.lower()): one.path for one in nearest}
+        for file in self.files:
+            taken = names.get((file.module, file.path.suffix.lower()))
+            if taken is not None and taken != file.path and file.module not in CONTROLLERS:
+                said = f"{file.path} is left out: {taken} has the same name and is nearer"
+                notes.append(Note(Place(), said, Effect.MOTIONS))
+        for file in nearest:
             source = self.source(file)
             if isinstance(source, Source):
                 found.append(source)
@@ -169,7 +177,8 @@ def _of_archive(path: Path) -> Iterator[File]:
                 if _is_program_file(inside) and not one.is_dir():
                     with archive.open(one) as entry:
                         yield File(inside, entry.read(BYTES_MAX + 1))
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError) as error:
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
+        # damaged, truncated, packed in a way that zipfile hasn't, or encrypted
         raise KrlError(f"{path.name} is no archive that can be read: {error}") from error
 
 
