@@ -180,15 +180,14 @@ def _modes(
         return {}
     start = analysis.steps[0].step.start
     end = analysis.steps[-1].step.end
+    since = np.concatenate((power.time[:1], power.time[:-1]))
+    inside = np.minimum(power.time, end) - np.maximum(since, start)
+    known = (inside > 0.0) & np.isfinite(power.power)
     rows = []
-    since = power.time[0]
-    for time, watts, mode in zip(
-        power.time.tolist(), power.power.tolist(), power.mode.tolist(), strict=True
-    ):
-        inside = min(time, end) - max(since, start)
-        since = time
-        if inside > 0.0 and math.isfinite(watts):
-            rows.append((mode_name(int(mode)), inside, watts * inside))
+    for number in np.unique(power.mode[known]).tolist():
+        own = known & (power.mode == number)
+        joules_of = float((power.power[own] * inside[own]).sum())
+        rows.append((mode_name(int(number)), float(inside[own].sum()), joules_of))
     if full is not None:
         rows += [(pause.mode, pause.seconds, pause.energy) for pause in full.added]
     found = _summed(rows, cycles)
