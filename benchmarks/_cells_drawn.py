@@ -113,7 +113,8 @@ def drawn(robots: int, stops: int, seed: int, conflicts: int = 12) -> Instance:
     lags = []
     handovers = []
     for k in range(robots - 1):
-        giver, taker = draws[k].stops[1], draws[k + 1].stops[1]
+        giver = draws[k].stops[1]
+        taker = draws[k + 1].stops[1]
         begin = phases[k] + draws[k].intervals[giver.number][0]
         taken = phases[k + 1] + draws[k + 1].intervals[taker.number][0]
         height = int(np.ceil((begin - taken) / cycle))

@@ -85,7 +85,8 @@ def _hop_faults(
     aid = int(dynamic.get("aid"))
     mid, _, start, took = done[aid]
     move = dynamic.find(f".//movement[@mid='{mid}']")
-    low, high = float(move.findtext("min-duration")), float(move.findtext("max-duration"))
+    low = float(move.findtext("min-duration"))
+    high = float(move.findtext("max-duration"))
     found = []
     if not low - TOLERANCE <= took <= high + TOLERANCE:
         found.append(f"{aid} takes {took}")
@@ -113,7 +114,8 @@ def _shared_faults(instance: ET.Element, done: dict, cycle: float) -> list[str]:
 def _late(instance: ET.Element, done: dict, cycle: float) -> list[str]:
     found = []
     for lag in instance.iter("time-lag"):
-        a, b = int(lag.findtext("from-activity")), int(lag.findtext("to-activity"))
+        a = int(lag.findtext("from-activity"))
+        b = int(lag.findtext("to-activity"))
         if a in done and b in done:
             bound = float(lag.findtext("length")) - cycle * int(lag.findtext("height"))
             if done[b][2] - done[a][2] < bound - TOLERANCE:

@@ -98,7 +98,8 @@ class PublishedModel:
         cycle = self.instance.cycle
         closing = robot.closing.number
         for hop in robot.hops:
-            e, v = hop.number, hop.start
+            e = hop.number
+            v = hop.start
             rest = -cycle if v == closing else 0.0
             p.row(
                 {self.start[e]: 1.0, self.start[v]: -1.0, self.duration[v]: -1.0},
@@ -130,7 +131,8 @@ class PublishedModel:
         robots = len(self.instance.robots)
         far = 2.0 * robots * cycle
         for conflict in self.instance.conflicts:
-            a, b = conflict.first[0], conflict.second[0]
+            a = conflict.first[0]
+            b = conflict.second[0]
             taken = {choice[conflict.first]: -far, choice[conflict.second]: -far}
             for n in range(-robots, robots + 1):
                 first = p.binary()

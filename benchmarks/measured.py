@@ -73,7 +73,8 @@ def main() -> None:
 
         seeds = min(asked.seeds, 3) if asked.quick else asked.seeds
         found = measured(Asked(("demo",), seeds, asked.quick))
-        rows, claims = list(found.rows), list(found.claims)
+        rows = list(found.rows)
+        claims = list(found.claims)
     else:
         table: list[Row] = []
         for own, held in _sets(asked.folder):

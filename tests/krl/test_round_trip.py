@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from ir_description import Cell, bundled_cells, load_cell
+from ir_description.poses import abc_from_rotation
 from ir_krl import STYLES, follow, parse, plc_input, read_plc_table
 from ir_msgs_py.modes import REST_MODES
 from ir_planner import Planner, RequestError
 from ir_planner.krl import EvaluatedProgram, KrlExport, evaluate_krl, export_krl, tool_in_flange
-from ir_planner.krl.inertia import abc_of_axes, principal_axes
+from ir_planner.krl.surroundings import principal_axes
 
 SHARE = 0.005  # of seconds and joules
 _STEP = re.compile(r"(\d+) (?:\S+ -> \S+|pause at .*?): ([\d.]+) s, (-?[\d.]+) J")
@@ -142,4 +143,4 @@ def test_an_inertia_comes_back_from_its_principal_axes() -> None:
         moments, axes = principal_axes(inertia)
         assert axes @ np.diag(moments) @ axes.T == pytest.approx(inertia, abs=1e-7)
         assert np.linalg.det(axes) == pytest.approx(1.0)
-        assert np.isfinite(abc_of_axes(axes)).all()
+        assert np.isfinite(abc_from_rotation(axes)).all()

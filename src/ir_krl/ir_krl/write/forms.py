@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from ir_krl.write.figures import frame_text
+from ir_krl.errors import Place
+from ir_krl.run.values import FRAME_NAMES, components, frame
 from ir_krl.write.parts import Style, WrittenMove
+from ir_msgs_py.arrays import FloatArray
 
 # The texts after ";%{" tell the editor which form it is; the lines below them are what the form
 # makes of its data, so that both say the same.
@@ -135,3 +137,18 @@ def _line_of_krc2(part: WrittenMove, n: int, tool: int) -> list[str]:
         f"BAS(#CP_PARAMS,{part.velocity:g})",
         f"LIN XP{n} {word}".rstrip(),
     ]
+
+
+# Numbers and frames as text.
+
+
+def decimal(value: float, digits: int) -> str:
+    """A number without the sign of a zero."""
+    text = f"{value:.{digits}f}"
+    return text if text.strip("-0.") else text.removeprefix("-")
+
+
+def frame_text(transform: FloatArray, digits: int) -> str:
+    """X to C [mm, deg] of a pose (4, 4) [m], without brackets."""
+    fields = components(frame(transform), FRAME_NAMES, Place())
+    return ",".join(f"{name} {decimal(value, digits)}" for name, value in fields.items())

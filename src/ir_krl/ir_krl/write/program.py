@@ -9,8 +9,7 @@ import numpy as np
 
 from ir_krl.run.commands import Payload
 from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES
-from ir_krl.write.figures import decimal, frame_text
-from ir_krl.write.forms import Forms
+from ir_krl.write.forms import Forms, decimal, frame_text
 from ir_krl.write.names import INPUT, OUTPUT, WIDTHS, Numbers, Wiring, check_name
 from ir_krl.write.parts import (
     Attached,

@@ -3,7 +3,6 @@
 from ir_planner.krl.execution import DrivenStep
 from ir_planner.krl.export import DEVIATION_MAX, KrlExport
 from ir_planner.krl.geometry import tool_in_flange
-from ir_planner.krl.places import posture_at, station_at
 from ir_planner.krl.requests import (
     EvaluatedProgram,
     EvaluatedStep,
@@ -12,6 +11,8 @@ from ir_planner.krl.requests import (
     follow_krl,
     follow_ur,
     one_movement,
+    posture_at,
+    station_at,
 )
 from ir_planner.krl.splines import ToolMotion
 

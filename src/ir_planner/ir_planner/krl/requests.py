@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_kernels import portable
 from ir_krl import (
     PLC_DONE,
     PLC_PAUSE,
@@ -26,18 +27,18 @@ from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_planner.certificates import in_scene
 from ir_planner.checks import Evaluation, evaluate_trajectory, total_report
+from ir_planner.curves import turn_of
 from ir_planner.errors import RequestError
 from ir_planner.krl.execution import DrivenStep, drive
 from ir_planner.krl.export import KrlExport, export
 from ir_planner.krl.geometry import Arm, tool_in_flange
 from ir_planner.krl.judged import judge_of
 from ir_planner.krl.makes import joint_limits
-from ir_planner.krl.places import posture_at, station_at
 from ir_planner.krl.surroundings import Surroundings, wires_of
 from ir_planner.planner import Planner
 from ir_planner.program import Charge, Pause, Scenes, spent
-from ir_planner.request import safety_distance
-from ir_planner.scene import load_text
+from ir_planner.request import POSTURES, safety_distance
+from ir_planner.scene import PlanningScene, load_text
 from ir_planner.timing import standing
 
 # What a driven program costs in the cell: seconds, joules and clearance of every step, and its
@@ -298,3 +299,29 @@ def one_movement(planner: Planner, trajectory_id: str) -> tuple[PlannedMovement,
         duration=trajectory.duration,
     )
     return (movement,)
+
+
+# Which station or posture a configuration stands at.
+
+PLACE_TOLERANCE = 2e-3  # m: taught points differ from a station's pose by about this
+TURN_TOLERANCE = np.radians(0.5)
+AXIS_TOLERANCE = np.radians(0.2)
+
+
+def station_at(scene: PlanningScene, q: FloatArray) -> str:
+    """Name of the station whose pose the tcp has at q (n,), else ""."""
+    tcp = scene.chain.tcp_poses(q[None])[0]
+    for station in scene.cell.stations:
+        away = float(portable.norm(station.pose[:3, 3] - tcp[:3, 3]))
+        turned = turn_of(portable.matmul(station.pose[:3, :3].T, tcp[:3, :3]))
+        if away <= PLACE_TOLERANCE and turned <= TURN_TOLERANCE:
+            return station.name
+    return ""
+
+
+def posture_at(scene: PlanningScene, q: FloatArray) -> str:
+    """Name of the posture that q (n,) is, else ""."""
+    for name in POSTURES:
+        if np.abs(q - scene.cell.posture(name)).max() <= AXIS_TOLERANCE:
+            return name
+    return ""

@@ -9,12 +9,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ir_description import Cell, InvalidValueError, Load, PartPlaces, ProgramStep, Signal
-from ir_description.poses import rotation_from_abc
+from ir_description.poses import abc_from_rotation, rotation_from_abc
 from ir_kernels import portable
 from ir_krl import GRIP, KrlMotionError, Note, Payload, Place, SignalRange
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.krl.geometry import tool_in_flange
-from ir_planner.krl.inertia import abc_of_axes, principal_axes
 from ir_planner.program import Doors, Scenes, doors_along
 from ir_planner.scene import PlanningScene
 
@@ -34,7 +33,7 @@ def payload_of(loads: tuple[Load, ...]) -> Payload:
     turn = tool_in_flange(np.eye(4))[:3, :3]
     moments, axes = principal_axes(portable.matmul(turn, inertia, turn.T))
     centre = portable.matmul(turn, com)
-    return Payload(mass, _three(centre), _three(abc_of_axes(axes)), _three(moments))
+    return Payload(mass, _three(centre), _three(abc_from_rotation(axes)), _three(moments))
 
 
 def _about(mass: float, away: FloatArray) -> FloatArray:
@@ -225,3 +224,33 @@ def nothing_around(scene: PlanningScene) -> Surroundings:
     scenes = Scenes(scene.cell, scene.power, scene.drives)
     wires = Wires({}, {}, 0, {})
     return Surroundings(scenes, wires, lambda _scene, _q: "", PartPlaces("", {}), fixed=scene)
+
+
+# Principal axes of an inertia, the same bits on every machine.
+
+_SWEEPS = 30
+_NONE = 1e-9  # of the trace: what is below is no product of inertia
+
+
+def principal_axes(inertia: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Moments (3,) about the axes, and the axes (3, 3) as columns of a rotation, of a symmetric
+    inertia (3, 3), by Jacobi's rotations.
+    """
+    a = np.array(inertia, dtype=float)
+    axes = np.eye(3)
+    small = _NONE * abs(float(np.trace(a)))
+    for _ in range(_SWEEPS):
+        k = int(np.argmax([abs(a[0, 1]), abs(a[0, 2]), abs(a[1, 2])]))
+        i, j = ((0, 1), (0, 2), (1, 2))[k]
+        if abs(a[i, j]) <= small:
+            break
+        theta = (a[j, j] - a[i, i]) / (2.0 * a[i, j])
+        t = float(np.copysign(1.0, theta) / (abs(theta) + np.sqrt(theta * theta + 1.0)))
+        c = 1.0 / np.sqrt(t * t + 1.0)
+        turn = np.eye(3)
+        turn[i, i] = turn[j, j] = c
+        turn[i, j] = c * t
+        turn[j, i] = -c * t
+        a = portable.matmul(turn.T, a, turn)
+        axes = portable.matmul(axes, turn)
+    return np.diag(a).copy(), axes
