@@ -21,12 +21,10 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind
 from ir_msgs_py.search_log import (
-    LOG,
     ConfigurationLog,
     CorrectionLog,
     SearchLog,
     WithdrawalLog,
-    log_of,
 )
 from ir_msgs_py.status import StatusCode
 from ir_planner import PlannerSettings
@@ -69,8 +67,7 @@ def planned(cell: Cell, power: PowerData, *stations: str, seed: int = 0) -> Prog
 
 
 def logs_of(plan: ProgramPlan) -> list[SearchLog]:
-    found = [log_of(stage.name, stage.note) for stage in plan.info.stages]
-    return [log for log in found if log is not None]
+    return list(plan.info.searches)
 
 
 @pytest.fixture(scope="module")
@@ -241,13 +238,13 @@ def test_what_the_searches_did_is_the_same_for_the_same_seed(
     plan: ProgramPlan, asked: Cell, power: PowerData
 ) -> None:
     again = planned(cell_from_yaml(cell_to_yaml(asked)), power)
-    assert _notes(again) == _notes(plan)
-    assert len(_notes(plan)) == 3
+    assert _logs(again) == _logs(plan)
+    assert len(_logs(plan)) == 3
     assert again.program_id == plan.program_id
 
 
-def _notes(plan: ProgramPlan) -> list[str]:
-    return [stage.note for stage in plan.info.stages if stage.name.startswith(LOG)]
+def _logs(plan: ProgramPlan) -> list[str]:
+    return [repr(log) for log in plan.info.searches]
 
 
 def test_what_a_cell_asks_for_is_written_and_read_again() -> None:

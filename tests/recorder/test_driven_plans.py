@@ -8,22 +8,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap_ros2._dynamic import serialize_dynamic
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 
 from ir_msgs.action import Plan
 from ir_msgs.msg import (
     PlannedMovement,
-    PlanningStage,
     ProgramPoint,
     ProgramSavings,
     ProgramState,
     RecordedCall,
 )
-from ir_msgs_py.search_log import ConfigurationLog, CorrectionLog, SearchLog, stage_of
+from ir_msgs_py.ros.search_conversions import searches_to_msg
+from ir_msgs_py.search_log import ConfigurationLog, CorrectionLog, SearchLog
 from ir_recorder import read_recording
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.format.schemas import SchemaLibrary
-from ir_recorder.reading.planner_answers import ACTION
+from ir_recorder.reading.cdr import Columns
+from ir_recorder.reading.planner_answers import ACTION, completed, result_definition
 from ir_recorder.recording.session import RecordingSession
 from ir_recorder.recording.writer import RecordingWriter
 
@@ -58,8 +59,7 @@ class Planned:
             *("a", self.program, 1, ((1.0,),), (1.0, 1.0)), *(ROWS, (), ROWS), met="", driven=ROWS
         )
         logs: tuple[SearchLog, ...] = (ConfigurationLog(self.program, 1, 1, 1, (), ()), driven)
-        stages = [stage_of(log) for log in logs]
-        answer.info.stages = [PlanningStage(name=each.name, note=each.note) for each in stages]
+        answer.searches = searches_to_msg(logs)
         return bytes(serialize_message(answer))
 
 
@@ -143,3 +143,12 @@ def test_a_movement_of_another_program_is_not_shown_as_driven(
     searches = read_recording(record(tmp_path / "a.mcap", PLANS, [(program, "t1")])).searches
     (correction,) = [log for log in searches if isinstance(log, CorrectionLog)]
     assert len(correction.driven) == points
+
+
+def test_an_answer_of_an_earlier_version_is_completed() -> None:
+    data = PLANS[0].result()
+    end = Columns([data], "ir_msgs/msg/Plan_Result", result_definition()).ends()[0]
+    earlier = data[:end] + b"\xab" * 24  # what a middleware leaves behind the last field
+    answer = deserialize_message(completed(earlier, ACTION), Plan.Result)
+    assert [each.trajectory_id for each in answer.movements] == ["t1", "t2"]
+    assert len(answer.searches.corrections) == 0

@@ -12,6 +12,7 @@ from enum import StrEnum
 import numpy as np
 
 from ir_msgs_py.modes import modes_of
+from ir_msgs_py.search_log import SearchLog
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_values.arrays import FloatArray, at_least, finite, not_nan, one_of, read_only, set_field
 from ir_values.errors import InvalidValueError
@@ -166,7 +167,8 @@ class PlanningInfo:
     start: joint values (n,) [rad] that were used, empty where there is no start; start_names: their
     joints.
     iterations: work done, in the unit of max_iterations; truncated: cut by planning_time [s].
-    timing: which the answer is, "synchronous" or "asynchronous"; "" where nobody chose.
+    timing: which the answer is, "synchronous" or "asynchronous"; "" where nobody chose. searches:
+    logs of the searches behind it, which answers on ROS hold in a field beside this one.
     """
 
     planner_id: str = ""
@@ -179,6 +181,7 @@ class PlanningInfo:
     stages: tuple[PlanningStage, ...] = ()
     rejected: tuple[Rejection, ...] = ()
     timing: str = ""
+    searches: tuple[SearchLog, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("seed", "iterations"):
@@ -195,6 +198,7 @@ class PlanningInfo:
         set_field(self, "planning_time", finite(self.planning_time, "planning_time", "s"))
         set_field(self, "stages", tuple(self.stages))
         set_field(self, "rejected", tuple(self.rejected))
+        set_field(self, "searches", tuple(self.searches))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -41,6 +41,7 @@ from ir_recorder.arguments import add_roots, roots_of
 from ir_recorder.errors import ReadError
 from ir_recorder.format import contents
 from ir_recorder.reading.mcap_file import RawRecording, chosen_namespace, read_raw
+from ir_recorder.reading.planner_answers import completed
 from ir_recorder.recording.arithmetic import arithmetic
 from ir_recorder.recording.session import PACKAGES, data_of_cell, installed_version
 
@@ -104,7 +105,7 @@ class RecordedPlanner:
                 else (kind.Request, kind.Response)
             )
             if len(call.request):
-                response = _decoded(bytes(call.response), answer) if len(call.response) else None
+                response = _answer(bytes(call.response), answer, call.type)
                 request = _decoded(bytes(call.request), ask)
                 yield Call(
                     _nanoseconds(call.header.stamp), call.service, call.type, request, response
@@ -189,6 +190,16 @@ def _decoded(data: bytes, kind: Any) -> Any:
         return deserialize_message(data, kind)
     except Exception as error:  # damaged bytes: the middleware raises what it likes
         raise ReadError(f"a message of type {kind.__name__} can't be read: {error}") from error
+
+
+def _answer(data: bytes, kind: Any, name: str) -> Any:
+    """An answer, also one of an earlier version; None where it wasn't recorded."""
+    if not data:
+        return None
+    try:
+        return _decoded(data, kind)
+    except ReadError:
+        return _decoded(completed(data, name), kind)
 
 
 def _parameters(page: bytes) -> dict[str, Any]:
@@ -278,7 +289,6 @@ HANDLERS = {
 }
 """The planner's handler of each type whose answers have ids."""
 IDS = ("trajectory_id", "program_id")
-_FRONT = "pareto front"  # the stage whose note has the ids of a front
 _FREE = 1e-9  # s: the age of a state that is as it was
 
 
@@ -339,6 +349,8 @@ def _again(planner: Planner, call: Call, states: list[tuple[int, bytes]]) -> Rep
     requests.guarded(getattr(requests, HANDLERS[call.type]))(call.request, answer)
     before = ids_of(call.response)
     now = ids_of(answer)
+    if not _front(call.response):  # a recording of an earlier version has no ids of the front
+        now = {key: value for key, value in now.items() if not key.startswith("pareto_ids")}
     if before == now:
         return Replanned(call.service, len(before) - 1, Comparison.EQUAL)
     other = [key for key in before | now if before.get(key) != now.get(key)]
@@ -355,10 +367,12 @@ def ids_of(message: Any) -> dict[str, str]:
     """The status and all ids of an answer by their place: "movements[2].trajectory_id"."""
     found = {"status": str(int(message.status.code))}
     found |= {place: value for place, name, value in _texts(message, "") if name in IDS and value}
-    for stage in message.info.stages:
-        if stage.name == _FRONT:
-            found[_FRONT] = stage.note
+    found |= {f"pareto_ids[{k}]": each for k, each in enumerate(_front(message))}
     return found
+
+
+def _front(message: Any) -> list[str]:
+    return list(getattr(message, "pareto_ids", ()))
 
 
 def _texts(message: Any, place: str) -> Iterator[tuple[str, str, str]]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -44,6 +44,7 @@ from ir_msgs_py.ros.plan_conversions import (
     program_savings_from_msg,
     report_from_msg,
 )
+from ir_msgs_py.ros.search_conversions import searches_from_msg
 from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.ros.topics import ACTION_SERVICES, SERVICE
 from ir_msgs_py.savings import ProgramPoint, ProgramSavings
@@ -247,7 +248,7 @@ class MovementPlan:
 @dataclass(frozen=True, eq=False)
 class OptimizedTrajectory:
     """A trajectory made cheaper; trajectory is None unless the options asked for points. durations
-    [s] and energies [J], each (P,): the trade of time for energy, the fastest first.
+    [s] and energies [J], each (P,), and ids: the trade of time for energy, the fastest first.
     """
 
     trajectory_id: str
@@ -257,6 +258,7 @@ class OptimizedTrajectory:
     durations: FloatArray
     energies: FloatArray
     info: PlanningInfo
+    ids: tuple[str, ...]
 
     @classmethod
     def from_msg(cls, response: Any) -> OptimizedTrajectory:
@@ -270,6 +272,7 @@ class OptimizedTrajectory:
             np.array(response.pareto_durations),
             np.array(response.pareto_energies),
             planning_info_from_msg(response.info),
+            tuple(response.pareto_ids),
         )
 
 
@@ -295,7 +298,9 @@ class ProgramPlan:
             result.program_id,
             tuple(planned_movement_from_msg(movement) for movement in result.movements),
             report_from_msg(result.report),
-            planning_info_from_msg(result.info),
+            replace(
+                planning_info_from_msg(result.info), searches=searches_from_msg(result.searches)
+            ),
             result.gap,
             program_savings_from_msg(result.savings),
             tuple(program_point_from_msg(point) for point in result.front),

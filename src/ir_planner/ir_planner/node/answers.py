@@ -24,6 +24,7 @@ from ir_msgs_py.ros.plan_conversions import (
     service_candidate_to_msg,
 )
 from ir_msgs_py.ros.power_conversions import power_mode_to_msg
+from ir_msgs_py.ros.search_conversions import searches_to_msg
 from ir_msgs_py.savings import ProgramPoint
 from ir_msgs_py.status import Status
 from ir_planner.cartesian import CartesianPlan
@@ -104,11 +105,12 @@ def fill_cartesian(response: Any, plan: CartesianPlan, include_points: bool) -> 
 
 
 def fill_optimization(response: Any, plan: OptimizationPlan, include_points: bool) -> None:
-    """optimize_trajectory: the front's movements are stored, their ids stand in a stage's note."""
+    """optimize_trajectory: the front's movements are stored."""
     response.before = report_to_msg(plan.before)
     response.after = report_to_msg(plan.after)
     response.pareto_durations = [float(point.report.duration) for point in plan.front]
     response.pareto_energies = [float(point.report.energy) for point in plan.front]
+    response.pareto_ids = [point.trajectory.trajectory_id for point in plan.front]
     response.info = planning_info_to_msg(plan.info)
     if plan.trajectory is not None:
         response.trajectory_id = plan.trajectory.trajectory_id
@@ -135,6 +137,7 @@ def fill_program(response: Any, plan: ProgramPlan, include_points: bool) -> None
     response.gap = plan.gap
     response.savings = program_savings_to_msg(plan.savings)
     response.front = [program_point_to_msg(_point(program)) for program in plan.front]
+    response.searches = searches_to_msg(plan.info.searches)
 
 
 def _point(program: ProgramPlan) -> ProgramPoint:

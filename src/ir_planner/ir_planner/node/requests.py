@@ -14,6 +14,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.errors import MsgsError, PoseError
 from ir_msgs_py.names import PLANNER
 from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.ros.search_conversions import searches_to_msg
 from ir_msgs_py.ros.serving import answered, unexpected
 from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
@@ -196,6 +197,7 @@ class Requests:
         goal = goal_of(request, cell)
         start = self._state(request.start, StatusCode.START_STATE_INVALID, at_rest="start")
         plan = self.planner.plan_regional(start=start, goal=goal, options=options)
+        response.searches = searches_to_msg(plan.info.searches)
         return self._movement(plan, response, options.include_points)
 
     def plan_service(self, request: Any, response: Any) -> Status:

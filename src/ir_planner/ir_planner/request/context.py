@@ -10,7 +10,7 @@ import numpy as np
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import ROBOTS_TIME_VALUE, PlanOptions
 from ir_msgs_py.report import PlanningInfo, PlanningStage, Rejection
-from ir_msgs_py.search_log import ConfigurationLog, SearchLog, stage_of
+from ir_msgs_py.search_log import ConfigurationLog, SearchLog
 from ir_planner.errors import CancelledError
 from ir_planner.scene import MotionLimits, PlanningScene
 
@@ -117,11 +117,12 @@ class Journal:
             iterations=self.work.iterations,
             truncated=self.work.truncated,
             planning_time=self.work.clock() - self.begin,
-            stages=(*self.stages, *map(stage_of, self.logs)),
+            stages=tuple(self.stages),
             rejected=tuple(
                 Rejection(reason, count) for reason, count in sorted(self.rejected.items())
             ),
             timing=self.timing,
+            searches=tuple(self.logs),
         )
 
 

@@ -221,7 +221,7 @@ class _Optimization:
             first = sorted(known, key=lambda movement: movement is not found)
             front = pareto_front(first, self.context)
             shown = thinned(front)
-            notes.append("; ".join(_point(movement) for movement in shown))
+            notes.append(f"{len(shown)} of {len(front)} movements")
         best = min(self._fits([*known, *front]), key=self._cost)
         if best is self.original:
             what = "energy" if self.options.duration > 0.0 else self.options.objective
@@ -348,10 +348,3 @@ def _station_at(ends: FloatArray, scene: PlanningScene) -> str:
         ):
             return station.name
     return ""
-
-
-def _point(movement: Movement) -> str:
-    return (
-        f"{movement.report.duration:.3f} s {movement.report.energy:.0f} J "
-        f"{movement.trajectory.trajectory_id}"
-    )

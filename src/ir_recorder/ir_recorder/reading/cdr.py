@@ -44,6 +44,7 @@ class _Leaf:
 class _Layout:
     leaves: dict[str, _Leaf]
     lengths: tuple[int, ...]  # offsets of the words that decide the layout
+    end: int  # of the last field
 
 
 class Columns:
@@ -124,6 +125,13 @@ class Columns:
         leaves = (layout.leaves.get(path) for _, _, layout in self._groups)
         return {leaf.count if leaf is not None else 0 for leaf in leaves}
 
+    def ends(self) -> IntArray:
+        """Offset (N,) behind the last field of each message; what follows is padding."""
+        out = np.zeros(self.count, dtype=np.int64)
+        for rows, _, layout in self._groups:
+            out[rows] = layout.end
+        return out
+
     def is_constant(self, path: str) -> bool:
         """Whether a field has the same bytes in all messages."""
         first: bytes | None = None
@@ -166,7 +174,7 @@ def _layout(data: bytes, definitions: dict[str, tuple[Field, ...]], name: str) -
         raise ReadError(
             f"a message of type {name} with {len(data)} bytes doesn't fit its definition: {error!r}"
         ) from error
-    return _Layout(walker.leaves, tuple(walker.lengths))
+    return _Layout(walker.leaves, tuple(walker.lengths), walker.at)
 
 
 class _Walker:
@@ -177,14 +185,14 @@ class _Walker:
             raise ReadError("a message isn't little-endian CDR")
         self._data = data
         self._definitions = definitions
-        self._at = _HEADER
+        self.at = _HEADER
         self.leaves: dict[str, _Leaf] = {}
         self.lengths: list[int] = []
 
     def structure(self, name: str, prefix: str) -> None:
         fields = self._definitions[name]
         if not fields:
-            self._at += 1  # an empty structure has one byte in CDR
+            self.at += 1  # an empty structure has one byte in CDR
         for field in fields:
             path = f"{prefix}{field.name}"
             count = 1 if field.count is None else field.count
@@ -204,25 +212,25 @@ class _Walker:
         size = np.dtype(dtype).itemsize
         if count:
             self._align(size)
-        self.leaves[path] = _Leaf(path, dtype, self._at, count)
+        self.leaves[path] = _Leaf(path, dtype, self.at, count)
         self._advance(size * count)
 
     def _text(self, path: str) -> None:
         length = self._length()
-        self.leaves[path] = _Leaf(path, "", self._at, length)
+        self.leaves[path] = _Leaf(path, "", self.at, length)
         self._advance(length)
 
     def _length(self) -> int:
         self._align(4)
-        self.lengths.append(self._at)
-        (length,) = _LENGTH.unpack_from(self._data, self._at)
-        self._at += 4
+        self.lengths.append(self.at)
+        (length,) = _LENGTH.unpack_from(self._data, self.at)
+        self.at += 4
         return int(length)
 
     def _align(self, size: int) -> None:
-        self._at += (_HEADER - self._at) % size
+        self.at += (_HEADER - self.at) % size
 
     def _advance(self, size: int) -> None:
-        self._at += size
-        if self._at > len(self._data):
-            raise struct.error(f"{self._at - len(self._data)} bytes are missing")
+        self.at += size
+        if self.at > len(self._data):
+            raise struct.error(f"{self.at - len(self._data)} bytes are missing")

@@ -15,13 +15,22 @@ import numpy as np
 from ir_msgs_py import names
 from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_msgs_py.savings import ProgramPoint
-from ir_msgs_py.search_log import CorrectionLog, SearchLog, log_of
+from ir_msgs_py.search_log import (
+    ConfigurationLog,
+    CorrectionLog,
+    Counts,
+    SearchLog,
+    Track,
+    WithdrawalLog,
+)
 from ir_recorder.errors import ReadError, SchemaError
 from ir_recorder.format.schemas import SEPARATOR, SchemaLibrary, fields_of, installed_prefixes
 from ir_recorder.reading.cdr import Columns
 from ir_recorder.reading.mcap_file import RawChannel, chosen_namespace, read_raw
 from ir_recorder.reading.messages import decoder_of
 from ir_recorder.reading.recording import ProgramEvent, Recording
+from ir_recorder.reading.search_notes import log_of
+from ir_values.arrays import FloatArray
 from ir_values.errors import IrError
 from ir_values.files import ANYWHERE, FileRoots
 
@@ -29,9 +38,12 @@ from ir_values.files import ANYWHERE, FileRoots
 # ROS.
 #
 # An answer is the result of the action ir_msgs/action/Plan as CDR. Its definition isn't in the
-# file: it is that of the installed interfaces, without which no front is read.
+# file: it is that of the installed interfaces, without which no front is read. Fields that earlier
+# versions did not have stand at its end: what comes before them is read without them.
 
 ACTION = "ir_msgs/action/Plan"
+_LATER = "searches|pareto_ids"  # fields that recordings of earlier versions don't have
+_EMPTY = 64  # bytes: more than their lengths of 0
 MOST_POINTS = 50  # of a front, by the request
 
 
@@ -89,23 +101,31 @@ def front_of(answer: bytes, definition: str) -> tuple[ProgramPoint, ...]:
     return tuple(points)
 
 
+def result_definition(*, later: bool = False) -> str:
+    """Text of the result's type as `answer_definition` gives it."""
+    return answer_definition(ACTION, later=later)
+
+
 @cache
-def result_definition() -> str:
-    """Text of the result's type and of all it is built from; "" where the interfaces aren't
-    installed.
+def answer_definition(kind: str, *, later: bool) -> str:
+    """Text of an action's result or a service's response and of all it is built from, with or
+    without the fields that earlier versions did not have; "" where the interfaces aren't installed.
     """
-    package, _, name = ACTION.split("/")
+    package, folder, name = kind.split("/")
     files = [
-        prefix / "share" / package / "action" / f"{name}.action" for prefix in installed_prefixes()
+        prefix / "share" / package / folder / f"{name}.{folder}" for prefix in installed_prefixes()
     ]
     text = next((file.read_text(encoding="utf-8") for file in files if file.is_file()), "")
     parts = re.split(r"^---\s*$", text, flags=re.MULTILINE)
-    if len(parts) != 3:
+    if len(parts) < 2:
         return ""
+    own_text = parts[1]
+    if not later:
+        own_text = re.sub(rf"^\S+ (?:{_LATER})\b.*\n", "", own_text, flags=re.MULTILINE)
     library = SchemaLibrary()
     sections = dict[str, str]()
     try:
-        for field in fields_of(parts[1], package):
+        for field in fields_of(own_text, package):
             if not field.primitive:
                 own, inner = field.type.split("/")
                 head, *others = library.schema(f"{own}/msg/{inner}").text.split(
@@ -117,9 +137,18 @@ def result_definition() -> str:
                     sections[title] = body
     except SchemaError:
         return ""
-    return parts[1] + "".join(
+    return own_text + "".join(
         f"{SEPARATOR}\nMSG: {title}\n{body}\n" for title, body in sections.items()
     )
+
+
+def completed(answer: bytes, kind: str) -> bytes:
+    """The CDR of an answer that an earlier version recorded, with empty values for the fields that
+    it did not have. Raises ReadError.
+    """
+    title = kind.replace("/action/", "/msg/").replace("/srv/", "/msg/")
+    columns = Columns([answer], f"{title}_Answer", answer_definition(kind, later=False))
+    return answer[: columns.ends()[0]] + bytes(_EMPTY)
 
 
 # The steps of the last program that was planned, from the planner's answer that a recording holds.
@@ -189,6 +218,8 @@ def _step(columns: Columns, place: str, seconds: float) -> PlannedMovement:
 # answers.
 
 MOST_STAGES = 2_000
+_FARTHEST = 1e3  # m: a position beyond is none
+_MOST_NUMBERS = 20_000  # of one track
 
 
 def with_plans(found: Recording, channel: RawChannel | None) -> Recording:
@@ -196,9 +227,7 @@ def with_plans(found: Recording, channel: RawChannel | None) -> Recording:
     where no plan is known.
     """
     plans = _driven_plans(channel, found.events)
-    logs = tuple(
-        log if plan.own else _not_driven(log) for plan in plans for log in _logs_of(plan.answer)
-    )
+    logs = tuple(log if plan.own else _not_driven(log) for plan in plans for log in _logs_of(plan))
     ids = {plan.answer.texts("savings.program_id")[0] for plan in plans}
     savings = tuple(
         event for event in found.savings if not plans or event.savings.program_id in ids
@@ -208,11 +237,12 @@ def with_plans(found: Recording, channel: RawChannel | None) -> Recording:
 
 @dataclass(frozen=True, eq=False)
 class _Driven:
-    """A planner's answer; own: its program itself was driven, not one of its front or its
-    savings.
+    """A planner's answer and its bytes; own: its program itself was driven, not one of its front or
+    its savings.
     """
 
     answer: Columns
+    data: bytes
     own: bool
 
 
@@ -232,7 +262,8 @@ def _driven_plans(
     for event in events:
         driven.setdefault(event.program_id, set()).add(event.movement.trajectory_id)
     if not driven:
-        return tuple(_Driven(plan, True) for plan in islice(_plans(recorded, definition), 1))
+        last = islice(_plans(recorded, definition), 1)
+        return tuple(_Driven(plan, data, True) for plan, data in last)
     found: list[_Driven] = []
     for program, trajectories in driven.items():
         ids = (
@@ -241,21 +272,21 @@ def _driven_plans(
         named = [
             answer for answer in recorded if ids and all(each.encode() in answer for each in ids)
         ]
-        plans = [plan for plan in _plans(named, definition) if ids <= _ids(plan)]
-        own = [plan for plan in plans if program in ("", plan.texts("program_id")[0])]
-        found += [_Driven(plan, bool(own)) for plan in (own or plans)[:1]]
+        plans = [each for each in _plans(named, definition) if ids <= _ids(each[0])]
+        own = [each for each in plans if program in ("", each[0].texts("program_id")[0])]
+        found += [_Driven(plan, data, bool(own)) for plan, data in (own or plans)[:1]]
     return tuple(found)
 
 
-def _plans(recorded: Iterable[bytes], definition: str) -> Iterator[Columns]:
-    """Answers that have a program."""
+def _plans(recorded: Iterable[bytes], definition: str) -> Iterator[tuple[Columns, bytes]]:
+    """Answers that have a program, and their bytes."""
     for answer in recorded:
         try:
             columns = Columns([answer], f"{ACTION.replace('/action/', '/msg/')}_Result", definition)
         except ReadError:
             continue
         if columns.texts("program_id")[0]:
-            yield columns
+            yield columns, answer
 
 
 def _ids(plan: Columns) -> set[str]:
@@ -265,12 +296,130 @@ def _ids(plan: Columns) -> set[str]:
     return {plan.texts(name)[0] for name in ("program_id", "savings.program_id", *points, *steps)}
 
 
-def _logs_of(columns: Columns) -> tuple[SearchLog, ...]:
-    def of_stage(k: int, field: str) -> str:
-        return columns.texts(f"info.stages[{k}].{field}")[0]
+def _logs_of(plan: _Driven) -> tuple[SearchLog, ...]:
+    """Logs of the searches behind an answer: in their field, or as notes of an earlier version."""
 
-    found = (log_of(of_stage(k, "name"), of_stage(k, "note")) for k in range(MOST_STAGES))
-    return tuple(log for log in found if log is not None)
+    def of_stage(k: int, field: str) -> str:
+        return plan.answer.texts(f"info.stages[{k}].{field}")[0]
+
+    noted = (log_of(of_stage(k, "name"), of_stage(k, "note")) for k in range(MOST_STAGES))
+    found = tuple(log for log in noted if log is not None)
+    if found:
+        return found
+    kind = f"{ACTION.replace('/action/', '/msg/')}_Result"
+    try:
+        columns = Columns([plan.data], kind, result_definition(later=True))
+        return tuple(_SearchFields(columns).logs())
+    except (ReadError, ValueError):  # an earlier version's, which ends before the field
+        return ()
+
+
+class _SearchFields:
+    """Reads the logs in the field `searches` of an answer. Raises ValueError where one makes no
+    sense.
+    """
+
+    def __init__(self, columns: Columns) -> None:
+        self._columns = columns
+
+    def logs(self) -> Iterator[SearchLog]:
+        """Withdrawals, configurations, corrections."""
+        for place in self._places("searches.withdrawals", "station"):
+            yield self._withdrawal(place)
+        for place in self._places("searches.configurations", "station"):
+            yield self._configurations(place)
+        for place in self._places("searches.corrections", "start"):
+            yield self._correction(place)
+
+    def _withdrawal(self, place: str) -> WithdrawalLog:
+        kept = self._points(f"{place}.kept")
+        parents = self._values(f"{place}.parents").astype(np.int64)
+        if parents.shape != (len(kept),) or (parents > np.arange(len(kept))).any():
+            raise ValueError(f"{place} has no tree")
+        return WithdrawalLog(
+            self._text(f"{place}.station"),
+            self._text(f"{place}.load"),
+            self._text(f"{place}.method"),
+            self._whole(f"{place}.generations"),
+            self._whole(f"{place}.candidates"),
+            self._counts(place),
+            self._pair(f"{place}.distance"),
+            kept,
+            parents,
+            self._points(f"{place}.dropped"),
+            self._points(f"{place}.path"),
+            bool(self._whole(f"{place}.asked")),
+            self._text(f"{place}.blocked"),
+        )
+
+    def _configurations(self, place: str) -> ConfigurationLog:
+        tracks = tuple(
+            Track(self._text(f"{track}.outcome"), self._points(f"{track}.points"))
+            for track in self._places(f"{place}.tracks", "outcome")
+        )
+        return ConfigurationLog(
+            self._text(f"{place}.station"),
+            self._whole(f"{place}.starts"),
+            self._whole(f"{place}.accepted"),
+            self._whole(f"{place}.distinct"),
+            self._counts(place),
+            tracks,
+        )
+
+    def _correction(self, place: str) -> CorrectionLog:
+        counts = self._values(f"{place}.fitness_counts").astype(np.int64)
+        fitness = np.split(self._values(f"{place}.fitness"), np.cumsum(counts)[:-1])
+        return CorrectionLog(
+            self._text(f"{place}.start"),
+            self._text(f"{place}.goal"),
+            self._whole(f"{place}.generations"),
+            tuple(tuple(each.tolist()) for each in fitness if len(counts)),
+            self._pair(f"{place}.costs"),
+            self._points(f"{place}.straight"),
+            tuple(
+                self._points(f"{each}.points")
+                for each in self._places(f"{place}.stretches", "outcome")
+            ),
+            self._points(f"{place}.path"),
+            self._text(f"{place}.met"),
+            self._points(f"{place}.driven"),
+        )
+
+    def _places(self, path: str, text: str) -> list[str]:
+        """Paths of the elements of a list, by a text that each has."""
+        count = 0
+        while self._columns.lengths(f"{path}[{count}].{text}") != {0}:
+            count += 1
+        return [f"{path}[{k}]" for k in range(count)]
+
+    def _text(self, path: str) -> str:
+        return self._columns.texts(path)[0]
+
+    def _whole(self, path: str) -> int:
+        return int(self._columns.integers(path)[0])
+
+    def _values(self, path: str) -> FloatArray:
+        (count,) = self._columns.lengths(path)
+        values: FloatArray = self._columns.numbers(path, count)[0]
+        if not np.isfinite(values).all():
+            raise ValueError(f"{path} is not finite")
+        return values
+
+    def _points(self, path: str) -> FloatArray:
+        points = self._values(path).reshape(-1, 3)
+        if points.size > _MOST_NUMBERS or (np.abs(points) > _FARTHEST).any():
+            raise ValueError(f"{path} is no track of a tool")
+        return points
+
+    def _pair(self, path: str) -> tuple[float, float]:
+        first, second = self._values(path).tolist()
+        return first, second
+
+    def _counts(self, place: str) -> Counts:
+        return tuple(
+            (self._text(f"{each}.reason"), self._whole(f"{each}.count"))
+            for each in self._places(f"{place}.rejected", "reason")
+        )
 
 
 def _not_driven(log: SearchLog) -> SearchLog:
