@@ -10,12 +10,19 @@ import numpy as np
 import pytest
 
 from ir_description import ProgramStep
+from ir_krl import follow, parse
 from ir_msgs_py.savings import BeforeAfter
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner, RequestError
-from ir_planner.before_after import Stretch, Today, before_after, before_after_common
+from ir_planner.before_after import (
+    Stretch,
+    Today,
+    before_after,
+    before_after_common,
+    today_of_krl,
+)
 from ir_planner.before_after.today_steps import asked_program
-from ir_planner.krl import station_at
+from ir_planner.krl import evaluate_krl, station_at, tool_in_flange
 
 
 def test_all_programs_make_the_same_stops_and_pauses(compared: BeforeAfter) -> None:
@@ -140,6 +147,24 @@ def test_a_program_that_goes_nowhere_is_a_sentence(planner: Planner) -> None:
     nothing = Today("still", "trace", home, (Stretch(None, home, 5.0),))
     with pytest.raises(RequestError, match="still has no movement"):
         before_after(planner, nothing)
+
+
+@pytest.mark.parametrize("body", ["", "PTP {A1 0,A2 -90,A3 90,A4 0,A5 0,A6 0}", "WAIT SEC 3"])
+def test_a_krl_program_without_a_movement_is_a_sentence(planner: Planner, body: str) -> None:
+    """The first motion only says where a program begins."""
+    cell = planner.cell
+    text = f"DEF ONE( )\n{body}\nEND\n"
+    program = follow([parse(text, "one.src")], cell.machine_home, tool_in_flange(cell.tcp))
+    found = evaluate_krl(planner, program)
+    assert not found.moves
+    with pytest.raises(RequestError, match="ONE has no movement: there is nothing to compare"):
+        today_of_krl(found)
+
+
+def test_pauses_alone_are_nothing_to_compare(planner: Planner) -> None:
+    cell = replace(planner.cell, program=(ProgramStep("PAUSE", dwell=9.0, power_mode="AUTO"),))
+    with pytest.raises(RequestError, match="has no movement: there is nothing to compare"):
+        before_after_common(Planner(cell), (), cell.machine_home)
 
 
 def test_a_cells_program_that_begins_in_a_posture_is_todays_that_starts_there(

@@ -60,6 +60,18 @@ def test_an_interval_with_zero_in_it_says_so(compared: BeforeAfter, planner: Pla
     assert "zero lies in it" not in before_after_html(compared, planner.cell)
 
 
+def test_a_program_that_takes_more_is_no_saving(compared: BeforeAfter, planner: Planner) -> None:
+    """Once "-2.8 %" were saved: what isn't saved is taken more, in every figure."""
+    worse = replace(compared.planned.saving, planned=1.028 * compared.planned.saving.common)
+    worse = replace(worse, saved_low=1.1 * worse.saved, saved_high=0.9 * worse.saved)
+    sides = tuple(replace(side, saving=worse) for side in compared.sides)
+    page = before_after_html(replace(compared, sides=sides, changes=()), planner.cell)
+    for words in ("more a cycle", "more a year", "2.8 % more", "No change saves as much"):
+        assert words in page
+    assert "saved a cycle</span>" not in page
+    assert "-2.8 %" not in page
+
+
 def test_names_of_a_program_cannot_write_into_the_page(
     compared: BeforeAfter, planner: Planner
 ) -> None:

@@ -4,13 +4,14 @@ id.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
 
-from ir_description import Cell, PowerData, load_cell
+from ir_description import Cell, PowerData, ProgramStep, load_cell
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, TrajectoryReport
 from ir_msgs_py.status import StatusCode
@@ -211,6 +212,23 @@ def test_automatic_pauses_take_the_cheapest_mode(power: PowerData) -> None:
     )
     chosen = [movement.power_mode for movement in plan.movements if movement.duration == 180.0]
     assert chosen == ["STAND_ON_BRAKES>BUS_POWER_OFF"]
+
+
+@pytest.mark.parametrize("lengths", [(0.01,), (10.0,), (3.0, 60.0, 600.0)])
+def test_a_program_of_pauses_alone_has_their_joules(
+    lengths: tuple[float, ...], demo_cell: Cell
+) -> None:
+    """Also held against the common program, which waits as long: both have nothing to slow down."""
+    steps = tuple(ProgramStep("PAUSE", dwell=each, power_mode="AUTO") for each in lengths)
+    plan = Planner(replace(demo_cell, program=steps)).plan_program(savings=True)
+    assert all(step.is_pause for step in plan.movements)
+    assert plan.report.duration == pytest.approx(sum(lengths))
+    assert plan.report.energy == pytest.approx(sum(s.report.energy for s in plan.movements))
+    assert plan.report.energy > 0.0
+    assert plan.report.energy_low <= plan.report.energy <= plan.report.energy_high
+    assert plan.report.certified
+    assert plan.savings.sentence.startswith("no movements; pauses ")
+    assert plan.savings.movements.common == plan.savings.movements.planned == 0.0
 
 
 @pytest.mark.parametrize("cut", [1, 2])

@@ -334,7 +334,7 @@ def totals_of(found: EvaluatedProgram) -> Row:
         "seconds": found.report.duration,
         "joules": found.report.energy,
         "clearance": found.report.min_clearance,
-        "certified": found.certified,
+        "certified": found.certified if found.moves else None,
         "stations": list(found.stations),
     }
 
@@ -350,6 +350,8 @@ def _handled(part: str) -> str:
 
 def _sentences(found: EvaluatedProgram) -> list[str]:
     judged = "free of violations" if found.certified else "NOT certified: see above"
+    if not found.moves:
+        judged = "it has no movement, so nothing was judged (its first one says where it starts)"
     return [
         f"{found.name}: {found.report.duration:.2f} s, {found.report.energy:.0f} J predicted, "
         f"{judged}",

@@ -253,6 +253,8 @@ def sentences_of(plan: ProgramPlan, cell: Cell) -> list[str]:
     waiting = totals["joules"] - totals["moving_joules"]
     energy = kilowatt_hours(totals["joules"] / J_PER_KWH)
     proof = "free of collision and within all limits at every instant, proved"
+    if all(step.is_pause for step in plan.movements):
+        proof = "nothing moves"
     lines = [
         f"movements {totals['moving_seconds']:.2f} s {totals['moving_joules'] / 1e3:.2f} kJ, "
         f"pauses {standing:.2f} s {waiting / 1e3:.2f} kJ",

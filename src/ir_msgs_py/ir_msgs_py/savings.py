@@ -39,6 +39,11 @@ class Saving:
         """Saved share of the common program's energy."""
         return 1.0 - self.planned / self.common if self.common > 0.0 else 0.0
 
+    @property
+    def change(self) -> str:
+        """The share in words: "44.5 % less", "2.8 % more"."""
+        return f"{100.0 * abs(self.share):.1f} % {'more' if self.share < 0.0 else 'less'}"
+
 
 @dataclass(frozen=True)
 class ProgramSavings:

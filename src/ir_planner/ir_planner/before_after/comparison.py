@@ -14,7 +14,7 @@ from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import BeforeAfter, Saving, Side
 from ir_msgs_py.status import StatusCode
 from ir_planner.before_after.changes import Costed, changes, costed, saving, side_of
-from ir_planner.before_after.today import Stretch, Today
+from ir_planner.before_after.today import Stretch, Today, nothing_moves
 from ir_planner.before_after.today_steps import (
     Asked,
     asked_program,
@@ -82,7 +82,7 @@ def before_after_common(
     """PTP at 100 % through stations (the cell's program where there are none), from start (n,),
     against the planner's.
 
-    Raises RequestError where nothing is found.
+    Raises RequestError where nothing is found, or nothing moves.
     """
     asking = _Asking(planner, tuple(stations), start, options or PlanOptions(), progress)
     free = asking.plan(0.0, savings=True)
@@ -91,6 +91,8 @@ def before_after_common(
     if common is None or same is None:
         reason = free.status.message if not free.status.ok else free.savings.sentence
         raise RequestError(StatusCode.PLANNING_FAILED, reason)
+    if all(step.is_pause for step in common.movements):
+        raise nothing_moves(f"the program of {planner.cell.name}")
     before = asking.costed(common.movements)
     sides = [
         asking.side(SAME, before.seconds, same, before),

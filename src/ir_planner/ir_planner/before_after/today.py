@@ -247,12 +247,22 @@ class Today:
         return sum(one.seconds for one in self.stretches)
 
 
+def nothing_moves(name: str) -> RequestError:
+    """The refusal of a program whose movements can't be compared: it has none."""
+    return RequestError(
+        StatusCode.INVALID_MOTION_PLAN, f"{name} has no movement: there is nothing to compare"
+    )
+
+
 def today_of_krl(found: EvaluatedProgram, process: Lines | None = None) -> Today:
     """A KRL program as a KR C4 drives it.
 
     process: lines (first, last) whose motions are a process; None: those between an output's on and
-    off, (): none. Raises RequestError for a process that can't be asked for as paths of the tool.
+    off, (): none. Raises RequestError for a program that doesn't move and for a process that
+    can't be asked for as paths of the tool.
     """
+    if not any(one.step.moves for one in found.steps):
+        raise nothing_moves(found.name)
     paths = process_paths([one.step for one in found.steps], process)
     stretches = tuple(_stretch(one, path) for one, path in zip(found.steps, paths, strict=True))
     start = np.asarray(found.steps[0].step.trajectory.positions[0])

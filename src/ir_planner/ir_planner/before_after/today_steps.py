@@ -7,10 +7,8 @@ import numpy as np
 from ir_description import Cell, CellPath, Equipment, ProgramStep, Signal, Station, Zone
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import MovementKind, PlannedMovement
-from ir_msgs_py.status import StatusCode
-from ir_planner.before_after.today import Stretch, Today, driven_as, same_poses
+from ir_planner.before_after.today import Stretch, Today, driven_as, nothing_moves, same_poses
 from ir_planner.checks import evaluate_trajectory
-from ir_planner.errors import RequestError
 from ir_planner.krl import posture_at, station_at
 from ir_planner.program import (
     AUTO,
@@ -78,10 +76,7 @@ def asked_program(today: Today, scene: PlanningScene) -> AskedProgram:
             pause = ProgramStep("PAUSE", dwell=one.seconds, power_mode=AUTO)
             steps.append(Asked(pause, (one,)))
     if not any(step.step.kind != "PAUSE" for step in steps):
-        raise RequestError(
-            StatusCode.INVALID_MOTION_PLAN,
-            f"{today.name} has no movement: there is nothing to compare",
-        )
+        raise nothing_moves(today.name)
     if any(one.handled or one.signals or one.awaited for one in today.stretches):
         steps = _with_signals(steps)
         notes = ["parts and signals at the stops are those of the program's own outputs and waits"]

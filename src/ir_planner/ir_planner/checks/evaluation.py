@@ -132,8 +132,16 @@ def total_report(
     as well.
     """
     moving = [report for report in reports if len(report.velocity_ratio)]
-    if not reports or not moving:
-        return TrajectoryReport(duration=sum(report.duration for report in reports))
+    if not reports:
+        return TrajectoryReport()
+    if not moving:
+        return TrajectoryReport(
+            duration=sum(report.duration for report in reports),
+            energy=sum(report.energy for report in reports),
+            base_energy=sum(report.base_energy for report in reports),
+            peak_power=max(report.peak_power for report in reports),
+            certified=all(report.certified for report in reports),
+        )
     tightest = min(range(len(reports)), key=lambda k: reports[k].min_clearance)
     ratios = {
         name: np.max([getattr(report, name) for report in moving], axis=0)

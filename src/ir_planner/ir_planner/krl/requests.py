@@ -77,6 +77,11 @@ class EvaluatedProgram:
     notes: tuple[Note, ...]
 
     @property
+    def moves(self) -> bool:
+        """Whether it has a movement: the first only says where it starts."""
+        return any(step.step.moves for step in self.steps)
+
+    @property
     def certified(self) -> bool:
         """Whether every movement is."""
         return all(step.found.verification.certified for step in self.steps if step.step.moves)

@@ -93,6 +93,8 @@ def _filled(
     movements = {part: point.movement for part, point in chosen.items()}
     energy = sum(movement.energy.total for movement in movements.values())
     found = [Timed(movements, left, energy + task.waiting(left))] if left >= SHORTEST_WAIT else []
+    if not chosen:  # pauses alone: nothing can be slowed down
+        return found or [Timed(movements, 0.0, energy)]
     last = bool(open_steps) and left <= open_steps[0].seconds
     if not (last or not open_steps or left < SHORTEST_WAIT):
         return found  # a whole step fits: that program comes next

@@ -197,11 +197,13 @@ def sentence_of(savings: ProgramSavings) -> str:
         if pauses.seconds > 0.0
         else "no pauses"
     )
-    return (
+    moving = (
         f"movements {_percent(movements)} in {movements.seconds:.2f} s against synchronous "
-        f"S-curve PTP at 100 % ({savings.around} of {savings.across} around bodies); {standing}; "
-        f"total {_percent(savings.total)}"
+        f"S-curve PTP at 100 % ({savings.around} of {savings.across} around bodies)"
+        if movements.seconds > 0.0
+        else "no movements"
     )
+    return f"{moving}; {standing}; total {_percent(savings.total)}"
 
 
 def _percent(saving: Saving) -> str:
@@ -209,7 +211,7 @@ def _percent(saving: Saving) -> str:
     sure = saving.certain or saving.common == saving.planned
     doubt = "" if sure else "; zero lies in it: it is open whether anything is saved"
     return (
-        f"{100.0 * saving.share:.1f} % less ({saving.planned / 1e3:.2f} kJ instead of "
+        f"{saving.change} ({saving.planned / 1e3:.2f} kJ instead of "
         f"{saving.common / 1e3:.2f} kJ, predicted; 90 % interval of what is saved {within}{doubt})"
     )
 

@@ -306,6 +306,9 @@ def _pause(name: str, result: StepResult, bounds: Tolerances) -> Iterator[Findin
     if movement.report.energy <= 0.0:
         yield unchecked(f"energy of {name}", "the pause carries no plan")
         return
+    if _rests(movement) and not math.isfinite(result.motors_power):
+        yield unchecked(f"energy of {name}", "what the motors would take meanwhile is not known")
+        return
     planned = movement.report.energy
     stored = _stored(result)
     if _rests(movement):

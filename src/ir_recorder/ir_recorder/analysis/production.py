@@ -52,6 +52,17 @@ class Amount:
         """So many of it."""
         return self.of(lambda value: value * count)
 
+    def gain(self) -> tuple[str, Amount]:
+        """A saving as people say it: "saved", or "more" where it is negative, and how much."""
+        if self.value >= 0.0:
+            return "saved", self
+        return "more", Amount(-self.value, -self.high, -self.low)
+
+
+def saved_amount(saving: Saving) -> Amount:
+    """What is saved [J]."""
+    return Amount(saving.saved, saving.saved_low, saving.saved_high)
+
 
 def sum_of(amounts: Sequence[Amount]) -> Amount:
     """Values and ends add up: what is unsure is so in all alike."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeGuard
@@ -13,11 +14,13 @@ from ir_description.files import plain_yaml
 from ir_msgs_py.savings import ProgramSavings, Saving
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.production import (
+    Amount,
     Production,
     demand_watts,
     idle_watts,
     levers,
     production_of,
+    saved_amount,
 )
 from ir_recorder.errors import RecorderError
 from ir_recorder.report.number_text import (
@@ -27,6 +30,7 @@ from ir_recorder.report.number_text import (
     number,
     seconds,
     share,
+    significant,
     text,
     watts,
 )
@@ -250,16 +254,18 @@ def _priced(energy: float, costs: Costs) -> str:
 
 
 def money(value: float, currency: str) -> str:
-    """An amount with its currency; small ones with three significant digits."""
+    """An amount with its currency; small ones with three significant digits, tiny ones with
+    two.
+    """
     if not math.isfinite(value):
         return DASH
     if abs(value) >= 100.0:
-        shown = f"{value:,.0f}"
+        shown = f"{value:,.0f}".replace(",", " ")
     elif abs(value) >= 1.0:
         shown = f"{value:.2f}"
     else:
-        shown = f"{value:.3g}"
-    return f"{shown.replace(',', ' ')} {currency}"
+        shown = significant(value, 3 if abs(value) >= 0.001 else 2)
+    return f"{shown} {currency}"
 
 
 def _saved(
@@ -267,28 +273,26 @@ def _saved(
 ) -> list[tuple[str, ...]]:
     if savings is None:
         return []
-    parts = [("saved by its movements", savings.movements)]
+    parts = [("by its movements", savings.movements)]
     if savings.pauses.seconds > 0.0:
-        parts += [("saved in its pauses", savings.pauses), ("saved together", savings.total)]
+        parts += [("in its pauses", savings.pauses), ("together", savings.total)]
     return [_saving(name, saving, counts, costs) for name, saving in parts]
 
 
-def _saving(name: str, saving: Saving, counts: tuple[float, ...], costs: Costs) -> tuple[str, ...]:
-    cells = [f"<b>{joules(saving.saved)}</b>{_joule_range(saving)}"]
+def _saving(where: str, saving: Saving, counts: tuple[float, ...], costs: Costs) -> tuple[str, ...]:
+    word, amount = saved_amount(saving).gain()
+    cells = [f"<b>{joules(amount.value)}</b>{_between(amount, joules)}"]
     for count in counts:
-        low, high = (costs.money(end * count) for end in (saving.saved_low, saving.saved_high))
-        amount = text(money(costs.money(saving.saved * count), costs.currency))
-        between = (
-            f"<small>{text(money(low, ''))}to {text(money(high, ''))}</small>" if high > low else ""
-        )
-        cells.append(f"<b>{amount}</b>{between}")
-    return (text(name), *cells)
+        price = amount.times(count).of(costs.money)
+        shown = text(money(price.value, costs.currency))
+        cells.append(f"<b>{shown}</b>{_between(price, lambda value: money(value, '').strip())}")
+    return (f"{word} {where}", *cells)
 
 
-def _joule_range(saving: Saving) -> str:
-    if saving.saved_high <= saving.saved_low:
+def _between(amount: Amount, show: Callable[[float], str]) -> str:
+    if amount.high <= amount.low:
         return ""
-    return f"<small>{joules(saving.saved_low)} to {joules(saving.saved_high)}</small>"
+    return f"<small>{text(show(amount.low))} to {text(show(amount.high))}</small>"
 
 
 def _assumptions(costs: Costs, counts: tuple[float, ...]) -> str:

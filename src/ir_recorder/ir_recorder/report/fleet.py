@@ -17,6 +17,7 @@ from ir_recorder.analysis.production import (
     levers,
     mean_of,
     production_of,
+    saved_amount,
     sum_of,
     without_production,
 )
@@ -271,8 +272,7 @@ def saved_of(member: Member, costs: Costs) -> Amount | None:
     if savings is None:
         return None
     total = savings.total
-    amount = Amount(total.saved, total.saved_low, total.saved_high)
-    return amount.times(costs.cycles_per_year(member.cycle.seconds))
+    return saved_amount(total).times(costs.cycles_per_year(member.cycle.seconds))
 
 
 def by_mode(members: Sequence[Member], costs: Costs) -> dict[str, dict[str, float]]:
@@ -362,7 +362,7 @@ def _tiles(robots: Sequence[Robot], costs: Costs) -> str:
     """The fleet in three figures."""
     yearly = sum_of([robot.yearly for robot in robots])
     saved = [robot.saved for robot in robots if robot.saved is not None]
-    of_it = sum_of(saved)
+    word, of_it = sum_of(saved).gain()
     price = money(costs.money(yearly.value), costs.currency)
     found = [
         Tile("energy a year", kilowatt_hours(yearly.value), (f"{counted(len(robots), 'robot')}",)),
@@ -372,7 +372,7 @@ def _tiles(robots: Sequence[Robot], costs: Costs) -> str:
         ends = [money(costs.money(end), costs.currency) for end in (of_it.low, of_it.high)]
         found.append(
             Tile(
-                "saved a year by plans, predicted",
+                f"{word} a year by plans, predicted",
                 money(costs.money(of_it.value), costs.currency),
                 (kilowatt_hours(of_it.value), f"90 % interval {ends[0]} to {ends[1]}"),
             )
@@ -482,8 +482,9 @@ def _yearly(amount: Amount, costs: Costs) -> tuple[str, str, str]:
 def _saved(amount: Amount | None, costs: Costs) -> str:
     if amount is None:
         return DASH
+    word, amount = amount.gain()
     price = money(costs.money(amount.value), costs.currency)
-    energy = kilowatt_hours(amount.value)
+    energy = f"{kilowatt_hours(amount.value)}{' more' if word == 'more' else ''}"
     return (
         f"<b>{text(price)}</b><small>{text(energy)}</small>"
         f"{_between(amount, lambda value: money(costs.money(value), costs.currency))}"

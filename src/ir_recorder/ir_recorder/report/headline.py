@@ -14,6 +14,7 @@ from ir_recorder.analysis.production import (
     planned_interval,
     planned_share,
     production_of,
+    saved_amount,
 )
 from ir_recorder.format.contents import OWN_FACTS, VERSION
 from ir_recorder.report.costs import NAMES, Costs, money
@@ -165,8 +166,10 @@ def _whole(analysis: Analysis, program: ProgramTotals) -> Tile:
     whole = program.whole
     shortened = program.unshortened is not None
     planned = program.planned_movements.energy + program.planned_pauses.energy
+    whole_cycle = production_of(analysis) is not None or not math.isfinite(whole.energy)
+    name = "program, one cycle" if whole_cycle else "program, not driven to its end"
     return Tile(
-        "this run, pauses shortened" if shortened else "program, one cycle",
+        "this run, pauses shortened" if shortened else name,
         joules(whole.energy),
         (
             f"{number(whole.energy / 3600.0, 'Wh')} in {seconds(whole.seconds)}",
@@ -227,13 +230,16 @@ def _saved(analysis: Analysis) -> Tile | None:
     if savings is None:
         return None
     total = savings.total
+    word, amount = saved_amount(total).gain()
     within = (
-        f"90 % interval {joules(total.saved_low)} to {joules(total.saved_high)}"
-        if total.saved_high > total.saved_low
+        f"90 % interval {joules(amount.low)} to {joules(amount.high)}"
+        if amount.high > amount.low
         else ""
     )
-    before = f"{joules(total.saved)} of the common program's {joules(total.common)}, predicted"
-    return Tile("saved by its plan", f"{100.0 * total.share:.1f} %", (before, within))
+    beside = "of" if word == "saved" else "than"
+    before = f"{joules(amount.value)} {beside} the common program's {joules(total.common)}"
+    name = "saved by its plan" if word == "saved" else "more by its plan"
+    return Tile(name, f"{100.0 * abs(total.share):.1f} %", (f"{before}, predicted", within))
 
 
 def _yearly(analysis: Analysis, costs: Costs) -> Tile | None:

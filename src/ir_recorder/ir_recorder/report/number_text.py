@@ -10,20 +10,36 @@ DASH = "–"
 _UNSEEN = ("Cc", "Cf", "Cs")  # categories of Unicode: control, format, surrogate
 
 
+def _fixed(value: float, digits: int) -> str:
+    """So many decimals, thousands apart, and no sign before a zero."""
+    shown = f"{value:,.{digits}f}".replace(",", " ")
+    return shown if any(digit in shown for digit in "123456789") else shown.removeprefix("-")
+
+
+def significant(value: float, digits: int) -> str:
+    """So many significant digits without an exponent, thousands apart."""
+    if value == 0.0:
+        return "0"
+    rounded = float(f"{value:.{digits}g}")
+    decimals = max(digits - 1 - math.floor(math.log10(abs(rounded))), 0)
+    shown = _fixed(rounded, decimals)
+    return shown.rstrip("0").rstrip(".") if decimals else shown
+
+
 def joules(value: float) -> str:
     """Whole joules ("1 235 J"), from 10 kJ on "12.3 kJ"."""
     if not math.isfinite(value):
         return DASH
     if abs(value) >= 10_000.0:
-        return f"{value / 1000.0:,.1f} kJ".replace(",", " ")
-    return f"{value:,.0f} J".replace(",", " ")
+        return f"{_fixed(value / 1000.0, 1)} kJ"
+    return f"{_fixed(value, 0)} J"
 
 
 def watts(value: float) -> str:
     """Watts without decimals, below 10 W with one."""
     if not math.isfinite(value):
         return DASH
-    return f"{value:,.0f} W".replace(",", " ") if abs(value) >= 10.0 else f"{value:.1f} W"
+    return f"{_fixed(value, 0 if abs(value) >= 10.0 else 1)} W"
 
 
 def kilowatt_hours(value: float) -> str:
@@ -32,8 +48,8 @@ def kilowatt_hours(value: float) -> str:
         return DASH
     kwh = value / 3.6e6
     if abs(kwh) < 0.01:
-        return f"{1e3 * kwh:.3g} Wh"
-    return f"{kwh:,.0f} kWh".replace(",", " ") if abs(kwh) >= 100.0 else f"{kwh:.3g} kWh"
+        return f"{significant(1e3 * kwh, 3)} Wh"
+    return f"{_fixed(kwh, 0) if abs(kwh) >= 100.0 else significant(kwh, 3)} kWh"
 
 
 def seconds(value: float) -> str:
@@ -45,7 +61,7 @@ def seconds(value: float) -> str:
 
 def millimetres(value: float) -> str:
     """Metres as millimetres."""
-    return f"{value * 1000.0:,.1f} mm".replace(",", " ") if math.isfinite(value) else DASH
+    return f"{_fixed(value * 1000.0, 1)} mm" if math.isfinite(value) else DASH
 
 
 def percent(value: float) -> str:
@@ -67,11 +83,8 @@ def number(value: float, unit: str) -> str:
         return DASH
     if unit == "m":
         return millimetres(value)
-    return (
-        f"{value:.4g} {unit}".strip()
-        if abs(value) < 1e4
-        else f"{value:,.0f} {unit}".replace(",", " ")
-    )
+    shown = significant(value, 4) if abs(value) < 1e3 else _fixed(value, 0)
+    return f"{shown} {unit}".strip()
 
 
 def interval(low: float, high: float, unit: str) -> str:

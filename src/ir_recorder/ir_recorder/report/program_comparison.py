@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ir_description import Cell
 from ir_msgs_py.savings import BeforeAfter, Change, Side
-from ir_recorder.analysis.production import Amount
+from ir_recorder.analysis.production import Amount, saved_amount
 from ir_recorder.report.cell_scene import cell_scene
 from ir_recorder.report.charts import Point, front_chart
 from ir_recorder.report.costs import J_PER_KWH, SETTINGS, Costs, money
@@ -59,7 +59,7 @@ def year_of(found: BeforeAfter, side: Side, costs: Costs) -> Year:
     report = side.report
     saving = side.saving
     cycle = Amount(report.energy, report.energy_low, report.energy_high)
-    saved = Amount(saving.saved, saving.saved_low, saving.saved_high)
+    saved = saved_amount(saving)
     fit = costs.cycles_per_shift(max(report.duration, 1e-9))
     return Year(shift, year, fit, cycle.times(shift), cycle.times(year), saved.times(year))
 
@@ -77,17 +77,18 @@ def tiles(found: BeforeAfter, costs: Costs) -> str:
     side = found.planned
     report = found.planned.report
     today = found.today.report
-    saved = side.saving
-    year = year_of(found, side, costs).saved
-    sure = "" if saved.certain else OPEN
-    between = _between(saved.saved_low, saved.saved_high, joules)
+    saving = side.saving
+    word, year = year_of(found, side, costs).saved.gain()
+    _, cycle = saved_amount(saving).gain()
+    sure = "" if saving.certain else OPEN
+    between = _between(cycle.low, cycle.high, joules)
     shown = (
-        ("saved a cycle", f"{100.0 * saved.share:.1f} %", between, sure),
-        ("saved a year", money(costs.money(year.value), costs.currency), _money(year, costs)),
+        (f"{word} a cycle", f"{100.0 * abs(saving.share):.1f} %", between, sure),
+        (f"{word} a year", money(costs.money(year.value), costs.currency), _money(year, costs)),
         (
-            "CO2 saved a year",
+            f"CO2 {word} a year",
             number(costs.co2(year.value), "kg"),
-            f"{kilowatt_hours(year.value)} less",
+            f"{kilowatt_hours(year.value)} {'less' if word == 'saved' else 'more'}",
         ),
         ("cycle time", seconds(report.duration), f"today {seconds(today.duration)}", side.name),
         (
@@ -228,9 +229,10 @@ def _saved(side: Side, own: bool) -> str:
     if own or not side.found:
         return DASH
     saving = side.saving
-    between = _between(saving.saved_low, saving.saved_high, joules)
+    _, amount = saved_amount(saving).gain()
+    between = _between(amount.low, amount.high, joules)
     doubt = "" if saving.certain else OPEN
-    return _cell(f"{100.0 * saving.share:.1f} %", joules(saving.saved), between, doubt)
+    return _cell(saving.change, joules(amount.value), between, doubt)
 
 
 def _cycles(year: Year | None) -> str:
