@@ -14,6 +14,7 @@ from ir_planner.krl.execution import DrivenStep, drive
 
 Follow = Callable[..., Followed]
 HEAD = "BAS(#INITMOV,0)\nPTP XHOME\n"
+OPEN = "\nEND\nDEF OPEN( )\n$OUT[1]=TRUE\n$OUT[2]=FALSE\nWAIT SEC 1\nIF $IN[9] THEN\nENDIF"
 FORM = "PP1={VEL 100.0,ACC 100.0,APO_DIST 50.0,APO_MODE #CDIS}\n"
 # what stands between two motions, and whether the advance run stops at it
 BETWEEN = {
@@ -39,6 +40,7 @@ BETWEEN = {
     "$VEL.CP=0.4": False,
     "$FLAG[2]=TRUE": False,
     "TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[7]=TRUE": False,
+    "TRIGGER WHEN PATH=-50 DELAY=0 DO OPEN( ) PRIO=-1": False,
     "HERE=$POS_ACT": True,
 }
 
@@ -55,7 +57,7 @@ def test_what_stops_the_advance_run_rounds_no_corner(
     """Law: motions are one movement exactly where nothing between them stops the advance run."""
     lines = (
         f"DECL INT N\nDECL BOOL B\nSIGNAL G $IN[11] TO $IN[12]\nN=0\n{HEAD}$APO.CPTP=100\n"
-        f"PTP {{A1 10,A5 30}} C_PTP\n{between}\nPTP {{A1 20,A2 -80}}"
+        f"PTP {{A1 10,A5 30}} C_PTP\n{between}\nPTP {{A1 20,A2 -80}}{OPEN}"
     )
     found = moving(planner, followed(lines))
     assert len(found) == 1 + BETWEEN[between]
@@ -78,7 +80,9 @@ def test_chains_stop_where_an_independent_count_says(planner: Planner, followed:
             between = str(chance.choice(kinds))
             lines += [f"PTP {{A1 {7 * k - 15},A3 {90 + 9 * (k % 3)}}}{word}", between]
             expected += not word or BETWEEN[between] or k == 4
-        found = moving(planner, followed("$APO.CDIS=40\n".join([lines[0], "\n".join(lines[1:])])))
+        found = moving(
+            planner, followed("$APO.CDIS=40\n".join([lines[0], "\n".join(lines[1:]) + OPEN]))
+        )
         assert len(found) == expected, lines
 
 

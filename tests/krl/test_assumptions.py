@@ -132,6 +132,32 @@ ASSUMED = {
         "$CIRC_TYPE #PATH: the tool is turned evenly in the base instead",
         Effect.PLACES,
     ),
+    "a wait beside a motion": (
+        "TRIGGER WHEN DISTANCE=0 DELAY=0 DO BLOW( )\nPTP {A1 1}\nEND\nDEF BLOW( )\nWAIT SEC 1",
+        "a wait beside a motion, as a TRIGGER asks for: the robot goes on",
+        Effect.TIMES,
+    ),
+    "a wait for nothing": (
+        "WAIT FOR FALSE",
+        "this wait never ends by itself: taken as ended",
+        Effect.MOTIONS,
+    ),
+    "what a channel sends": (
+        'CREAD(H,S,M,1,0.0,O,"%d",N)',
+        "CREAD isn't followed: what it would fill in stays as it is",
+        Effect.MOTIONS,
+    ),
+    "a text that is put together": (
+        "STRCOPY(A[],B[])",
+        "STRCOPY isn't followed: what it would fill in stays as it is",
+        Effect.MOTIONS,
+    ),
+    "a base that moves": (
+        "BAS(#EX_BASE,3)",
+        "BAS(#EX_BASE): a base that external axes move isn't followed",
+        Effect.PLACES,
+    ),
+    "a palletising robot": ("$PAL_MODE=TRUE", "$PAL_MODE isn't modelled", Effect.PLACES),
     "a halt": ("HALT", "HALT waits for the operator: taken as no pause", Effect.TIMES),
 }
 
@@ -205,6 +231,26 @@ def test_stubs_are_written_for_what_nobody_gave(followed: Follow) -> None:
     )
     assert again.unknown == ()
     assert texts(again) == []
+
+
+ENDED = {  # a wait, what is given: inputs 1 to 3 behind it
+    "$IN[1] OR $IN[2]": ({}, "100"),
+    "($IN[1]==TRUE) OR $IN[2] OR $IN[3]": ({}, "100"),
+    "$IN[1] OR ($IN[2] AND $IN[3])": ({1: False}, "011"),
+    "$IN[1] OR $IN[2] OR $IN[3] ": ({3: True}, "001"),
+    "NOT ($IN[1] AND $IN[2])": ({1: True}, "100"),
+    "NOT $IN[1] OR $IN[2]": ({1: True}, "110"),
+}
+
+
+@pytest.mark.parametrize("condition", ENDED)
+def test_a_wait_for_one_of_several_ends_by_one_of_them(condition: str, followed: Follow) -> None:
+    """Law: behind a wait its condition holds: by what is given where that does, else its first."""
+    inputs, wanted = ENDED[condition]
+    read = "\n".join(f"IF $IN[{n}] THEN\nWAIT SEC {n}\nENDIF" for n in (1, 2, 3))
+    program = followed(f"WAIT FOR {condition}\n{read}", inputs=inputs)
+    waited = {one.seconds for one in program.commands if isinstance(one, Wait)}
+    assert "".join("1" if n in waited else "0" for n in (1, 2, 3)) == wanted
 
 
 def test_an_input_that_was_waited_for_is_as_it_was_waited_for(followed: Follow) -> None:

@@ -182,6 +182,7 @@ SYNTAX = {
     "a loop that isn't closed": ("LOOP\nWAIT SEC 1", 4, 1),
     "an aggregate that isn't closed": ("PTP {A1 0", 2, 10),
     "a call without brackets": ("  OPEN_GRIPPER", 2, 3),
+    "an ELSEIF": ("IF TRUE THEN\n ELSEIF FALSE THEN\nENDIF", 3, 2),
 }
 
 

@@ -47,6 +47,8 @@ _EXPECTED_MAX = 6  # alternatives that a sentence names
 # constructs of KRL that aren't read: named, so that nobody looks for a typing error
 _KNOWN_ELSEWHERE = {
     "STOP": "stops of a spline by a condition, outside of a SPLINE",
+    "ELSEIF": "KRL has none: ELSE with an IF of its own inside",
+    "ELSIF": "KRL has none: ELSE with an IF of its own inside",
 }
 
 
@@ -78,10 +80,13 @@ class Word(str):
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter of a routine: its name, and whether its value goes back to the caller (OUT)."""
+    """One parameter of a routine: its name, whether its value goes back to the caller (OUT, and
+    where nothing is said), and whether that is said.
+    """
 
     name: str
     out: bool
+    directed: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +182,7 @@ def _is_sizes(node: Any) -> bool:
 
 def _parameter(tree: Tree) -> Parameter:
     name, *direction = (str(one) for one in tree.children if one and not _is_sizes(one))
-    return Parameter(name, direction == ["OUT"])
+    return Parameter(name, direction != ["IN"], bool(direction))
 
 
 def _complaint(error: Any, text: str) -> tuple[str, int]:

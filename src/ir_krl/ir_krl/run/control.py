@@ -67,6 +67,7 @@ class Control:
     notes: list[Note] = field(default_factory=list)
     statements: int = 0
     continuing: bool = False  # CONTINUE was the statement before
+    triggered: bool = False  # statements run beside a motion, as a TRIGGER asks for
     expressions: Expressions = field(init=False)
     _signals: Signals = field(init=False)
     _guessed_exits: int = 0  # times that an assumed value decided about leaving a loop
@@ -101,7 +102,7 @@ class Control:
         self.statements += 1
         self._check_budget(statement)
         getattr(self, f"_{statement.data}")(statement)
-        self.continuing = statement.data == "continue_"
+        self.continuing = self.triggered or statement.data == "continue_"
 
     def _turns_back(self, between: Sequence[Tree], jump: Jump, turns: dict[str, _Turn]) -> bool:
         """Whether a jump back is followed: not for ever, where nothing that is known ends it."""
@@ -162,7 +163,7 @@ class Control:
         """A condition, and whether it hangs on an assumed value or on nothing at all."""
         before = self.memory.guesses
         holds = self.expressions.truth(tree, what)
-        self.continuing = False
+        self.continuing = self.triggered
         return holds, self.memory.guesses > before or _constant(tree)
 
     def _if_(self, tree: Tree) -> None:
@@ -194,11 +195,13 @@ class Control:
         if by == 0:
             raise KrlRunError("STEP is 0; it must be another number", self.place(step))
         path: tuple[Step, ...] = ((str(name), None),)
+        place = self.place(tree)
+        self.memory.set(path, value, place)
         try:
             while (value <= end) if by > 0 else (value >= end):
-                self.memory.set(path, value, self.place(tree))
                 self.body(body)
-                value += by
+                value = integer(self.memory.get(path, place), str(name), place) + by
+                self.memory.set(path, value, place)
                 self._one_more(tree)
         except LoopExit:
             pass
@@ -289,7 +292,7 @@ class Control:
         subject, *cases, default = tree.children
         before = self.memory.guesses
         value = self.memory.guess(self.expressions.value(subject), 0, self.place(tree))
-        self.continuing = False
+        self.continuing = self.triggered
         open_ = self.memory.guesses > before
         self._count_exits(tree, open_=open_)
         for case in cases:
@@ -338,7 +341,10 @@ class Control:
                 f"WAIT SEC {seconds:g}: a wait is read up to {WAIT_MAX:g} s, a week",
                 self.place(tree),
             )
-        if seconds > 0.0:
+        if self.triggered:
+            text = "a wait beside a motion, as a TRIGGER asks for: the robot goes on"
+            self.note(tree, text, Effect.TIMES)
+        elif seconds > 0.0:
             self.commands.append(Wait(seconds, self.place(tree)))
         else:  # passed at once, as on the controller; yet the advance run stops
             self.stop(self.place(tree), f"WAIT SEC {seconds:g}")
@@ -353,6 +359,9 @@ class Control:
             text = "WAIT FOR after CONTINUE: taken as fulfilled when it is reached"
             self.note_at(place, text, Effect.TIMES)
             return
+        if _constant(condition) and not self.expressions.truth(condition, "the condition"):
+            text = "this wait never ends by itself: taken as ended"
+            self.note_at(place, text, Effect.MOTIONS)
         self.commands.append(WaitFor(_written(condition), place))
 
     def _waited(self, tree: Tree, *, wanted: bool) -> list[tuple[int, bool]]:
@@ -363,6 +372,8 @@ class Control:
             case "joined" if str(tree.children[1]) == ("AND" if wanted else "OR"):
                 left, _, right = tree.children
                 return self._waited(left, wanted=wanted) + self._waited(right, wanted=wanted)
+            case "joined" if str(tree.children[1]) == ("OR" if wanted else "AND"):
+                return self._waited_one(tree.children[::2], wanted=wanted)
             case "compared" if tree.children[2].data in ("true", "false"):
                 same = (str(tree.children[1]) == "==") is (tree.children[2].data == "true")
                 return self._waited(tree.children[0], wanted=wanted is same)
@@ -371,6 +382,16 @@ class Control:
                 if name == INPUT and index is not None and not rest:
                     return [(index[0], wanted)]
         return []
+
+    def _waited_one(self, sides: Sequence[Tree], *, wanted: bool) -> list[tuple[int, bool]]:
+        """Inputs of that one of two conditions which ends a wait: of one that holds as they are
+        given, else of the first that may.
+        """
+        given = self._signals.inputs
+        choices = [self._waited(side, wanted=wanted) for side in sides]
+        held = [one for one in choices if one and all(given.get(n) is on for n, on in one)]
+        open_ = [one for one in choices if all(given.get(n, on) is on for n, on in one)]
+        return next(iter([*held, *open_]), [])
 
     def _check_names(self, tree: Any) -> None:
         """Note a name in a condition that nothing is known of."""

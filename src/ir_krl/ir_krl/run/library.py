@@ -39,12 +39,7 @@ WITHOUT_EFFECT = frozenset(
         "SJERK",
         "USE_CM_PRO_VALUES",
         "ERR_CLEAR",
-        "SWRITE",
-        "SREAD",
         "RESET_CD_PARAMS",
-        "STRCLEAR",
-        "STRADD",
-        "STRCOPY",
         "SET_KRLMSG",
         "SET_KRLDLG",
         "CLEAR_KRLMSG",
@@ -56,6 +51,8 @@ WITHOUT_EFFECT = frozenset(
 """Called in many programs; neither the path nor the speeds of a motion follows from them here."""
 STOPPING = frozenset({"CWRITE", "CREAD", "COPEN", "CCLOSE", "CIOCTL"})
 """What speaks with other programs: the advance run stops, nothing moves."""
+FILLING = frozenset({"CREAD", "SREAD", "SWRITE", "STRADD", "STRCLEAR", "STRCOPY"})
+"""What gives its arguments values that nobody knows here: texts, what a channel sent."""
 CONTROLLERS = frozenset(
     ("BAS", "BAS_EX", "IR_STOPM", "MSGLIB", "COLLMONLIB", "TM_BIB", "KRLMSG", "SPS", "CELL_TEACH")
 )
@@ -81,7 +78,7 @@ class Library:
         self.chosen: dict[str, Assumption | None] = {}  # what is assumed of $TOOL and $BASE
         self._named: dict[str, Callable[[Arguments, Place], Value]] = {
             "BAS": self._bas,
-            "SVEL_JOINT": self._all_axes("$VEL_AXIS"),
+            "SVEL_JOINT": self._joint_velocity,
             "SACC_JOINT": self._joint_acceleration,
             "SVEL_CP": self._tool_velocity,
             "SACC_CP": self._path_acceleration,
@@ -101,11 +98,15 @@ class Library:
 
     def has(self, name: str) -> bool:
         """Whether the controller has a routine of this name."""
-        return name in self._named or name in _MATHEMATICS or name in WITHOUT_EFFECT | STOPPING
+        known = WITHOUT_EFFECT | STOPPING | FILLING
+        return name in self._named or name in _MATHEMATICS or name in known
 
     def call(self, name: str, arguments: Arguments, place: Place) -> Value:
         """Its value; 0 where it has none. Raises KrlRunError."""
-        if name in WITHOUT_EFFECT | STOPPING:
+        if name in FILLING:
+            text = f"{name} isn't followed: what it would fill in stays as it is"
+            self._memory.noted(place, text, Effect.MOTIONS)
+        if name in WITHOUT_EFFECT | STOPPING | FILLING:
             return 0
         if name not in _MATHEMATICS:
             return self._named[name](arguments, place)
@@ -136,20 +137,20 @@ class Library:
             case "PTP_PARAMS":
                 self._axis_data(place)
                 self._frames(place)
-                self._set("$VEL_AXIS", amount())
+                self._axis_speed(amount())
             case "CP_PARAMS":
                 self._tool_data(place)
                 self._frames(place)
                 self._tool_speed(amount())
             case "PTP_DAT":
-                self._set("$VEL_AXIS", self._noted("PDAT_ACT", "VEL", FULL, place))
+                self._axis_speed(self._noted("PDAT_ACT", "VEL", FULL, place))
                 self._axis_data(place)
             case "CP_DAT":
                 otherwise = self._default("DEF_VEL_CP")
                 self._tool_speed(self._noted("LDAT_ACT", "VEL", otherwise, place))
                 self._tool_data(place)
             case "VEL_PTP":
-                self._set("$VEL_AXIS", amount())
+                self._axis_speed(amount())
             case "ACC_PTP":
                 self._set("$ACC_AXIS", min(amount(), FULL))
             case "VEL_CP":
@@ -164,8 +165,11 @@ class Library:
                 self._take_tool(round(amount()))
             case "BASE":
                 self._take_base(round(amount()))
-            case "EX_BASE" | "OUT_SYNC" | "OUT_ASYNC" | "GROUP" | "ACC_GLUE":
+            case "GROUP":
                 pass
+            case "EX_BASE":
+                text = "BAS(#EX_BASE): a base that external axes move isn't followed"
+                self._memory.noted(place, text, Effect.PLACES)
             case other:
                 text = f"BAS(#{other}) isn't known: no effect assumed"
                 self._memory.noted(place, text, Effect.SPEEDS)
@@ -180,7 +184,7 @@ class Library:
     def _initialised(self) -> None:
         """BAS(#INITMOV): speeds, approximation, tool 1, base 0 as $config.dat has them."""
         memory = self._memory
-        memory.shared["$VEL_AXIS"] = all_axes(FULL)
+        memory.shared["$VEL_AXIS"] = all_axes(self._default("DEF_VEL_PTP"))
         memory.shared["$ACC_AXIS"] = all_axes(FULL)
         velocity, acceleration, apo = (
             {part: self._default(name) for part, name in parts}
@@ -314,13 +318,14 @@ class Library:
             return Symbol("INITIALIZED")
         return Symbol("DECLARED" if self._memory.declared(name.upper()) else "UNDEFINED")
 
-    def _all_axes(self, name: str) -> Callable[[Arguments, Place], Value]:
-        def applied(arguments: Arguments, place: Place) -> Value:
-            value = number(_first(arguments, name, place), name, place)
-            self._set(name, value)
-            return value
+    def _joint_velocity(self, arguments: Arguments, place: Place) -> Value:
+        return self._axis_speed(number(_first(arguments, "SVEL_JOINT", place), "speed", place))
 
-        return applied
+    def _axis_speed(self, percent: float) -> float:
+        """$VEL_AXIS of all axes, `percent` of DEF_VEL_PTP, which it is at most."""
+        share = self._default("DEF_VEL_PTP") * min(percent, FULL) / FULL
+        self._set("$VEL_AXIS", share)
+        return share
 
     def _joint_acceleration(self, arguments: Arguments, place: Place) -> Value:
         share = min(_component(arguments, "ACC", place), FULL)

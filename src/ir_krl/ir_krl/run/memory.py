@@ -9,7 +9,19 @@ from typing import Any
 from ir_krl.errors import KrlRunError, Place
 from ir_krl.run.notes import Effect
 from ir_krl.run.system import Assumption
-from ir_krl.run.values import Array, Structure, Unknown, Value, copied, integer, number
+from ir_krl.run.values import (
+    TYPES,
+    Array,
+    Structure,
+    Types,
+    Unknown,
+    Value,
+    copied,
+    integer,
+    number,
+    rounded,
+    typed,
+)
 
 # Variables by name, as they stand while a program runs: of the routine that runs, of its module,
 # of all.
@@ -39,8 +51,9 @@ Noted = Callable[[Place, str, Effect], None]
 class Memory:
     """`shared` holds what is known everywhere, `modules` the data lists by the names of their
     modules, `scopes` the calls that run. module: whose statements run; listed: all names that data
-    lists declare; assumed: values that the program didn't bring, by name or name[index]; noted:
-    hears of those that are used; guesses: how many were; watched: see `watch`.
+    lists declare; types: components of structures; assumed: values that the program didn't bring,
+    by name or name[index]; noted: hears of those that are used; guesses: how many were; watched:
+    see `watch`.
     """
 
     shared: dict[str, Value]
@@ -52,6 +65,7 @@ class Memory:
     modules: dict[str, dict[str, Value]] = field(default_factory=dict)
     module: str = ""
     listed: set[str] = field(default_factory=set)
+    types: dict[str, Mapping[str, str]] = field(default_factory=lambda: dict(TYPES))
 
     def enter(self, values: dict[str, Value], names: Iterable[str]) -> None:
         """A call begins, with these parameters and their values."""
@@ -61,8 +75,10 @@ class Memory:
         """The call ends; what its variables hold."""
         return self.scopes.pop().values
 
-    def declare(self, name: str, value: Value | None, everywhere: bool = False) -> None:
-        """A variable of the routine that runs; of its module's data list, where none runs."""
+    def declare(self, name: str, value: Value | None, kind: str, everywhere: bool = False) -> None:
+        """A variable of the type `kind`, of the routine that runs; of its module's data list, where
+        none runs.
+        """
         if self.scopes:
             self.scopes[-1].names.add(name)
             home = self.scopes[-1].values
@@ -72,11 +88,13 @@ class Memory:
         if isinstance(value, Array) and not value.elements:
             held = home.get(name, self.shared.get(name))
             value = held if isinstance(held, Array) else value  # a parameter, or the controller's
-        if value is not None:
-            self._watch(home, name)
-            home[name] = value
-            if not isinstance(value, Array):
-                self.assumed.pop(name, None)
+        if value is None:
+            home[name] = typed(kind, home.get(name, Unknown(name, kind)), self.types)
+            return
+        self._watch(home, name)
+        home[name] = typed(kind, value, self.types)
+        if not isinstance(value, Array):
+            self.assumed.pop(name, None)
 
     def has(self, name: str) -> bool:
         """Whether a variable of this name has a value."""
@@ -181,20 +199,23 @@ class Memory:
             self.assumed.pop(name, None)
             if index is not None:
                 self.assumed.pop(f"{name}[{', '.join(map(str, index))}]", None)
-        if not rest and index is None:
-            home[name] = _merged(home.get(name), value)
-            return
         holder = home
+        parts: Mapping[str, str] = {}
         for (part, part_index), following in zip(path, [*rest, None], strict=True):
             elements: dict[Any, Value] = holder
             key: Any = part
+            kind = parts.get(part, "")
             if part_index is not None:
-                elements = _array_at(holder, part, place).elements
+                array = _array_at(holder, part, kind, place)
+                elements = array.elements
                 key = part_index
+                kind = array.kind
             if following is None:
-                elements[key] = _merged(elements.get(key), value)
+                elements[key] = _merged(elements.get(key), value, kind, self.types)
                 return
-            holder = _structure_at(elements, key, part, place).fields
+            held = _structure_at(elements, key, part, kind, place)
+            holder = held.fields
+            parts = self.types.get(held.kind, {})
 
     def _home(self, name: str) -> dict[str, Value]:
         """Where a variable is, or would be."""
@@ -211,18 +232,23 @@ class Memory:
 
     def _elsewhere(self, name: str) -> str:
         """The one data list of another module that has a variable of this name, else ""."""
-        found = [module for module, one in self.modules.items() if name in one]
+        found = [
+            module
+            for module, one in self.modules.items()
+            if not isinstance(one.get(name, Unknown(name)), Unknown)
+        ]
         return found[0] if len(found) == 1 and found[0] != self.module else ""
 
     def _own(self) -> dict[str, Value]:
         return self.modules.setdefault(self.module, {})
 
 
-def _merged(before: Value | None, value: Value) -> Value:
-    """The new value of a variable: components that an aggregate leaves out stay, and so does INT or
-    REAL.
+def _merged(before: Value | None, value: Value, kind: str, types: Types) -> Value:
+    """The new value of a variable of the type `kind`: components that an aggregate leaves out stay,
+    and so does INT or REAL.
     """
-    new = copied(value)
+    kind = kind or (before.kind if isinstance(before, Unknown | Structure) else "")
+    new = typed(kind, copied(value), types)
     if isinstance(new, Structure) and isinstance(before, Structure):
         return Structure(
             {**before.fields, **new.fields}
@@ -233,25 +259,27 @@ def _merged(before: Value | None, value: Value) -> Value:
     if isinstance(before, float) and isinstance(new, int) and not isinstance(new, bool):
         return float(new)
     if isinstance(before, int) and not isinstance(before, bool) and isinstance(new, float):
-        return round(new)
+        return rounded(new)
     return new
 
 
-def _array_at(holder: dict[str, Value], name: str, place: Place) -> Array:
+def _array_at(holder: dict[str, Value], name: str, kind: str, place: Place) -> Array:
     """The array of a name, made where there is none. Raises KrlRunError."""
     held = holder.get(name)
     if held is None or isinstance(held, Unknown):
-        held = holder[name] = Array()
+        held = holder[name] = Array(kind=kind or (held.kind if held else ""))
     if not isinstance(held, Array):
         raise KrlRunError(f"{name} is no array: leave out the index", place)
     return held
 
 
-def _structure_at(elements: dict[Any, Value], key: Any, name: str, place: Place) -> Structure:
+def _structure_at(
+    elements: dict[Any, Value], key: Any, name: str, kind: str, place: Place
+) -> Structure:
     """The structure at a key, made where there is none. Raises KrlRunError."""
     held = elements.get(key)
     if held is None or isinstance(held, Unknown):
-        held = elements[key] = Structure({})
+        held = elements[key] = Structure({}, kind or (held.kind if held else ""))
     if not isinstance(held, Structure):
         raise KrlRunError(f"{name} has no components", place)
     return held

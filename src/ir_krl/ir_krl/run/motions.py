@@ -101,7 +101,17 @@ class Assigning(Control):
             self.memory.set(((OUTPUT, (int(number),)),), level, place)
 
 
-_MOVING = ("$CORR", "$SEN", "$TECH", "$SOFT", "$TRAFO", "$ASYNC", "$EX_KIN", "$JOINT_OFFSET")
+_MOVING = (
+    "$CORR",
+    "$SEN",
+    "$TECH",
+    "$SOFT",
+    "$TRAFO",
+    "$ASYNC",
+    "$EX_KIN",
+    "$JOINT_OFFSET",
+    "$PAL_MODE",
+)
 """Beginnings of the names of system variables that change where a motion leads."""
 
 
@@ -388,9 +398,9 @@ class Moving(Assigning):
     def _act(self, actions: Iterable[Tree]) -> None:
         """What triggers do while the robot moves."""
         for action in actions:
-            self.continuing = True
+            self.continuing = self.triggered = True
             getattr(self, f"_{action.data}")(action)
-        self.continuing = False
+        self.continuing = self.triggered = False
 
     _lin = _circ = _ptp
 

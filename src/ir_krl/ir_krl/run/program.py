@@ -8,7 +8,7 @@ from pathlib import PurePath
 from typing import Any
 
 from ir_krl.errors import KrlRunError, Place
-from ir_krl.language import Routine, Source, Tree, place_of
+from ir_krl.language import Parameter, Routine, Source, Tree, place_of
 from ir_krl.run.commands import Command
 from ir_krl.run.control import Endless, Jump, LoopExit, Returned
 from ir_krl.run.expressions import Expressions
@@ -132,6 +132,9 @@ def follow(
         there = ", ".join(routines.names[:8]) or "none"
         raise KrlRunError(f"there is no routine {name or 'at all'}; routines: {there}")
     memory = Memory(system_variables(home, tool), assumed_variables())
+    for source in sources:
+        for body in (*source.data, *(one.body for one in source.routines)):
+            memory.types |= _structures(body)
     run = _Run(routines, memory, dict(inputs or {}), loop_passes)
     run.standing = Standing(run.commands, home, kinematics)
     try:
@@ -148,6 +151,21 @@ def follow(
         raise KrlRunError(NESTED, Place(run.expressions.file)) from None
     notes = worst_first(run.notes)
     return Followed(name, tuple(run.commands), notes, run.signals, tuple(run.unknown.values()))
+
+
+def _structures(body: Tree) -> dict[str, dict[str, str]]:
+    """The types that STRUC declares in a body: what their components are."""
+    found: dict[str, dict[str, str]] = {}
+    for statement in body.children:
+        if statement.data != "structure":
+            continue
+        name, *members = (one for one in statement.children if one != GLOBAL)
+        kind = ""
+        for member in members:
+            *own, component, _ = member.children
+            kind = str(own[0]) if own else kind
+            found.setdefault(str(name), {})[str(component)] = kind
+    return found
 
 
 class _Run(Moving):
@@ -248,7 +266,8 @@ class _Run(Moving):
         try:
             self.body(routine.body)
         except Returned as returned:
-            return 0 if returned.value is None else returned.value
+            value = 0 if returned.value is None else returned.value
+            return typed(routine.result, value, self.memory.types)
         except LoopExit:
             raise KrlRunError(
                 "EXIT stands outside of a loop: RETURN leaves a routine",
@@ -274,11 +293,11 @@ class _Run(Moving):
             name, index, expression = declarator.children
             value: Value | None = None if index is None else Array(kind=str(kind))
             if expression is not None:
-                value = typed(str(kind), copied(self.expressions.value(expression)))
-            self.memory.declare(str(name), value, everywhere)
+                value = copied(self.expressions.value(expression))
+            self.memory.declare(str(name), value, str(kind), everywhere)
 
     def _structure(self, tree: Tree) -> None:
-        """A type of structures needs no entry: components are made where they are set."""
+        """Types are known before the program runs."""
 
     _enumeration = _external = _structure
 
@@ -332,14 +351,21 @@ class _Run(Moving):
         result = self.routine(routine, values, place)
         left = self.memory.leave()
         for parameter, tree in zip(routine.parameters, trees, strict=False):
-            if (
-                parameter.out
-                and parameter.name in left
-                and tree is not None
-                and tree.data == "access"
-            ):
-                self.memory.set(self.expressions.path(tree), left[parameter.name], place)
+            value = left.get(parameter.name, Unknown(parameter.name))
+            back = parameter.out and tree is not None and tree.data == "access"
+            if back and not isinstance(value, Unknown):
+                self._given_back(routine, parameter, tree, value, place)
         return result
+
+    def _given_back(
+        self, routine: Routine, parameter: Parameter, tree: Tree, value: Value, place: Place
+    ) -> None:
+        """The value of a parameter that is one of the caller's variables."""
+        path = self.expressions.path(tree)
+        if not parameter.directed and self.memory.get(path, place) != value:
+            text = f"{parameter.name} of {routine.name} has neither :IN nor :OUT: taken as :OUT"
+            self.note_at(place, text, Effect.MOTIONS)
+        self.memory.set(path, value, place)
 
     def _unknown(self, name: str, arguments: int, place: Place, *, function: bool) -> Value:
         """A routine that nobody gave: it moves nothing, and the advance run stops at it. Its value

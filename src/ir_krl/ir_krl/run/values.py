@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -12,6 +14,9 @@ from ir_krl.errors import KrlRunError, Place
 from ir_msgs_py.arrays import FloatArray
 
 # Values of KRL: numbers, truth values, texts, enumeration values, structures and arrays.
+
+Types: TypeAlias = Mapping[str, Mapping[str, str]]
+"""What the components of structures are, by the names of the types; "" is an aggregate's."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +57,12 @@ class Array:
 
 @dataclass(frozen=True)
 class Unknown:
-    """What a name holds that nobody has given a value; what a routine returns that nobody gave."""
+    """What a name holds that nobody has given a value; what a routine returns that nobody gave.
+    kind: the type of the variable, where it is declared.
+    """
 
     name: str
+    kind: str = ""
 
     @property
     def remedy(self) -> str:
@@ -108,7 +116,12 @@ def number(value: Value, what: str, place: Place) -> float:
 
 def integer(value: Value, what: str, place: Place) -> int:
     """An INT, or a REAL rounded as KRL does. Raises KrlRunError."""
-    return round(number(value, what, place))
+    return rounded(number(value, what, place))
+
+
+def rounded(value: float) -> int:
+    """A REAL as an INT: to the nearest, halves away from 0, as the controller assigns it."""
+    return int(math.copysign(math.floor(abs(value) + 0.5), value))
 
 
 def truth(value: Value, what: str, place: Place) -> bool:
@@ -139,14 +152,30 @@ def kind_of(value: Value) -> str:  # noqa: PLR0911 - one of each kind
             return "an array"
 
 
-def typed(kind: str, value: Value) -> Value:
-    """A value as its declaration calls it: REAL X=3 is 3.0, an aggregate takes the type's name."""
-    if isinstance(value, Structure) and not value.kind:
-        return Structure(value.fields, kind)
-    if kind == "REAL" and isinstance(value, int) and not isinstance(value, bool):
-        return float(value)
-    if kind == "INT" and isinstance(value, float):
-        return round(value)
+def typed(kind: str, value: Value, types: Types) -> Value:
+    """A value as a variable of the type `kind` holds it: 3 is 3.0 in a REAL and in X of a FRAME,
+    2.5 is 3 in an INT, an aggregate takes the type's name. "" where the type isn't known.
+    """
+    match value:
+        case Structure():
+            among = _WIDER.get(kind, ())
+            name = kind if value.kind in among else value.kind or kind
+            parts = types.get(name, {})
+            return Structure(
+                {
+                    part: typed(parts.get(part, ""), one, types)
+                    for part, one in value.fields.items()
+                    if not among or part in parts
+                },
+                name,
+            )
+        case Array():
+            held_at = {index: typed(kind, one, types) for index, one in value.elements.items()}
+            return Array(held_at, kind or value.kind)
+        case int() if kind == "REAL" and not isinstance(value, bool):
+            return float(value)
+        case float() if kind == "INT":
+            return rounded(value)
     return value
 
 
@@ -158,6 +187,26 @@ ANGLE_NAMES = ("A", "B", "C")
 FRAME_NAMES = (*PLACE_NAMES, *ANGLE_NAMES)
 EXTERNAL_NAMES = ("E1", "E2", "E3", "E4", "E5", "E6")
 AXIS_NAMES = ("A1", "A2", "A3", "A4", "A5", "A6")
+_FRAME = dict.fromkeys(FRAME_NAMES, "REAL")
+_POS = {**_FRAME, "S": "INT", "T": "INT"}
+_AXIS = dict.fromkeys(AXIS_NAMES, "REAL")
+_EXTERNAL = dict.fromkeys(EXTERNAL_NAMES, "REAL")
+TYPES: Types = {
+    "": _POS | _AXIS | _EXTERNAL,
+    "FRAME": _FRAME,
+    "POS": _POS,
+    "E6POS": _POS | _EXTERNAL,
+    "AXIS": _AXIS,
+    "E6AXIS": _AXIS | _EXTERNAL,
+    "LOAD": {"M": "REAL", "CM": "FRAME", "J": "INERTIA"},
+    "INERTIA": dict.fromkeys(PLACE_NAMES, "REAL"),
+    "CP": dict.fromkeys(("CP", "ORI1", "ORI2"), "REAL"),
+    "PDAT": dict.fromkeys(("VEL", "ACC", "APO_DIST"), "REAL"),
+    "LDAT": dict.fromkeys(("VEL", "ACC", "APO_DIST", "APO_FAC"), "REAL"),
+}
+"""Those that every controller has."""
+_WIDER = {"FRAME": ("POS", "E6POS"), "POS": ("E6POS",), "AXIS": ("E6AXIS",)}
+"""Whose values a variable of a type holds without the components that it has not itself."""
 _MM = 1e-3  # m
 
 
