@@ -5,9 +5,11 @@ worth?
 
 Every cell's program, or a random visit of its stations for each seed, is planned, written as KRL,
 read back, driven by the controller's model and certified again: what that costs, how near the ends
-come, and what Coal at 0.0005 rad and limits at 10 kHz say of it. The programs of the tests' corpus
-make the same trip. Four programs of today, one of them with a seam, are held against the planner's.
-Motions of known energy are sampled with noise and judged from positions alone.
+come, and what Coal at 0.0005 rad and limits at 10 kHz say of it. These cells and cells drawn at
+random are written in every style and read back, each step beside what its comment says. Programs
+made around motions that are known are read. The programs of the tests' corpus make the same trip.
+Four programs of today, one of them with a seam, are held against the planner's. Motions of known
+energy are sampled with noise and judged from positions alone.
 """
 
 from __future__ import annotations
@@ -21,6 +23,8 @@ from _results import at_least, at_most, command_line, finish, line_of
 from _second_opinion import SecondOpinion
 from _shop_baselines import baselines
 from _shop_corpus import corpus
+from _shop_hidden import PROGRAMS, QUICK_PROGRAMS, hidden_truths
+from _shop_round_trip import DRAWN, QUICK_DRAWN, round_trips
 from _shop_traces import traces
 
 from ir_description import bundled_cells, load_cell
@@ -181,7 +185,14 @@ def main() -> None:
         ),
         at_most("limits at 10 kHz", max(row.limit_share for row in written), "share", 1.0 + 1e-6),
     ]
-    found = [([asdict(row) for row in rows], claims), corpus(), baselines(), traces()]
+    found = [
+        ([asdict(row) for row in rows], claims),
+        round_trips(QUICK_DRAWN if arguments.quick else DRAWN),
+        hidden_truths(QUICK_PROGRAMS if arguments.quick else PROGRAMS),
+        corpus(),
+        baselines(),
+        traces(),
+    ]
     everything = [row for of_one, _ in found for row in of_one]
     finish(arguments.json, everything, [claim for _, of_one in found for claim in of_one])
 

@@ -14,6 +14,7 @@ from ir_description import cell_from_yaml, cell_to_yaml, load_cell
 from ir_krl import Followed, KrlError, Numbers, Payload, follow, parse
 from ir_krl.write import Wiring
 from ir_planner import Planner
+from ir_planner.before_after import before_after, today_of_krl
 from ir_planner.checks import evaluate_trajectory
 from ir_planner.krl import evaluate_krl, export_krl, tool_in_flange
 from ir_planner.krl.strokes import one_after_the_other
@@ -172,3 +173,33 @@ def test_an_exported_program_takes_the_part_when_it_is_read(
     assert [one.step.handled for one in found.steps if one.step.handled] == ["+gear"]
     assert not any("$LOAD" in note.text for note in found.notes)
     assert plan.movements[-1].load == found.steps[-1].step.scene.load_text
+
+
+CARRIED = (
+    "$LOAD={{M {mass},CM {{X 0,Y 0,Z 200,A 0,B 0,C 0}},J {{X 5,Y 5,Z 5}}}}\nPTP {{A1 0}}\n"
+    "PTP {{A1 40,A3 60}}\nWAIT SEC 2\n{more}PTP {{A1 -20,A3 100}}"
+)
+
+
+@pytest.mark.parametrize("mass", [0, 50, 150])
+def test_a_comparison_carries_what_load_says(
+    mass: int, planner: Planner, followed: Callable[..., Followed]
+) -> None:
+    """Law: what a program costs today is the same in `ir krl import` and `ir compare`, and the
+    planner's carries the same.
+    """
+    found = evaluate_krl(planner, followed(CARRIED.format(mass=mass, more="")))
+    answer = before_after(planner, today_of_krl(found))
+    assert answer.today.report.energy == pytest.approx(found.report.energy, rel=1e-9)
+    for side in answer.sides:
+        assert {step.load for step in side.movements} == {"$LOAD"}
+    assert any("carries what $LOAD says" in note for note in answer.notes)
+
+
+def test_a_load_that_changes_on_the_way_is_named(
+    planner: Planner, followed: Callable[..., Followed]
+) -> None:
+    found = evaluate_krl(planner, followed(CARRIED.format(mass=50, more="$LOAD.M=90\n")))
+    today = today_of_krl(found)
+    assert today.load is None
+    assert "put them right in the cell" in today.notes[-1]

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_description import CellPath
+from ir_description import CellPath, Load
 from ir_krl import PLC_DONE, Place
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import LINE, CartesianPath
@@ -14,7 +14,7 @@ from ir_msgs_py.plc import Signal
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.errors import RequestError
-from ir_planner.krl import DrivenStep, EvaluatedProgram, EvaluatedStep, ToolMotion
+from ir_planner.krl import DrivenStep, EvaluatedProgram, EvaluatedStep, ToolMotion, is_named
 from ir_planner.program import Doors
 
 # What today's program works along: processes of a KRL program as paths of the tool.
@@ -227,7 +227,7 @@ class Stretch:
 @dataclass(frozen=True, eq=False)
 class Today:
     """A program as it runs, from `start` (n,) [rad]; kind: what it is read from; notes: what was
-    assumed.
+    assumed; load: what it carries all along, None: what the cell says.
     """
 
     name: str
@@ -235,6 +235,7 @@ class Today:
     start: FloatArray
     stretches: tuple[Stretch, ...]
     notes: tuple[str, ...] = ()
+    load: Load | None = None
 
     @property
     def doors(self) -> Doors | None:
@@ -275,7 +276,26 @@ def today_of_krl(found: EvaluatedProgram, process: Lines | None = None) -> Today
             f"{len(waits)} waits for machines count no time: how long they take is not in a program"
         )
     notes += process_notes([one.step for one in found.steps], paths)
-    return Today(found.name, "KRL program", start, stretches, tuple(notes))
+    load, said = _load([one.step for one in found.steps if one.step.moves])
+    return Today(found.name, "KRL program", start, stretches, (*notes, *said), load)
+
+
+def _load(steps: Sequence[DrivenStep]) -> tuple[Load | None, list[str]]:
+    """What $LOAD says instead of the cell, where it says the same all along, and what else must be
+    told.
+    """
+    scenes = [step.scene for step in steps]
+    named = [scene.loads[0] for scene in scenes if scene.loads[:1] and is_named(scene.loads[0])]
+    masses = {load.mass for load in named}
+    handled = any(step.handled for step in steps)
+    if len(named) == len(scenes) and len(masses) == 1 and not handled:
+        return named[0], ["every program of this comparison carries what $LOAD says"]
+    if named:
+        return None, [
+            "$LOAD is another one than the cell's in a part of the program: every program of this "
+            "comparison is costed with the cell's loads; put them right in the cell"
+        ]
+    return None, []
 
 
 def _stretch(one: EvaluatedStep, process: CellPath | None) -> Stretch:

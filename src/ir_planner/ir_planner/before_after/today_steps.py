@@ -52,6 +52,7 @@ class AskedProgram:
 
 def asked_program(today: Today, scene: PlanningScene) -> AskedProgram:
     """Today's program as the planner is asked for it. Raises RequestError where it goes nowhere."""
+    scene = _carrying(today, scene)
     stops = _Stops(scene)
     steps: list[Asked] = []
     moves: list[Stretch] = []
@@ -84,6 +85,14 @@ def asked_program(today: Today, scene: PlanningScene) -> AskedProgram:
         steps, notes = _handled(steps, scene.cell, posture_at(scene, today.start))
     cell = replace(stops.cell(), program=tuple(step.step for step in steps))
     return AskedProgram(cell, tuple(steps), (*stops.notes(), *notes))
+
+
+def _carrying(today: Today, scene: PlanningScene) -> PlanningScene:
+    """The scene with what today's program says that it carries."""
+    if today.load is None:
+        return scene
+    cell = replace(scene.cell, tool=today.load)
+    return replace(scene, cell=cell, loads=cell.loads())
 
 
 def _with_signals(steps: list[Asked]) -> list[Asked]:

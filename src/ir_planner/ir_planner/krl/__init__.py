@@ -15,6 +15,7 @@ from ir_planner.krl.requests import (
     station_at,
 )
 from ir_planner.krl.splines import ToolMotion
+from ir_planner.krl.surroundings import is_named
 
 __all__ = [
     "DEVIATION_MAX",
@@ -27,6 +28,7 @@ __all__ = [
     "export_krl",
     "follow_krl",
     "follow_ur",
+    "is_named",
     "one_movement",
     "posture_at",
     "station_at",

@@ -20,6 +20,7 @@ from ir_planner.scene import PlanningScene
 # Loads as KRL gives them, in KUKA's flange: mass, centre, and the axes of inertia.
 
 _TINY = 1e-6  # kg, kg m^2: what carries nothing still needs a mass
+_NAMED = "$LOAD"
 _SAME = 0.005  # share of the mass, and kg, m: two loads that are the same but for rounding
 
 
@@ -53,6 +54,11 @@ def same_payload(a: Payload, b: Payload) -> bool:
     return abs(a.mass - b.mass) <= _SAME * max(a.mass, b.mass, 1.0) and (light or apart <= _SAME)
 
 
+def is_named(load: Load) -> bool:
+    """Whether a load is what a program's $LOAD says."""
+    return load.name == _NAMED
+
+
 def loads_with(payload: Payload, loads: tuple[Load, ...], place: Place) -> tuple[Load, ...]:
     """The loads of the cell with the mass, centre and inertia that a program gives them; their
     shapes and watts stay. Raises KrlMotionError for an inertia that no body has.
@@ -63,7 +69,7 @@ def loads_with(payload: Payload, loads: tuple[Load, ...], place: Place) -> tuple
     inertia = portable.matmul(axes, np.diag(moments), axes.T)
     try:
         one = Load(
-            "$LOAD",
+            _NAMED,
             "tool",
             max(payload.mass, _TINY),
             portable.matmul(back, np.array(payload.centre)),
