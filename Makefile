@@ -77,6 +77,7 @@ docs: setup-tests ## pages that are written from code, then all of docs/ as a si
 	@$(BIN)/python tools/security_policy.py
 	@$(BIN)/python tools/mistakes_page.py
 	@$(BIN)/python tools/architecture_page.py
+	@$(BIN)/python tools/readme_figures.py
 	@$(BIN)/python tools/docs_site.py
 
 clean:            ## remove what was built; .venv stays (rm -rf .venv for all)

@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 from pyarrow import parquet
 
+from ir_cli.compare import row_of
 from ir_cli.main import main
 from ir_msgs_py.savings import BeforeAfter
 from ir_planner import Planner
-from ir_recorder.report.costs import Costs
+from ir_recorder.report.costs import J_PER_KWH, Costs, money
+from ir_recorder.report.number_text import joules, kilowatt_hours, millimetres, number, watts
 from ir_recorder.report.program_comparison import (
     before_after_columns,
     before_after_html,
@@ -144,6 +146,39 @@ def test_every_amount_of_the_table_follows_from_the_joules(compared: BeforeAfter
     assert [row["saved_j"] for row in changes] == [
         change.saving.saved for change in compared.changes
     ]
+
+
+def test_every_figure_is_one_value_on_the_page_in_the_table_and_of_the_command(
+    compared: BeforeAfter, planner: Planner
+) -> None:
+    """The page and the command round what the table holds in full."""
+    costs = Costs(price=0.27, grid=0.41, parts_per_cycle=3.0)
+    columns = before_after_columns(compared, costs)
+    page = before_after_html(compared, planner.cell, costs)
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    wholes = [row for row in rows if row["what"] == "cycle"]
+    sides = [compared.today, *compared.sides]
+    for row, side in zip(wholes, sides, strict=True):
+        said = row_of(side)
+        joules_shown = [row[f"energy{end}_j"] for end in ("", "_low", "_high")]
+        assert [said["joules"], said["joules_low"], said["joules_high"]] == joules_shown
+        assert said["peak_watts"] == row["peak_w"]
+        assert said["clearance"] == row["clearance_m"]
+        shown = [
+            *(kilowatt_hours(each) for each in joules_shown),
+            kilowatt_hours(row["year_kwh"] * J_PER_KWH),
+            money(row["year_money"], "EUR"),
+            number(row["year_co2_kg"], "kg"),
+            watts(row["peak_w"]),
+            millimetres(row["clearance_m"]),
+        ]
+        if side is not compared.today:
+            assert said["saved_joules"] == row["saved_j"]
+            shown += [joules(row["saved_j"]), money(row["year_saved_money"], "EUR")]
+        assert [figure for figure in shown if figure not in page] == []
+    changes = [row for row in rows if row["what"].startswith("change")]
+    for row in changes:
+        assert money(row["year_saved_money"], "EUR") in page
 
 
 def test_a_program_that_is_too_slow_for_the_cycles_says_so(

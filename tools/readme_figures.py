@@ -1,0 +1,95 @@
+"""Writes the table of figures in README.md: what `ir compare demo` says, rounded.
+
+A test compares. The planner's clock stands, so that no busy machine cuts a plan.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from ir_msgs_py.savings import BeforeAfter
+from ir_planner import Planner
+from ir_planner.before_after import before_after_common
+from ir_recorder.analysis.production import Amount
+from ir_recorder.report.costs import J_PER_KWH, Costs, money
+from ir_recorder.report.number_text import millimetres, seconds, significant
+from ir_recorder.report.program_comparison import Year, year_of
+
+PAGE = Path(__file__).resolve().parents[1] / "README.md"
+START = "| | point to point at 100 % | planned | |\n"
+END = "\n\n"
+
+
+def compared() -> BeforeAfter:
+    """The demonstration's program against PTP at 100 %."""
+    planner = Planner("demo", clock=lambda: 0.0)
+    return before_after_common(planner, (), planner.cell.park)
+
+
+def figures(found: BeforeAfter, costs: Costs) -> str:
+    """The table, without the empty line after it."""
+    today = found.today
+    planned = found.planned
+    free = next(side for side in found.sides if side.name == "free")
+    now, then = (year_of(found, side, costs) for side in (today, planned))
+    saving = planned.saving
+    within = [f"{end / 3600.0:.0f}" for end in (saving.saved_low, saving.saved_high)]
+    sooner = today.report.duration - free.report.duration
+    rows = (
+        (
+            "cycle",
+            seconds(today.report.duration),
+            seconds(planned.report.duration),
+            f"or {sooner:.0f} s shorter for the same energy",
+        ),
+        (
+            "energy from the mains",
+            *(f"{side.report.energy / J_PER_KWH:.3f} kWh" for side in (today, planned)),
+            f"{100.0 * saving.share:.0f} % less: {saving.saved / 3600.0:.0f} Wh, "
+            f"at 90 % between {within[0]} and {within[1]}",
+        ),
+        (
+            "a year, two shifts",
+            _price(now.energy, costs),
+            _price(then.energy, costs),
+            f"{_price(then.saved, costs)} and {_co2(then, costs)} of CO2 less",
+        ),
+        (
+            "peak power",
+            *(f"{side.report.peak_power / 1e3:.1f} kW" for side in (today, planned)),
+            "",
+        ),
+        (
+            "nearest to anything",
+            *(millimetres(side.report.min_clearance) for side in (today, planned)),
+            "proved" if planned.certified else "not certified",
+        ),
+    )
+    lines = (" | ".join(("", *row, "")).strip() for row in rows)
+    return "\n".join((START + "|---|---|---|---|", *lines)).replace("|  |", "| |")
+
+
+def _price(amount: Amount, costs: Costs) -> str:
+    return money(costs.money(amount.value), costs.currency)
+
+
+def _co2(year: Year, costs: Costs) -> str:
+    return f"{significant(costs.co2(year.saved.value), 3)} kg"
+
+
+def page() -> str:
+    """README.md with the figures of this build."""
+    before, _, after = PAGE.read_text(encoding="utf-8").partition(START)
+    return before + figures(compared(), Costs()) + END + after.partition(END)[2]
+
+
+def main() -> int:
+    """Writes README.md."""
+    PAGE.write_text(page(), encoding="utf-8")
+    sys.stdout.write(f"{PAGE}\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
