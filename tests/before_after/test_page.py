@@ -17,7 +17,7 @@ from ir_cli.main import main
 from ir_msgs_py.savings import BeforeAfter
 from ir_planner import Planner
 from ir_recorder.report.costs import J_PER_KWH, Costs, money
-from ir_recorder.report.number_text import joules, kilowatt_hours, millimetres, number, watts
+from ir_recorder.report.number_text import kilowatt_hours, millimetres, number, watts
 from ir_recorder.report.program_comparison import (
     before_after_columns,
     before_after_html,
@@ -174,7 +174,7 @@ def test_every_figure_is_one_value_on_the_page_in_the_table_and_of_the_command(
         ]
         if side is not compared.today:
             assert said["saved_joules"] == row["saved_j"]
-            shown += [joules(row["saved_j"]), money(row["year_saved_money"], "EUR")]
+            shown += [kilowatt_hours(row["saved_j"]), money(row["year_saved_money"], "EUR")]
         assert [figure for figure in shown if figure not in page] == []
     changes = [row for row in rows if row["what"].startswith("change")]
     for row in changes:

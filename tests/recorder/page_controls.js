@@ -42,7 +42,8 @@
 [...document.querySelectorAll('main table')].every((t) => t.caption && t.caption.textContent)
 
 /* names for those who don't see: every table, every picture, every control */
-[...document.querySelectorAll('canvas, svg')].every((c) => c.getAttribute('role') === 'img' && c.getAttribute('aria-label'))
+[...document.querySelectorAll('canvas, svg')].every((c) => c.getAttribute('aria-hidden')
+  || c.getAttribute('role') === 'img' && c.getAttribute('aria-label'))
 
 /* names for those who don't see: every table, every picture, every control */
 [...document.querySelectorAll('button, input, select')].every((c) => c.textContent.trim() || c.getAttribute('aria-label')

@@ -164,15 +164,15 @@ def mark(index: int, x: float, y: float, inside: str) -> str:
 # Energy over cycle time as a drawing: programs as points, those that no other one beats joined by
 # a line.
 
-WIDTH = 720.0
+WIDTH = 560.0
 HEIGHT = 300.0
 _LEFT = 84.0
-_RIGHT = 190.0
+_RIGHT = 150.0
 _TOP = 18.0
 _BOTTOM = 44.0
 # how wide and how high a name is, and how far it stands below its middle
-_NAME = 90.0
-_LINE = 14.0
+_NAME = 130.0
+_LINE = 18.0
 _HALF = 4.0
 # span of an axis: what differs by less reads alike
 _LEAST_S = 0.05
@@ -244,7 +244,7 @@ def front_chart(points: Sequence[Point], along: str = "cycle time") -> str:
         f"{p.name} {seconds(p.seconds)}, {joules(p.energy)}, {p.source}" for p in points
     )
     return (
-        '<div class="figure scroll"><svg class="front" id="energy_over_cycle_time" '
+        '<div class="figure"><svg class="front" id="energy_over_cycle_time" '
         f'viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{text(said)}">'
         f'{_grid(x, y, along)}<polyline class="line" points="{line}"/>{marks}</svg></div>'
     )
@@ -284,23 +284,49 @@ def _grid(x: _Axis, y: _Axis, along: str) -> str:
     right = WIDTH - _RIGHT
     bottom = HEIGHT - _BOTTOM
     parts = []
-    for value in y.ticks():
+    for value, shown in zip(y.ticks(), _energies(y.ticks()), strict=True):
         at = y.at(value)
         parts.append(f'<path class="grid" d="M{_LEFT:g} {at:.1f}H{right:g}"/>')
-        parts.append(
-            f'<text x="{_LEFT - 8:g}" y="{at + 4:.1f}" text-anchor="end">{joules(value)}</text>'
-        )
-    for value in x.ticks():
+        parts.append(f'<text x="{_LEFT - 8:g}" y="{at + 4:.1f}" text-anchor="end">{shown}</text>')
+    for value, shown in zip(x.ticks(), _times(x.ticks()), strict=True):
         at = x.at(value)
         parts.append(f'<path class="grid" d="M{at:.1f} {_TOP:g}V{bottom:g}"/>')
-        parts.append(
-            f'<text x="{at:.1f}" y="{bottom + 18:g}" text-anchor="middle">{seconds(value)}</text>'
-        )
+        parts.append(f'<text x="{at:.1f}" y="{bottom + 18:g}" text-anchor="middle">{shown}</text>')
     middle = (_LEFT + right) / 2.0
     return (
         "".join(parts)
         + f'<text x="{middle:g}" y="{HEIGHT - 6:g}" text-anchor="middle">{along}</text>'
     )
+
+
+_MINUTE = 60.0  # s
+_KILO = 1e3
+
+
+def _times(ticks: Sequence[float]) -> list[str]:
+    """Labels of an axis [s]: in minutes where it spans some, with as many decimals as its step."""
+    step = _step(ticks)
+    if step >= _MINUTE:
+        return _labels(ticks, step, _MINUTE, "min")
+    return _labels(ticks, step, 1.0, "s")
+
+
+def _energies(ticks: Sequence[float]) -> list[str]:
+    """Labels of an axis [J], with as many decimals as its step."""
+    step = _step(ticks)
+    most = max(map(abs, ticks), default=0.0)
+    return (
+        _labels(ticks, step, _KILO, "kJ") if most >= 10.0 * _KILO else _labels(ticks, step, 1, "J")
+    )
+
+
+def _step(ticks: Sequence[float]) -> float:
+    return ticks[1] - ticks[0] if len(ticks) > 1 else 1.0
+
+
+def _labels(ticks: Sequence[float], step: float, scale: float, unit: str) -> list[str]:
+    decimals = max(0, math.ceil(-math.log10(step / scale) - 1e-9))
+    return [f"{tick / scale:,.{decimals}f} {unit}".replace(",", " ") for tick in ticks]
 
 
 def _heights(points: Sequence[Point], x: _Axis, y: _Axis) -> list[float]:

@@ -25,7 +25,6 @@ from ir_recorder.analysis.production import (
 from ir_recorder.errors import RecorderError
 from ir_recorder.report.number_text import (
     DASH,
-    joules,
     kilowatt_hours,
     number,
     seconds,
@@ -242,7 +241,7 @@ def idle_money(energy: float, costs: Costs) -> str:
 def _row(
     name: str, energy: float, length: float, counts: tuple[float, ...], costs: Costs
 ) -> tuple[str, ...]:
-    cycle = f"<b>{joules(energy)}</b><small>{seconds(length)}</small>"
+    cycle = f"<b>{kilowatt_hours(energy)}</b><small>{seconds(length)}</small>"
     return (text(name), cycle, *(_priced(energy * count, costs) for count in counts))
 
 
@@ -268,6 +267,16 @@ def money(value: float, currency: str) -> str:
     return f"{shown} {currency}"
 
 
+def share_between(amount: Amount, whole: float) -> str:
+    """The 90 % interval of a share of `whole` [J], in percent as the share itself; "" without
+    one.
+    """
+    if whole <= 0.0 or amount.high <= amount.low:
+        return ""
+    low, high = (100.0 * end / whole for end in (amount.low, amount.high))
+    return f"90 % interval {low:.1f} to {high:.1f} %"
+
+
 def _saved(
     savings: ProgramSavings | None, counts: tuple[float, ...], costs: Costs
 ) -> list[tuple[str, ...]]:
@@ -281,7 +290,7 @@ def _saved(
 
 def _saving(where: str, saving: Saving, counts: tuple[float, ...], costs: Costs) -> tuple[str, ...]:
     word, amount = saved_amount(saving).gain()
-    cells = [f"<b>{joules(amount.value)}</b>{_between(amount, joules)}"]
+    cells = [f"<b>{kilowatt_hours(amount.value)}</b>{_between(amount, kilowatt_hours)}"]
     for count in counts:
         price = amount.times(count).of(costs.money)
         shown = text(money(price.value, costs.currency))
@@ -322,14 +331,14 @@ def lever_section(analysis: Analysis, costs: Costs) -> str:
     rows = (
         (
             text(lever.name),
-            f"at most <b>{joules(lever.joules)}</b>",
+            f"<b>{kilowatt_hours(lever.joules)}</b>",
             share(lever.joules, cycle.energy),
             text(money(costs.money(lever.joules * yearly), costs.currency)),
             f"{text(lever.means)}<small>counted: {text(lever.basis)}</small>",
         )
         for lever in found
     )
-    heads = ("lever", ">joules of a cycle", ">share", ">a year, at most", "what would save them")
+    heads = ("lever", ">of a cycle, at most", ">share", ">a year, at most", "what would save them")
     return (
         '<section id="levers"><h2>The biggest levers</h2><p class="hint">Upper bounds from '
         "figures of this "
@@ -348,7 +357,7 @@ def clock_section(analysis: Analysis, costs: Costs) -> str:
         return ""
     found = [_demand(analysis, cycle, costs), _payback(cycle, costs)]
     return (
-        f'<section id="clock"><h2>Around the clock</h2><p class="hint">{" ".join(found).strip()}'
+        f'<section id="around"><h2>Around the clock</h2><p class="hint">{" ".join(found).strip()}'
         f"</p>{_idle(analysis, costs)}</section>"
     )
 
@@ -394,8 +403,8 @@ def _idle(analysis: Analysis, costs: Costs) -> str:
     ]
     heads = ("when nobody works", ">power", ">a year")
     return (
-        f'<p class="hint">{costs.idle_hours:,.0f} hours a year lie outside of the shifts (nights, '
-        "weekends, holidays): at machine home, by the data of controller and tool. Left alone, the "
+        f'<p class="hint">{significant(costs.idle_hours, 6)} hours a year lie outside of the '
+        "shifts (nights, weekends, holidays): at machine home, by the data of controller and tool. Left alone, the "
         "controller only closes the brakes.</p>"
         f"{table(heads, rows, 'When nobody works')}"
     )

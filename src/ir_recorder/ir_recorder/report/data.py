@@ -18,10 +18,19 @@ from ir_recorder.report.motion_scene import (
     lanes,
     planned_scene,
     planned_side,
+    rests_of,
     scene,
 )
 from ir_recorder.report.number_text import mode_words
-from ir_recorder.report.series import Json, axis_curves, envelope, floats, machine_lanes
+from ir_recorder.report.series import (
+    Json,
+    Span,
+    axis_curves,
+    envelope,
+    floats,
+    long_rests,
+    machine_lanes,
+)
 from ir_values.arrays import FloatArray
 
 MOST_POINTS = 24_000  # of the power curve: 4 minutes as they were read
@@ -48,11 +57,20 @@ def page_data(analysis: Analysis, safety_distance: float) -> str:
         ],
         "safetyDistance": safety_distance,
         "axes": axis_curves(analysis),
+        "rests": long_rests([_rests(analysis)]),
         "scene": scene(analysis),
         "blamed": [] if analysis.cell is None else blamed(analysis.cell, analysis.problems),
         **_planned(analysis),
     }
     return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def _rests(analysis: Analysis) -> list[Span]:
+    return [
+        (result.step.start, result.step.end)
+        for result in analysis.steps
+        if result.step.movement.is_pause
+    ]
 
 
 def _planned(analysis: Analysis) -> dict[str, Json]:
@@ -63,7 +81,8 @@ def _planned(analysis: Analysis) -> dict[str, Json]:
     if side is not None:
         power = _curve(side.time, side.watts)
         drawn = planned_scene(side, analysis.cell)
-        return {"end": side.report.duration, "power": power, "lanes": lanes(side), "scene": drawn}
+        shown = {"power": power, "lanes": lanes(side), "scene": drawn}
+        return {**shown, "end": side.report.duration, "rests": long_rests([rests_of(side)])}
     if analysis.recording.planned:
         return {}  # the steps of a file, without their trajectories
     return {"end": 1.0, "scene": failed_scene(analysis.cell)}

@@ -17,7 +17,7 @@ from ir_recorder.analysis.production import (
     saved_amount,
 )
 from ir_recorder.format.contents import OWN_FACTS, VERSION
-from ir_recorder.report.costs import NAMES, Costs, money
+from ir_recorder.report.costs import NAMES, Costs, money, share_between
 from ir_recorder.report.number_text import (
     DASH,
     joules,
@@ -111,11 +111,11 @@ def tiles(analysis: Analysis, costs: Costs | None = None) -> str:
     """The figures; those of the program where one was executed."""
     program = analysis.program
     origin = analysis.recording.origin
-    paid = (_saved(analysis), _yearly(analysis, costs or Costs()))
+    paid = (_yearly(analysis, costs or Costs()), _saved(analysis))
     shown = (
-        [_whole(analysis, program), _unshortened(program), *paid, *_parts(program, origin)]
+        [*paid, _unshortened(program), _whole(analysis, program), *_parts(program, origin)]
         if program is not None
-        else [*_planned(analysis), *paid]
+        else [*paid, *_planned(analysis)]
         if analysis.recording.only_planned
         else [
             Tile("program", "none executed", ("figures of the whole recording only",)),
@@ -231,13 +231,10 @@ def _saved(analysis: Analysis) -> Tile | None:
         return None
     total = savings.total
     word, amount = saved_amount(total).gain()
-    within = (
-        f"90 % interval {joules(amount.low)} to {joules(amount.high)}"
-        if amount.high > amount.low
-        else ""
-    )
+    within = share_between(amount, total.common)
     beside = "of" if word == "saved" else "than"
-    before = f"{joules(amount.value)} {beside} the common program's {joules(total.common)}"
+    energy = kilowatt_hours(amount.value)
+    before = f"{energy} {beside} the common program's {kilowatt_hours(total.common)}"
     name = "saved by its plan" if word == "saved" else "more by its plan"
     return Tile(name, f"{100.0 * abs(total.share):.1f} %", (f"{before}, predicted", within))
 

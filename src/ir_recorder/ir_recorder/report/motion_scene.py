@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 
@@ -17,7 +18,16 @@ from ir_recorder.analysis.loads import carried
 from ir_recorder.measure import PowerModel, planned_samples
 from ir_recorder.reading.recording import TextEvent
 from ir_recorder.report.cell_scene import cell_scene, door_bodies, matrix, part_meshes
-from ir_recorder.report.series import Curves, Json, floats, indices, packed, quantised
+from ir_recorder.report.series import (
+    Curves,
+    Json,
+    Span,
+    floats,
+    indices,
+    long_rests,
+    packed,
+    quantised,
+)
 from ir_values.arrays import FloatArray
 
 # The cell and its motion for the picture in 3D: the joint values 50 times a second, parts, loads,
@@ -141,10 +151,26 @@ def motion_of(side: Side, cell: Cell) -> dict[str, Json]:
     }
 
 
+def rests_of(side: Side) -> list[Span]:
+    """When a program rests [s], and after its end."""
+    rests = [(at, at + step.duration) for at, step in _timed(side) if step.is_pause]
+    return [*rests, (side.report.duration, math.inf)]
+
+
 def power_curves(sides: Sequence[Side]) -> dict[str, Json]:
-    """Power at the mains of all programs on one grid, each from its start."""
+    """Power at the mains of all programs on one grid, each from its start; a few points in rests
+    that all have.
+    """
     end = max(side.report.duration for side in sides)
-    time = np.linspace(0.0, end, _POINTS)
+    time = np.linspace(0.0, end, 8 * _POINTS)
+    inner = 0.5  # s at the ends of a rest, in which modes change
+    rests = long_rests([rests_of(side) for side in sides])
+    resting = np.zeros(len(time), dtype=bool)
+    for start, stop in rests:
+        resting |= (time > start + inner) & (time < stop - inner)
+    moving = np.flatnonzero(~resting)
+    kept = moving[:: max(1, len(moving) // _POINTS)]
+    time = time[np.union1d(kept, np.flatnonzero(resting)[::64])]
     value = np.column_stack([np.interp(time, side.time, side.watts, right=0.0) for side in sides])
     curves = packed(Curves("power at the mains, predicted", "W", time, value))
     ends: list[Json] = [side.report.duration for side in sides]

@@ -105,16 +105,27 @@ def report_html(
         "tiles": tiles(analysis, costs or Costs()),
         "capacity": text(joules(controller.dc_link_capacity_energy)),
         "costs": costs_section(analysis, costs or Costs()),
-        "front": front_section(analysis, front),
+        "front": folded(front_section(analysis, front)),
         "levers": lever_section(analysis, costs or Costs()),
-        "clock": clock_section(analysis, costs or Costs()),
+        "around": clock_section(analysis, costs or Costs()),
         "checks": check_table(checks),
         "style": asset("page.css"),
         "data": page_data(analysis, drawn),
         "script": "\n".join(asset(script) for script in SCRIPTS),
         **{name: chart(analysis) for name, chart in CHARTS.items()},
     }
+    parts |= {name: folded(parts[name]) for name in ("savings", "methods")}
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("page.html"))
+
+
+def folded(section: str) -> str:
+    """A section that opens when its heading is chosen: what an engineer looks at."""
+    return re.sub(
+        r"<section( id=\"\w+\")?><h2>(.*?)</h2>(.*)</section>",
+        r'<details class="part"\1><summary><h2>\2</h2></summary>\3</details>',
+        section,
+        flags=re.DOTALL,
+    )
 
 
 def asset(name: str) -> str:

@@ -11,7 +11,7 @@ from ir_msgs_py.savings import ProgramSavings, Saving
 from ir_recorder.analysis import Analysis, Finding, Verdict
 from ir_recorder.analysis.checks import row_name
 from ir_recorder.analysis.indirect import Agreement
-from ir_recorder.analysis.production import production_of
+from ir_recorder.analysis.production import production_of, saved_amount
 from ir_recorder.analysis.results import Share, StepResult
 from ir_recorder.format import contents
 from ir_recorder.report.number_text import (
@@ -33,8 +33,7 @@ MOST_WARNINGS = 100  # a node that repeats itself must not fill the page
 LONGEST_TEXT = 500  # characters of one warning
 
 
-_NARROW = 3  # columns: a phone shows the rows of wider tables as cards,
-_FEW = 8  # unless there are more rows than these: it scrolls long ones sideways
+_NARROW = 2  # columns: a phone shows each row of wider tables as a card
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str, kind: str = "") -> str:
@@ -43,7 +42,8 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str, kin
     caption: for screen readers, and the name of the CSV file that the page writes of it.
     """
     columns = "".join(
-        f'<th scope="col"{_number(head)}>{text(head.lstrip(">"))}</th>' for head in heads
+        f'<th scope="col"{_number(head)}>{text(head.lstrip(">"))}</th>' if head else "<td></td>"
+        for head in heads
     )
     cells = [_cells(heads, row) for row in rows]
     body = "".join(f"<tr>{row}</tr>" for row in cells)
@@ -51,9 +51,9 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str, kin
         return '<p class="empty">Nothing was recorded.</p>'
     head = f"<thead><tr>{columns}</tr></thead>"
     named = f'<caption class="unseen">{text(caption)}</caption>'
-    wide = "cards" if len(heads) > _NARROW and len(cells) <= _FEW else ""
+    wide = "cards" if len(heads) > _NARROW else ""
     return (
-        '<div class="scroll"><table '
+        f'<div class="scroll" tabindex="0" role="region" aria-label="{text(caption)}"><table '
         f'class="{f"{kind} {wide}".strip()}">{named}{head}<tbody>{body}</tbody></table></div>'
     )
 
@@ -379,7 +379,7 @@ def savings_section(analysis: Analysis) -> str:
             text(name),
             joules(saving.common),
             joules(saving.planned),
-            f"<b>{_share_savings(saving)}</b>{_within(saving)}",
+            f"<b>{saving.change}</b>{_within(saving)}",
             seconds(saving.seconds),
             text(baseline),
         )
@@ -406,7 +406,7 @@ def savings_lines(analysis: Analysis) -> list[str]:
     if savings is None:
         return []
     return [
-        f"{name}: {_share_savings(saving)} saved by plan (predicted), "
+        f"{name}: {saving.change} by plan (predicted), "
         f"{joules(saving.planned)} instead of {joules(saving.common)} "
         f"in {seconds(saving.seconds)}{_sure(saving)}, against {baseline}"
         for name, saving, baseline in _rows(analysis, savings)
@@ -433,8 +433,15 @@ def _rows(analysis: Analysis, savings: ProgramSavings) -> list[Row]:
 
 
 def _within(saving: Saving) -> str:
-    words = _sure(saving).removeprefix(", ")
-    return f"<small>{text(words)}</small>" if words else ""
+    """What is saved, and its interval in percent as the figure above it."""
+    word, amount = saved_amount(saving).gain()
+    lines = [f"{joules(amount.value)}{' more' if word == 'more' else ''}"]
+    if amount.high > amount.low and saving.common > 0.0:
+        low, high = (100.0 * end / saving.common for end in (amount.low, amount.high))
+        lines.append(f"90 % interval {low:.1f} to {high:.1f} %")
+        if not saving.certain:
+            lines.append("zero lies in it, so it is open whether anything is saved")
+    return "".join(f"<small>{text(line)}</small>" for line in lines)
 
 
 def _sure(saving: Saving) -> str:
@@ -447,7 +454,3 @@ def _sure(saving: Saving) -> str:
         if saving.certain
         else f"{within}: zero lies in it, so it is open whether anything is saved"
     )
-
-
-def _share_savings(saving: Saving) -> str:
-    return f"{100.0 * saving.share:.1f} %"

@@ -3,7 +3,7 @@
 (() => {
   const find = (id) => document.getElementById(id);
   const data = JSON.parse(find("data").textContent);
-  const timeline = new Timeline(data.end);
+  const timeline = new Timeline(data.end, data.rests);
   const power = new PowerChart(find("power"), timeline, find("tip"), data);
   const clearance = new ClearanceChart(find("clearance"), timeline, find("tip"), data);
   const axes = axesSection(find("axes"), timeline, find("tip"), data.axes);
@@ -84,7 +84,7 @@
   addEventListener("beforeprint", () => {
     theme = root.dataset.theme || "";
     root.dataset.theme = "light";
-    for (const chart of [power, clearance, ...axes]) chart.draw();
+    for (const chart of [power, clearance, ...axes]) chart.paint();
     if (motion) { motion.recolour(); motion.draw(); }
   });
   addEventListener("afterprint", () => {
@@ -100,6 +100,19 @@
     repaint();
   });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
+
+  /* a link into what is folded away opens it */
+  const unfold = () => {
+    const place = location.hash.length > 1 && !location.hash.includes("=") ? document.getElementById(location.hash.slice(1)) : null;
+    if (place && place.tagName === "DETAILS") { place.open = true; place.scrollIntoView(); }
+  };
+  addEventListener("hashchange", unfold);
+  for (const link of document.querySelectorAll("a[href^='#']")) link.addEventListener("click", () => setTimeout(unfold));
+  unfold();
+
+  /* a telephone has no width for the flows: it shows their table */
+  const flows = document.querySelector("#flows details");
+  if (flows && matchMedia("(max-width: 700px)").matches) flows.open = true;
 
   exportButtons();
   const wanted = /[#&]t=([\d.]+)/.exec(location.hash);

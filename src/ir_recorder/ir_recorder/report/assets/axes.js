@@ -52,8 +52,8 @@ class AxesChart extends TimeChart {
     this.valueAxis(g, low, high, this.curves.unit, y);
     this.plot(g);
     for (const k of axes) {
-      const named = this.curves.names ? look(k) : null;
-      g.strokeStyle = css(named ? named.colour : this.curves.series === "tool" ? "--accent" : `--a${k % 6 + 1}`);
+      const named = this.curves.series === "tool" ? null : look(k);
+      g.strokeStyle = css(named ? named.colour : "--accent");
       if (limits) {
         g.setLineDash([6, 4]);
         for (const bound of limits[k]) line(g, this.left, y(bound), this.width - this.right, y(bound));
@@ -126,7 +126,7 @@ function axesSection(place, timeline, tip, list) {
     bar.append(box);
   };
   const names = list.length && list[0].names;
-  for (let k = 0; k < most; k++) toggle(names ? names[k] : `A${k + 1}`, true, (on) => { shown.axes[k] = on; }, names ? k : `a${k % 6 + 1}`);
+  for (let k = 0; k < most; k++) toggle(names ? names[k] : `A${k + 1}`, true, (on) => { shown.axes[k] = on; }, k);
   if (list.some((c) => c.limits)) toggle("limits", false, (on) => { shown.limits = on; });
   for (const curves of list) {
     const figure = document.createElement("figure"), caption = document.createElement("figcaption"), canvas = document.createElement("canvas");

@@ -2,7 +2,7 @@
 /* Puts the page together: two pictures in 3D on one timeline, and one chart of powers. */
 (() => {
   const find = (id) => document.getElementById(id), root = document.documentElement;
-  const data = JSON.parse(find("data").textContent), timeline = new Timeline(data.end);
+  const data = JSON.parse(find("data").textContent), timeline = new Timeline(data.end, data.rests);
   const sides = Object.fromEntries(data.sides.map((side) => [side.name, { ...data.cell, ...side }]));
   const charts = axesSection(find("axes"), timeline, find("tip"), data.axes);
   const today = new Motion(find("view-today"), timeline, sides.today, 0);
@@ -68,7 +68,7 @@
   addEventListener("beforeprint", () => {
     theme = root.dataset.theme || "";
     root.dataset.theme = "light";
-    for (const chart of charts) chart.draw();
+    for (const chart of charts) chart.paint();
     for (const view of views) { view.recolour(); view.draw(); }
   });
   addEventListener("afterprint", () => {

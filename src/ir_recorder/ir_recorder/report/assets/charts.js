@@ -23,7 +23,9 @@ function floorIndex(times, value) {
 
 /* Time shown by everything, and the part of it that the charts show. */
 class Timeline {
-  constructor(end) {
+  /* rests [[from, to]] s, in their order: stretches without a movement, that charts show short */
+  constructor(end, rests = []) {
+    this.rests = rests;
     this.end = Math.max(end, 1e-3);
     this.now = 0;
     this.from = 0;
@@ -37,6 +39,37 @@ class Timeline {
     this.from = Math.max(0, Math.min(from, to - least));
     this.to = Math.min(this.end, Math.max(to, this.from + least));
     this.notify();
+  }
+  /* Rests that take much of what is shown, and the seconds of the axis that each of them takes. */
+  breaks() {
+    if (this.broken && this.broken.from === this.from && this.broken.to === this.to) return this.broken;
+    let left = this.to - this.from;
+    const inside = this.rests.filter(([from, to]) => from >= this.from && to <= this.to);
+    const long = inside.sort((a, b) => b[1] - b[0] - (a[1] - a[0])).filter(([from, to]) => {
+      if (to - from <= 0.15 * left) return false;
+      left -= to - from;
+      return true;
+    }).sort((a, b) => a[0] - b[0]);
+    const short = Math.max(left, 1e-3) * 0.07;
+    this.broken = { from: this.from, to: this.to, long, short, whole: left + long.length * short };
+    return this.broken;
+  }
+  /* Place of a time on the axis, 0 to 1, and back. */
+  place(time) {
+    const { long, short, whole } = this.breaks();
+    let at = time - this.from;
+    for (const [from, to] of long) if (time > from) at -= (Math.min(time, to) - from) * (1 - short / (to - from));
+    return at / whole;
+  }
+  at(place) {
+    const { long, short, whole } = this.breaks();
+    let time = this.from + place * whole;
+    for (const [from, to] of long) {
+      if (time <= from) break;
+      time = time - from < short ? from + (time - from) * (to - from) / short : time + to - from - short;
+      if (time <= to) break;
+    }
+    return time;
   }
   notify() { for (const listener of this.listeners) listener(); }
   /* A time as people read it. */
@@ -75,10 +108,12 @@ class TimeChart {
   }
   schedule() {
     if (this.pending) return;
-    this.pending = requestAnimationFrame(() => { this.pending = 0; this.draw(); });
+    this.pending = requestAnimationFrame(() => { this.pending = 0; this.paint(); });
   }
-  x(time) { return this.left + (time - this.timeline.from) / (this.timeline.to - this.timeline.from) * (this.width - this.left - this.right); }
-  time(x) { return this.timeline.from + (x - this.left) / (this.width - this.left - this.right) * (this.timeline.to - this.timeline.from); }
+  /* Draws what is on the page; what is folded away is drawn when it opens. */
+  paint() { if (this.canvas.offsetParent) this.draw(); }
+  x(time) { return this.left + this.timeline.place(time) * (this.width - this.left - this.right); }
+  time(x) { return this.timeline.at((x - this.left) / (this.width - this.left - this.right)); }
   position(event) { return event.clientX - this.canvas.getBoundingClientRect().left; }
   down(event) {
     this.drag = { start: this.position(event), now: this.position(event) };
@@ -143,14 +178,32 @@ class TimeChart {
     return g;
   }
   timeAxis(g) {
-    const step = tickStep((this.timeline.to - this.timeline.from) / Math.min(8, this.width / 80));
+    const { long, whole } = this.timeline.breaks(), wide = Math.min(8, this.width / 80), low = this.height - this.bottom / 2 + 2;
+    const step = tickStep(whole / wide);
+    g.textAlign = "center";
+    let last = -Infinity;
+    for (const [from, to] of long) this.rest(g, this.x(from), this.x(to), to - from, low);
     g.strokeStyle = css("--line");
     g.fillStyle = css("--soft");
-    g.textAlign = "center";
     for (let t = Math.ceil(this.timeline.from / step) * step; t <= this.timeline.to + 1e-9; t += step) {
-      line(g, this.x(t), this.top, this.x(t), this.height - this.bottom);
-      g.fillText(this.timeline.tick(t), this.x(t), this.height - this.bottom / 2 + 2);
+      const x = this.x(t), inside = long.some(([from, to]) => t > from && t < to);
+      if (inside || long.some(([from, to]) => Math.abs(x - (this.x(from) + this.x(to)) / 2) < 50) || x - last < 44) continue;
+      last = x;
+      line(g, x, this.top, x, this.height - this.bottom);
+      g.fillText(this.timeline.tick(t), x, low);
     }
+  }
+  /* A rest that is shown short: a band with two strokes, and how long it is. */
+  rest(g, from, to, seconds, low) {
+    const middle = (from + to) / 2, bottom = this.height - this.bottom;
+    g.fillStyle = css("--sky");
+    g.fillRect(from, this.top, to - from, bottom - this.top);
+    g.strokeStyle = css("--soft");
+    for (const x of [middle - 3, middle + 3]) line(g, x - 3, bottom + 5, x + 3, bottom - 5);
+    g.fillStyle = css("--ink");
+    const words = seconds < 600 ? `${Math.round(seconds)} s` : `${Math.round(seconds / 60)} min`;
+    const shown = this.width < 520 ? words : `${words} rest`, half = g.measureText(shown).width / 2;
+    g.fillText(shown, Math.min(middle, this.width - half - 1), low);
   }
   valueAxis(g, low, high, unit, y) {
     const step = tickStep((high - low) / 5);

@@ -2,7 +2,7 @@
 /* Puts the page of a comparison together: one timeline, one chart of powers. */
 (() => {
   const find = (id) => document.getElementById(id), root = document.documentElement;
-  const data = JSON.parse(find("data").textContent), timeline = new Timeline(data.end);
+  const data = JSON.parse(find("data").textContent), timeline = new Timeline(data.end, data.rests);
   const charts = axesSection(find("axes"), timeline, find("tip"), data.axes);
   if (!data.axes.length) find("axes").hidden = true;
   exportButtons();
