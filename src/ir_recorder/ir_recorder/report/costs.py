@@ -404,7 +404,7 @@ def _idle(analysis: Analysis, costs: Costs) -> str:
     heads = ("when nobody works", ">power", ">a year")
     return (
         f'<p class="hint">{significant(costs.idle_hours, 6)} hours a year lie outside of the '
-        "shifts (nights, weekends, holidays): at machine home, by the data of controller and tool. Left alone, the "
-        "controller only closes the brakes.</p>"
+        "shifts (nights, weekends, holidays): at machine home, by the data of controller and "
+        "tool. Left alone, the controller only closes the brakes.</p>"
         f"{table(heads, rows, 'When nobody works')}"
     )

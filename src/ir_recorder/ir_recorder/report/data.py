@@ -81,7 +81,7 @@ def _planned(analysis: Analysis) -> dict[str, Json]:
     if side is not None:
         power = _curve(side.time, side.watts)
         drawn = planned_scene(side, analysis.cell)
-        shown = {"power": power, "lanes": lanes(side), "scene": drawn}
+        shown: dict[str, Json] = {"power": power, "lanes": lanes(side), "scene": drawn}
         return {**shown, "end": side.report.duration, "rests": long_rests([rests_of(side)])}
     if analysis.recording.planned:
         return {}  # the steps of a file, without their trajectories

@@ -447,9 +447,9 @@ def _around_the_clock(members: Sequence[Member], robots: Sequence[Robot], costs:
     rows.append(_clock_row("<b>all</b>", sum(demands), sums, costs))
     heads = ("robot", ">largest quarter of an hour", *(f">{_shown(mode)}" for mode in modes))
     hint = (
-        f"{significant(costs.idle_hours, 6)} hours a year lie outside of the shifts; the columns of "
-        "modes say what rest takes in them, by the data. The peak of all robots is the sum of theirs: as if "
-        "all came at once."
+        f"{significant(costs.idle_hours, 6)} hours a year lie outside of the shifts; the columns "
+        "of modes say what rest takes in them, by the data. The peak of all robots is the sum of "
+        "theirs: as if all came at once."
     )
     return f'<p class="hint">{text(hint)}</p>{table(heads, rows, "Peak and rest")}'
 

@@ -69,15 +69,15 @@ LONG_REST = 20.0  # s: charts show longer rests short
 Span: TypeAlias = tuple[float, float]
 
 
-def long_rests(programs: Sequence[Sequence[Span]]) -> list[Json]:
-    """Stretches [from, to] s in which every program rests, long enough for charts to show them
+def long_rests(programs: Sequence[Sequence[Span]]) -> list[Span]:
+    """Stretches (from, to) s in which every program rests, long enough for charts to show them
     short; rests of each program in their order.
     """
     common = list(programs[0]) if programs else []
     for other in programs[1:]:
         both = ((max(a, c), min(b, d)) for a, b in common for c, d in other)
         common = [(start, end) for start, end in both if end > start]
-    return [[start, end] for start, end in common if LONG_REST < end - start < math.inf]
+    return [(start, end) for start, end in common if LONG_REST < end - start < math.inf]
 
 
 # Curves of every axis for the engineer: position, speed, torque, power, tracking error,
