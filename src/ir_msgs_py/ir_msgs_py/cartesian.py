@@ -25,6 +25,7 @@ POSES_MAX = 2000  # of a path
 # m/s
 SPEED_MIN = 1e-4
 SPEED_MAX = 10.0
+SPEED_TOLERANCE_MIN = 1e-4  # share of the speed
 LENGTH_MAX = 10.0  # m: of an approach, a retract and a blending radius
 _RIGID = 1e-6  # of a rotation
 _POSES = {LINE: (1, 1), CIRCLE: (2, 2), SPLINE: (1, POSES_MAX)}
@@ -116,7 +117,7 @@ class CartesianPath:
         one_of(self.orientation, ORIENTATIONS, "orientation")
         for name, low, high, unit in (
             ("tool_speed", SPEED_MIN, SPEED_MAX, "m/s"),
-            ("speed_tolerance", 1e-4, 1.0, ""),
+            ("speed_tolerance", SPEED_TOLERANCE_MIN, 1.0, ""),
             ("blending_radius", 0.0, LENGTH_MAX, "m"),
             ("free_angle", 0.0, math.pi + 1e-6, "rad"),
             ("approach", 0.0, LENGTH_MAX, "m"),

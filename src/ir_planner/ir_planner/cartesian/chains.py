@@ -264,6 +264,7 @@ _WIDE_FEW = 3.3
 _SAME = 1e-6  # relative cost of chains that differ by whole turns only
 _APART = 0.3  # rad: ends of chains with a free angle that are nearer are smoothed to one
 _OVERSPEED_WATTS = 2000.0  # what an axis at its speed limit costs in the search; far more beyond
+_A_JUMP = 1e9  # J that count for a jump where samples could be closer
 _FEW = 100  # configurations of a layer, up to which all pairs are compared
 _LAYER = 10.0  # between layers in the tree of neighbours, further than any jump
 
@@ -303,7 +304,11 @@ def chains(
     before, after = _neighbours(q, layer, turning, np.diff(layers.s) > wide if wide else None)
     family = _families(len(q), before, after)
     seconds = (np.diff(layers.s) / speed)[layer[before]]
-    joules = _edge_joules(q[before], difference(q[before], q[after], turning), seconds, scene)
+    steps = difference(q[before], q[after], turning)
+    joules = _edge_joules(q[before], steps, seconds, scene)
+    jumps = np.flatnonzero(np.abs(steps).max(axis=1) > JUMP)
+    if len(jumps):  # only where samples could be closer
+        joules[jumps] = _A_JUMP * (1.0 + _strays(q[before[jumps]], steps[jumps], scene))
     apart = _SAME if len(np.unique(layers.angle)) == 1 else _APART
     if by_start:  # the same edges from the end
         before, after, layer = after, before, len(layers.s) - 1 - layer
@@ -323,6 +328,17 @@ def chains(
         order = nodes[trace if by_start else trace[::-1]]
         found.append(Chain(layers.s, layers.q[order], layers.angle[order], float(cost[node])))
     return found
+
+
+def _strays(q: FloatArray, steps: FloatArray, scene: PlanningScene) -> FloatArray:
+    """How far (E,) the tool is off its way, in 0.1 m or rad, halfway along steps (E, n) from q (E,
+    n): near a singularity far less than elsewhere, so that is where samples should be closer.
+    """
+    first, middle, last = (
+        scene.chain.tcp_poses(q + share * steps)[:, :3] for share in (0.0, 0.5, 1.0)
+    )
+    off = np.square(middle - 0.5 * (first + last))
+    return np.asarray(np.sqrt(100.0 * off[:, :, 3].sum(axis=1) + off[:, :, :3].sum(axis=(1, 2))))
 
 
 def _neighbours(

@@ -1,5 +1,6 @@
 """Dead ends: where no chain leads on along a path, why, and finer samples that may lead on."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -33,6 +34,10 @@ def dead_end(asked: Asked, layers: Layers, reached: IntArray) -> PathRefusedErro
     """The refusal with place, axis and what may help; reached (M,): configurations that chains lead
     to.
     """
+    if len(reached) == 0:
+        return PathRefusedError(
+            "no configuration at the beginning of the path is left", StatusCode.INVALID_MOTION_PLAN
+        )
     last = int(layers.layer[reached].max())
     at = reached[layers.layer[reached] == last]
     here = layers.q[at]
@@ -118,7 +123,7 @@ def _help(asked: Asked) -> str:
 # within millimetres, and a slow tool has the time for it.
 
 _PARTS = 4  # of an interval where axes jump
-_FINEST = 2e-4  # m: what is shorter isn't divided
+_FINEST = 2e-6  # m: what is shorter isn't divided
 _ROUNDS = 16  # of dividing
 _LOOKED_AT = 3  # chains that jump, whose intervals are divided
 
@@ -153,7 +158,7 @@ def _chains_through(
     asked: Asked, layers: Layers, most: int, *, by_start: bool
 ) -> tuple[list[Chain], Layers]:
     """The same, without regard to the limits of axes whose whole turns are left out."""
-    speed = asked.path.tool_speed
+    speed = asked.speed
     space = asked.space
     try:
         return chains(layers, speed, space, most, by_start=by_start), layers
@@ -172,18 +177,31 @@ def _divided(asked: Asked, layers: Layers) -> Layers:
     for _ in range(_ROUNDS):
         asked.context.work.check()
         try:
-            found = chains(layers, asked.path.tool_speed, asked.space, _LOOKED_AT, wide=_FINEST)
+            found = chains(layers, asked.speed, asked.space, _LOOKED_AT, wide=_FINEST)
             steps = [_jumps(chain.q, layers.turning) for chain in found]
             open_ = np.logical_or.reduce(steps)
             if not all(step.any() for step in steps):
                 break
         except NoChainError as error:
+            if len(error.reached) == 0:
+                break
             open_ = np.arange(len(layers.s) - 1) == layers.layer[error.reached].max()
         between = _between(layers.s, open_ & (np.diff(layers.s) > _FINEST))
         if len(between) == 0:
             break
         layers = _with(layers, between, asked)
     return layers
+
+
+def closer_at(asked: Asked, layers: Layers, places: Iterable[float]) -> Layers:
+    """The layers with finer samples around places [m]; the same where nothing is left to divide."""
+    last = len(layers.s) - 2
+    open_ = np.zeros(last + 1, dtype=bool)
+    for place in places:
+        k = int(np.clip(np.searchsorted(layers.s, place) - 1, 0, last))
+        open_[max(k - 1, 0) : k + 2] = True
+    between = _between(layers.s, open_ & (np.diff(layers.s) > _FINEST))
+    return _with(layers, between, asked) if len(between) else layers
 
 
 def _jumps(q: FloatArray, turning: BoolArray) -> BoolArray:

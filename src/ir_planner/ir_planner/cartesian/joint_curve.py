@@ -15,7 +15,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import StatusCode
 from ir_planner.cartesian.chains import JUMP, Chain, turned_towards
 from ir_planner.cartesian.path_parts import Rates, about_tool, rates_of
-from ir_planner.cartesian.tool_path import PathRefusedError, ToolPath
+from ir_planner.cartesian.tool_path import PathRefusedError, StrayedError, ToolPath
 from ir_planner.checks import FreeSpace
 from ir_planner.scene import PlanningScene
 
@@ -75,6 +75,11 @@ class JointCurve:
         orders = range(_DEGREE, -1, -1)
         return begins, np.array([self.spline(begins, nu=k) / math.factorial(k) for k in orders])
 
+    @property
+    def knots(self) -> FloatArray:
+        """Arc lengths (K,) m between which it is one polynomial, both ends among them."""
+        return np.unique(self.spline.t)
+
     def at(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """q and its first three derivatives by s, (M, n) each, at s (M,)."""
         begins, coefficients = self._pieces
@@ -122,9 +127,12 @@ def curve_of(
         if worst <= (1.0 if finer < _FINER[-1] else _LAST):
             return curve
     why = singularity(curve.spline(place), scene) or _SHARP
-    raise PathRefusedError(
+    k = int(np.searchsorted(s, place))
+    apart = 1e3 * (s[k] - s[k - 1])
+    raise StrayedError(
         f"the axes can't follow the path at {place:.3f} m{why}: between samples "
-        f"{1e3 * (s[1] - s[0]):.2g} mm apart they leave it by {worst * SPLINE_ERROR * 1e3:.3g} mm"
+        f"{apart:.2g} mm apart they leave it by {worst * SPLINE_ERROR * 1e3:.3g} mm",
+        place,
     )
 
 
@@ -144,8 +152,10 @@ def followed(poses: FloatArray, s: FloatArray, chain: Chain, scene: PlanningScen
     reached[found.pose_index[first]] = away[first] <= JUMP
     if not reached.all():
         k = int(np.argmin(reached))
-        raise PathRefusedError(
-            f"the path leaves the reach or an axis limit at {s[k]:.3f} m", StatusCode.NO_IK_SOLUTION
+        raise StrayedError(
+            f"the path leaves the reach or an axis limit at {s[k]:.3f} m",
+            float(s[k]),
+            StatusCode.NO_IK_SOLUTION,
         )
     q = every[first]
     jump = np.abs(np.diff(q, axis=0)).max(axis=1)
@@ -153,9 +163,10 @@ def followed(poses: FloatArray, s: FloatArray, chain: Chain, scene: PlanningScen
         k = int(np.argmax(jump))
         j = int(np.argmax(np.abs(q[k + 1] - q[k])))
         name = scene.cell.robot.joint_names[j]
-        raise PathRefusedError(
+        raise StrayedError(
             f"{name} would have to jump by {np.degrees(jump[k]):.0f} deg at {s[k]:.3f} m"
-            f"{singularity(q[k], scene)}"
+            f"{singularity(q[k], scene)}",
+            float(0.5 * (s[k] + s[k + 1])),
         )
     return q
 

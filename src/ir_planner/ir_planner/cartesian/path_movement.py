@@ -5,15 +5,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_msgs_py.cartesian import SPEED_TOLERANCE_MIN
 from ir_msgs_py.status import StatusCode
 from ir_planner.cartesian.chains import Chain, Layers, difference
-from ir_planner.cartesian.dead_ends import chains_through
+from ir_planner.cartesian.dead_ends import chains_through, closer_at
 from ir_planner.cartesian.joint_curve import Angle, JointCurve, angle_along, curve_of
 from ir_planner.cartesian.path_times import SentPath, sent, timed_stroke
+from ir_planner.cartesian.slowing import slower_between, unhurried
 from ir_planner.cartesian.speed_ramps import Span
-from ir_planner.cartesian.tool_path import Asked, PathRefusedError, ToolPath
+from ir_planner.cartesian.tool_path import Asked, PathRefusedError, StrayedError, ToolPath
+from ir_planner.curves import extremes
 from ir_planner.request import DURATION_MAX
-from ir_planner.scene import MotionLimits
+from ir_planner.scene import MotionLimits, PlanningScene, lasting_longer
 from ir_planner.timing import Movement, within_torque
 
 T1_SPEED = 0.25  # m/s at the tcp and at the centre of the flange
@@ -24,9 +27,11 @@ _COSTLIER = 1.2
 _COSTLIER_J = 100.0
 _TRIED = 12  # chains at most: where one can't keep the speed, the next is tried
 _ROUNDS = 6  # of chains that aren't certified
+_CLOSER = 12  # times that samples are closer where axes turn between them
 _AROUND = 0.02  # m along the path, and
 _NEAR = 0.3  # rad around a configuration that isn't certified: not asked again
 _SHRUNK = 0.999
+_REST = 0.1  # of the tolerance of the speed, for single places, where all are slower
 _LIMITS = ("velocity", "acceleration", "jerk")
 _FARTHER = 0.93
 
@@ -45,28 +50,83 @@ class DrivenPath:
     slower: float = 1.0
     longer: bool = False
 
+    @property
+    def top_speed(self) -> float:
+        """The highest [m/s] for which it is laid out."""
+        return max(float(stroke.law.last.max()) for stroke in self.sent.strokes)
+
 
 def best_along(asked: Asked, layers: Layers) -> DrivenPath:
-    """The certified movement of least cost by the request's objective over the cheapest chains.
+    """The certified movement of least cost by the request's objective over the cheapest chains;
+    where no speed has to be kept, the shortest of those that are laid out for it and for less.
 
     Raises PathRefusedError with the reason of the cheapest one where none is certified.
     """
+    if asked.path.speed_tolerance < 1.0:
+        return _best_within_tolerance(asked, layers)
+    best: DrivenPath | None = None
+    reason: PathRefusedError | None = None
+    for rate in _rates(asked.fastest):
+        trial = replace(asked, rate=rate)
+        if best is not None and trial.least_duration >= best.movement.trajectory.duration:
+            break
+        try:
+            found = _best_at(trial, layers)
+        except PathRefusedError as error:
+            if error.code != StatusCode.INVALID_MOTION_PLAN:
+                raise
+            reason = reason or error
+            continue
+        if best is None or _duration(found) < _duration(best):
+            best = found
+    if best is None:
+        assert reason is not None  # of the first rate
+        raise reason
+    return best
+
+
+def _best_within_tolerance(asked: Asked, layers: Layers) -> DrivenPath:
+    """The same at the speed asked for; where that isn't found, evenly as much slower as may be."""
+    try:
+        return _best_at(asked, layers)
+    except PathRefusedError as error:
+        if error.code != StatusCode.INVALID_MOTION_PLAN:
+            raise
+        lost = asked.path.speed_tolerance
+        rest = replace(asked.path, speed_tolerance=max(_REST * lost, SPEED_TOLERANCE_MIN))
+        slower = replace(asked, path=rest, rate=1.0 - (1.0 - 2.0 * _REST) * lost)
+        try:
+            return _best_at(slower, layers)
+        except PathRefusedError:
+            raise error from None
+
+
+def _duration(one: DrivenPath) -> float:
+    return one.movement.trajectory.duration
+
+
+def _rates(fastest: float) -> list[float]:
+    """Shares of the speeds that are asked for, the highest [m/s] of which is given, that make it
+    the speeds of one list whatever is asked: so whoever asks for more never waits longer.
+    """
+    speeds = [step * 10.0**k for k in range(-6, 2) for step in _STEPS]
+    above = min(speed for speed in speeds if speed >= fastest * (1.0 - 1e-12))
+    return [speed / fastest for speed in sorted(speeds, reverse=True) if speed <= above]
+
+
+_STEPS = (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
+
+
+def _best_at(asked: Asked, layers: Layers) -> DrivenPath:
+    """The same at one speed. Raises PathRefusedError."""
     reason: PathRefusedError | None = None
     journal = asked.context.journal
     for _ in range(_ROUNDS):
         asked.context.work.check()
-        with journal.stage("search") as notes:
-            try:
-                found, layers = chains_through(asked, layers, _TRIED)
-            except PathRefusedError as error:
-                raise reason or error from error
-            notes.append(f"{len(found)} chains")
-        with journal.stage("timing") as notes:
-            driven, error_of_first = _driven(asked, found)
-            notes.append(f"{len(driven)} within the limits")
-        if not driven:
-            assert error_of_first is not None  # each chain that isn't driven gave one
-            raise reason or error_of_first
+        try:
+            driven, layers = _driven_chains(asked, layers)
+        except PathRefusedError as error:
+            raise reason or error from error
         with journal.stage("proof") as notes:
             for one in sorted(driven, key=lambda one: one.movement.coarse_cost):
                 one = within_limits(asked, one)
@@ -80,19 +140,45 @@ def best_along(asked: Asked, layers: Layers) -> DrivenPath:
     raise reason
 
 
-def _driven(asked: Asked, found: list[Chain]) -> tuple[list[DrivenPath], PathRefusedError | None]:
-    """The first chains that keep the speed, by longer ramps if none does with short ones, and why
-    the first of the others doesn't.
+def _driven_chains(asked: Asked, layers: Layers) -> tuple[list[DrivenPath], Layers]:
+    """The cheapest chains that keep the speed, and the layers with the samples that it took. Raises
+    PathRefusedError.
+
+    Where the axes turn between two samples other than those make believe, samples are closer.
     """
-    driven, reason = _driven_with(asked, found, longer=False)
-    return (driven, reason) if driven else (_driven_with(asked, found, longer=True)[0], reason)
+    journal = asked.context.journal
+    for _ in range(_CLOSER):
+        with journal.stage("search") as notes:
+            found, layers = chains_through(asked, layers, _TRIED)
+            notes.append(f"{len(found)} chains")
+        with journal.stage("timing") as notes:
+            driven, reasons = _driven(asked, found)
+            notes.append(f"{len(driven)} within the limits")
+        if driven:
+            return driven, layers
+        strayed = [error.place for error in reasons if isinstance(error, StrayedError)]
+        closer = closer_at(asked, layers, strayed)
+        if closer is layers:
+            break
+        layers = closer
+    raise reasons[0]  # each chain that isn't driven gave one
+
+
+def _driven(asked: Asked, found: list[Chain]) -> tuple[list[DrivenPath], list[PathRefusedError]]:
+    """The first chains that keep the speed, by longer ramps if none does with short ones, and why
+    the others don't.
+    """
+    driven, reasons = _driven_with(asked, found, longer=False)
+    if driven or asked.path.speed_tolerance >= 1.0:
+        return driven, reasons
+    return _driven_with(asked, found, longer=True)[0], reasons
 
 
 def _driven_with(
     asked: Asked, found: list[Chain], *, longer: bool
-) -> tuple[list[DrivenPath], PathRefusedError | None]:
+) -> tuple[list[DrivenPath], list[PathRefusedError]]:
     driven: list[DrivenPath] = []
-    reason: PathRefusedError | None = None
+    reasons: list[PathRefusedError] = []
     for chain in found:
         if len(driven) == COMPARED or (driven and asked.context.work.exhausted):
             break
@@ -103,8 +189,8 @@ def _driven_with(
         except PathRefusedError as error:
             if not longer:
                 asked.context.journal.reject(str(error))
-            reason = reason or error
-    return driven, reason
+            reasons.append(error)
+    return driven, reasons
 
 
 def _worth(chain: Chain, driven: list[DrivenPath], objective: str) -> bool:
@@ -169,23 +255,53 @@ def timed(asked: Asked, chain: Chain, share: float = 1.0, *, longer: bool = Fals
     ends = _strokes(whole)
     curves = [curve_of(whole, chain, angle, (whole.ends[a], whole.ends[b]), scene) for a, b in ends]
     slower = _flange_share(asked, curves) if asked.t1 else 1.0
-    along = [_spans(whole, a, b, slower) for a, b in ends]
+    along = [_spans(whole, a, b, slower * asked.rate) for a, b in ends]
     made: list[DrivenPath] = []
 
     def within(limits: MotionLimits) -> Movement:
         limits = limits.scaled(share, share)
         strokes = tuple(
-            timed_stroke(curve, spans, path.speed_tolerance, limits, scene, longer=longer)
+            unhurried(curve, spans, limits, scene).stretched(max(asked.rate, 1.0))
+            if path.speed_tolerance >= 1.0
+            else timed_stroke(curve, spans, path.speed_tolerance, limits, scene, longer=longer)
             for curve, spans in zip(curves, along, strict=True)
         )
         _check_duration(sum(stroke.duration for stroke in strokes), asked)
         points = sent(strokes, limits, scene)
+        if path.speed_tolerance >= 1.0:
+            points = _as_slow_as_sent(points, limits, scene)
         movement = Movement(chain.q, points.trajectory, asked.context, fixed_time=True)
         made.append(DrivenPath(movement, points, angle, chain, slower, longer))
         return movement
 
     within_torque(within, asked.context)
     return made[-1]
+
+
+def _as_slow_as_sent(path: SentPath, limits: MotionLimits, scene: PlanningScene) -> SentPath:
+    """The path with more time where what is sent exceeds a limit between its points."""
+    for _ in range(_ROUNDS):
+        largest = extremes(*path.trajectory.coefficients())
+        use = lasting_longer(
+            limits,
+            largest.velocity,
+            largest.acceleration,
+            largest.jerk,
+            np.zeros_like(largest.velocity),
+        )
+        if use.max() <= 1.0:
+            break
+        counts = np.cumsum([0, *(len(tau) - 1 for tau in path.instants)])
+        strokes = tuple(
+            slower_between(stroke, tau, use[first:last], limits, scene)
+            if use[first:last].max() > 1.0
+            else stroke
+            for stroke, tau, first, last in zip(
+                path.strokes, path.instants, counts[:-1], counts[1:], strict=True
+            )
+        )
+        path = sent(strokes, limits, scene)
+    return path
 
 
 def _check_duration(duration: float, asked: Asked) -> None:

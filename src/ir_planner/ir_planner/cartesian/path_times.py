@@ -77,6 +77,17 @@ class TimedStroke:
         """Seconds."""
         return float(self.at(np.array([self.law.total])).t[0])
 
+    def stretched(self, factor: float) -> TimedStroke:
+        """The same, slower by `factor`."""
+        law = self.law
+        slower = SpeedLaw(law.duration * factor, law.first / factor, law.last / factor, law.even)
+        if self.slowness is None:
+            return replace(self, law=slower)
+        from scipy.interpolate import BSpline
+
+        spline = self.slowness
+        return replace(self, law=slower, slowness=BSpline(spline.t * factor, spline.c, spline.k))
+
     def at(self, tau: FloatArray) -> Driven:
         """The motion at instants tau (M,) s of the law."""
         s, v, a, j = self.law.at(tau)
@@ -112,9 +123,9 @@ def timed_stroke(
 
     longer: where it would be refused, ramps reach as far along the path as it takes.
     """
-    spans, ramps = _fitting(curve, spans, tolerance, limits, scene)
+    spans, ramps = fitting(curve, spans, tolerance, limits, scene)
     made = TimedStroke(curve, law_of(spans, ramps))
-    if use_of(made.at(_instants(made.law)), limits, scene).max() <= ENOUGH:
+    if use_of(made.at(instants(made.law)), limits, scene).max() <= ENOUGH:
         return made
     try:
         return _slowed(made, tolerance, limits, scene)
@@ -125,7 +136,7 @@ def timed_stroke(
         return grown
 
 
-def _fitting(
+def fitting(
     curve: JointCurve,
     spans: tuple[Span, ...],
     tolerance: float,
@@ -163,7 +174,7 @@ def _grown(
     ends = np.concatenate([[0.0], np.cumsum([span.length for span in spans])])
     speeds = np.array([0.0, *(span.speed for span in spans), 0.0])
     for _ in range(_GROWTHS):
-        motion = made.at(_instants(made.law))
+        motion = made.at(instants(made.law))
         use = use_of(motion, limits, scene)
         if use.max() <= ENOUGH:
             return made
@@ -207,7 +218,7 @@ def _too_short(
     axis = ""
     with suppress(TooShortError):  # elsewhere: then no axis is named
         law = law_of(spans, ramps * fits * _SHORTER)
-        motion = TimedStroke(curve, law).at(_instants(law))
+        motion = TimedStroke(curve, law).at(instants(law))
         at = int(np.argmax(use_of(motion, limits, scene)))
         worst = _worst(motion, at, limits, scene)
         axis = f"; with shorter ramps {worst} at {motion.s[at]:.3f} m"
@@ -220,7 +231,8 @@ def _too_short(
     )
 
 
-def _instants(law: SpeedLaw) -> FloatArray:
+def instants(law: SpeedLaw) -> FloatArray:
+    """Instants (M,) s of a law at which a stroke is looked at."""
     count = int(np.clip(law.total / _STEP_S, _SAMPLES_MIN, _SAMPLES_MAX))
     share = np.linspace(0.0, 1.0, PER_RAMP)
     inner = (law.times[:-1, None] + share * law.duration[:, None]).ravel()
@@ -238,11 +250,11 @@ def _slowed(
     from scipy.ndimage import convolve1d, maximum_filter1d
 
     window = np.hanning(2 * _AROUND + 3)[1:-1]
-    tau = np.unique(np.concatenate([_instants(law), knots]))
+    tau = np.unique(np.concatenate([instants(law), knots]))
     owner = np.clip(np.searchsorted(knots, tau), 0, len(knots) - 1)
     begun = made.at(tau)
     if use_of(begun, limits, scene).max() > most * 1.5:
-        raise _refused(begun, limits, scene, tolerance)
+        raise refused(begun, limits, scene, tolerance)
     for _ in range(_ROUNDS):
         slowed = replace(made, slowness=portable.interpolating_spline(knots, slowness, 5))
         use = use_of(slowed.at(tau), limits, scene)
@@ -254,10 +266,10 @@ def _slowed(
         slowness = slowness * (1.0 + convolve1d(widest, window / window.sum(), mode="nearest"))
         if slowness.max() > most:
             break
-    raise _refused(begun, limits, scene, tolerance)
+    raise refused(begun, limits, scene, tolerance)
 
 
-def _refused(
+def refused(
     motion: Driven, limits: MotionLimits, scene: PlanningScene, tolerance: float
 ) -> PathRefusedError:
     """Why the speed can't be kept: the worst place, its axis and what it lacks."""

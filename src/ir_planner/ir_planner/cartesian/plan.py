@@ -100,8 +100,12 @@ class Drawn:
         found = kept_of(driven.sent, self.asked.whole, driven.angle, self.asked.context.scene)
         leaves = max((joint.leaves for joint in self.joints), default=0.0)
         turns = max((joint.turns for joint in self.joints), default=0.0)
+        share = min(driven.top_speed / (driven.slower * self.asked.fastest), 1.0)
         found = replace(
-            found, tool_error=found.tool_error + leaves, rotation_error=found.rotation_error + turns
+            found,
+            tool_error=found.tool_error + leaves,
+            rotation_error=found.rotation_error + turns,
+            speed_deviation=max(found.speed_deviation, 1.0 - (1.0 - found.speed_deviation) * share),
         )
         if found.tool_error > TOOL_ERROR_MAX:
             raise PathRefusedError(
@@ -280,8 +284,17 @@ def remarks(path: CartesianPath, found: DrivenPath) -> Iterator[tuple[str, str]]
     if found.longer:
         yield "speed", f"the axes need long ramps: the tool keeps its speed {_kept_between(found)}"
     asked = found.slower * max(part.tool_speed or path.tool_speed for part in path.segments)
-    top = max(float(stroke.law.last.max()) for stroke in found.sent.strokes)
-    if top < _REACHED * asked:
+    top = found.top_speed
+    slowed = [stroke for stroke in found.sent.strokes if stroke.slowness is not None]
+    if path.speed_tolerance >= 1.0 and slowed:
+        mean = sum(s.curve.end - s.curve.begin for s in found.sent.strokes) / sum(
+            s.duration for s in found.sent.strokes
+        )
+        yield (
+            "speed",
+            f"slower than {asked:.4g} m/s where the axes need it: {mean:.4g} m/s in the mean",
+        )
+    elif top < _REACHED * asked:
         yield (
             "speed",
             f"the path is too short for {asked:.4g} m/s: the tool moves at {top:.4g} m/s at most",

@@ -381,13 +381,33 @@ def _turn(first: FloatArray, second: FloatArray) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """The path, as it is drawn, whether its first configuration is given, and T1."""
+    """The path, as it is drawn, whether its first configuration is given, and T1. rate: times what
+    is asked for the movement is laid out; where that is above 1 it is then slowed to it.
+    """
 
     path: CartesianPath
     whole: ToolPath
     fixed: bool
     t1: bool
     context: Context
+    rate: float = 1.0
+
+    @property
+    def speed(self) -> float:
+        """Of the tool [m/s] for which it is laid out."""
+        return self.path.tool_speed * self.rate
+
+    @property
+    def fastest(self) -> float:
+        """The highest speed [m/s] that is asked for."""
+        return max(part.speed for part in self.whole.parts)
+
+    @property
+    def least_duration(self) -> float:
+        """Seconds: no movement at these speeds takes less."""
+        lengths = np.diff(self.whole.ends)
+        speeds = [part.speed for part in self.whole.parts]
+        return float((lengths / speeds).sum()) / self.rate
 
     @property
     def space(self) -> FreeSpace:
@@ -410,6 +430,18 @@ class PathRefusedError(Exception):
     def status(self) -> Status:
         """The answer."""
         return Status(self.code, str(self))
+
+
+class StrayedError(PathRefusedError):
+    """The axes can't be followed between samples of a chain at `place` m: closer ones may show
+    where they turn, or that they would have to jump.
+    """
+
+    def __init__(
+        self, sentence: str, place: float, code: StatusCode = StatusCode.PLANNING_FAILED
+    ) -> None:
+        super().__init__(sentence, code)
+        self.place = place
 
 
 class NoChainError(Exception):
