@@ -14,7 +14,7 @@ setup(
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
     install_requires=["setuptools", "numpy", "scipy", "highspy"],
-    extras_require={"ompl": ["ompl"]},
+    extras_require={"ompl": ["ompl"], "contract": ["pytest"]},
     zip_safe=False,
     maintainer="The maintainers",
     maintainer_email="maintainers@example.org",

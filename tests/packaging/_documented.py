@@ -45,7 +45,7 @@ SNIPPETS = {
     "cad.md": "run: tests/packaging/test_documented_commands_run.py",
     "cartesian.md": "run: tests/examples/test_cartesian_page.py",
     "compare.md": "run: tests/packaging/test_documented_commands_run.py",
-    "extending.md": "a signature: tests/contract",
+    "extending.md": "a signature: ir_planner.contract",
     "krl.md": "run: tests/examples/test_krl_page.py",
     "library.md": "run: tests/examples/test_library_page.py",
     "recording.md": "run: tests/recorder/test_documentation.py",

@@ -124,7 +124,7 @@ def leaves(block: dict[str, object], prefix: str = "") -> Iterator[tuple[str, ob
 SETTINGS = {
     "ir_planner": {"": (PlannerSettings,)},
     "ir_sim_driver": {
-        "": (NodeSettings, ControllerSettings, *LINKS),
+        "": (NodeSettings, ControllerSettings, *LINKS.values()),
         "execution.": (ExecutionSettings,),
     },
     "ir_program_runner": {"": (ProgramSettings, LinkSettings)},

@@ -272,7 +272,8 @@ def test_extending_names_every_promise_that_a_contract_asks_for() -> None:
     page = (ROOT / "docs" / "extending.md").read_text("utf-8")
     asked = {
         f"{path.name}::{test}"
-        for path in (ROOT / "tests" / "contract").glob("test_*.py")
+        for pattern in ("tests/contract/test_*.py", "src/*/*/contract/test_*.py")
+        for path in ROOT.glob(pattern)
         for test in re.findall(r"^def (test_\w+)", path.read_text("utf-8"), re.MULTILINE)
         if "notice" not in test
     }

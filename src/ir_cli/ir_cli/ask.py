@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,7 @@ from ir_msgs_py.cartesian import CartesianPath
 from ir_msgs_py.report import DistancePair
 from ir_planner import CartesianPlan, Planner
 from ir_planner.before_after import assumed_doors
+from ir_planner.search import SEARCHES
 
 
 def add_move(move: argparse.ArgumentParser) -> None:
@@ -55,6 +57,8 @@ def add_move(move: argparse.ArgumentParser) -> None:
         "-o", "--output", type=Path, metavar="FILE", help="write its points as CSV"
     )
     add_renamed(move, "--trajectory", output)
+    words = "the search to ask alone, one of an installed package too (several in turn)"
+    move.add_argument("--planner", default="", metavar="NAME", help=words)
     add_options(move)
     add_parameters(move)
     add_formats(move, comma=False)
@@ -69,10 +73,11 @@ def run_move(arguments: argparse.Namespace) -> int:
             arguments.start, planner, arguments.safety_distance, arguments.load
         )
         goal = goal_of(arguments.goal, planner)
-        plan = planner.plan_regional(
-            start=start, goal=goal, options=options_of(arguments, arguments.duration)
-        )
+        options = replace(options_of(arguments, arguments.duration), planner_id=arguments.planner)
+        plan = planner.plan_regional(start=start, goal=goal, options=options)
     notes = assumed_doors(planner.cell)
+    if origin := SEARCHES.origin(plan.info.planner_id):
+        notes = (*notes, f"planner {plan.info.planner_id} is of the package {origin}")
     said = "".join(f"\nnote: {note}" for note in notes)
     if plan.trajectory is None:
         return failed(plan.status.message + said)

@@ -18,7 +18,7 @@ from ir_cli.planning import add_cell, sentences
 from ir_description import Cell, Equipment, InvalidValueError, cell_to_yaml, load_cell, robot_named
 from ir_description.cell import shape_register, zone_around
 from ir_description.files.solid_mesh import PIECES, PIECES_MAX, UNITS, SolidReader, pieces_of
-from ir_description.files.worlds import WRITERS, read_world
+from ir_description.files.worlds import IMPORTERS, WRITERS, read_world
 from ir_recorder.report.shapes import body_mesh
 from ir_values.errors import one_line
 from ir_values.output_files import write_file
@@ -192,7 +192,7 @@ def add_import(command: argparse.ArgumentParser) -> None:
 def run_import(arguments: argparse.Namespace) -> int:
     """Divide the mesh and print its line, or print the cell of a world."""
     path = Path(arguments.file)
-    if path.suffix.lower() in WORLDS:
+    if path.suffix.lower() in WORLDS or path.suffix.lower().removeprefix(".") in IMPORTERS:
         return run_world(path, arguments.robot, arguments.visuals)
     if arguments.unit is None:
         raise InputError(f"say the unit of {path.name[:60]!a}: --unit {' or '.join(UNITS)}")

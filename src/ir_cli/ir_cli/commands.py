@@ -33,7 +33,8 @@ class Command:
     @property
     def group(self) -> str:
         """Its group; "" for a command of the first page."""
-        return self.path.partition(" ")[0] if " " in self.path else ""
+        first = self.path.partition(" ")[0]
+        return first if first in GROUPS else ""
 
     def parser(self) -> argparse.ArgumentParser:
         """Its parser, with all arguments."""
@@ -66,6 +67,14 @@ COMMANDS = (
         "Writes a cell file to begin with, in the size of its robot; its program plans.",
         "ir new my_cell.yaml --robot kr6_r900_2",
         ("cell new",),
+    ),
+    Command(
+        "new search",
+        "ir_cli.new_search:add_new_search",
+        "begin a package with a search of your own",
+        "Writes a small package with a search that works, which the planner finds by its entry "
+        "point once it is installed.",
+        "ir new search over_the_top",
     ),
     Command(
         "check",
@@ -411,7 +420,7 @@ OLD = {
 """Old names and the new ones. `ir check CELL STATE` is an old one, too: `ir ask state`."""
 QUIET = ("cell new", "cell check")
 """Names that stay beside the short ones: they run without a notice."""
-NAMES = (*(path for path in BY_PATH if " " not in path), *GROUPS)
+NAMES = (*(each.path for each in COMMANDS if not each.group), *GROUPS)
 """First words of the first help page."""
 
 

@@ -42,6 +42,8 @@ def whole_parser() -> argparse.ArgumentParser:
         names = [command.path, *(old for old in OLD if old in QUIET and OLD[old] == command.path)]
         for path in names:
             group, _, name = path.rpartition(" ")
+            if group and group not in GROUPS:
+                continue  # `new search`: a word can't have words below it and arguments as well
             parent = groups[group] if group else first
             own = command.parser()
             parent.add_parser(

@@ -39,7 +39,7 @@ from ir_sim_driver.plant import (
     carried,
     custom_load,
 )
-from ir_sim_driver.plc import LINKS, Link, PlcSettings
+from ir_sim_driver.plc import LINKS, Link, PlcSettings, usable_links
 from ir_sim_driver.power import IdleTimes
 
 __all__ = [
@@ -74,4 +74,5 @@ __all__ = [
     "carried",
     "custom_load",
     "make_simulation",
+    "usable_links",
 ]

@@ -20,13 +20,13 @@ from ir_planner import PlannerSettings
 from ir_program_runner import LinkSettings, ProgramSettings
 from ir_recorder.recording.settings import RecorderSettings
 from ir_sim_driver import (
-    LINKS,
     ControllerSettings,
     ControlSettings,
     ExecutionSettings,
     IdleTimes,
     LoadCheckSettings,
     PlcSettings,
+    usable_links,
 )
 from ir_sim_driver.controller import SupervisionSettings
 from ir_sim_driver.node.parameters import NodeSettings
@@ -38,7 +38,7 @@ NODE_SETTINGS: dict[str, tuple[tuple[str, Callable[[], Any]], ...]] = {
     "ir_sim_driver": (
         ("", NodeSettings),
         ("", ControllerSettings),
-        *(("", link) for link in LINKS),
+        *(("", link) for link in usable_links()),
         ("control.", ControlSettings),
         ("execution.", ExecutionSettings),
         ("supervision.", SupervisionSettings),

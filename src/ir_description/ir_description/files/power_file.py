@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import cache
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +24,8 @@ from ir_description.robot import (
     without_table,
 )
 from ir_values.arrays import FloatArray
-from ir_values.errors import InvalidValueError, RobotFileError, UnknownNameError
+from ir_values.errors import DescriptionError, InvalidValueError, RobotFileError, UnknownNameError
+from ir_values.extensions import Registry
 from ir_values.files import inside, is_path, read_regular_file, text_of
 from ir_values.yaml_items import Item, Table, read_items
 from ir_values.yaml_tree import Node, Scalar, parse_yaml
@@ -327,19 +330,44 @@ NONE = "none"
 BYTES_MAX = 1_000_000
 
 
+def _made_table(name: str, value: Any) -> Traversable:
+    """The file of a table that an entry point names."""
+    if not isinstance(value, Traversable):
+        raise InvalidValueError("must be the path of a table of power figures (.yaml)")
+    return value
+
+
+CONTROLLERS: Registry[Traversable] = Registry(
+    "ir_description.controllers",
+    {
+        entry.name.removesuffix(".yaml"): entry
+        for entry in sorted(_POWER.iterdir(), key=lambda entry: entry.name)
+        if entry.name.endswith(".yaml")
+    },
+    _made_table,
+)
+
+
 def bundled_controllers() -> tuple[str, ...]:
-    """Names of the tables that come with the package."""
-    names = (entry.name for entry in _POWER.iterdir())
-    return tuple(sorted(name.removesuffix(".yaml") for name in names if name.endswith(".yaml")))
+    """Names of the tables that come with the project or with an installed package."""
+    return tuple(CONTROLLERS)
 
 
 @cache
 def bundled_controller(name: str) -> PowerData:
     """The bundled table of that name; the same object for the same name."""
-    if name not in bundled_controllers():
-        raise UnknownNameError("controller", name, bundled_controllers())
-    path = _POWER / f"{name}.yaml"
-    return power_from_yaml(path.read_text(encoding="utf-8"), path.name)
+    return power_from_yaml(*_table(name))
+
+
+def _table(name: str) -> tuple[str, str]:
+    """Text and name of a table's file. Raises UnknownNameError, RobotFileError."""
+    if name not in CONTROLLERS:
+        raise UnknownNameError("controller", name, CONTROLLERS)
+    try:
+        path = CONTROLLERS[name]
+        return path.read_text(encoding="utf-8"), path.name
+    except (DescriptionError, OSError, UnicodeDecodeError) as error:
+        raise RobotFileError(name, 0, f"the table can't be read: {error}") from error
 
 
 def read_controller(item: Item, folder: Path | None) -> PowerData:
@@ -362,6 +390,8 @@ def controller_document(item: Item, power: PowerData, folder: Path | None) -> No
     """What a robot file that needs no other file says of its controller."""
     if item.is_scalar() and is_path(item.text()):
         return parse_yaml(_text_controller_reader(item.text(), folder), power.name, RobotFileError)
+    if item.is_scalar() and CONTROLLERS.origin(item.text()):
+        return parse_yaml(*_table(item.text()), RobotFileError)
     return item.node
 
 

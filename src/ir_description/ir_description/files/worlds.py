@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree as Xml
 
 import numpy as np
@@ -23,7 +24,8 @@ from ir_description.files.solid_mesh import PIECES, SUFFIXES, piece_names, piece
 from ir_description.poses import abc_from_rotation, composed, pose_of, rotation_from_abc
 from ir_description.shapes import Body
 from ir_values.arrays import FloatArray
-from ir_values.errors import InvalidValueError, shown
+from ir_values.errors import DescriptionError, InvalidValueError, shown
+from ir_values.extensions import Registry
 from ir_values.files import read_regular_file
 
 BYTES_MAX = 8_000_000
@@ -56,8 +58,10 @@ def read_world(path: Path, taken: NameRegister, *, visuals: bool = False) -> Wor
     visuals: whether links without a collision shape take what people see of them.
 
     Raises InvalidValueError, also where no body can be read. Nothing outside the file's folder is
-    opened.
+    opened. Other endings are read by installed packages.
     """
+    if path.suffix.lower().removeprefix(".") in IMPORTERS:
+        return _imported(path)
     try:
         text = read_regular_file(path, BYTES_MAX).decode("utf-8")
     except UnicodeDecodeError as error:
@@ -78,6 +82,32 @@ def read_world(path: Path, taken: NameRegister, *, visuals: bool = False) -> Wor
         said = "; ".join(reader.left_out) or "it has none"
         raise InvalidValueError(f"no body of the world can be read: {said}")
     return World(_plain(name), machines, tuple(reader.left_out))
+
+
+def _made_importer(name: str, value: Any) -> Callable[[Path], World]:
+    """The function of an entry point."""
+    if not callable(value):
+        raise InvalidValueError("must be a function of a path that returns a World")
+    read: Callable[[Path], World] = value
+    return read
+
+
+IMPORTERS: Registry[Callable[[Path], World]] = Registry(
+    "ir_description.worlds", {}, _made_importer, reserved=("sdf", "world", "urdf", "scene")
+)
+"""Readers of installed packages, by the ending of the files that they read, without its dot."""
+
+
+def _imported(path: Path) -> World:
+    """The world by an installed package. Raises InvalidValueError."""
+    ending = path.suffix.lower().removeprefix(".")
+    try:
+        world = IMPORTERS[ending](path)
+    except DescriptionError as error:
+        raise InvalidValueError(str(error)) from error
+    if not world.machines:
+        raise InvalidValueError(f"{IMPORTERS.origin(ending)} reads no machine from it")
+    return world
 
 
 def _document(text: str) -> Xml.Element:

@@ -124,6 +124,8 @@ def unknown_searches(
             yield from _unknown(
                 station.name, station.search.withdrawal, EXIT_SEARCHES, "withdrawal"
             )
+            if why := EXIT_SEARCHES.why_not(station.search.withdrawal):
+                yield Finding("error", station.name, f"withdrawal: {why}")
 
 
 def check_searches(cell: Cell, steps: Sequence[ProgramStep], searches: Searches) -> None:

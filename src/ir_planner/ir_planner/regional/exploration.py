@@ -15,7 +15,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.optimize import QUICK, THOROUGH, Portfolio, Refinement
 from ir_planner.request import Context
-from ir_planner.search import Ends, Search, correction_log, guesses, quick
+from ir_planner.search import SEARCHES, Ends, Search, correction_log, guesses, quick
 
 Searches = Mapping[str, Search]
 Path = tuple[str, FloatArray]  # the search that found it, and its waypoints (M, n)
@@ -49,6 +49,7 @@ def first_paths(
     journal = context.journal
     for name, search in _attempts(context.options.planner_id, searches, briefly):
         with journal.stage(name) as notes:
+            notes.extend(filter(None, [SEARCHES.origin(name)]))
             found = search.find(ends, space, context.options.seed, space.work)
             if found.paths:
                 notes.append(

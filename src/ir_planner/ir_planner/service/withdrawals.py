@@ -5,14 +5,15 @@ What comes out is shortened: shortcuts, waypoints pulled straight, and the end r
 the zone has just been left; all of it over certified edges.
 """
 
-from collections import Counter
+from collections import ChainMap, Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
 from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.settings import check_settings, setting
+from ir_msgs_py.settings import check_settings, describe, setting
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.request import Journal, Work
@@ -20,6 +21,8 @@ from ir_planner.scene import path_cost
 from ir_planner.search import EXIT, connect, fewest_corners, first_different, joint_scale
 from ir_planner.service.exit import Exit, ExitSearch, ExitsFound
 from ir_planner.service.modified_ga import ModifiedGa
+from ir_values.errors import InvalidValueError
+from ir_values.extensions import Registry
 
 # Exit paths by two trees: one grows from the interaction configuration, the other from
 # configurations outside.
@@ -77,7 +80,39 @@ def _until_out(path: FloatArray, problem: Exit) -> FloatArray:
     return path[: last + 1]
 
 
-EXIT_SEARCHES: Mapping[str, ExitSearch] = {"modified_ga": ModifiedGa(), "tree": ExitTree()}
+@dataclass(frozen=True)
+class Unusable:
+    """Stands in for a search whose package can't be used: it refuses with the reason."""
+
+    why: str = setting("", "Why the installed package can't be used.", read_only=True)
+    title: ClassVar[str] = "unusable"
+
+    def find(
+        self, problem: Exit, wanted: int, seed: np.random.SeedSequence, work: Work
+    ) -> ExitsFound:
+        """Raises RequestError."""
+        raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, f"planner_id: {self.why}")
+
+
+def made_exit_search(name: str, value: Any) -> ExitSearch:
+    """The search of an entry point: a frozen dataclass, or a search with other settings. Raises
+    InvalidValueError.
+    """
+    search = value() if isinstance(value, type) else value
+    if not (is_dataclass(search) and callable(getattr(search, "find", None))):
+        raise InvalidValueError("must be a frozen dataclass with a method find")
+    if not isinstance(getattr(search, "title", None), str):
+        raise InvalidValueError("has no title: the name of its stage in answers")
+    describe(type(search))
+    return cast(ExitSearch, search)
+
+
+EXIT_SEARCHES: Registry[ExitSearch] = Registry(
+    "ir_planner.exit_searches",
+    {"modified_ga": ModifiedGa(), "tree": ExitTree()},
+    made_exit_search,
+    stand_in=Unusable,
+)
 _SEARCHED = (
     2  # raw paths per candidate that is wanted: shortened, some of them end at the same place
 )
@@ -115,7 +150,7 @@ class Withdrawal:
 
 def exit_searches(modified_ga: ModifiedGa) -> Mapping[str, ExitSearch]:
     """The registered searches, the modified GA with these settings."""
-    return {**EXIT_SEARCHES, "modified_ga": modified_ga}
+    return ChainMap({"modified_ga": modified_ga}, EXIT_SEARCHES)
 
 
 def withdrawal(
@@ -123,17 +158,18 @@ def withdrawal(
 ) -> Withdrawal:
     """Up to `wanted` different shortened exit paths, cheapest by W first.
 
-    method: a key of `searches`, or "": each in turn until one finds any.
+    method: a key of `searches`, or "": those of the project in turn until one finds any.
     """
     seed = np.random.SeedSequence([journal.seed % 2**63, _STREAM])
     farthest = problem.interaction
     rejected = Counter[str]()
     depth = float(problem.area.zone_distance(farthest[None])[0])
     paths: list[ExitPath] = []
-    for name, search in searches.items():
-        if paths or method not in ("", name):
-            continue
+    default = [name for name in searches if not EXIT_SEARCHES.origin(name)]
+    for name in [method] if method else default:
+        search = searches[name]
         with journal.stage(search.title) as notes:
+            notes.extend(filter(None, [EXIT_SEARCHES.origin(name)]))
             found = search.find(problem, _SEARCHED * wanted, seed, journal.work)
             notes.append(found.note)
         journal.rejected.update(+found.rejected)
@@ -143,6 +179,8 @@ def withdrawal(
             farthest = found.farthest
             depth = distance
         paths = [ExitPath(name, path, found) for path in found.paths]
+        if paths:
+            break
     if paths:
         with journal.stage("shorten") as notes:
             paths = _cheapest(paths, problem, wanted)

@@ -17,6 +17,7 @@ from ir_recorder.format.contents import Split, part_facts, part_path
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.recording.arithmetic import arithmetic
 from ir_recorder.recording.writer import RecordingSummary, RecordingWriter, checked_path
+from ir_values.extensions import installed_extensions
 
 # What a further file of a recording repeats, so that it can be read alone.
 
@@ -139,7 +140,12 @@ class RecordingSession:
         own = {
             contents.VERSION: installed_version("ir_recorder"),
             contents.STARTED: str(time),
-            contents.PACKAGES: ", ".join(f"{name} {installed_version(name)}" for name in PACKAGES),
+            contents.PACKAGES: ", ".join(
+                (
+                    *(f"{name} {installed_version(name)}" for name in PACKAGES),
+                    *installed_extensions(),
+                )
+            ),
             contents.ARITHMETIC: arithmetic(),
         }
         self._facts = {**own, **facts}

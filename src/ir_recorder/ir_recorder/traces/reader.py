@@ -4,9 +4,10 @@ uses it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -30,6 +31,8 @@ from ir_recorder.traces.trace import (
     Trace,
 )
 from ir_values.arrays import FloatArray
+from ir_values.errors import DescriptionError, InvalidValueError, listed
+from ir_values.extensions import Registry
 
 # Traces of a recording: the joints' and the meter's, each with its own instants.
 
@@ -89,6 +92,20 @@ def _rows(columns: Mapping[str, FloatArray], kept: FloatArray) -> Mapping[str, F
     return MappingProxyType({name: values[kept] for name, values in columns.items()})
 
 
+ReadTraces = Callable[[Path], Sequence[Trace]]
+
+
+def _made_reader(name: str, value: Any) -> ReadTraces:
+    """The function of an entry point."""
+    if not callable(value):
+        raise InvalidValueError("must be a function of a path that returns traces")
+    read: ReadTraces = value
+    return read
+
+
+READERS: Registry[ReadTraces] = Registry("ir_recorder.traces", {}, _made_reader)
+"""Readers of installed packages, by the ending of the files that they read, without its dot."""
+
 _DIGITS = "0123456789"
 _NAMES = (TIME, POWER, ENERGY, MODE, LOAD)
 
@@ -117,7 +134,19 @@ def read_traces(
         return (_shifted(read_bag(path), mapping),)
     if ending == ".mcap":
         return tuple(_shifted(trace, mapping) for trace in recorded_traces(read_recording(path)))
-    raise RecorderError(f"{path}: traces are read from .csv, .parquet, .mcap and .db3")
+    with_dot = [f".{each}" for each in READERS]
+    if ending in with_dot:
+        return tuple(_shifted(each, mapping) for each in _installed(path, ending))
+    known = listed((".csv", ".parquet", ".mcap", ".db3", *with_dot))
+    raise RecorderError(f"{path}: traces are read from {known}")
+
+
+def _installed(path: Path, ending: str) -> tuple[Trace, ...]:
+    """Traces by the reader of an installed package. RecorderError where it can't be used."""
+    try:
+        return tuple(READERS[ending.removeprefix(".")](path))
+    except DescriptionError as error:
+        raise RecorderError(f"{path}: {error}") from error
 
 
 def column_names(joint_names: Sequence[str]) -> frozenset[str]:

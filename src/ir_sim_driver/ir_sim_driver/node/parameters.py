@@ -14,7 +14,7 @@ from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.load_check import LoadCheckSettings
 from ir_sim_driver.motion import ExecutionSettings
 from ir_sim_driver.plant import BACKENDS, TYPICAL, ControlSettings
-from ir_sim_driver.plc import LINKS, Link, PlcSettings, WakeOnLan
+from ir_sim_driver.plc import Link, PlcSettings, WakeOnLan, usable_links
 from ir_sim_driver.power import IdleTimes
 from ir_values.settings import check_settings, setting
 
@@ -87,7 +87,9 @@ class DriverParameters:
         self, node: Node, refuse: Callable[[], str], changed: Callable[[ExecutionSettings], None]
     ) -> None:
         self.node: NodeSettings = Parameters(node, NodeSettings).value
-        self.links: tuple[Link, ...] = tuple(Parameters(node, link).value for link in LINKS)
+        self.links: tuple[Link, ...] = tuple(
+            Parameters(node, link).value for link in usable_links()
+        )
         execution = Parameters(
             node,
             ExecutionSettings,

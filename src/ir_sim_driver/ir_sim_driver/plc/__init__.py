@@ -12,6 +12,7 @@ from ir_sim_driver.plc.inputs import (
     Plc,
     PlcSettings,
     Watchdog,
+    usable_links,
 )
 from ir_sim_driver.plc.port import STOP_BIT, Controller, Link, OpenLink, Readout
 from ir_sim_driver.plc.stop import StopMachine, StopState
@@ -35,4 +36,5 @@ __all__ = [
     "StopState",
     "WakeOnLan",
     "Watchdog",
+    "usable_links",
 ]

@@ -16,8 +16,7 @@ from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import ROBOTS_TIME_VALUE, TIMINGS
 from ir_planner import PlannerError
 from ir_planner.scene import scene_with
-from ir_planner.search import SEARCHES
-from ir_planner.search.with_ompl import missing, needs_ompl
+from ir_planner.search import SEARCHES, not_installed
 from ir_studies.errors import SettingsError
 from ir_studies.work import (
     Job,
@@ -106,9 +105,9 @@ class ArenaSettings:
         checked_known("timings", self.timings, TIMINGS)
         priced = self.time_value != ROBOTS_TIME_VALUE
         checked_numbers(self, _WHOLE, (*_REAL, _PRICE) if priced else _REAL)
-        wanted = [name for name in self.planners if name in SEARCHES and needs_ompl(SEARCHES[name])]
-        if wanted and missing():
-            raise SettingsError(f"planners: {', '.join(wanted)}: {missing()}")
+        for name in self.planners:
+            if name in SEARCHES and (how := not_installed(SEARCHES[name])):
+                raise SettingsError(f"planners: {name}: {how}")
         self._check_cells()
 
     @property

@@ -16,6 +16,7 @@ import scipy
 
 from ir_kernels import compiled
 from ir_recorder.recording.arithmetic import arithmetic
+from ir_values.extensions import extension_modules, installed_extensions
 
 PACKAGES = (
     "ir_description", "ir_kernels", "ir_krl", "ir_msgs_py", "ir_planner", "ir_recorder", "ir_sim_driver", "ir_values",  # noqa: E501
@@ -36,22 +37,36 @@ def computed_with(kind: str) -> str:
     kernels = "reference" if compiled.NAME == "reference" else "compiled"
     if kind == _WITH_OMPL:
         versions += f", ompl {_version('ompl')}"
+    extensions = "".join(f", {each}" for each in installed_extensions())
     return (
         f"{versions}, kernels {kernels}, {platform.machine()}, sources {sources()}, "
-        f"arithmetic {arithmetic()}"
+        f"arithmetic {arithmetic()}{extensions}"
     )
 
 
 def sources() -> str:
-    """Digest of the project's Python and YAML files, wherever they are installed."""
+    """Digest of the Python and YAML files of the project and of packages that extend it, wherever
+    they are installed.
+    """
     digest = sha256()
-    for package in PACKAGES:
-        found = find_spec(package)
-        folder = Path(found.origin).parent if found is not None and found.origin else Path()
-        for path in sorted(file for file in folder.rglob("*") if file.suffix in (".py", ".yaml")):
-            digest.update(f"{package}/{path.relative_to(folder).as_posix()}\n".encode())
+    for package in (*PACKAGES, *extension_modules()):
+        for name, path in _files_of(package):
+            digest.update(f"{package}/{name}\n".encode())
             digest.update(sha256(path.read_bytes()).digest())
     return digest.hexdigest()[:_CHARACTERS]
+
+
+def _files_of(package: str) -> list[tuple[str, Path]]:
+    """Files of a package, or the one of a module, by their names in it."""
+    found = find_spec(package)
+    if found is None or not found.origin:
+        return []
+    origin = Path(found.origin)
+    if origin.name != "__init__.py":
+        return [(origin.name, origin)]
+    folder = origin.parent
+    files = sorted(file for file in folder.rglob("*") if file.suffix in (".py", ".yaml"))
+    return [(file.relative_to(folder).as_posix(), file) for file in files]
 
 
 def _version(package: str) -> str:
