@@ -40,7 +40,7 @@ def completed(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
 
 
 def test_commands_options_and_choices_are_completed(completed) -> None:
-    assert set(NAMES) <= completed("")
+    assert {name for name in NAMES if " " not in name} <= completed("")
     assert "send_goal" in completed("ros", "se")
     assert {"--namespace", "--domain", "--cell", "-p"} <= completed("ros", "up", "-")
     assert "topics" in completed("ros", "list", "t")

@@ -22,6 +22,7 @@ NOT_RUN = {
     r"(ros up|demo)\b.*": "starts nodes: tests/system/test_readme.py, tests/system/test_demo.py",
     r"ros (call|echo|list|send_goal|front|live)\b.*": f"{NODES}: tests/system/test_readme.py, "
     "tests/system",
+    r"ask move .* --planner .*": "needs its package: tests/cli/test_new_search.py",
     r"view\b.*": "waits for a browser until Ctrl-C: tests/cli/test_view.py",
     r"study .* --scheduler .*": "needs a cluster: tests/studies",
     r"(study layout layout|study statistics statistics|study arena arena).yaml -o "
@@ -45,7 +46,7 @@ SNIPPETS = {
     "cad.md": "run: tests/packaging/test_documented_commands_run.py",
     "cartesian.md": "run: tests/examples/test_cartesian_page.py",
     "compare.md": "run: tests/packaging/test_documented_commands_run.py",
-    "extending.md": "a signature: ir_planner.contract",
+    "extending.md": "a signature: tests/cli/test_new_search.py",
     "krl.md": "run: tests/examples/test_krl_page.py",
     "library.md": "run: tests/examples/test_library_page.py",
     "recording.md": "run: tests/recorder/test_documentation.py",

@@ -112,7 +112,7 @@ def test_functions_that_are_named_exist(page: Path) -> None:
 def texts_by_file() -> dict[str, str]:
     """Text of all test files of a name."""
     texts: dict[str, str] = {}
-    for path in (ROOT / "tests").rglob("test_*.py"):
+    for path in (*ROOT.glob("tests/**/test_*.py"), *ROOT.glob("src/*/*/contract/test_*.py")):
         texts[path.name] = texts.get(path.name, "") + path.read_text("utf-8")
     return texts
 

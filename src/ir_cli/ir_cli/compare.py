@@ -39,7 +39,7 @@ from ir_planner.before_after import before_after, before_after_common, today_of_
 from ir_planner.krl import evaluate_krl
 
 KRL = (".src", ".dat", ".sub", UR)
-TRACES = (".csv", ".txt", ".parquet", ".mcap")
+TRACES = (".csv", ".txt", ".parquet", ".mcap", ".db3", ".xml")
 COLUMNS: Columns = {
     "program": ("program", text),
     "seconds": ("s", number(2)),
@@ -63,7 +63,8 @@ def add_compare(compare: argparse.ArgumentParser) -> None:
     """Arguments of `ir compare`."""
     add_cell(compare)
     words = (
-        "a KRL program (.src, then .dat; a folder or .zip), or a trace (.csv, .parquet, .mcap); "
+        "a KRL program (.src, then .dat; a folder or .zip), or a trace (.csv, .parquet, .mcap, "
+        ".db3, .xml); "
         "none: PTP at 100 %%"
     )
     compare.add_argument("today", nargs="*", type=Path, metavar="TODAY", help=words)

@@ -33,6 +33,7 @@ from ir_recorder.traces.trace import ACCELERATION, EFFORT, GAP_FACTOR, VELOCITY
 from ir_values.output_files import replacing_text
 
 ENDINGS = ("", VELOCITY, ACCELERATION)
+RECORDED = (".mcap", ".db3", ".xml", ".dat")  # what they hold is measured
 DAY = 86400.0  # s
 _SAME_PLACE = 0.001  # rad
 _NEAR = 0.02  # s: rows that lie nearer say by themselves how fast a joint is
@@ -114,7 +115,7 @@ def read_motion(
     times = trace.time
     if not 0.0 <= times[0] <= DAY:  # of a clock that knows the date
         times = times - times[0]
-    if accelerations is None or mapping is not None or path.suffix.lower() == ".mcap":
+    if accelerations is None or mapping is not None or path.suffix.lower() in RECORDED:
         return _without_holes(trace, times, positions, joint_names)
     try:
         found = JointTrajectory.from_seconds(
@@ -182,16 +183,47 @@ def _without_holes(
     positions = positions[whole]
     if len(times) < 2:
         raise InputError(f"{source}: {len(times)} rows have the positions of all joints")
+    notes = _bridged(source, times, positions)
+    return Rows(times - times[0], positions, (*trace.problems, *notes))
+
+
+def _bridged(source: str, times: FloatArray, positions: FloatArray) -> tuple[str, ...]:
+    """What is said of rows that come late. InputError for a gap in which the robot moved, unless
+    the rows around it say how: it is short, and their speeds cover the way.
+    """
     steps = np.diff(times)
     moved = np.abs(np.diff(positions, axis=0)).max(axis=1)
-    lost = np.flatnonzero((steps > GAP_FACTOR * np.median(steps)) & (moved > _SAME_PLACE))
-    if len(lost):
-        k = int(lost[0])
+    gaps = np.flatnonzero((steps > GAP_FACTOR * np.median(steps)) & (moved > _SAME_PLACE))
+    left = [k for k in gaps if not _is_bridged(times, positions, int(k))]
+    if left:
+        k = int(left[0])
         raise InputError(
             f"{source}: between {times[k]:.3f} s and {times[k + 1]:.3f} s there are no rows, and "
             f"the robot moved by {moved[k]:.3f} rad: nobody knows how"
         )
-    return Rows(times - times[0], positions, trace.problems)
+    if not len(gaps):
+        return ()
+    k = int(gaps[np.argmax(steps[gaps])])
+    return (
+        f"{len(gaps)} rows come late, the latest {1e3 * steps[k]:.3g} ms after the one before at "
+        f"{times[k]:.3f} s: the speeds around them cover the way within {_SAME_PLACE:g} rad",
+    )
+
+
+def _is_bridged(times: FloatArray, positions: FloatArray, k: int) -> bool:
+    """Whether the speeds before and after rows k, k + 1 explain the way between them."""
+    gap = times[k + 1] - times[k]
+    before = int(np.searchsorted(times, times[k] - _NEAR))
+    after = int(np.searchsorted(times, times[k + 1] + _NEAR, side="right")) - 1
+    if gap > _NEAR or before == k or after == k + 1:
+        return False
+    arriving = (positions[k] - positions[before]) / (times[k] - times[before])
+    leaving = (positions[after] - positions[k + 1]) / (times[after] - times[k + 1])
+    # speeds in the middles of their spans, carried on to the middle of the gap
+    spans = 0.5 * np.array([times[k] - times[before] + gap, times[after] - times[k + 1] + gap])
+    speed = (arriving * spans[1] + leaving * spans[0]) / spans.sum()
+    way = positions[k + 1] - positions[k]
+    return bool(np.abs(way - speed * gap).max() <= _SAME_PLACE)
 
 
 # The robot's limits. A wrong unit, a missing row in the middle of a movement or a log of another
@@ -307,7 +339,7 @@ def motion_of(
 
 def between(file: Path, found: JointTrajectory | Rows, begin: float, end: float) -> Rows:
     """The rows from `begin` to `end` [s]. InputError where that makes no sense."""
-    if isinstance(found, JointTrajectory) or file.suffix.lower() == ".mcap":
+    if isinstance(found, JointTrajectory) or file.suffix.lower() in RECORDED:
         raise InputError(f"{file}: --between is of measured positions in a CSV or Parquet file")
     inside = (found.time >= begin) & (found.time <= end)
     if np.count_nonzero(inside) < 2:

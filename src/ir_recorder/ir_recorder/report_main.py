@@ -122,7 +122,10 @@ def _paths(files: Sequence[str], roots: FileRoots) -> list[tuple[Path, bool]]:
     paths: list[tuple[Path, bool]] = []
     for name in files:
         if Path(name).is_dir():
-            paths += [(path, False) for path in sorted(roots.inside(name).glob("*.mcap"))]
+            inner = roots.inside(name)
+            paths += [
+                (path, False) for path in sorted([*inner.glob("*.mcap"), *inner.glob("*.db3")])
+            ]
         else:
             paths.append((Path(name), True))
     if len(paths) > MOST:

@@ -154,6 +154,43 @@ class Columns:
         return self.integers(f"{path}.sec") * 1_000_000_000 + self.integers(f"{path}.nanosec")
 
 
+MOST_JOINTS = 64  # that a message of joint states names
+
+
+def joint_groups(columns: Columns) -> dict[tuple[str, ...], IntArray]:
+    """Rows of messages of joint states by the joints that they name, most joints first; those that
+    name none are last.
+    """
+    named = [columns.texts(f"name[{k}]") for k in range(MOST_JOINTS)]
+    groups: dict[tuple[str, ...], list[int]] = {}
+    for row, names in enumerate(zip(*named, strict=True)):
+        groups.setdefault(tuple(name for name in names if name), []).append(row)
+    order = sorted(groups, key=lambda names: (-len(names), -len(groups[names])))
+    return {names: np.array(groups[names], dtype=np.int64) for names in order}
+
+
+def fitting(messages: Sequence[bytes], type_name: str, schema: str) -> list[int]:
+    """Rows of the messages that fit the definition of their type."""
+    sizes: dict[int, list[int]] = {}
+    for row, message in enumerate(messages):
+        sizes.setdefault(len(message), []).append(row)
+    kept: list[int] = []
+    for rows in sizes.values():
+        if _fit([messages[row] for row in rows], type_name, schema):
+            kept += rows
+        else:
+            kept += [row for row in rows if _fit([messages[row]], type_name, schema)]
+    return sorted(kept)
+
+
+def _fit(messages: Sequence[bytes], type_name: str, schema: str) -> bool:
+    try:
+        Columns(messages, type_name, schema)
+    except ReadError:
+        return False
+    return True
+
+
 def _check_kind(leaf: _Leaf, numeric: bool) -> None:
     if bool(leaf.dtype) is not numeric:
         found, wanted = ("numbers", "a text") if leaf.dtype else ("a text", "numbers")

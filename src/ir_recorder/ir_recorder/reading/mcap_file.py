@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
@@ -29,7 +29,7 @@ from ir_values.files import ANYWHERE, FileRoots
 
 @dataclass(frozen=True)
 class RawChannel:
-    """One topic's messages as bytes; log_time (N,) [ns] in the order of the file."""
+    """One topic's messages as bytes; log_time (N,) [ns] does not decrease."""
 
     topic: str
     type: str
@@ -173,6 +173,7 @@ class _Collector:
         self.channels: dict[int, Channel] = {}
         self.times: dict[int, list[int]] = {}
         self.data: dict[int, list[bytes]] = {}
+        self.sequence: dict[int, list[int]] = {}
         self.attachments: list[RawAttachment] = []
         self.facts: list[tuple[str, str]] = []
         self.problems: list[str] = []
@@ -188,6 +189,7 @@ class _Collector:
             elif record.channel_id in self.channels:
                 self.times[record.channel_id].append(record.log_time)
                 self.data[record.channel_id].append(record.data)
+                self.sequence[record.channel_id].append(record.sequence)
             else:
                 self.orphans += 1
         elif isinstance(record, Schema):
@@ -196,6 +198,7 @@ class _Collector:
             self.channels[record.id] = record
             self.times.setdefault(record.id, [])
             self.data.setdefault(record.id, [])
+            self.sequence.setdefault(record.id, [])
         elif isinstance(record, Attachment):
             self.attachments.append(RawAttachment(record.name, record.media_type, record.data))
         elif isinstance(record, Metadata):
@@ -208,7 +211,7 @@ class _Collector:
     def raw_channels(self) -> Iterator[RawChannel]:
         for number, channel in self.channels.items():
             schema = self.schemas.get(channel.schema_id)
-            yield RawChannel(
+            one = RawChannel(
                 channel.topic,
                 schema.name if schema else "",
                 channel.message_encoding,
@@ -218,6 +221,22 @@ class _Collector:
                 np.array(self.times[number], dtype=np.int64),
                 tuple(self.data[number]),
             )
+            yield in_order(one, self.sequence[number])
+
+
+def in_order(channel: RawChannel, sequence: Sequence[int] = ()) -> RawChannel:
+    """The channel with its messages by time, those of one time by their numbers where a file gives
+    them; writers need not keep that order in the file.
+    """
+    if (np.diff(channel.log_time) >= 0).all():
+        return channel
+    order = (
+        np.lexsort((np.array(sequence), channel.log_time))
+        if sequence
+        else (np.argsort(channel.log_time, kind="stable"))
+    )
+    messages = tuple(channel.messages[int(k)] for k in order)
+    return replace(channel, log_time=channel.log_time[order], messages=messages)
 
 
 def read_raw(

@@ -4,7 +4,7 @@ not a refusal.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -16,7 +16,8 @@ from ir_msgs_py.names import owns_diagnostic, owns_logger
 from ir_msgs_py.plc import PlcInputs, PlcOutputs
 from ir_recorder.errors import ReadError
 from ir_recorder.format import contents
-from ir_recorder.reading.cdr import Columns
+from ir_recorder.reading.bag_file import read_bag_file
+from ir_recorder.reading.cdr import Columns, fitting, joint_groups
 from ir_recorder.reading.limits import ReadLimits
 from ir_recorder.reading.mcap_file import RawChannel, RawRecording, chosen_namespace, read_raw
 from ir_recorder.reading.messages import contact_sentence, decoder_of, movement_from, savings_from
@@ -60,6 +61,7 @@ _OF_A_RUN = (names.JOINT_STATES, names.POWER_STATE, names.CONTROLLER_STATE, name
 _CALLS = f"{names.PLANNER}/{names.CALLS}"
 # a message lacks a field, or has another kind of value in it
 _NO_SENSE = (AttributeError, TypeError, ValueError, OverflowError, IndexError, IrError)
+_LATE = 2_000_000_000  # ns that a message may arrive late: more is another clock
 _WARN = 30  # rcl_interfaces/Log
 # action_msgs/GoalStatus
 _OUTCOMES = {
@@ -121,7 +123,15 @@ def read_recording(
     namespace: of the cell ("/cell_1"); None: the first one, with a sentence where there are more.
     ReadError when the file is no recording, or holds no cell of that namespace.
     """
-    return _Reader(read_raw(path, roots, limits), namespace).recording()
+    read = read_bag_file if Path(path).suffix.lower() == ".db3" else read_raw
+    return _Reader(read(Path(path), roots, limits), namespace).recording()
+
+
+def _taken(channel: RawChannel, rows: Sequence[int]) -> tuple[Columns, RawChannel]:
+    """Columns of these messages of a channel."""
+    messages = tuple(channel.messages[row] for row in rows)
+    channel = replace(channel, messages=messages, log_time=channel.log_time[list(rows)])
+    return Columns(messages, channel.type, channel.schema_text), channel
 
 
 class _Reader:
@@ -204,12 +214,63 @@ class _Reader:
                 self._problems.append(f"{self._prefix}{name} isn't in the recording")
             return None
         try:
-            columns = Columns(channel.messages, channel.type, channel.schema_text)
-            columns.require(*(REQUIRED.get(name) or ()))
+            required = REQUIRED.get(name) or ()
+            columns, channel = self._columns(channel)
+            columns.require(*required)
+            if name == names.JOINT_STATES:
+                columns, channel = self._of_one_robot(columns, channel)
+            if set(_STAMP) <= set(required):
+                columns, channel = self._by_stamp(columns, channel)
             return build(columns, channel)
         except (ReadError, IrError) as error:
             self._problems.append(f"{channel.topic} can't be read: {error}")
             return None
+
+    def _columns(self, channel: RawChannel) -> tuple[Columns, RawChannel]:
+        """The fields of a channel, without a few messages that don't fit its type."""
+        try:
+            return Columns(channel.messages, channel.type, channel.schema_text), channel
+        except ReadError:
+            rows = fitting(channel.messages, channel.type, channel.schema_text)
+            lost = len(channel.messages) - len(rows)
+            if lost >= len(rows):
+                raise
+            self._problems.append(
+                f"{channel.topic}: {lost} of {len(channel.messages)} messages are empty or of "
+                f"another type than {channel.type}: left out"
+            )
+            return _taken(channel, rows)
+
+    def _of_one_robot(self, columns: Columns, channel: RawChannel) -> tuple[Columns, RawChannel]:
+        """The joint states that name most joints; others on the topic, as a gripper's or empty
+        ones, are left out and told.
+        """
+        groups = joint_groups(columns)
+        if len(groups) < 2:
+            return columns, channel
+        chosen, *others = groups
+        if any(len(each) == len(chosen) for each in others):
+            return columns, channel
+        for each in others:
+            joints = ", ".join(each)[:200] or "no joint"
+            self._problems.append(
+                f"{channel.topic}: {len(groups[each])} messages of {joints} are left out"
+            )
+        return _taken(channel, groups[chosen].tolist())
+
+    def _by_stamp(self, columns: Columns, channel: RawChannel) -> tuple[Columns, RawChannel]:
+        """Messages that arrived in another order than they were made in, in that of their stamps;
+        a clock that was set back stays as it is.
+        """
+        stamps = columns.stamps()
+        back = np.maximum.accumulate(stamps) - stamps
+        if not 0 < back.max(initial=0) <= _LATE:
+            return columns, channel
+        self._problems.append(
+            f"{channel.topic}: {np.count_nonzero(back)} messages arrived after later ones, by at "
+            f"most {back.max() * 1e-6:.3g} ms: put into the order of their stamps"
+        )
+        return _taken(channel, np.argsort(stamps, kind="stable").tolist())
 
     def _seconds(self, stamps: IntArray) -> FloatArray:
         return np.asarray((stamps - self._start) * 1e-9, dtype=np.float64)

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import os
 import sqlite3
+from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 
 from ir_recorder.errors import RecorderError
-from ir_recorder.reading.cdr import Columns
+from ir_recorder.reading.cdr import Columns, fitting, joint_groups
 from ir_recorder.traces.table_files import opened
 from ir_recorder.traces.trace import EFFORT, VELOCITY, Trace
+from ir_values.arrays import IntArray
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 _SCHEMA = """\
@@ -42,10 +44,22 @@ def read_bag(path: Path) -> Trace:
             rows = _messages(bag, path)
     except sqlite3.Error as error:
         raise RecorderError(f"{path}: can't be read as a bag: {error}") from error
+    fit = fitting([data for _, data in rows], JOINT_STATE, _SCHEMA)
+    columns = Columns([rows[k][1] for k in fit], JOINT_STATE, _SCHEMA)
+    groups = joint_groups(columns)
+    names = _names(groups, path)
+    taken = [fit[k] for k in groups[names]]
+    problems = [
+        f"{len(groups[each])} joint states of {', '.join(each)[:200] or 'no joint'}: left out"
+        for each in groups
+        if each != names
+    ]
+    if len(fit) < len(rows):
+        problems.append(f"{len(rows) - len(fit)} messages are no {JOINT_STATE}: left out")
+    rows = [rows[k] for k in taken]
     columns = Columns([data for _, data in rows], JOINT_STATE, _SCHEMA)
     stamps = columns.stamps()
     nanoseconds = np.array([time for time, _ in rows]) if not stamps.any() else stamps
-    names = _names(columns, path)
     time = (nanoseconds - nanoseconds[0]) * 1e-9
     kept = np.concatenate([[True], time[1:] > np.maximum.accumulate(time)[:-1]])
     found = {}
@@ -55,8 +69,18 @@ def read_bag(path: Path) -> Trace:
             for k, name in enumerate(names):
                 found[f"{name}{ending}"] = values[kept, k].copy()
     lost = int(np.count_nonzero(~kept))
-    problems = (f"{lost} joint states go back in time: left out",) if lost else ()
-    return Trace(str(path), time[kept], MappingProxyType(found), problems=problems)
+    problems += [f"{lost} joint states go back in time: left out"] if lost else []
+    return Trace(str(path), time[kept], MappingProxyType(found), problems=tuple(problems))
+
+
+def types_of(path: Path) -> frozenset[str]:
+    """Types of the topics of a bag. RecorderError where it is none."""
+    os.close(opened(path))
+    try:
+        with sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True) as bag:
+            return frozenset(str(row[0]) for row in bag.execute("SELECT type FROM topics"))
+    except sqlite3.Error as error:
+        raise RecorderError(f"{path}: can't be read as a bag: {error}") from error
 
 
 def _messages(bag: sqlite3.Connection, path: Path) -> list[tuple[int, bytes]]:
@@ -75,11 +99,9 @@ def _messages(bag: sqlite3.Connection, path: Path) -> list[tuple[int, bytes]]:
     return [(int(time), bytes(data)) for time, data in bag.execute(query, (topic,))]
 
 
-def _names(columns: Columns, path: Path) -> list[str]:
-    """Names of the joints, which all messages give in one order."""
-    columns.require("position")
-    width = max(columns.lengths("position"), default=0)
-    names = [columns.texts(f"name[{k}]") for k in range(width)]
-    if not names or any(len(set(each)) != 1 for each in names):
+def _names(groups: Mapping[tuple[str, ...], IntArray], path: Path) -> tuple[str, ...]:
+    """The joints of the robot: most joints are named by one kind of messages, in one order."""
+    first, *others = groups or ((),)
+    if not first or any(len(each) == len(first) for each in others):
         raise RecorderError(f"{path}: its joint states name other joints from message to message")
-    return [each[0] for each in names]
+    return first

@@ -82,6 +82,7 @@ def parsed(heading: str, where: str) -> tuple[str, float]:
 # the row before, or: sample
 
 FORMAT = "ir_trace/1"
+_STEP_MAX = 3600.0  # s
 _MOST_FACTORS = 4  # of a product: voltage, current, share
 _KEYS = ("format", "columns", "clock_offset", "power_is")
 
@@ -89,12 +90,13 @@ _KEYS = ("format", "columns", "clock_offset", "power_is")
 @dataclass(frozen=True)
 class Column:
     """A column of a file: its heading, and what its values are multiplied by; or the product of
-    several, each with its own factor.
+    several, each with its own factor. number: of the column, from 1 on, instead of its heading.
     """
 
     heading: str
     factor: float = 1.0
     others: tuple[Column, ...] = ()
+    number: int = 0
 
 
 @dataclass(frozen=True)
@@ -102,12 +104,14 @@ class TraceMapping:
     """Columns of a file by the names that they mean; empty: the headings say it themselves.
 
     clock_offset [s] is added to the file's time, NaN where it is to be found by comparing. sampled:
-    power is the value of an instant, else the mean since the row before.
+    power is the value of an instant, else the mean since the row before. step [s]: between rows of
+    a file without a column of time; NaN: it has one.
     """
 
     columns: Mapping[str, Column] = field(default_factory=lambda: MappingProxyType({}))
     clock_offset: float = math.nan
     sampled: bool = False
+    step: float = math.nan
 
 
 def read_mapping(path: Path) -> TraceMapping:
@@ -126,22 +130,42 @@ def read_mapping(path: Path) -> TraceMapping:
     meaning = tree.get("power_is", "mean")
     if meaning not in ("mean", "sample"):
         raise RecorderError(f"{path}: power_is is {str(meaning)[:40]!r}, it must be mean or sample")
-    return TraceMapping(
-        _columns(path, tree.get("columns")), _offset(path, tree), meaning == "sample"
-    )
-
-
-def _columns(path: Path, tree: Any) -> Mapping[str, Column]:
-    if not isinstance(tree, dict) or "time" not in tree:
+    columns = tree.get("columns")
+    if not isinstance(columns, dict) or TIME not in columns:
         raise RecorderError(f"{path}: columns must name at least time")
-    return MappingProxyType(
-        {str(name): _column(f"{path}: {name}", each) for name, each in tree.items()}
+    step = _step(f"{path}: {TIME}", columns[TIME])
+    return TraceMapping(
+        MappingProxyType(
+            {
+                str(name): _column(f"{path}: {name}", each)
+                for name, each in columns.items()
+                if name != TIME or math.isnan(step)
+            }
+        ),
+        _offset(path, tree),
+        meaning == "sample",
+        step,
     )
+
+
+def _step(where: str, tree: Any) -> float:
+    """Seconds between rows of a file without time, NaN where a column has it."""
+    if not isinstance(tree, dict) or "step" not in tree:
+        return math.nan
+    step = tree["step"]
+    if not set(tree) <= {"step", "unit"} or not isinstance(step, int | float) or step is True:
+        raise RecorderError(f"{where[:200]}: must be {{step: number, unit: unit}}")
+    seconds = step * factor(str(tree.get("unit", "s")), where)
+    if not 0.0 < seconds <= _STEP_MAX:
+        raise RecorderError(f"{where[:200]}: step is {seconds:g} s, must be in (0, {_STEP_MAX:g}]")
+    return float(seconds)
 
 
 def _column(where: str, tree: Any) -> Column:
     if isinstance(tree, str):
         return Column(tree, _in_heading(tree))
+    if _is_number(tree):
+        return Column(f"number {tree}", number=int(tree))
     if isinstance(tree, dict) and set(tree) == {"product"}:
         parts = tree["product"]
         if not isinstance(parts, list) or not 2 <= len(parts) <= _MOST_FACTORS:
@@ -154,9 +178,25 @@ def _column(where: str, tree: Any) -> Column:
         raise RecorderError(
             f"{where[:200]}: must be {{column: heading, unit: unit}} or {{product: [.., ..]}}"
         )
-    heading = str(tree["column"])
     given = "unit" in tree
+    if _is_number(tree["column"]):
+        number = int(tree["column"])
+        scale = factor(str(tree["unit"]), where) if given else 1.0
+        return Column(f"number {number}", scale, number=number)
+    heading = str(tree["column"])
     return Column(heading, factor(str(tree["unit"]), where) if given else _in_heading(heading))
+
+
+def _is_number(tree: Any) -> bool:
+    """Whether a column is given by its number."""
+    return isinstance(tree, int) and not isinstance(tree, bool)
+
+
+def unit_of(heading: str) -> str:
+    """The unit in a heading's brackets, "" where there is none that is known."""
+    found = _BRACKETS.match(heading.strip())
+    unit = found["unit"].strip() if found else ""
+    return unit if unit.lower() in FACTORS else ""
 
 
 def _in_heading(heading: str) -> float:
@@ -188,6 +228,13 @@ def chosen(
     """
     places: dict[str, tuple[int, float]] = {}
     for name, column in _all_columns(mapping):
+        if column.number:
+            if not 1 <= column.number <= len(headings):
+                raise RecorderError(
+                    f"{where}: there is no column {column.number}, there are {len(headings)}"
+                )
+            places[name] = column.number - 1, column.factor
+            continue
         if column.heading not in headings:
             raise RecorderError(
                 f"{where}: there is no column {column.heading[:80]!r}, {_known(headings)}"
@@ -196,14 +243,17 @@ def chosen(
             raise RecorderError(f"{where}: column {column.heading[:80]} is there twice")
         places[name] = headings.index(column.heading), column.factor
     for k, heading in enumerate([] if mapping.columns else headings):
-        name, scale = _named(heading, where, wanted)
+        name, scale = named(heading, where, wanted)
         if not wanted(name):
             continue
         if name in places:
             raise RecorderError(f"{where}: column {name} is there twice")
         places[name] = k, scale
-    if TIME not in places:
-        raise RecorderError(f"{where}: there is no column time, {_known(headings)}")
+    if TIME not in places and math.isnan(mapping.step):
+        raise RecorderError(
+            f"{where}: there is no column time, {_known(headings)}; a mapping gives the step "
+            "between rows of a file without it: time: {step: 4, unit: ms}"
+        )
     return places
 
 
@@ -227,7 +277,7 @@ def multiplied(columns: Mapping[str, FloatArray], mapping: TraceMapping) -> dict
     return found
 
 
-def _named(heading: str, where: str, wanted: Wanted) -> tuple[str, float]:
+def named(heading: str, where: str, wanted: Wanted) -> tuple[str, float]:
     """Name and factor of a heading; a unit in brackets has to be known only where the name is
     wanted.
     """

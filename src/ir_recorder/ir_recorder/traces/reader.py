@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from ir_msgs_py.modes import Mode
-from ir_msgs_py.names import JOINT_NAMES
+from ir_msgs_py.names import JOINT_NAMES, POWER_STATE
 from ir_recorder.errors import RecorderError
-from ir_recorder.reading.reader import read_recording
+from ir_recorder.reading.reader import TYPES, read_recording
 from ir_recorder.reading.recording import JointSeries, PowerSeries, Recording
-from ir_recorder.traces.bag_files import read_bag
+from ir_recorder.traces.bag_files import read_bag, types_of
 from ir_recorder.traces.columns import TraceMapping, Wanted
+from ir_recorder.traces.kuka_files import read_kuka_trace, read_rsi
 from ir_recorder.traces.table_files import read_csv, read_parquet
 from ir_recorder.traces.trace import (
     EFFORT,
@@ -92,6 +93,7 @@ def _rows(columns: Mapping[str, FloatArray], kept: FloatArray) -> Mapping[str, F
     return MappingProxyType({name: values[kept] for name, values in columns.items()})
 
 
+ENDINGS_READ = (".csv", ".txt", ".parquet", ".mcap", ".db3", ".xml", ".dat")
 ReadTraces = Callable[[Path], Sequence[Trace]]
 
 
@@ -106,6 +108,7 @@ def _made_reader(name: str, value: Any) -> ReadTraces:
 READERS: Registry[ReadTraces] = Registry("ir_recorder.traces", {}, _made_reader)
 """Readers of installed packages, by the ending of the files that they read, without its dot."""
 
+POWER_TYPE = TYPES[POWER_STATE]
 _DIGITS = "0123456789"
 _NAMES = (TIME, POWER, ENERGY, MODE, LOAD)
 
@@ -115,8 +118,7 @@ def read_traces(
     mapping: TraceMapping | None = None,
     joint_names: Sequence[str] = JOINT_NAMES,
 ) -> tuple[Trace, ...]:
-    """The traces of a file by its ending (.csv, .txt, .parquet, .mcap, .db3): one, or those of a
-    recording.
+    """The traces of a file by its ending (ENDINGS_READ): one, or those of a recording.
 
     Without a mapping the columns that are read are `time`, `power`, `energy`, `mode`, `load`, and
     for each joint its name and `_velocity`, `_acceleration`, `_effort`. RecorderError or ReadError
@@ -126,23 +128,40 @@ def read_traces(
     mapping = mapping or TraceMapping()
     ending = path.suffix.lower()
     wanted = _wanted(path, joint_names)
-    if ending in (".csv", ".txt"):
-        return (_shifted(read_csv(path, wanted, mapping), mapping),)
-    if ending == ".parquet":
-        return (_shifted(read_parquet(path, wanted, mapping), mapping),)
-    if ending == ".db3":
-        return (_shifted(read_bag(path), mapping),)
-    if ending == ".mcap":
-        return tuple(_shifted(trace, mapping) for trace in recorded_traces(read_recording(path)))
-    with_dot = [f".{each}" for each in READERS]
-    if ending in with_dot:
-        return tuple(_shifted(each, mapping) for each in _installed(path, ending))
-    known = listed((".csv", ".parquet", ".mcap", ".db3", *with_dot))
-    raise RecorderError(f"{path}: traces are read from {known}")
+    tables = {
+        ".csv": read_csv,
+        ".txt": read_csv,
+        ".parquet": read_parquet,
+        ".dat": read_kuka_trace,
+    }
+    if ending in tables:
+        found: tuple[Trace, ...] = (tables[ending](path, wanted, mapping, joint_names),)
+    elif ending == ".xml":
+        found = (read_rsi(path, joint_names),)
+    elif ending == ".db3":
+        found = _of_bag(path)
+    elif ending == ".mcap":
+        found = recorded_traces(read_recording(path))
+    else:
+        found = _installed(path, ending)
+    return tuple(_shifted(trace, mapping) for trace in found)
+
+
+def _of_bag(path: Path) -> tuple[Trace, ...]:
+    """Joints and meter of a bag of this project; of any other the joint states."""
+    if POWER_TYPE in types_of(path):
+        return recorded_traces(read_recording(path))
+    return (read_bag(path),)
 
 
 def _installed(path: Path, ending: str) -> tuple[Trace, ...]:
-    """Traces by the reader of an installed package. RecorderError where it can't be used."""
+    """Traces by the reader of an installed package. RecorderError where there is none, or it can't
+    be used.
+    """
+    endings = [f".{each}" for each in READERS]
+    if ending not in endings:
+        known = listed((*ENDINGS_READ, *endings))
+        raise RecorderError(f"{path}: traces are read from {known}")
     try:
         return tuple(READERS[ending.removeprefix(".")](path))
     except DescriptionError as error:

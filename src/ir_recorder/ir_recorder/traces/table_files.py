@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+import math
 import os
 import stat
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime
-from itertools import compress, islice, pairwise
+from itertools import chain, compress, islice, pairwise
 from pathlib import Path
 from sys import intern
 from types import MappingProxyType
@@ -17,7 +19,8 @@ from typing import Any, TextIO
 import numpy as np
 
 from ir_recorder.errors import RecorderError
-from ir_recorder.traces.columns import TraceMapping, Wanted, chosen, multiplied
+from ir_recorder.traces.columns import Column, TraceMapping, Wanted, chosen, multiplied, named
+from ir_recorder.traces.makers import MakersColumns, makers_columns
 from ir_recorder.traces.trace import LOAD, MODE, TIME, Trace
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
@@ -59,11 +62,16 @@ _BLOCK = 10_000  # lines that are converted at a time
 WORDS = (MODE, LOAD)  # columns of words
 
 
-def read_csv(path: Path, wanted: Wanted, mapping: TraceMapping) -> Trace:
-    """The trace of a CSV file; RecorderError with the line and the column that is wrong."""
+def read_csv(
+    path: Path, wanted: Wanted, mapping: TraceMapping, joint_names: Sequence[str] = ()
+) -> Trace:
+    """The trace of a CSV file; RecorderError with the line and the column that is wrong.
+
+    joint_names: of the robot, for headings as its maker's logs have them.
+    """
     with _lines(path) as file:
         try:
-            return _Reader(path, file, wanted, mapping, _cut(file)).trace()
+            return _Reader(path, file, wanted, mapping, _cut(file), joint_names).trace()
         except csv.Error as error:
             raise RecorderError(f"{path}: {error}") from error
 
@@ -88,10 +96,15 @@ class _Reader:
     """cut: the last line has no end; one that lacks values is left out then."""
 
     def __init__(
-        self, path: Path, file: Iterator[str], wanted: Wanted, mapping: TraceMapping, cut: bool
+        self,
+        path: Path,
+        file: Iterator[str],
+        wanted: Wanted,
+        mapping: TraceMapping,
+        cut: bool,
+        joint_names: Sequence[str],
     ) -> None:
         self._path = path
-        self._mapping = mapping
         self._cut = cut
         self._file = file
         self._begin = 0
@@ -101,7 +114,14 @@ class _Reader:
             ";\t, ", key=lambda sign: (header.count(sign) > 0, sign != " ", header.count(sign))
         )
         self._headings = [each.strip() for each in next(self._split([header]), [])]
-        self._places = chosen(self._headings, f"{path}:{self._begin}", wanted, mapping)
+        where = f"{path}:{self._begin}"
+        if _is_row(self._headings):
+            self._file = chain([header], file)
+            self._begin -= 1
+            self._headings = _numbers_of(self._headings, where, mapping)
+        self._maker = _maker_of(self._headings, where, wanted, mapping, joint_names)
+        self._mapping = mapping if self._maker is None else self._maker.mapping
+        self._places = chosen(self._headings, where, wanted, self._mapping)
 
     def _split(self, lines: Iterable[str]) -> Iterator[list[str]]:
         """Rows of cells; several spaces separate as one does."""
@@ -146,6 +166,8 @@ class _Reader:
                 )
         values = np.concatenate(blocks) if blocks else np.empty((0, len(numbers)))
         columns = {name: np.ascontiguousarray(values[:, k]) for k, name in enumerate(numbers)}
+        if TIME not in columns:
+            columns[TIME] = self._mapping.step * np.arange(len(values), dtype=np.float64)
         spoken = {name: tuple(each) for name, each in texts.items()}
         still = not (np.diff(columns[TIME]) > 0.0).all()
         if still and not (kept := _once(values, spoken)).all():
@@ -156,6 +178,9 @@ class _Reader:
         time = columns.pop(TIME)
         self._check_time(time, lines)
         columns = multiplied(columns, self._mapping)
+        if self._maker is not None:
+            columns, note = self._maker.proved(columns, f"{self._path}:{self._begin}")
+            self._problems.append(note)
         texts_of = MappingProxyType(spoken)
         problems = tuple(self._problems)
         sampled = self._mapping.sampled
@@ -237,6 +262,83 @@ class _Reader:
             )
 
 
+def _is_row(cells: Sequence[str]) -> bool:
+    """Whether a first line is no line of headings: every cell is a number."""
+    try:
+        return len(cells) > 1 and all(
+            math.isfinite(float(each.replace(",", "."))) for each in cells
+        )
+    except ValueError:
+        return False
+
+
+def _numbers_of(cells: Sequence[str], where: str, mapping: TraceMapping) -> list[str]:
+    """Headings of a file without any. RecorderError where no mapping gives columns by number."""
+    named = [column for column in mapping.columns.values() if not column.number]
+    if named or not mapping.columns:
+        raise RecorderError(
+            f"{where}: has {len(cells)} columns without headings: a mapping (--mapping) names them "
+            "by number, as columns: {time: {column: 1, unit: s}, joint_a1: {column: 2, unit: rad}}"
+        )
+    return [f"number {k}" for k in range(1, len(cells) + 1)]
+
+
+def _maker_of(
+    headings: Sequence[str],
+    where: str,
+    wanted: Wanted,
+    mapping: TraceMapping,
+    joint_names: Sequence[str],
+) -> MakersColumns | None:
+    """What the headings of a maker's log mean, where no mapping and no name of a joint says it;
+    what is read by its own name beside the joints is still read.
+    """
+    if mapping.columns:
+        return None
+    plain = {heading: named(heading, where, wanted) for heading in headings}
+    if any(name in joint_names for name, _ in plain.values()):
+        return None
+    times = [Column(heading, scale) for heading, (name, scale) in plain.items() if name == TIME]
+    found = makers_columns(headings, joint_names, where, times[0] if times else None)
+    if found is None:
+        return None
+    beside = {
+        name: Column(heading, scale)
+        for heading, (name, scale) in plain.items()
+        if name != TIME and wanted(name)
+    }
+    columns = MappingProxyType({**beside, **found.mapping.columns})
+    return replace(found, mapping=replace(mapping, columns=columns))
+
+
+def table_trace(
+    path: Path,
+    table: Mapping[str, FloatArray],
+    wanted: Wanted,
+    mapping: TraceMapping,
+    joint_names: Sequence[str],
+) -> Trace:
+    """The trace of a table of numbers (N,) by heading; RecorderError where a column makes no
+    sense.
+    """
+    headings = list(table)
+    maker = _maker_of(headings, str(path), wanted, mapping, joint_names)
+    mapping = mapping if maker is None else maker.mapping
+    places = chosen(headings, str(path), wanted, mapping)
+    columns = {name: scale * table[headings[place]] for name, (place, scale) in places.items()}
+    if TIME not in columns:
+        columns[TIME] = mapping.step * np.arange(len(table[headings[0]]), dtype=np.float64)
+    time = columns.pop(TIME)
+    columns = multiplied(columns, mapping)
+    notes: tuple[str, ...] = ()
+    if maker is not None:
+        columns, note = maker.proved(columns, str(path))
+        notes = (note,)
+    return Trace(
+        str(path), time, MappingProxyType(columns), problems=notes, sampled=mapping.sampled
+    )
+
+
 def _once(values: FloatArray, spoken: Mapping[str, Sequence[str]]) -> BoolArray:
     """Which rows (N,) say something else than the one before, in values (N, columns) or words."""
     before = values[:-1]
@@ -251,7 +353,9 @@ def _once(values: FloatArray, spoken: Mapping[str, Sequence[str]]) -> BoolArray:
 # Traces as Parquet, by the optional pyarrow: the same columns as in CSV.
 
 
-def read_parquet(path: Path, wanted: Wanted, mapping: TraceMapping) -> Trace:
+def read_parquet(
+    path: Path, wanted: Wanted, mapping: TraceMapping, joint_names: Sequence[str] = ()
+) -> Trace:
     """The trace of a Parquet file; RecorderError where pyarrow isn't installed or a column makes no
     sense.
     """
@@ -262,9 +366,10 @@ def read_parquet(path: Path, wanted: Wanted, mapping: TraceMapping) -> Trace:
     try:
         with os.fdopen(opened(path), "rb") as stream:
             file = parquet.ParquetFile(stream)
-            places = chosen(
-                [str(name) for name in file.schema_arrow.names], str(path), wanted, mapping
-            )
+            headings = [str(name) for name in file.schema_arrow.names]
+            maker = _maker_of(headings, str(path), wanted, mapping, joint_names)
+            mapping = mapping if maker is None else maker.mapping
+            places = chosen(headings, str(path), wanted, mapping)
             if file.metadata.num_rows * len(places) > VALUES_MAX:
                 raise RecorderError(f"{path}: more than {VALUES_MAX} values, the limit")
             table = _read(file, [place for place, _ in places.values()])
@@ -279,10 +384,16 @@ def read_parquet(path: Path, wanted: Wanted, mapping: TraceMapping) -> Trace:
             )
         else:
             columns[name] = scale * _numbers(path, column, name)
+    if TIME not in columns:
+        columns[TIME] = mapping.step * np.arange(len(table[0]), dtype=np.float64)
     time = columns.pop(TIME)
     columns = multiplied(columns, mapping)
+    notes: tuple[str, ...] = ()
+    if maker is not None:
+        columns, note = maker.proved(columns, str(path))
+        notes = (note,)
     return Trace(
-        str(path), time, MappingProxyType(columns), MappingProxyType(texts), sampled=mapping.sampled
+        str(path), time, MappingProxyType(columns), MappingProxyType(texts), notes, mapping.sampled
     )
 
 

@@ -9,10 +9,9 @@ import pytest
 
 from ir_description import Cell, Load, load_cell
 from ir_kernels.dynamics import DynamicsModel
-from ir_sim_driver.controller.settings import SimulationSettings
+from ir_sim_driver.controller import SimulationSettings
 from ir_sim_driver.errors import SettingsError
-from ir_sim_driver.plant import BACKENDS, make_backend
-from ir_sim_driver.plant.backend import Backend, Work
+from ir_sim_driver.plant import BACKENDS, Backend, Work, make_backend
 
 SETTINGS = SimulationSettings()
 DT = SETTINGS.dt

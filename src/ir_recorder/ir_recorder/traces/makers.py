@@ -1,0 +1,191 @@
+"""Columns of logs as controllers name them: whose they are, and in which units.
+
+A unit in a heading counts. Without one the unit is the documented one of the maker's format (UR's
+RTDE: rad, s and A; KUKA's AIPos and $AXIS_ACT: degrees, IPOC: ms). Plain names as A1 or J1 are of
+no format: they are degrees where that is proved, as axis 2 or 3 would turn farther than an arm can
+if they were rad. Whatever is taken is said.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from ir_recorder.errors import RecorderError
+from ir_recorder.traces.columns import FACTORS, Column, TraceMapping, unit_of
+from ir_recorder.traces.trace import CURRENT, TIME, VELOCITY
+from ir_values.arrays import FloatArray
+
+_TURN = 2.0 * math.pi
+_ARM = (1, 2)  # the second and third joint: no arm turns them farther than a turn from zero
+
+
+@dataclass(frozen=True)
+class _Family:
+    """Headings of all joints: `name` with {} for the number, which begins at `first`; unit "" where
+    no document gives it; time: heading and unit of the column of time in this format.
+    """
+
+    name: str
+    first: int
+    unit: str
+    of: str
+    time: tuple[str, str] = ("", "")
+    more: tuple[tuple[str, str, str], ...] = ()  # further columns: name, ending, unit
+
+
+_RTDE = (("actual_qd_{}", VELOCITY, "rad/s"), ("actual_current_{}", CURRENT, "a"))
+_FAMILIES = (
+    _Family("actual_q_{}", 0, "rad", "UR's RTDE", ("timestamp", "s"), _RTDE),
+    _Family("actual_q{}", 0, "rad", "UR's RTDE", ("timestamp", "s")),
+    *(
+        _Family(f"aipos{sign}a{{}}", 1, "deg", "KUKA's RSI", ("ipoc", "ms"))
+        for sign in (".", "_", " ", "")
+    ),
+    *(
+        _Family(f"{word}{sign}a{{}}", 1, "deg", "KUKA's $AXIS_ACT", ("ipoc", "ms"))
+        for word in ("$axis_act", "axis_act", "axisact")
+        for sign in (".", "_", " ")
+    ),
+    *(
+        _Family(name, first, "", "")
+        for name in ("a{}", "j{}", "joint{}", "joint_{}", "joint {}", "axis{}", "axis_{}", "q{}")
+        for first in (1, 0)
+    ),
+)
+_TIMES = ("time", "zeit", "t", "timestamp")
+
+
+@dataclass(frozen=True, eq=False)
+class MakersColumns:
+    """What a log's headings mean; joints: those whose unit the values have to prove."""
+
+    mapping: TraceMapping
+    joints: tuple[str, ...]
+    headings: tuple[str, ...]
+    note: str
+
+    def proved(
+        self, columns: Mapping[str, FloatArray], where: str
+    ) -> tuple[dict[str, FloatArray], str]:
+        """The columns in SI, and a sentence on their units. RecorderError where nothing proves a
+        unit.
+        """
+        if not self.joints:
+            return dict(columns), self.note
+        arm = [self.joints[k] for k in _ARM if k < len(self.joints)]
+        reached = {name: float(np.nanmax(np.abs(columns[name]), initial=0.0)) for name in arm}
+        name = max(reached, key=lambda each: reached[each])
+        heading = self.headings[self.joints.index(name)]
+        if not reached[name] > _TURN:
+            raise RecorderError(
+                f"{where}: {self.headings[0]} .. {self.headings[-1]} have no unit, and nothing "
+                f"proves one: write it into the headings, as {self.headings[0]} [deg], or into a "
+                "mapping (--mapping)"
+            )
+        degrees = math.radians(1.0)
+        found = {
+            each: values * degrees if each in self.joints else values
+            for each, values in columns.items()
+        }
+        why = f"{heading} reaches {reached[name]:.4g}, which in rad is more than a turn"
+        return found, f"{self.note}, in degrees: {why}"
+
+
+def makers_columns(
+    headings: Sequence[str], joint_names: Sequence[str], where: str, time: Column | None = None
+) -> MakersColumns | None:
+    """The columns of a known family of headings that has all joints; None where there is none.
+
+    time: the column of that name, where there is one.
+
+    RecorderError for a joint that the robot doesn't have, and for a time without a unit.
+    """
+    places = _by_name(headings)
+    for family in _FAMILIES:
+        found = [places.get(family.name.format(family.first + k)) for k in range(len(joint_names))]
+        if not joint_names or None in found:
+            continue
+        own = [heading for heading in found if heading is not None]
+        extra = places.get(family.name.format(family.first + len(joint_names)))
+        if extra is not None:
+            there = ", ".join(joint_names)
+            raise RecorderError(f"{where}: {extra} is no joint of the robot, which has {there}")
+        return _columns(family, own, joint_names, places, where, time)
+    return None
+
+
+def _columns(
+    family: _Family,
+    own: Sequence[str],
+    joint_names: Sequence[str],
+    places: Mapping[str, str],
+    where: str,
+    time: Column | None,
+) -> MakersColumns:
+    units = [unit_of(heading) or family.unit for heading in own]
+    unproved = "" in units
+    if unproved and any(units):
+        raise RecorderError(f"{where}: only some of {own[0]} .. {own[-1]} have a unit")
+    columns = {TIME: time or _time(family, places, where)}
+    for name, heading, unit in zip(joint_names, own, units, strict=True):
+        columns[name] = Column(heading, FACTORS[unit.lower()] if unit else 1.0)
+    columns.update(_further(family, joint_names, places))
+    said = f"{own[0]} .. {own[-1]} are taken as {joint_names[0]} .. {joint_names[-1]}"
+    if family.of and not unit_of(own[0]):
+        said += f", in {family.unit} as {family.of} gives them"
+    return MakersColumns(
+        TraceMapping(MappingProxyType(columns)),
+        tuple(joint_names) if unproved else (),
+        tuple(own),
+        said,
+    )
+
+
+def _further(
+    family: _Family, joint_names: Sequence[str], places: Mapping[str, str]
+) -> Iterator[tuple[str, Column]]:
+    """Speeds and currents that the format has of all joints."""
+    for pattern, ending, unit in family.more:
+        found = [places.get(pattern.format(family.first + k)) for k in range(len(joint_names))]
+        own = [heading for heading in found if heading is not None]
+        if len(own) == len(joint_names):
+            for name, heading in zip(joint_names, own, strict=True):
+                yield f"{name}{ending}", Column(heading, FACTORS[unit_of(heading) or unit])
+
+
+def _time(family: _Family, places: Mapping[str, str], where: str) -> Column:
+    heading, unit = family.time
+    if heading in places:
+        return Column(places[heading], FACTORS[(unit_of(places[heading]) or unit).lower()])
+    found = next((places[name] for name in _TIMES if name in places), None)
+    if found is None:
+        known = ", ".join(places.values())[:200]
+        raise RecorderError(
+            f"{where}: there is no column time, there is: {known}; a mapping (--mapping) gives the "
+            "step between rows: time: {step: 4, unit: ms}"
+        )
+    unit = unit_of(found)
+    if not unit:
+        raise RecorderError(
+            f"{where}: column {found} has no unit: write it into the heading, as {found} [s], or "
+            "into a mapping (--mapping)"
+        )
+    return Column(found, FACTORS[unit.lower()])
+
+
+def _by_name(headings: Sequence[str]) -> dict[str, str]:
+    """Headings by their lower-case names without a unit; those that stand twice are none."""
+    found: dict[str, str] = {}
+    twice = set()
+    for heading in headings:
+        name = re.sub(r"\s*[\[(].*", "", heading).strip().lower()
+        if name in found:
+            twice.add(name)
+        found[name] = heading
+    return {name: heading for name, heading in found.items() if name not in twice and name}

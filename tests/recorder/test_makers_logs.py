@@ -1,0 +1,199 @@
+"""Logs as controllers write them: names, units and times are those of their makers, and told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ir_recorder.errors import RecorderError
+from ir_recorder.traces import Trace, read_mapping, read_traces
+
+NAMES = tuple(f"joint_a{k}" for k in range(1, 7))
+HOME = np.array([0.0, -90.0, 90.0, 0.0, 30.0, 0.0])  # deg
+COUNT = 40
+
+
+def degrees() -> np.ndarray:
+    """Rows (COUNT, 6) of a small motion [deg]."""
+    share = np.linspace(0.0, 1.0, COUNT)[:, None]
+    return HOME + 20.0 * share * np.arange(1, 7)
+
+
+def table(path: Path, headings: list[str], rows: np.ndarray, sign: str = ",") -> Path:
+    lines = [sign.join(headings)] if headings else []
+    lines += [sign.join(f"{value:.9g}" for value in row) for row in rows]
+    path.write_text("\n".join([*lines, ""]))
+    return path
+
+
+def read(path: Path, mapping: Path | None = None) -> Trace:
+    (trace,) = read_traces(path, read_mapping(mapping) if mapping else None, NAMES)
+    return trace
+
+
+def timed(step: float, values: np.ndarray) -> np.ndarray:
+    return np.column_stack([step * np.arange(len(values)), values])
+
+
+def check(trace: Trace, step: float) -> None:
+    assert trace.time - trace.time[0] == pytest.approx(step * np.arange(COUNT), abs=1e-6)
+    for k, name in enumerate(NAMES):
+        assert trace.columns[name] == pytest.approx(np.radians(degrees()[:, k]), abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("time", "pattern", "first", "unit", "scale"),
+    [
+        ("timestamp", "actual_q_{}", 0, 1.0, 1.0),
+        ("IPOC", "AIPos.A{}", 1, 180 / np.pi, 1e3),
+        ("Time [ms]", "AXIS_ACT.A{} [deg]", 1, 180 / np.pi, 1e3),
+        ("Zeit [s]", "$AXIS_ACT_A{}", 1, 180 / np.pi, 1.0),
+        ("time", "A{}", 1, 180 / np.pi, 1.0),
+        ("time", "A{} [rad]", 1, 1.0, 1.0),
+        ("time", "a{} (deg)", 1, 180 / np.pi, 1.0),
+        ("time_ms", "J{}", 1, 180 / np.pi, 1e3),
+    ],
+)
+def test_headings_of_makers(
+    tmp_path: Path, time: str, pattern: str, first: int, unit: float, scale: float
+) -> None:
+    rows = timed(0.004 * scale, np.radians(degrees()) * unit)
+    path = table(tmp_path / "log.csv", [time, *(pattern.format(first + k) for k in range(6))], rows)
+    trace = read(path)
+    check(trace, 0.004)
+    (note,) = trace.problems
+    assert "are taken as joint_a1 .. joint_a6" in note
+
+
+def test_plain_names_are_degrees_only_where_that_is_proved(tmp_path: Path) -> None:
+    headings = ["time", *(f"A{k}" for k in range(1, 7))]
+    (note,) = read(table(tmp_path / "deg.csv", headings, timed(0.01, degrees()))).problems
+    assert "which in rad is more than a turn" in note
+    radians = table(tmp_path / "rad.csv", headings, timed(0.01, np.radians(degrees())))
+    with pytest.raises(RecorderError, match=r"nothing proves one: .*A1 \[deg\]"):
+        read(radians)
+
+
+@given(scale=st.floats(0.0, 0.999))
+def test_what_may_be_radians_is_never_taken_as_degrees(
+    tmp_path_factory: pytest.TempPathFactory, scale: float
+) -> None:
+    """Axes 2 and 3 of an arm stay within a turn: values that do prove nothing."""
+    values = scale * 2.0 * np.pi * np.cos(np.outer(np.arange(COUNT), np.arange(1, 7)))
+    headings = ["time", *(f"A{k}" for k in range(1, 7))]
+    path = table(tmp_path_factory.mktemp("log") / "a.csv", headings, timed(0.01, values))
+    with pytest.raises(RecorderError, match="nothing proves one"):
+        read(path)
+
+
+@pytest.mark.parametrize(
+    ("headings", "said"),
+    [
+        (["time", "A1", "A2", "A3", "A4", "A5", "A6", "A7"], "A7 is no joint"),
+        (["time", "A1 [deg]", "A2", "A3", "A4", "A5", "A6"], "only some of"),
+        (["Time", "A1", "A2", "A3", "A4", "A5", "A6"], "column Time has no unit"),
+        (["A1", "A2", "A3", "A4", "A5", "A6"], "time: {step"),
+    ],
+)
+def test_what_is_not_clear_is_refused(tmp_path: Path, headings: list[str], said: str) -> None:
+    rows = np.tile(np.arange(COUNT)[:, None], (1, len(headings))) * 1.0
+    path = table(tmp_path / "log.csv", headings, rows)
+    with pytest.raises(RecorderError, match=said):
+        read(path).joints(NAMES)
+
+
+def test_columns_by_number_and_a_step(tmp_path: Path) -> None:
+    mapping = tmp_path / "mapping.yaml"
+    joints = "".join(f"  {name}: {{column: {k}, unit: deg}}\n" for k, name in enumerate(NAMES, 2))
+    mapping.write_text(f"format: ir_trace/1\ncolumns:\n  time: {{column: 1, unit: ms}}\n{joints}")
+    check(read(table(tmp_path / "bare.csv", [], timed(8.0, degrees())), mapping), 0.008)
+    joints = "".join(f"  {name}: {{column: {k}, unit: deg}}\n" for k, name in enumerate(NAMES, 1))
+    mapping.write_text(f"format: ir_trace/1\ncolumns:\n  time: {{step: 8, unit: ms}}\n{joints}")
+    check(read(table(tmp_path / "timeless.csv", [], degrees()), mapping), 0.008)
+    with pytest.raises(RecorderError, match="7 columns without headings"):
+        read(tmp_path / "bare.csv")
+    mapping.write_text(mapping.read_text().replace("column: 6", "column: 7"))
+    with pytest.raises(RecorderError, match="no column 7"):
+        read(tmp_path / "timeless.csv", mapping)
+
+
+@pytest.mark.parametrize("step", ["0", "-1", "true", "x", "1e9", ".nan"])
+def test_a_step_that_is_none_is_refused(tmp_path: Path, step: str) -> None:
+    mapping = tmp_path / "mapping.yaml"
+    mapping.write_text(f"format: ir_trace/1\ncolumns:\n  time: {{step: {step}}}\n  joint_a1: 1\n")
+    with pytest.raises(RecorderError, match="time"):
+        read_mapping(mapping)
+
+
+def rsi(rows: np.ndarray, clock: int = 4208163632) -> str:
+    packets = []
+    for k, row in enumerate(rows):
+        axes = " ".join(f'A{i}="{value:.7f}"' for i, value in enumerate(row, 1))
+        packets.append(
+            f'<Rob Type="KUKA"><RIst X="1.0" A="9.0"/>\n<AIPos {axes}/><EIPos E1="{k}.0"/>'
+            f"<IPOC>{clock + 4 * k}</IPOC></Rob>\n"
+        )
+    return "".join(packets)
+
+
+def test_packets_of_rsi(tmp_path: Path) -> None:
+    path = tmp_path / "rsi.xml"
+    path.write_text(rsi(degrees()))
+    trace = read(path)
+    check(trace, 0.004)
+    assert any("external axes E1 move" in each for each in trace.problems)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ('A4="', 'A9="', r"rsi.xml:5: this packet of RSI has no AIPos A4"),
+        ("IPOC>4208163640", "IPOC>soon", r"rsi.xml:5: IPOC is 'soon'"),
+        ("</Rob>", "", "no packet of RSI"),
+    ],
+)
+def test_a_damaged_packet_is_named(tmp_path: Path, before: str, after: str, said: str) -> None:
+    path = tmp_path / "rsi.xml"
+    text = rsi(degrees())
+    third = text.index("<Rob", text.index("<Rob", 10) + 1)
+    changed = (
+        text.replace(before, after)
+        if not after
+        else (text[:third] + text[third:].replace(before, after, 1))
+    )
+    path.write_text(changed)
+    with pytest.raises(RecorderError, match=said):
+        read(path)
+
+
+def kuka_trace(path: Path, rows: np.ndarray, name: str = "A{}", unit: str = "deg") -> Path:
+    channel = "#BEGINCHANNELHEADER\n200,{}\n202,{}\n210,{}\n{}220,{}\n{}#ENDCHANNELHEADER\n"
+    text = "DIAEXTENDED {@:ENGLISH\n#BEGINGLOBALHEADER\n1,WINDOWS 32Bit\n#ENDGLOBALHEADER\n"
+    text += channel.format("Zeit", "s", "IMPLIZIT", "", len(rows), "240,0\n241,0.012\n")
+    for k in range(6):
+        own = f"211,{path.stem.upper()}.r64\n213,BLOCK\n214,REAL64\n"
+        text += channel.format(
+            name.format(k + 1), unit, "EXPLIZIT", own, len(rows), f"221,{k + 1}\n240,0\n241,0.5\n"
+        )
+    path.write_text(text)
+    path.with_suffix(".r64").write_bytes((2.0 * rows).astype("<f8").tobytes())
+    return path
+
+
+def test_a_trace_of_a_kuka_controller(tmp_path: Path) -> None:
+    check(read(kuka_trace(tmp_path / "ipo.dat", degrees())), 0.012)
+
+
+def test_a_trace_that_was_cut_or_lacks_its_numbers_is_refused(tmp_path: Path) -> None:
+    path = kuka_trace(tmp_path / "ipo.dat", degrees())
+    numbers = path.with_suffix(".r64")
+    numbers.write_bytes(numbers.read_bytes()[:-48])
+    with pytest.raises(RecorderError, match="was it cut"):
+        read(path)
+    numbers.unlink()
+    with pytest.raises(RecorderError, match="is not beside the header"):
+        read(path)
