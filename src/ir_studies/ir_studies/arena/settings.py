@@ -105,9 +105,13 @@ class ArenaSettings:
         checked_known("timings", self.timings, TIMINGS)
         priced = self.time_value != ROBOTS_TIME_VALUE
         checked_numbers(self, _WHOLE, (*_REAL, _PRICE) if priced else _REAL)
+        lacking: dict[str, list[str]] = {}
         for name in self.planners:
-            if name in SEARCHES and (how := not_installed(SEARCHES[name])):
-                raise SettingsError(f"planners: {name}: {how}")
+            if name in SEARCHES:
+                lacking.setdefault(not_installed(SEARCHES[name]), []).append(name)
+        for how, names in lacking.items():
+            if how:
+                raise SettingsError(f"planners: {', '.join(names)}: {how}")
         self._check_cells()
 
     @property
