@@ -123,6 +123,10 @@ def options_with(options: PlanOptions | None, changes: OptionFields) -> PlanOpti
         return replace(options or PlanOptions(), **changes)
     except InvalidValueError as error:
         raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, str(error)) from error
+    except (TypeError, ValueError) as error:
+        given = ", ".join(f"{name}={value!r}"[:80] for name, value in changes.items())
+        sentence = f"options {given}: one has a value of no fitting type: {error}"
+        raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, sentence) from error
 
 
 class Planner:
@@ -283,6 +287,8 @@ class Planner:
     ) -> Standby:
         """How to spend a pause [s] at q (n,), None: machine home, or at one of the postures."""
         scene = self.scene(load)
+        if q is not None:
+            q = within_limits(q, scene.cell, "q", StatusCode.INVALID_ROBOT_STATE)
         options = PlanOptions(load=scene.load_text)
 
         def plan(start: FloatArray, goal: Goal) -> MovementPlan:
@@ -449,11 +455,14 @@ class Planner:
         """The goal as a value, joint values within their limits. Raises RequestError."""
         if isinstance(goal, str):
             return parse_goal(goal, self.cell)
+        if goal is None:
+            raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, "goal is None: give one")
         if not isinstance(goal, Goal):
             goal = Goal(pose=goal) if np.shape(goal) == (4, 4) else Goal(configuration=goal)
         if goal.configuration is None:
             return goal
-        q = self._joint_values(goal.configuration, "goal", StatusCode.GOAL_STATE_INVALID)
+        code = StatusCode.GOAL_STATE_INVALID
+        q = within_limits(goal.configuration, self.cell, "goal", code)
         return replace(goal, configuration=q)
 
     def _configuration(self, place: Place | None, what: str, code: StatusCode) -> FloatArray:
@@ -469,14 +478,7 @@ class Planner:
             raise RequestError(
                 code, f"{what} is a pose: joint values or a posture must be given, see compute_ik"
             )
-        return self._joint_values(q, what, code)
-
-    def _joint_values(self, q: FloatArray, what: str, code: StatusCode) -> FloatArray:
-        """Joint values of the cell's robot within their limits. Raises RequestError."""
-        n = self.cell.robot.n
-        if np.shape(q) != (n,):
-            raise RequestError(code, f"{what} has shape {np.shape(q)}: it must be ({n},)")
-        return within_limits(np.asarray(q, dtype=np.float64), self.cell, what, code)
+        return within_limits(q, self.cell, what, code)
 
     def _remember(self, plan: ProgramPlan) -> None:
         for movement in plan.movements:

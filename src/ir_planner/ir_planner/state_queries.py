@@ -12,7 +12,7 @@ from ir_msgs_py.status import StatusCode
 from ir_planner.checks import StateCheck, state_check
 from ir_planner.errors import RequestError
 from ir_planner.program import with_doors
-from ir_planner.request import bounded, safety_distance, within_limits
+from ir_planner.request import bounded, joint_values, safety_distance, within_limits
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
 
 PAIRS_MAX = 1000
@@ -58,6 +58,7 @@ def asked_states(scene: PlanningScene, q: FloatArray, margin: float, station: st
             f"states has {len(q)} states: it must be 1 to {STATES_MAX}",
         )
     robot = scene.cell.robot
+    q = joint_values(q, (len(q), robot.n), "states", StatusCode.INVALID_ROBOT_STATE)
     low = robot.position_min - LIMIT_TOLERANCE
     high = robot.position_max + LIMIT_TOLERANCE
     bad = np.flatnonzero(~((q >= low) & (q <= high)).all(axis=1))

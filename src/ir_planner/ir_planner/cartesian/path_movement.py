@@ -129,7 +129,7 @@ def _best_at(asked: Asked, layers: Layers) -> DrivenPath:
             raise reason or error from error
         with journal.stage("proof") as notes:
             for one in sorted(driven, key=lambda one: one.movement.coarse_cost):
-                one = within_limits(asked, one)
+                one = farther_from_limits(asked, one)
                 violation = one.movement.violation
                 if violation is None:
                     return one
@@ -204,7 +204,7 @@ def _worth(chain: Chain, driven: list[DrivenPath], objective: str) -> bool:
     return not (by_joules and known and chain.joules > min(known) * _COSTLIER + _COSTLIER_J)
 
 
-def within_limits(asked: Asked, one: DrivenPath) -> DrivenPath:
+def farther_from_limits(asked: Asked, one: DrivenPath) -> DrivenPath:
     """The same with more distance from the limits where the interpolant between points exceeds
     one.
     """

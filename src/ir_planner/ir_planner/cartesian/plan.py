@@ -20,8 +20,8 @@ from ir_planner.cartesian.path_movement import (
     T1_SPEED,
     DrivenPath,
     best_along,
+    farther_from_limits,
     timed,
-    within_limits,
 )
 from ir_planner.cartesian.path_parts import parts_of
 from ir_planner.cartesian.tool_error import Kept, kept_of
@@ -38,7 +38,7 @@ from ir_planner.checks import FreeSpace
 from ir_planner.curves import extremes
 from ir_planner.errors import RequestError
 from ir_planner.presentation import plot_trajectory, result_text
-from ir_planner.request import Context, checked_options, chosen
+from ir_planner.request import Context, checked_options, chosen, within_limits
 from ir_planner.timing import Movement
 
 # What a request for a Cartesian path is answered with.
@@ -202,7 +202,7 @@ def choices_along(
     for chain in _different(whole):
         context.work.check()
         try:
-            driven = within_limits(whole.asked, timed(whole.asked, chain))
+            driven = farther_from_limits(whole.asked, timed(whole.asked, chain))
             if driven.movement.certified:
                 whole.kept(driven)
                 found.append(driven)
@@ -342,7 +342,8 @@ def _planned(
     path: CartesianPath, start: FloatArray | None, t1: bool, context: Context
 ) -> CartesianPlan:
     if start is not None:
-        start = _checked_start(start, context)
+        cell = context.scene.cell
+        start = within_limits(start, cell, "start", StatusCode.START_STATE_INVALID)
     whole = drawn(path, start, t1, context)
     found = best_along(whole.asked, whole.layers)
     with context.journal.stage("tool error"):
@@ -362,30 +363,6 @@ def _planned(
         whole.lengths,
         len(whole.layers.q),
     )
-
-
-def _checked_start(start: FloatArray, context: Context) -> FloatArray:
-    """The configuration (n,) that is given, within the axis limits. Raises RequestError."""
-    robot = context.scene.cell.robot
-    q = np.asarray(start, dtype=float)
-    if q.shape != (robot.n,) or not np.isfinite(q).all():
-        raise RequestError(
-            StatusCode.START_STATE_INVALID,
-            f"start has shape {q.shape}: it must be {robot.n} finite angles in rad",
-        )
-    over = np.maximum(q - robot.position_max, robot.position_min - q)
-    if over.max() > _ROUNDED:
-        j = int(np.argmax(over))
-        low, high = np.degrees([robot.position_min[j], robot.position_max[j]])
-        raise RequestError(
-            StatusCode.START_STATE_INVALID,
-            f"{robot.joint_names[j]} of start is {np.degrees(q[j]):.2f} deg: "
-            f"it must be in [{low:g}, {high:g}] deg",
-        )
-    return q
-
-
-_ROUNDED = 1e-9  # rad
 
 
 def heading_status(error: HeadingError) -> Status:

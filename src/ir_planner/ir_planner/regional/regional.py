@@ -31,7 +31,7 @@ from ir_planner.regional.safeguards import (
     over_free_steps,
     with_own_laws,
 )
-from ir_planner.request import Context, Goal, Journal
+from ir_planner.request import Context, Goal, Journal, within_limits
 from ir_planner.scene import STILL, path_cost
 from ir_planner.search import Ends, fewest_corners, pulled
 from ir_planner.timing import Movement, check_requested
@@ -106,9 +106,17 @@ def plan_regional(
     """Movement from start (n,) to a goal (n,), or to the best reachable of goals (G, n), cheapest
     by W first.
 
-    All within the limits. Raises RequestError for options that can't be met (duration),
+    Raises RequestError for ends beyond a limit and for options that can't be met (duration),
     CancelledError when asked to stop.
     """
+    cell = context.scene.cell
+    start = within_limits(start, cell, "start", StatusCode.START_STATE_INVALID)
+    goals = np.array(
+        [
+            within_limits(goal, cell, "goal", StatusCode.GOAL_STATE_INVALID)
+            for goal in np.atleast_2d(goals)
+        ]
+    )
     status, found = search_regional(start, goals, context, searches)
     info = context.journal.info(start, context.joint_names)
     if found is None:

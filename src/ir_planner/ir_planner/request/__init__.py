@@ -10,7 +10,14 @@ from ir_planner.request.bounds import (
     safety_distance,
 )
 from ir_planner.request.context import Clock, Context, Journal, Work, noted
-from ir_planner.request.goals import POSTURES, Goal, one_goal, parse_goal, within_limits
+from ir_planner.request.goals import (
+    POSTURES,
+    Goal,
+    joint_values,
+    one_goal,
+    parse_goal,
+    within_limits,
+)
 
 __all__ = [
     "DURATION_MAX",
@@ -25,6 +32,7 @@ __all__ = [
     "checked_options",
     "chosen",
     "examinable",
+    "joint_values",
     "noted",
     "one_goal",
     "parse_goal",

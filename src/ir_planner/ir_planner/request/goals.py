@@ -9,6 +9,7 @@ import re
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ir_description import LIMIT_TOLERANCE, Cell
 from ir_description.poses import rotation_from_abc
@@ -104,11 +105,24 @@ def _pose(values: list[float]) -> FloatArray:
     return pose
 
 
-def within_limits(q: FloatArray, cell: Cell, what: str, code: StatusCode) -> FloatArray:
+def joint_values(q: ArrayLike, shape: tuple[int, ...], what: str, code: StatusCode) -> FloatArray:
+    """Numbers of this shape. Raises RequestError."""
+    try:
+        values = np.asarray(q, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise RequestError(code, f"{what} has values that are no numbers: {error}") from error
+    if values.shape != shape:
+        raise RequestError(code, f"{what} has shape {values.shape}: it must be {shape}")
+    return values
+
+
+def within_limits(q: ArrayLike, cell: Cell, what: str, code: StatusCode) -> FloatArray:
     """Joint values (n,) rad within the robot's limits; those at most LIMIT_TOLERANCE beyond one are
-    at it. RequestError with joint, value, bounds and excess in degrees for others.
+    at it. RequestError with joint, value, bounds and excess in degrees for others, and for what are
+    no n numbers.
     """
     robot = cell.robot
+    q = joint_values(q, (robot.n,), what, code)
     for i, value in enumerate(q):
         low = float(robot.position_min[i])
         high = float(robot.position_max[i])
