@@ -190,3 +190,30 @@ def test_a_figure_without_source_or_sense_is_refused(old: str, new: str, sentenc
         i for i, text in enumerate(ROBOT_TEXT.replace(old, new, 1).split("\n"), 1) if new in text
     )
     assert caught.value.line == line
+
+
+def with_coupling(rows: str) -> RobotModel:
+    line = f"drives:\n  wrist_coupling: {{value: {rows}, source: sheet, confidence: H}}\n"
+    return robot_from_yaml(ROBOT_TEXT.replace("drives:\n", line, 1))
+
+
+def test_a_wrist_coupling_is_read_and_none_is_the_default(robot: RobotModel) -> None:
+    turns = np.eye(6)
+    turns[5, 4], turns[4, 3] = 1.0, -0.5
+    coupled = with_coupling("[[6, 5, 1.0], [5, 4, -0.5]]")
+    assert np.array_equal(coupled.motor_turns, turns)
+    assert coupled.coupled
+    assert not robot.coupled
+
+
+@pytest.mark.parametrize(
+    ("rows", "sentence"),
+    [
+        ("[[6, 6, 1.0]]", "couples motor 6 with axis 6"),
+        ("[[7, 5, 1.0]]", "couples motor 7 with axis 5"),
+        ("[[6, 5, 1.0], [5, 6, 1.0]]", "so that motors do not determine them"),
+    ],
+)
+def test_a_coupling_that_is_none_is_refused(rows: str, sentence: str) -> None:
+    with pytest.raises(RobotFileError, match=sentence):
+        with_coupling(rows)

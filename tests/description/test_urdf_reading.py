@@ -261,3 +261,26 @@ def test_capsules_hold_their_triangles_and_stand_out_by_no_more_than_they_say(se
             surface = surface[~inside]
         beyond = surface @ hull.equations[:, :3].T + hull.equations[:, 3]
         assert beyond.max(initial=0.0) <= fit.overhang
+
+
+@pytest.mark.parametrize(
+    ("kind", "rows"),
+    [
+        ("FourBarLinkageTransmission", "[[6, 5, 0.5]]"),
+        ("DifferentialTransmission", "[[5, 6, 0.5], [6, 5, -2]]"),
+    ],
+)
+@pytest.mark.parametrize("wrapped", ["{}", '<ros2_control name="x">{}</ros2_control>'])
+def test_a_transmission_that_couples_motors_is_proposed_as_the_sheet_says_it(
+    kind: str, rows: str, wrapped: str
+) -> None:
+    tag = "plugin" if "ros2" in wrapped else "type"
+    joints = "".join(
+        f'<joint name="{name}"><role>joint{k}</role><mechanicalReduction>{n}</mechanicalReduction>'
+        "</joint>"
+        for k, name, n in ((2, "j6", 2), (1, "j5", 4))
+    )
+    text = f'<transmission name="wrist"><{tag}>transmission_interface/{kind}</{tag}>{joints}'
+    arm = urdf_arm(arm_text(wrapped.format(f"{text}</transmission>")), "arm.urdf")
+    (note,) = (note for note in arm.notes if "j5 and j6 share" in note)
+    assert f"wrist_coupling: {{value: {rows}," in note

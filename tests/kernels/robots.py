@@ -5,7 +5,7 @@ Masses, drives and counterbalance of the KR 210: machine data of the KR C4 and
 kroshu/kuka_robot_descriptions.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -60,6 +60,11 @@ class RobotLiteral:
     capsules: tuple[Any, ...] = ()
     self_pairs: tuple[tuple[str, str], ...] = ()
     load_self_capsules: tuple[str, ...] = field(default=())
+    motor_turns: Any = None
+
+    def __post_init__(self) -> None:
+        if self.motor_turns is None:
+            object.__setattr__(self, "motor_turns", np.eye(len(self.link_mass) - 1))
 
 
 def _translations(offsets: list[list[float]]) -> FloatArray:
@@ -188,6 +193,17 @@ def random_chain(rng: np.random.Generator, n: int) -> RobotLiteral:
     )
 
 
+def coupled(robot: RobotLiteral, seed: int) -> RobotLiteral:
+    """The robot with motors that turn with other joints as well, each with one or two."""
+    rng = np.random.default_rng(seed)
+    n = len(robot.link_mass) - 1
+    turns = np.eye(n)
+    for motor in range(1, n):
+        turns[motor, motor - 1] = rng.uniform(-1.0, 1.0)
+    turns[0, -1] += 0.3 if n > 1 else 0.0
+    return replace(robot, motor_turns=turns)
+
+
 def power_gradients(
     model: DynamicsModel, q: FloatArray, qd: FloatArray, qdd: FloatArray
 ) -> Gradients:
@@ -195,9 +211,10 @@ def power_gradients(
     torque = model.inverse_dynamics(q, qd, qdd)
     of = model.torque_gradients(q, qd, qdd)
     data = model.data
-    per_torque = (qd + 2.0 * data.copper_loss / data.gear_ratio**2 * torque)[:, :, None]
+    turns = data.coupling.turns
+    per_torque = (qd @ turns.T + 2.0 * data.copper_loss / data.gear_ratio**2 * torque)[:, :, None]
     return Gradients(
         per_torque * of.q,
-        per_torque * of.qd + torque[:, :, None] * np.eye(model.n),
+        per_torque * of.qd + torque[:, :, None] * turns,
         per_torque * of.qdd,
     )

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 from geometry_cases import CAPSULES, COLUMNS, KR210, SELF_PAIRS, TCP, Body, Capsule, every_kind
-from robots import RobotLiteral, kr210, random_chain, tool_155
+from robots import RobotLiteral, coupled, kr210, random_chain, tool_155
 from scipy.interpolate import BSpline
 
 from ir_kernels import Chain, CollisionModel, DynamicsModel, SplineCost, SplineTerms
@@ -49,12 +49,15 @@ def kr210_cost(
     )
 
 
-def chain_models(seed: int, n: int) -> tuple[RobotLiteral, CollisionModel, DynamicsModel]:
+def chain_models(
+    seed: int, n: int, *, wrist: bool = False
+) -> tuple[RobotLiteral, CollisionModel, DynamicsModel]:
     """A random chain without a counterbalance, a capsule on each link, among bodies of all
-    kinds.
+    kinds; wrist: with coupled motors.
     """
     rng = np.random.default_rng(seed)
     robot = random_chain(rng, n)
+    robot = coupled(robot, seed) if wrist else robot
     capsules = [
         Capsule(f"c{k}", k, rng.normal(0.0, 0.2, 3), rng.normal(0.0, 0.2, 3), 0.05)
         for k in range(1, n + 1)

@@ -110,9 +110,11 @@ def test_the_cost_is_what_it_says(core: Any, seed: int, regeneration: Regenerati
         assert cost.value(control, interval, row).value == pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.parametrize("n", [1, 4, 8, 16])
-def test_the_cost_of_other_robots_is_what_it_says(core: Any, n: int) -> None:
-    robot, collision, _ = chain_models(n, n)
+@pytest.mark.parametrize(
+    ("n", "wrist"), [(1, False), (4, False), (6, True), (7, True), (8, False), (16, False)]
+)
+def test_the_cost_of_other_robots_is_what_it_says(core: Any, n: int, wrist: bool) -> None:
+    robot, collision, _ = chain_models(n, n, wrist=wrist)
     robot = plain(robot)
     dynamics = DynamicsModel(robot)
     t = terms(robot, len(collision.pairs), threshold=np.full((1, len(collision.pairs)), 0.1))
@@ -253,9 +255,11 @@ def test_derivatives_are_those_of_differences(
     check_derivatives(cost, control, interval, rng.integers(0, 2, 9), seed, directions(core))
 
 
-@pytest.mark.parametrize("n", [1, 3, 7])
-def test_derivatives_of_other_robots_are_those_of_differences(core: Any, n: int) -> None:
-    robot, collision, dynamics = chain_models(10 + n, n)
+@pytest.mark.parametrize(("n", "wrist"), [(1, False), (3, False), (6, True), (7, False), (7, True)])
+def test_derivatives_of_other_robots_are_those_of_differences(
+    core: Any, n: int, wrist: bool
+) -> None:
+    robot, collision, dynamics = chain_models(10 + n, n, wrist=wrist)
     t = terms(robot, len(collision.pairs), threshold=np.full((1, len(collision.pairs)), 0.1))
     cost = SplineCost(collision, dynamics, t, core=core)
     check_derivatives(cost, motion(n, 8, n), 0.2, np.zeros(5, int), n, directions(core))

@@ -192,12 +192,11 @@ def _controller(robot: RobotModel) -> Iterator[Remark]:
 
 
 def _wrist(robot: RobotModel) -> Iterator[Remark]:
-    if robot.coupled:
-        yield Remark(
-            "warning",
-            "wrist_coupling",
-            "is counted by ir energy fit; plans and the simulated robot leave it out",
-        )
+    turns = robot.motor_turns - np.eye(robot.n)
+    pairs = [f"motor {i + 1} with axis {j + 1}" for i, j in np.argwhere(turns).tolist()]
+    if pairs:
+        said = f"turning {', '.join(pairs)}: torques, limits and losses are those of the motors"
+        yield Remark("note", "wrist_coupling", said)
 
 
 def _marks(robot: RobotModel) -> Iterator[Remark]:

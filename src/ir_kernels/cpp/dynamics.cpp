@@ -37,6 +37,9 @@ core::ChainInput input_of(const py::object& data) {
   in.copper = flat(data, "copper_loss");
   in.envelope_speed = flat(data, "envelope_speed");
   in.envelope_torque = flat(data, "envelope_torque");
+  const py::object coupling = data.attr("coupling");
+  in.turns = flat(coupling, "turns");
+  in.inverse = flat(coupling, "inverse");
   in.knots = static_cast<int>(in.envelope_speed.size()) / in.n;
   const py::object cylinder = data.attr("counterbalance");
   if (!cylinder.is_none()) {
@@ -81,7 +84,7 @@ class Dynamics : public core::Core {
     });
   }
   py::tuple torque_limit(const Array& qd) const {
-    return run(qd, {}, [&](double* limit) { return envelope.limits(qd.data(), qd.shape(0), limit); });
+    return run(qd, {}, [&](double* limit) { return envelope.limits(model, qd.data(), qd.shape(0), limit); });
   }
   py::tuple axis_power(const Array& qd, const Array& tau) const {
     return run(qd, {&tau}, [&](double* power) {

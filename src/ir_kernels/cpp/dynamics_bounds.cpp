@@ -82,7 +82,7 @@ TorqueBounds torque_bounds(const Model<double>& m, const Envelope& envelope, con
     upper_of.assign(pieces.size() * n, 0.0);
     for (std::size_t first = 0; first < pieces.size(); first += kLanes) {
       Batch batch;
-      const std::size_t used = fill(batch, pieces, first, coefficients, n, terms);
+      const std::size_t used = fill(m, batch, pieces, first, coefficients, terms);
       double upper[kMaxJoints][kLanes], ratio[kMaxJoints][kLanes];
       upper_ratios(m, envelope, batch, terms, upper);
       for (std::size_t l = 0; l < used; ++l)

@@ -6,14 +6,29 @@
 
 namespace ir::dynamics {
 
+namespace {
+
+// Speeds of the motors where the joints turn at qd.
+struct MotorSpeed {
+  double w[kMaxJoints];
+  MotorSpeed(const Model<double>& m, const double* qd) {
+    std::copy(qd, qd + m.n, w);
+    if (m.coupling.any) multiply(m.n, m.coupling.turns, w);
+  }
+};
+
+}  // namespace
+
 bool axis_power(const Model<double>& m, const double* qd, const double* tau, long N, double* power) {
   bool finite = true;
-  for (long k = 0; k < N; ++k)
+  for (long k = 0; k < N; ++k) {
+    const MotorSpeed speed(m, qd + k * m.n);
     for (int i = 0; i < m.n; ++i) {
-      const double p = axis_power(m.drive[i], tau[k * m.n + i], qd[k * m.n + i]);
+      const double p = axis_power(m.drive[i], tau[k * m.n + i], speed.w[i]);
       power[k * m.n + i] = p;
       finite &= p - p == 0.0;
     }
+  }
   return finite;
 }
 
@@ -35,11 +50,14 @@ double Envelope::least(int joint, double slowest, double fastest) const {
   return least;
 }
 
-bool Envelope::limits(const double* qd, long N, double* limit) const {
+bool Envelope::limits(const Model<double>& m, const double* qd, long N, double* limit) const {
   bool finite = true;
-  for (long k = 0; k < N * n_; ++k) {
-    limit[k] = this->limit(static_cast<int>(k % n_), std::abs(qd[k]));
-    finite &= qd[k] - qd[k] == 0.0;
+  for (long k = 0; k < N; ++k) {
+    const MotorSpeed speed(m, qd + k * n_);
+    for (int i = 0; i < n_; ++i) {
+      limit[k * n_ + i] = this->limit(i, std::abs(speed.w[i]));
+      finite &= speed.w[i] - speed.w[i] == 0.0;
+    }
   }
   return finite;
 }

@@ -19,7 +19,7 @@ struct Piece {
 struct Batch {
   Doubles begin, end;
   Doubles c[kMaxJoints][kMaxTerms];
-  bool rests[kMaxJoints][kLanes];  // the joint doesn't move at all in the segment
+  bool rests[kMaxJoints][kLanes];  // the motor doesn't move at all in the segment
 };
 
 inline Interval evaluate(const Interval* a, int terms, const Interval& x) {
@@ -50,18 +50,25 @@ inline Motion enclose(const Doubles* c, int terms, Doubles middle, const Interva
   return motion;
 }
 
-// Everything of the torque but Coulomb friction.
+// Everything of the motors' torque but Coulomb friction; qd and qdd of the joints become those of the motors.
 template <class S>
-void smooth_torque(const Model<double>& m, const S* sn, const S* cs, const S* qd, const S* qdd, S* tau) {
+void smooth_torque(const Model<double>& m, const S* sn, const S* cs, S* qd, S* qdd, S* tau) {
   newton_euler(m, sn, cs, qd, qdd, tau);
-  for (int i = 0; i < m.n; ++i) tau[i] = tau[i] + qdd[i] * m.drive[i].rotor + qd[i] * m.drive[i].viscous;
   const int b = m.balance.joint;
-  if (b >= 0) tau[b] = tau[b] - balance_torque(m.balance, sn[b], cs[b]);
+  if (m.coupling.any) {
+    if (b >= 0) tau[b] = tau[b] - balance_torque(m.balance, sn[b], cs[b]);
+    multiply<true>(m.n, m.coupling.inverse, tau);
+    multiply(m.n, m.coupling.turns, qd);
+    multiply(m.n, m.coupling.turns, qdd);
+  }
+  for (int i = 0; i < m.n; ++i) tau[i] = tau[i] + qdd[i] * m.drive[i].rotor + qd[i] * m.drive[i].viscous;
+  if (b >= 0 && !m.coupling.any) tau[b] = tau[b] - balance_torque(m.balance, sn[b], cs[b]);
 }
 
 // Pieces `first` onwards as a batch; how many of them are used. coefficients (S, n, terms).
-inline std::size_t fill(Batch& batch, const std::vector<Piece>& pieces, std::size_t first, const double* coefficients,
-                        int n, int terms) {
+inline std::size_t fill(const Model<double>& m, Batch& batch, const std::vector<Piece>& pieces, std::size_t first,
+                        const double* coefficients, int terms) {
+  const int n = m.n;
   const std::size_t used = std::min<std::size_t>(kLanes, pieces.size() - first);
   for (std::size_t l = 0; l < kLanes; ++l) {
     const Piece& p = pieces[first + std::min(l, used - 1)];
@@ -73,10 +80,17 @@ inline std::size_t fill(Batch& batch, const std::vector<Piece>& pieces, std::siz
       for (int k = 0; k < terms; ++k) batch.c[i][k][l] = c[k];
     }
   }
+  if (!m.coupling.any) return used;
+  bool moves[kMaxJoints];
+  for (std::size_t l = 0; l < kLanes; ++l) {
+    for (int j = 0; j < n; ++j) moves[j] = !batch.rests[j][l];
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) batch.rests[i][l] = (j == 0 || batch.rests[i][l]) && !(moves[j] && m.coupling.turns[i][j] != 0.0);
+  }
   return used;
 }
 
-// Speed and acceleration, and the torque but for Coulomb friction: at the middles of the pieces, and over them.
+// Speed and acceleration of the motors, and their torque but for Coulomb friction: at the middles of the pieces, and over them.
 struct Enclosure {
   Interval step;  // t - m
   Interval speed0[kMaxJoints], torque0[kMaxJoints];
@@ -111,12 +125,12 @@ inline Enclosure enclose(const Model<double>& m, const Batch& batch, int terms) 
   return found;
 }
 
-// Coulomb friction of a joint over the pieces: of either sign where its speed may vanish, none where it rests.
-inline Interval coulomb(const Model<double>& m, const Batch& batch, int joint, const Interval& speed) {
+// Coulomb friction of a motor over the pieces: of either sign where its speed may vanish, none where it rests.
+inline Interval coulomb(const Model<double>& m, const Batch& batch, int motor, const Interval& speed) {
   Interval friction;
-  const double size = m.drive[joint].coulomb;
+  const double size = m.drive[motor].coulomb;
   for (int l = 0; l < kLanes; ++l) {
-    const bool rests = batch.rests[joint][l];
+    const bool rests = batch.rests[motor][l];
     friction.lo[l] = rests ? 0.0 : speed.lo[l] > 0.0 ? size : -size;
     friction.hi[l] = rests ? 0.0 : speed.hi[l] < 0.0 ? -size : size;
   }

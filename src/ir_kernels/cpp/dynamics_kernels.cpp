@@ -47,9 +47,15 @@ bool inverse_dynamics_of(const Model<T>& m, const double* q, const double* qd, c
     load_columns(qdd, N, n, first, A);
     angles<kJoints>(m, Q, s, c);
     newton_euler<kJoints>(m, s, c, D, A, t);
-    for (int i = 0; i < n; ++i) t[i] += A[i] * m.drive[i].rotor + friction(m.drive[i], D[i]);
     const int b = m.balance.joint;
-    if (b >= 0) t[b] -= balance_torque(m.balance, s[b], c[b]);
+    if (m.coupling.any) {
+      if (b >= 0) t[b] -= balance_torque(m.balance, s[b], c[b]);
+      multiply<true>(n, m.coupling.inverse, t);
+      multiply(n, m.coupling.turns, D);
+      multiply(n, m.coupling.turns, A);
+    }
+    for (int i = 0; i < n; ++i) t[i] += A[i] * m.drive[i].rotor + friction(m.drive[i], D[i]);
+    if (b >= 0 && !m.coupling.any) t[b] -= balance_torque(m.balance, s[b], c[b]);
     finite.look(t, n);  // what isn't finite makes its own joint's torque so
     store_columns(t, N, n, first, tau);
   }
@@ -130,9 +136,21 @@ bool forward_dynamics(const Model<double>& m, const double* q, const double* qd,
     angles<0>(m, Q, s, c);
     newton_euler(m, s, c, D, A, h);
     composite_bodies(m, s, c, H);
-    for (int i = 0; i < n; ++i) {
-      t[i] -= h[i] + friction(m.drive[i], D[i]);
-      H[i * n + i] += m.drive[i].rotor;
+    if (m.coupling.any) {
+      multiply(n, m.coupling.turns, D);
+      for (int i = 0; i < n; ++i) t[i] -= friction(m.drive[i], D[i]);
+      multiply<true>(n, m.coupling.turns, t);
+      for (int i = 0; i < n; ++i) {
+        t[i] -= h[i];
+        for (int k = 0; k < n; ++k)
+          for (int l = 0; l < n; ++l)
+            H[k * n + l] += splat<Doubles>(m.coupling.turns[i][k] * m.drive[i].rotor * m.coupling.turns[i][l]);
+      }
+    } else {
+      for (int i = 0; i < n; ++i) {
+        t[i] -= h[i] + friction(m.drive[i], D[i]);
+        H[i * n + i] += m.drive[i].rotor;
+      }
     }
     const int b = m.balance.joint;
     if (b >= 0) t[b] += balance_torque(m.balance, s[b], c[b]);
@@ -141,6 +159,21 @@ bool forward_dynamics(const Model<double>& m, const double* q, const double* qd,
   }
   return finite.all();
 }
+
+namespace {
+
+// What the motors' torques gain per acceleration of the joints, from the arm's inertia H (n, n).
+void of_motors(const Model<double>& m, Doubles* H) {
+  const int n = m.n;
+  Doubles column[kMaxJoints];
+  for (int k = 0; k < n; ++k) {
+    for (int i = 0; i < n; ++i) column[i] = H[i * n + k];
+    multiply<true>(n, m.coupling.inverse, column);
+    for (int i = 0; i < n; ++i) H[i * n + k] = column[i] + m.drive[i].rotor * m.coupling.turns[i][k];
+  }
+}
+
+}  // namespace
 
 // long: one block of lanes and its rest
 bool torque_gradients(const Model<double>& m, const double* q, const double* qd, const double* qdd, long N,
@@ -169,16 +202,23 @@ bool torque_gradients(const Model<double>& m, const double* q, const double* qd,
       cs[k].d = -s[k];
       newton_euler(m, sn, cs, speed, rate, t);
       if (m.balance.joint == k) t[k] = t[k] - balance_torque(m.balance, sn[k], cs[k]);
+      if (m.coupling.any) multiply<true>(n, m.coupling.inverse, t);
       for (int i = 0; i < n; ++i) by_q[i * n + k] = t[i].d;
       sn[k].d = cs[k].d = Doubles{};
       speed[k].d = splat<Doubles>(1.0);
       newton_euler(m, sn, cs, speed, rate, t);
+      if (m.coupling.any) multiply<true>(n, m.coupling.inverse, t);
       for (int i = 0; i < n; ++i) by_qd[i * n + k] = t[i].d;
-      by_qd[k * n + k] += m.drive[k].viscous;
+      if (m.coupling.any) {
+        for (int i = 0; i < n; ++i) by_qd[i * n + k] += m.drive[i].viscous * m.coupling.turns[i][k];
+      } else {
+        by_qd[k * n + k] += m.drive[k].viscous;
+      }
       speed[k].d = Doubles{};
     }
     composite_bodies(m, s, c, H);
-    for (int i = 0; i < n; ++i) H[i * n + i] += m.drive[i].rotor;
+    if (m.coupling.any) of_motors(m, H);
+    else for (int i = 0; i < n; ++i) H[i * n + i] += m.drive[i].rotor;
     store_columns(by_q, N, n * n, first, of_q);
     store_columns(by_qd, N, n * n, first, of_qd);
     store_columns(H, N, n * n, first, of_qdd);

@@ -26,7 +26,7 @@ class Envelope {
       : n_(n), knots_(knots), speed_(std::move(speed)), torque_(std::move(torque)) {}
   double limit(int joint, double speed) const;
   double least(int joint, double slowest, double fastest) const;  // over a range of speeds, both >= 0
-  bool limits(const double* qd, long N, double* limit) const;
+  bool limits(const Model<double>& m, const double* qd, long N, double* limit) const;  // at the speeds of the joints
   int knots() const { return knots_; }
   const double* speeds(int joint) const { return &speed_[joint * knots_]; }             // (knots)
   const double* torques(int joint) const { return &torque_[joint * (knots_ + 1)]; }     // (knots + 1)

@@ -260,6 +260,13 @@ Model<double> build_model(const ChainInput& in) {  // long: one block per part o
   const Vec3 lift = transpose(frames[0].axes()) * (-1.0 * in.gravity);
   for (int k = 0; k < 3; ++k) model.lift[k] = lift[k];
   model.balance = balance_of(in, model.joint);
+  for (int i = 0; i < in.n; ++i)
+    for (int j = 0; j < in.n; ++j) {
+      const double turns = in.turns[i * in.n + j];
+      model.coupling.turns[i][j] = turns;
+      model.coupling.inverse[i][j] = in.inverse[i * in.n + j];
+      model.coupling.any |= turns != (i == j ? 1.0 : 0.0);
+    }
   return model;
 }
 
@@ -283,6 +290,12 @@ Model<float> to_single(const Model<double>& m) {
   s.balance.square_sin = f(b.square_sin);
   for (int k = 0; k < Balance<double>::kTerms; ++k) s.balance.coefficient[k] = f(b.coefficient[k]);
   for (int k = 0; k < 3; ++k) s.lift[k] = f(m.lift[k]);
+  s.coupling.any = m.coupling.any;
+  for (int i = 0; i < m.n; ++i)
+    for (int j = 0; j < m.n; ++j) {
+      s.coupling.turns[i][j] = f(m.coupling.turns[i][j]);
+      s.coupling.inverse[i][j] = f(m.coupling.inverse[i][j]);
+    }
   return s;
 }
 

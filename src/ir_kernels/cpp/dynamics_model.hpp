@@ -18,6 +18,7 @@ struct ChainInput {
   std::vector<double> origin, axis, mass, com, inertia;
   Vec3 gravity{};
   std::vector<double> rotor, viscous, coulomb, ratio, copper, envelope_speed, envelope_torque;
+  std::vector<double> turns, inverse;  // (n, n) of the coupling; see ir_kernels/coupling.py
   int knots = 0;
   int balanced_joint = -1;
   std::array<double, 2> pivot{}, eye{};
@@ -60,12 +61,36 @@ struct Balance {
   T coefficient[kTerms];
 };
 
+// Motors that turn with other joints than their own: w = turns qd, torque of the motors = inverse' torque of the joints.
+template <class T>
+struct Coupling {
+  bool any = false;
+  T turns[kMaxJoints][kMaxJoints], inverse[kMaxJoints][kMaxJoints];
+};
+
+// x = matrix x, or matrix' x, for any kind of number; what counts for nothing is left out.
+template <bool kTransposed = false, class S, class T>
+inline void multiply(int n, const T (&matrix)[kMaxJoints][kMaxJoints], S* x) {
+  S product[kMaxJoints];
+  for (int i = 0; i < n; ++i) {
+    bool begun = false;
+    for (int j = 0; j < n; ++j) {
+      const T share = kTransposed ? matrix[j][i] : matrix[i][j];
+      if (share == T(0)) continue;
+      product[i] = begun ? product[i] + x[j] * share : x[j] * share;
+      begun = true;
+    }
+  }
+  for (int i = 0; i < n; ++i) x[i] = product[i];
+}
+
 template <class T>
 struct Model {
   int n = 0;
   Joint<T> joint[kMaxJoints];
   Drive<T> drive[kMaxJoints];
   Balance<T> balance;
+  Coupling<T> coupling;
   T lift[3];  // minus the acceleration of free fall, in frame 0
 };
 

@@ -18,7 +18,7 @@ PowerBounds power_bounds(const Model<double>& m, const double* coefficients, con
   for (const Piece& p : pieces) bounds.seconds.push_back(p.end - p.begin);
   for (std::size_t first = 0; first < pieces.size(); first += kLanes) {
     Batch batch;
-    const std::size_t used = fill(batch, pieces, first, coefficients, m.n, terms);
+    const std::size_t used = fill(m, batch, pieces, first, coefficients, terms);
     const Enclosure found = enclose(m, batch, terms);
     Interval middle = point(Doubles{}), slope = middle, over = middle;
     Doubles taken{};

@@ -44,6 +44,7 @@ class SplineCost {
     Lane s[dynamics::kMaxJoints], c[dynamics::kMaxJoints], tau[dynamics::kMaxJoints];
     Lane of_q[dynamics::kMaxJoints], of_qd[dynamics::kMaxJoints], of_qdd[dynamics::kMaxJoints];
     Lane of_tau[dynamics::kMaxJoints], power[dynamics::kMaxJoints];
+    Lane turn[dynamics::kMaxJoints], of_turn[dynamics::kMaxJoints];  // speeds of motors that are coupled
     dynamics::LinkTrace<Lane> link[dynamics::kMaxJoints];
     Lane counts;  // 1 where the lane is a sample
   };

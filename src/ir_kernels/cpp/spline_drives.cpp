@@ -49,10 +49,20 @@ double SplineCost::drives_of(double step) {  // long: value and derivative side 
       const int b = arm.balance.joint;
       g.tau[b] -= dynamics::balance_torque(arm.balance, g.s[b], g.c[b]);
     }
+    Lane change[dynamics::kMaxJoints];  // of the motors' speeds
+    for (int j = 0; j < n_; ++j) {
+      g.turn[j] = g.qd[j];
+      change[j] = g.qdd[j];
+    }
+    if (arm.coupling.any) {
+      dynamics::multiply<true>(n_, arm.coupling.inverse, g.tau);
+      dynamics::multiply(n_, arm.coupling.turns, g.turn);
+      dynamics::multiply(n_, arm.coupling.turns, change);
+    }
     for (int j = 0; j < n_; ++j) {
       const auto& d = arm.drive[j];
-      const Lane v = g.qd[j], speed = abs(v), root = sqrt(v * v + still * still);
-      g.tau[j] += g.qdd[j] * d.rotor + v * d.viscous + d.coulomb * v / root;
+      const Lane v = g.turn[j], speed = abs(v), root = sqrt(v * v + still * still);
+      g.tau[j] += change[j] * d.rotor + v * d.viscous + d.coulomb * v / root;
       g.power[j] = g.tau[j] * v + d.copper_at_joint * g.tau[j] * g.tau[j];
       Lane limit = splat<Lane>(standing_[j]), falls{};
       for (int k = 0; k < bends_; ++k) {
@@ -66,20 +76,28 @@ double SplineCost::drives_of(double step) {  // long: value and derivative side 
       const Lane torque = abs(g.tau[j]) + unsure, inverse = 1.0 / (limit * terms_.torque_share);
       const Lane use = max(torque * inverse - 1.0, Lane{}) * g.counts;
       const double fastest = 1.0 / terms_.velocity[j];
-      const Lane over = max(speed * fastest - 1.0, Lane{}) * g.counts;
+      const Lane q_speed = abs(g.qd[j]), over = max(q_speed * fastest - 1.0, Lane{}) * g.counts;
       const Lane penalty = terms_.penalty * (use * use + over * over);
       cost += penalty * step;
       of_step += penalty;
       const Lane weight = 2.0 * step * terms_.penalty * use;
       const Lane sign_v = v > 0.0 ? splat<Lane>(1.0) : splat<Lane>(-1.0);
       g.of_tau[j] = weight * inverse * (g.tau[j] > 0.0 ? splat<Lane>(1.0) : splat<Lane>(-1.0));
-      g.of_qd[j] = sign_v * (2.0 * step * terms_.penalty * fastest * over - weight * torque * inverse / limit * falls) -
-                   2.0 * weight * inverse * unsure * v / (root * root);
+      const Lane too_fast = 2.0 * step * terms_.penalty * fastest * over;  // owed to the joint, the rest to the motor
+      const Lane too_steep = weight * torque * inverse / limit * falls;
+      const Lane too_slow = 2.0 * weight * inverse * unsure * v / (root * root);
+      if (arm.coupling.any) {
+        g.of_turn[j] = -(sign_v * too_steep) - too_slow;
+        g.of_qd[j] = (g.qd[j] > 0.0 ? too_fast : -too_fast);
+      } else {
+        g.of_qd[j] = sign_v * (too_fast - too_steep) - too_slow;
+      }
       if (terms_.travel[j] > 0.0) {
-        const Lane travelled = terms_.travel[j] * (root - still) * g.counts;
+        const Lane way = arm.coupling.any ? sqrt(g.qd[j] * g.qd[j] + still * still) : root;
+        const Lane travelled = terms_.travel[j] * (way - still) * g.counts;
         cost += travelled * step;
         of_step += travelled;
-        g.of_qd[j] += (step * terms_.travel[j]) * g.counts * v / root;
+        g.of_qd[j] += (step * terms_.travel[j]) * g.counts * g.qd[j] / way;
       }
     }
   }
@@ -178,15 +196,22 @@ template <int kJoints> double SplineCost::slower_of() {
   for (std::size_t k = 0; k < groups_.size(); ++k) {
     Group& g = groups_[k];
     const Lane of_power = load<Lane>(&of_power_[8 * k]) * g.counts;
+    Lane* of_turn = arm.coupling.any ? g.of_turn : g.of_qd;
     for (int j = 0; j < n_; ++j) {
       const auto& d = arm.drive[j];
       const bool alone = terms_.regeneration == dynamics::Regeneration::kNone;
       const Lane w = alone ? of_power * above(g.power[j], terms_.smoothing).slope : of_power;
-      g.of_tau[j] += w * (g.qd[j] + 2.0 * d.copper_at_joint * g.tau[j]);
-      g.of_qd[j] += w * g.tau[j];
-      const Lane root = g.qd[j] * g.qd[j] + still * still;
-      g.of_qd[j] += g.of_tau[j] * (d.viscous + d.coulomb * still * still / (root * sqrt(root)));
+      g.of_tau[j] += w * (g.turn[j] + 2.0 * d.copper_at_joint * g.tau[j]);
+      of_turn[j] += w * g.tau[j];
+      const Lane root = g.turn[j] * g.turn[j] + still * still;
+      of_turn[j] += g.of_tau[j] * (d.viscous + d.coulomb * still * still / (root * sqrt(root)));
       g.of_qdd[j] += g.of_tau[j] * d.rotor;
+    }
+    if (arm.coupling.any) {  // from the motors to the joints
+      dynamics::multiply<true>(n_, arm.coupling.turns, g.of_turn);
+      dynamics::multiply<true>(n_, arm.coupling.turns, g.of_qdd);
+      dynamics::multiply(n_, arm.coupling.inverse, g.of_tau);
+      for (int j = 0; j < n_; ++j) g.of_qd[j] += g.of_turn[j];
     }
     const int b = arm.balance.joint;
     if (b >= 0) {

@@ -1,6 +1,9 @@
 """Batched dynamics of a robot with its drives: one class, arrays (N, n) in and out.
 
 tau = H qdd + C qd + g + J_r qdd + F_v qd + F_c sign(qd) - T_cb      (eq. 8)
+
+Where motors turn with other joints than their own, rotors, friction, losses and limits are those of
+the motors (`ir_kernels.coupling`).
 """
 
 from collections.abc import Sequence
@@ -126,6 +129,7 @@ class DynamicsModel:
         pose = np.eye(4) if base_pose is None else base_pose
         self.data = dynamics_data(robot, loads, pose, gravity)
         self.n = self.data.n
+        self.coupling = self.data.coupling
         self.lossy = any(getattr(self.data, name).any() for name in FURTHER_LOSSES)
         self._core = (
             None if core is None or not hasattr(core, "Dynamics") else core.Dynamics(self.data)
@@ -197,21 +201,24 @@ class DynamicsModel:
         return np.asarray(self._run("forward_dynamics", q=q, qd=qd, tau=tau))
 
     def torque_limit(self, qd: ArrayLike) -> FloatArray:
-        """Torque (N, n) Nm available at the speeds |qd|: the envelope of gear and motor."""
+        """Torque (N, n) Nm available where joints turn at qd: the envelope of gear and motor."""
         return np.asarray(self._run("torque_limit", qd=qd))
 
     def axis_power(self, qd: ArrayLike, tau: ArrayLike) -> FloatArray:
-        """Power (N, n) W each axis takes from the DC bus: tau qd + k_cu (tau / ratio)^2, with the
+        """Power (N, n) W each axis takes from the DC bus: tau w + k_cu (tau / ratio)^2, with the
         losses of iron, inverter and gear that the robot has; negative while braking.
         """
         power = np.asarray(self._run("axis_power", qd=qd, tau=tau))
         return power + self.further_losses(qd, tau) if self.lossy else power
 
     def further_losses(self, qd: ArrayLike, tau: ArrayLike) -> FloatArray:
-        """Losses (N, n) W that most data have at zero: k_fe qd^2 + k_i |tau / ratio| + k_g |tau qd|
-        + P_0.
+        """Losses (N, n) W that most data have at zero: k_fe w^2 + k_i |tau / ratio| + k_g |tau w| +
+        P_0, w the speeds of the motors.
         """
-        speed = np.asarray(qd, float)
+        return self.losses_at(self.coupling.motors(np.asarray(qd, float)), tau)
+
+    def losses_at(self, speed: FloatArray, tau: ArrayLike) -> FloatArray:
+        """`further_losses` by the speeds (N, n) of the motors."""
         torque = np.abs(np.asarray(tau, float))
         d = self.data
         inverter = d.inverter_loss / np.abs(d.gear_ratio)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ir_kernels import portable
+from ir_kernels.coupling import Coupling
 from ir_kernels.data import ChainLike
 from ir_kernels.errors import InputError
 from ir_values.arrays import FloatArray
@@ -162,7 +163,8 @@ class DynamicsData:
     (n, 3), inertia (n, 3, 3) about the centre of mass: the moving links 1..n with the loads in the
     last one. gravity (3,): the acceleration of free fall in the frame of link 0. rotor_inertia,
     viscous, coulomb, gear_ratio, copper_loss, iron_loss, inverter_loss, gear_loss, idle_loss (n,):
-    the drives. envelope_speed (n, K), envelope_torque (n, K + 1): torque available, a step down at
+    the drives, figures of the motors seen at their joints. coupling: of motors and joints.
+    envelope_speed (n, K), envelope_torque (n, K + 1): torque available, a step down at
     the first speed.
     """
 
@@ -184,6 +186,7 @@ class DynamicsData:
     envelope_speed: FloatArray
     envelope_torque: FloatArray
     counterbalance: CounterbalanceData | None
+    coupling: Coupling
 
     @property
     def n(self) -> int:
@@ -288,6 +291,9 @@ def dynamics_data(
         envelope_speed=_frozen("robot.envelope_speed", robot.envelope_speed, (n, knots)),
         envelope_torque=_frozen("robot.envelope_torque", robot.envelope_torque, (n, knots + 1)),
         counterbalance=_counterbalance(robot.counterbalance),
+        coupling=Coupling(
+            _frozen("robot.motor_turns", getattr(robot, "motor_turns", np.eye(n)), (n, n))
+        ),
     )
     if (data.gear_ratio == 0.0).any():
         raise InputError("robot.gear_ratio holds a zero")

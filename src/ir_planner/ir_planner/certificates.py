@@ -27,7 +27,6 @@ from ir_planner.service import ServicePlan
 from ir_planner.trajectories import OptimizationPlan
 
 AnyMovement = TypeVar("AnyMovement", MovementPlan, CartesianPlan)
-_COUPLED = "the wrist is coupled: torques and joules are those of motors without the coupling"
 Stamp = Callable[[TrajectoryReport, JointTrajectory | None], TrajectoryReport]
 
 
@@ -95,11 +94,8 @@ def evaluation_in(
 
 
 def remarked(info: PlanningInfo, scene: PlanningScene, note: str) -> PlanningInfo:
-    """The record with a remark on the options, with doors that are not as the cell has them, and
-    with a coupling of the wrist, which torques leave out.
-    """
-    coupling = _COUPLED if scene.cell.robot.coupled else ""
-    return noted(noted(noted(info, note), doors_text(scene.doors), "doors"), coupling, "wrist")
+    """The record with a remark on the options, and with doors that are not as the cell has them."""
+    return noted(noted(info, note), doors_text(scene.doors), "doors")
 
 
 def _advised(status: Status, scene: PlanningScene) -> Status:

@@ -16,6 +16,8 @@ from ir_description.poses import transformed
 from ir_description.robot.power import PowerData, without_table
 from ir_description.shapes import Capsule
 from ir_kernels import portable
+from ir_kernels.coupling import Coupling
+from ir_kernels.errors import InputError
 from ir_msgs_py.names import WORLD_FRAME
 from ir_values.arrays import FloatArray, frozen, frozen_inertia, frozen_pose, in_range
 from ir_values.errors import InvalidValueError
@@ -177,6 +179,10 @@ class RobotModel:
         self._check_signs()
         self._check_envelope()
         self._check_names(n)
+        try:
+            _ = self.coupling
+        except InputError as error:
+            raise InvalidValueError(str(error)) from error
 
     @property
     def n(self) -> int:
@@ -186,7 +192,12 @@ class RobotModel:
     @cached_property
     def coupled(self) -> bool:
         """Whether a motor turns with another joint than its own."""
-        return not np.array_equal(self.motor_turns, np.eye(self.n))
+        return self.coupling.coupled
+
+    @cached_property
+    def coupling(self) -> Coupling:
+        """Of motors and joints."""
+        return Coupling(self.motor_turns)
 
     @cached_property
     def peak_watts(self) -> float:

@@ -4,6 +4,9 @@ core.
 tau = H(q) qdd + h(q, qd) + J_r qdd + F_v qd + F_c sign(qd) - T_cb(q)      (eq. 8; design: gravity
 is part of h)
 
+Where motors turn with other joints, w = T qd: tau = T^-T (H qdd + h - T_cb) + J_r T qdd + F_v w +
+F_c sign(w) (`ir_kernels.coupling`).
+
 Recursive Newton-Euler in link frames (Luh, Walker, Paul 1980), composite bodies for H (Walker, Orin
 1982). Arrays q, qd, qdd, tau are (N, n); rad, rad/s, rad/s^2, Nm.
 """
@@ -141,8 +144,26 @@ def rigid(
 
 
 def friction(data: DynamicsData, qd: FloatArray) -> FloatArray:
-    """F_v qd + F_c sign(qd) (N, n), zero at rest."""
-    return data.viscous * qd + data.coulomb * np.sign(qd.real)
+    """F_v w + F_c sign(w) (N, n) of the motors, zero at rest."""
+    speed = motor_speed(data, qd)
+    return data.viscous * speed + data.coulomb * np.sign(speed.real)
+
+
+def motor_speed(data: DynamicsData, qd: FloatArray) -> FloatArray:
+    """What the motors turn (N, n) where the joints turn at qd; complex steps pass."""
+    return qd @ data.coupling.turns.T if data.coupling.coupled else qd
+
+
+def combined(matrix: FloatArray, numbers: Sequence[Number]) -> list[Number]:
+    """A matrix (n, n) times any kind of number; nothing of what counts for nothing."""
+    rows = []
+    for row in matrix.tolist():
+        terms = [x * share for share, x in zip(row, numbers, strict=True) if share != 0.0]
+        total = terms[0]
+        for term in terms[1:]:
+            total = total + term
+        rows.append(total)
+    return rows
 
 
 def inverse_dynamics(
@@ -152,6 +173,9 @@ def inverse_dynamics(
     counterbalance.
     """
     arm = rigid(data, q, qd, qdd)
+    if data.coupling.coupled:
+        through = (arm - counterbalance(data, q)) @ data.coupling.inverse
+        return through + data.rotor_inertia * (qdd @ data.coupling.turns.T) + friction(data, qd)
     return arm + data.rotor_inertia * qdd + friction(data, qd) - counterbalance(data, q)
 
 
@@ -219,18 +243,21 @@ def forward_dynamics(
     """Accelerations (N, n) under the motor torques tau (N, n): (H + J_r) qdd = tau - h - friction +
     T_cb.
     """
-    effort = tau - bias(data, q, qd) - friction(data, qd) + counterbalance(data, q)
-    H = mass_matrix(data, q) + np.diag(data.rotor_inertia)
+    turns = data.coupling.turns
+    given = (tau - friction(data, qd)) @ turns
+    effort = given - bias(data, q, qd) + counterbalance(data, q)
+    H = mass_matrix(data, q) + turns.T @ np.diag(data.rotor_inertia) @ turns
     return np.asarray(np.linalg.solve(H, effort[:, :, None])[:, :, 0])
 
 
 def torque_limit(data: DynamicsData, qd: FloatArray) -> FloatArray:
-    """Torque available at the speed |qd| (N, n)."""
+    """Torque available at the speed |w| (N, n)."""
     limit = np.empty_like(qd)
+    turning = np.abs(motor_speed(data, qd))
     for j in range(data.n):
         speeds = data.envelope_speed[j]
         torques = data.envelope_torque[j]
-        speed = np.abs(qd[:, j])
+        speed = turning[:, j]
         limit[:, j] = np.where(speed < speeds[0], torques[0], np.interp(speed, speeds, torques[1:]))
     return limit
 
@@ -239,7 +266,7 @@ def axis_power(data: DynamicsData, qd: FloatArray, tau: FloatArray) -> FloatArra
     """Power each axis takes from the DC bus (N, n) W: mechanical plus copper losses, negative while
     braking.
     """
-    return tau * qd + data.copper_loss * (tau / data.gear_ratio) ** 2
+    return tau * motor_speed(data, qd) + data.copper_loss * (tau / data.gear_ratio) ** 2
 
 
 STEP = 1e-100  # of the complex steps: so small that no digit is lost
@@ -259,7 +286,11 @@ def torque_gradients(
         step[0, j] = STEP * 1j
         of_q[:, :, j] = inverse_dynamics(data, q + step, qd, qdd).imag / STEP
         of_qd[:, :, j] = inverse_dynamics(data, q, qd + step, qdd).imag / STEP
-    return of_q, of_qd, mass_matrix(data, q) + np.diag(data.rotor_inertia)
+    H = mass_matrix(data, q)
+    if data.coupling.coupled:
+        through = data.coupling.inverse.T @ H
+        return of_q, of_qd, through + np.diag(data.rotor_inertia) @ data.coupling.turns
+    return of_q, of_qd, H + np.diag(data.rotor_inertia)
 
 
 # The drives' common DC bus, step by step: the oracle of the compiled scan.

@@ -22,7 +22,7 @@ from ir_kernels.reference.interval import (
     sine_cosine,
 )
 from ir_kernels.reference.limits import derivative, evaluate
-from ir_values.arrays import FloatArray, IntArray
+from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Pieces:
 
 @dataclass(frozen=True)
 class Enclosure:
-    """Per joint over the pieces (K,): step = t - m; speed, torque without Coulomb friction and that
+    """Per motor over the pieces (K,): step = t - m; speed, torque without Coulomb friction and that
     friction; at the middles, and over the pieces with their derivatives.
     """
 
@@ -58,6 +58,12 @@ def pieces_of(durations: FloatArray, counts: IntArray) -> Pieces:
     )
 
 
+def resting(data: DynamicsData, coefficients: FloatArray) -> BoolArray:
+    """Motors (S, n) that don't move in a segment: none of the joints that they turn with does."""
+    moves = (coefficients[:, :, 1:] != 0.0).any(axis=2)
+    return np.asarray(~(moves[:, None, :] & (data.coupling.turns != 0.0)).any(axis=2))
+
+
 def _horner(a: list[Interval], x: Interval) -> Interval:
     value = a[-1]
     for coefficient in reversed(a[:-1]):
@@ -67,22 +73,27 @@ def _horner(a: list[Interval], x: Interval) -> Interval:
 
 def _smooth_torque(
     data: DynamicsData, sin: Number, cos: Number, qd: Number, qdd: Number
-) -> list[Number]:
+) -> tuple[list[Number], list[Number]]:
+    """Torques without Coulomb friction, and speeds, of the motors."""
     tau = dynamics.rigid_body_torque(data, sin, cos, qd, qdd)
-    for j in range(data.n):
-        tau[j] = tau[j] + qdd[j] * float(data.rotor_inertia[j]) + qd[j] * float(data.viscous[j])
     if data.counterbalance is not None:
         j = data.counterbalance.joint
         tau[j] = tau[j] - dynamics.counterbalance_torque(
             data.counterbalance, sin[j], cos[j], lambda x: power(x, 0.5), power
         )
-    return tau
+    coupling = data.coupling
+    if coupling.coupled:
+        tau = dynamics.combined(coupling.inverse.T, tau)
+        qd, qdd = (dynamics.combined(coupling.turns, each) for each in (qd, qdd))
+    for j in range(data.n):
+        tau[j] = tau[j] + qdd[j] * float(data.rotor_inertia[j]) + qd[j] * float(data.viscous[j])
+    return tau, list(qd)
 
 
 def enclosure(
-    data: DynamicsData, coefficients: FloatArray, rests: FloatArray, pieces: Pieces
+    data: DynamicsData, coefficients: FloatArray, rests: BoolArray, pieces: Pieces
 ) -> Enclosure:
-    """Of coefficients (S, n, terms), `rests` (S, n) those that don't move, over pieces (K,)."""
+    """Of coefficients (S, n, terms), `rests` (S, n) of the motors, over pieces (K,)."""
     middle = 0.5 * (pieces.begin + pieces.end)
     step = Interval((interval(pieces.begin) - middle).lo, (interval(pieces.end) - middle).hi)
     points: list[list[Interval]] = [[], [], []]
@@ -98,26 +109,25 @@ def enclosure(
                 points[order].append(a[0] if a else interval(0.0 * middle))
             a = [c * float(k) for k, c in enumerate(a) if k > 0]
     sin0, cos0 = zip(*(sine_cosine(q) for q in points[0]), strict=True)
-    at_middle = _smooth_torque(data, sin0, cos0, points[1], points[2])
+    at_middle, speed0 = _smooth_torque(data, sin0, cos0, points[1], points[2])
     both = [sine_cosine(q) for q in ranges[0]]
-    speed = [Dual(v, a) for v, a in zip(ranges[1], ranges[2], strict=True)]
-    over = _smooth_torque(
+    over, speed = _smooth_torque(
         data,
         [Dual(s, c * v) for (s, c), v in zip(both, ranges[1], strict=True)],
         [Dual(c, -(s * v)) for (s, c), v in zip(both, ranges[1], strict=True)],
-        speed,
+        [Dual(v, a) for v, a in zip(ranges[1], ranges[2], strict=True)],
         [Dual(a, jerk) for a, jerk in zip(ranges[2], ranges[3], strict=True)],
     )
     torque = [
         Dual(intersect(t.v, t0 + t.d * step), t.d) for t, t0 in zip(over, at_middle, strict=True)
     ]
     friction = []
-    for j, v in enumerate(ranges[1]):
+    for j, v in enumerate(each.v for each in speed):
         size = float(data.coulomb[j])
         still = rests[pieces.segment, j]
         least = np.where(still, 0.0, np.where(v.lo > 0.0, size, -size))
         friction.append(Interval(least, np.where(still, 0.0, np.where(v.hi < 0.0, -size, size))))
-    return Enclosure(step, points[1], at_middle, speed, torque, friction)
+    return Enclosure(step, speed0, at_middle, speed, torque, friction)
 
 
 # A proof of the torque limits by interval arithmetic over pieces of the trajectory, halved where
@@ -152,7 +162,7 @@ def least_limit(
 
 
 def upper_ratios(
-    data: DynamicsData, coefficients: FloatArray, rests: FloatArray, pieces: Pieces
+    data: DynamicsData, coefficients: FloatArray, rests: BoolArray, pieces: Pieces
 ) -> FloatArray:
     """(K, n): |tau| / limit is nowhere in a piece above this."""
     found = enclosure(data, coefficients, rests, pieces)
@@ -173,7 +183,7 @@ def upper_ratios(
 def sampled_ratios(
     data: DynamicsData,
     coefficients: FloatArray,
-    rests: FloatArray,
+    rests: BoolArray,
     segment: IntArray,
     t: FloatArray,
 ) -> FloatArray:
@@ -184,9 +194,10 @@ def sampled_ratios(
         motion.append(evaluate(c, t[:, None, None])[..., 0])
         c = derivative(c) if c.shape[2] > 1 else 0.0 * c
     q, qd, qdd = motion
-    smooth = dynamics.inverse_dynamics(data, q, qd, qdd) - data.coulomb * np.sign(qd)
-    moving = np.abs(smooth + data.coulomb * np.sign(qd))
-    slow = np.where(np.abs(qd) < REST, np.abs(smooth) + data.coulomb, moving)
+    turning = dynamics.motor_speed(data, qd)
+    smooth = dynamics.inverse_dynamics(data, q, qd, qdd) - data.coulomb * np.sign(turning)
+    moving = np.abs(smooth + data.coulomb * np.sign(turning))
+    slow = np.where(np.abs(turning) < REST, np.abs(smooth) + data.coulomb, moving)
     size = np.where(rests[segment], np.abs(smooth), slow)
     return np.asarray(size / dynamics.torque_limit(data, qd))
 
@@ -199,7 +210,7 @@ def torque_bounds(
     upper = np.zeros(n)
     sampled = np.full(n, -1.0)
     time = np.zeros(n)
-    rests = (coefficients[:, :, 1:] == 0.0).all(axis=2)
+    rests = resting(data, coefficients)
     start = np.concatenate([[0.0], np.cumsum(durations)[:-1]])
     counts = np.maximum(FEWEST_PIECES, np.ceil(durations / FIRST_PIECE)).astype(int)
     pieces = pieces_of(durations, counts)
@@ -242,7 +253,7 @@ def power_bounds(
     """
     counts = np.maximum(np.ceil(durations / longest), 1).astype(int)
     pieces = pieces_of(durations, counts)
-    rests = (coefficients[:, :, 1:] == 0.0).all(axis=2)
+    rests = resting(data, coefficients)
     found = enclosure(data, coefficients, rests, pieces)
     middle: Number = interval(np.zeros(len(pieces.segment)))
     slope = middle

@@ -87,9 +87,11 @@ def torque_limit(data: DynamicsData, speed: FloatArray) -> tuple[FloatArray, Flo
 
 def torques(data: DynamicsData, s: Samples) -> FloatArray:
     """Torque (N, n) of the motors, with friction that turns round smoothly."""
-    friction = data.viscous * s.qd + data.coulomb * s.qd / np.hypot(s.qd, STILL)
+    speed = dynamics.motor_speed(data, s.qd)
+    friction = data.viscous * speed + data.coulomb * speed / np.hypot(speed, STILL)
     arm = dynamics.rigid(data, s.q, s.qd, s.qdd) - dynamics.counterbalance(data, s.q)
-    return arm + data.rotor_inertia * s.qdd + friction
+    through = arm @ data.coupling.inverse if data.coupling.coupled else arm
+    return through + data.rotor_inertia * dynamics.motor_speed(data, s.qdd) + friction
 
 
 def torques_back(data: DynamicsData, s: Samples, of_torque: FloatArray) -> None:
@@ -99,7 +101,9 @@ def torques_back(data: DynamicsData, s: Samples, of_torque: FloatArray) -> None:
     of_q, of_qd, of_qdd = dynamics.torque_gradients(data, s.q, s.qd, s.qdd)  # with viscous friction
     s.of_q += np.einsum("ki,kij->kj", of_torque, of_q)
     s.of_qd += np.einsum("ki,kij->kj", of_torque, of_qd)
-    s.of_qd += of_torque * data.coulomb * STILL**2 / np.hypot(s.qd, STILL) ** 3
+    speed = dynamics.motor_speed(data, s.qd)
+    of_speed = of_torque * data.coulomb * STILL**2 / np.hypot(speed, STILL) ** 3
+    s.of_qd += of_speed @ data.coupling.turns
     s.of_qdd += np.einsum("ki,kij->kj", of_torque, of_qdd)
 
 
@@ -229,29 +233,28 @@ class SplineCost:
         t = self.terms
         data = self.data
         torque = torques(data, s)
-        speed = np.abs(s.qd)
-        limit, falls = torque_limit(data, speed)
+        turning = dynamics.motor_speed(data, s.qd)
+        limit, falls = torque_limit(data, np.abs(turning))
         # near standstill friction may be as much more than it is with its smoothed sign
-        unsure = data.coulomb * (STILL / np.hypot(s.qd, STILL)) ** 2
+        unsure = data.coulomb * (STILL / np.hypot(turning, STILL)) ** 2
         use = (np.abs(torque) + unsure) / (limit * t.torque_share)
         too_much = np.maximum(use - 1.0, 0.0)
-        too_fast = np.maximum(speed / t.velocity - 1.0, 0.0)
+        too_fast = np.maximum(np.abs(s.qd) / t.velocity - 1.0, 0.0)
         travelled = t.travel * (np.hypot(s.qd, STILL) - STILL)
         rate = t.penalty * float(np.sum(too_much**2 + too_fast**2)) + float(np.sum(travelled))
         weight = 2.0 * t.penalty * step * too_much
         of_torque = weight * np.sign(torque) / (limit * t.torque_share)
-        s.of_qd += np.sign(s.qd) * (
-            2.0 * t.penalty * step * too_fast / t.velocity - weight * use / limit * falls
-        )
-        s.of_qd -= (
-            2.0 * weight / (limit * t.torque_share) * unsure * s.qd / np.hypot(s.qd, STILL) ** 2
-        )
+        s.of_qd += np.sign(s.qd) * (2.0 * t.penalty * step * too_fast / t.velocity)
+        of_speed = -np.sign(turning) * (weight * use / limit * falls)
+        slow = turning / np.hypot(turning, STILL) ** 2
+        of_speed -= 2.0 * weight / (limit * t.torque_share) * unsure * slow
         s.of_qd += step * t.travel * s.qd / np.hypot(s.qd, STILL)
         power = dynamics.axis_power(data, s.qd, torque)
         energy, adds, of_step = bus(power, step, t)
         of_power = t.energy_value * step * adds
-        of_torque += of_power * (s.qd + 2.0 * data.copper_loss / data.gear_ratio**2 * torque)
-        s.of_qd += of_power * torque
+        of_torque += of_power * (turning + 2.0 * data.copper_loss / data.gear_ratio**2 * torque)
+        of_speed += of_power * torque
+        s.of_qd += of_speed @ data.coupling.turns
         torques_back(data, s, of_torque)
         # without a common bus a slope stands for the share of its axis that counts, not for its
         # joules

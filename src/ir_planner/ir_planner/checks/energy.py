@@ -148,4 +148,5 @@ def _further(trajectory: JointTrajectory, scene: PlanningScene) -> float:
     speed = extremes(coefficients, durations).velocity.max(axis=0, keepdims=True)
     share = np.asarray(scene.dynamics.torque_bounds(coefficients, durations).upper)
     torque = share * scene.dynamics.torque_limit(np.zeros_like(speed))
-    return float(scene.dynamics.further_losses(speed, torque).sum())
+    most = scene.dynamics.coupling.most(speed)
+    return float(scene.dynamics.losses_at(most, torque).sum())

@@ -131,7 +131,8 @@ def _axis_slope(at: _States, scene: PlanningScene) -> FloatArray:
     parameters = scene.parameters
     model = scene.dynamics
     d = scene.dynamics.data
-    q, qd, qdd, _ = at.motion
+    q = at.motion.q
+    qd, qdd = (d.coupling.motors(each) for each in (at.motion.qd, at.motion.qdd))  # of the motors
     speed = np.abs(qd)
     size = np.abs(at.torque)
     ratio = np.abs(d.gear_ratio)
@@ -152,7 +153,7 @@ def _axis_slope(at: _States, scene: PlanningScene) -> FloatArray:
         slope[parameters.places(term)] = axes[term].sum(axis=0)
     slope[parameters.index(IDLE)] = at.price.mean(axis=1).sum()  # of all axes alike
     rotor = d.rotor_inertia * qdd
-    balance = model.counterbalance(q)
+    balance = d.coupling.motor_torque(model.counterbalance(q))
     body = at.torque - rotor - d.viscous * qd - d.coulomb * direction + balance
     carried = _carried(at, scene)
     scaled = {"rotor_inertia": rotor, "counterbalance": -balance, "load_mass": carried}

@@ -39,7 +39,7 @@ def potential_energy(q: FloatArray, scene: PlanningScene) -> FloatArray:
     places = (q[:, None, :] * share[None, :, None]).reshape(-1, q.shape[1])
     still = np.zeros_like(places)
     torque = scene.dynamics.inverse_dynamics(places, still, still).reshape(len(q), _PLACES, -1)
-    return np.asarray((torque.mean(axis=1) * q).sum(axis=1))
+    return np.asarray((torque.mean(axis=1) * scene.dynamics.coupling.motors(q)).sum(axis=1))
 
 
 def least_seconds(distance: FloatArray, limits: MotionLimits) -> FloatArray:
@@ -63,9 +63,10 @@ def least_cost(
     robot = scene.cell.robot
     seconds = least_seconds(distance, limits)
     rise = potential_energy(second, scene)[None] - potential_energy(first, scene)[:, None]
-    work = rise + portable.matmul(distance, robot.friction_coulomb)
+    travel = np.abs(robot.coupling.motors(second[None] - first[:, None]))  # of the motors, at least
+    work = rise + portable.matmul(travel, robot.friction_coulomb)
     viscous = portable.matmul(
-        distance * distance, robot.friction_viscous
+        travel * travel, robot.friction_viscous
     )  # J s: joules at an even speed, times the duration
     with np.errstate(divide="ignore", invalid="ignore"):
         best = np.sqrt(rates.joule * viscous / rates.second) if rates.second > 0.0 else np.inf

@@ -183,8 +183,9 @@ def stretched_costs(
     # what holds the arm and dry friction stay, the viscous one falls with the speed, the rest with
     # its square
     holding = scene.dynamics.inverse_dynamics(motion.q, still, still)
-    viscous = drives.viscous * motion.qd
-    dry = drives.coulomb * np.sign(motion.qd)
+    turning = drives.coupling.motors(motion.qd)
+    viscous = drives.viscous * turning
+    dry = drives.coulomb * np.sign(turning)
     whole = scene.dynamics.inverse_dynamics(motion.q, motion.qd, motion.qdd)
     torque = (
         (whole - holding - viscous - dry) / (slower * slower) + viscous / slower + (holding + dry)

@@ -128,7 +128,7 @@ def _mechanical(analysis: Analysis, start: float, end: float) -> tuple[float, fl
     torque = joints.effort[inside]
     if len(time) < 2 or not np.isfinite([speed, torque]).all():
         return NAN, NAN, NAN
-    watts = (speed * torque).sum(axis=1)
+    watts = (cell.robot.coupling.motors(speed) * torque).sum(axis=1)
     lifts = [_lifting(joints, cell, result) for result in analysis.movements]
     return _integral(time, watts), sum(up for up, _ in lifts), sum(down for _, down in lifts)
 

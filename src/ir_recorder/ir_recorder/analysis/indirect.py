@@ -99,6 +99,7 @@ class IndirectMeter:
         ):
             return NAN
         step = float((end - start) / len(time))
+        speed = self._robot.coupling.motors(speed)
         motor = torque / self._robot.gear_ratio
         axes = torque * speed + of("copper") * motor**2 + of("inverter") * np.abs(motor)
         value = self._parameters.value

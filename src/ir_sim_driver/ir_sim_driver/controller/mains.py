@@ -75,6 +75,7 @@ class Mains:
         watts = self._known.of(level)
         if level is Mode.STAND_ON_MOTORS:
             q = self._backend.q[None]
-            hold = dynamics.gravity(q) - dynamics.counterbalance(q)
-            watts += float(dynamics.axis_power(np.zeros_like(q), hold).sum())
+            still = np.zeros_like(q)
+            hold = dynamics.inverse_dynamics(q, still, still)
+            watts += float(dynamics.axis_power(still, hold).sum())
         return watts

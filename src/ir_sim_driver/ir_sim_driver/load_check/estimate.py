@@ -80,6 +80,11 @@ class Uncertainty:
         """
         plain = self._plain.inverse_dynamics(q, qd, qdd)
         links = [link.inverse_dynamics(q, qd, qdd) - plain for link in self._links]
+        coupling = self.model.coupling
+        rotors = self.model.reflected_inertia * coupling.motors(qdd)
+        scaled = self._scaled.inverse_dynamics(q, qd, qdd) - plain
+        balance = coupling.motor_torque(self._plain.counterbalance(q))
+        qd = coupling.motors(qd)
         sign = np.tanh(qd / _SIGN)
         n = self._plain.n
         rest = (
@@ -91,9 +96,7 @@ class Uncertainty:
         axes = (qd, sign, np.abs(torque) * sign)
         known = [_on_axis(values, j) for values in axes for j in range(n)]
         standing = STANDING_SHARE * self.model.friction_coulomb * self.standing(qd)
-        known.append(self.model.reflected_inertia * qdd)
-        known.append(self._scaled.inverse_dynamics(q, qd, qdd) - plain)
-        known.append(-self._plain.counterbalance(q))
+        known += [rotors, scaled, -balance]
         return np.concatenate(
             (
                 np.stack(known, axis=2) @ self._root,
@@ -106,7 +109,7 @@ class Uncertainty:
         )
 
     def standing(self, qd: FloatArray) -> FloatArray:
-        """Share (N, n) of the Coulomb friction that may act either way, because the axis hardly
+        """Share (N, n) of the Coulomb friction that may act either way, because the motor hardly
         moves.
         """
         return np.asarray(1.0 / (1.0 + (qd / _STANDS) ** 2))
@@ -229,8 +232,9 @@ class Declared:
         q, qd, qdd, _ = motion
         expected = self._model.inverse_dynamics(q, qd, qdd)
         more, *shifted = (other.inverse_dynamics(q, qd, qdd) - expected for other in self._others)
-        either_way = self.robot.standing(qd) * self.robot.model.friction_coulomb
-        return expected - np.sign(qd) * either_way, more / _KG, np.stack(shifted, axis=2)
+        speed = self.robot.model.coupling.motors(qd)
+        either_way = self.robot.standing(speed) * self.robot.model.friction_coulomb
+        return expected - np.sign(speed) * either_way, more / _KG, np.stack(shifted, axis=2)
 
 
 def weighed(motion: Motion, declared: Declared, threshold: float) -> LoadFinding | None:
@@ -291,7 +295,7 @@ def _noise(robot: Uncertainty, qd: FloatArray) -> FloatArray:
     that start or stop, the friction that may change from one instant to the next.
     """
     unexplained = UNEXPLAINED * robot.model.envelope_torque[:, 0]
-    standing = robot.standing(qd)
+    standing = robot.standing(robot.model.coupling.motors(qd))
     changing = _CHANGES * standing + _STARTS * standing * (1.0 - standing)
     return np.asarray(np.hypot(unexplained, changing * robot.model.friction_coulomb))
 

@@ -18,8 +18,8 @@ STANDING = 1e-3
 
 
 class Work(NamedTuple):
-    """What the motors did in K steps: speed (K, n) [rad/s] in the middle of the step, torque (K, n)
-    [Nm] at the joint.
+    """What the motors did in K steps: their speed (K, n) [rad/s] in the middle of the step, torque
+    (K, n) [Nm], both seen at the joint.
     """
 
     speed: FloatArray

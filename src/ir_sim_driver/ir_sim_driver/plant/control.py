@@ -122,6 +122,7 @@ class ServoControl:
         self._viscous: list[float] = np.array(robot.friction_viscous).tolist()
         self._coulomb: list[float] = np.array(robot.friction_coulomb).tolist()
         self._base_pose = base_pose
+        self._coupling = robot.coupling
         self._drives = Drivetrain(robot)
         self.declare(())
 
@@ -145,10 +146,12 @@ class ServoControl:
         new = self._law.dot(rows)
         speed = new[_NOW]
         model = self._model.inverse_dynamics_at(self.command, speed, new[_CHANGE])
+        turning = self._coupling.motors(speed)
         # plain floats, joint by joint: half the time of arrays this small
-        friction = zip(model.tolist(), self._viscous, self._coulomb, speed.tolist(), strict=True)
+        friction = zip(model.tolist(), self._viscous, self._coulomb, turning.tolist(), strict=True)
         wanted = [t + viscous * v + dry * math.tanh(v * _STEEP) for t, viscous, dry, v in friction]
-        torque, cut = self._drives.limited(wanted, new[_MEASURED].tolist())
+        measured = self._coupling.motors(new[_MEASURED])
+        torque, cut = self._drives.limited(wanted, measured.tolist())
         if cut:  # else the integral would wind up
             new[_INTEGRAL] = rows[_KEPT][_INTEGRAL]
         rows[_KEPT] = new[:_NOW]
@@ -156,6 +159,6 @@ class ServoControl:
         return torque, cut
 
     def _encoders(self, q: FloatArray) -> FloatArray:
-        """What the encoders say (n,) [rad]."""
-        seen: FloatArray = np.rint(q / self._count) * self._count
-        return seen
+        """What the encoders of the motors say of the joints (n,) [rad]."""
+        seen: FloatArray = np.rint(self._coupling.motors(q) / self._count) * self._count
+        return self._coupling.joints(seen)

@@ -137,7 +137,7 @@ class IdealBackend:
         self._path = self._path[-2:]
         self._driven = []
         self._last = torque[-1]
-        speed = np.where(driven, middle, 0.0)
+        speed = np.where(driven, self._robot.coupling.motors(middle), 0.0)
         if len(self._done.speed):
             speed = np.vstack((self._done.speed, speed))
             torque = np.vstack((self._done.torque, torque))

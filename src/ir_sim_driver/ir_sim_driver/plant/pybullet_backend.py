@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Sequence
 from operator import add, sub
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from scipy.linalg.lapack import dposv
@@ -376,9 +376,11 @@ class PyBulletBackend:
         self._dt = dt
         self._n = len(plant.robot.joint_names)
         self._drives = Drivetrain(plant.robot)
+        self._coupling = plant.robot.coupling
         self._gears = Gears(plant.gears, dt)
         self._axes = range(self._n)
-        self._inertia: FloatArray = np.zeros((self._n, self._n))  # H + J_r, and what friction adds
+        # seen by the motors: H + J_r, and what friction adds
+        self._inertia: FloatArray = np.zeros((self._n, self._n))
         self._diagonal = self._inertia.ravel()[:: self._n + 1]
         self._rotor: list[float] = self._drives.rotor_inertia.tolist()
         self._servo = ServoControl(model, dt, base, control)
@@ -390,7 +392,7 @@ class PyBulletBackend:
         self.saturated = False
         self._rest = [0.0] * self._n
         self._be(np.array(plant.robot.machine_home, dtype=np.float64))
-        self._load = self._rest  # through the gears to the links in the last step
+        self._load: Sequence[float] = self._rest  # through the gears to the links in the last step
         self._speeds: list[Sequence[float]] = []
         self._torques: list[FloatArray] = []
         self._stale = False  # whether Bullet's state is older than ours
@@ -464,7 +466,10 @@ class PyBulletBackend:
         stopping = np.array(self._lagging) * (-1.0 / self._dt)
         links = H @ stopping + h
         balance = np.array(self._drives.counterbalance(self._at))
-        wanted = links + self._drives.rotor_inertia * stopping - balance
+        rotors = self._coupling.joint_torque(
+            self._drives.rotor_inertia * self._coupling.motors(stopping)
+        )
+        wanted = self._coupling.motor_torque(links + rotors - balance)
         torque: FloatArray = np.clip(wanted, -most, most)
         self.torque = torque if motors else self._still
         self.saturated = False
@@ -487,9 +492,10 @@ class PyBulletBackend:
         self._torques.append(self._still)
 
     def work(self) -> Work:
-        """Speed and torque of every step since the last call."""
+        """Speed and torque of the motors in every step since the last call."""
         shape = (len(self._speeds), self._n)
-        work = Work(np.array(self._speeds).reshape(shape), np.array(self._torques).reshape(shape))
+        speed = self._coupling.motors(np.array(self._speeds).reshape(shape))
+        work = Work(speed, np.array(self._torques).reshape(shape))
         self._speeds.clear()
         self._torques.clear()
         return work
@@ -511,10 +517,12 @@ class PyBulletBackend:
         stepped.
         """
         links = self._arm.inverse_dynamics(q.tolist(), qd.tolist(), qdd.tolist())
-        through = np.array(links) - self._drives.counterbalance(q.tolist())
-        speed = qd.tolist()
+        arm = np.array(links) - self._drives.counterbalance(q.tolist())
+        through = self._coupling.motor_torque(arm)
+        speed = self._coupling.motors(qd).tolist()
         friction, _ = self._gears.friction(speed, self._gears.dry(speed, through.tolist()))
-        torque: FloatArray = through + self._drives.rotor_inertia * qdd + friction
+        rotors = self._drives.rotor_inertia * self._coupling.motors(qdd)
+        torque: FloatArray = through + rotors + friction
         return torque
 
     def _bias(self, qd: Sequence[float]) -> FloatArray:
@@ -532,28 +540,33 @@ class PyBulletBackend:
         arm = self._arm
         q = self._at
         balance = self._drives.counterbalance(q)
+        given = self._coupling.joint_torque(torque)
         outer = list(
             map(
                 sub,
-                map(add, torque.tolist(), balance),
+                map(add, given.tolist(), balance),
                 arm.inverse_dynamics(q, self._now, self._rest),
             )
         )
         if self.disturbance is not None:
             outer = list(map(add, outer, self.disturbance.tolist()))
         links = arm.inverse_dynamics(q, self._lagging, self._accelerations(outer))
-        self._load = list(map(sub, links, balance))
+        self._load = self._of_motors(list(map(sub, links, balance)), torque=True)
         self._advance(links)
 
     def _accelerations(self, outer: Sequence[float]) -> list[float]:
-        """qdd (n,) of a step in which this torque (n,) acts, and friction at the speed in its
-        middle.
+        """qdd (n,) of a step in which this torque (n,) acts on the joints, and friction at the
+        speed in its middle; solved for the motors, to which rotors and friction belong.
         """
         gears = self._gears
-        lagging = self._lagging
-        speed = self._now
+        lagging = self._of_motors(self._lagging)
+        speed = self._of_motors(self._now)
+        outer = self._of_motors(outer, torque=True)
         half = 0.5 * self._dt
         rows = self._arm.mass_matrix(self._at)
+        if self._coupling.coupled:
+            inverse = self._coupling.inverse
+            rows = (inverse.T @ np.array(rows) @ inverse).tolist()
         self._inertia[:] = rows
         own = [row[j] + rotor for j, row, rotor in zip(self._axes, rows, self._rotor, strict=True)]
         dry = gears.dry(speed, self._load)
@@ -573,7 +586,16 @@ class PyBulletBackend:
             if max(map(abs, map(sub, friction, expected))) < _FRICTION:
                 break
         gears.heat(friction, speed)
+        if self._coupling.coupled:
+            return cast(list[float], self._coupling.joints(np.array(qdd)).tolist())
         return qdd
+
+    def _of_motors(self, values: Sequence[float], *, torque: bool = False) -> Sequence[float]:
+        """What speeds or torques (n,) of the joints are for the motors."""
+        if not self._coupling.coupled:
+            return values
+        convert = self._coupling.motor_torque if torque else self._coupling.motors
+        return cast(list[float], convert(np.array(values)).tolist())
 
     def _advance(self, links: Sequence[float]) -> None:
         """Make a step with these torques (n,) on the links."""

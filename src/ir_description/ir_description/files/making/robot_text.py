@@ -95,6 +95,7 @@ _OPTIONAL = (
     "counterbalance",
     "capsule_radius_m",
     "envelope_rad_s_nm",
+    "wrist_coupling",
     *_ROWS,
 )
 
@@ -115,6 +116,10 @@ def drive_sheet(text: str, source: str, arm: UrdfArm) -> DriveSheet:
         )
     if "envelope_rad_s_nm" in top and not _unknown(top["envelope_rad_s_nm"]):
         known["envelope_rad_s_nm"] = _value(top["envelope_rad_s_nm"], _envelope)
+    if "wrist_coupling" in top and not _unknown(top["wrist_coupling"]):
+        known["wrist_coupling"] = _value(
+            top["wrist_coupling"], lambda item: item.rows(3, -10, 16, count=(1, AXES))
+        )
     notes = _complete(known, arm, source)
     radii = (
         top["capsule_radius_m"].numbers(AXES + 1, 0, 100, "m", above=True)
@@ -334,7 +339,8 @@ def _lines(
     yield f"  axis: {_figure(Value(arm.axis, 'URDF', 'H'), _ALL_DIGITS)}"
     yield from (f"  {key}: {_figure(sheet.values[key])}" for key in _JOINT_ROWS)
     yield "drives:"
-    yield from (f"  {key}: {_figure(sheet.values[key])}" for key in _DRIVE_ROWS)
+    rows = [*_DRIVE_ROWS, *(["wrist_coupling"] if "wrist_coupling" in sheet.values else [])]
+    yield from (f"  {key}: {_figure(sheet.values[key])}" for key in rows)
     yield "links:"
     for name, link in zip(links, arm.links, strict=True):
         J = link.inertia

@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ir_description.files.making.transmissions import coupling_notes
 from ir_description.files.making.urdf_tree import (
     UrdfJoint,
     UrdfLink,
@@ -151,7 +152,8 @@ def urdf_arm(text: str, source: str, tip: str = "", without: Collection[str] = (
     ]
     axis = _snapped(np.array(turned))
     rounding += _BODY * float(np.abs(axis - np.array(turned)).sum())
-    notes = [*read.notes, *_below_base(tree.path(base)), *gathering.notes]
+    couplings = coupling_notes(read.transmissions, [joint.name for joint in moving])
+    notes = [*read.notes, *_below_base(tree.path(base)), *gathering.notes, *couplings]
     if rounding > SAID:
         notes.append(
             "angles written with few digits are taken as right angles: that moves a point of the "

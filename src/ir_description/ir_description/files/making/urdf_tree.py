@@ -14,6 +14,7 @@ from xml.parsers import expat
 
 import numpy as np
 
+from ir_description.files.making.transmissions import UrdfTransmission, urdf_transmissions
 from ir_description.files.robot_file import inertia_matrix
 from ir_description.poses import rotation_from_abc
 from ir_values.arrays import FloatArray
@@ -88,13 +89,14 @@ class UrdfJoint:
 @dataclass(frozen=True)
 class UrdfTree:
     """A robot: its links and joints by name; joints by the link that they carry. notes: what was
-    read otherwise than it stands there, in words.
+    read otherwise than it stands there, in words. transmissions: those that couple motors.
     """
 
     name: str
     links: dict[str, UrdfLink]
     above: dict[str, UrdfJoint]
     notes: tuple[str, ...] = field(default=())
+    transmissions: tuple[UrdfTransmission, ...] = field(default=())
 
     def below(self, name: str) -> list[UrdfJoint]:
         """Joints that a link carries, in the order of the file."""
@@ -193,7 +195,8 @@ class _Reader:
             joints[joint.name] = joint
             above[joint.child] = joint
         _check_tree(root, links, above)
-        return UrdfTree(root.get("name") or "robot", links, above, tuple(self._notes))
+        name = root.get("name") or "robot"
+        return UrdfTree(name, links, above, tuple(self._notes), urdf_transmissions(root))
 
     def _link(self, element: Xml.Element) -> UrdfLink:
         name = _name(element, "link")
