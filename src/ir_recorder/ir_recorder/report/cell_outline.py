@@ -159,7 +159,7 @@ class View:
 def drawing(content: Iterable[str], label: str, name: str) -> str:
     """The drawing as SVG."""
     return (
-        f'<div class="figure scroll"><svg class="method" id="{name}" viewBox="0 0 {WIDTH:g} '
+        f'<div class="figure"><svg class="method" id="{name}" viewBox="0 0 {WIDTH:g} '
         f'{HEIGHT:g}" role="img" aria-label="{text(label)}">{"".join(content)}</svg></div>'
     )
 

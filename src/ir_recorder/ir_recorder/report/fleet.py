@@ -315,6 +315,7 @@ def _summed(
 # The page of a fleet: tables with sums, and bars of each robot's year.
 
 _ROWS = 40  # of movements: the rest is one row
+_COLUMNS = 5  # of robots, those that take most: the rest is one column; the table has them all
 REST = "all others"
 
 
@@ -499,7 +500,7 @@ def _between(amount: Amount, show: Callable[[float], str]) -> str:
 
 
 def _matrix(what: str, found: Mapping[str, Mapping[str, float]], robots: Sequence[Robot]) -> str:
-    """Rows by name, a column for each robot and one for all."""
+    """Rows by name, a column for each of the first robots, one for the others and one for all."""
     if not found:
         return '<p class="empty">No recording says it.</p>'
     names = list(found)
@@ -507,13 +508,19 @@ def _matrix(what: str, found: Mapping[str, Mapping[str, float]], robots: Sequenc
     if len(names) > _ROWS:
         rest = {r.name: sum(found[name].get(r.name, 0.0) for name in names[_ROWS:]) for r in robots}
         rows.append(_row(REST, rest, robots))
-    return table(
-        (what, *(f">{robot.name}" for robot in robots), ">all"), rows, f"kWh a year by {what}"
-    )
+    return table((what, *_robot_heads(robots), ">all"), rows, f"kWh a year by {what}")
+
+
+def _robot_heads(robots: Sequence[Robot]) -> list[str]:
+    heads = [f">{robot.name}" for robot in robots[:_COLUMNS]]
+    return [*heads, ">other robots"] if len(robots) > _COLUMNS else heads
 
 
 def _row(name: str, own: Mapping[str, float], robots: Sequence[Robot]) -> tuple[str, ...]:
-    cells = (text(kilowatt_hours(own[robot.name])) if robot.name in own else "" for robot in robots)
+    shown = [own.get(robot.name) for robot in robots[:_COLUMNS]]
+    if len(robots) > _COLUMNS:
+        shown.append(sum(own.get(robot.name, 0.0) for robot in robots[_COLUMNS:]))
+    cells = ("" if value is None else text(kilowatt_hours(value)) for value in shown)
     return (text(_shown(name)), *cells, f"<b>{text(kilowatt_hours(sum(own.values())))}</b>")
 
 
@@ -525,7 +532,7 @@ def _potential(members: Sequence[Member], robots: Sequence[Robot], costs: Costs)
         (*_row(name, own, robots), text(money(costs.money(sum(own.values())), costs.currency)))
         for name, own in found.items()
     ]
-    heads = ("measure", *(f">{robot.name}" for robot in robots), ">all", ">a year, at most")
+    heads = ("measure", *_robot_heads(robots), ">all", ">a year, at most")
     hint = "Upper bounds, each by itself: together they count some joules twice."
     return f'<p class="hint">{hint}</p>{table(heads, rows, "kWh a year by measure")}'
 

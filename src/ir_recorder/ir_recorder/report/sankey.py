@@ -57,7 +57,7 @@ def sankey_section(analysis: Analysis) -> str:
     return (
         '<section id="flows"><h2>Where the joules go</h2>'
         f'<p class="hint">{text(hint)}</p>'
-        f'<div class="figure scroll">{sankey(flows)}</div>'
+        f'<div class="figure">{sankey(flows)}</div>'
         f"<details><summary>The same as a table</summary>{_table(flows)}</details></section>"
     )
 

@@ -218,11 +218,12 @@ def against(best: Final, given: Final) -> str:
     does, sign = ("saves", 1.0) if less >= 0.0 else ("takes more:", -1.0)
     low, high = sorted((sign * saved.low, sign * saved.high))
     sure = "" if low > 0.0 else "; zero lies in it: it is open whether anything is saved"
-    moving = best.mean("moving_j") / given.mean("moving_j") - 1.0
+    moving = 1.0 - best.mean("moving_j") / given.mean("moving_j")
+    change = f"{percent(abs(moving)).lstrip('+')} {'less' if moving >= 0.0 else 'more'}"
     return (
         f"the given one {joules(given.mean())}. It {does} {joules(sign * less)}, "
         f"{percent(sign * less / given.mean()).lstrip('+')} (90 % interval {joules(low)} to "
-        f"{joules(high)}{sure}); of the movements alone {percent(moving)}. A cycle takes "
+        f"{joules(high)}{sure}); the movements alone take {change}. A cycle takes "
         f"{best.mean('duration_s'):.2f} s instead of {given.mean('duration_s'):.2f} s."
     )
 

@@ -11,7 +11,7 @@ from ir_recorder.report.charts import tick_step
 from ir_recorder.report.number_text import text
 from ir_studies.statistics.findings import Comparison
 
-WIDTH = 720.0
+WIDTH = 560.0
 LINE = 34.0
 _LEFT = 170.0
 _RIGHT = 20.0
@@ -38,7 +38,7 @@ def dots(comparisons: Sequence[Comparison], title: str) -> str:
     lines = "".join(_line(each, _TOP + LINE * (k + 0.5), at) for k, each in enumerate(kept))
     said = "; ".join(f"{each.name}: mean {each.mean.value:+.1f} %" for each in kept)
     return (
-        f'<div class="figure scroll"><svg class="dots" viewBox="0 0 {WIDTH:g} {height:g}" '
+        f'<div class="figure"><svg class="dots" viewBox="0 0 {WIDTH:g} {height:g}" '
         'role="img" '
         f'aria-label="{text(title)}: '
         f'{text(said)}">{_axis(range(first, last + 1), step, height, at)}{lines}'

@@ -146,7 +146,7 @@ class LiveClearanceChart extends ClearanceChart {
       find("answer").textContent = `${name}: the server has not answered`;
     }
   };
-  const bits = new Bits(find("inputs"), find("outputs"), find("hold"), press);
+  const bits = new Bits(find("inputs"), find("outputs"), find("hold"), press, find("stop"));
   find("view-only").hidden = Boolean(token);
 
   const takeScene = async (number) => {

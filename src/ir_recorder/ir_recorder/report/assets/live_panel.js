@@ -41,7 +41,8 @@ function showFigures(place, rows) {
 
 /* Buttons and lamps of bits, made when a bit is heard of first. */
 class Bits {
-  constructor(inputs, outputs, hold, press) {
+  constructor(inputs, outputs, hold, press, stop) {
+    this.stop = stop;
     this.inputs = inputs;
     this.outputs = outputs;
     this.hold = hold;
@@ -60,14 +61,14 @@ class Bits {
     const key = `${side} ${name}`, switchable = side === "in" && typeof level === "boolean";
     if (!this.made.has(key)) {
       const made = element(side === "in" && switchable ? "button" : side === "in" ? "span" : "li");
-      made.append(document.createTextNode(name), element("b"));
-      made.title = BIT_WORDS[name] || name.replace(/_/g, " ");
+      made.append(document.createTextNode(BIT_WORDS[name] || name.replace(/_/g, " ")), element("b"));
+      made.title = name;
       if (switchable) {
         made.type = "button";
         made.dataset.bit = name;
         made.addEventListener("click", () => this.press(name, made.getAttribute("aria-pressed") !== "true"));
       }
-      place.append(made);
+      (name === "emergency_stop" && switchable ? this.stop : place).append(made);
       this.made.set(key, made);
     }
     const made = this.made.get(key), value = made.querySelector("b"), words = typeof level === "boolean" ? (level ? "1" : "0") : level;

@@ -1,0 +1,158 @@
+"""Every page at a desk, on a phone and on paper: nothing is cut, nothing overlaps, nothing scrolls
+sideways, and axe finds nothing.
+
+Needs Chromium. Without it these tests say `not checked: browser`; where CI=true it has to be there.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import axe_core_python
+import pytest
+
+from ir_msgs_py.savings import BeforeAfter
+from ir_planner import Planner
+from ir_planner.before_after import before_after_common
+from ir_recorder import Analysis, analyse, findings
+from ir_recorder.report import report_html
+from ir_recorder.report.compare import comparison_html
+from ir_recorder.report.fleet import fleet_html, member_of
+from ir_recorder.report.program_comparison import before_after_html
+from ir_studies.arena.figures import Run
+from ir_studies.arena.page import page_html as arena_html
+from ir_studies.arena.settings import ArenaSettings, Entry
+
+TOOL = Path(__file__).resolve().parents[2] / "tools" / "_chromium.py"
+BOXES = Path(__file__).with_name("page_boxes.js").read_text()
+AXE = (Path(axe_core_python.__file__).parent / "axe.min.js").read_text(encoding="utf-8")
+FOUND = """axe.run(document, {resultTypes: ['violations']}).then(
+    (found) => found.violations.map((one) =>
+        `${one.id}: ${one.nodes.slice(0, 3).map((node) => node.html.slice(0, 120)).join(' | ')}`))
+"""
+SIZES = {"desk": (1400, 900), "phone": (390, 844), "paper": (703, 1047)}
+OPEN = "document.querySelectorAll('details').forEach((each) => { each.open = true; })"
+
+
+def _tool() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("_chromium", TOOL)
+    assert spec is not None
+    assert spec.loader is not None
+    module = sys.modules["_chromium"] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    tool = _tool()
+    if tool.chromium() is None:
+        pytest.skip("needs Chromium: apt install chromium")
+    with tool.Browser() as started:
+        yield started
+
+
+@cache
+def compared() -> tuple[BeforeAfter, Planner]:
+    planner = Planner("open", clock=lambda: 0.0)
+    home = planner.cell.machine_home
+    return before_after_common(planner, ("p1", "p2", "home"), home, 30.0), planner
+
+
+def report(analysis: Analysis) -> str:
+    return report_html(analysis, findings(analysis))
+
+
+def empty(analysis: Analysis) -> str:
+    bare = replace(
+        analysis.recording, power=None, joints=None, controller=None, events=(), cell_yaml=""
+    )
+    return report(analyse(bare))
+
+
+def recordings(analysis: Analysis) -> str:
+    checked = (analysis, findings(analysis))
+    return comparison_html([checked, checked, checked])
+
+
+def fleet(analysis: Analysis) -> str:
+    member = member_of(analysis, "robot")
+    assert member is not None
+    robots = [replace(member, robot=f"hall_{k}_robot_with_a_long_name") for k in range(9)]
+    return fleet_html(robots, left_out=["cut.mcap: left out: it was not driven to the end"])
+
+
+def before_and_after(_: Analysis) -> str:
+    found, planner = compared()
+    return before_after_html(found, planner.cell)
+
+
+def arena(_: Analysis) -> str:
+    settings = ArenaSettings(planners=("portfolio", "tree"), cells=("open",), seeds=1)
+    runs = []
+    for planner, cost in (("portfolio", 100.0), ("tree", 104.0)):
+        for task in ("home->p1", "p1->home"):
+            row = {
+                **{"solved": True, "cost_j": cost, "first_s": 0.1, "final_s": 0.4},
+                **{"movement_cost": cost, "duration_s": 1.0, "energy_j": cost},
+                **{"clearance_m": 0.02, "progress": [[0.1, 2.0 * cost], [0.4, cost]]},
+                **{"total_s": 1.0, "straight_free": False},
+            }
+            runs.append(Run(Entry(planner, "open", task, 0, "", "synchronous"), row))
+    return arena_html(runs, settings)
+
+
+PAGES: dict[str, Callable[[Analysis], str]] = {
+    "report": report,
+    "empty report": empty,
+    "recordings": recordings,
+    "fleet": fleet,
+    "before and after": before_and_after,
+    "arena": arena,
+}
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_nothing_is_cut_overlaps_or_scrolls_and_axe_finds_nothing(
+    browser: Any, analysis: Analysis, tmp_path: Path, name: str
+) -> None:
+    path = tmp_path / "page.html"
+    path.write_text(PAGES[name](analysis), encoding="utf-8")
+    faults = {}
+    for size, (wide, high) in SIZES.items():
+        page = browser.open(path, wide, high, touch=size == "phone", dark=size == "phone")
+        if size == "paper":
+            page.call("Emulation.setEmulatedMedia", media="print")
+            page.run("dispatchEvent(new Event('beforeprint'))")
+        page.frame()
+        faults[size] = page.run(BOXES)
+        if size != "paper":
+            page.run(OPEN)
+            page.frame()
+            faults[f"{size}, all unfolded"] = page.run(BOXES)
+            page.run(f"{AXE}; 0")
+            faults[f"{size}, axe"] = page.run(FOUND)
+        page.close()
+    assert {size: found for size, found in faults.items() if found} == {}
+
+
+def test_the_judge_sees_faults(browser: Any, tmp_path: Path) -> None:
+    path = tmp_path / "page.html"
+    path.write_text(
+        "<!doctype html><html lang=en><title>x</title><body><main><p id=a>one</p><p id=a "
+        "style='margin-top:-2.2rem'>two</p><div style='width:2000px'>wide</div><div class=scroll "
+        "style='overflow:auto;width:90px'><p style='width:300px'>long</p></div></main>"
+    )
+    page = browser.open(path, 390, 844)
+    found = " ".join(page.run(BOXES))
+    page.close()
+    for words in ("the page scrolls", "beyond the page", "scrolls sideways by", "one on the other"):
+        assert words in found
+    assert "two elements are called a" in found
