@@ -5,11 +5,11 @@
 
 A fixed list of requests is answered by the planner's core of each checkout, both built, each in a
 process of its own. Answers: status, trajectory ids, program id and every figure of the reports, bit
-by bit; each difference is listed. Speed: the same request before, after, before, after, N rounds,
-never at once; the
-ratio after : before of the least processor times of a request, and the median of it over the
-requests of a group. --script also runs a benchmark of each checkout in turns and compares its times
-of the same name.
+by bit; each difference is listed, and per group by how much the figures of whole answers changed.
+Speed: the same request before, after, before, after, N rounds, never at once; the ratio after :
+before of the least processor times of a request, and the median of it over the requests of a
+group. --script also runs a benchmark of each checkout in turns and compares its times of the same
+name.
 """
 
 from __future__ import annotations
@@ -108,6 +108,40 @@ def differences(before: dict[str, Any], after: dict[str, Any]) -> list[str]:
         if json.dumps(old) != json.dumps(new):
             found.append(f"{name}: {old} -> {new}")
     return found
+
+
+# What differs, as changes: rounding that differs leads descents into neighbouring optima.
+
+FIGURES = ("duration", "energy", "movement_cost")
+
+
+def changes(before: dict[str, Any], after: dict[str, Any]) -> dict[str, float]:
+    """Relative change of the figures of a whole answer that both checkouts have."""
+    found = {}
+    for name in FIGURES:
+        old = before.get(name)
+        new = after.get(name)
+        if isinstance(old, float) and isinstance(new, float) and old > 0.0:
+            found[name] = new / old - 1.0
+    return found
+
+
+def show_changes(rows: list[dict[str, Any]]) -> None:
+    """A line per group: the median and the ends of each figure's relative change."""
+    print("\nchange in %: median, least, largest")
+    for group in dict.fromkeys(row["group"] for row in rows):
+        told = []
+        for name in FIGURES:
+            seen = [
+                row["changes"][name]
+                for row in rows
+                if row["group"] == group and name in row["changes"]
+            ]
+            if seen:
+                middle, least, most = 100.0 * np.quantile(seen, [0.5, 0.0, 1.0])
+                told.append(f"{name} {middle:+.3f} {least:+.2f} {most:+.2f}")
+        if told:
+            print(f"{group:32s} {'; '.join(told)}")
 
 
 # Benchmarks of two checkouts run in turns, and the ratio of their times of the same name.
@@ -221,6 +255,7 @@ def row_of(k: int, sides: tuple[Side, Side], rounds: int) -> dict[str, Any]:
         "id": first[1]["answer"].get("id", ""),
         "identical": not found,
         "differences": found,
+        "changes": changes(first[0]["answer"], first[1]["answer"]),
         **({"before_ms": 1e3 * least[0], "after_ms": 1e3 * least[1]} if rounds else {}),
     }
 
@@ -285,6 +320,7 @@ def main() -> None:
         for k in chosen(after.requests, given):
             rows.append(row_of(k, (before, after), rounds))
             show(rows[-1])
+    show_changes(rows)
     groups = groups_of(rows)
     claims = claims_of(rows, groups)
     for name in given.script:
