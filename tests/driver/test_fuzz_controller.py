@@ -91,7 +91,7 @@ def act(simulation, what, value, plan, start):  # noqa: C901
         case "pause":
             simulation.pauses.start(3.0, simulation.executor.active)
         case "end_pause":
-            simulation.pauses.end()
+            simulation.control.end_pause()
         case "cancel":
             simulation.cancel(simulation.executor.goal_id or 0)
         case "load":
@@ -155,6 +155,40 @@ def keep_the_laws(make, plan, start, sequence):
             + reading.capacitor_energy
         )
         assert reading.energy == pytest.approx(parts, rel=1e-9, abs=1e-6)
+
+
+short_sequences = st.lists(st.tuples(actions, st.integers(1, 60)), max_size=8)
+
+
+@settings(max_examples=120, deadline=None, derandomize=True)
+@given(sequence=short_sequences)
+def test_the_time_to_operate_of_an_ended_pause_is_kept_from_every_state(
+    make, plan, start, sequence
+):
+    """Or End_Pause is refused, and nothing but its answer has happened."""
+    simulation = make(
+        transitions=QUICK,
+        idle=IDLE,
+        controller=ControllerSettings(enabling_switch=True),
+        load="none",
+        backend="ideal",
+    )
+    for (what, value), steps in sequence:
+        with contextlib.suppress(DriverError):
+            act(simulation, what, value, plan, start)
+        simulation.run(steps * 1e-3)
+    if not simulation.on_the_network:
+        return
+    try:
+        announced = simulation.control.end_pause()
+    except DriverError as error:
+        assert "can't be ended" in str(error)
+        return
+    for _ in range(round(1e3 * announced) + 3):
+        simulation.step()
+        if simulation.modes.motors_on:
+            return
+    pytest.fail(f"motors are not on after {announced} s but {simulation.modes.mode.name}")
 
 
 @pytest.mark.parametrize(

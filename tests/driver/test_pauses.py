@@ -107,7 +107,7 @@ def test_ending_a_pause_early_finishes_the_shortest_stay(make):
     simulation = make()
     simulation.pauses.start(200.0, executing=False)
     simulation.run(4.4)  # on brakes for 1.3 s, then into bus power off
-    announced = simulation.pauses.end()
+    announced = simulation.control.end_pause()
     assert announced == pytest.approx(1.9 + 20.0, abs=0.01)
     simulation.run(announced + 0.01)
     assert simulation.modes.mode is Mode.STAND_ON_MOTORS
@@ -135,7 +135,7 @@ def test_a_pause_is_refused_outside_ext_beside_power_bits_and_in_motion(make):
 
 def test_the_brake_timer_runs_again_after_a_pause_that_was_ended_on_motors(make):
     simulation = make(idle=IdleTimes(motors_to_brakes_in_program=0.5))
-    simulation.pauses.end()
+    simulation.control.end_pause()
     simulation.run(0.9)
     assert simulation.modes.mode is Mode.STAND_ON_BRAKES
 

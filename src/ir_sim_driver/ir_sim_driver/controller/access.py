@@ -176,7 +176,7 @@ class PlcSide:
                 plc.turn_switch(writer, mode)
             try:
                 if pause == 0.0:
-                    simulation.pauses.end()
+                    simulation.control.end_pause()
                 elif pause is not None:
                     simulation.pauses.start(pause, simulation.executor.active)
             except RequestRefusedError:

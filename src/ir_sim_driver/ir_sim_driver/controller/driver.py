@@ -321,7 +321,7 @@ class Driver:
     def end_pause(self) -> float:
         """End the pause; seconds until motors are on."""
         with self._access.online() as simulation:
-            return simulation.pauses.end()
+            return simulation.control.end_pause()
 
     def query_modes(self) -> tuple[tuple[PowerMode, ...], Mode]:
         """All modes with the present load and posture, and the present mode."""

@@ -155,9 +155,7 @@ class Pauses:
         return next(mode for mode in table if mode.mode is deepest)
 
     def end(self) -> float:
-        """End_Pause: back to motors; returns the seconds it takes, the rest of the minimum stay
-        included.
-        """
+        """Back to motors; returns the seconds it takes, the rest of the minimum stay included."""
         self.forget()
         self.wants_motors = True
         return self._modes.time_to_ready()
@@ -277,6 +275,35 @@ class ModeControl:
                 f"stop {self._plc.stop.number} is latched: a person has to recover first",
             )
         self.latches.end_rest = self._plc.stop.number
+
+    def end_pause(self) -> float:
+        """PROFIenergy End_Pause: back to motors; the seconds until they are on.
+
+        Raises RequestRefusedError where something else keeps them off, so that the time would never
+        come.
+        """
+        reason = self._kept_off()
+        if reason:
+            raise RequestRefusedError(
+                StatusCode.INVALID_ROBOT_STATE, f"the pause can't be ended: {reason}"
+            )
+        return self.pauses.end()
+
+    def _kept_off(self) -> str:
+        """Why the motors can't come on when a pause ends, "" when they can."""
+        plc = self._plc
+        if plc.stop.stopped or self.modes.mode is Mode.EMERGENCY_STOP:
+            return "emergency stop: release it and recover first"
+        if self.latches.restart:
+            return "a cold start is on: wait until the controller has started"
+        if self.modes.target in OFF_THE_NETWORK and self.modes.target in ROW:
+            seconds = self.modes.time_to_target
+            return f"the controller falls asleep in {seconds:.3g} s: wake it by Wake-on-LAN then"
+        if plc.rest is not None or plc.raw.ab or plc.raw.hib or plc.raw.ks:
+            return "a power bit of the PLC is 1: clear AB, HIB and KS"
+        if self.latches.drives_off or plc.raw.drives_off:
+            return "drives_off was given, drives_on is needed"
+        return ""
 
     def _forget_requests(self) -> None:
         """A stop has a new number: nothing of before it is asked for any more."""
