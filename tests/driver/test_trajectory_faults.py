@@ -129,26 +129,6 @@ def test_a_last_velocity_that_is_not_zero_is_refused(standing, start, cell, home
     refused(start, standing, trajectory, INVALID, "point 1", "last velocity")
 
 
-def test_lines_that_kink_too_sharply_are_refused_and_gentle_ones_run(
-    make, start, run_out, plan, home
-):
-    simulation = make("pybullet")
-    refused(
-        start,
-        simulation,
-        plan(1.0, home, home + 0.3, velocities=False),
-        INVALID,
-        "corners",
-        "rad/s^2",
-    )
-    sharp = plan([1.0, 2.0, 3.0], home, home + 0.2, home, velocities=False)
-    refused(start, simulation, sharp, INVALID, "corners", "give the points velocities")
-    start(simulation, plan([1.0, 2.0, 3.0], home, home + 0.01, home + 0.02, velocities=False))
-    outcome = run_out(simulation)
-    assert outcome.code == ErrorCode.SUCCESSFUL
-    assert outcome.max_tool_deviation < 0.005
-
-
 def test_points_are_bounded(make, start, plan, home):
     simulation = make(execution=ExecutionSettings(max_points=100))
     many = plan(np.linspace(0.0, 10.0, 101), *[home] * 101)
@@ -163,11 +143,9 @@ def test_effort_and_multi_dof_are_unsupported(standing, start, plan, home):
 @pytest.mark.parametrize(
     ("tolerance", "word"),
     [
-        (JointTolerance("joint_x", 0.1), "unknown joint"),
         (JointTolerance("joint_a1", -2.0), "-2"),
         (JointTolerance("joint_a1", float("nan")), "nan"),
         (JointTolerance("joint_a1", velocity=float("inf")), "inf"),
-        (JointTolerance("joint_a1", acceleration=0.5), "nothing measures accelerations"),
     ],
 )
 def test_tolerances_that_mean_nothing_are_refused(standing, start, plan, home, tolerance, word):
@@ -175,7 +153,7 @@ def test_tolerances_that_mean_nothing_are_refused(standing, start, plan, home, t
     refused(start, standing, plan(1.0, home, home), INVALID, word, goal_tolerance=(tolerance,))
 
 
-@pytest.mark.parametrize("goal_time", [-1.0, float("nan")])
+@pytest.mark.parametrize("goal_time", [-2.0, float("nan")])
 def test_a_goal_time_that_means_nothing_is_refused(standing, start, plan, home, goal_time):
     refused(start, standing, plan(1.0, home, home), INVALID, "goal_time", goal_time=goal_time)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -121,9 +121,9 @@ class VettedGoal:
         return route
 
     def delay(self, now_ns: int) -> float:
-        """Seconds until time 0 of the trajectory."""
+        """Seconds until time 0 of the trajectory; below 0: since, by its header stamp."""
         stamp = self.goal.stamp_ns
-        return 0.0 if stamp == 0 else max(0.0, (stamp - now_ns) * _NS)
+        return 0.0 if stamp == 0 else (stamp - now_ns) * _NS
 
 
 def vet(
@@ -138,7 +138,9 @@ def vet(
     trajectory must keep clear of now. Raises TrajectoryRefusedError.
     """
     checked = check_goal(goal, tuple(robot.joint_names), settings, now_ns)
-    executed = check_trajectory(checked.trajectory, robot, dynamics, settings)
+    executed, note = check_trajectory(checked.trajectory, robot, dynamics, settings)
+    label = checked.label or checked.trajectory.trajectory_id
+    checked = replace(checked, trajectory=executed, label=label).noted(note)
     try:
         keep = asked(checked.station)
     except InvalidValueError as error:

@@ -137,6 +137,7 @@ class _Run:
     wait: int  # steps until it may start
     quiet: float  # bound of the tool's deviation [m] below which nothing can be broken
     error: FloatArray  # largest of each joint so far (n,) [rad]
+    note: str  # what the outcome says beside how the goal ended
     s: float = 0.0
     ahead: Iterator[tuple[float, FloatArray]] = field(
         default_factory=lambda: iter(())
@@ -279,11 +280,12 @@ class Executor:
             route,
             path_tolerance,
             Tolerances.of(self._names, goal.goal_tolerance, s.goal_tolerance),
-            goal.goal_time or s.goal_time,
+            goal.settling_time(s),
             label,
             max(0, round(delay / self._dt)),
             -1.0 if path_tolerance.has_velocity else quiet,
             np.zeros(len(self._still)),
+            goal.note,
         )
         # a route from rest starts with speed zero, so path time may start at once; one in motion
         # carries on
@@ -416,6 +418,7 @@ class Executor:
         self._outcomes.append(
             replace(
                 run.outcome,
+                sentence="; ".join(text for text in (run.outcome.sentence, run.note) if text),
                 max_tool_deviation=run.deviation,
                 max_tracking_error=tuple(run.error.tolist()),
                 settling_time=run.settling * self._dt,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
@@ -30,6 +31,10 @@ class ErrorCode(IntEnum):
     CONTACT = -6
 
 
+FOR_EVER = -1.0
+"""As the longest wait for the goal tolerance."""
+
+
 @dataclass(frozen=True)
 class JointTolerance:
     """Tolerance of one joint [rad, rad/s, rad/s^2]; 0: the default, -1: unbounded."""
@@ -45,12 +50,13 @@ class TrajectoryGoal:
     """A trajectory with what the sender allows.
 
     stamp_ns: node clock at which the trajectory starts, 0 = now. goal_time [s]: longest wait for
-    the goal tolerance after the end, 0 = the default. has_effort: points carry effort. multi_dof:
-    number of multi-dof points. cell_hash, load: the cell and the load that it was planned with, "":
-    not compared. station: whose contacts are allowed, "": none. states: of machines that it relies
-    on ("lathe=door_open").
+    the goal tolerance after the end, 0 = the default, -1 = for ever. has_effort: points carry
+    effort. multi_dof: number of multi-dof points. cell_hash, load: the cell and the load that it
+    was planned with, "": not compared. station: whose contacts are allowed, "": none. states: of
+    machines that it relies on ("lathe=door_open").
     allow_collision: start it although it is known to collide. after_stop: number of the last stop
-    that the sender knows; a later one makes the goal void. None: not compared.
+    that the sender knows; a later one makes the goal void. None: not compared. note: what its
+    outcome says beside how it ended.
     """
 
     trajectory: JointTrajectory
@@ -67,6 +73,17 @@ class TrajectoryGoal:
     states: tuple[str, ...] = ()
     allow_collision: bool = False
     after_stop: int | None = None
+    note: str = ""
+
+    def settling_time(self, settings: ExecutionSettings) -> float:
+        """Longest wait for the goal tolerance [s]."""
+        if self.goal_time == FOR_EVER:
+            return math.inf
+        return self.goal_time or settings.goal_time
+
+    def noted(self, note: str) -> TrajectoryGoal:
+        """The goal with one more note; "" for none."""
+        return replace(self, note="; ".join(text for text in (self.note, note) if text))
 
 
 @dataclass(frozen=True)
@@ -116,11 +133,13 @@ class Tolerances:
         cls, joint_names: Sequence[str], given: Sequence[JointTolerance], default: float
     ) -> Tolerances:
         """Arrays in the robot's joint order; 0 means the default [rad] (speed: unbounded), -1
-        unbounded.
+        unbounded. Joints that the robot doesn't have are left out.
         """
         position = np.full(len(joint_names), default)
         velocity = np.full(len(joint_names), np.inf)
         for tolerance in given:
+            if tolerance.name not in joint_names:
+                continue
             j = joint_names.index(tolerance.name)
             if tolerance.position != 0.0:
                 position[j] = tolerance.position if tolerance.position > 0.0 else np.inf
@@ -195,10 +214,19 @@ class ExecutionSettings:
     )
     blend_time: float = setting(
         0.02,
-        "A velocity that jumps by more than the acceleration limit times this is refused.",
+        "Corners of positions alone are rounded over at least this time; a first velocity that "
+        "jumps by more than the acceleration limit times it is refused.",
         unit="s",
         minimum=0.001,
         maximum=0.1,
+    )
+    corner_tolerance: float = setting(
+        0.02,
+        "How far points of positions alone may be passed by where their corners are rounded, per "
+        "joint; beyond it the trajectory is slowed.",
+        unit="rad",
+        minimum=1e-4,
+        maximum=0.5,
     )
     bridge_time: float = setting(
         0.25,
@@ -206,6 +234,11 @@ class ExecutionSettings:
         unit="s",
         minimum=0.05,
         maximum=5.0,
+    )
+    join_late: bool = setting(
+        False,
+        "Whether a trajectory whose header stamp has passed is joined in the middle; otherwise it "
+        "starts from its beginning, later.",
     )
     max_points: int = setting(
         20_000, "Longest trajectory, in points.", minimum=1, maximum=1_000_000

@@ -12,67 +12,19 @@ import numpy as np
 from ir_description import RobotModel
 from ir_kernels import Extrema, polynomial_extrema
 from ir_kernels.dynamics import DynamicsModel
-from ir_msgs_py.trajectory import NS_PER_S, JointTrajectory
+from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.motion.goal import ErrorCode, ExecutionSettings, JointTolerance, TrajectoryGoal
+from ir_sim_driver.motion.corner_rounding import SHARES, SLOWEST, is_rounded, rounded
+from ir_sim_driver.motion.goal import (
+    FOR_EVER,
+    ErrorCode,
+    ExecutionSettings,
+    JointTolerance,
+    TrajectoryGoal,
+)
 from ir_sim_driver.motion.path import Motion, Path, quintic
-from ir_values.arrays import BoolArray, FloatArray, IntArray
+from ir_values.arrays import BoolArray, FloatArray
 from ir_values.errors import JointNamesError
-
-# Trajectories of positions alone: their corners are rounded, so that velocity never jumps.
-#
-# The linear interpolant has corners, which no drive can follow. What is executed is its mean over
-# the last w = blend_time: q~(t) = 1/w int_{t-w}^{t} q(u) du, a piecewise parabola with q~'
-# continuous and q~'' = (q'(t) - q'(t - w)) / w. A cubic Hermite spline through its knots t_i and
-# t_i + w is exactly it.
-
-_APART = 100_000  # ns; between nearer knots the rounding of positions would count as acceleration
-
-
-def rounded(trajectory: JointTrajectory, blend_time: float) -> JointTrajectory:
-    """The trajectory that is executed: itself when it carries velocities, else its mean over
-    blend_time [s].
-
-    It ends blend_time later. Before a first time 0 the robot rests; before a later one the mean
-    continues the first line, so that what leads in meets it in motion.
-    """
-    if trajectory.velocities is not None or len(trajectory.times_ns) < 2:
-        return trajectory
-    window_ns = round(blend_time * NS_PER_S)
-    given = trajectory.times_ns
-    knots = np.unique(np.concatenate((given, given + window_ns)))
-    first = int(given[0])
-    t = (given - first) / NS_PER_S
-    q = trajectory.positions
-    start = q[0] if first == 0 else q[0] - (q[1] - q[0]) / t[1] * blend_time
-    t = np.concatenate(([-blend_time], t, [t[-1] + blend_time]))
-    at = (knots - first) / NS_PER_S
-    now, then = (_interpolated(t, np.vstack((start, q, q[-1])), x) for x in (at, at - blend_time))
-    velocities = (now - then) / blend_time
-    velocities[-1] = 0.0
-    # q~' is a line between knots: its integral keeps neighbours consistent to the last bit
-    steps = np.diff(at)[:, None] * 0.5 * (velocities[1:] + velocities[:-1])
-    mean = 0.5 * (start + q[0]) + np.vstack((np.zeros(q.shape[1]), np.cumsum(steps, axis=0)))
-    mean[-1] = q[-1]
-    kept = _apart(knots)
-    return JointTrajectory(trajectory.joint_names, knots[kept], mean[kept], velocities[kept])
-
-
-def _apart(knots: IntArray) -> IntArray:
-    """Indices of knots (N,) [ns], ascending, that are at least _APART apart; the first and the last
-    stay.
-    """
-    kept = [0]
-    for k in range(1, len(knots) - 1):
-        if knots[k] - knots[kept[-1]] >= _APART and knots[-1] - knots[k] >= _APART:
-            kept.append(k)
-    return np.array([*kept, len(knots) - 1])
-
-
-def _interpolated(t: FloatArray, q: FloatArray, at: FloatArray) -> FloatArray:
-    """Values (M, n) at times (M,) of lines through q (N, n) at t (N,)."""
-    return np.stack([np.interp(at, t, column) for column in q.T], axis=1)
-
 
 # Limits of position, velocity, acceleration and torque, proved for every instant.
 #
@@ -253,23 +205,26 @@ def route_onto(
     delay: float,
     share: float,
 ) -> Route:
-    """Path from the commanded motion `now` onto and along what is executed of the trajectory.
+    """Path from the commanded motion `now` onto and along the trajectory that is executed.
 
-    acceleration_max (n,) [rad/s^2]. delay [s]: until time 0 of the trajectory; a robot at rest
+    acceleration_max (n,) [rad/s^2]. delay [s]: until time 0 of the trajectory, below 0 since; a
+    robot at rest
     waits for it.
     share: of acceleration_max, that closing the last difference may use; anything else has its time
     given. Raises TrajectoryRefusedError.
     """
     moving = bool(now.qd.any())
-    first = float(trajectory.times[0]) + (delay if moving else 0.0)
-    executed = rounded(trajectory, settings.blend_time)
-    coefficients, durations = executed.coefficients()
+    late = max(0.0, -delay) if settings.join_late else 0.0
+    if late > 0.0:
+        return _bridged(trajectory, now, settings.bridge_time, late)
+    first = float(trajectory.times[0]) + (max(0.0, delay) if moving else 0.0)
+    coefficients, durations = trajectory.coefficients()
     if first > 0.0:
-        lead = quintic(now, _motion_at_point(executed, 0), first)
+        lead = quintic(now, _motion_at_point(trajectory, 0), first)
         return Route(_path([lead, coefficients], [np.array([first]), durations], now.q), 0.0, 1)
     _check_start(trajectory, now, acceleration_max, settings)
-    if moving or np.abs(_motion_at_point(executed, 0).qd).max() > AT_REST:
-        return _bridged(executed, now, settings.bridge_time)
+    if moving or np.abs(_motion_at_point(trajectory, 0).qd).max() > AT_REST:
+        return _bridged(trajectory, now, settings.bridge_time)
     delta = np.abs(trajectory.positions[0] - now.q)
     if delta.max() <= _SAME:
         return Route(Path(coefficients, durations, trajectory.positions[0]), 0.0, 0)
@@ -279,17 +234,21 @@ def route_onto(
     return Route(_path([closing, coefficients], [np.array([T]), durations], now.q), T, 1)
 
 
-def _bridged(executed: JointTrajectory, now: Motion, bridge_time: float) -> Route:
-    coefficients, durations = executed.coefficients()
-    if len(durations) == 0:
+def _bridged(
+    trajectory: JointTrajectory, now: Motion, bridge_time: float, late: float = 0.0
+) -> Route:
+    """Onto the first point that is at least bridge_time [s] ahead, `late` [s] after time 0."""
+    coefficients, durations = trajectory.coefficients()
+    if len(durations) == 0 and trajectory.times[0] <= late:
         raise TrajectoryRefusedError(
             ErrorCode.INVALID_GOAL,
             "the only point has time 0 s and the robot moves: give it a time above 0 s",
         )
-    k = min(int(np.searchsorted(executed.times, bridge_time)), len(durations))
-    bridge = quintic(now, _motion_at_point(executed, k), float(executed.times[k]))
-    pieces = [bridge, coefficients[k:]], [executed.times[k : k + 1], durations[k:]]
-    return Route(_path(*pieces, now.q), 0.0, 1)
+    k = min(int(np.searchsorted(trajectory.times, late + bridge_time)), len(durations))
+    bridge_time = float(trajectory.times[k]) - late
+    bridge = quintic(now, _motion_at_point(trajectory, k), bridge_time)
+    pieces = [bridge, coefficients[k:]], [np.array([bridge_time]), durations[k:]]
+    return Route(_path(*pieces, now.q), -late, 1)
 
 
 def _path(coefficients: list[FloatArray], durations: list[FloatArray], rest: FloatArray) -> Path:
@@ -373,11 +332,16 @@ def check_goal(
         )
     _check_stamp(goal, trajectory, settings, now_ns)
     _check_end(trajectory)
+    goal = replace(goal, trajectory=trajectory)
     for tolerance in (*goal.path_tolerance, *goal.goal_tolerance):
-        _check_tolerance(tolerance, joint_names)
-    if not (math.isfinite(goal.goal_time) and goal.goal_time >= 0.0):
-        raise _invalid(f"goal_time_tolerance is {goal.goal_time:g} s: it must be at least 0 s")
-    return replace(goal, trajectory=trajectory)
+        goal = goal.noted(_checked_tolerance(tolerance, joint_names))
+    known = math.isfinite(goal.goal_time) and (goal.goal_time >= 0.0 or goal.goal_time == FOR_EVER)
+    if not known:
+        raise _invalid(
+            f"goal_time_tolerance is {goal.goal_time:g} s: it must be at least 0 s (0: default), "
+            "or -1 s (for ever)"
+        )
+    return goal
 
 
 def check_trajectory(
@@ -385,24 +349,44 @@ def check_trajectory(
     robot: RobotModel,
     dynamics: DynamicsModel,
     settings: ExecutionSettings,
-) -> JointTrajectory:
+) -> tuple[JointTrajectory, str]:
     """Check every instant of a trajectory against the limits, whatever state the robot is in; what
-    is executed of it.
+    is executed of it, and what its sender should know, "" for nothing.
 
-    May take a while for long ones. Raises TrajectoryRefusedError.
+    Positions alone are rounded and, where the limits need it, slowed. May take a while for long
+    ones. Raises TrajectoryRefusedError.
     """
     _check_points(trajectory, robot, settings)
-    executed = rounded(trajectory, settings.blend_time)
+    if not is_rounded(trajectory):
+        _check_segments(trajectory, robot, dynamics, settings)
+        return trajectory, ""
+    for share in SHARES:
+        executed = rounded(trajectory, robot, settings, share)
+        if executed.slowed > SLOWEST:
+            break
+        try:
+            _check_segments(executed.trajectory, robot, dynamics, settings)
+        except TrajectoryRefusedError as error:
+            refusal = error
+        else:
+            return executed.trajectory, executed.note(settings)
+    if executed.slowed <= SLOWEST:
+        raise refusal
+    raise _invalid(
+        f"the lines between the points would have to be driven {executed.slowed:.3g} times slower "
+        f"to keep the limits: at most {SLOWEST:g}; give the points more time"
+    )
+
+
+def _check_segments(
+    trajectory: JointTrajectory,
+    robot: RobotModel,
+    dynamics: DynamicsModel,
+    settings: ExecutionSettings,
+) -> None:
     with np.errstate(over="ignore", invalid="ignore"):
-        coefficients, durations = executed.coefficients()
-    try:
-        check_limits(coefficients, durations, float(executed.times[0]), robot, dynamics, settings)
-    except TrajectoryRefusedError as error:
-        if executed is trajectory:
-            raise
-        corners = f"corners of positions alone are rounded over {settings.blend_time:g} s"
-        raise _invalid(f"{error}; {corners}: give the points velocities") from error
-    return executed
+        coefficients, durations = trajectory.coefficients()
+    check_limits(coefficients, durations, float(trajectory.times[0]), robot, dynamics, settings)
 
 
 def checked_route(
@@ -434,7 +418,7 @@ def checked_route(
         try:
             check_limits(coefficients, durations, -found.offset, robot, dynamics, settings, allowed)
         except TrajectoryRefusedError as error:
-            if found.offset == 0.0:
+            if found.offset <= 0.0:
                 raise
             refusal = error
         else:
@@ -470,7 +454,7 @@ def _check_stamp(
     if goal.stamp_ns == 0:
         return
     delay = (goal.stamp_ns - now_ns) * _NS
-    if delay + trajectory.duration < 0.0:
+    if delay + trajectory.duration <= 0.0:
         raise TrajectoryRefusedError(
             ErrorCode.OLD_HEADER_TIMESTAMP,
             f"the trajectory ended {-delay - trajectory.duration:.3f} s ago by its header stamp: "
@@ -495,24 +479,23 @@ def _check_end(trajectory: JointTrajectory) -> None:
         )
 
 
-def _check_tolerance(tolerance: JointTolerance, joint_names: tuple[str, ...]) -> None:
-    if tolerance.name not in joint_names:
-        raise _invalid(
-            f"tolerance for unknown joint {tolerance.name[:80]!r}: expected are "
-            f"{', '.join(joint_names)}"
-        )
+def _checked_tolerance(tolerance: JointTolerance, joint_names: tuple[str, ...]) -> str:
+    """What of a tolerance is not used, "" when all is. Raises TrajectoryRefusedError."""
     for what in ("position", "velocity", "acceleration"):
         value = getattr(tolerance, what)
         if not (math.isfinite(value) and (value >= 0.0 or value == -1.0)):
             raise _invalid(
-                f"{what} tolerance of {tolerance.name} is {value:g}: it must be at least 0 (0: "
-                "default), or -1 (unbounded)"
+                f"{what} tolerance of {tolerance.name[:80]} is {value:g}: it must be at least 0 "
+                "(0: default), or -1 (unbounded)"
             )
+    if tolerance.name not in joint_names:
+        return f"tolerance for unknown joint {tolerance.name[:80]!r} is not used"
     if tolerance.acceleration > 0.0:
-        raise _invalid(
-            f"acceleration tolerance of {tolerance.name} is {tolerance.acceleration:g} rad/s^2: "
-            "nothing measures accelerations, it must be 0 (default) or -1 (unbounded)"
+        return (
+            f"acceleration tolerance of {tolerance.name} is not used: nothing measures "
+            "accelerations"
         )
+    return ""
 
 
 def _invalid(sentence: str) -> TrajectoryRefusedError:

@@ -1,0 +1,149 @@
+"""What clients of ROS' joint trajectory controller send, and how it is executed here."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import CubicHermiteSpline
+
+from ir_kernels.dynamics import DynamicsModel
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_sim_driver.errors import TrajectoryRefusedError
+from ir_sim_driver.motion import ExecutionSettings, JointTolerance, check_trajectory
+from ir_sim_driver.motion.goal import ErrorCode
+
+SETTINGS = ExecutionSettings()
+
+
+@pytest.fixture
+def home(cell):
+    return np.array(cell.machine_home)
+
+
+@pytest.fixture(scope="module")
+def dynamics(cell):
+    return DynamicsModel(cell.robot)
+
+
+steps = st.lists(
+    st.tuples(
+        st.floats(0.02, 3.0),
+        st.lists(st.floats(-0.25, 0.25), min_size=6, max_size=6),
+    ),
+    min_size=2,
+    max_size=8,
+)
+
+
+@settings(
+    max_examples=80,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(steps=steps, first=st.sampled_from([0.0, 1.5]))
+def test_lines_are_driven_within_limits_past_every_point(cell, dynamics, home, steps, first):
+    """Judged by samples of SciPy's Hermite spline; refused only where ten times the time is too
+    short.
+    """
+    times = first + np.concatenate(([0.0], np.cumsum([step for step, _ in steps])))
+    q = home + np.concatenate((np.zeros((1, 6)), np.array([move for _, move in steps])))
+    sent = JointTrajectory.from_seconds(cell.robot.joint_names, times, q)
+    speed = np.abs(np.diff(q, axis=0)) / np.diff(times)[:, None]
+    try:
+        executed, note = check_trajectory(sent, cell.robot, dynamics, SETTINGS)
+    except TrajectoryRefusedError as error:
+        refused = str(error)
+    else:
+        refused = ""
+    if refused:
+        assert (speed / cell.robot.velocity_max).max() > 0.2
+        assert "times slower" in refused
+        return
+    t = executed.times
+    spline = CubicHermiteSpline(t, executed.positions, executed.velocities)
+    dense = np.linspace(t[0], t[-1], 4000)
+    slack = 1.0 + 2e-3
+    assert (np.abs(spline(dense, 1)) <= cell.robot.velocity_max * slack).all()
+    assert (np.abs(spline(dense, 2)) <= cell.robot.acceleration_max * slack).all()
+    assert np.allclose(executed.velocities[-1], 0.0)
+    assert np.array_equal(executed.positions[-1], q[-1])
+    passed = [np.abs(spline(dense) - point).max(axis=1).min() for point in q]
+    resolution = np.abs(np.diff(spline(dense), axis=0)).max()
+    assert max(passed[1:]) <= SETTINGS.corner_tolerance + resolution
+    shortest = (t[-1] - t[0]) >= (times[-1] - times[0]) - 1e-9
+    assert shortest, "it is never faster than sent"
+    if "slowed" not in note:
+        assert t[-1] - times[-1] <= 2.0
+
+
+def test_way_points_of_a_test_script_run_and_the_outcome_says_how(make, start, run_out, plan, home):
+    simulation = make("pybullet")
+    up = home + 0.2 * np.array([1.0, -1.0, 0.5, 0.0, 0.0, 0.0])
+    sent = plan([2.0, 4.0, 6.0, 8.0], home, up, home, up, velocities=False)
+    start(simulation, sent)
+    outcome = run_out(simulation)
+    assert outcome.code == ErrorCode.SUCCESSFUL, outcome.sentence
+    assert "points passed by at most" in outcome.sentence
+    assert outcome.label == sent.trajectory_id
+    assert np.abs(simulation.backend.q - up).max() < 0.005
+
+
+def test_lines_that_are_too_fast_are_slowed_and_absurd_ones_refused(
+    make, start, run_out, plan, home
+):
+    simulation = make()
+    there = home + np.array([2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    start(simulation, plan([1.0, 1.5, 2.0], home, there, home, velocities=False))
+    outcome = run_out(simulation)
+    assert outcome.code == ErrorCode.SUCCESSFUL
+    assert "slowed to" in outcome.sentence
+    with pytest.raises(
+        TrajectoryRefusedError, match=r"times slower to keep the limits: at most 10"
+    ):
+        start(simulation, plan([1.0, 1.01, 1.02], home, there, home, velocities=False))
+
+
+def test_gentle_lines_run_as_sent_without_a_word(make, start, run_out, plan, home):
+    simulation = make("pybullet")
+    start(simulation, plan([1.0, 2.0, 3.0], home, home + 0.01, home + 0.02, velocities=False))
+    outcome = run_out(simulation)
+    assert outcome.code == ErrorCode.SUCCESSFUL
+    assert outcome.sentence == ""
+    assert outcome.max_tool_deviation < 0.005
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "words"),
+    [
+        (JointTolerance("gripper_finger", 0.1), "unknown joint 'gripper_finger' is not used"),
+        (JointTolerance("joint_a1", acceleration=0.5), "nothing measures accelerations"),
+    ],
+)
+def test_tolerances_that_can_t_be_used_are_named_in_the_outcome(
+    make, start, run_out, plan, home, tolerance, words
+):
+    simulation = make()
+    start(simulation, plan(1.0, home, home), path_tolerance=(tolerance,), goal_time=-1.0)
+    outcome = run_out(simulation)
+    assert outcome.code == ErrorCode.SUCCESSFUL
+    assert words in outcome.sentence
+
+
+@pytest.mark.parametrize("join", [False, True])
+def test_a_stamp_in_the_past_starts_late_or_joins_in_the_middle(
+    make, start, run_out, plan, home, join
+):
+    simulation = make("ideal", execution=ExecutionSettings(join_late=join))
+    simulation.run(2.0)
+    there = home + np.array([0.3, 0.0, 0.0, 0.0, 0.0, 0.0])
+    begun = simulation.time
+    now_ns = round(begun * 1e9)
+    start(simulation, plan([0.0, 4.0], home, there), now_ns, stamp_ns=now_ns - 1_000_000_000)
+    outcome = run_out(simulation)
+    assert outcome.code == ErrorCode.SUCCESSFUL
+    taken = simulation.time - begun
+    assert taken == pytest.approx(3.0 if join else 4.0, abs=0.2)
+    assert np.abs(simulation.backend.q - there).max() < 1e-3
