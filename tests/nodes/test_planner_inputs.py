@@ -4,16 +4,26 @@ from __future__ import annotations
 
 from typing import Any
 
+import hypothesis
 import numpy as np
 import pytest
+from hypothesis import strategies as st
 from sensor_msgs.msg import JointState
 
 from ir_description import load_cell
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
-from ir_planner.node.inputs import LOOKS, LastState, measured_velocity, state_of
+from ir_planner.node.inputs import (
+    LOOKS,
+    LastState,
+    has_joints,
+    measured_velocity,
+    of_joints,
+    state_of,
+)
 from ir_planner.scene.motion_limits import STILL
+from ir_values.errors import JointNamesError
 
 
 def test_a_standing_robot_is_one_start_however_its_measurement_trembles() -> None:
@@ -32,7 +42,7 @@ def test_a_standing_robot_is_one_start_however_its_measurement_trembles() -> Non
 def test_no_state_and_an_old_one_are_distinguished() -> None:
     state = LastState()
     assert state.known(0.0, 1.0) is None
-    with pytest.raises(RequestError, match="no joint_states have come yet"):
+    with pytest.raises(RequestError, match="no joint_states of this robot have come yet"):
         state.fresh(0.0, 1.0)
     state.take(np.zeros(6), 0.0)
     with pytest.raises(RequestError, match=r"came 2.5 s ago: it must be at most 1 s"):
@@ -75,11 +85,11 @@ def test_a_driver_that_is_held_up_is_heard_a_moment_later(before: float | None) 
 
 def test_a_driver_that_stays_silent_and_one_that_is_not_there_are_said() -> None:
     silent = Busy(after=10 * LOOKS)
-    with pytest.raises(RequestError, match="no joint_states have come yet"):
+    with pytest.raises(RequestError, match="no joint_states of this robot have come yet"):
         silent.ask()
     assert silent.looks <= LOOKS + 1
     missing = Busy(after=5, offered=False)
-    with pytest.raises(RequestError, match="no joint_states have come yet"):
+    with pytest.raises(RequestError, match="no joint_states of this robot have come yet"):
         missing.ask()
     assert missing.looks <= 2
 
@@ -156,3 +166,37 @@ def test_a_start_or_goal_that_moves_is_refused_and_a_state_that_moves_is_none_th
     assert free.tolist() == list(CELL.park)
     slow = given(velocity=[1e-4] * 6, effort=[float("nan")] * 6)
     assert state_of(slow, CELL, StatusCode.START_STATE_INVALID, "start") is not None
+
+
+@hypothesis.given(
+    own=st.permutations(["joint_a1", "joint_a2", "joint_a3"]),
+    others=st.lists(
+        st.sampled_from(["finger", "e1", "left/joint_a1", "left_joint_a2"]), unique=True
+    ),
+    seed=st.integers(0, 2**32 - 1),
+    velocities=st.booleans(),
+)
+def test_joints_beside_the_robot_s_are_left_out_of_joint_states(own, others, seed, velocities):
+    names = [*own, *others]
+    generator = np.random.default_rng(seed)
+    generator.shuffle(names)
+    values = {
+        name: float(value)
+        for name, value in zip(names, generator.normal(size=len(names)), strict=True)
+    }
+    msg = JointState(name=names, position=[values[name] for name in names])
+    if velocities:
+        msg.velocity = [2.0 * values[name] for name in names]
+    robot = ("joint_a1", "joint_a2", "joint_a3")
+    assert has_joints(msg, robot)
+    found = of_joints(msg, robot)
+    assert sorted(found.name) == sorted(robot)
+    assert list(found.position) == [values[name] for name in found.name]
+    assert list(found.velocity) == [2.0 * values[name] for name in found.name] * velocities
+
+
+def test_joints_that_are_missing_in_joint_states_are_named():
+    msg = JointState(name=["joint_a1", "finger"], position=[0.0, 0.0])
+    assert not has_joints(msg, ("joint_a1", "joint_a2"))
+    with pytest.raises(JointNamesError, match=r"joint_a2 missing .* has joint_a1, finger"):
+        of_joints(msg, ("joint_a1", "joint_a2"))

@@ -98,18 +98,32 @@ class Received(NamedTuple):
 
 
 class LatestMessage:
-    """The newest message of a topic, whoever publishes it and however fast."""
+    """The newest message of a topic, whoever publishes it and however fast.
 
-    def __init__(self, node: Node, message_type: Any, topic: str) -> None:
-        newest = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    depth: how many wait between two looks, so that one that fits isn't pushed out by others.
+    """
+
+    def __init__(self, node: Node, message_type: Any, topic: str, depth: int = 1) -> None:
+        newest = QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
         self._taken = _Taken(node, message_type, topic, newest)
 
-    def take(self) -> Received | None:
-        """Return the newest message that has come since the last call, None when none has."""
-        found = self._taken.next()
-        if found is None:
+    def take(self, fits: Callable[[Any], bool] = lambda message: True) -> Received | None:
+        """Return the newest message since the last call that fits, the newest where none does, None
+        when none has come.
+        """
+        newest = None
+        fitting = None
+        while True:
+            found = self._taken.next()
+            if found is None:
+                break
+            newest = found
+            if fits(found[0]):
+                fitting = found
+        chosen = fitting or newest
+        if chosen is None:
             return None
-        message, info = found
+        message, info = chosen
         return Received(message, max(0.0, (time.time_ns() - info["received_timestamp"]) * 1e-9))
 
 

@@ -7,6 +7,7 @@ from threading import Lock
 from typing import Any
 
 import numpy as np
+from sensor_msgs.msg import JointState
 
 from ir_description import Cell, CellPath
 from ir_kernels import portable
@@ -33,6 +34,7 @@ from ir_planner.planner import Planner
 from ir_planner.request import POSITION_MAX, Goal, one_goal
 from ir_planner.state_queries import STATES_MAX
 from ir_planner.trajectories import POINTS_MAX, Reference
+from ir_values.errors import JointNamesError
 
 # What requests say, as values: states, goals, poses, options, trajectories. Nothing here is
 # planned.
@@ -43,6 +45,7 @@ AT_REST = (
 # s; 4 s for a driver that publishes 500 times a second
 LOOK = 0.02
 LOOKS = 200
+_SHOWN = 6  # names of foreign joints in a sentence
 MEASURED = 9  # decimals of rad: finer than any encoder, and less than what counts as movement
 
 
@@ -69,6 +72,7 @@ class LastState:
         with self._lock:
             # + 0.0: no negative zeros
             self.q = np.round(q, MEASURED) + 0.0
+            self.problem = ""
             self.came = now
             self.velocity = velocity
 
@@ -116,7 +120,8 @@ class LastState:
         if q is None:
             raise RequestError(
                 StatusCode.ROBOT_STATE_STALE,
-                "no joint_states have come yet: give the state in the request",
+                f"no joint_states of this robot have come yet: "
+                f"{self.problem or 'nobody publishes them'}; give the state in the request",
             )
         age = now - self.came
         if age > max_age:
@@ -126,6 +131,34 @@ class LastState:
                 "give the state in the request",
             )
         return q
+
+
+def has_joints(msg: Any, joint_names: tuple[str, ...]) -> bool:
+    """Whether a joint_states message says where all joints of the robot are."""
+    return not msg.name or set(joint_names) <= set(msg.name)
+
+
+def of_joints(msg: Any, joint_names: tuple[str, ...]) -> Any:
+    """A joint_states message without joints of grippers, axes and robots beside this one.
+
+    Raises JointNamesError where joints of this one are missing.
+    """
+    names = list(msg.name)
+    if not names or set(names) == set(joint_names):
+        return msg
+    missing = [name for name in joint_names if name not in names]
+    if missing:
+        raise JointNamesError(
+            f"{', '.join(missing)} missing in joint_states, which has "
+            f"{', '.join(name[:40] for name in names[:_SHOWN])}{' ...' * (len(names) > _SHOWN)}"
+        )
+    places = [k for k, name in enumerate(names) if name in joint_names]
+    own = JointState(header=msg.header, name=[names[k] for k in places])
+    for field_name in ("position", "velocity"):
+        values = getattr(msg, field_name)
+        whole = len(values) == len(names)
+        setattr(own, field_name, [values[k] for k in places] if whole else values)
+    return own
 
 
 def measured_velocity(msg: Any, joint_names: tuple[str, ...]) -> FloatArray | None:

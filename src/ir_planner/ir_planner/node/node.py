@@ -60,13 +60,14 @@ from ir_planner.checks import cell_shapes, movement_shapes
 from ir_planner.errors import PlannerError
 from ir_planner.node.answers import fill_status
 from ir_planner.node.goal_queue import GoalQueue
-from ir_planner.node.inputs import LastState, measured_velocity
+from ir_planner.node.inputs import LastState, has_joints, measured_velocity, of_joints
 from ir_planner.node.requests import Requests
 from ir_planner.node.topics import Announcements, ShownMarkers
 from ir_planner.planner import Planner
 from ir_planner.service import ServicePlan, service_shapes
 from ir_planner.settings import PlannerSettings
 
+_PUBLISHERS = 16  # of joint_states beside the robot's, without pushing its message out
 _GOALS_WAITING = 100  # beyond, a client is in a loop: each takes seconds
 _THREADS = (
     8  # quick and long requests, texts and points, changes, standby, the goal, cancelling, a spare
@@ -118,7 +119,7 @@ class PlannerNode(Node):
         self._announcements = Announcements(self, self.planner, self._quick)
         self._goals = GoalQueue(self._execute_plan, self._refuse_plan, _GOALS_WAITING)
         self._offer()
-        self._states = LatestMessage(self, JointState, names.JOINT_STATES)
+        self._states = LatestMessage(self, JointState, names.JOINT_STATES, _PUBLISHERS)
         self.create_timer(1.0, self._diagnose, callback_group=self._quick)
         self._load_first_cell(parameters.value.cell)
 
@@ -193,18 +194,21 @@ class PlannerNode(Node):
         return fill_status(Plan.Result(), Status(StatusCode.FAILURE, sentence), names.PLANNER)
 
     def _look(self) -> None:
-        """Remember where the robot is; a message about another robot's joints is none."""
-        received = self._states.take() if self.planner.has_cell else None
-        if received is None:
+        """Remember where the robot is; a message about other joints alone is none."""
+        if not self.planner.has_cell:
             return
         joints = self.planner.cell.robot.joint_names
+        received = self._states.take(lambda message: has_joints(message, joints))
+        if received is None:
+            return
         try:
-            q = configuration_from_msg(received.message, joints)
+            message = of_joints(received.message, joints)
+            q = configuration_from_msg(message, joints)
         except InvalidValueError as error:
             self._last_state.problem = str(error)
             return
         self._last_state.take(
-            q, time.monotonic() - received.age, measured_velocity(received.message, joints)
+            q, time.monotonic() - received.age, measured_velocity(message, joints)
         )
 
     def _change_settings(self, settings: PlannerSettings) -> None:
