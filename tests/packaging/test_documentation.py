@@ -278,3 +278,14 @@ def test_extending_names_every_promise_that_a_contract_asks_for() -> None:
         if "notice" not in test
     }
     assert {each for each in asked if each not in page} == set()
+
+
+def test_where_is_what_begins_at_names_that_the_files_define() -> None:
+    page = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+    rows = page.partition("## Where is what")[2].partition("\n## ")[0]
+    begins = re.findall(r"`(\w+)/([\w/]+\.py)`: ((?:`\w+`(?:, )?)+)", rows)
+    assert len(begins) > 15
+    for package, path, listed in begins:
+        text = (ROOT / "src" / package / package / path).read_text("utf-8")
+        for name in CODE.findall(listed):
+            assert re.search(rf"^ *(def|class) {name}\b", text, re.MULTILINE), (path, name)

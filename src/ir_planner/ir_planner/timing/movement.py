@@ -143,8 +143,6 @@ class Movement:
 # the difference; a motion that needs more has few samples where its torque is highest. These are
 # the shares of the torque that the reserve leaves, tried until the guaranteed bounds hold.
 
-# Torque is sampled while a motion is timed and bounded when it is proved. Nearly always 2 % cover
-# the difference; what needs more has few samples where its torque is highest.
 TORQUE_SHARES = (0.98, 0.95, 0.9, 0.8)
 
 
