@@ -13,7 +13,7 @@ from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ir_msgs_py.ros.parameters import Parameters
+from ir_msgs_py.ros.parameters import Parameters, check_names
 from ir_values.errors import ParameterError
 from ir_values.settings import setting
 
@@ -74,7 +74,9 @@ def test_a_good_change_is_taken_and_reported(node):
     [
         ("speed", 3.0, "out of range"),
         ("speed", float("nan"), "out of range"),
-        ("speed", "fast", "type"),
+        ("speed", "fast", "speed is fast: it must be a number"),
+        ("speed", True, "it must be a number"),
+        ("weights", 1.0, "it must be a list of numbers"),
         ("samples", 0, "out of range"),
         ("method", "luck", 'method is "luck": known are tree, grid'),
         ("weights", [1.0, -2.0], "weights is -2: it must be at least 0"),
@@ -88,6 +90,31 @@ def test_a_bad_change_is_refused_with_its_reason_and_nothing_changes(node, name,
     assert reason in result.reason.lower() or reason in result.reason
     assert parameters.value == Search()
     assert node.get_parameter("speed").value == 0.5
+
+
+def test_integers_are_taken_for_real_numbers(ros_context, node):
+    parameters = Parameters(node, Search)
+    results = node.set_parameters([Parameter("speed", value=1), Parameter("weights", value=[3, 4])])
+    assert all(result.successful for result in results)
+    assert parameters.value == Search(speed=1.0, weights=(3.0, 4.0))
+    assert isinstance(parameters.value.speed, float)
+    given = [Parameter("speed", value=2), Parameter("weights", value=[5])]
+    started = Node("started", context=ros_context, parameter_overrides=given)
+    assert Parameters(started, Search).value == Search(speed=2.0, weights=(5.0,))
+    started.destroy_node()
+
+
+@pytest.mark.parametrize("words", [["--ros-args", "-p", "sped:=1.0"], []])
+def test_a_misspelt_name_is_refused_on_the_command_line_and_warned_of_in_files(ros_context, words):
+    given = [Parameter("sped", value=1.0)]
+    started = Node("started", context=ros_context, parameter_overrides=given)
+    Parameters(started, Search)
+    if words:
+        with pytest.raises(ParameterError, match=r"no parameter 'sped': did you mean speed\?"):
+            check_names(started, words)
+    else:
+        check_names(started, words)
+    started.destroy_node()
 
 
 def test_what_the_class_refuses_as_a_whole_is_refused(node):

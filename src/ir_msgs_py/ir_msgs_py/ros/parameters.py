@@ -10,6 +10,8 @@ import math
 from array import array
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from difflib import get_close_matches
+from itertools import pairwise
 from typing import Any, Generic, TypeVar
 
 from rcl_interfaces.msg import (
@@ -23,6 +25,7 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from ir_msgs_py.ros.rclpy_inside import given_names
 from ir_msgs_py.ros.serving import ANY
 from ir_values.errors import IrError, ParameterError, one_line
 from ir_values.settings import Setting, changed, tree
@@ -135,14 +138,14 @@ class Parameters(Generic[T]):
             raise ParameterError(f"{self._prefix}{name}: {error}") from error
         except InvalidParameterValueException as error:
             raise ParameterError(f"{self._prefix}{name} must be {each.bounds}: {error}") from error
-        return _plain(parameter.value)
+        return _typed(each, parameter.value)
 
     def _mine(self, parameters: Iterable[Parameter]) -> dict[str, Any]:
         mine = {}
         for parameter in parameters:
             name = parameter.name.removeprefix(self._prefix)
             if parameter.name.startswith(self._prefix) and name in self._settings:
-                mine[name] = _plain(parameter.value)
+                mine[name] = _typed(self._settings[name], parameter.value)
         return mine
 
     def _check(self, values: Iterable[tuple[str, Any]]) -> None:
@@ -150,7 +153,10 @@ class Parameters(Generic[T]):
             self._settings[name].check(value)
 
     def _answer(self, parameters: list[Parameter]) -> SetParametersResult:
-        changes = self._mine(parameters)
+        try:
+            changes = self._mine(parameters)
+        except ParameterError as error:
+            return SetParametersResult(successful=False, reason=str(error))
         if not changes:
             return SetParametersResult(successful=True)
         reason = self._refuse(tuple(changes))
@@ -176,6 +182,8 @@ def _descriptor(each: Setting) -> ParameterDescriptor:
         description=each.sentence + unit,
         additional_constraints=each.bounds,
         read_only=each.read_only,
+        # an integer is taken for a real number, which rclpy refuses where the type is fixed
+        dynamic_typing=each.type in (float, tuple[float, ...]),
     )
     bounded = each.minimum is not None or each.maximum is not None
     low = -math.inf if each.minimum is None else each.minimum
@@ -200,5 +208,47 @@ def _default(each: Setting) -> Any:
     return each.default
 
 
-def _plain(value: Any) -> Any:
-    return tuple(value) if isinstance(value, (list, array)) else value
+def _typed(each: Setting, value: Any) -> Any:
+    """A parameter's value as the setting has it; ParameterError for another type."""
+    value = tuple(value) if isinstance(value, (list, array)) else value
+    if each.type is float:
+        return _real(each.name, value)
+    if each.type == tuple[float, ...]:
+        return tuple(_real(each.name, element) for element in _elements(each.name, value))
+    return value
+
+
+def _elements(name: str, value: Any) -> tuple[Any, ...]:
+    if not isinstance(value, tuple):
+        raise ParameterError(f"{name} is {one_line(str(value), 80)}: it must be a list of numbers")
+    return value
+
+
+def _real(name: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ParameterError(f"{name} is {one_line(str(value), 80)}: it must be a number")
+    return float(value)
+
+
+# Names that no parameter has.
+
+
+def check_names(node: Node, words: Sequence[str]) -> None:
+    """Raise ParameterError for a name of the command line `words` that the node does not have.
+
+    Names in files are warned of: a file may hold the parameters of several nodes for all of them.
+    """
+    unknown = sorted(name for name in given_names(node) if not node.has_parameter(name))
+    told = {
+        word.partition(":=")[0].rpartition(":")[2]
+        for option, word in pairwise(words)
+        if option in ("-p", "--param")
+    }
+    known = sorted(node.get_parameters_by_prefix(""))
+    for name in unknown:
+        near = get_close_matches(name, known, n=1)
+        hint = f": did you mean {near[0]}?" if near else ""
+        sentence = f"there is no parameter {one_line(name, 80)!r}{hint}"
+        if name in told:
+            raise ParameterError(sentence)
+        node.get_logger().warning(f"{sentence} (in a file of parameters)")

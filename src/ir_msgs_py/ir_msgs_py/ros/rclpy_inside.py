@@ -28,6 +28,13 @@ def part(owner: Any, name: str) -> Any:
     return getattr(owner, name, None)
 
 
+def given_names(node: Node) -> tuple[str, ...]:
+    """Names of the parameters that the node was started with, on the command line and in files;
+    none where this rclpy doesn't tell: then a misspelt one is ignored, as by plain rclpy.
+    """
+    return tuple(part(node, "_parameter_overrides") or ())
+
+
 class _NeverRaisedError(Exception):
     """Stands for an exception that this rclpy does not have."""
 
