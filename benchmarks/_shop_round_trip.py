@@ -12,7 +12,7 @@ from _shop_cells import drawn_cell
 
 from ir_description import bundled_cells
 from ir_krl import STYLES, follow, parse, plc_input, read_plc_table
-from ir_msgs_py.report import MovementKind
+from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_planner import Planner, ProgramPlan, RequestError
 from ir_planner.krl import EvaluatedStep, KrlExport, evaluate_krl, export_krl, tool_in_flange
 
@@ -75,12 +75,14 @@ def apart(
     read = evaluate_krl(planner, program, plc=table)
     lines = export.source.splitlines()
     said = [(float(m[2]), float(m[3])) for one in lines if (m := _COMMENT.match(one))]
-    rows = list(zip(export.steps, _steps_of(export, read.steps), said, strict=True))
+    told = [pair for pair in zip(export.steps, said, strict=True) if pair[0].duration > _BRIEF]
+    steps = [step for step, _ in told]
+    mine = _steps_of(steps, read.steps)
+    rows = [(step, one, figures) for (step, figures), one in zip(told, mine, strict=True)]
     seconds, joules = (
         max(
-            abs(sum(one) - told[k]) / max(told[k], least)
-            for _, mine, told in rows
-            for one in ([step.report.duration if k == 0 else step.report.energy for step in mine],)
+            abs(sum(_figures(one)[k] for one in again) - figures[k]) / max(figures[k], least)
+            for _, again, figures in rows
         )
         for k, least in ((0, _BRIEF), (1, _LEAST))
     )
@@ -92,20 +94,22 @@ def apart(
         len(rows),
         seconds,
         joules,
-        sum(mine[0].step.scene.load_text != step.load for step, mine, _ in rows),
-        sum(mine[0].power_mode != step.power_mode for step, mine, _ in rows),
-        sum(_contacts(mine) != _kept(step) for step, mine, _ in rows if _kept(step) is not None),
+        sum(again[0].step.scene.load_text != step.load for step, again, _ in rows),
+        sum(again[0].power_mode != step.power_mode for step, again, _ in rows),
+        sum(_contacts(again) != _kept(step) for step, again, _ in rows if _kept(step) is not None),
         read.certified,
         export.seconds - before,
         export.joules - paid,
     )
 
 
-def _steps_of(export: KrlExport, steps: Sequence[EvaluatedStep]) -> list[list[EvaluatedStep]]:
+def _steps_of(
+    written: Sequence[PlannedMovement], steps: Sequence[EvaluatedStep]
+) -> list[list[EvaluatedStep]]:
     """What was read back of each step: a path may come to rest on its way."""
     lasting = [one for one in steps if one.step.moves or one.report.duration > _BRIEF]
     found = []
-    for step in export.steps:
+    for step in written:
         mine = [lasting.pop(0)]
         while (
             step.kind == MovementKind.CARTESIAN
@@ -117,6 +121,10 @@ def _steps_of(export: KrlExport, steps: Sequence[EvaluatedStep]) -> list[list[Ev
     if lasting:
         raise AssertionError(f"{len(lasting)} steps more are read than were written")
     return found
+
+
+def _figures(one: EvaluatedStep) -> tuple[float, float]:
+    return one.report.duration, one.report.energy
 
 
 def _contacts(mine: Sequence[EvaluatedStep]) -> float:

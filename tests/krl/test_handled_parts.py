@@ -13,7 +13,7 @@ import pytest
 from ir_description import cell_from_yaml, cell_to_yaml, load_cell
 from ir_krl import Followed, KrlError, Numbers, Payload, follow, parse
 from ir_krl.write import Wiring
-from ir_planner import Planner
+from ir_planner import Planner, RequestError
 from ir_planner.before_after import before_after, today_of_krl
 from ir_planner.checks import evaluate_trajectory
 from ir_planner.krl import evaluate_krl, export_krl, tool_in_flange
@@ -203,3 +203,31 @@ def test_a_load_that_changes_on_the_way_is_named(
     today = today_of_krl(found)
     assert today.load is None
     assert "put them right in the cell" in today.notes[-1]
+
+
+@pytest.mark.parametrize("name", ["grip", "Grip", "IR_PAUSE", "ir_done"])
+@pytest.mark.parametrize("style", ["spline", "kss8"])
+def test_a_signal_that_the_program_has_itself_is_refused(
+    exported: tuple[Planner, Any, Any], name: str, style: str
+) -> None:
+    planner, plan, _ = exported
+    steps = (*plan.movements[:-1], replace(plan.movements[-1], set_signals=(f"{name}=0",)))
+    with pytest.raises(RequestError, match=f"the signal {name}, which in a written program is"):
+        export_krl(planner, steps, "takes", style=style)
+
+
+@pytest.mark.parametrize(("grips", "load"), [("TFT", "gripper+gear"), ("TTF", "gripper")])
+def test_what_is_left_and_taken_in_one_standstill(
+    exported: tuple[Planner, Any, Any], grips: str, load: str
+) -> None:
+    planner, _, _ = exported
+    cell = planner.cell
+    at = planner.plan_program(stations=("infeed_pick",), start=cell.posture("home"))
+    assert at.status.ok, at.status.message
+    q = np.degrees(at.movements[-1].trajectory.positions[-1])
+    there = ",".join(f"A{k} {v:.6f}" for k, v in enumerate(q, 1))
+    set_ = "\n".join(f"$OUT[5]={'TRUE' if one == 'T' else 'FALSE'}" for one in grips)
+    text = f"DEF P( )\nPTP XHOME\nPTP {{{there}}}\n{set_}\nPTP XHOME\nEND\n"
+    program = follow([parse(text, "p.src")], cell.machine_home, tool_in_flange(cell.tcp))
+    found = evaluate_krl(planner, program)
+    assert found.steps[-1].step.scene.load_text == load

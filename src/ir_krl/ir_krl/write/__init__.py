@@ -16,7 +16,7 @@ from ir_krl.write.parts import (
     check_style,
 )
 from ir_krl.write.plc import PlcPause, plc_input, plc_table, read_plc_table, structured_text
-from ir_krl.write.program import GRIP, PLC_DONE, PLC_PAUSE, PLC_THERE, Texts, written
+from ir_krl.write.program import GRIP, PLC_DONE, PLC_PAUSE, PLC_THERE, Texts, check_signal, written
 
 __all__ = [
     "GRIP",
@@ -41,6 +41,7 @@ __all__ = [
     "WrittenSignals",
     "WrittenSpline",
     "check_name",
+    "check_signal",
     "check_style",
     "plc_input",
     "plc_table",

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ir_krl.errors import KrlError
 from ir_krl.run.commands import Payload
 from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES
 from ir_krl.write.forms import Forms, decimal, frame_text
@@ -32,9 +33,24 @@ PLC_THERE = "IR_PLC"
 """The input that says that the PLC spends pauses, in EXT."""
 PLC_DONE = "IR_DONE"
 """The input that says that a pause is over and the drives are ready."""
+_OWN_SIGNALS = {
+    GRIP: "the gripper's, which closes where a part is attached and opens where it is detached",
+    PLC_PAUSE: "the number of the pause",
+    PLC_THERE: "the PLC's",
+    PLC_DONE: "the PLC's",
+}
 START_SPEED = 10
 """% of the axes' speed, on the way from wherever the robot stands."""
 _HIGHEST_TOOL = 16  # of TOOL_DATA: inline forms name tools by number, from here downwards
+
+
+def check_signal(name: str) -> None:
+    """Raise KrlError for a signal that a written program uses by itself."""
+    if name.upper() in _OWN_SIGNALS:
+        raise KrlError(
+            f"a step sets or awaits the signal {name}, which in a written program is "
+            f"{_OWN_SIGNALS[name.upper()]}: give the cell's signal another name"
+        )
 
 
 @dataclass(frozen=True)

@@ -105,7 +105,7 @@ def _with_signals(steps: list[Asked]) -> list[Asked]:
         done = asked.stretches
         waits = tuple(signal for one in done for signal in one.awaited)
         signals = tuple(signal for one in done for signal in one.signals)
-        handled = "".join(one.handled for one in done)
+        handled, *more = [one.handled for one in done if one.handled] or [""]
         if asked.step.kind == "PAUSE":
             awaited += waits
             result.append(replace(asked, step=replace(asked.step, set_signals=signals)))
@@ -120,6 +120,10 @@ def _with_signals(steps: list[Asked]) -> list[Asked]:
         )
         awaited = []
         result.append(replace(asked, step=step))
+        again = replace(step, wait_for=(), set_signals=(), attach="", detach="")
+        for other in more if asked.step.kind == "STATION" else ():
+            handling = {"attach" if other[0] == "+" else "detach": other[1:]}
+            result.append(Asked(replace(again, **handling), ()))
     return result
 
 

@@ -201,6 +201,12 @@ class _Drive:
         handled = self.around.gripped(command.number, command.value, self.here, command.place)
         if handled:  # until a motion says what $LOAD is then
             self._payload = None
+        before = self.steps[-1].handled if self.steps else ""
+        if handled and before and handled[1:] != before[1:]:  # another part at the same stop
+            self._stand(0.0, command.place, "")
+        elif handled and before:  # left and taken again
+            self.steps[-1] = replace(self.steps[-1], handled="")
+            handled = ""
         if self.steps:
             last = self.steps[-1]
             outputs = (*last.outputs, (command.number, command.value))

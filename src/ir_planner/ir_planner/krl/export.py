@@ -24,6 +24,7 @@ from ir_krl import (
     WrittenSignals,
     WrittenSpline,
     check_name,
+    check_signal,
     check_style,
     plc_table,
     structured_text,
@@ -53,6 +54,7 @@ __all__ = ["DEVIATION_MAX", "KrlExport", "attached", "export"]
 
 _PAUSES_MAX = 255
 _IDS = 5  # in a line of the header
+_MANY_JOULES = 100.0  # that one decimal is enough for
 _Motion: TypeAlias = WrittenSpline | WrittenPath | WrittenMove
 
 
@@ -277,7 +279,8 @@ class _Job:
         modes.
         """
         report = step.report
-        costs = f"{step.duration:.3f} s, {report.energy:.1f} J"
+        digits = 1 if abs(report.energy) >= _MANY_JOULES else 3
+        costs = f"{step.duration:.3f} s, {report.energy:.{digits}f} J"
         if step.is_pause:
             pause = self._pauses.get(id(self._steps[k]))
             rest = f"; {pause.sentence}" if pause else ""
@@ -432,7 +435,9 @@ def _total(steps: Sequence[PlannedMovement]) -> tuple[float, float]:
 
 
 def _signals(texts: Sequence[str]) -> tuple[tuple[str, bool], ...]:
-    split = (text.partition("=") for text in texts)
+    split = [text.partition("=") for text in texts]
+    for name, _, _ in split:
+        check_signal(name)
     return tuple((name, value != "0") for name, _, value in split)
 
 
