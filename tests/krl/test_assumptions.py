@@ -443,3 +443,26 @@ def test_a_damaged_archive_is_read_or_is_one_sentence(tmp_path: Path, seed: int)
     except KrlError as error:
         said = str(error)
     assert "\n" not in said
+
+
+def test_the_data_list_beside_a_file_has_its_name_in_any_case(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "prog.src").write_text("DEF PROG( )\nPTP XHOME\nPTP P1\nEND\n")
+    there = "{A1 5,A2 -90,A3 90,A4 0,A5 10,A6 0}"
+    (tmp_path / "PROG.DAT").write_text(f"DEFDAT PROG\nDECL E6AXIS P1={there}\nENDDAT\n")
+    assert main(["krl", "import", str(tmp_path / "prog.src"), "--cell", "open"]) == 0
+    assert "P1" not in capsys.readouterr().err
+
+
+def test_a_project_says_why_no_program_is_found(tmp_path: Path) -> None:
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "p.src").write_text("DEF P( )\nPTP XHOME\nEND\n")
+    with pytest.raises(KrlError, match=r"p is in 2 files, give one: a/p\.src, b/p\.src"):
+        read_project(tmp_path).main("p")
+    with pytest.raises(KrlError, match=r"no file has a routine q: a/p\.src, b/p\.src"):
+        read_project(tmp_path).main("q")
+    (tmp_path / "b" / "p.src").write_text("DEF P( )\nLOOP\nEND\n")
+    with pytest.raises(KrlError, match=r"no file has a routine q: b/p\.src:3:1: "):
+        read_project(tmp_path).main("q")

@@ -231,3 +231,11 @@ def test_what_is_left_and_taken_in_one_standstill(
     program = follow([parse(text, "p.src")], cell.machine_home, tool_in_flange(cell.tcp))
     found = evaluate_krl(planner, program)
     assert found.steps[-1].step.scene.load_text == load
+
+
+def test_a_load_with_a_negative_inertia_is_refused(
+    planner: Planner, followed: Callable[..., Followed]
+) -> None:
+    load = "$LOAD={M 50,CM {X 0,Y 0,Z 100,A 0,B 0,C 0},J {X -5,Y 1,Z 1}}"
+    with pytest.raises(KrlError, match=r"\$LOAD: J is X -5, Y 1, Z 1 kg m\^2, none may be below 0"):
+        evaluate_krl(planner, followed(f"{load}\nPTP XHOME\nPTP {{A1 3}}"))

@@ -20,12 +20,14 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from visualization_msgs.msg import MarkerArray
 
+from ir_krl import parse, read_plc_table
 from ir_msgs.action import Plan
 from ir_msgs.msg import PlanOptions, ProgramSavings, Status
 from ir_msgs.srv import (
     CheckState,
     ComputeIk,
     EvaluateTrajectory,
+    ExportProgram,
     GetCell,
     GetProgram,
     GetTrajectory,
@@ -226,6 +228,38 @@ def test_plan_program_and_get_program(call: Call) -> None:
     ]
     moves = [movement for movement in stored.movements if movement.trajectory_id]
     assert all(movement.trajectory.points for movement in moves)
+
+
+def test_an_exported_program_is_what_its_fields_say(call: Call) -> None:
+    """Text, data, the PLC's part and both reports, of a program and of one movement in a style."""
+    plan = call(PlanProgram, "plan_program")
+    whole = call(ExportProgram, "export_program", program_id=plan.program_id, name="visit")
+    assert whole.status.code == Status.SUCCESS, whole.status.message
+    moving = [one for one in plan.movements if one.trajectory_id]
+    for report, ours in ((whole.planned, moving), (whole.exported, moving)):
+        assert report.certified
+        assert report.duration == pytest.approx(sum(one.report.duration for one in ours), rel=0.01)
+    assert whole.planned.energy == pytest.approx(sum(one.report.energy for one in moving), rel=1e-6)
+    assert 0.0 < whole.deviation <= 0.002
+    sources = [parse(whole.text, "visit.src"), parse(whole.data, "visit.dat")]
+    assert sources[0].routines[0].name == "VISIT"
+    sequences = [one.power_mode for one in plan.movements if not one.trajectory_id]
+    asked = {mode for sequence in sequences if sequence for mode in sequence.split(">")}
+    pauses = read_plc_table(whole.plc_table, "visit.plc.csv").values()
+    assert {mode for one in pauses for mode in one.modes} >= asked
+    assert "FUNCTION_BLOCK" in whole.plc_text
+    one = moving[0].trajectory_id
+    form = call(ExportProgram, "export_program", trajectory_id=one, name="one", style="krc2")
+    assert form.status.code == Status.SUCCESS, form.status.message
+    assert "PTP X" in form.text
+    assert not form.plc_table
+    assert not form.plc_text
+    assert form.exported.duration >= form.planned.duration - 0.01
+    for field, wrong in (("style", "kss9"), ("name", "1st"), ("language", "rapid")):
+        chosen = {"trajectory_id": one, "name": "one", field: wrong}
+        refused = call(ExportProgram, "export_program", **chosen)
+        assert refused.status.code != Status.SUCCESS
+        assert wrong in refused.status.message
 
 
 def test_a_program_comes_with_its_savings_and_its_front(

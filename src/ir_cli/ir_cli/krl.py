@@ -168,7 +168,8 @@ def data_beside(source: Path) -> Path | None:
     """The .dat of the module whose .src this is; None without one."""
     if not source.parent.is_dir():
         return None
-    found = (one for one in source.parent.iterdir() if one.stem == source.stem)
+    stem = source.stem.upper()  # as on the controller, whose names have no case
+    found = (one for one in source.parent.iterdir() if one.stem.upper() == stem)
     return next((one for one in found if one.suffix.lower() == ".dat"), None)
 
 

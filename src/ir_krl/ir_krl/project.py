@@ -107,7 +107,13 @@ class Project:
             return found[0]
         named = ", ".join(str(one.path) for one in (found or programs)[:_NAMED])
         if not found:
-            raise KrlError(f"{self.name}: no file has a routine {routine or 'that moves'}: {named}")
+            unread = [one for one in map(self.source, self.files) if isinstance(one, KrlError)]
+            listed = "; ".join(map(str, unread[:_NAMED])) or named or "there is no other"
+            raise KrlError(
+                f"{self.name}: no file has a routine {routine or 'that moves'}: {listed}"
+            )
+        if routine:
+            raise KrlError(f"{self.name}: {routine} is in {len(found)} files, give one: {named}")
         raise KrlError(f"{self.name} has {len(found)} programs: give --routine or one of {named}")
 
     def _names(self, file: File) -> list[str]:

@@ -64,6 +64,9 @@ def loads_with(payload: Payload, loads: tuple[Load, ...], place: Place) -> tuple
     shapes and watts stay. Raises KrlMotionError for an inertia that no body has.
     """
     back = tool_in_flange(np.eye(4))[:3, :3].T
+    if min(payload.inertia) < 0.0:
+        j = ", ".join(f"{n} {value:g}" for n, value in zip("XYZ", payload.inertia, strict=True))
+        raise KrlMotionError(f"$LOAD: J is {j} kg m^2, none may be below 0", place)
     axes = portable.matmul(back, rotation_from_abc(payload.angles))
     moments = np.maximum(np.array(payload.inertia), _TINY)
     inertia = portable.matmul(axes, np.diag(moments), axes.T)
