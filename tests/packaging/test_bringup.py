@@ -173,3 +173,36 @@ def test_docker_installs_the_pinned_versions() -> None:
     ]
     assert wanted
     assert set(wanted) <= pins
+
+
+APT_NAMES = {"PyYAML": "python3-yaml"}
+
+
+def test_docker_installs_all_that_is_needed_at_run_time() -> None:
+    dockerfile = (ROOT / "docker" / "Dockerfile").read_text()
+    by_pip = (ROOT / "docker" / "requirements.txt").read_text()
+    needed = [
+        line.strip()
+        for line in (ROOT / "requirements" / "run.txt").read_text().splitlines()
+        if line[:1].isalpha()
+    ]
+    assert needed
+    missing = [
+        name
+        for name in needed
+        if f"{name}==" not in by_pip
+        and f"{APT_NAMES.get(name, f'python3-{name}')} " not in dockerfile
+    ]
+    assert missing == []
+
+
+def test_commands_that_docker_s_files_show_begin_with_a_command_of_the_image() -> None:
+    dockerfile = (ROOT / "docker" / "Dockerfile").read_text()
+    compose = yaml.safe_load((ROOT / "docker" / "compose.yaml").read_text())
+    shown = re.findall(r"docker run .*? ir (\w+)", dockerfile)
+    shown += re.findall(r'^CMD \["(\w+)"', dockerfile, re.MULTILINE)
+    shown += [service["command"][0] for service in compose["services"].values()]
+    setups = "".join(path.read_text() for path in (ROOT / "src").glob("*/setup.py"))
+    scripts = set(re.findall(r"[\"'](\w+) ?= ?[\w.]+:\w+", setups))
+    assert len(shown) > 5
+    assert set(shown) - {"bash"} <= scripts
