@@ -239,3 +239,33 @@ def test_a_load_with_a_negative_inertia_is_refused(
     load = "$LOAD={M 50,CM {X 0,Y 0,Z 100,A 0,B 0,C 0},J {X -5,Y 1,Z 1}}"
     with pytest.raises(KrlError, match=r"\$LOAD: J is X -5, Y 1, Z 1 kg m\^2, none may be below 0"):
         evaluate_krl(planner, followed(f"{load}\nPTP XHOME\nPTP {{A1 3}}"))
+
+
+@pytest.mark.parametrize(
+    "done",
+    [
+        "WAIT FOR $IN[9]\n$OUT[5]=TRUE",
+        "WAIT SEC 0.5\n$OUT[5]=TRUE\nWAIT SEC 0.5",
+        "WAIT FOR $IN[9]\n$OUT[5]=TRUE\nWAIT SEC 1\n$OUT[5]=FALSE\nWAIT SEC 0\n$OUT[5]=TRUE",
+    ],
+)
+def test_what_is_taken_after_a_wait_is_carried_in_a_comparison(
+    exported: tuple[Planner, Any, Any], done: str
+) -> None:
+    """Law: today's movements have the same loads and costs in `ir krl import` and `ir compare`."""
+    planner, plan, _ = exported
+    cell = planner.cell
+    entry = next(step for step in plan.movements if step.kind == "service_entry")
+    above, there = (
+        "PTP {" + ",".join(f"A{k} {v:.6f}" for k, v in enumerate(np.degrees(q), 1)) + "}\n"
+        for q in (entry.trajectory.positions[0], entry.trajectory.positions[-1])
+    )
+    text = f"DEF P( )\nPTP XHOME\n{above}{there}{done}\n{above}PTP XHOME\nEND\n"
+    program = follow([parse(text, "p.src")], cell.machine_home, tool_in_flange(cell.tcp))
+    found = evaluate_krl(planner, program)
+    answer = before_after(planner, today_of_krl(found))
+    assert answer.today.report.energy == pytest.approx(found.report.energy, rel=1e-9)
+    loads = [one.step.scene.load_text for one in found.steps if one.step.moves]
+    assert loads == ["gripper", "gripper", "gripper+gear", "gripper+gear"]
+    assert [one.load for one in answer.today.movements if not one.is_pause] == loads
+    assert answer.sides[0].movements[-1].load == "gripper+gear"

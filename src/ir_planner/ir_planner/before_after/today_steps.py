@@ -76,15 +76,25 @@ def asked_program(today: Today, scene: PlanningScene) -> AskedProgram:
         elif one.seconds > 0.0:
             pause = ProgramStep("PAUSE", dwell=one.seconds, power_mode=AUTO)
             steps.append(Asked(pause, (one,)))
+        elif steps:  # a standstill of no time: what is done in it belongs to the stop
+            steps[-1] = replace(steps[-1], stretches=(*steps[-1].stretches, one))
     if not any(step.step.kind != "PAUSE" for step in steps):
         raise nothing_moves(today.name)
-    if any(one.handled or one.signals or one.awaited for one in today.stretches):
-        steps = _with_signals(steps)
-        notes = ["parts and signals at the stops are those of the program's own outputs and waits"]
-    else:
-        steps, notes = _handled(steps, scene.cell, posture_at(scene, today.start))
+    steps, notes = _at_stops(steps, today, scene)
     cell = replace(stops.cell(), program=tuple(step.step for step in steps))
     return AskedProgram(cell, tuple(steps), (*stops.notes(), *notes))
+
+
+def _at_stops(
+    steps: list[Asked], today: Today, scene: PlanningScene
+) -> tuple[list[Asked], list[str]]:
+    """The steps with parts and signals: the program's own, else the cell's where it makes the same
+    stops.
+    """
+    if any(one.handled or one.signals or one.awaited for one in today.stretches):
+        said = "parts and signals at the stops are those of the program's own outputs and waits"
+        return _with_signals(steps), [said]
+    return _handled(steps, scene.cell, posture_at(scene, today.start))
 
 
 def _carrying(today: Today, scene: PlanningScene) -> PlanningScene:
@@ -97,10 +107,12 @@ def _carrying(today: Today, scene: PlanningScene) -> PlanningScene:
 
 def _with_signals(steps: list[Asked]) -> list[Asked]:
     """The steps with what the program itself waits for, sets, takes and leaves at them. What is
-    waited for in a standstill counts before the next movement.
+    waited for in a standstill counts before the next movement; what is taken or left in one is at
+    the stop before, once more.
     """
     result: list[Asked] = []
     awaited: list[Signal] = []
+    at = ProgramStep("POSTURE", "home")
     for asked in steps:
         done = asked.stretches
         waits = tuple(signal for one in done for signal in one.awaited)
@@ -109,22 +121,23 @@ def _with_signals(steps: list[Asked]) -> list[Asked]:
         if asked.step.kind == "PAUSE":
             awaited += waits
             result.append(replace(asked, step=replace(asked.step, set_signals=signals)))
-            continue
-        taken, left = (handled[1:], "") if handled[:1] == "+" else ("", handled[1:])
-        step = replace(
-            asked.step,
-            wait_for=(*awaited, *waits),
-            set_signals=signals,
-            attach=taken if asked.step.kind == "STATION" else "",
-            detach=left if asked.step.kind == "STATION" else "",
-        )
-        awaited = []
-        result.append(replace(asked, step=step))
-        again = replace(step, wait_for=(), set_signals=(), attach="", detach="")
-        for other in more if asked.step.kind == "STATION" else ():
-            handling = {"attach" if other[0] == "+" else "detach": other[1:]}
-            result.append(Asked(replace(again, **handling), ()))
+            more = [handled, *more]
+        else:
+            at = asked.step
+            there = replace(at, wait_for=(*awaited, *waits), set_signals=signals)
+            awaited = []
+            result.append(replace(asked, step=_handling(there, handled)))
+        result += [Asked(_handling(at, one), ()) for one in more if one and at.kind == "STATION"]
     return result
+
+
+def _handling(step: ProgramStep, handled: str) -> ProgramStep:
+    """A step with the part that is taken ("+gear") or left ("-gear") where a station is."""
+    if step.kind != "STATION":
+        return step
+    taken = handled[1:] if handled[:1] == "+" else ""
+    left = handled[1:] if handled[:1] == "-" else ""
+    return replace(step, attach=taken, detach=left)
 
 
 def _handled(steps: list[Asked], cell: Cell, start: str) -> tuple[list[Asked], list[str]]:
@@ -233,6 +246,8 @@ def costed_steps(asked: tuple[Asked, ...], request: ProgramRequest) -> tuple[Pla
         for stretch in step.stretches:
             doors = at.doors_before if stretch.doors is None else stretch.doors
             scene = scenes.of(at.before, doors)
+            if stretch.trajectory is None and stretch.seconds == 0.0:
+                continue
             if stretch.trajectory is None:
                 costing.pause(stretch, here, scene)
             else:
