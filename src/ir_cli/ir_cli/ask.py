@@ -91,6 +91,55 @@ def run_move(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def add_escape(escape: argparse.ArgumentParser) -> None:
+    """Arguments of `ir ask escape`."""
+    add_cell(escape)
+    words = 'where the robot stands: "A1 0 A2 -90 ..." in degrees, also beyond a limit'
+    escape.add_argument("start", metavar="START", help=words)
+    escape.add_argument("--station", default="", help="whose allowed contacts hold")
+    escape.add_argument("-o", "--output", type=Path, metavar="FILE", help="write its points as CSV")
+    add_options(escape)
+    add_parameters(escape)
+    add_formats(escape, comma=False)
+    escape.set_defaults(run=run_escape)
+
+
+def run_escape(arguments: argparse.Namespace) -> int:
+    """Plan and print; exit code 1 where there is no way out on which nothing gets worse."""
+    with sentences():
+        planner = planner_of(arguments.cell, arguments.power_parameters)
+        plan = planner.plan_escape(
+            arguments.start, station=arguments.station, options=options_of(arguments)
+        )
+    if not plan.status.ok:
+        return failed(plan.status.message)
+    if plan.trajectory is None or plan.waypoints is None:
+        sys.stdout.write(f"{plan.status.message}\n")
+        return 0
+    if arguments.output:
+        write_trace(arguments.output, plan.trajectory)
+    if arguments.json:
+        gained = [
+            {**_row(pair), "left": left} for pair, left in zip(plan.pairs, plan.left, strict=True)
+        ]
+        figures = {**figures_of(plan.report), "waypoints": plan.waypoints, "pairs": gained}
+        print_json({"trajectory_id": plan.trajectory.trajectory_id, **figures})
+        return 0
+    steps = len(plan.waypoints) - 1
+    sys.stdout.write(
+        f"{plan.report.duration:.2f} s, {plan.report.energy:.0f} J, {steps} "
+        f"step{'' if steps == 1 else 's'}, proved: nothing gets nearer or farther beyond a limit\n"
+    )
+    for pair, left in zip(plan.pairs, plan.left, strict=True):
+        sys.stdout.write(
+            f"{pair.body_a} and {pair.body_b} ({pair.kind}): {1e3 * pair.distance:.1f} mm, "
+            f"{1e3 * left:.1f} mm at the end\n"
+        )
+    end = " ".join(f"A{k} {value:.2f}" for k, value in enumerate(np.degrees(plan.waypoints[-1]), 1))
+    sys.stdout.write(f"it ends at {end}\n")
+    return 0
+
+
 def add_path(path: argparse.ArgumentParser) -> None:
     """Arguments of `ir ask path`."""
     add_cell(path)

@@ -363,6 +363,14 @@ COMMANDS = (
         ("move",),
     ),
     Command(
+        "ask escape",
+        "ir_cli.ask:add_escape",
+        "a way out of where the robot stands too near, or beyond a limit",
+        "Plans a slow way out of a place where something is too near or touched, or a joint is "
+        "beyond its limit, on which nothing gets worse.",
+        "ir ask escape demo 'A1 0 A2 -3 A3 90 A4 0 A5 0 A6 0'",
+    ),
+    Command(
         "ask path",
         "ir_cli.ask:add_path",
         "drive the tool along a path at a given speed",

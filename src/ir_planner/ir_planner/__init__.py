@@ -22,7 +22,7 @@ from ir_planner.errors import (
 )
 from ir_planner.planner import Planner
 from ir_planner.program import ProgramPlan, Standby
-from ir_planner.regional import MovementPlan
+from ir_planner.regional import EscapePlan, MovementPlan
 from ir_planner.request import Goal, parse_goal
 from ir_planner.service import ServicePlan
 from ir_planner.settings import PlannerSettings
@@ -33,6 +33,7 @@ from ir_planner.what_if import what_if
 __all__ = [
     "CancelledError",
     "CartesianPlan",
+    "EscapePlan",
     "Evaluation",
     "Goal",
     "IkAnswer",

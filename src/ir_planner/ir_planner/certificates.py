@@ -20,13 +20,13 @@ from ir_planner.program import (
     with_doors,
     with_intervals,
 )
-from ir_planner.regional import MovementPlan
+from ir_planner.regional import EscapePlan, MovementPlan
 from ir_planner.request import noted
 from ir_planner.scene import PlanningScene
 from ir_planner.service import ServicePlan
 from ir_planner.trajectories import OptimizationPlan
 
-AnyMovement = TypeVar("AnyMovement", MovementPlan, CartesianPlan)
+AnyMovement = TypeVar("AnyMovement", MovementPlan, CartesianPlan, EscapePlan)
 Stamp = Callable[[TrajectoryReport, JointTrajectory | None], TrajectoryReport]
 
 

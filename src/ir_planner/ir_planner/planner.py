@@ -52,7 +52,7 @@ from ir_planner.program import (
     nobody,
     plan_program,
 )
-from ir_planner.regional import MovementPlan, plan_to_goal
+from ir_planner.regional import EscapePlan, MovementPlan, plan_escape, plan_to_goal
 from ir_planner.request import (
     Clock,
     Context,
@@ -63,6 +63,7 @@ from ir_planner.request import (
     checked_options,
     chosen,
     examinable,
+    joints_of,
     noted,
     parse_goal,
     within_limits,
@@ -90,6 +91,7 @@ Place = Goal | str | FloatArray
 tcp in the cell."""
 AnyPath = CartesianPath | CellPath  # a cell's own comes with what it allows to touch
 Cancelled = Callable[[], bool]
+_START = StatusCode.START_STATE_INVALID
 _NEVER: Cancelled = lambda: False  # noqa: E731 - a default argument
 MARGIN = 0.02  # m: S_m where a request names none, as in the messages
 
@@ -314,6 +316,30 @@ class Planner:
         end = self._goal(goal)
         context = Context.of(scene, options, self._work(options, cancelled))
         return self._kept(plan_to_goal(begin, end, context, self.settings.searches), scene, note)
+
+    def plan_escape(
+        self,
+        start: Place,
+        *,
+        station: str = "",
+        options: PlanOptions | None = None,
+        cancelled: Cancelled = _NEVER,
+        **changes: Unpack[OptionFields],
+    ) -> EscapePlan:
+        """A slow way from a start (n,) that is too near to something, in it or beyond a limit, on
+        which nothing gets worse. station: its allowed contacts hold.
+        """
+        options, note = checked_options(options_with(options, changes))
+        scene = self.scene(options.load)
+        scene.allowed(station)  # an unknown one is refused here
+        if isinstance(start, str):
+            begin = joints_of(start, self.cell)
+            start = self._configuration(start, "start", _START) if begin is None else begin
+        q = start.configuration if isinstance(start, Goal) else start
+        if q is None:
+            raise RequestError(_START, "start is a pose: joint values or a posture must be given")
+        context = Context.of(scene, options, self._work(options, cancelled), station)
+        return self._kept(plan_escape(q, context), scene, note)
 
     def plan_service(
         self,

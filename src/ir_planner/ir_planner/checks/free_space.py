@@ -134,7 +134,8 @@ def end_in_collision(
         (goal, "goal", StatusCode.GOAL_IN_COLLISION),
     ):
         if not space.states_free(q[None])[0]:
-            return Status(code, too_near(q, space, what, safety_distance))
+            hint = "; plan_escape (ir ask escape) leads out" if what == "start" else ""
+            return Status(code, too_near(q, space, what, safety_distance) + hint)
     return None
 
 

@@ -11,9 +11,11 @@ from ir_planner.request.bounds import (
 )
 from ir_planner.request.context import Clock, Context, Journal, Work, noted
 from ir_planner.request.goals import (
+    OUTSIDE_MAX,
     POSTURES,
     Goal,
     joint_values,
+    joints_of,
     one_goal,
     parse_goal,
     within_limits,
@@ -21,6 +23,7 @@ from ir_planner.request.goals import (
 
 __all__ = [
     "DURATION_MAX",
+    "OUTSIDE_MAX",
     "POSITION_MAX",
     "POSTURES",
     "Clock",
@@ -33,6 +36,7 @@ __all__ = [
     "chosen",
     "examinable",
     "joint_values",
+    "joints_of",
     "noted",
     "one_goal",
     "parse_goal",

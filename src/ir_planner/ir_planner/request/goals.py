@@ -23,6 +23,7 @@ _WORDS = re.compile(r"[A-Za-z]+\d*|\S+")
 _TEXT_MAX = 300
 _LENGTH_MAX = 100.0  # m
 _NO_ANGLE = 1e6  # rad
+OUTSIDE_MAX = 0.35  # rad beyond a limit, from where a way out is planned: twice what a stop leaves
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,17 +78,32 @@ def parse_goal(text: str, cell: Cell) -> Goal:
             return Goal(pose=station.pose, station=station.name, text=stripped)
     if stripped.lower() in POSTURES:
         return Goal(configuration=cell.posture(stripped.lower()), text=stripped.lower())
-    words = _WORDS.findall(stripped.replace(",", " ").replace("=", " "))
-    keys = [word.upper() for word in words[::2]]
-    joints = [f"A{i + 1}" for i in range(cell.robot.n)]
-    if len(words) > 1 and keys[0] in joints:
-        values = _numbers(keys, words[1::2], joints, "deg")
-        q = within_limits(np.radians(values), cell, "goal", StatusCode.GOAL_STATE_INVALID)
+    words, keys = _words(stripped)
+    joints = joints_of(stripped, cell)
+    if joints is not None:
+        q = within_limits(joints, cell, "goal", StatusCode.GOAL_STATE_INVALID)
         return Goal(configuration=q, text=stripped)
     if len(words) > 1 and keys[0] in _POSE_KEYS:
         return Goal(pose=_pose(_numbers(keys, words[1::2], list(_POSE_KEYS), "")), text=stripped)
     texts = ('"A1 0 A2 -90 ..." in degrees', '"X 1.8 Y 0 Z 1.2 A 0 B 90 C 0"')
     raise UnknownNameError("goal", stripped, [*(s.name for s in cell.stations), *POSTURES, *texts])
+
+
+def joints_of(text: str, cell: Cell) -> FloatArray | None:
+    """Joint values (n,) rad of a text in degrees, wherever they lie; None: it is another goal.
+    Raises RequestError.
+    """
+    words, keys = _words(text)
+    joints = [f"A{i + 1}" for i in range(cell.robot.n)]
+    if len(words) < 2 or keys[0] not in joints:
+        return None
+    return np.asarray(np.radians(_numbers(keys, words[1::2], joints, "deg")))
+
+
+def _words(text: str) -> tuple[list[str], list[str]]:
+    """The words of a text, and every second one in capitals."""
+    words = _WORDS.findall(text.replace(",", " ").replace("=", " "))
+    return words, [word.upper() for word in words[::2]]
 
 
 def _pose(values: list[float]) -> FloatArray:
@@ -136,9 +152,16 @@ def within_limits(q: ArrayLike, cell: Cell, what: str, code: StatusCode) -> Floa
                 code,
                 f"{what}: {robot.joint_names[i]} is {_angle(float(value))}: it must be in "
                 f"[{math.degrees(low):g}, {math.degrees(high):g}] deg, exceeded by "
-                f"{_angle(excess)}",
+                f"{_angle(excess)}{_hint(code, excess)}",
             )
     return np.clip(q, robot.position_min, robot.position_max)
+
+
+def _hint(code: StatusCode, excess: float) -> str:
+    """What helps a start that is `excess` rad beyond a limit."""
+    if code != StatusCode.START_STATE_INVALID or excess > OUTSIDE_MAX:
+        return ""
+    return "; plan_escape (ir ask escape) leads back"
 
 
 def _angle(value: float) -> str:
