@@ -96,7 +96,7 @@ def test_a_table_of_another_kind_is_a_sentence(
 ) -> None:
     folder = demo_file.parent
     out = ["-o", str(folder / "table_page.html"), "--root", str(folder)]
-    assert main([str(demo_file), *out, "--table", str(folder / "steps.xlsx")]) == 1
+    assert main([str(demo_file), *out, "--table", str(folder / "steps.ods")]) == 1
     assert "ends in .csv or .parquet" in capsys.readouterr().err
 
 

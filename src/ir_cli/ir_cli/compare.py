@@ -61,6 +61,8 @@ COLUMNS: Columns = {
 
 def add_compare(compare: argparse.ArgumentParser) -> None:
     """Arguments of `ir compare`."""
+    from ir_recorder.arguments import add_locale
+
     add_cell(compare)
     words = (
         "a KRL program (.src, then .dat; a folder or .zip), or a trace (.csv, .parquet, .mcap, "
@@ -89,8 +91,9 @@ def add_compare(compare: argparse.ArgumentParser) -> None:
         "-o", "--output", default="out/compare.html", metavar="FILE.html", help=page
     )
     compare.add_argument(
-        "--table", default="", metavar="FILE", help="figures as .csv or .parquet as well"
+        "--table", default="", metavar="FILE", help="figures as .csv, .xlsx or .parquet as well"
     )
+    add_locale(compare)
     add_followed(compare)
     words = (
         "of KRL: lines (5-9) whose motions are a process, that every program drives, repeatable; "
@@ -114,7 +117,10 @@ def run_compare(arguments: argparse.Namespace) -> int:
         planner = planner_of(arguments.cell, arguments.power_parameters)
         found = _found(arguments, planner, line)
     page = write_before_after(found, planner.cell, arguments.output, costs)
-    table = write_before_after_table(found, arguments.table, costs) if arguments.table else None
+    table = None
+    if arguments.table:
+        locale = arguments.locale
+        table = write_before_after_table(found, arguments.table, costs, locale=locale)
     rows = [row_of(side) for side in (found.today, *found.sides)]
     if arguments.json:
         print_json({"today": found.name, "kind": found.kind, "programs": rows, **_rest(found)})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from ir_recorder.arguments import add_roots, roots_of
+from ir_recorder.arguments import add_locale, add_roots, roots_of
 from ir_recorder.report.costs import Costs, read_costs
 from ir_recorder.report.fleet import read_members, write_fleet, write_fleet_table
 from ir_recorder.report_main import add_arguments, run
@@ -28,8 +28,9 @@ def add_fleet(fleet: argparse.ArgumentParser) -> None:
     )
     fleet.add_argument("--costs", default="", metavar="FILE", help="prices, shifts and CO2 (YAML)")
     fleet.add_argument(
-        "--table", default="", metavar="FILE", help="figures as .csv or .parquet as well"
+        "--table", default="", metavar="FILE", help="figures as .csv, .xlsx or .parquet as well"
     )
+    add_locale(fleet)
     add_roots(fleet)
     fleet.set_defaults(run=run_fleet)
 
@@ -54,5 +55,7 @@ def run_fleet(arguments: argparse.Namespace) -> int:
         )
     sys.stdout.write(f"{write_fleet(members, arguments.output, left_out, costs, roots)}\n")
     if arguments.table:
-        sys.stdout.write(f"{write_fleet_table(members, arguments.table, roots)}\n")
+        sys.stdout.write(
+            f"{write_fleet_table(members, arguments.table, roots, arguments.locale)}\n"
+        )
     return 0

@@ -17,7 +17,7 @@ from ir_description import (
 )
 from ir_recorder.analysis import Analysis, analyse, findings
 from ir_recorder.analysis.meter import with_meter
-from ir_recorder.arguments import add_roots, roots_of
+from ir_recorder.arguments import add_locale, add_roots, roots_of
 from ir_recorder.errors import ReadError, RecorderError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import is_further_part
@@ -58,8 +58,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--meter-mapping", default="", metavar="FILE", help="what its columns are (.yaml)"
     )
     parser.add_argument(
-        "--table", default="", help="steps as a table to write as well (.csv or .parquet)"
+        "--table", default="", help="steps as a table to write as well (.csv, .xlsx or .parquet)"
     )
+    add_locale(parser)
     parser.add_argument(
         "--picture", default="", help="picture to write as well (.png), of one recording"
     )
@@ -78,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
         page = write_report(*compared[0], options.output, roots=roots, costs=costs, front=front)
     sys.stdout.write(f"{page}\n")
     if options.table:
-        sys.stdout.write(f"{write_table(analyses, options.table, roots)}\n")
+        sys.stdout.write(f"{write_table(analyses, options.table, roots, options.locale)}\n")
     if options.picture:
         sys.stdout.write(f"{write_picture(analyses[0], options.picture, roots)}\n")
     return 0

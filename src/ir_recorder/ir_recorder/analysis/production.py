@@ -273,6 +273,17 @@ def _stretched(before: Saving, after: Saving) -> Saving:
 QUARTER = 900.0  # s: over which suppliers measure demand
 
 
+def driven_and_predicted(analysis: Analysis) -> tuple[float, float]:
+    """Joules of all that was driven, waiting included, and what was predicted of it; NaN where one
+    is not known.
+    """
+    program = analysis.program
+    if program is None:
+        return math.nan, math.nan
+    planned = program.planned_movements.energy + program.planned_pauses.energy
+    return program.whole.energy, planned if planned > 0.0 else math.nan
+
+
 def demand_watts(analysis: Analysis, cycle: Production) -> float:
     """The largest mean power [W] of a quarter of an hour of cycles, one after the other.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -13,6 +14,7 @@ from ir_recorder.analysis.production import (
     Amount,
     Production,
     demand_watts,
+    driven_and_predicted,
     idle_watts,
     levers,
     mean_of,
@@ -27,13 +29,14 @@ from ir_recorder.format.contents import is_further_part
 from ir_recorder.reading.reader import read_recording
 from ir_recorder.report.costs import SETTINGS, Costs, idle_money, money
 from ir_recorder.report.files import write_output
-from ir_recorder.report.headline import Tile
+from ir_recorder.report.headline import Tile, started
 from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import (
     DASH,
-    joules,
+    ENGLISH,
     kilowatt_hours,
     number,
+    percent,
     seconds,
     significant,
     text,
@@ -150,7 +153,8 @@ MOST = 200  # recordings of a fleet
 class Member:
     """A recording of a robot. robot: the folder that the file lies in, or its own name; cycle: what
     its program takes in production; measures: joules of a cycle that each could save at most;
-    demand [W]: of its largest quarter of an hour; idle [W]: at rest by power mode.
+    demand [W]: of its largest quarter of an hour; idle [W]: at rest by power mode; month: of its
+    start, as "2026-05" (UTC); driven, predicted [J]: of its run, as it was driven.
     """
 
     robot: str
@@ -160,6 +164,9 @@ class Member:
     measures: Mapping[str, float]
     demand: float
     idle: Mapping[str, float]
+    month: str
+    driven: float
+    predicted: float
 
 
 def read_members(
@@ -214,6 +221,8 @@ def member_of(analysis: Analysis, robot: str, said: Said = lambda _: None) -> Me
         measures,
         demand_watts(analysis, cycle),
         idle_watts(analysis),
+        started(analysis.recording).strftime("%Y-%m"),
+        *driven_and_predicted(analysis),
     )
 
 
@@ -339,6 +348,7 @@ def fleet_html(
     sections = [
         _section("Robots", _robots(robots, prices)),
         _section("Peak, and when nobody works", _around_the_clock(members, robots, prices)),
+        _section("Month by month: driven and predicted", _months(members)),
         _section("By power mode", _matrix("mode", by_mode(members, prices), robots)),
         _section("What could be saved, by measure", _potential(members, robots, prices)),
         _section(
@@ -391,7 +401,7 @@ def _robots(robots: Sequence[Robot], costs: Costs) -> str:
             *_yearly(robot.yearly, costs),
             _saved(robot.saved, costs),
             seconds(robot.seconds),
-            text(joules(robot.joules)),
+            text(kilowatt_hours(robot.joules / costs.parts_per_cycle)),
         )
         for robot in robots
     ]
@@ -416,7 +426,7 @@ def _robots(robots: Sequence[Robot], costs: Costs) -> str:
         ">CO2 a year",
         ">saved a year, predicted",
         ">cycle",
-        ">energy a cycle",
+        ">energy a part",
     )
     hint = (
         "A year is one cycle after the other, pauses at full length. What plans save is "
@@ -453,6 +463,38 @@ def _around_the_clock(members: Sequence[Member], robots: Sequence[Robot], costs:
         "theirs: as if all came at once."
     )
     return f'<p class="hint">{text(hint)}</p>{table(heads, rows, "Peak and rest")}'
+
+
+def _months(members: Sequence[Member]) -> str:
+    """What was driven in each month, beside what was predicted of it."""
+    known = [member for member in members if math.isfinite(member.driven - member.predicted)]
+    if not known:
+        return '<p class="empty">No recording holds a program that was driven and its plan.</p>'
+    kinds = dict.fromkeys((m.month, m.cycle.origin) for m in sorted(known, key=lambda m: m.month))
+    rows = []
+    for month, origin in kinds:
+        own = [m for m in known if (m.month, m.cycle.origin) == (month, origin)]
+        driven, predicted = (sum(getattr(m, name) for m in own) for name in ("driven", "predicted"))
+        shares = [m.driven / m.predicted - 1.0 for m in own]
+        rows.append(
+            (
+                text(month),
+                text(origin),
+                str(len({m.robot for m in own})),
+                str(len(own)),
+                f"<b>{kilowatt_hours(driven)}</b>",
+                kilowatt_hours(predicted),
+                f"<b>{percent(driven / predicted - 1.0)}</b>"
+                f"<small>{percent(min(shares))} to {percent(max(shares))}</small>",
+            )
+        )
+    heads = ("month", "origin", ">robots", ">recordings", ">driven", ">predicted", ">difference")
+    hint = (
+        "Runs as they were driven, waiting between steps included, which no plan contains; below a "
+        "difference those of single recordings. A difference that grows is a robot, a tool or a "
+        "program that has changed."
+    )
+    return f'<p class="hint">{hint}</p>{table(heads, rows, "Month by month")}'
 
 
 def _clock_row(
@@ -577,6 +619,8 @@ def fleet_columns(members: Sequence[Member]) -> dict[str, list[TableValue]]:
         cycle = member.cycle
         whose = (member.robot, member.file, cycle.origin)
         rows.append((*whose, "cycle", "", cycle.seconds, cycle.energy))
+        rows.append((*whose, "driven", member.month, float("nan"), member.driven))
+        rows.append((*whose, "predicted", member.month, float("nan"), member.predicted))
         if cycle.savings is not None:
             total = cycle.savings.total
             rows.append((*whose, "saved", "by its plan", total.seconds, total.saved))
@@ -593,7 +637,12 @@ def fleet_columns(members: Sequence[Member]) -> dict[str, list[TableValue]]:
 
 
 def write_fleet_table(
-    members: Sequence[Member], path: str | Path, roots: FileRoots = ANYWHERE
+    members: Sequence[Member],
+    path: str | Path,
+    roots: FileRoots = ANYWHERE,
+    locale: str = ENGLISH,
 ) -> Path:
-    """Writes the rows as .csv or .parquet below `roots`; RecorderError for another ending."""
-    return write_columns(fleet_columns(members), path, START, roots)
+    """Writes the rows as .csv, .xlsx or .parquet below `roots`; RecorderError for another
+    ending.
+    """
+    return write_columns(fleet_columns(members), path, START, roots, locale)

@@ -10,6 +10,7 @@ from datetime import UTC, datetime, timedelta
 from ir_msgs_py.savings import one_sided
 from ir_recorder.analysis import Analysis, Finding, ProgramTotals, Share, Verdict, summary
 from ir_recorder.analysis.production import (
+    driven_and_predicted,
     planned_clearance,
     planned_interval,
     planned_share,
@@ -17,6 +18,7 @@ from ir_recorder.analysis.production import (
     saved_amount,
 )
 from ir_recorder.format.contents import OWN_FACTS, VERSION
+from ir_recorder.reading.recording import Recording
 from ir_recorder.report.costs import NAMES, Costs, money, share_between
 from ir_recorder.report.number_text import (
     DASH,
@@ -54,13 +56,18 @@ _PREDICTED = "predicted, not driven"
 def subtitle(analysis: Analysis) -> str:
     """File, start, length and energy of the whole recording."""
     recording = analysis.recording
-    start = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=recording.start_ns * 1e-9)
+    start = started(recording)
     version = recording.fact(VERSION)
     return text(
         f"{recording.path.name}, {start:%Y-%m-%d %H:%M:%S} UTC, recorded "
         f"{seconds(recording.duration)}, {joules(analysis.energy)} at the mains"
         + (f", recorder {version}" if version else "")
     )
+
+
+def started(recording: Recording) -> datetime:
+    """When a recording begins, by the clock of its nodes."""
+    return datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=recording.start_ns * 1e-9)
 
 
 def plant_of(analysis: Analysis) -> str:
@@ -165,7 +172,7 @@ def _recorded(analysis: Analysis) -> Tile:
 def _whole(analysis: Analysis, program: ProgramTotals) -> Tile:
     whole = program.whole
     shortened = program.unshortened is not None
-    planned = program.planned_movements.energy + program.planned_pauses.energy
+    _, planned = driven_and_predicted(analysis)
     whole_cycle = production_of(analysis) is not None or not math.isfinite(whole.energy)
     name = "program, one cycle" if whole_cycle else "program, not driven to its end"
     return Tile(

@@ -7,6 +7,9 @@ from html import escape
 from unicodedata import category
 
 DASH = "–"
+ENGLISH = "en"
+LOCALES = (ENGLISH, "de")
+"""Of CSV files: decimals with a point and commas between columns, or a comma and semicolons."""
 _UNSEEN = ("Cc", "Cf", "Cs")  # categories of Unicode: control, format, surrogate
 
 

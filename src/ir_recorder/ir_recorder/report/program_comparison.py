@@ -19,6 +19,7 @@ from ir_recorder.report.files import write_output
 from ir_recorder.report.motion_scene import motion_of, power_curves, rests_of
 from ir_recorder.report.number_text import (
     DASH,
+    ENGLISH,
     joules,
     kilowatt_hours,
     millimetres,
@@ -112,6 +113,7 @@ def figure_table(found: BeforeAfter, costs: Costs) -> str:
     rows = [
         ("cycle time", *(_of(side, seconds(side.report.duration)) for side in sides)),
         ("energy a cycle", *(_energy(side, kilowatt_hours) for side in sides)),
+        *_a_part(sides, costs),
         ("against today", *(_saved(side, side is found.today) for side in sides)),
         ("cycles a shift", *(_cycles(year) for year in years)),
         (
@@ -226,6 +228,20 @@ def _energy(side: Side, show: Show) -> str:
     return _amount(
         Amount(report.energy, report.energy_low, report.energy_high) if side.found else None, show
     )
+
+
+def _a_part(sides: Sequence[Side], costs: Costs) -> list[tuple[str, ...]]:
+    """A row, where a cycle does not make one part."""
+    if costs.parts_per_cycle == 1.0:
+        return []
+    parts = [
+        Amount(r.energy, r.energy_low, r.energy_high).times(1.0 / costs.parts_per_cycle)
+        if side.found
+        else None
+        for side in sides
+        for r in (side.report,)
+    ]
+    return [("energy a part", *(_amount(part, kilowatt_hours) for part in parts))]
 
 
 def _saved(side: Side, own: bool) -> str:
@@ -370,10 +386,16 @@ def before_after_columns(
 
 
 def write_before_after_table(
-    found: BeforeAfter, path: str | Path, costs: Costs | None = None, roots: FileRoots = ANYWHERE
+    found: BeforeAfter,
+    path: str | Path,
+    costs: Costs | None = None,
+    roots: FileRoots = ANYWHERE,
+    locale: str = ENGLISH,
 ) -> Path:
-    """Writes the rows as .csv or .parquet below `roots`; RecorderError for another ending."""
-    return write_columns(before_after_columns(found, costs), path, START, roots)
+    """Writes the rows as .csv, .xlsx or .parquet below `roots`; RecorderError for another
+    ending.
+    """
+    return write_columns(before_after_columns(found, costs), path, START, roots, locale)
 
 
 def _whole(found: BeforeAfter, side: Side, costs: Costs) -> Mapping[str, TableValue]:
@@ -396,6 +418,7 @@ def _whole(found: BeforeAfter, side: Side, costs: Costs) -> Mapping[str, TableVa
         },
         **{"peak_w": report.peak_power, "peak_low_w": side.peak[0], "peak_high_w": side.peak[1]},
         **{"clearance_m": report.min_clearance, "shift_cycles": year.cycles_a_shift},
+        "part_kwh": report.energy / J_PER_KWH / costs.parts_per_cycle,
         **_amounts("shift_kwh", year.shift.of(lambda joules: joules / J_PER_KWH)),
         **_amounts("year_kwh", kwh),
         **_amounts("year_money", year.energy.of(costs.money)),

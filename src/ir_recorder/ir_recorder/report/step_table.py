@@ -1,5 +1,5 @@
-"""Steps of recordings as columns of numbers, for CSV, Parquet and pandas: SI units, the unit in
-each name.
+"""Steps of recordings as columns of numbers, for CSV, Parquet, pandas and spreadsheets: SI units,
+the unit in each name.
 
 ``pandas.DataFrame(step_columns([analysis]))`` is the table of a program.
 """
@@ -8,13 +8,18 @@ from __future__ import annotations
 
 import csv
 import math
+import re
+from codecs import BOM_UTF8
 from collections.abc import Mapping, Sequence
 from io import BytesIO, StringIO
 from pathlib import Path
+from xml.sax.saxutils import escape
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from ir_recorder.analysis import Analysis, StepResult
 from ir_recorder.errors import PathError, RecorderError
 from ir_recorder.report.files import write_output
+from ir_recorder.report.number_text import ENGLISH
 from ir_values.files import ANYWHERE, FileRoots
 
 TableValue = str | float | int
@@ -55,10 +60,15 @@ def _row(analysis: Analysis, result: StepResult) -> dict[str, TableValue]:
 
 
 def write_table(
-    analyses: Sequence[Analysis], path: str | Path, roots: FileRoots = ANYWHERE
+    analyses: Sequence[Analysis],
+    path: str | Path,
+    roots: FileRoots = ANYWHERE,
+    locale: str = ENGLISH,
 ) -> Path:
-    """Writes the steps as .csv or .parquet below `roots`; RecorderError for another ending."""
-    return write_columns(step_columns(analyses), path, CSV_START, roots)
+    """Writes the steps as .csv, .xlsx or .parquet below `roots`; RecorderError for another
+    ending.
+    """
+    return write_columns(step_columns(analyses), path, CSV_START, roots, locale)
 
 
 def write_columns(
@@ -66,25 +76,36 @@ def write_columns(
     path: str | Path,
     start: bytes,
     roots: FileRoots = ANYWHERE,
+    locale: str = ENGLISH,
 ) -> Path:
-    """Writes columns as .csv or .parquet below `roots`, in place of a table that begins alike;
-    RecorderError for another ending.
+    """Writes columns as .csv, .xlsx or .parquet below `roots`, in place of a table that begins
+    alike; RecorderError for another ending. locale: how a .csv writes its decimals.
     """
     if str(path).endswith(".csv"):
-        return write_output(path, _csv(columns), start, roots)
+        content = _csv(columns, locale)
+        begins = start if locale == ENGLISH else BOM_UTF8 + start.replace(b",", b";")
+        return write_output(path, content, begins, roots)
+    if str(path).endswith(".xlsx"):
+        content = workbook(columns)
+        return write_output(path, content, content[:_SAME], roots)
     if str(path).endswith(".parquet"):
         return write_output(path, _parquet(columns), PARQUET_START, roots)
-    raise PathError(f"{path}: a table ends in .csv or .parquet")
+    raise PathError(f"{path}: a table ends in .csv, .xlsx or .parquet")
 
 
-def _csv(columns: Mapping[str, Sequence[TableValue]]) -> bytes:
+def _csv(columns: Mapping[str, Sequence[TableValue]], locale: str) -> bytes:
     """Texts that a spreadsheet would take for a formula get an apostrophe; NaN is an empty cell."""
     out = StringIO()
-    writer = csv.writer(out, lineterminator="\n")
+    with_comma = locale != ENGLISH
+    writer = csv.writer(out, lineterminator="\n", delimiter=";" if with_comma else ",")
     writer.writerow(columns)
     for row in zip(*columns.values(), strict=True):
-        writer.writerow([_shown(value) for value in row])
-    return out.getvalue().encode()
+        shown = [_shown(value) for value in row]
+        if with_comma:
+            pairs = zip(row, shown, strict=True)
+            shown = [t if isinstance(v, str) else t.replace(".", ",") for v, t in pairs]
+        writer.writerow(shown)
+    return (BOM_UTF8 if with_comma else b"") + out.getvalue().encode()
 
 
 def _shown(value: TableValue) -> str:
@@ -102,3 +123,48 @@ def _parquet(columns: Mapping[str, Sequence[TableValue]]) -> bytes:
     out = BytesIO()
     parquet.write_table(arrow.table(dict(columns)), out)
     return out.getvalue()
+
+
+# A workbook of one sheet (ECMA-376): numbers as numbers, in whatever way the reader writes them.
+
+_SAME = 49  # bytes: header and name of the first member, the same in every workbook written here
+_MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+_PACKAGE = "http://schemas.openxmlformats.org/package/2006"
+_OFFICE = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
+_KIND = "application/vnd.openxmlformats-officedocument.spreadsheetml"
+_XML = '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>\n'
+_MEMBERS = {
+    "[Content_Types].xml": f'<Types xmlns="{_PACKAGE}/content-types">'
+    '<Default Extension="rels" '
+    'ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
+    f'<Override PartName="/xl/workbook.xml" ContentType="{_KIND}.sheet.main+xml"/>'
+    f'<Override PartName="/xl/worksheets/sheet1.xml" ContentType="{_KIND}.worksheet+xml"/>'
+    "</Types>",
+    "_rels/.rels": f'<Relationships xmlns="{_PACKAGE}/relationships"><Relationship Id="r1" '
+    f'Type="{_OFFICE}/officeDocument" Target="xl/workbook.xml"/></Relationships>',
+    "xl/workbook.xml": f'<workbook xmlns="{_MAIN}" xmlns:r="{_OFFICE}"><sheets>'
+    '<sheet name="table" sheetId="1" r:id="r1"/></sheets></workbook>',
+    "xl/_rels/workbook.xml.rels": f'<Relationships xmlns="{_PACKAGE}/relationships">'
+    f'<Relationship Id="r1" Type="{_OFFICE}/worksheet" Target="worksheets/sheet1.xml"/>'
+    "</Relationships>",
+}
+_UNWRITABLE = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def workbook(columns: Mapping[str, Sequence[TableValue]]) -> bytes:
+    """Columns as the bytes of an .xlsx file, the same for the same columns."""
+    rows = [list(columns), *zip(*columns.values(), strict=True)]
+    lines = (f"<row>{''.join(_cell(value) for value in row)}</row>" for row in rows)
+    sheet = f'<worksheet xmlns="{_MAIN}"><sheetData>{"".join(lines)}</sheetData></worksheet>'
+    out = BytesIO()
+    with ZipFile(out, "w", ZIP_DEFLATED) as file:
+        for name, content in {**_MEMBERS, "xl/worksheets/sheet1.xml": sheet}.items():
+            file.writestr(ZipInfo(name), _XML + content, ZIP_DEFLATED)
+    return out.getvalue()
+
+
+def _cell(value: TableValue) -> str:
+    if not isinstance(value, str):
+        return f"<c><v>{value!r}</v></c>" if math.isfinite(value) else "<c/>"
+    written = escape(_UNWRITABLE.sub("\ufffd", value))
+    return f'<c t="inlineStr"><is><t xml:space="preserve">{written}</t></is></c>'
