@@ -97,7 +97,7 @@ def test_a_table_of_another_kind_is_a_sentence(
     folder = demo_file.parent
     out = ["-o", str(folder / "table_page.html"), "--root", str(folder)]
     assert main([str(demo_file), *out, "--table", str(folder / "steps.ods")]) == 1
-    assert "ends in .csv or .parquet" in capsys.readouterr().err
+    assert "ends in .csv, .xlsx or .parquet" in capsys.readouterr().err
 
 
 def test_a_folder_is_compared_and_what_is_no_recording_left_out(
