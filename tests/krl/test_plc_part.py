@@ -9,7 +9,12 @@ import pytest
 
 from ir_krl import KrlError, PlcPause, plc_table, read_plc_table, structured_text
 from ir_msgs_py.modes import Mode, TransitionTimes
+from ir_msgs_py.plc import OperatingMode
 from ir_planner.program import switch_times
+from ir_sim_driver.controller.mode_control import ModeControl
+from ir_sim_driver.controller.settings import SimulationSettings
+from ir_sim_driver.notices import Notices
+from ir_sim_driver.plc.inputs import Plc, PlcSettings
 
 NUMBERS = {"IR_PAUSE": 33, "IR_PLC": 40, "IR_DONE": 41}
 TIMES = TransitionTimes()
@@ -133,6 +138,7 @@ class Block:
         exec(self._code, {"v": self, "now": now})
 
 
+@pytest.mark.parametrize("kind", ["Robot", "Simulated"])
 @pytest.mark.parametrize(
     ("modes", "seconds"),
     [
@@ -143,11 +149,15 @@ class Block:
         ("STAND_ON_BRAKES>BUS_POWER_OFF>HIBERNATION", 340.0),
     ],
 )
-def test_the_structured_text_spends_a_pause_as_planned(modes: str, seconds: float) -> None:
-    """Against a controller that follows the transition times, whatever the text is made from."""
+def test_the_structured_text_spends_a_pause_as_planned(
+    modes: str, seconds: float, kind: str
+) -> None:
+    """Against a controller that follows the transition times, whatever the text is made from, and
+    against the driver's own state machine with its rules of AB and HIB.
+    """
     planned = pause(modes, seconds)
     block = Block(structured_text("MAIN", [planned], NUMBERS, ["for a test"]))
-    robot = Robot()
+    robot = Simulated() if kind == "Simulated" else Robot()
     step = 0.05
     asked_in: list[str] = []
     for k in range(int((seconds + 30.0) / step)):
@@ -220,3 +230,35 @@ class Robot:
         elif wakes and self.mode is not Mode.STAND_ON_MOTORS:
             self.goal = Mode.STAND_ON_MOTORS
             self.left = TIMES.leave(self.mode.name)
+
+
+class Simulated(Robot):
+    """The modes of the simulated driver, asked for by its PLC inputs."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._plc = Plc(PlcSettings(), Notices(), OperatingMode.EXT)
+        self._control = ModeControl(SimulationSettings(), self._plc, lambda _mode: 0.0, {})
+
+    @property
+    def online(self) -> bool:
+        return self.mode not in (Mode.TO_HIBERNATION, Mode.HIBERNATION, Mode.FROM_HIBERNATION)
+
+    def obey(self, block: Block, step: float) -> None:
+        inputs = ("AB", "HIB", "DrivesOff", "DrivesOn", "ConfMess")
+        bits = ("ab", "hib", "drives_off", "drives_on", "conf_mess")
+        for name, bit in zip(inputs, bits, strict=True):
+            self._plc.set_bit(bit, bool(getattr(block, name)))
+        self.seconds_in[self.mode.name] += step
+        self.active = self.active or bool(block.ExtStart)
+        if block.PauseDone and self.active:
+            self.asked = 0
+            self.over = True
+        asleep = not self.online
+        self._control.latches.wake = bool(block.SendWakePacket)
+        self._plc.step(step)
+        self._control.react_to_plc()
+        self._control.step(step, motion=False, standing=True, emergency=False)
+        self.mode = self.goal = self._control.modes.mode
+        if asleep and self.online:
+            self._plc.wake()
