@@ -82,6 +82,10 @@ WAITS = {  # statements that end in WAIT SEC of what they compute
         2.0,
     ),
     "VARSTATE": ('DECL INT N\nIF VARSTATE("N")==#DECLARED THEN\nN=1\nENDIF\nWAIT SEC N', 1.0),
+    "letters of a text": (
+        'DECL CHAR S[4]\nS[]="AB"\nIF (S[2]=="B") AND (S[]=="AB") THEN\nWAIT SEC 1\nENDIF',
+        1.0,
+    ),
     "messages": ('MsgNotify("Größe")\nWAIT SEC 1', 1.0),
     "loads of the controller": ("$LOAD=LOAD_DATA[2]\n$LOAD.M=10.0\nWAIT SEC 1", 1.0),
     "comments": ("WAIT SEC 1 ; and no more", 1.0),

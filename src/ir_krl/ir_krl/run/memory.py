@@ -291,6 +291,9 @@ def _element(value: Value, name: str, index: tuple[int, ...] | None, place: Plac
     written = f"{name}[{', '.join(map(str, index))}]"
     if isinstance(value, Unknown):
         return Unknown(written)
+    if isinstance(value, str) and len(index) == 1:  # a letter of a text
+        within = 1 <= index[0] <= len(value)
+        return value[index[0] - 1] if within else Unknown(written)
     if not isinstance(value, Array):
         raise KrlRunError(f"{name} is no array: leave out the index", place)
     return value.elements.get(index, Unknown(written))
