@@ -466,3 +466,12 @@ def test_a_project_says_why_no_program_is_found(tmp_path: Path) -> None:
     (tmp_path / "b" / "p.src").write_text("DEF P( )\nLOOP\nEND\n")
     with pytest.raises(KrlError, match=r"no file has a routine q: b/p\.src:3:1: "):
         read_project(tmp_path).main("q")
+
+
+def test_a_loop_is_followed_once_at_least(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "p.src").write_text("DEF P( )\nPTP XHOME\nEND\n")
+    words = ["krl", "import", str(tmp_path / "p.src"), "--cell", "open", "--loop-passes", "0"]
+    assert main(words) == 2
+    assert "--loop-passes 0: a loop is followed once at least" in capsys.readouterr().err

@@ -217,3 +217,28 @@ def test_a_kept_orientation(planner: Planner, followed: Follow) -> None:
     first, last = planner.scene("none").chain.tcp_poses(trajectory.positions[[0, -1]])[:, :3, :3]
     assert first == pytest.approx(last, abs=1e-9)
     assert abs(np.trace(first.T @ rotation_from_abc([0, 0, 0])) - np.trace(first)) < 1e-9
+
+
+SPLINES = {  # blocks whose time is said, or follows from the speeds
+    "all parts timed": (
+        "PTP_SPLINE\nTIME_BLOCK START\nSPTP {A1 10}\nTIME_BLOCK PART=60\nSPTP {A1 20,A3 80}\n"
+        "TIME_BLOCK END=2.5\nENDSPLINE"
+    ),
+    "a time at the end": (
+        "PTP_SPLINE\nTIME_BLOCK START\nSPTP {A1 10}\nSPTP {A1 20,A3 80}\nTIME_BLOCK END=4\n"
+        "ENDSPLINE"
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SPLINES)
+def test_a_time_block_is_as_slow_as_the_override(
+    name: str, planner: Planner, followed: Follow
+) -> None:
+    """Law: what takes t at 100 % takes t / o at an override of o, whatever sets the time."""
+    took = []
+    for override in (100, 50, 20):
+        program = followed(f"$OV_PRO={override}\nPTP XHOME\n{SPLINES[name]}")
+        steps, _ = drive(program, planner.scene("none"), planner.cell.machine_home)
+        took.append(sum(step.trajectory.duration for step in steps) * override / 100)
+    assert took[1:] == pytest.approx(took[:1] * 2, rel=5e-3)

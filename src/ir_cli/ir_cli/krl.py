@@ -128,6 +128,8 @@ def add_followed(parser: argparse.ArgumentParser) -> None:
 
 def followed(files: Sequence[Path], planner: Planner, arguments: argparse.Namespace) -> Followed:
     """The commands of the program in these files, as the options of `add_followed` say."""
+    if arguments.loop_passes < 1:
+        raise InputError(f"--loop-passes {arguments.loop_passes}: a loop is followed once at least")
     if files[0].suffix.lower() == UR:
         if len(files) > 1:
             raise InputError(f"{files[1]}: a script of a UR is one file")

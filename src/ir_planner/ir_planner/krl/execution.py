@@ -255,7 +255,7 @@ class _Drive:
             self.notes.append(
                 Note(block.place, "parts have speeds of their own: driven as its first part")
             )
-        least = sum(one.seconds for one in block.times)
+        least = sum(one.seconds for one in block.times) / block.parts[0].speeds.override
         drawn = None if block.axis else tool_spline(block, self.here, self.arm)
         self._drive(curve, block, block.parts[0].speeds, drawn, least)
 

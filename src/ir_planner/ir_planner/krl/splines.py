@@ -181,8 +181,8 @@ def block_curve(block: SplineBlock, start: FloatArray, arm: Arm) -> AxisCurve:
 
 
 def timed_block(block: SplineBlock, start: FloatArray, arm: Arm) -> JointTrajectory | None:
-    """The trajectory from `start` (n,) of a PTP_SPLINE whose TIME_BLOCK times all its parts; else
-    None.
+    """The trajectory from `start` (n,) of a PTP_SPLINE whose TIME_BLOCK times all its parts, at an
+    override of 100 %; else None.
     """
     whole = [one for one in block.times if one.first == 0 and one.last == len(block.parts)]
     if not block.axis or len(block.times) != 1 or not whole:
@@ -191,6 +191,7 @@ def timed_block(block: SplineBlock, start: FloatArray, arm: Arm) -> JointTraject
     times = _passing_times(whole[0], len(block.parts))
     if times is None:
         return None
+    times = times / block.parts[0].speeds.override
     times = times * (
         round(times[-1] / GRID_S) * GRID_S / times[-1]
     )  # at rest where the last point lies
