@@ -16,6 +16,7 @@ from ir_recorder.report.costs import (
     Costs,
     clock_section,
     costs_section,
+    given_and_assumed,
     lever_section,
     money,
     read_costs,
@@ -135,11 +136,13 @@ def test_rest_outside_of_the_shifts_is_priced_by_mode(analysis: Analysis) -> Non
 
 def test_assumptions_are_marked_and_given_figures_are_not(analysis: Analysis) -> None:
     assumed = costs_section(analysis, Costs())
-    assert assumed.count("(assumed)") == len(NAMES)
+    assert "Given" not in assumed
+    words = given_and_assumed(Costs())
+    assert words.startswith("Assumed: price 0.2, ")
+    assert words.count(",") == len(NAMES) - 1
     own = costs_section(analysis, replace(Costs(), price=0.5, given=("price",)))
-    assert own.count("(assumed)") == len(NAMES) - 1
-    assert "price 0.5," in own
-    assert "(assumed)" not in costs_section(analysis, replace(Costs(), given=NAMES))
+    assert "Given: price 0.5. Assumed: currency EUR, " in own
+    assert "Assumed" not in costs_section(analysis, replace(Costs(), given=NAMES))
 
 
 def test_the_cycle_is_the_one_with_full_pauses(analysis: Analysis) -> None:

@@ -9,7 +9,7 @@ import pytest
 from ir_msgs_py.savings import one_sided
 from ir_recorder import Analysis, analyse, findings
 from ir_recorder.report import report_html
-from ir_recorder.report.headline import source, tiles, verdict
+from ir_recorder.report.headline import run_tiles, source, tiles, verdict
 
 
 def test_simulated_figures_are_labelled(analysis: Analysis, page: str) -> None:
@@ -42,15 +42,16 @@ def test_nothing_checked_is_not_checked() -> None:
 
 def test_shortened_pauses_stand_beside_the_energy_of_the_full_cycle(analysis: Analysis) -> None:
     facts = (("unshortened_pauses", "600 s, 1800 s"),)
-    shown = tiles(analyse(replace(analysis.recording, facts=facts)))
-    assert "this run, pauses shortened" in shown
+    found = analyse(replace(analysis.recording, facts=facts))
+    shown = tiles(found)
+    assert "this run, pauses shortened" in run_tiles(found)
     assert "cycle with full pauses" in shown
     assert "pauses of 40.0 min instead of 1.20 s" in shown
-    assert "pauses shortened" not in tiles(analysis)
+    assert "pauses shortened" not in tiles(analysis) + run_tiles(analysis)
 
 
-def test_pauses_are_in_the_headline(analysis: Analysis) -> None:
-    shown = tiles(analysis)
+def test_pauses_are_in_the_figures_of_the_run(analysis: Analysis) -> None:
+    shown = run_tiles(analysis)
     for name in ("movements", "pauses", "waiting between steps"):
         assert f"<span>{name}</span>" in shown
 

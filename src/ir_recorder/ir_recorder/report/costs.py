@@ -305,17 +305,22 @@ def _between(amount: Amount, show: Callable[[float], str]) -> str:
 
 
 def _assumptions(costs: Costs, counts: tuple[float, ...]) -> str:
-    """What the amounts rest on; what no file gave is named an assumption."""
-    items = []
+    """What the amounts rest on."""
+    a_shift, a_year = (f"{count:,.0f}".replace(",", " ") for count in counts[1:3])
+    made = f"{a_shift} cycles a shift, {a_year} a year."
+    assumed = "" if set(NAMES) <= set(costs.given) else " Give your own with --costs costs.yaml."
+    return f'<p class="hint">{text(made)} {text(given_and_assumed(costs))}{assumed}</p>'
+
+
+def given_and_assumed(costs: Costs) -> str:
+    """All settings in two sentences: those that a file gave, and those that are assumed."""
+    shown: dict[bool, list[str]] = {True: [], False: []}
     for each in SETTINGS:
         value = getattr(costs, each.name)
-        shown = value if isinstance(value, str) else f"{value:g} {each.unit}".strip()
-        mark = "" if each.name in costs.given else " (assumed)"
-        items.append(f"{each.name.replace('_', ' ')} {shown}{mark}")
-    a_shift, a_year = (f"{count:,.0f}".replace(",", " ") for count in counts[1:3])
-    made = f"{a_shift} cycles a shift, {a_year} a year"
-    assumed = "" if set(NAMES) <= set(costs.given) else " Give your own with --costs costs.yaml."
-    return f'<p class="hint">{text(made)}; {text(", ".join(items))}.{assumed}</p>'
+        words = value if isinstance(value, str) else f"{value:g} {each.unit}".strip()
+        shown[each.name in costs.given].append(f"{each.name.replace('_', ' ')} {words}")
+    heads = {True: "Given", False: "Assumed"}
+    return " ".join(f"{heads[own]}: {', '.join(items)}." for own, items in shown.items() if items)
 
 
 # The biggest levers as a table: joules, share, money a year, and what would save them.

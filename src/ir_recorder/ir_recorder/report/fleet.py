@@ -27,7 +27,7 @@ from ir_recorder.errors import ReadError, RecorderError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import is_further_part
 from ir_recorder.reading.reader import read_recording
-from ir_recorder.report.costs import SETTINGS, Costs, idle_money, money
+from ir_recorder.report.costs import Costs, given_and_assumed, idle_money, money
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import Tile, started
 from ir_recorder.report.methods import counted
@@ -42,7 +42,7 @@ from ir_recorder.report.number_text import (
     text,
     watts,
 )
-from ir_recorder.report.page import PAGE_START, asset
+from ir_recorder.report.page import PAGE_START, asset, folded
 from ir_recorder.report.step_table import TableValue, write_columns
 from ir_recorder.report.tables import table
 from ir_values.errors import IrError
@@ -349,10 +349,12 @@ def fleet_html(
         _section("Robots", _robots(robots, prices)),
         _section("Peak, and when nobody works", _around_the_clock(members, robots, prices)),
         _section("Month by month: driven and predicted", _months(members)),
-        _section("By power mode", _matrix("mode", by_mode(members, prices), robots)),
+        folded(_section("By power mode", _matrix("mode", by_mode(members, prices), robots))),
         _section("What could be saved, by measure", _potential(members, robots, prices)),
-        _section(
-            "By movement and pause", _matrix("movement", by_movement(members, prices), robots)
+        folded(
+            _section(
+                "By movement and pause", _matrix("movement", by_movement(members, prices), robots)
+            )
         ),
     ]
     title = f"{counted(len(robots), 'robot')}, {counted(len(members), 'recording')}"
@@ -485,7 +487,11 @@ def _months(members: Sequence[Member]) -> str:
                 f"<b>{kilowatt_hours(driven)}</b>",
                 kilowatt_hours(predicted),
                 f"<b>{percent(driven / predicted - 1.0)}</b>"
-                f"<small>{percent(min(shares))} to {percent(max(shares))}</small>",
+                + (
+                    f"<small>{percent(min(shares))} to {percent(max(shares))}</small>"
+                    if len(own) > 1
+                    else ""
+                ),
             )
         )
     heads = ("month", "origin", ">robots", ">recordings", ">driven", ">predicted", ">difference")
@@ -599,12 +605,7 @@ def _problems(left_out: Sequence[str]) -> str:
 
 
 def _assumptions(costs: Costs) -> str:
-    shown = (
-        f"{each.name.replace('_', ' ')} {getattr(costs, each.name)} {each.unit}".strip()
-        + ("" if each.name in costs.given else " (assumed)")
-        for each in SETTINGS
-    )
-    return f'<p class="hint">{text(", ".join(shown))}.</p>'
+    return f'<p class="hint">{text(given_and_assumed(costs))}</p>'
 
 
 # A fleet as columns of numbers, for CSV, Parquet and pandas: SI units, joules of a cycle.

@@ -115,25 +115,33 @@ def notes(analysis: Analysis) -> str:
 
 
 def tiles(analysis: Analysis, costs: Costs | None = None) -> str:
-    """The figures; those of the program where one was executed."""
+    """The figures for who pays; those of the program where one was executed."""
     program = analysis.program
-    origin = analysis.recording.origin
     paid = (_yearly(analysis, costs or Costs()), _saved(analysis))
-    shown = (
-        [*paid, _unshortened(program), _whole(analysis, program), *_parts(program, origin)]
-        if program is not None
-        else [*paid, *_planned(analysis)]
-        if analysis.recording.only_planned
-        else [
-            Tile("program", "none executed", ("figures of the whole recording only",)),
-            *paid,
-            _recorded(analysis),
-        ]
-    )
-    if analysis.recording.only_planned:
-        return "".join(tile.html() for tile in shown if tile is not None)
+    if analysis.recording.only_planned and program is None:
+        return _html([*paid, *_planned(analysis)])
     peak = Tile("peak power", watts(analysis.peak_power), ("of a 10 ms reading",))
-    return "".join(tile.html() for tile in [*shown, peak, _clearance(analysis)] if tile is not None)
+    if program is None:
+        none = Tile("program", "none executed", ("figures of the whole recording only",))
+        return _html([*paid, none, _recorded(analysis), peak, _clearance(analysis)])
+    return _html([*paid, _unshortened(program) or _whole(analysis, program), peak])
+
+
+def run_tiles(analysis: Analysis) -> str:
+    """The figures of the run, for engineers; "" where no program was executed."""
+    program = analysis.program
+    if program is None:
+        return ""
+    parts = _parts(program, analysis.recording.origin)
+    own = _html([_whole(analysis, program), *parts, _clearance(analysis)])
+    return (
+        '<details class="part"><summary><h2>This run in figures</h2></summary>'
+        f'<div class="tiles">{own}</div></details>'
+    )
+
+
+def _html(shown: Sequence[Tile | None]) -> str:
+    return "".join(tile.html() for tile in shown if tile is not None)
 
 
 def _planned(analysis: Analysis) -> list[Tile]:
@@ -177,9 +185,9 @@ def _whole(analysis: Analysis, program: ProgramTotals) -> Tile:
     name = "program, one cycle" if whole_cycle else "program, not driven to its end"
     return Tile(
         "this run, pauses shortened" if shortened else name,
-        joules(whole.energy),
+        kilowatt_hours(whole.energy),
         (
-            f"{number(whole.energy / 3600.0, 'Wh')} in {seconds(whole.seconds)}",
+            f"{joules(whole.energy)} in {seconds(whole.seconds)}",
             f"predicted {joules(planned)}{_within(analysis)}, "
             f"{_against(whole.energy, planned, analysis.recording.origin)}",
             _why(analysis),
@@ -222,10 +230,10 @@ def _unshortened(program: ProgramTotals) -> Tile | None:
         return Tile(
             "cycle with full pauses", "not known", ("the pauses of the run don't match the cell's",)
         )
-    energy = f"{number(full.energy / 3600.0, 'Wh')} in {seconds(full.seconds)}"
+    energy = f"{joules(full.energy)} in {seconds(full.seconds)}"
     return Tile(
         "cycle with full pauses",
-        joules(full.energy),
+        kilowatt_hours(full.energy),
         (energy, cut, "computed from this run and the data"),
     )
 

@@ -16,7 +16,7 @@ from ir_recorder.report.charts import front_section, joule_bars
 from ir_recorder.report.costs import Costs, clock_section, costs_section, lever_section
 from ir_recorder.report.data import page_data
 from ir_recorder.report.files import write_output
-from ir_recorder.report.headline import notes, source, subtitle, tiles, verdict
+from ir_recorder.report.headline import notes, run_tiles, source, subtitle, tiles, verdict
 from ir_recorder.report.methods import methods_section
 from ir_recorder.report.number_text import joules, text
 from ir_recorder.report.sankey import sankey_section
@@ -103,6 +103,7 @@ def report_html(
         "verdict": verdict(checks),
         "notes": notes(analysis),
         "tiles": tiles(analysis, costs or Costs()),
+        "run": run_tiles(analysis),
         "capacity": text(joules(controller.dc_link_capacity_energy)),
         "costs": costs_section(analysis, costs or Costs()),
         "front": folded(front_section(analysis, front)),

@@ -14,7 +14,7 @@ from ir_msgs_py.savings import BeforeAfter, Change, Side
 from ir_recorder.analysis.production import Amount, saved_amount
 from ir_recorder.report.cell_scene import cell_scene
 from ir_recorder.report.charts import Point, front_chart
-from ir_recorder.report.costs import J_PER_KWH, SETTINGS, Costs, money, share_between
+from ir_recorder.report.costs import J_PER_KWH, Costs, given_and_assumed, money, share_between
 from ir_recorder.report.files import write_output
 from ir_recorder.report.motion_scene import motion_of, power_curves, rests_of
 from ir_recorder.report.number_text import (
@@ -191,12 +191,6 @@ def _keyed(side: Side) -> Sequence[tuple[tuple[str, int], str]]:
 
 def assumptions(found: BeforeAfter, costs: Costs) -> str:
     """What the amounts rest on; what no file gave is named an assumption."""
-    items = []
-    for each in SETTINGS:
-        value = getattr(costs, each.name)
-        shown = value if isinstance(value, str) else f"{value:g} {each.unit}".strip()
-        mark = "" if each.name in costs.given else " (assumed)"
-        items.append(f"{each.name.replace('_', ' ')} {shown}{mark}")
     parameters = found.today.report.power_parameters or "the data sheet"
     said = (
         "Same cycle time: the planner's program in the time of today's. Free: as fast as pays, "
@@ -210,7 +204,7 @@ def assumptions(found: BeforeAfter, costs: Costs) -> str:
         "as the line asks for, and there today's program waits at its end as well; what is left "
         "of a shift counts nothing."
     )
-    return f'<p class="hint">{text(said)}</p><p class="hint">{text(", ".join(items))}.</p>'
+    return f'<p class="hint">{text(said)}</p><p class="hint">{text(given_and_assumed(costs))}</p>'
 
 
 def _cell(value: str, *smaller: str) -> str:
