@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 from hypothesis import strategies as st
 
-from ir_cli.cells import cell_text
+from ir_cli.new_cell import cell_text
 from ir_description import Cell, cell_from_yaml, load_robot
 
 ROBOTS = ("kr6_r900_2", "kr210_r2700_extra")
