@@ -20,6 +20,7 @@ OTHERS = {
     "recording": {"--seconds", "--minutes", "--kills", "--demo", "--quick", "--json"},
     "paper": {"--only", "--again", "--seeds", "--quick", "--json"},  # each claim names its cells
     "hostile": {"--seeds", "--quick", "--json"},  # one cell: it asks for the driver
+    "strangers": {"--seeds", "--quick", "--json"},  # files, no cells
 }
 
 

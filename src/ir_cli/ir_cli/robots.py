@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ir_cli.errors import InputError, unknown_name
 from ir_cli.output import (
@@ -29,6 +30,10 @@ from ir_description import (
     robot_named,
 )
 
+if TYPE_CHECKING:
+    from ir_cli.robot_from_urdf import RobotSource
+
+URDFS = (".urdf", ".xacro")
 COLUMNS = {
     "robot": ("robot", text),
     "title": ("maker and model", text),
@@ -48,8 +53,11 @@ def add_list(listing: argparse.ArgumentParser) -> None:
 def add_check(check: argparse.ArgumentParser) -> None:
     """Arguments of `ir robot check`."""
     check.add_argument(
-        "robot", metavar="ROBOT", help="a robot file, or the name of a bundled robot"
+        "robot",
+        metavar="ROBOT",
+        help="a robot file, the name of a bundled robot, or a URDF or xacro file",
     )
+    _add_figures(check)
     add_formats(check, comma=False)
     check.set_defaults(run=run_check)
 
@@ -63,22 +71,48 @@ def add_new(new: argparse.ArgumentParser) -> None:
         "urdf", nargs="?", metavar="URDF", help="a URDF or xacro file: links, joints, shapes"
     )
     new.add_argument("--urdf", dest="urdf_option", metavar="FILE", help=argparse.SUPPRESS)
-    new.add_argument(
-        "--payload", type=float, metavar="KG", help="rated payload, where there is no drive sheet"
-    )
-    words = "mass of the arm with its base, by its data sheet: for links without a mass"
-    new.add_argument("--mass", type=float, metavar="KG", help=words)
-    new.add_argument("--drives", metavar="FILE", help="what the URDF does not say; see --template")
+    _add_figures(new)
     output = new.add_argument(
         "-o", "--output", metavar="FILE", default="", help="robot file (URDF's name, .yaml)"
     )
     add_renamed(new, "--out", output)
-    new.add_argument("--tip", default="", metavar="LINK", help="link at the flange (flange, tool0)")
-    words = "leave out a link with all that it carries; repeatable"
-    new.add_argument("--without", action="append", default=[], metavar="LINK", help=words)
-    words = "folder below which package://NAME/.. is found (that of the URDF and those above)"
-    new.add_argument("--packages", default="", metavar="FOLDER", help=words)
     new.set_defaults(run=run_new)
+
+
+def _add_figures(parser: argparse.ArgumentParser) -> None:
+    """What a URDF doesn't say, and which parts of it are the robot."""
+    parser.add_argument(
+        "--payload", type=float, metavar="KG", help="rated payload, where there is no drive sheet"
+    )
+    words = "mass of the arm with its base, by its data sheet: for links without a mass"
+    parser.add_argument("--mass", type=float, metavar="KG", help=words)
+    words = "what the URDF does not say; see ir robot new --template"
+    parser.add_argument("--drives", metavar="FILE", help=words)
+    words = "link at the flange (flange, tool0)"
+    parser.add_argument("--tip", default="", metavar="LINK", help=words)
+    words = "leave out a link with all that it carries; repeatable"
+    parser.add_argument("--without", action="append", default=[], metavar="LINK", help=words)
+    words = "folder below which package://NAME/.. is found (that of the URDF and those above)"
+    parser.add_argument("--packages", default="", metavar="FOLDER", help=words)
+
+
+def _source(urdf: Path, arguments: argparse.Namespace) -> RobotSource:
+    """What a robot is made from. Raises InputError."""
+    from ir_cli.robot_from_urdf import RobotSource
+
+    for name, most in (("payload", 1e4), ("mass", 1e5)):
+        value = getattr(arguments, name)
+        if value is not None and not 0.0 < value <= most:
+            raise InputError(f"--{name} is {value:g} kg, must be in (0, {most:g}] kg")
+    return RobotSource(
+        urdf=urdf,
+        drives=Path(arguments.drives) if arguments.drives else None,
+        payload=arguments.payload,
+        mass=arguments.mass,
+        tip=arguments.tip,
+        without=tuple(arguments.without),
+        packages=Path(arguments.packages) if arguments.packages else None,
+    )
 
 
 def run_new(arguments: argparse.Namespace) -> int:
@@ -94,29 +128,24 @@ def run_new(arguments: argparse.Namespace) -> int:
             "give a URDF: ir robot new robot.urdf --payload 20 --mass 250; ir robot new --template "
             "prints an empty sheet for what a URDF does not say (--drives)"
         )
-    for name, most in (("payload", 1e4), ("mass", 1e5)):
-        value = getattr(arguments, name)
-        if value is not None and not 0.0 < value <= most:
-            raise InputError(f"--{name} is {value:g} kg, must be in (0, {most:g}] kg")
-    from ir_cli.robot_from_urdf import RobotSource, write_robot
+    from ir_cli.robot_from_urdf import write_robot
 
     urdf = Path(named)
-    source = RobotSource(
-        urdf=urdf,
-        drives=Path(arguments.drives) if arguments.drives else None,
-        payload=arguments.payload,
-        mass=arguments.mass,
-        tip=arguments.tip,
-        without=tuple(arguments.without),
-        packages=Path(arguments.packages) if arguments.packages else None,
+    write_robot(
+        _source(urdf, arguments), Path(arguments.output or f"{urdf.name.partition('.')[0]}.yaml")
     )
-    write_robot(source, Path(arguments.output or f"{urdf.name.partition('.')[0]}.yaml"))
     return 0
 
 
 def run_check(arguments: argparse.Namespace) -> int:
     """Print all errors of a file, else remarks on the robot; exit code 1 where it can't be used."""
-    robot = _readable(arguments.robot)
+    file = Path(arguments.robot)
+    if file.suffix.lower() in URDFS:
+        from ir_cli.robot_from_urdf import made_robot
+
+        robot: RobotModel | None = made_robot(_source(file, arguments)).robot
+    else:
+        robot = _readable(arguments.robot)
     if robot is None:
         return 1
 

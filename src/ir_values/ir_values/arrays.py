@@ -199,3 +199,12 @@ def solid_box_inertia(mass: float, size: ArrayLike) -> FloatArray:
     """
     x, y, z = frozen(size, (3,), "size") ** 2
     return frozen(np.diag([y + z, x + z, x + y]) * (mass / 12.0), (3, 3), "inertia")
+
+
+def number_of(text: str) -> float:
+    """The number that a text is in files of others; ValueError for what only Python takes for one:
+    1_000, or digits of other scripts.
+    """
+    if not text.isascii() or "_" in text:
+        raise ValueError(f"{text[:40]!a} is no number")
+    return float(text)

@@ -36,6 +36,7 @@ _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
 def mesh_path(folder: Path, name: str, suffixes: tuple[str, ...] = (".stl",)) -> Path:
     """Return the path of a mesh inside the folder of its cell file; nothing leads out of it."""
     path = Path(name)
+    refuse_surfaces(path)
     if (
         "://" in name
         or "\\" in name
@@ -53,22 +54,41 @@ def mesh_path(folder: Path, name: str, suffixes: tuple[str, ...] = (".stl",)) ->
     return resolved
 
 
+SURFACES = (".step", ".stp", ".iges", ".igs", ".sat", ".x_t", ".prt", ".sldprt", ".catpart")
+"""Files of CAD systems with curved surfaces instead of triangles."""
+
+
+def refuse_surfaces(path: Path) -> None:
+    """Raise InvalidValueError for a file of a CAD system that has no triangles."""
+    if path.suffix.lower() in SURFACES:
+        raise InvalidValueError(
+            f"mesh file {shown(path.name)} has curved surfaces, which are not read: export it from "
+            "CAD as .stl, .obj or .glb, with chords of about 1 mm"
+        )
+
+
+def check_triangles(count: int, most: int = TRIANGLES_MAX) -> None:
+    """Raise InvalidValueError for a mesh of too few or too many triangles."""
+    if not 4 <= count <= most:
+        remedy = "; export it coarser: chords of about 1 mm are enough" if count > most else ""
+        raise InvalidValueError(f"the mesh has {count} triangles, must have 4 to {most}{remedy}")
+
+
 def read_stl(path: Path) -> FloatArray:
     """Return the triangles (T, 3, 3) of an STL file in its own unit."""
     return triangles_from_stl(read_regular_file(path, BYTES_MAX))
 
 
-def triangles_from_stl(content: bytes) -> FloatArray:
-    """Return the triangles (T, 3, 3) of STL content; binary where the length fits, else ASCII."""
+def triangles_from_stl(content: bytes, most: int = TRIANGLES_MAX) -> FloatArray:
+    """Return the triangles (T, 3, 3) of STL content, at most so many; binary where the length fits,
+    else ASCII.
+    """
     count = int.from_bytes(content[80:84], "little") if len(content) >= 84 else -1
     if len(content) == 84 + 50 * count:
         triangles = np.frombuffer(content, dtype=_BINARY, offset=84)["corners"].astype(np.float64)
     else:
         triangles = _ascii_triangles(content)
-    if not 4 <= len(triangles) <= TRIANGLES_MAX:
-        raise InvalidValueError(
-            f"the mesh has {len(triangles)} triangles, must have 4 to {TRIANGLES_MAX}"
-        )
+    check_triangles(len(triangles), most)
     return frozen(triangles, (None, 3, 3), "mesh")
 
 
@@ -77,6 +97,8 @@ def _ascii_triangles(content: bytes) -> FloatArray:
         raise InvalidValueError(
             "the file is neither a binary STL (its length does not fit) nor an ASCII one"
         )
+    if not content.rstrip().rpartition(b"\n")[2].lstrip().startswith(b"endsolid"):
+        raise InvalidValueError("the ASCII STL does not end with endsolid: was it cut?")
     found = _VERTEX.findall(content)
     if len(found) % 3:
         raise InvalidValueError(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_description.poses import pose_of, rotation_from_quaternion
-from ir_values.arrays import FloatArray
+from ir_values.arrays import FloatArray, number_of
 from ir_values.errors import InvalidValueError, shown
 
 _COUNT = 200_000  # lines of a mesh, and shapes of an object
@@ -71,7 +71,7 @@ class _Lines:
     def numbers(self, count: int, what: str, text: str | None = None) -> FloatArray:
         text = self.take(what) if text is None else text
         try:
-            values = np.array([float(word) for word in text.split()])
+            values = np.array([number_of(word) for word in text.split()])
         except ValueError:
             values = np.zeros(0)
         if len(values) != count or not np.isfinite(values).all():

@@ -25,6 +25,7 @@ from ir_description.files.mesh import (
     BYTES_MAX,
     CELL_TRIANGLES_MAX,
     TRIANGLES_MAX,
+    check_triangles,
     mesh_path,
     triangles_from_stl,
 )
@@ -75,8 +76,10 @@ def read_solid(folder: Path, name: str, suffixes: tuple[str, ...] = SUFFIXES) ->
     return SolidMesh(_checked(triangles), content)
 
 
-def triangles_from_obj(content: bytes) -> FloatArray:
-    """Triangles (T, 3, 3) of an OBJ: faces with more corners become fans; all else is left out."""
+def triangles_from_obj(content: bytes, most: int = TRIANGLES_MAX) -> FloatArray:
+    """Triangles (T, 3, 3) of an OBJ, at most so many: faces with more corners become fans; all else
+    is left out.
+    """
     vertices: list[list[float]] = []
     triangles: list[tuple[int, int, int]] = []
     for number, line in enumerate(content.split(b"\n"), start=1):
@@ -93,8 +96,8 @@ def triangles_from_obj(content: bytes) -> FloatArray:
                 ]
         except ValueError as error:
             raise InvalidValueError(f"line {number} of the OBJ is wrong: {error}") from error
-        if len(triangles) > TRIANGLES_MAX:
-            break
+        if len(triangles) > most:
+            check_triangles(len(triangles), most)
     if not triangles:
         raise InvalidValueError("the OBJ has no faces")
     found: FloatArray = np.array(vertices)[np.array(triangles)]
@@ -166,10 +169,7 @@ class _Resolver:
 
 
 def _checked(triangles: FloatArray) -> FloatArray:
-    if not 4 <= len(triangles) <= TRIANGLES_MAX:
-        raise InvalidValueError(
-            f"the mesh has {len(triangles)} triangles, must have 4 to {TRIANGLES_MAX}"
-        )
+    check_triangles(len(triangles))
     if not np.isfinite(triangles).all():
         raise InvalidValueError("the mesh has corners that are not finite")
     return triangles + 0.0  # no zeros that differ by their sign

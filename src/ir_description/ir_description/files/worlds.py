@@ -23,7 +23,7 @@ from ir_description.files.moveit_scene import SceneObject, scene_objects
 from ir_description.files.solid_mesh import PIECES, SUFFIXES, piece_names, pieces_of, read_solid
 from ir_description.poses import abc_from_rotation, composed, pose_of, rotation_from_abc
 from ir_description.shapes import Body
-from ir_values.arrays import FloatArray
+from ir_values.arrays import FloatArray, number_of
 from ir_values.errors import DescriptionError, InvalidValueError, shown
 from ir_values.extensions import Registry
 from ir_values.files import read_regular_file
@@ -271,8 +271,8 @@ class _Reader:
         if shape.tag == "box":
             size[:] = _row(_value(shape, "size"), 3)
         else:
-            size[0] = float(_value(shape, "radius"))
-            size[1] = 0.0 if shape.tag == "sphere" else float(_value(shape, "length"))
+            size[0] = number_of(_value(shape, "radius"))
+            size[1] = 0.0 if shape.tag == "sphere" else number_of(_value(shape, "length"))
         return [Body(name, shape.tag, pose, size)]  # type: ignore[arg-type]
 
     def _mesh(self, name: str, shape: Xml.Element, pose: FloatArray) -> list[Body]:
@@ -356,7 +356,7 @@ def _value(shape: Xml.Element, key: str) -> str:
 
 
 def _row(text: str, count: int) -> FloatArray:
-    values = np.array([float(word) for word in text.split()])
+    values = np.array([number_of(word) for word in text.split()])
     if values.shape != (count,) or not np.isfinite(values).all():
         raise ValueError(f"{shown(text)} must be {count} numbers")
     return values

@@ -45,6 +45,10 @@ def read_bag(path: Path) -> Trace:
     except sqlite3.Error as error:
         raise RecorderError(f"{path}: can't be read as a bag: {error}") from error
     fit = fitting([data for _, data in rows], JOINT_STATE, _SCHEMA)
+    if not fit:
+        raise RecorderError(
+            f"{path}: none of its {len(rows)} messages is a {JOINT_STATE} in little-endian CDR"
+        )
     columns = Columns([rows[k][1] for k in fit], JOINT_STATE, _SCHEMA)
     groups = joint_groups(columns)
     names = _names(groups, path)

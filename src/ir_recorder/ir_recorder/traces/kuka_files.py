@@ -19,7 +19,7 @@ from ir_recorder.errors import RecorderError
 from ir_recorder.traces.columns import TraceMapping, Wanted
 from ir_recorder.traces.table_files import VALUES_MAX, opened, table_trace
 from ir_recorder.traces.trace import Trace
-from ir_values.arrays import FloatArray
+from ir_values.arrays import FloatArray, number_of
 from ir_values.errors import shown
 
 # RSI: <Rob Type="KUKA"> .. <AIPos A1="0.0" .. /> .. <IPOC>4208163632</IPOC></Rob>, again and again.
@@ -75,7 +75,7 @@ def _packet(text: str, count: int, where: str) -> list[float]:
         if value is None:
             raise RecorderError(f"{where}: this packet of RSI has no {name}")
         try:
-            values.append(float(value))
+            values.append(number_of(value))
         except ValueError:
             values.append(math.nan)
         if not math.isfinite(values[-1]):
@@ -160,7 +160,7 @@ def _values(path: Path, channel: Channel, channels: Sequence[Channel]) -> FloatA
 def _number(channel: Channel, key: str, where: str, default: float = math.nan) -> float:
     text = channel.get(key, "")
     try:
-        value = float(text) if text else default
+        value = number_of(text) if text else default
     except ValueError:
         value = math.nan
     if not math.isfinite(value):

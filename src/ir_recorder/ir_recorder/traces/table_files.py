@@ -22,7 +22,7 @@ from ir_recorder.errors import RecorderError
 from ir_recorder.traces.columns import Column, TraceMapping, Wanted, chosen, multiplied, named
 from ir_recorder.traces.makers import MakersColumns, makers_columns
 from ir_recorder.traces.trace import LOAD, MODE, TIME, Trace
-from ir_values.arrays import BoolArray, FloatArray, IntArray
+from ir_values.arrays import BoolArray, FloatArray, IntArray, number_of
 
 # Files of measurements as a user names them: regular ones of a bounded size.
 
@@ -227,7 +227,7 @@ class _Reader:
 
     def _number(self, text: str, name: str, line: int) -> float:
         try:
-            value = float(text)
+            value = number_of(text)
         except ValueError:
             value = self._unusual(text.strip(), name, line)
         else:
@@ -244,7 +244,7 @@ class _Reader:
             return float("nan")
         try:
             if self._delimiter != "," and text.count(",") == 1:
-                return float(text.replace(",", "."))
+                return number_of(text.replace(",", "."))
             if name == TIME:
                 return datetime.fromisoformat(text).timestamp()
         except ValueError:
@@ -266,7 +266,7 @@ def _is_row(cells: Sequence[str]) -> bool:
     """Whether a first line is no line of headings: every cell is a number."""
     try:
         return len(cells) > 1 and all(
-            math.isfinite(float(each.replace(",", "."))) for each in cells
+            math.isfinite(number_of(each.replace(",", "."))) for each in cells
         )
     except ValueError:
         return False

@@ -20,7 +20,7 @@ from ir_description.files.collada import triangles_from_collada
 from ir_description.files.making.capsule_fit import CapsuleFit
 from ir_description.files.making.urdf_arm import PlacedShape, SideMotion
 from ir_description.files.making.urdf_tree import UrdfShape
-from ir_description.files.mesh import BYTES_MAX, triangles_from_stl
+from ir_description.files.mesh import TRIANGLES_MAX, refuse_surfaces, triangles_from_stl
 from ir_description.files.solid_mesh import triangles_from_obj
 from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError, shown
@@ -31,6 +31,9 @@ SIZE_MAX = 20.0
 """Farthest corner [m] of a mesh from its origin: beyond, its scale is hardly meant."""
 _SWEEP = np.radians(15.0)  # between two postures of a joint that sweeps
 _FOLDERS_MAX = 20_000
+_BYTES_MAX = 120_000_000
+_TRIANGLES_MAX = 2_000_000
+_SLABS = 32  # of a mesh of more than TRIANGLES_MAX triangles
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +68,7 @@ class Meshes:
         if name not in self._known:
             path = self._path(name)
             try:
-                triangles = _read(path)
+                triangles = self._bounded(_read(path), path)
             except InvalidValueError as error:
                 raise InvalidValueError(f"{path}: {error}") from error
             if not len(triangles) or not np.isfinite(triangles).all():
@@ -74,6 +77,17 @@ class Meshes:
                 )
             self._known[name] = triangles
         return self._known[name]
+
+    def _bounded(self, triangles: FloatArray, path: Path) -> FloatArray:
+        """The triangles; hulls that contain them where they are too many for capsules."""
+        if len(triangles) <= TRIANGLES_MAX or not np.isfinite(triangles).all():
+            return triangles
+        slabs = _slabs(triangles)
+        self.notes.append(
+            f"{path.name}: {len(triangles)} triangles are taken as the hulls of {_SLABS} slabs of "
+            "them, which contain it"
+        )
+        return slabs
 
     def _path(self, name: str) -> Path:
         if name.startswith(("package://", "model://")):
@@ -129,14 +143,15 @@ def _is_package(folder: Path, name: str) -> bool:
 
 
 def _read(path: Path) -> FloatArray:
-    content = read_regular_file(path, BYTES_MAX)
+    refuse_surfaces(path)
+    content = read_regular_file(path, _BYTES_MAX)
     suffix = path.suffix.lower()
     if suffix == ".stl":
-        return triangles_from_stl(content)
+        return triangles_from_stl(content, _TRIANGLES_MAX)
     if suffix == ".dae":
         return triangles_from_collada(content)
     if suffix == ".obj":
-        return triangles_from_obj(content)
+        return triangles_from_obj(content, _TRIANGLES_MAX)
     try:
         import trimesh
     except ImportError as error:
@@ -225,6 +240,16 @@ def _swept(triangles: FloatArray, motion: SideMotion) -> FloatArray:
         points = np.concatenate([points, points + (1.0 / np.cos(0.5 * step) - 1.0) * beside])
     poses = [motion.at(value) for value in np.linspace(motion.lower, motion.upper, count)]
     return _hull(np.concatenate([points @ pose[:3, :3].T + pose[:3, 3] for pose in poses]))
+
+
+def _slabs(triangles: FloatArray) -> FloatArray:
+    """Hulls (T, 3, 3) of slabs of triangles across their longest direction; together they contain
+    every triangle.
+    """
+    middles = triangles.mean(axis=1)
+    longest = int(np.argmax(np.ptp(middles, axis=0)))
+    parts = np.array_split(np.argsort(middles[:, longest], kind="stable"), _SLABS)
+    return np.concatenate([_hull(triangles[part].reshape(-1, 3)) for part in parts])
 
 
 def _hull(points: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ import numpy as np
 from ir_description.files.making.transmissions import UrdfTransmission, urdf_transmissions
 from ir_description.files.robot_file import inertia_matrix
 from ir_description.poses import rotation_from_abc
-from ir_values.arrays import FloatArray
+from ir_values.arrays import FloatArray, number_of
 from ir_values.errors import RobotFileError, listed, shown
 
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
@@ -391,7 +391,7 @@ def _number(element: Xml.Element, key: str, what: str, missing: str | None = Non
     if text is None:
         raise _UrdfError(element, f"{what} has no {key}")
     try:
-        value = float(text)
+        value = number_of(text)
     except ValueError:
         value = np.nan
     if not np.isfinite(value):
@@ -404,7 +404,7 @@ def _row(element: Xml.Element, key: str, what: str, missing: str | None = None) 
     if text is None:
         raise _UrdfError(element, f"{what} has no {key}")
     try:
-        values = np.array([float(word) for word in text.split()])
+        values = np.array([number_of(word) for word in text.split()])
     except ValueError:
         values = np.zeros(0)
     if values.shape != (3,) or not np.isfinite(values).all():
