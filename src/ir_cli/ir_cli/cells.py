@@ -81,7 +81,7 @@ def run_check(arguments: argparse.Namespace) -> int:
     cell = _readable(arguments.cell)
     if cell is None:
         return 1
-    from ir_cli.station_access import stations_of
+    from ir_cli.station_access import heavy_loads, stations_of
     from ir_planner.program import unknown_searches  # a planner, only for a cell that can be read
     from ir_planner.search import SEARCHES
 
@@ -90,6 +90,7 @@ def run_check(arguments: argparse.Namespace) -> int:
     findings: list[Finding | Suggestion] = [
         *check_cell(cell),
         *unknown_searches(cell, cell.program, SEARCHES),
+        *heavy_loads(cell),
         *suggestions,
     ]
     if arguments.json:

@@ -11,17 +11,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_cli.output import Columns, Row, number, text
-from ir_description import AllowedContact, Cell, Station
+from ir_description import AllowedContact, Cell, Finding, Station
 from ir_msgs_py.arrays import FloatArray
 from ir_planner.configurations import free_configurations, no_configuration
 from ir_planner.program.steps import Route, Scenes, placed_steps
 from ir_planner.scene import PlanningScene, tcp_inside
 from ir_planner.service import line_poses
+from ir_planner.settings import PlannerSettings
+from ir_planner.timing import need_of
 
 # Situations at a station, and the configurations that reach it.
 
 MARGIN = 0.02  # m, the default of a request
 _SAME = 1e-6  # rad
+_ABOUT = 0.02  # rad about machine home
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +56,35 @@ def visits(cell: Cell) -> Iterator[Visit]:
     for name, situations in found.items():
         once = {id(scene): scene for scene in situations or [start]}
         yield from (Visit(cell.station(name), scene) for scene in once.values())
+
+
+def heavy_loads(cell: Cell) -> Iterator[Finding]:
+    """Loads that need more of a joint's torque, moved slowly about machine home, than the default
+    reserve leaves, or than there is.
+    """
+    scenes = [PlanningScene(cell, cell.loads(), cell.robot.controller)]
+    scenes += [
+        PlanningScene(cell, cell.loads(part.name), cell.robot.controller) for part in cell.parts
+    ]
+    here = np.array(cell.machine_home)
+    reserve = PlannerSettings().torque_reserve
+    for scene in scenes:
+        need = need_of([(here - _ABOUT, here + _ABOUT)], scene)
+        if need >= 1.0:
+            yield Finding(
+                "error",
+                scene.load_text,
+                f"needs {need:.2f} times the torque of a joint to be moved slowly at machine home: "
+                "it must be below 1",
+            )
+        elif need > 1.0 - reserve:
+            yield Finding(
+                "warning",
+                scene.load_text,
+                f"needs {need:.3f} of the torque of a joint to be moved slowly at machine home: "
+                f"{1.0 - need:.3f} is left at most, less than the reserve of {reserve:g} for the "
+                "feedback; such movements leave less and say so",
+            )
 
 
 def reaching(visit: Visit) -> FloatArray:

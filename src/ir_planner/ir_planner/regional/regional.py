@@ -34,7 +34,12 @@ from ir_planner.regional.safeguards import (
 from ir_planner.request import Context, Goal, Journal, within_limits
 from ir_planner.scene import STILL, path_cost
 from ir_planner.search import Ends, fewest_corners, pulled
-from ir_planner.timing import Movement, check_requested
+from ir_planner.timing import (
+    TOO_HEAVY,
+    Movement,
+    check_requested,
+    with_less_reserve,
+)
 
 # What a request for a movement is answered with.
 
@@ -130,6 +135,20 @@ def search_regional(
     """The best movement found, with the status that says so or says why not; start (n,), goals (n,)
     or (G, n).
     """
+    status, found = _search_timed(start, goals, context, searches)
+    if found is None and TOO_HEAVY in status.message:
+        lines = [(np.asarray(start), goal) for goal in np.atleast_2d(goals)]
+        for eased in with_less_reserve(lines, context):
+            status, found = _search_timed(start, goals, eased, searches)
+            if found is not None:
+                break
+    return status, found
+
+
+def _search_timed(
+    start: FloatArray, goals: FloatArray, context: Context, searches: Searches
+) -> tuple[Status, Movement | None]:
+    """The same with the torque that the context's reserve leaves."""
     if context.options.timing == "asynchronous":
         synchronous = context.with_timing("synchronous")
         return with_own_laws(context, lambda: _search(start, goals, synchronous, searches))

@@ -137,6 +137,12 @@ class PlanningScene:
     cell_hash: str = ""
     doors: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
+    def leaving(self, torque_reserve: float) -> "PlanningScene":
+        """The same with another share of the torque for the feedback; what is computed stays."""
+        other = replace(self, drives=replace(self.drives, torque_reserve=torque_reserve))
+        other.__dict__.update({**self.__dict__, "drives": other.drives})
+        return other
+
     @property
     def load_text(self) -> str:
         """What is attached, as people write it."""

@@ -16,7 +16,8 @@ from ir_planner.timing.objective import (
     objective_weights,
     request_cost,
 )
-from ir_planner.timing.ptp import fastest, free_law
+from ir_planner.timing.ptp import TOO_HEAVY, fastest, free_law
+from ir_planner.timing.reserve import need_of, with_less_reserve
 from ir_planner.timing.spline_timing import time_spline
 from ir_planner.timing.straight_steps import distinct, straight_steps
 from ir_planner.timing.time_law import GRID_NS, GRID_S, StepLaws, TimeLaw
@@ -25,6 +26,7 @@ __all__ = [
     "DURATION_SLACK",
     "GRID_NS",
     "GRID_S",
+    "TOO_HEAVY",
     "TORQUE_SHARES",
     "Movement",
     "ObjectiveWeights",
@@ -43,6 +45,7 @@ __all__ = [
     "distinct",
     "fastest",
     "free_law",
+    "need_of",
     "objective_value",
     "objective_weights",
     "request_cost",
@@ -50,5 +53,6 @@ __all__ = [
     "straight_steps",
     "stretched",
     "time_spline",
+    "with_less_reserve",
     "within_torque",
 ]

@@ -30,6 +30,7 @@ from ir_values.arrays import BoolArray, FloatArray, IntArray
 _SPEEDS = np.array([1.0, 0.93, 0.86, 0.78, 0.7, 0.6, 0.5, 0.4, 0.28, 0.15])
 _REFINED = np.array([-0.045, -0.03, -0.015, 0.0, 0.015, 0.03, 0.045])
 _HALVINGS = 7
+TOO_HEAVY = "the load is too heavy for this movement"
 _PER_PHASE = 7
 
 
@@ -101,10 +102,14 @@ def fastest_law(
     if best is None:
         best = _best_law(start, delta, slower, (a, j), limits.torque_share, dynamics)
     if best is None:
-        joint = int(np.argmax(use[0].max(axis=0)))
+        one = np.ones(1)
+        slow = phase_steps(_limits(slower[-1:], 0.01 * a * one, 0.01 * a * one, j))
+        need = _torque_of_laws(dynamics, start, delta, slow).max(axis=(0, 1))
+        joint = int(np.argmax(need))
+        kept = f", {limits.torque_reserve:g} is its reserve" if limits.torque_reserve > 0.0 else ""
         raise TimingError(
-            f"joint {joint + 1} needs {use[0, :, joint].max():.2f} times its torque at full "
-            "speed and too much at 1/256 of it as well: the load is too heavy for this movement",
+            f"joint {joint + 1} needs {need[joint]:.3f} of its torque at 1/256 of full speed, at "
+            f"most {limits.torque_share:.3f} may be used{kept}: {TOO_HEAVY}",
             joint,
         )
     return _refined(best, start, delta, (a, j), limits.torque_share, dynamics)

@@ -31,6 +31,7 @@ from ir_planner.timing import (
     fastest,
     straight_steps,
     time_spline,
+    with_less_reserve,
     within_torque,
 )
 
@@ -69,7 +70,7 @@ def plan_through(
             blocked, context.journal.info(start, context.joint_names), TrajectoryReport()
         )
     try:
-        movement = _followed(reference, context)
+        movement = _with_what_torque_there_is(reference, context)
     except TimingError as error:
         status = Status(StatusCode.INVALID_MOTION_PLAN, str(error))
         return MovementPlan(
@@ -81,6 +82,22 @@ def plan_through(
     if not status.ok:
         return MovementPlan(status, info, movement.report)
     return MovementPlan(status, info, movement.report, movement.trajectory, reference.points)
+
+
+def _with_what_torque_there_is(reference: Reference, context: Context) -> Movement:
+    """The movement with the torque reserve that is asked for, or as much of it as the load leaves.
+    Raises TimingError.
+    """
+    try:
+        return _followed(reference, context)
+    except TimingError as error:
+        reason = error
+    for eased in with_less_reserve(itertools.pairwise(reference.points), context):
+        try:
+            return _followed(reference, eased)
+        except TimingError as error:
+            reason = error
+    raise reason
 
 
 def _within(reference: Reference, scene: PlanningScene) -> Reference:
