@@ -103,7 +103,7 @@ REFUSED = {
         asked(
             LINE, start=JointState(name=[f"joint_a{k}" for k in range(1, 7)], position=[7.0] * 6)
         ),
-        "joint_a2 of start is 401.07 deg: it must be in [-140, -5] deg",
+        "start: joint_a1 is 401.07 deg: it must be in [-185, 185] deg",
     ),
     "corner": (asked(*TWO), "at 0.300 m the path has a corner of 90.0 deg"),
     "turning corner": (asked(*TWO, orientation="tangent", speed_tolerance=1.0), "can't follow it"),
