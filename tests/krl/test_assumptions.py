@@ -158,6 +158,21 @@ ASSUMED = {
         Effect.PLACES,
     ),
     "a palletising robot": ("$PAL_MODE=TRUE", "$PAL_MODE isn't modelled", Effect.PLACES),
+    "a flag that follows an expression": (
+        "$CYCFLAG[2]=$IN[1] AND $IN[2]\nIF $CYCFLAG[2] THEN\nENDIF",
+        "$CYCFLAG[2] is taken as it was when it was set, not evaluated anew",
+        Effect.MOTIONS,
+    ),
+    "a timer": (
+        "$TIMER[2]=0\n$TIMER_STOP[2]=FALSE\nIF $TIMER[2]>=5000 THEN\nENDIF",
+        "$TIMER[2] stands still: no time passes for a timer",
+        Effect.MOTIONS,
+    ),
+    "a timer that ends a loop": (
+        "$TIMER[2]=0\nLOOP\nIF ($TIMER[2]>=5000) OR $IN[4] THEN\nEXIT\nENDIF\nENDLOOP",
+        "$TIMER[2] stands still: no time passes for a timer",
+        Effect.MOTIONS,
+    ),
     "a halt": ("HALT", "HALT waits for the operator: taken as no pause", Effect.TIMES),
 }
 
@@ -475,3 +490,26 @@ def test_a_loop_is_followed_once_at_least(
     words = ["krl", "import", str(tmp_path / "p.src"), "--cell", "open", "--loop-passes", "0"]
     assert main(words) == 2
     assert "--loop-passes 0: a loop is followed once at least" in capsys.readouterr().err
+
+
+BESIDE = {  # lines of the program: A1 of its motions, whether the submit program is named
+    "IF ready THEN\nPTP {A1 10}\nENDIF\nPTP {A1 20}": ([20], True),
+    "ready=TRUE\nIF ready THEN\nPTP {A1 10}\nENDIF": ([10], False),
+    "LOOP\nIF ready THEN\nEXIT\nENDIF\nPTP {A1 5}\nENDLOOP\nPTP {A1 20}": ([5, 20], True),
+    "DECL BOOL ready\nready=TRUE\nIF ready THEN\nPTP {A1 10}\nENDIF": ([10], False),
+    "PTP {A1 count}": ([7], False),
+}
+
+
+@pytest.mark.parametrize("lines", BESIDE)
+def test_what_the_submit_program_sets_is_assumed(lines: str) -> None:
+    sources = [
+        parse(f"DEF P( )\n{lines}\nEND\n", "p.src"),
+        parse("DEFDAT $CONFIG\nDECL BOOL ready=FALSE\nDECL INT count=7\nENDDAT\n", "$config.dat"),
+        parse("DEF SPS( )\nLOOP\nready=$IN[7]\n$OUT[1]=TRUE\nENDLOOP\nEND\n", "sps.sub"),
+    ]
+    program = follow(sources, np.zeros(6), np.eye(4))
+    moves, named = BESIDE[lines]
+    assert angles(program) == moves
+    said = "READY is set by sps.sub: taken as it is at the start"
+    assert (said in texts(program)) is named

@@ -9,7 +9,7 @@ from typing import Any
 
 from ir_krl.errors import KrlRunError, Place
 from ir_krl.language import Tree, place_of
-from ir_krl.run.memory import SINGLE, Memory, Signals, Step
+from ir_krl.run.memory import SINGLE, TIMER, Memory, Signals, Step
 from ir_krl.run.system import STOPS_ADVANCE
 from ir_krl.run.values import (
     FRAME_NAMES,
@@ -103,6 +103,8 @@ class Expressions:
             return self.signals.read(name, index[0], place)
         if name in STOPS_ADVANCE:
             self.signals.stops(place, name)
+        if name == TIMER and index is not None:
+            self.signals.stands_still(index[0], place)
         return self.memory.get(path, place)
 
     def _call(self, tree: Tree, place: Place) -> Value:

@@ -100,6 +100,11 @@ class Memory:
         """Whether a variable of this name has a value."""
         return not isinstance(self._home(name).get(name, Unknown(name)), Unknown)
 
+    def valued(self, name: str) -> bool:
+        """Whether data lists give a variable of this name a value."""
+        homes = (self.shared, *self.modules.values())
+        return any(not isinstance(one.get(name, Unknown(name)), Unknown) for one in homes)
+
     def declared(self, name: str) -> bool:
         """Whether a variable of this name is declared where statements run, with or without a
         value.
@@ -305,7 +310,8 @@ INPUT = "$IN"
 OUTPUT = "$OUT"
 TIMER = "$TIMER"
 TIMER_FLAG = "$TIMER_FLAG"
-SINGLE = frozenset((INPUT, OUTPUT, TIMER_FLAG, "$FLAG", "$CYCFLAG"))
+CYCLIC = "$CYCFLAG"
+SINGLE = frozenset((INPUT, OUTPUT, TIMER_FLAG, "$FLAG", CYCLIC))
 """What is TRUE or FALSE by its number."""
 SIGNALS = 8192
 """A KR C4 has $OUT[1] to $OUT[8192], and as many inputs."""
@@ -348,9 +354,7 @@ class Signals:
         if name == INPUT:
             return self._input(index, place)
         if name == TIMER_FLAG:
-            self.memory.guesses += 1
-            text = f"$TIMER[{index}] stands still: no time passes for a timer"
-            self.noted(place, text, Effect.MOTIONS)
+            self.stands_still(index, place)
             return number(self._held(TIMER, index) or 0, f"$TIMER[{index}]", place) > 0.0
         held = self._held(name, index)
         if held is None:
@@ -359,7 +363,17 @@ class Signals:
             return False
         if not isinstance(held, bool):
             raise KrlRunError(f"{name}[{index}] isn't TRUE or FALSE", place)
+        if name == CYCLIC:
+            self.memory.guesses += 1
+            text = f"{name}[{index}] is taken as it was when it was set, not evaluated anew"
+            self.noted(place, text, Effect.MOTIONS)
         return held
+
+    def stands_still(self, index: int, place: Place) -> None:
+        """A timer is read: its time doesn't pass."""
+        self.memory.guesses += 1
+        text = f"$TIMER[{index}] stands still: no time passes for a timer"
+        self.noted(place, text, Effect.MOTIONS)
 
     def _input(self, index: int, place: Place) -> bool:
         if index in self.inputs:

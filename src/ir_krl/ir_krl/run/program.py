@@ -17,7 +17,7 @@ from ir_krl.run.memory import Memory, SignalRange, Signals
 from ir_krl.run.motions import Motions, Moving
 from ir_krl.run.notes import Effect, Note, worst_first
 from ir_krl.run.standing import AXES_NOW, PLACE_NOW, Kinematics, Standing
-from ir_krl.run.system import assumed_variables, system_variables
+from ir_krl.run.system import Assumption, assumed_variables, system_variables
 from ir_krl.run.values import Array, Unknown, Value, copied, typed
 from ir_msgs_py.arrays import FloatArray
 
@@ -69,6 +69,8 @@ class Routines:
 
 GLOBAL = "GLOBAL"
 CONFIGURATION = "$CONFIG"
+BACKGROUND = ".sub"
+"""Files of programs that the submit interpreter runs beside the robot's."""
 NESTED = "brackets, signs or blocks are nested too deeply"
 _UNMODELLED = {
     "analog": "an analog signal",
@@ -141,6 +143,7 @@ def follow(
         for source in sources:
             for body in source.data:
                 run.data(body, source.file, lenient=module_of(source.file) != module_of(first.file))
+        run.background([one for one in sources if one.file.lower().endswith(BACKGROUND)])
         for source in settings:
             for body in source.data:
                 run.settings(body, source.file)
@@ -166,6 +169,14 @@ def _structures(body: Tree) -> dict[str, dict[str, str]]:
             kind = str(own[0]) if own else kind
             found.setdefault(str(name), {})[str(component)] = kind
     return found
+
+
+def _assigned(tree: Tree) -> set[str]:
+    """Names of the variables that a body sets, those of the system apart."""
+    if tree.data == "assignment":
+        name = str(tree.children[0].children[0])
+        return set() if name.startswith("$") else {name}
+    return {name for one in tree.children if isinstance(one, Tree) for name in _assigned(one)}
 
 
 class _Run(Moving):
@@ -218,6 +229,14 @@ class _Run(Moving):
                 self._statement(statement)
             self._at(file)
             self._statement(statement)
+
+    def background(self, sources: Sequence[Source]) -> None:
+        """What programs beside this one set is known as it stands at the start, and assumed."""
+        for source in sources:
+            for name in {name for one in source.routines for name in _assigned(one.body)}:
+                text = f"{name} is set by {source.file}: taken as it is at the start"
+                if self.memory.valued(name):
+                    self.memory.assumed.setdefault(name, Assumption(text, Effect.MOTIONS))
 
     def _stopped(self, place: Place, name: str) -> None:
         """What stops the advance run is read: where the robot stands is known then."""
