@@ -39,7 +39,7 @@ class Shot:
 
 SHOTS = (
     Shot("report.png", (1400, 1730)),
-    Shot("report_axes.png", (1400, 1500), at="#over-time"),
+    Shot("report_axes.png", (1400, 1500), at="#axes"),
     Shot("report_tablet.png", (768, 1024), at="#motion", dark=True),
     Shot("report_phone.png", (390, 844), touch=True),
     Shot("report_methods.png", (1400, 640), at="#methods"),
@@ -90,7 +90,10 @@ def _draw(browser: Browser, file: Path | str, shot: Shot, folder: Path) -> list[
     if shot.media == "print":
         page.call("Emulation.setEmulatedMedia", media="print")
         page.run("dispatchEvent(new Event('beforeprint'))")
-    page.run(f"document.querySelector('{shot.at}').scrollIntoView({{behavior: 'instant'}})")
+    place = f"document.querySelector('{shot.at}')"
+    page.run(f"{place}.open = true")  # where it is folded away
+    page.frame()
+    page.run(f"{place}.scrollIntoView({{behavior: 'instant'}})")
     page.picture(folder / shot.name, whole=False)
     wrong = [*page.faults, *(page.requests if isinstance(file, Path) else ())]
     page.close()

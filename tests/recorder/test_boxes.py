@@ -156,3 +156,36 @@ def test_the_judge_sees_faults(browser: Any, tmp_path: Path) -> None:
     for words in ("the page scrolls", "beyond the page", "scrolls sideways by", "one on the other"):
         assert words in found
     assert "two elements are called a" in found
+
+
+PLACED = """(() => {
+    const timeline = new Timeline(2021, [[33, 213], [214, 218.5], [219, 2019]]), faults = [];
+    let last = -1;
+    for (const [from, to] of [[0, 2021], [20, 250], [1000, 1500], [33, 213]]) {
+        timeline.zoom(from, to);
+        last = -1;
+        for (let k = 0; k <= 500; k++) {
+            const time = from + (to - from) * k / 500, place = timeline.place(time);
+            const back = timeline.at(place);
+            if (place <= last || place > 1 + 1e-9) faults.push(['order', time, place]);
+            if (Math.abs(back - time) > 1e-6) faults.push(['back', time, back]);
+            last = place;
+        }
+    }
+    timeline.zoom(0, 2021);
+    return [faults, timeline.breaks().long.length, timeline.place(219) - timeline.place(0)];
+})()"""
+
+
+def test_a_time_axis_with_rests_is_in_order_and_can_be_read_back(
+    browser: Any, analysis: Analysis, tmp_path: Path
+) -> None:
+    """Two of three rests of a cycle are shown short; what moves has most of the axis."""
+    path = tmp_path / "page.html"
+    path.write_text(before_and_after(analysis), encoding="utf-8")
+    page = browser.open(path, 1400, 900)
+    faults, broken, moving = page.run(PLACED)
+    page.close()
+    assert faults == []
+    assert broken == 2
+    assert moving > 0.7

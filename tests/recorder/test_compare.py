@@ -186,3 +186,21 @@ def test_the_run_stands_beside_the_common_program(analysis: Analysis) -> None:
     for words in ("this run", "common program", "planned in its time"):
         assert words in section
     assert front_section(replace(analysis, recording=replace(analysis.recording, savings=()))) == ""
+
+
+@given(
+    st.floats(1.0, 1e5),
+    st.floats(1e-3, 1e4),
+    st.floats(10.0, 1e7),
+    st.floats(1e-3, 1e6),
+)
+def test_no_two_ticks_of_an_axis_read_alike(
+    seconds: float, longer: float, energy: float, more: float
+) -> None:
+    """Once 33.6, 33.6, 33.6, 33.7, 33.7 min."""
+    points = [Point("a", seconds, energy + more, "x"), Point("b", seconds + longer, energy, "x")]
+    drawn = front_chart(points)
+    for anchor in ("middle", "end"):
+        ticks = re.findall(rf'text-anchor="{anchor}">(-?[\d .]+ (?:s|min|J|kJ))</text>', drawn)
+        assert len(ticks) >= 2
+        assert len(set(ticks)) == len(ticks)

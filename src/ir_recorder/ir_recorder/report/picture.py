@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from io import BytesIO
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,6 +38,8 @@ TRANSITION = "#c3ccd6"
 PICTURE_START = b"\x89PNG\r\n\x1a\n"
 MOST_POINTS = 4000  # more than twice the picture's pixels
 
+_LINE = 150  # characters of a line below the drawings: wider ones are cut
+
 
 def write_picture(analysis: Analysis, path: str | Path, roots: FileRoots = ANYWHERE) -> Path:
     """Power with the modes marked, joules per movement, and the tool's path from above, as PNG
@@ -55,7 +58,8 @@ def write_picture(analysis: Analysis, path: str | Path, roots: FileRoots = ANYWH
     _joules(figure.add_subplot(grid[1, 0]), analysis)
     _path(figure.add_subplot(grid[1, 1]), analysis)
     if saved := savings_lines(analysis):
-        figure.supxlabel("\n".join(saved), fontsize=8.5, color="#39434f", ha="left", x=0.02)
+        lines = [line for sentence in saved for line in wrap(sentence, _LINE)]
+        figure.supxlabel("\n".join(lines), fontsize=8.5, color="#39434f", ha="left", x=0.02)
     picture = BytesIO()
     figure.savefig(picture, format="png")
     return write_output(path, picture.getvalue(), PICTURE_START, roots)
