@@ -66,7 +66,7 @@ def test_headings_of_makers(
     trace = read(path)
     check(trace, 0.004)
     (note,) = trace.problems
-    assert "are taken as joint_a1 .. joint_a6" in note
+    assert "are taken as positions of joint_a1 .. joint_a6" in note
 
 
 def test_plain_names_are_degrees_only_where_that_is_proved(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from ir_values.errors import FileRefusedError, one_line
 from ir_values.files import ANYWHERE, FileRoots
 
 _OVERHEAD = 120  # bytes of memory that a message takes beside its own
+_READ = ("ir_msgs/", "sensor_msgs/")  # packages of the types that are read
 _DEFINITIONS = "SELECT topic_type, encoded_message_definition FROM message_definitions"
 
 
@@ -26,7 +27,7 @@ def read_bag_file(
     """Everything readable in a bag; ReadError when there is nothing, or it isn't one.
 
     Definitions are those in the bag (ROS 2 Iron and later) or, where it has none, of the installed
-    packages; a topic whose type is nowhere defined is named in `problems` and left out.
+    packages. A topic that could be read but whose type is nowhere defined is named in `problems`.
     """
     try:
         roots.open_to_read(path).close()
@@ -36,7 +37,7 @@ def read_bag_file(
         raise ReadError(f"{path} can't be read: {error.strerror}") from error
     reader = _Reader(path, ChunkReader(limits or ReadLimits()))
     try:
-        source = f"{path.resolve().as_uri()}?mode=ro&immutable=1"
+        source = f"{path.resolve().as_uri()}?mode=ro"
         with closing(sqlite3.connect(source, uri=True)) as bag:
             channels = tuple(in_order(channel) for channel in reader.channels(bag))
     except sqlite3.Error as error:
@@ -79,7 +80,8 @@ class _Reader:
         try:
             return self._library.schema(kind).text
         except SchemaError as error:
-            self.problems.append(f"{topic} is left out: {error}")
+            if kind.startswith(_READ):
+                self.problems.append(f"{topic} is left out: {error}")
             return ""
 
     def _messages(

@@ -54,7 +54,17 @@ _FAMILIES = (
     ),
     *(
         _Family(name, first, "", "")
-        for name in ("a{}", "j{}", "joint{}", "joint_{}", "joint {}", "axis{}", "axis_{}", "q{}")
+        for name in (
+            "a{}",
+            "j{}",
+            "joint{}",
+            "joint_{}",
+            "joint {}",
+            "axis{}",
+            "axis_{}",
+            "q{}",
+            "q_{}",
+        )
         for first in (1, 0)
     ),
 )
@@ -136,7 +146,7 @@ def _columns(
     for name, heading, unit in zip(joint_names, own, units, strict=True):
         columns[name] = Column(heading, FACTORS[unit.lower()] if unit else 1.0)
     columns.update(_further(family, joint_names, places))
-    said = f"{own[0]} .. {own[-1]} are taken as {joint_names[0]} .. {joint_names[-1]}"
+    said = f"{own[0]} .. {own[-1]} are taken as positions of {joint_names[0]} .. {joint_names[-1]}"
     if family.of and not unit_of(own[0]):
         said += f", in {family.unit} as {family.of} gives them"
     return MakersColumns(
