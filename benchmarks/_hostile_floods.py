@@ -1,6 +1,6 @@
 """Presses of the emergency stop while the driver's node is flooded: how late, how many lost.
 
-    python benchmarks/_hostile_floods.py levels | goals     # one flood, until it is ended
+    python benchmarks/_hostile_floods.py levels     # one flood, until it is ended
 
 A press by topic is timed until `~/stop_number` says so, one by service or Modbus until it is
 answered.
@@ -14,26 +14,29 @@ import socket
 import subprocess
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import numpy as np
 from _hostile_node import PRESS, RELEASE, Prey, prey
 from rclpy.qos import QoSProfile
 from std_msgs.msg import UInt64
-from trajectory_msgs.msg import JointTrajectoryPoint
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import PlcInputs
-from ir_msgs.srv import SetPlcInput
+from ir_msgs.srv import QueryModes, SetPlcInput
 from ir_msgs_py import names
 from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.ros.client import Client
+from ir_msgs_py.ros.topics import SERVICE
 
 LOST = 20.0  # s after which a press counts as lost
 POINTS = 20_000
-FLOODS = ("none", "levels", "goals")
+FLOODS = ("none", "levels", "requests", "trajectories", "goals")
+AT_ONCE = 500  # requests of a flood under way
 SETTLE = 10.0  # s after a flood in which memory has to return
 _RELEASED = PlcInputs(move_enable=True)
 _PRESSED = PlcInputs(move_enable=True, emergency_stop=True)
@@ -44,18 +47,60 @@ Way = Callable[[bool], None]
 def flood(kind: str) -> None:
     """Send as fast as it goes, until the process is ended."""
     with Client(timeout=60.0) as client:
-        if kind == "levels":
-            publisher = _publisher(client)
-            while True:
-                publisher.publish(_RELEASED)
-        goal = ExecuteTrajectory.Goal()
-        goal.trajectory.joint_names = list(names.JOINT_NAMES)
-        goal.trajectory.points = [_point(k) for k in range(POINTS)]
+        send = {
+            "levels": _levels,
+            "requests": _requests,
+            "trajectories": _trajectories,
+            "goals": _goals,
+        }[kind](client)
         while True:
-            try:
-                client.send_goal(names.EXECUTE_TRAJECTORY, goal, None, 60.0)
-            except MsgsError:  # what a flood gets
-                time.sleep(0.0)
+            send()
+
+
+def _levels(client: Client) -> Callable[[], None]:
+    """Of the PLC's topic, none of them a press."""
+    publisher = _publisher(client)
+    return lambda: publisher.publish(_RELEASED)
+
+
+def _requests(client: Client) -> Callable[[], None]:
+    """Of a service, whose answers are not waited for."""
+    node = client.node
+    run = client._executor.run
+    service = run(lambda: node.create_client(QueryModes, names.QUERY_MODES, qos_profile=SERVICE))
+    client._executor.wait_until(service.service_is_ready, 60.0)
+    request = QueryModes.Request()
+    under_way: deque[Any] = deque()
+
+    def send() -> None:
+        under_way.append(service.call_async(request))
+        if len(under_way) > AT_ONCE:
+            service.remove_pending_request(under_way.popleft())
+
+    return send
+
+
+def _trajectories(client: Client) -> Callable[[], None]:
+    """Long ones by topic."""
+    publisher = _publisher(client, JointTrajectory, names.COMMANDED_TRAJECTORY)
+    message = _long()
+    return lambda: publisher.publish(message)
+
+
+def _goals(client: Client) -> Callable[[], None]:
+    """Long ones, each answered before the next."""
+    goal = ExecuteTrajectory.Goal(trajectory=_long())
+
+    def send() -> None:
+        with suppress(MsgsError):  # what a flood gets
+            client.send_goal(names.EXECUTE_TRAJECTORY, goal, None, 60.0)
+
+    return send
+
+
+def _long() -> JointTrajectory:
+    points = [_point(k) for k in range(POINTS)]
+    return JointTrajectory(joint_names=list(names.JOINT_NAMES), points=points)
 
 
 def _point(k: int) -> Any:
@@ -64,10 +109,10 @@ def _point(k: int) -> Any:
     return point
 
 
-def _publisher(client: Client) -> Any:
+def _publisher(client: Client, kind: Any = PlcInputs, topic: str = names.PLC_INPUTS) -> Any:
     executor = client._executor
     quality = QoSProfile(depth=1000)
-    made = executor.run(lambda: client.node.create_publisher(PlcInputs, names.PLC_INPUTS, quality))
+    made = executor.run(lambda: client.node.create_publisher(kind, topic, quality))
     executor.wait_until(lambda: made.get_subscription_count() > 0, 60.0)
     return made
 
@@ -96,11 +141,15 @@ def floods(presses: int, processes: int = 2) -> Iterator[dict[str, Any]]:
         driver.client.subscribe(
             names.STOP_NUMBER, UInt64, lambda msg: numbers.append((time.monotonic(), msg.data))
         )
+        pressed: list[bool] = []
+        driver.client.subscribe(
+            names.PLC_INPUTS_IN_FORCE, PlcInputs, lambda msg: pressed.append(msg.emergency_stop)
+        )
         for kind in FLOODS:
             before = driver.has()["rss_mb"]
             with flooded(kind, processes):
                 for way, press in _ways(driver):
-                    late, lost = _timed(press, numbers, presses, answered=way != "topic")
+                    late, lost = _timed(press, numbers, pressed, presses, way != "topic")
                     yield _row(kind, way, late, lost)
             time.sleep(SETTLE)
             after = driver.has()["rss_mb"]
@@ -118,12 +167,12 @@ def _ways(driver: Prey) -> Iterator[tuple[str, Way]]:
     """How the button is pressed and let go."""
     publisher = _publisher(driver.client)
 
-    def by_service(level: bool) -> None:
-        request = SetPlcInput.Request(name="emergency_stop", value=level)
+    def by_service() -> None:
+        request = SetPlcInput.Request(name="emergency_stop", value=True)
         driver.client.call(names.SET_PLC_INPUT, request)
 
     yield "topic", lambda level: publisher.publish(_PRESSED if level else _RELEASED)
-    yield "service", by_service
+    yield "service", lambda level: by_service() if level else publisher.publish(_RELEASED)
     # opened now: the driver cuts a client that says nothing for a minute
     with socket.create_connection(("127.0.0.1", driver.port), timeout=60.0) as modbus:
 
@@ -135,13 +184,18 @@ def _ways(driver: Prey) -> Iterator[tuple[str, Way]]:
 
 
 def _timed(
-    press: Way, numbers: list[tuple[float, int]], count: int, answered: bool
+    press: Way,
+    numbers: list[tuple[float, int]],
+    pressed: list[bool],
+    count: int,
+    answered: bool,
 ) -> tuple[list[float], int]:
-    """Seconds until each press counts, and how many never did."""
+    """Seconds until each press counts, and how many never did; each button is let go before."""
     late: list[float] = []
     lost = 0
     for _ in range(count):
         known = numbers[-1][1] if numbers else 0
+        del pressed[:]
         began = time.monotonic()
         press(True)
         done = time.monotonic()
@@ -152,6 +206,9 @@ def _timed(
         else:
             late.append((done if answered else numbers[-1][0]) - began)
         press(False)
+        let_go = time.monotonic()
+        while pressed[-1:] != [False] and time.monotonic() - let_go < LOST:
+            time.sleep(0.005)
         time.sleep(0.05)
     return late or [LOST], lost
 

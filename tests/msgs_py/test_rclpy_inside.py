@@ -20,7 +20,7 @@ from std_msgs.msg import Int32
 
 from ir_msgs.action import RunProgram
 from ir_msgs.srv import SetPlcInput
-from ir_msgs_py.ros import rclpy_inside
+from ir_msgs_py.ros import rclpy_inside, serving
 from ir_msgs_py.ros.serving import BoundedService, RecordedActionServer
 from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.ros.topics import CommandTopic, LatestMessage, PolledTopic
@@ -168,6 +168,7 @@ def test_a_client_of_a_service_that_has_gone_ends_no_executor(
         found_nobody.append(response)
         gone()
 
+    monkeypatch.setattr(serving, "aside_sender", lambda service: service.send_response)
     server = Server(ros_context)
     try:
         monkeypatch.setattr(_rclpy.Service, "service_send_response", send)
@@ -184,6 +185,32 @@ def test_a_client_of_a_service_that_has_gone_ends_no_executor(
         ask(ros_executor, ros_node, wait_for, ListParameters, "list_parameters")
     finally:
         server.close()
+
+
+def test_a_response_that_is_sent_aside_arrives_and_what_can_t_be_sent_is_raised(
+    ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any
+) -> None:
+    server = Server(ros_context)
+    try:
+        plain = server.executor.run(
+            lambda: server.node.create_service(SetPlcInput, "~/raw", answer)
+        )
+        sent: list[Any] = []
+        send = rclpy_inside.aside_sender(plain)
+        assert send != plain.send_response  # this rclpy has what it takes
+
+        def note(response: Any, header: Any) -> None:
+            sent.append((response, header))
+            send(response, header)
+
+        plain.send_response = note
+        assert ask(ros_executor, ros_node, wait_for, name="raw").status.code == StatusCode.SUCCESS
+    finally:
+        server.close()
+    with pytest.raises(rclpy_inside.UNSENT):
+        send(*sent[0])
+    with pytest.raises(TypeError):
+        send(ListParameters.Response(), sent[0][1])
 
 
 def test_a_warning_of_the_c_code_stays_one_under_a_filter_that_raises() -> None:

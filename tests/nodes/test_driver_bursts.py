@@ -26,7 +26,7 @@ from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.ros.topics import ACTION_SERVICES, REQUESTS_WAITING, SERVICE
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.node import SimDriver
-from ir_sim_driver.node.command_topics import PlcTopic
+from ir_sim_driver.node.presses import PlcTopic
 from ir_sim_driver.node.trajectory_actions import Executions
 
 PRESSED = PlcInputs(emergency_stop=True, move_enable=True)
@@ -58,9 +58,10 @@ class Heard:
         self.written: list[Any] = []
         self.pressed: list[Any] = []
         self.said: list[str] = []
+        self.stop_number = 0
 
-    def write_all_inputs(self, _writer: str, *levels: Any) -> None:
-        self.written.append(levels)
+    def write_heard(self, _writer: str, written: Any) -> None:
+        self.written.append([each.inputs for each in written])
 
     def write_inputs(self, _writer: str, levels: Any) -> None:
         self.pressed.append(levels)
@@ -74,7 +75,8 @@ def test_a_press_does_not_come_behind_old_levels_nor_with_a_mode_that_is_none(
     server = BackgroundExecutor(ros_context)
     try:
         node = server.add_node(rclpy.create_node("busy", context=ros_context))
-        topic = server.run(lambda: PlcTopic(node, driver))  # type: ignore[arg-type]
+        alone = SimpleNamespace(apart=False)
+        topic = server.run(lambda: PlcTopic(node, driver, alone))  # type: ignore[arg-type]
         publisher = ros_executor.run(
             lambda: ros_node.create_publisher(
                 PlcInputs, "/ir_sim_driver/plc_inputs", QoSProfile(depth=1000)

@@ -26,7 +26,7 @@ from rclpy.parameter import Parameter
 from ir_cli.ros.processes import NodeProcesses, cell_nodes
 from ir_msgs.msg import Status
 from ir_msgs_py.errors import CallTimedOutError
-from ir_msgs_py.names import NODES
+from ir_msgs_py.names import NODES, hidden_node
 from ir_msgs_py.ros import client as client_module
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.messages import interface_type
@@ -34,6 +34,7 @@ from ir_program_runner.node import ProgramRunnerNode
 from ir_recorder.node.recorder import RecorderNode
 from ir_sim_driver.node import SimDriver
 
+REQUESTS = hidden_node("ir_sim_driver", "requests")
 DRIVER = {"backend": "ideal", "wake_port": 0}
 # of each service and action; of all
 SAMPLED = 2
@@ -43,7 +44,13 @@ RUNS = 0.5  # s; a goal that makes sense after all is canceled then
 ENOUGH = 5  # that went wrong: each may have taken a minute
 SENTENCE_MAX = 4000  # characters: what fits a screen
 GROWN_MB = 25.0
-OFFERED = {"ir_planner": 20, "ir_sim_driver": 13, "ir_program_runner": 7, "ir_recorder": 8}
+OFFERED = {
+    "ir_planner": 20,
+    "ir_sim_driver": 12,
+    REQUESTS: 1,
+    "ir_program_runner": 7,
+    "ir_recorder": 8,
+}
 """Services and actions of each node, parameters included; one that is added may be entered here."""
 
 
@@ -84,7 +91,7 @@ class Attack:
             return all(len(offers_of(client, node)) >= count for node, count in OFFERED.items())
 
         wait_for(all_offered, what="all services and actions are offered")
-        self.offers = [offer for node in NODES for offer in offers_of(client, node)]
+        self.offers = [offer for node in (*NODES, REQUESTS) for offer in offers_of(client, node)]
         self.cases = [
             (offer, case) for offer in self.offers for case in fields.cases_of(_part(offer))
         ]

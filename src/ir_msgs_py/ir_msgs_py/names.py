@@ -125,6 +125,14 @@ def owns_diagnostic(namespace: str, name: str) -> bool:
     return _parent(f"/{name.partition(':')[0]}") == _bare(namespace)
 
 
+def hidden_node(name: str, what: str) -> str:
+    """Name in the graph of a second node that the node `name` has, for `what`.
+
+    Tools hide names that begin with an underscore.
+    """
+    return f"_{name}_{what}"
+
+
 def owns_node(namespace: str, fully_qualified: str) -> bool:
     """Whether a node ("/cell_1/ir_planner") is right in the namespace."""
     return _parent(fully_qualified) == _bare(namespace)

@@ -144,6 +144,42 @@ def take_request(service: Any) -> tuple[Any, Any] | None:
     return None if taken is None or taken[1] is None else taken
 
 
+def can_poll() -> bool:
+    """Whether `take_bytes` and `take_request` work with what this rclpy makes."""
+    subscriptions = part(part(_rclpy, "Subscription"), "take_message")
+    return None not in (subscriptions, part(part(_rclpy, "Service"), "service_take_request"))
+
+
+_FILTER_BYTES = (
+    256  # more than rcl_subscription_content_filter_options_t has; all 0 is its beginning
+)
+
+
+def keep_only(subscription: Any, expression: str) -> bool:
+    """Let the subscription hear only messages for which this SQL expression of DDS holds: their
+    publishers leave out the others. False where rclpy or the middleware can't, and all are heard.
+    """
+    pointer = part(part(subscription, "handle"), "pointer")
+    if pointer is None:
+        return False
+    try:
+        rcl = ctypes.CDLL("librcl.so")
+        begin = rcl.rcl_subscription_content_filter_options_init
+        use = rcl.rcl_subscription_set_content_filter
+        end = rcl.rcl_subscription_content_filter_options_fini
+    except (OSError, AttributeError):
+        return False
+    handle = ctypes.c_void_p(pointer)
+    options = ctypes.create_string_buffer(_FILTER_BYTES)
+    words = expression.encode()
+    if begin(handle, words, ctypes.c_size_t(0), None, options) != 0:
+        return False
+    try:
+        return bool(use(handle, options) == 0)
+    finally:
+        end(handle, options)
+
+
 _PARTICIPANT = 12  # bytes of an endpoint's identity that all endpoints of a participant share
 _VALUE = 2 * ctypes.sizeof(ctypes.c_void_p)  # where an object of pybind11 points to what it wraps
 
@@ -177,6 +213,72 @@ def forget_request(goal: Any) -> None:
     """
     if part(goal, "_goal_request") is not None:
         goal._goal_request = type(goal.request)()
+
+
+_TIMEOUT = 2  # RCL_RET_TIMEOUT: the client was not discovered in time
+_INFO = 16  # bytes of the times in front of a request's identity in rmw_service_info_t
+_Create = ctypes.PYFUNCTYPE(ctypes.c_void_p)
+_Fill = ctypes.PYFUNCTYPE(ctypes.c_bool, ctypes.py_object, ctypes.c_void_p)
+_Destroy = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)
+_api = ctypes.pythonapi
+_api.PyCapsule_GetName.restype = ctypes.c_char_p
+_api.PyCapsule_GetName.argtypes = [ctypes.py_object]
+_api.PyCapsule_GetPointer.restype = ctypes.c_void_p
+_api.PyCapsule_GetPointer.argtypes = [ctypes.py_object, ctypes.c_char_p]
+
+
+def _address(capsule: Any) -> int:
+    """What a capsule of Python points to."""
+    return int(_api.PyCapsule_GetPointer(capsule, _api.PyCapsule_GetName(capsule)))
+
+
+def aside_sender(service: Any) -> Callable[[Any, Any], None]:
+    """What sends a response of this service while other threads of Python run.
+
+    rclpy holds all of them up meanwhile: 0.1 s for a client that has died, a millisecond each where
+    clients don't keep up. Where an inside is missing, it is rclpy's own.
+    """
+    plain: Callable[[Any, Any], None] = service.send_response
+    kind = type(service.srv_type.Response)
+    capsules = [part(kind, f"_{name}") for name in ("CREATE_ROS_MESSAGE", "CONVERT_FROM_PY")]
+    capsules.append(part(kind, "_DESTROY_ROS_MESSAGE"))
+    pointer = part(part(service, "handle"), "pointer")
+    info = part(_rclpy, "rmw_service_info_t")
+    try:
+        rcl_send = ctypes.CDLL("librcl.so").rcl_send_response
+        forget = ctypes.CDLL("librcutils.so").rcutils_reset_error
+    except (OSError, AttributeError):
+        return plain
+    if None in (*capsules, pointer, info):
+        return plain
+    create = _Create(_address(capsules[0]))
+    fill = _Fill(_address(capsules[1]))
+    destroy = _Destroy(_address(capsules[2]))
+
+    def send_aside(response: Any, header: Any) -> None:
+        value = ctypes.c_void_p.from_address(id(header) + _VALUE).value
+        if (
+            type(header) is not info
+            or not value
+            or not isinstance(response, service.srv_type.Response)
+        ):
+            plain(response, header)
+            return
+        message = create()
+        try:
+            if not fill(response, message):
+                raise RCLError(f"a response of {service.service_name} can't be converted")
+            with service.handle:
+                at = ctypes.c_void_p(service.handle.pointer)
+                code = rcl_send(at, ctypes.c_void_p(value + _INFO), ctypes.c_void_p(message))
+            if code != 0:
+                forget()
+            if code not in (0, _TIMEOUT):
+                raise RCLError(f"failed to send a response of {service.service_name}: {code}")
+        finally:
+            destroy(message)
+
+    return send_aside
 
 
 UNDISCOVERED = 0.09

@@ -29,6 +29,7 @@ from ir_msgs_py.ros.messages import type_name
 from ir_msgs_py.ros.rclpy_inside import (
     PatientActionServer,
     PatientSender,
+    aside_sender,
     can_take_requests,
     forget_request,
     send_to_whoever_is_left,
@@ -184,7 +185,7 @@ class BoundedService(Waitable):
             service_type, name, handler, qos_profile=SERVICE, callback_group=untouched
         )
         self._calls = Calls.of(node)
-        self._sender = PatientSender(self._service.send_response)
+        self._sender = PatientSender(aside_sender(self._service))
         if not can_take_requests(self._service):
             node.destroy_service(self._service)
             self._service = node.create_service(

@@ -23,7 +23,7 @@ REQUESTS_WAITING = 1000
 """Requests of a service that wait for their answers at most; what comes beyond is refused
 (`serving.BoundedService`).
 """
-BURST = 20_000
+BURST = 5_000
 """Requests that the middleware keeps between two looks of a node. ROS keeps 10 by default, and
 drops the eleventh without a word to anybody; only a client that sends more than these faster than
 the node looks, which is some ten thousand times a second, loses any. What nobody uses takes no

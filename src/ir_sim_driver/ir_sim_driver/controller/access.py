@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 from ir_msgs_py.announcements import Contact, MachineState
@@ -12,7 +12,7 @@ from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.notices import Level
-from ir_sim_driver.plc import Readout
+from ir_sim_driver.plc import Readout, Written
 
 
 class Access:
@@ -153,11 +153,15 @@ class PlcSide:
         """Set all levels at once, several times in a row. Raises RequestRefusedError when all are
         written.
         """
+        self.write_heard(writer, [Written(levels) for levels in inputs])
+
+    def write_heard(self, writer: str, heard: Sequence[Written]) -> None:
+        """As `write_all_inputs`, with what is known of when they were written."""
         refusal: RequestRefusedError | None = None
         with self._access.writing() as simulation:
-            for levels in inputs:
+            for written in heard:
                 try:
-                    simulation.plc.write_all(writer, levels)
+                    simulation.plc.write_all(writer, written)
                 except RequestRefusedError as error:
                     refusal = error
             if refusal is not None:

@@ -289,14 +289,18 @@ class Driver:
     # -- requests; each raises RequestRefusedError, also while the controller is off the network
     # -------------
 
-    def press(self, writer: str, name: str, level: bool) -> tuple[PlcInputs, str]:
+    def press(self, writer: str, name: str, level: bool, came_ns: int = 0) -> tuple[PlcInputs, str]:
         """Set one bit, or the mode switch by the name of its position.
 
         Returns the levels and a remark: why the bit will not count. A pressed emergency stop is
-        latched in every mode, asleep too, and has been acted upon when this returns.
+        latched in every mode, asleep too, and has been acted upon when this returns. came_ns: as of
+        `recover`; only a press may come before the last stop.
         """
-        with self._access.online(asleep_too=name == STOP_BIT and level) as simulation:
+        pressed = name == STOP_BIT and level
+        with self._access.online(asleep_too=pressed) as simulation:
             plc = simulation.plc
+            if not pressed:
+                plc.stop.refuse_earlier(came_ns, name)
             if name == END_REST:
                 if level:
                     plc.check_owner(writer)
@@ -331,16 +335,11 @@ class Driver:
     def recover(self, came_ns: int = 0) -> str:
         """Leave the emergency stop; a remark.
 
-        came_ns: when the request came [ns of the host's clock], 0: now. One that came before the
-        last stop, and waited, is refused.
+        came_ns: when the request came [ns of the host's monotonic clock], 0: now. One that came
+        before the last stop, and waited, is refused.
         """
         with self._access.online() as simulation:
-            stop = simulation.plc.stop
-            if 0 < came_ns < stop.wall_ns:
-                raise RequestRefusedError(
-                    StatusCode.INVALID_ROBOT_STATE,
-                    f"recover came before stop {stop.number}: ask again",
-                )
+            simulation.plc.stop.refuse_earlier(came_ns, "recover")
             return simulation.recover()
 
     def set_load(self, load: Callable[[Cell], Carried]) -> Carried:

@@ -31,15 +31,17 @@ from ir_msgs_py.ros.topics import ACTION_SERVICES
 from ir_sim_driver.controller import Driver, Joints, Simulation, make_simulation
 from ir_sim_driver.errors import DriverError, LinkError, TrajectoryRefusedError
 from ir_sim_driver.node.announcements import Announcements
-from ir_sim_driver.node.command_topics import (
-    TURN,
-    CommandThread,
-    PlcTopic,
-    PolledService,
-    TrajectoryTopic,
-)
+from ir_sim_driver.node.command_topics import TrajectoryTopic
 from ir_sim_driver.node.messages import condition_of, hardware_id
 from ir_sim_driver.node.parameters import DriverParameters
+from ir_sim_driver.node.presses import (
+    TURN,
+    CommandThread,
+    OwnParticipant,
+    PlcTopic,
+    PolledService,
+    presses_the_stop,
+)
 from ir_sim_driver.node.real_time import FOREIGN, OWN, SYSTEM, GridThread, ScaledClock
 from ir_sim_driver.node.services import Services
 from ir_sim_driver.node.streams import Streams
@@ -125,7 +127,10 @@ class SimDriver(Node):
         """Stop the plant, then the rest. Raises DriverError when the plant had ended
         before.
         """
-        self._presses.close()
+        for thread in self._threads:
+            thread.close()
+        for each in (self._inputs, self._recoveries, self._presses, self._requests):
+            each.close()
         self._plant.close()
         for link in self._links.values():
             link.close()
@@ -162,13 +167,27 @@ class SimDriver(Node):
                 self._serve_action(FollowJointTrajectory, names.FOLLOW_JOINT_TRAJECTORY)
             )
         answers = Services(self._driver, self.get_name(), self._announcements.look)
-        recoveries = PolledService(self, Recover, names.RECOVER, answers.recover)
-        self._presses = CommandThread(
-            PlcTopic(self, self._driver).poll,
-            PolledService(self, SetPlcInput, names.SET_PLC_INPUT, answers.set_plc_input).poll,
-            lambda: recoveries.poll() if self._refuse_waiting() else 0,
+        self._presses = OwnParticipant(self, "presses")
+        self._requests = OwnParticipant(self, "requests")
+        self._inputs = PolledService(
+            self._requests.node,
+            SetPlcInput,
+            names.SET_PLC_INPUT,
+            answers.set_plc_input,
+            self,
+            urgent=presses_the_stop,
         )
-        self._presses.start()
+        self._recoveries = PolledService(self, Recover, names.RECOVER, answers.recover, self)
+        self._threads = (
+            CommandThread("presses", PlcTopic(self, self._driver, self._presses).poll),
+            CommandThread(
+                "requests",
+                self._inputs.poll,
+                lambda: self._recoveries.poll() if self._refuse_waiting() else 0,
+            ),
+        )
+        for thread in self._threads:
+            thread.start()
         BoundedService(self, StartPause, names.START_PAUSE, answers.start_pause)
         BoundedService(self, EndPause, names.END_PAUSE, answers.end_pause)
         BoundedService(self, QueryModes, names.QUERY_MODES, answers.query_modes)

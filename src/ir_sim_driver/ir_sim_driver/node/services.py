@@ -33,11 +33,12 @@ class Services:
 
     def set_plc_input(self, request: Any, response: Any, came_ns: int = 0) -> Any:
         """Set one bit, or the mode switch by the name of its position; the remark: why it won't
-        count.
+        count. came_ns: when the request came [ns of the monotonic clock].
         """
 
         def work() -> str:
-            levels, remark = self._driver.press(SERVICE, request.name, bool(request.value))
+            value = bool(request.value)
+            levels, remark = self._driver.press(SERVICE, request.name, value, came_ns)
             response.inputs = plc_inputs_to_msg(levels)
             return remark
 
@@ -76,7 +77,7 @@ class Services:
         return self._answer(response, work)
 
     def recover(self, request: Any, response: Any, came_ns: int = 0) -> Any:
-        """Leave the emergency stop; came_ns: when the request came [ns of the host's clock]."""
+        """Leave the emergency stop; came_ns: when the request came [ns of the monotonic clock]."""
         return self._answer(response, lambda: self._driver.recover(came_ns))
 
     def set_load(self, request: Any, response: Any) -> Any:

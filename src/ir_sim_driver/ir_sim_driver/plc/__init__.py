@@ -12,6 +12,7 @@ from ir_sim_driver.plc.inputs import (
     Plc,
     PlcSettings,
     Watchdog,
+    Written,
     usable_links,
 )
 from ir_sim_driver.plc.port import STOP_BIT, Controller, Link, OpenLink, Readout
@@ -36,5 +37,6 @@ __all__ = [
     "StopState",
     "WakeOnLan",
     "Watchdog",
+    "Written",
     "usable_links",
 ]

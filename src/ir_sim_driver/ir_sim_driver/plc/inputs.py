@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, is_dataclass, replace
 from math import inf
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 from ir_msgs_py.modes import REST_OF_BIT, ROW, Mode
 from ir_msgs_py.plc import PLC_INPUT_NAMES, OperatingMode, PlcInputs
@@ -141,6 +141,19 @@ class PlcSettings:
         check_settings(self)
 
 
+class Written(NamedTuple):
+    """All levels, and when they came on the host's monotonic clock [ns], 0: now.
+
+    overtaken: by a press of the same topic, or they are that press. again: and press the button
+    after it was let go, what has no number yet.
+    """
+
+    inputs: PlcInputs
+    came_ns: int = 0
+    overtaken: bool = False
+    again: bool = False
+
+
 def _stop_first(bit: str) -> bool:
     """Sort key: whatever else a message says, its emergency stop comes first."""
     return bit != STOP_BIT
@@ -172,6 +185,7 @@ class Plc:
         self.stop = StopMachine()
         self.order = 0
         self._rose: dict[str, int] = {}
+        self._stopped_by = ("", 0)  # who has stopped by a press, and the number of that stop
         self._fell = 0  # order of the message that let go of the emergency stop
         self._up = 0.0  # s since then
         self.no_hibernation = ""
@@ -190,16 +204,41 @@ class Plc:
         Raises RequestRefusedError; a pressed emergency stop counts even then.
         """
         pressed = levels.get(STOP_BIT, False)
-        self._guard(writer, pressed, alone=pressed and len(levels) == 1)
-        self._greeted = True
-        self.order += 1
-        for bit in sorted(levels, key=_stop_first):
-            self._set(bit, levels[bit])
+        number = self.stop.number
+        try:
+            self._guard(writer, pressed, alone=pressed and len(levels) == 1)
+            self._greeted = True
+            self.order += 1
+            for bit in sorted(levels, key=_stop_first):
+                self._set(bit, levels[bit])
+        finally:
+            self._note_stop(writer, number)
 
-    def write_all(self, writer: str, inputs: PlcInputs) -> None:
-        """Set all levels in the name of a writer. Raises as `write`."""
-        self._guard(writer, inputs.emergency_stop)
-        self.set_all(inputs)
+    def write_all(self, writer: str, written: Written) -> None:
+        """Set all levels in the name of a writer. Raises as `write`.
+
+        What came before the last stop, or a press has overtaken, does not let go of the button, and
+        nothing that it raises acknowledges. Stops by the same writer are in the order of its
+        messages.
+        """
+        inputs = written.inputs
+        number = self.stop.number
+        late = written.overtaken or (
+            self._stopped_by != (writer, number) and self.stop.came_later(written.came_ns)
+        )
+        if written.again and self.stop.pressed:
+            self.stop.press_again(self.order)
+            inputs = inputs.with_bit(STOP_BIT, False)
+        try:
+            self._guard(writer, inputs.emergency_stop)
+            self._set_all(inputs, late)
+        finally:
+            self._note_stop(writer, number)
+
+    def _note_stop(self, writer: str, number: int) -> None:
+        """Remember who has stopped since stop `number`."""
+        if self.stop.number != number:
+            self._stopped_by = (writer, self.stop.number)
 
     def turn_switch(self, writer: str, mode: OperatingMode) -> None:
         """Turn the mode switch in the name of a writer. Raises RequestRefusedError."""
@@ -225,13 +264,16 @@ class Plc:
 
     def set_all(self, inputs: PlcInputs) -> None:
         """Take all levels at once, as the topic and the field bus do."""
+        self._set_all(inputs, late=False)
+
+    def _set_all(self, inputs: PlcInputs, late: bool) -> None:
         if not self._greeted and self._uptime < self._settings.startup_window:
             stuck = frozenset(bit for bit in POWER_BITS if getattr(inputs, bit))
             self._stick(stuck, Level.WARN, "at the start")
         self._greeted = True
         self.order += 1
-        for bit in _WRITTEN:
-            self._set(bit, getattr(inputs, bit))
+        for bit in _WRITTEN[1:] if late and not inputs.emergency_stop else _WRITTEN:
+            self._set(bit, getattr(inputs, bit), late=late)
         if inputs.operating_mode is not OperatingMode.UNCHANGED:
             self.set_operating_mode(inputs.operating_mode)
 
@@ -309,7 +351,7 @@ class Plc:
         if self._up >= self._settings.debounce - 1e-9:
             self.stop.release(self._fell)
 
-    def _set(self, bit: str, level: bool) -> None:
+    def _set(self, bit: str, level: bool, *, late: bool = False) -> None:
         if level == getattr(self.raw, bit):
             return
         self.raw = self.raw.with_bit(bit, level)
@@ -319,7 +361,7 @@ class Plc:
             self._fell = self.order
             self._up = 0.0
         elif level:
-            self._rose[bit] = self.order
+            self._rose[bit] = 0 if late else self.order
         if not level and bit in self._stuck:
             self._stuck -= {bit}
             return

@@ -12,6 +12,9 @@ from __future__ import annotations
 import time
 from enum import Enum
 
+from ir_msgs_py.status import StatusCode
+from ir_sim_driver.errors import RequestRefusedError
+
 
 class StopState(Enum):
     """Rows of the table."""
@@ -42,13 +45,14 @@ _PUSHED = (StopState.PRESSED, StopState.PRESSED_FAULT)
 class StopMachine:
     """state: where it is. number: of the last stop, 0 before the first.
 
-    wall_ns: time of that stop on the host's clock. Orders grow with every message that is written.
+    at_ns: time of that stop on the host's monotonic clock. Orders grow with every message that is
+    written.
     """
 
     def __init__(self) -> None:
         self.state = StopState.RUN
         self.number = 0
-        self.wall_ns = 0
+        self.at_ns = 0
         self._since = 0
         self._acknowledged = 0
 
@@ -67,10 +71,27 @@ class StopMachine:
         """Whether a fault is latched, which only `recover` takes away."""
         return self.state in (StopState.FAULT, StopState.PRESSED_FAULT)
 
+    def came_later(self, came_ns: int) -> bool:
+        """Whether the last stop came after this time of the monotonic clock; 0: it did not."""
+        return 0 < came_ns < self.at_ns
+
+    def refuse_earlier(self, came_ns: int, what: str) -> None:
+        """Raise RequestRefusedError where a request came before the last stop, and waited."""
+        if self.came_later(came_ns):
+            raise RequestRefusedError(
+                StatusCode.INVALID_ROBOT_STATE, f"{what} came before stop {self.number}: ask again"
+            )
+
     def press(self, order: int) -> None:
         """The button goes down, in whatever mode or transition."""
         self._count(order)
         self.state = _PRESS.get(self.state, StopState.PRESSED)
+
+    def press_again(self, order: int) -> None:
+        """The button went down again, and that it was let go between is known only now."""
+        at_ns = self.at_ns
+        self.press(order)
+        self.at_ns = at_ns
 
     def fault(self, order: int) -> None:
         """The supervision, the physics or a contact stops the robot."""
@@ -80,7 +101,7 @@ class StopMachine:
 
     def _count(self, order: int) -> None:
         self.number += 1
-        self.wall_ns = time.time_ns()
+        self.at_ns = time.monotonic_ns()
         self._since = order  # of the last stop or release
 
     def release(self, order: int) -> None:
