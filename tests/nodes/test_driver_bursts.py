@@ -181,6 +181,27 @@ def test_what_waits_for_a_busy_node_while_a_stop_is_latched_moves_nothing_after_
     assert max(abs(each[0] - start[0]) for each in positions) < 0.01
 
 
+def test_no_goal_is_taken_after_a_recovery_by_plc_before_those_that_wait_are_refused(
+    ros_context: Any, ros_executor: Any, wait_for: Any
+) -> None:
+    """However long the thread that takes them gets no processor."""
+    parameters = {"cell": "open", "backend": "ideal", "wake_port": 0, "plc.startup_window": 0.0}
+    overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+    node = ros_executor.add_node(SimDriver(context=ros_context, parameter_overrides=overrides))
+    requests = node._threads[1]
+    requests.close()
+    driver = node._driver
+    for bit in ("emergency_stop", "conf_mess", "drives_on"):
+        for level in (True, False):
+            driver.press("service", bit, level)
+            begin = driver.stamp_ns
+            wait_for(lambda begin=begin: driver.stamp_ns > begin + 60_000_000, what="levels count")
+    wait_for(lambda: not driver.stopped, what="the PLC recovers")
+    assert "stop 1 came after" in node._admit(2, 0).refusal
+    assert node._refuse_waiting()
+    assert node._admit(2, 0).ticket
+
+
 @pytest.mark.parametrize(
     "durability", [DurabilityPolicy.TRANSIENT_LOCAL, DurabilityPolicy.VOLATILE]
 )

@@ -34,7 +34,6 @@ from ir_program_runner.node import ProgramRunnerNode
 from ir_recorder.node.recorder import RecorderNode
 from ir_sim_driver.node import SimDriver
 
-REQUESTS = hidden_node("ir_sim_driver", "requests")
 DRIVER = {"backend": "ideal", "wake_port": 0}
 # of each service and action; of all
 SAMPLED = 2
@@ -44,13 +43,7 @@ RUNS = 0.5  # s; a goal that makes sense after all is canceled then
 ENOUGH = 5  # that went wrong: each may have taken a minute
 SENTENCE_MAX = 4000  # characters: what fits a screen
 GROWN_MB = 25.0
-OFFERED = {
-    "ir_planner": 20,
-    "ir_sim_driver": 12,
-    REQUESTS: 1,
-    "ir_program_runner": 7,
-    "ir_recorder": 8,
-}
+OFFERED = {"ir_planner": 20, "ir_sim_driver": 13, "ir_program_runner": 7, "ir_recorder": 8}
 """Services and actions of each node, parameters included; one that is added may be entered here."""
 
 
@@ -75,6 +68,10 @@ def offers_of(client: Client, node: str) -> list[Offer]:
         actions = get_action_server_names_and_types_by_node(client.node, node, "/")
     except NodeNameNonExistentError:  # not discovered yet
         return []
+    with suppress(NodeNameNonExistentError):  # a participant of its own, where there is one
+        services += client.node.get_service_names_and_types_by_node(
+            hidden_node(node, "requests"), "/"
+        )
     kinds = [(name, "srv", types[0]) for name, types in services if "/_action/" not in name]
     kinds += [(name, "action", types[0]) for name, types in actions]
     return [(name, kind, interface_type(text, kind)) for name, kind, text in sorted(kinds)]
@@ -91,7 +88,7 @@ class Attack:
             return all(len(offers_of(client, node)) >= count for node, count in OFFERED.items())
 
         wait_for(all_offered, what="all services and actions are offered")
-        self.offers = [offer for node in (*NODES, REQUESTS) for offer in offers_of(client, node)]
+        self.offers = [offer for node in NODES for offer in offers_of(client, node)]
         self.cases = [
             (offer, case) for offer in self.offers for case in fields.cases_of(_part(offer))
         ]

@@ -4,7 +4,7 @@ it.
 
 from ir_sim_driver.controller.driver import Driver, Snapshot
 from ir_sim_driver.controller.goal_checks import VettedGoal
-from ir_sim_driver.controller.goals import NO_GOAL, refused
+from ir_sim_driver.controller.goals import NO_GOAL, ended_by_stop, refused
 from ir_sim_driver.controller.outputs import Entry, Frame, Joints, report
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
 from ir_sim_driver.controller.simulation import Simulation, make_simulation
@@ -24,6 +24,7 @@ __all__ = [
     "Snapshot",
     "SupervisionSettings",
     "VettedGoal",
+    "ended_by_stop",
     "make_simulation",
     "refused",
     "report",

@@ -10,10 +10,9 @@ from trajectory_msgs.msg import JointTrajectory
 from ir_msgs_py import names
 from ir_msgs_py.ros.rclpy_inside import can_take_messages, take_bytes
 from ir_sim_driver.controller import Driver, refused
-from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import ErrorCode, Outcome, TrajectoryGoal
 from ir_sim_driver.node.messages import goal_from_trajectory
-from ir_sim_driver.node.trajectory_actions import TrajectoryReader
+from ir_sim_driver.node.trajectory_actions import Admit, TrajectoryReader
 
 _POINT = (
     256  # bytes; one with positions, velocities, accelerations and efforts of six joints has 232
@@ -23,10 +22,14 @@ _HEAD = 65_536  # bytes for header and names: some twenty times what they need
 
 
 class TrajectoryTopic:
-    """Hands each trajectory to the driver; what is refused becomes a warning."""
+    """Hands each trajectory to the driver; what is refused becomes a warning.
 
-    def __init__(self, node: Node, driver: Driver) -> None:
+    admit: from points and bytes.
+    """
+
+    def __init__(self, node: Node, driver: Driver, admit: Admit) -> None:
         self._driver = driver
+        self._admit = admit
         self._reader = TrajectoryReader()
         topic = names.COMMANDED_TRAJECTORY
         self._subscription = node.create_subscription(
@@ -55,12 +58,11 @@ class TrajectoryTopic:
         def read() -> TrajectoryGoal:
             return goal_from_trajectory(self._reader.read(message), most)
 
-        try:  # the points are counted when it is read
-            ticket = self._driver.admit(0, _OBJECTS * len(message))
-        except TrajectoryRefusedError as error:
-            self._ended(refused(str(error), error.code))
+        admission = self._admit(0, _OBJECTS * len(message))  # points are counted when it is read
+        if admission.refusal:
+            self._ended(refused(admission.refusal))
         else:
-            self._driver.submit(0, read, self._ended, ticket)
+            self._driver.submit(0, read, self._ended, admission.ticket)
 
     def _ended(self, outcome: Outcome) -> None:
         if outcome.code is not ErrorCode.SUCCESSFUL:

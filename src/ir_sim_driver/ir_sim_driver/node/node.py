@@ -28,7 +28,7 @@ from ir_msgs_py.ros.diagnostics import Diagnostics
 from ir_msgs_py.ros.node_process import run_node
 from ir_msgs_py.ros.serving import BoundedService
 from ir_msgs_py.ros.topics import ACTION_SERVICES
-from ir_sim_driver.controller import Driver, Joints, Simulation, make_simulation
+from ir_sim_driver.controller import Driver, Joints, Simulation, ended_by_stop, make_simulation
 from ir_sim_driver.errors import DriverError, LinkError, TrajectoryRefusedError
 from ir_sim_driver.node.announcements import Announcements
 from ir_sim_driver.node.command_topics import TrajectoryTopic
@@ -146,7 +146,8 @@ class SimDriver(Node):
         self._streams = Streams(self, self._driver.joint_names)
         self._markers = self.create_publisher(MarkerArray, names.ROBOT_MARKERS, 1)
         self._diagnostics = Diagnostics(self)
-        self._trajectory_topic = TrajectoryTopic(self, self._driver)
+        self._drained = 0  # the last stop of before which no goal waits any more
+        self._trajectory_topic = TrajectoryTopic(self, self._driver, self._admit)
         self.create_subscription(
             Float64,
             names.SPEED_SCALING,
@@ -166,7 +167,7 @@ class SimDriver(Node):
             self._actions.append(
                 self._serve_action(FollowJointTrajectory, names.FOLLOW_JOINT_TRAJECTORY)
             )
-        answers = Services(self._driver, self.get_name(), self._announcements.look)
+        self._answers = answers = Services(self._driver, self.get_name(), self._announcements.look)
         self._presses = OwnParticipant(self, "presses")
         self._requests = OwnParticipant(self, "requests")
         self._inputs = PolledService(
@@ -177,7 +178,7 @@ class SimDriver(Node):
             self,
             urgent=presses_the_stop,
         )
-        self._recoveries = PolledService(self, Recover, names.RECOVER, answers.recover, self)
+        self._recoveries = PolledService(self, Recover, names.RECOVER, self._recover, self)
         self._threads = (
             CommandThread("presses", PlcTopic(self, self._driver, self._presses).poll),
             CommandThread(
@@ -217,19 +218,33 @@ class SimDriver(Node):
         return server
 
     def _refuse_waiting(self) -> bool:
-        """While a stop is latched, take goals that wait for a busy executor, so that they are
-        refused and none is left for after the recovery. Whether none waits.
+        """After a stop, take goals that wait for a busy executor, so that they are refused and none
+        is left for after the recovery, whatever recovers. Whether none waits.
         """
-        if not self._driver.stopped:
+        number = self._driver.stop_number
+        if self._drained == number:
             return True
+        over = not self._driver.stopped
         takers: list[BoundedActionServer | TrajectoryTopic] = [
             *self._actions,
             self._trajectory_topic,
         ]
-        return all(taker.take_waiting(TURN) for taker in takers)
+        none_waits = all(taker.take_waiting(TURN) for taker in takers)
+        if none_waits and over:
+            self._drained = number
+        return none_waits
+
+    def _recover(self, request: Any, response: Any, came_ns: int) -> Any:
+        """Recover, and take no goal that came before that."""
+        response = self._answers.recover(request, response, came_ns)
+        self._refuse_waiting()
+        return response
 
     def _admit(self, points: int, size: int) -> Admission:
         """Ask the driver for a goal of so many points and bytes."""
+        number = self._driver.stop_number
+        if self._drained != number and not self._driver.stopped:
+            return Admission(refusal=ended_by_stop(number))  # it may have waited since before
         try:
             return Admission(self._driver.admit(points, size))
         except TrajectoryRefusedError as error:
