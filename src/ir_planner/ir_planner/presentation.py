@@ -14,7 +14,17 @@ from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 
+_DIGITS = 10  # of a mm, at most
 _SAMPLES = 400  # of a plotted trajectory: finer than a screen shows
+
+
+def in_mm(distance: float, bound: float) -> tuple[str, str]:
+    """Two distances [m] in mm, with as many digits as it takes to tell them apart."""
+    for digits in range(1, _DIGITS):
+        texts = f"{1e3 * distance:.{digits}f}", f"{1e3 * bound:.{digits}f}"
+        if texts[0] != texts[1]:
+            break
+    return texts
 
 
 def status_text(status: Status) -> str:

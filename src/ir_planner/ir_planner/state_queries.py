@@ -13,7 +13,7 @@ from ir_planner.checks import StateCheck, state_check
 from ir_planner.errors import RequestError
 from ir_planner.program import with_doors
 from ir_planner.request import bounded, joint_values, safety_distance, within_limits
-from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
+from ir_planner.scene import END_TOLERANCE, PlanningScene
 
 PAIRS_MAX = 1000
 STATES_MAX = 10_000
@@ -72,7 +72,7 @@ def asked_states(scene: PlanningScene, q: FloatArray, margin: float, station: st
     kept[there] = threshold[near.pair[there]]
     allowed = scene.own_distance(station)
     smallest = scene.collision.min_distance(q).distance if allowed.any() else near.distance
-    valid = ~there | (near.distance > kept - PROOF_TOLERANCE)
+    valid = ~there | (near.distance > kept - END_TOLERANCE)
     return StatesCheck(valid, smallest, _pairs(near, scene, allowed))
 
 

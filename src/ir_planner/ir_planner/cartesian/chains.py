@@ -11,6 +11,7 @@ from ir_msgs_py.status import StatusCode
 from ir_planner.cartesian.path_parts import about_tool
 from ir_planner.cartesian.tool_path import NoChainError, PathRefusedError, ToolPath
 from ir_planner.checks import FreeSpace, pair_value
+from ir_planner.presentation import in_mm
 from ir_planner.scene import PlanningScene
 
 # Configurations along a path: at samples of it, for angles about the tool's axis, all of them.
@@ -162,9 +163,10 @@ def nearest_sentence(q: FloatArray, space: FreeSpace) -> str:
     lacking = space.threshold[near.pair] - near.distance
     k = int(np.argmin(lacking))
     pair = pair_value(space.scene, q[k], int(near.pair[k]))
+    distance, bound = in_mm(pair.distance, float(space.threshold[near.pair[k]]))
     return (
         f"in the best of them {pair.body_a} and {pair.body_b} ({pair.kind}) come to "
-        f"{pair.distance * 1e3:.1f} mm, they must keep {space.threshold[near.pair[k]] * 1e3:.1f} mm"
+        f"{distance} mm, they must keep {bound} mm"
     )
 
 

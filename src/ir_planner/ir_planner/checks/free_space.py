@@ -11,9 +11,9 @@ from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks.clearance import nearest_pairs, pair_value
-from ir_planner.presentation import status_text
+from ir_planner.presentation import in_mm, status_text
 from ir_planner.request import Work
-from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
+from ir_planner.scene import END_TOLERANCE, PROOF_TOLERANCE, PlanningScene
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +52,13 @@ class FreeSpace:
         if len(q) == 0:
             return np.zeros(0, dtype=bool)
         return np.asarray(self.scene.collision.is_free(q, self.threshold), dtype=bool)
+
+    def ends_free(self, q: FloatArray) -> BoolArray:
+        """Which configurations (N, n) may begin or end a movement: so free that a proof can begin
+        there.
+        """
+        kept = self.threshold + (PROOF_TOLERANCE / 2 - END_TOLERANCE)
+        return np.asarray((self.scene.collision.distances(q) > kept).all(axis=1))
 
     def certificates(self, q0: FloatArray, q1: FloatArray) -> Certificates:
         """Certificates of the straight movements (N, n) to (N, n)."""
@@ -115,7 +122,7 @@ def state_check(
     """Nearest pairs at q (n,), and whether all keep S_m, `margin` m (or what `station` allows)."""
     threshold = scene.thresholds(margin, station)
     distance = scene.collision.distances(q[None])[0]
-    valid = bool((distance > threshold - PROOF_TOLERANCE).all())
+    valid = bool((distance > threshold - END_TOLERANCE).all())
     pairs = nearest_pairs(scene, q, threshold, max_pairs, station)
     smallest = float(distance.min(initial=np.inf))
     if valid or not len(distance):
@@ -133,7 +140,7 @@ def end_in_collision(
         (start, "start", StatusCode.START_STATE_IN_COLLISION),
         (goal, "goal", StatusCode.GOAL_IN_COLLISION),
     ):
-        if not space.states_free(q[None])[0]:
+        if not space.ends_free(q[None])[0]:
             hint = "; plan_escape (ir ask escape) leads out" if what == "start" else ""
             return Status(code, too_near(q, space, what, safety_distance) + hint)
     return None
@@ -171,7 +178,8 @@ def _named(scene: PlanningScene, pair: int) -> str:
 def too_near_sentence(pair: DistancePair, kept: float) -> str:
     """Which pair is how near, and the distance [m] it must keep."""
     where = "in penetration" if pair.distance < 0.0 else "too near"
+    distance, bound = in_mm(pair.distance, kept)
     return (
         f"{pair.body_a} and {pair.body_b} ({pair.kind}) are {where}: "
-        f"distance {pair.distance * 1e3:.1f} mm, it must be more than {kept * 1e3:.1f} mm"
+        f"distance {distance} mm, it must be more than {bound} mm"
     )

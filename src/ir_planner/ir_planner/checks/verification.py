@@ -17,6 +17,7 @@ from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.clearance import pair_value
 from ir_planner.curves import Extremes, extremes
+from ir_planner.presentation import in_mm
 from ir_planner.scene import (
     PROOF_TOLERANCE,
     PlanningScene,
@@ -266,11 +267,12 @@ def _violation(
     kept = float(threshold[z]) + PROOF_TOLERANCE
     excess = kept - pair.distance
     k = segment_at(trajectory, interval[1])
+    distance, bound = in_mm(pair.distance, kept)
     come = "come to" if verdict == COLLIDES else "can't be proved to stay apart, they are at"
     sentence = (
-        f"{pair.body_a} and {pair.body_b} ({pair.kind}) {come} {pair.distance * 1e3:.1f} mm "
-        f"after waypoint {k} at {interval[1]:.3f} s: they must stay {kept * 1e3:.1f} mm apart "
-        f"(excess {excess * 1e3:.1f} mm)"
+        f"{pair.body_a} and {pair.body_b} ({pair.kind}) {come} {distance} mm "
+        f"after waypoint {k} at {interval[1]:.3f} s: they must stay {bound} mm apart "
+        f"(excess {in_mm(excess, 0.0)[0]} mm)"
     )
     return Violation(interval[0], k, "clearance", excess, sentence, pair)
 

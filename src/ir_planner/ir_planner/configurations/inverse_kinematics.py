@@ -17,7 +17,8 @@ from ir_msgs_py.report import IkSolution
 from ir_msgs_py.search_log import ConfigurationLog, Track
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import nearest_pair
-from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, movement_cost
+from ir_planner.presentation import in_mm
+from ir_planner.scene import END_TOLERANCE, PlanningScene, movement_cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +48,7 @@ def free_configurations(
     rejected: Counter[str] = Counter()
     if len(found.q) == 0:
         return Configurations(found.q, found.branch, 0, rejected)
-    limit = threshold - PROOF_TOLERANCE / 2
+    limit = threshold - END_TOLERANCE
     closest = scene.collision.min_distance(found.q, limit)
     for k in range(len(found.q)):
         z = int(closest.pair[k])
@@ -69,10 +70,10 @@ def _least_lacking(scene: PlanningScene, closest: MinDistance, threshold: FloatA
     lacking = threshold[closest.pair] - closest.distance
     k = int(np.argmin(lacking))
     pair = scene.collision.pairs[int(closest.pair[k])]
-    kept = float(threshold[closest.pair[k]])
+    distance, bound = in_mm(float(closest.distance[k]), float(threshold[closest.pair[k]]))
     return (
         f"in the best of them {pair.body_a} and {pair.body_b} come to "
-        f"{closest.distance[k] * 1e3:.1f} mm, they must keep more than {kept * 1e3:.1f} mm"
+        f"{distance} mm, they must keep more than {bound} mm"
     )
 
 

@@ -24,7 +24,7 @@ from ir_planner.curves import extremes
 from ir_planner.errors import RequestError, TimingError
 from ir_planner.presentation import plot_trajectory, result_text
 from ir_planner.request import OUTSIDE_MAX, Context, joint_values
-from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, polynomials_between
+from ir_planner.scene import END_TOLERANCE, PROOF_TOLERANCE, PlanningScene, polynomials_between
 from ir_planner.timing import GRID_S, StepLaws, TimedPath, blended, fastest
 
 DEEPER = 1e-5  # m that a pair may get nearer within a step: what the proof of it needs
@@ -165,7 +165,7 @@ class _Way:
     def free(self) -> bool:
         """Whether nothing lacks at the start."""
         within = (self.start >= self.low) & (self.start <= self.high)
-        kept = self.distances(self.start[None])[0] > self.kept - PROOF_TOLERANCE
+        kept = self.distances(self.start[None])[0] > self.kept - END_TOLERANCE
         return bool(within.all() and kept.all())
 
     def _step(self, q: FloatArray, reached: FloatArray, lack: float) -> FloatArray | None:

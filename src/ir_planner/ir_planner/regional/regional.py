@@ -20,7 +20,7 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import FreeSpace, end_in_collision, pair_value
 from ir_planner.configurations import free_configurations, no_configuration
 from ir_planner.optimize import Portfolio, Refinement
-from ir_planner.presentation import plot_trajectory, result_text
+from ir_planner.presentation import in_mm, plot_trajectory, result_text
 from ir_planner.regional.exploration import Path, Searches, first_paths
 from ir_planner.regional.no_path import barrier, enclosure
 from ir_planner.regional.safeguards import (
@@ -90,12 +90,14 @@ def refusal(
     pair = pair_value(space.scene, q, int(found.pair[0]))
     x, y, z = space.scene.chain.tcp_poses(q[None])[0, :3, 3]
     needed = float(space.threshold[int(found.pair[0])])
+    distance, bound = in_mm(pair.distance, needed)
+    short = in_mm(max(needed - pair.distance, 0.0), 0.0)[0]
     return Status(
         StatusCode.PLANNING_FAILED,
         f"no path found{cut}: on the straight movement {pair.body_a} and {pair.body_b} "
-        f"({pair.kind}) come to {pair.distance * 1e3:.1f} mm at {100 * share:.0f} % of it (tcp "
-        f"at {x:.2f}, {y:.2f}, {z:.2f} m), {1e3 * max(needed - pair.distance, 0.0):.1f} mm below "
-        f"the {needed * 1e3:.1f} mm they must keep; tried: {tried}; another start or goal "
+        f"({pair.kind}) come to {distance} mm at {100 * share:.0f} % of it (tcp "
+        f"at {x:.2f}, {y:.2f}, {z:.2f} m), {short} mm below "
+        f"the {bound} mm they must keep; tried: {tried}; another start or goal "
         "configuration, or a smaller safety distance, may help",
     )
 

@@ -4,6 +4,7 @@ W.
 
 from ir_planner.scene.motion_limits import STILL, Dynamics, MotionLimits, lasting_longer, torque_use
 from ir_planner.scene.planning_scene import (
+    END_TOLERANCE,
     PROOF_TOLERANCE,
     RUNNING,
     Drives,
@@ -18,6 +19,7 @@ from ir_planner.scene.planning_scene import (
 from ir_planner.scene.zones import polynomials_between, spans_outside, tcp_inside
 
 __all__ = [
+    "END_TOLERANCE",
     "PROOF_TOLERANCE",
     "RUNNING",
     "STILL",

@@ -108,6 +108,7 @@ def path_cost(weights: FloatArray, waypoints: FloatArray) -> float:
 
 
 PROOF_TOLERANCE = 1e-6  # m: proofs show d > S_m - 1e-6
+END_TOLERANCE = 2e-7  # m: a state is free where d > S_m - 2e-7, so that a proof can begin there
 _TURN = 2.0 * np.pi
 RUNNING = "STAND_ON_MOTORS"
 

@@ -22,7 +22,7 @@ from ir_planner.checks import CLOSEST, PATH, ZONES, Colour, FreeSpace, Shape, ne
 from ir_planner.configurations import free_configurations, no_configuration
 from ir_planner.errors import RequestError, TimingError
 from ir_planner.optimize import movement_over
-from ir_planner.presentation import plot_trajectory, result_text
+from ir_planner.presentation import in_mm, plot_trajectory, result_text
 from ir_planner.request import Context, Journal
 from ir_planner.scene import PlanningScene
 from ir_planner.service.exit import Exit, ExitSearch
@@ -110,9 +110,10 @@ def _best_clearance(pose: FloatArray, inside: FreeSpace) -> str:
     near = inside.scene.collision.min_distance(q, inside.threshold)
     best = int(np.argmax(near.distance - inside.threshold[near.pair]))
     pair = inside.scene.collision.pairs[int(near.pair[best])]
+    distance, bound = in_mm(float(near.distance[best]), float(inside.threshold[near.pair[best]]))
     return (
-        f"; the best clearance is {near.distance[best] * 1e3:.1f} mm between {pair.body_a} and "
-        f"{pair.body_b}, it must be more than {inside.threshold[near.pair[best]] * 1e3:.1f} mm"
+        f"; the best clearance is {distance} mm between {pair.body_a} and "
+        f"{pair.body_b}, it must be more than {bound} mm"
     )
 
 
