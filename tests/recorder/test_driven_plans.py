@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from ir_msgs_py.search_log import ConfigurationLog, CorrectionLog, SearchLog
 from ir_recorder import read_recording
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.format.schemas import SchemaLibrary
+from ir_recorder.reading import planner_answers
 from ir_recorder.reading.cdr import Columns
 from ir_recorder.reading.planner_answers import ACTION, completed, result_definition
 from ir_recorder.recording.session import RecordingSession
@@ -115,6 +117,26 @@ def test_searches_are_those_of_the_programs_that_were_driven(
     searches = read_recording(record(tmp_path / "a.mcap", PLANS, driven)).searches
     assert [log.station for log in searches if isinstance(log, ConfigurationLog)] == shown
     assert len(searches) == 2 * len(shown)
+
+
+def test_an_answer_is_read_a_few_times_however_many_programs_were_driven(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[int] = []
+    plans = planner_answers._plans
+
+    def counted(recorded: Any, definition: str) -> Any:
+        for each in plans(recorded, definition):
+            read.append(1)
+            yield each
+
+    monkeypatch.setattr(planner_answers, "_plans", counted)
+    every = [Planned(f"program-{k}", ("t1",), ("common",)) for k in range(20)]
+    driven = [("common", "t1"), *((f"program-{k}", "t1") for k in range(20))]
+    many = [*driven, *((f"elsewhere-{k}", "t1") for k in range(200))]
+    searches = read_recording(record(tmp_path / "a.mcap", every, many)).searches
+    assert len(searches) == 2 * len(driven)
+    assert len(read) <= 2 * len(driven)
 
 
 @pytest.mark.parametrize(

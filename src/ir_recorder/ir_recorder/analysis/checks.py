@@ -13,6 +13,7 @@ from ir_msgs_py.report import PlannedMovement
 from ir_recorder.analysis.resting_power import Plateau
 from ir_recorder.analysis.results import Analysis, StepResult
 from ir_recorder.analysis.steps import UNSEEN, ExecutedStep
+from ir_recorder.reading.recording import GoalEnd
 from ir_values.settings import check_settings, setting
 
 # How far measured may be from planned, with the reason of each bound.
@@ -434,8 +435,10 @@ def findings(analysis: Analysis, tolerances: Tolerances | None = None) -> tuple[
 
 def _requests(analysis: Analysis) -> Iterator[Finding]:
     """Goals that were asked of planner and runner: all of them have to succeed."""
-    for action in sorted({goal.action for goal in analysis.recording.goals}):
-        own = [goal for goal in analysis.recording.goals if goal.action == action]
+    by_action: dict[str, list[GoalEnd]] = {}
+    for goal in analysis.recording.goals:
+        by_action.setdefault(goal.action, []).append(goal)
+    for action, own in sorted(by_action.items()):
         done = sum(goal.status == _SUCCEEDED for goal in own)
         others = ", ".join(goal.outcome for goal in own if goal.status != _SUCCEEDED)
         why = "every goal that was sent has to succeed"

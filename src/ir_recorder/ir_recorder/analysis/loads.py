@@ -67,14 +67,17 @@ def _sharpened(reported: list[tuple[float, str]], power: PowerSeries) -> list[tu
     jumps = np.flatnonzero(
         (np.abs(np.diff(power.base_power)) > TOOL_STEP) & (np.diff(power.mode) == 0)
     )
+    before_jumps = power.time[jumps]
+    behind_jumps = power.time[jumps + 1]
     result: list[tuple[float, str]] = []
     for time, load in reported:
         if result and result[-1][1] != load:
             start = result[-1][0] - STALE
-            own = [k for k in jumps if start < power.time[k] and power.time[k + 1] <= time]
-            if own:
-                before = float(power.time[own[0]])
-                behind = float(power.time[own[-1] + 1])
+            first = int(np.searchsorted(before_jumps, start, "right"))
+            end = int(np.searchsorted(behind_jumps, time, "right"))
+            if first < end:
+                before = float(before_jumps[first])
+                behind = float(behind_jumps[end - 1])
                 old = result[-1][1]
                 while result and result[-1][0] > before and result[-1][1] == old:
                     result.pop()

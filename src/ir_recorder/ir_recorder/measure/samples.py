@@ -333,5 +333,7 @@ def _loads(runs: LoadRuns, middles: FloatArray) -> tuple[tuple[tuple[Load, ...],
     for start, end, loads in runs:
         if loads not in held:
             held.append(loads)
-        load[(middles >= start) & (middles <= end)] = held.index(loads)
+        first = int(np.searchsorted(middles, start, "left"))
+        behind = int(np.searchsorted(middles, end, "right"))
+        load[first:behind] = held.index(loads)
     return tuple(held), load

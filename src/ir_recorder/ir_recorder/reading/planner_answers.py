@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import islice
@@ -265,17 +265,48 @@ def _driven_plans(
         last = islice(_plans(recorded, definition), 1)
         return tuple(_Driven(plan, data, True) for plan, data in last)
     found: list[_Driven] = []
+    answers_of = _answers_by_id(recorded, driven, definition)
     for program, trajectories in driven.items():
         ids = (
             {program} if program else trajectories - {""}
         )  # steps that a client handed over have no name
-        named = [
-            answer for answer in recorded if ids and all(each.encode() in answer for each in ids)
-        ]
-        plans = [each for each in _plans(named, definition) if ids <= _ids(each[0])]
-        own = [each for each in plans if program in ("", each[0].texts("program_id")[0])]
-        found += [_Driven(plan, data, bool(own)) for plan, data in (own or plans)[:1]]
+        named = answers_of.get(min(ids), []) if ids else []
+        plans = [each for each in named if ids <= each.ids]
+        own = [each for each in plans if program in ("", each.program)]
+        for each in (own or plans)[:1]:
+            plan, data = next(_plans([each.data], definition))
+            found.append(_Driven(plan, data, bool(own)))
     return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Named:
+    """An answer with a program, and the ids that it names."""
+
+    data: bytes
+    program: str
+    ids: frozenset[str]
+
+
+def _answers_by_id(
+    recorded: Iterable[bytes], driven: Mapping[str, set[str]], definition: str
+) -> dict[str, list[_Named]]:
+    """Answers by each id of a driven program or trajectory that they name, in their order.
+
+    Each answer is read once: a file may name a hundred thousand programs.
+    """
+    wanted = {*driven, *(each for own in driven.values() for each in own)} - {""}
+    written = {each.encode() for each in wanted}
+    found: dict[str, list[_Named]] = {}
+    for answer in recorded:
+        if answer[1:2] != b"\0" and written.isdisjoint(answer.split(b"\0")):
+            continue  # in little-endian CDR a text stands between zeros
+        for plan, data in _plans([answer], definition):
+            ids = frozenset(_ids(plan))
+            named = _Named(data, plan.texts("program_id")[0], ids)
+            for each in ids & wanted:
+                found.setdefault(each, []).append(named)
+    return found
 
 
 def _plans(recorded: Iterable[bytes], definition: str) -> Iterator[tuple[Columns, bytes]]:
