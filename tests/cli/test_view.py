@@ -24,9 +24,12 @@ from ir_cli.view import server as loopback
 from ir_cli.view.background import Inbox
 from ir_cli.view.cell_file import STILL, Watched
 from ir_cli.view.clearance import names_in
+from ir_cli.view.panel import legend_html
+from ir_cli.view.playback import motion_of
 from ir_cli.view.server import closed, opened
 from ir_cli.view.session import Session
 from ir_description import load_cell
+from ir_planner import Planner
 
 PATIENCE = 60.0  # s: a busy machine
 DIRECT = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # what is here needs no proxy
@@ -385,3 +388,13 @@ def test_ctrl_c_ends_it_and_what_it_plans() -> None:
         process.kill()
     assert process.returncode == 130
     assert said == ""
+
+
+def test_the_legend_says_the_peak_of_the_plan() -> None:
+    """As `ir plan` and a comparison say it, not the largest of the samples that are drawn."""
+    planner = Planner("open", clock=lambda: 0.0)
+    plan = planner.plan_program(stations=("p1", "home"), start=planner.cell.machine_home)
+    motion = motion_of(plan.movements, planner.cell, planner.scene)
+    assert motion is not None
+    assert motion.watts.max() <= motion.peak == plan.report.peak_power
+    assert f"to {plan.report.peak_power / 1e3:.1f} kW at the mains" in legend_html(motion)

@@ -225,7 +225,7 @@ class Drawing:
         corners = signs * zone.size @ zone.pose[:3, :3].T + zone.pose[:3, 3]
         edges = corners[np.array(_BOX)]
         self._shown["zones"].append(self._lines(f"/machines/{name}/zone", edges, ZONE, 1.5))
-        top = np.array([zone.pose[0, 3], zone.pose[1, 3], corners[:, 2].max() + 0.1])
+        top = np.array([zone.pose[0, 3], zone.pose[1, 3], corners[:, 2].max() + 0.3])
         self._shown["labels"].append(scene.add_label(f"/machines/{name}/name", name, position=top))
         for station in self.cell.stations:
             if station.equipment == name:

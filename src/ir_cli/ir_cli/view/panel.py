@@ -145,7 +145,7 @@ def legend_html(motion: PlayedMotion) -> str:
     """The colours of the path with the watts that they mean."""
     stops = ",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in SCALE)
     low = motion.watts.min() / 1e3
-    high = motion.watts.max() / 1e3
+    high = motion.peak / 1e3
     bar = f"<div style='height:8px;background:linear-gradient(to right,{stops})'></div>"
     note = "<br>pauses are played in 1 s at most" if motion.shortened else ""
     return f"<div {_BOX}>{bar}{low:.1f} kW to {high:.1f} kW at the mains{note}</div>"

@@ -55,6 +55,11 @@ class PlayedMotion:
         """Seconds that it is played."""
         return float(self.time[-1])
 
+    @property
+    def peak(self) -> float:
+        """Largest power at the mains [W], as the plan's reports have it; samples lie below."""
+        return max(step.movement.report.peak_power for step in self.steps)
+
     def at(self, time: float) -> int:
         """The sample that is shown at a time [s]."""
         return min(int(np.searchsorted(self.time, time)), len(self.time) - 1)
