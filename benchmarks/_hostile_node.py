@@ -7,6 +7,8 @@ from __future__ import annotations
 import os
 import socket
 import struct
+import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -19,21 +21,24 @@ from typing import Any
 
 import numpy as np
 from _node_process import running
+from rclpy.action import ActionClient
 from rclpy.logging import LoggingSeverity, set_logger_level
 from rclpy.qos import QoSProfile
+from sensor_msgs.msg import JointState
 
 from ir_msgs.action import ExecuteTrajectory
-from ir_msgs.msg import ControllerState, PlcInputs, PowerState
+from ir_msgs.msg import CellState, ControllerState, PlcInputs, PowerState
 from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, StartPause
 from ir_msgs_py import names
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
-from ir_msgs_py.ros.topics import SERVICE
+from ir_msgs_py.ros.topics import ACTION_SERVICES, LATCHED, SERVICE
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.plc.modbus import COILS
 
 AT_ONCE = 50  # requests under way
+GIVEN_UP = 15.0  # s after its death in which a client is forgotten, on a busy machine
 ANSWERED = 60.0  # s, for a lump of requests
 PRESS = struct.pack(">HHHBBHH", 1, 0, 6, 1, 5, COILS.index("emergency_stop"), 0xFF00)
 RELEASE = PRESS[:-2] + b"\0\0"
@@ -117,6 +122,70 @@ def attack(calls: int, presses: int) -> list[dict[str, Any]]:
             ),
         ]
         return [_row(driver, *work) for work in works]
+
+
+def killed_row(clients: int) -> dict[str, Any]:
+    """Clients that are killed with goals that wait, and how many of these moved the robot after
+    the middleware has given their client up.
+    """
+    went_on = 0
+    with prey() as driver:
+        speeds: list[float] = []
+        driver.client.subscribe(
+            names.JOINT_STATES,
+            JointState,
+            lambda msg: speeds.append(float(np.abs(msg.velocity).max())),
+        )
+        for _ in range(clients):
+            with subprocess.Popen([sys.executable, __file__]) as client:
+                driver.client._executor.wait_until(lambda: speeds[-1:] > [1e-3], ANSWERED)
+                time.sleep(1.0)
+                client.kill()
+            time.sleep(GIVEN_UP)
+            del speeds[:]
+            driver.client._executor.wait_until(lambda: len(speeds) > 1000, ANSWERED)
+            went_on += max(speeds) > 1e-3
+    return {"case": "killed clients", "cases": clients, "went_on": went_on}
+
+
+def send_and_wait() -> None:
+    """Goals there and back, 31 of them, by a client that ends only when it is killed."""
+    with Client(timeout=ANSWERED) as client:
+        q = client.next_message(names.CONTROLLER_STATE, ControllerState).reference.positions
+        node = client.node
+        run = client._executor.run
+        action = run(
+            lambda: ActionClient(
+                node, ExecuteTrajectory, names.EXECUTE_TRAJECTORY, **ACTION_SERVICES
+            )
+        )
+        client._executor.wait_until(action.server_is_ready, ANSWERED)
+        start = np.array(q)
+        for k in range(31):
+            target = start + (0.0 if k % 2 else 0.3) * np.eye(6)[0]
+            path = JointTrajectory.from_seconds(
+                names.JOINT_NAMES, [60.0], target[None], np.zeros((1, 6))
+            )
+            goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(path))
+            run(lambda goal=goal: action.send_goal_async(goal))
+        time.sleep(600.0)
+
+
+def cells_row() -> dict[str, Any]:
+    """Cells that no driver can take, and how many of them ended it."""
+    texts = ("", "{", "1", "name: x", "name: x\nrobot: {name: kr210}", "a: " + "[" * 10_000)
+    ended = 0
+    with prey() as driver:
+        node = driver.client.node
+        run = driver.client._executor.run
+        publisher = run(lambda: node.create_publisher(CellState, names.CELL, LATCHED))
+        driver.client._executor.wait_until(lambda: publisher.get_subscription_count() > 0, ANSWERED)
+        for text in texts:
+            run(lambda text=text: publisher.publish(CellState(name="x", cell_yaml=text)))
+            del driver.modes[:]
+            heard = driver.client._executor.wait_until(lambda: len(driver.modes) > 100, ANSWERED)
+            ended += not heard or call(names.QUERY_MODES, QueryModes.Request(), driver, 1) > 0
+    return {"case": "cells", "cases": len(texts), "ended": ended}
 
 
 def _row(driver: Prey, what: str, count: int, act: Callable[[Prey, int], int]) -> dict[str, Any]:
@@ -266,3 +335,7 @@ def _recover(driver: Prey) -> None:
         driver.client.call(names.RECOVER, Recover.Request())
         if executor.wait_until(stands, 0.2):
             return
+
+
+if __name__ == "__main__":
+    send_and_wait()

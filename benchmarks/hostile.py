@@ -17,6 +17,7 @@ import argparse
 import importlib.util
 import resource
 import sys
+import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -26,7 +27,7 @@ from typing import Any
 
 import numpy as np
 from _hostile_floods import floods
-from _hostile_node import attack
+from _hostile_node import attack, cells_row, killed_row
 from _hostile_stops import stops_row
 from _results import Claim, add_ending, at_least, at_most, finish, line_of
 
@@ -101,14 +102,31 @@ def deviation_row(cases: int, seed: int) -> dict[str, Any]:
 
 def law() -> ModuleType:
     """The walk and the sequences of tests/driver/test_stop_law.py."""
-    name = "test_stop_law"
-    spec = importlib.util.spec_from_file_location(name, FAULTS.parent / "driver" / f"{name}.py")
+    return module_of("driver", "test_stop_law")
+
+
+def module_of(folder: str, name: str) -> ModuleType:
+    """A module of a folder of the tests."""
+    spec = importlib.util.spec_from_file_location(name, FAULTS.parent / folder / f"{name}.py")
     if spec is None or spec.loader is None:
-        raise FileNotFoundError(f"{name}.py is not in {FAULTS.parent / 'driver'}")
+        raise FileNotFoundError(f"{name}.py is not in {FAULTS.parent / folder}")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # its dataclasses look themselves up
     spec.loader.exec_module(module)
     return module
+
+
+def writers_row(pairs: int) -> dict[str, Any]:
+    """Pairs of writers of one file, and whether one of them lost anything without saying so."""
+    lost = 0
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            tested = module_of("recorder", "test_writer")
+            tested.test_of_a_pair_of_writers_one_is_refused_and_nothing_is_lost(Path(folder), pairs)
+        except AssertionError as error:
+            print(error)
+            lost = 1
+    return {"case": "writers", "cases": pairs, "lost": lost}
 
 
 def sequence_row(count: int, steps: int) -> dict[str, Any]:
@@ -208,6 +226,10 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
         ),
         at_least("interleavings of stops on a node", total("node stops", "cases"), "", 10_000),
         at_most("of them that break the law of stops", total("node stops", "wrong"), "", 0),
+        at_least("pairs of writers", total("writers", "cases"), "", 200),
+        at_most("of them that lost anything", total("writers", "lost"), "", 0),
+        at_most("cells that ended the driver", total("cells", "ended"), "", 0),
+        at_most("killed clients whose goals went on", total("killed clients", "went_on"), "", 0),
         at_most("presses under floods lost", total("press", "lost"), "", 0),
         at_most("presses under floods, p99.9", latest, "ms", 50.0),
         at_most("memory after a flood, of before", kept, "%", 120.0),
@@ -249,6 +271,9 @@ def main() -> None:
     show(sequence_row(50, 200) if given.quick else sequence_row(2_000, 200))
     for row in walk_rows(4 if given.quick else 8):
         show(row)
+    show(writers_row(200))
+    show(cells_row())
+    show(killed_row(1 if given.quick else 5))
     for row in attack(200, 12) if given.quick else attack(5_000, 334):
         show(row)
     show(stops_row(50, FIRST_SEED) if given.quick else stops_row(10_000, FIRST_SEED))
