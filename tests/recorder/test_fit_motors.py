@@ -1,18 +1,21 @@
-"""Fits by what a controller says of its motors, over several recordings, and their worth."""
+"""Fits by what a controller says of its motors, by meters that read seldom, over several
+recordings; and their worth.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from ir_description import PowerParameters, RobotModel, data_sheet_of, load_robot
+from ir_description import PowerParameters, RobotModel, data_sheet_of, load_cell, load_robot
 from ir_recorder.errors import RecorderError
 from ir_recorder.fit import Estimate, LeftOut, fit, left_out, recommendation, shaft_work
-from ir_recorder.fit.data import without_turns
-from ir_recorder.measure import PowerModel, Samples
+from ir_recorder.fit.data import Source, fit_data, without_turns
+from ir_recorder.measure import PowerModel, Samples, samples_of
 from ir_recorder.measure.arm import arm_torques
 from ir_recorder.traces import Trace
 
@@ -153,3 +156,77 @@ def test_too_little_is_refused_with_what_there_is() -> None:
     short: Sequence[Samples] = [told(moved(robot, 1, 2.0), model, prior.mean)]
     with pytest.raises(RecorderError, match=r"2\.0 s have torques"):
         fit(short, model, prior, motors=True)
+
+
+REST = 90.0
+
+
+def seen(samples: Samples, model: PowerModel, mean: np.ndarray, period: float) -> Samples:
+    """The samples with a meter that reads every so many seconds, and not where the samples end."""
+    watts = model.watts(mean, model.prepare(samples)) + REST
+    time = np.arange(0.037, samples.time[-1], period)
+    edges = np.concatenate([[0.0], samples.time + 0.5 * samples.step])
+    count = np.concatenate([[0.0], np.cumsum(watts * samples.step)])
+    energy = np.interp(time, edges, count)
+    names = model.layout.joints
+    columns = {name: samples.q[:, k].copy() for k, name in enumerate(names)}
+    joints = Trace("joints", samples.time, columns)
+    meter = Trace("meter", time, {"energy": energy})
+    return samples_of(joints, meter, names, model.layout.modes, [(-np.inf, np.inf, ())])
+
+
+@pytest.mark.parametrize("period", [0.04, 0.1, 0.2])
+def test_what_is_predicted_is_averaged_as_the_meter_does(period: float) -> None:
+    model, prior = model_of(load_robot("kr6_r900_2"))
+    samples = seen(moved(load_robot("kr6_r900_2"), 3), model, prior.mean, period)
+    assert samples.readings is not None
+    watts = model.watts(prior.mean, model.prepare(samples)) + REST
+    shown = samples.metered(watts)
+    inner = slice(30, -30)  # beside both ends
+    plain = np.sqrt(np.mean((watts - samples.watts)[inner] ** 2))
+    assert np.sqrt(np.mean((shown - samples.watts)[inner] ** 2)) < 0.35 * plain
+    assert shown.sum() == pytest.approx(watts.sum())
+    assert samples.metered(shown) == pytest.approx(shown)
+    both = np.column_stack([watts, 2.0 * watts])
+    assert samples.metered(both)[:, 1] == pytest.approx(2.0 * shown)
+    fine = replace(samples, readings=None)
+    assert fine.metered(watts) is watts
+
+
+def test_friction_is_found_by_a_meter_of_ten_readings_a_second() -> None:
+    robot = load_robot("kr6_r900_2")
+    model, prior = model_of(robot)
+    truth = truth_of(prior, 5)
+    standing = replace(prior, covariance=prior.covariance + np.diag(_open(prior.names, 30.0)))
+    runs = [seen(moved(robot, seed), model, truth, 0.1) for seed in (1, 2)]
+    found = fit(runs, model, standing)
+    for movement in found.movements:
+        assert abs(movement.after / movement.measured - 1.0) < 0.03
+
+
+def _open(names: tuple[str, ...], deviation: float) -> np.ndarray:
+    return np.array([deviation**2 if name.startswith("watts.") else 0.0 for name in names])
+
+
+@pytest.mark.parametrize(("period", "shift"), [(0.1, 1.37), (0.2, -2.4), (0.04, 0.5)])
+def test_the_clock_of_a_slow_meter_is_found(period: float, shift: float, tmp_path: Path) -> None:
+    """A reading is the mean since the one before: it belongs to the middle between them."""
+    robot = load_robot("kr6_r900_2")
+    model, prior = model_of(robot)
+    samples = moved(robot, 6, 20.0)
+    watts = model.watts(prior.mean, model.prepare(samples)) + REST
+    each = round(period / samples.step)
+    means = watts[: len(watts) // each * each].reshape(-1, each).mean(axis=1)
+    time = period * (np.arange(len(means)) + 1)
+    heads = ",".join(["time", *robot.joint_names])
+    rows = np.column_stack([samples.time, samples.q])
+    np.savetxt(tmp_path / "joints.csv", rows, "%.9g", ",", header=heads, comments="")
+    meter = tmp_path / "meter.csv"
+    np.savetxt(
+        meter, np.column_stack([time + shift, means]), "%.9g", ",", header="time,power", comments=""
+    )
+    source = Source(tmp_path / "joints.csv", meter, cell=load_cell("kr6_bench"), load="none")
+    data = fit_data(source, prior)
+    (said,) = (note for note in data.notes if "on its clock" in note)
+    found = float(said.split(": ")[1].split(" s ")[0])
+    assert found == pytest.approx(-shift, abs=0.02)

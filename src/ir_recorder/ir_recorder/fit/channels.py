@@ -92,14 +92,17 @@ class Meter:
     def predicted(self, x: FloatArray, softness: float) -> tuple[FloatArray, FloatArray]:
         """Watts (R,) and their slopes (R, P + E)."""
         mean = x[: len(x) - self._extra]
-        found = [self._model.watts_and_slopes(mean, run.prepared, softness) for run in self._runs]
-        slopes = self.reduced([each for _, each in found])
-        none = np.zeros((len(slopes), self._extra))
-        return self.reduced([watts for watts, _ in found]), np.hstack([slopes, none])
+        watts, slopes = [], []
+        for run in self._runs:
+            found = self._model.watts_and_slopes(mean, run.prepared, softness)
+            watts.append(run.samples.metered(found[0]))
+            slopes.append(run.samples.metered(found[1]))
+        rows = self.reduced(slopes)
+        return self.reduced(watts), np.hstack([rows, np.zeros((len(rows), self._extra))])
 
     def watts(self, mean: FloatArray) -> list[FloatArray]:
-        """Watts (M,) of every sample of each recording."""
-        return [self._model.watts(mean, run.prepared) for run in self._runs]
+        """Watts (M,) of every sample of each recording, as its meter shows them."""
+        return [run.samples.metered(self._model.watts(mean, run.prepared)) for run in self._runs]
 
     def time(self) -> FloatArray:
         """Seconds (R,) of the rows on their recordings' clocks."""

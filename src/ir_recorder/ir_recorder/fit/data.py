@@ -322,15 +322,14 @@ def _aligned(
     one.
     """
     if meter is not None:
-        time = meter.time
-        watts = _watts(meter)
+        time, watts = _watts(meter)
         what = "the recorded power"
     else:
         samples = samples_of(joints, None, prior.joints, prior.modes, runs)
         time = samples.time
         watts = model.watts(prior.mean, model.prepare(samples))
         what = "the power that the data sheet predicts"
-    offset = clock_offset(time, watts, outer.time, _watts(outer))
+    offset = clock_offset(time, watts, *_watts(outer))
     note = (
         f"{outer.source}: {offset.seconds:+.3f} s on its clock agrees with {what} by "
         f"{offset.correlation:.2f}"
@@ -338,9 +337,9 @@ def _aligned(
     return outer.shifted(offset.seconds), note
 
 
-def _watts(meter: Trace) -> FloatArray:
-    """Mean watts (N,) by the meter's count, the first as the second."""
+def _watts(meter: Trace) -> tuple[FloatArray, FloatArray]:
+    """Middles (N - 1,) s between readings, and the mean watts (N - 1,) there."""
     joules = meter.joules()
     assert joules is not None  # only metered traces come here
-    means = np.diff(joules) / np.diff(meter.time)
-    return np.concatenate([means[:1], means])
+    middles = 0.5 * (meter.time[1:] + meter.time[:-1])
+    return middles, np.diff(joules) / np.diff(meter.time)

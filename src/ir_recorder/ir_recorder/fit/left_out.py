@@ -193,7 +193,8 @@ def _features(estimate: Estimate, run: Run) -> FloatArray:
     arm = run.prepared.torques
     torque = arm.links + arm.loads + arm.rotors - arm.counterbalance
     modes = samples.mode[:, None] == np.arange(len(estimate.prior.modes))
-    return np.hstack([torque * qd, torque**2, np.abs(qd), qd**2, qdd * qd, modes])
+    features = np.hstack([torque * qd, torque**2, np.abs(qd), qd**2, qdd * qd, modes])
+    return samples.metered(features)
 
 
 _SEEN = 0.01  # of a feature's size: with less of it nothing is learnt of it

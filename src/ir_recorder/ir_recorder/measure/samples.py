@@ -38,7 +38,8 @@ class Samples:
     UNKNOWN in transitions and where nobody knows; load (M,): place in `loads`, UNKNOWN as well.
     watts (M,): mean at the mains, NaN where it wasn't measured. motors (M,): whether the drives are
     on. effort (M, n): what the controller says of its motors, Nm at the joints, or A (currents);
-    None where it says nothing.
+    None where it says nothing. readings (K,) s: when a meter read that reads more seldom than at
+    every step; None for others.
     """
 
     step: float
@@ -53,6 +54,7 @@ class Samples:
     loads: tuple[tuple[Load, ...], ...]
     effort: FloatArray | None = None
     currents: bool = False
+    readings: FloatArray | None = None
 
     @property
     def known(self) -> BoolArray:
@@ -75,9 +77,27 @@ class Samples:
         arrays = {
             field.name: getattr(self, field.name)[rows]
             for field in fields(self)
-            if isinstance(getattr(self, field.name), np.ndarray)
+            if isinstance(getattr(self, field.name), np.ndarray) and field.name != "readings"
         }
         return replace(self, **arrays)
+
+    def metered(self, values: FloatArray) -> FloatArray:
+        """Values (M, ...) as `watts` would show them: means between two readings of the meter."""
+        if self.readings is None or len(self) == 0:
+            return values
+        edges = self.time[0] + self.step * (np.arange(len(self) + 1) - 0.5)
+        inside = self.readings[(self.readings > edges[0]) & (self.readings < edges[-1])]
+        times = np.concatenate([edges[:1], inside, edges[-1:]])
+        total = np.concatenate([np.zeros_like(values[:1]), np.cumsum(values, axis=0)])
+        return np.diff(_linear(edges, times, _linear(times, edges, total)), axis=0)
+
+
+def _linear(at: FloatArray, times: FloatArray, values: FloatArray) -> FloatArray:
+    """Values (K, ...) at rising times (K,), linear between them, at other times (L,) within."""
+    k = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
+    share = (at - times[k]) / (times[k + 1] - times[k])
+    share = share.reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray((1.0 - share) * values[k] + share * values[k + 1])
 
 
 def movements(
@@ -151,6 +171,7 @@ def differentiated(values: FloatArray, step: float, bandwidth: float = BANDWIDTH
 
 STEP = 0.01  # s
 MOST_SAMPLES = 720_000  # two hours
+_SELDOM = 1.5  # steps between two readings of a meter that averages over more than a sample
 _SAME_PLACE = 0.001  # rad: a robot that is there again after a gap was at rest in it
 _FASTEST = 0.001  # s: finer positions are thinned
 _MOTORS = "STAND_ON_MOTORS"
@@ -199,7 +220,12 @@ def samples_of(
         for start, length in meter.gaps():
             watts[(edges[1:] > start) & (edges[:-1] < start + length)] = np.nan
     effort, currents = _effort(joints, joint_names, edges)
-    return Samples(step, middles, q, qd, qdd, mode, load, motors, watts, held, effort, currents)
+    readings = None
+    if meter is not None and energy is not None and np.median(np.diff(meter.time)) > _SELDOM * step:
+        readings = meter.time
+    return Samples(
+        step, middles, q, qd, qdd, mode, load, motors, watts, held, effort, currents, readings
+    )
 
 
 def _effort(
