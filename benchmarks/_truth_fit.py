@@ -66,6 +66,11 @@ class Test:
 
 def measured(asked: Asked) -> Found:
     """Errors of energies and powers over the plants, and how often the interval holds."""
+    return driven(asked)[0]
+
+
+def driven(asked: Asked) -> tuple[Found, list[bool]]:
+    """The same, and of every movement whether its interval after the fit holds."""
     planner = planner_in(CELL, PlannerSettings())
     prior = data_sheet()
     programme = plan_programme(planner, prior, QUICK if asked.quick else FULL)
@@ -77,7 +82,8 @@ def measured(asked: Asked) -> Found:
     )
     plants: list[Plant] = over_seeds(rig.plant, range(asked.seeds))
     off = [] if asked.quick else over_seeds(rig.stepped, range(min(STEPPED, asked.seeds)))
-    return Found([plant.row() for plant in plants], [*_claims(plants), *_stepped_claims(off)])
+    found = Found([plant.row() for plant in plants], [*_claims(plants), *_stepped_claims(off)])
+    return found, [inside for plant in plants for inside in plant.covered["after"]]
 
 
 def _to_first(planner: Planner, first: Test) -> Test:

@@ -197,3 +197,15 @@ def test_a_trace_that_was_cut_or_lacks_its_numbers_is_refused(tmp_path: Path) ->
     numbers.unlink()
     with pytest.raises(RecorderError, match="is not beside the header"):
         read(path)
+
+
+def test_power_of_a_ur_is_its_voltage_times_its_current(tmp_path: Path) -> None:
+    rows = timed(0.008, np.radians(degrees()))
+    volts = 48.0 + 0.01 * np.arange(COUNT)
+    amperes = 1.0 + 0.02 * np.arange(COUNT)
+    heads = ["timestamp", *(f"actual_q_{k}" for k in range(6))]
+    heads += ["actual_robot_voltage", "actual_robot_current"]
+    table(tmp_path / "log.csv", heads, np.column_stack([rows, volts, amperes]), " ")
+    trace = read(tmp_path / "log.csv")
+    check(trace, 0.008)
+    assert trace.columns["power"] == pytest.approx(volts * amperes)

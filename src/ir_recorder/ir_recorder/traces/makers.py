@@ -11,14 +11,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
 
 from ir_recorder.errors import RecorderError
 from ir_recorder.traces.columns import FACTORS, Column, TraceMapping, unit_of
-from ir_recorder.traces.trace import CURRENT, TIME, VELOCITY
+from ir_recorder.traces.trace import CURRENT, POWER, TIME, VELOCITY
 from ir_values.arrays import FloatArray
 
 _TURN = 2.0 * math.pi
@@ -37,11 +37,13 @@ class _Family:
     of: str
     time: tuple[str, str] = ("", "")
     more: tuple[tuple[str, str, str], ...] = ()  # further columns: name, ending, unit
+    power: tuple[str, ...] = ()  # columns in V and A whose product is W
 
 
 _RTDE = (("actual_qd_{}", VELOCITY, "rad/s"), ("actual_current_{}", CURRENT, "a"))
+_RTDE_POWER = ("actual_robot_voltage", "actual_robot_current")
 _FAMILIES = (
-    _Family("actual_q_{}", 0, "rad", "UR's RTDE", ("timestamp", "s"), _RTDE),
+    _Family("actual_q_{}", 0, "rad", "UR's RTDE", ("timestamp", "s"), _RTDE, _RTDE_POWER),
     _Family("actual_q{}", 0, "rad", "UR's RTDE", ("timestamp", "s")),
     *(
         _Family(f"aipos{sign}a{{}}", 1, "deg", "KUKA's RSI", ("ipoc", "ms"))
@@ -160,7 +162,10 @@ def _columns(
 def _further(
     family: _Family, joint_names: Sequence[str], places: Mapping[str, str]
 ) -> Iterator[tuple[str, Column]]:
-    """Speeds and currents that the format has of all joints."""
+    """Speeds and currents that the format has of all joints, and its power."""
+    if family.power and set(family.power) <= set(places) and POWER not in places:
+        volts, *others = (Column(places[name]) for name in family.power)
+        yield POWER, replace(volts, others=tuple(others))
     for pattern, ending, unit in family.more:
         found = [places.get(pattern.format(family.first + k)) for k in range(len(joint_names))]
         own = [heading for heading in found if heading is not None]
