@@ -17,6 +17,7 @@ from oracles import torques
 
 from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
+from ir_planner import Planner
 from ir_planner.regional import MovementPlan
 from ir_planner.request.context import Work
 from ir_planner.scene.planning_scene import PlanningScene
@@ -141,3 +142,23 @@ def test_asynchronous_joints_never_take_longer_and_the_answer_names_its_timing(
         assert "synchronous" in note
     else:
         assert own.info.timing == "asynchronous"
+
+
+@pytest.mark.parametrize("cell", ["open", "table_columns", "deep_box"])
+@pytest.mark.parametrize("seed", range(4))
+def test_movement_cost_is_no_more_than_that_of_the_answer_for_energy(cell: str, seed: int) -> None:
+    planner = Planner(cell, clock=lambda: 0.0)
+    robot = planner.cell.robot
+    draw = np.random.default_rng([seed, 17])
+    ends: list[np.ndarray] = []
+    while len(ends) < 2:
+        q = draw.uniform(0.7 * robot.position_min, 0.7 * robot.position_max)
+        q = np.clip(q, robot.position_min, robot.position_max)
+        if planner.check_state(q).valid:
+            ends.append(q)
+    start, goal = ends
+    cheapest = planner.plan_regional(start=start, goal=goal)
+    if not cheapest.status.ok:
+        pytest.skip("no path")
+    least = planner.plan_regional(start=start, goal=goal, objective="movement_cost")
+    assert least.report.movement_cost <= cheapest.report.movement_cost * (1.0 + 1e-9)

@@ -87,9 +87,22 @@ def best_found(exploration: Exploration, context: Context) -> tuple[Answer | Non
         least, duration = _as_asked(_optimised_again(own, context.asking("movement_cost")), context)
         best = _cheaper(best, least)
         shortest = min(shortest, duration)
-    if options.objective == "energy" and options.duration <= 0.0 and best is not None:
-        best = best[0], _least_over_durations(best[1], context)
+    if options.duration <= 0.0:
+        best = _held_against_others(best, exploration, context)
     return best, shortest
+
+
+def _held_against_others(
+    best: Answer | None, exploration: Exploration, context: Context
+) -> Answer | None:
+    """The best answer of free duration, or a better one that other durations or J lead to."""
+    objective = context.options.objective
+    if objective == "energy" and best is not None:
+        return best[0], _least_over_durations(best[1], context)
+    if objective == "movement_cost":
+        other = _explored(exploration, context.asking("time_and_energy"))
+        return _cheaper(best, _as_asked(other.best(), context)[0])
+    return best
 
 
 def _least_over_durations(best: Movement, context: Context) -> Movement:
