@@ -48,8 +48,8 @@ from ir_sim_driver.plc import STOP_BIT, TOPIC, Written
 from ir_values.errors import IrError
 
 PERIOD = 0.004  # s between two looks while nothing comes
-TURN = 64  # requests that one look answers: 2 ms
-_TAKEN = 512  # messages or requests that one look takes, about as long
+TURN = 64  # messages of a topic that one look takes, or requests that it answers: 2 ms
+_REQUESTS = 512  # that one look takes, about as long
 _LAST = 1.0  # s for the last answer
 _SAID_AGAIN = 60.0  # s between two warnings of one kind
 _PRESSED = f"{STOP_BIT} = TRUE"
@@ -343,7 +343,7 @@ def _taken(subscriptions: Sequence[tuple[Any, bool]]) -> Iterator[Heard]:
     """What waits, at most a turn of each."""
     ahead = time.time_ns() - time.monotonic_ns()
     for subscription, latching in subscriptions:
-        for _ in range(_TAKEN):
+        for _ in range(TURN):
             taken = take_bytes(subscription)
             if taken is None:
                 break
@@ -450,7 +450,7 @@ class PolledService:
     def _take(self) -> int:
         """Take a turn of what has come and answer the urgent ones; how many."""
         ahead = time.time_ns() - time.monotonic_ns()
-        for count in range(_TAKEN):
+        for count in range(_REQUESTS):
             taken = take_request(self._service)
             if taken is None:
                 return count
@@ -462,7 +462,7 @@ class PolledService:
                 self._waiting.append((request, header, came))
             else:
                 self._refuse(header)
-        return _TAKEN
+        return _REQUESTS
 
     def _answer(self, request: Any, header: Any, came: int, *, urgent: bool = False) -> None:
         response = self._type.Response()
