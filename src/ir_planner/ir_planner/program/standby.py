@@ -475,8 +475,7 @@ def _known_modes(scene: PlanningScene) -> list[str]:
 
 def break_even(name: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> float:
     """Pause [s] at q (n,) from which a mode saves against the next shallower one, both entered from
-    motors;
-    inf: never.
+    motors, and never shorter than it can be entered and left in; inf: never.
     """
     known = _known_modes(scene)
     k = known.index(name)
@@ -491,7 +490,10 @@ def break_even(name: str, q: FloatArray, scene: PlanningScene, times: Transition
         for mode, power in zip((shallower, deeper), watts, strict=True)
     ]
     gain = watts[0] - watts[1]
-    return float("inf") if gain <= 0.0 else max((extra[1] - extra[0]) / gain, 0.0)
+    if gain <= 0.0:
+        return float("inf")
+    shortest = times.enter(deeper) + times.minimum_stay(deeper) + times.leave(deeper)
+    return max((extra[1] - extra[0]) / gain, shortest)
 
 
 # Where to wait: at which of some postures a pause costs least, moving there and back included.
