@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import CartesianPath, CartesianSegment
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_values.arrays import FloatArray
 
 # The few names of the planner that a comparison needs, wherever a checkout keeps them.
 #

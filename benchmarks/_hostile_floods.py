@@ -29,9 +29,9 @@ from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import PlcInputs
 from ir_msgs.srv import QueryModes, SetPlcInput
 from ir_msgs_py import names
-from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.topics import SERVICE
+from ir_values.errors import IrError
 
 LOST = 20.0  # s after which a press counts as lost
 POINTS = 20_000
@@ -92,7 +92,7 @@ def _goals(client: Client) -> Callable[[], None]:
     goal = ExecuteTrajectory.Goal(trajectory=_long())
 
     def send() -> None:
-        with suppress(MsgsError):  # what a flood gets
+        with suppress(IrError):  # what a flood gets
             client.send_goal(names.EXECUTE_TRAJECTORY, goal, None, 60.0)
 
     return send

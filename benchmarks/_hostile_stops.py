@@ -31,12 +31,12 @@ from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import PlcInputs
 from ir_msgs.srv import Recover, SetPlcInput
 from ir_msgs_py import names
-from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.topics import ACTION_SERVICES
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_values.errors import IrError
 
 NEW = 5  # axis of the goals that are sent after the recovery
 STILL = 1e-3  # rad; a motor that is switched on again takes up less
@@ -311,10 +311,10 @@ def stops_row(count: int, seed: int) -> dict[str, Any]:
         for k in range(count):
             try:
                 episode(driven, random.Random(seed * 1_000_000 + k))
-            except (BrokenLawError, MsgsError, OSError) as error:
+            except (BrokenLawError, IrError, OSError) as error:
                 print(f"episode {k} of seed {seed}: {type(error).__name__}: {error}", flush=True)
                 wrong += 1
-                with suppress(MsgsError):
+                with suppress(IrError):
                     driven.rest()
                     driven.run()
     seconds = time.monotonic() - began

@@ -15,7 +15,7 @@ import numpy as np
 
 from ir_description import PowerData, RobotModel, load_robot
 from ir_description.robot import DcLink, without_table
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 ESTIMATED = 0.08  # share of the peak torque: Coulomb friction, and viscous at full speed
 _COPPER = 0.03  # share of the peak power at peak torque

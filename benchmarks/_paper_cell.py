@@ -16,10 +16,10 @@ from matplotlib.patches import Polygon
 from scipy.spatial import ConvexHull
 
 from ir_description import Cell, load_cell
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind
 from ir_recorder.report.shapes import body_mesh, capsule_mesh
+from ir_values.arrays import FloatArray
 
 CELL = "demo"
 COLOURS = {"OPEN": "tab:green", "SEMI_CLOSED": "tab:orange", "CLOSED": "tab:red"}

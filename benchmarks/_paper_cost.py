@@ -24,9 +24,9 @@ from _paper_result import (
 from _regional_ours import planner_of
 from scipy.stats import kendalltau
 
-from ir_msgs_py.arrays import FloatArray
 from ir_planner.scene import movement_cost
 from ir_planner.scene.planning_scene import movement_weights
+from ir_values.arrays import FloatArray
 
 # per seed
 PAIRS = 4000

@@ -20,7 +20,6 @@ from typing import cast
 import numpy as np
 from ompl import util
 
-from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.scene import PlanningScene, path_cost
@@ -28,6 +27,7 @@ from ir_planner.search import SEARCHES, Ends, fewest_corners, pulled
 from ir_planner.search.with_ompl import worker
 from ir_planner.search.with_ompl.host import Parameters, Problem
 from ir_planner.search.with_ompl.planners import OmplSearch
+from ir_values.arrays import FloatArray
 
 LATE_S = 60.0  # of wall time: a search that hangs is ended
 _FORK = multiprocessing.get_context("fork")  # the scene is large, and OMPL is loaded only once

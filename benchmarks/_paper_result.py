@@ -23,7 +23,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.stats import rankdata
 
-from ir_msgs_py.arrays import FloatArray, IntArray
+from ir_values.arrays import FloatArray, IntArray
 
 Row = dict[str, Any]
 

@@ -21,7 +21,7 @@ from _paper_result import (
 )
 from _paper_zones import KINDS, MOST, questions
 
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 EDGES = 6000  # checks of a search, in certified edges: one that spends them counts with them
 SIZES = (0, 1, 3, 10, 30, MOST)

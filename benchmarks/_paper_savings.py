@@ -24,9 +24,9 @@ from _paper_result import (
 )
 from _regional_ours import planner_of
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Goal, Planner
+from ir_values.arrays import FloatArray
 
 # per seed
 PAIRS = 1200

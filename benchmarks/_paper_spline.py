@@ -25,10 +25,10 @@ from _paper_result import (
 from _regional_ours import planner_of
 from scipy.interpolate import make_interp_spline
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import natural_durations, spline_through, virtual_knots
 from ir_planner.scene import torque_use
+from ir_values.arrays import FloatArray
 
 # per seed
 PAIRS = 250

@@ -24,7 +24,6 @@ from _paper_result import (
 )
 from _paper_stations import MARGIN, Place, cells_of, difference, of_reading, places
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_planner.request import Context, Work
 from ir_planner.scene import path_cost
@@ -32,6 +31,7 @@ from ir_planner.search import fewest_corners
 from ir_planner.service.exit import Exit
 from ir_planner.service.modified_ga import ModifiedGa, withdraw
 from ir_planner.service.withdrawals import ExitTree
+from ir_values.arrays import FloatArray
 
 CELLS = ("cnc_door", "deep_box", "demo")
 # of each cell and seed; searches per station and reading

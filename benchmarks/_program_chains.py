@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
@@ -25,6 +24,7 @@ from ir_planner.program.stops import Node
 from ir_planner.request import Context, Journal, Work
 from ir_planner.scene import PlanningScene
 from ir_planner.service import exit_searches, timed_service
+from ir_values.arrays import BoolArray, FloatArray
 
 # What no movement between two configurations can undercut: its time, its drive energy and W of eq.
 # (9).

@@ -23,11 +23,11 @@ from ir_krl import (
     parse,
     written,
 )
-from ir_msgs_py.arrays import FloatArray
 from ir_planner import Planner
 from ir_planner.krl import follow_krl, tool_in_flange
 from ir_planner.krl.execution import DrivenStep, drive
 from ir_planner.krl.export import attached
+from ir_values.arrays import FloatArray
 
 CORPUS = Path(__file__).parents[1] / "tests" / "krl" / "programs"
 CELL = "open"

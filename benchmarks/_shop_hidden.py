@@ -11,7 +11,7 @@ import numpy as np
 from _results import Claim, at_least, at_most
 
 from ir_krl import Effect, KrlError, Motion, SetOutput, Wait, follow, parse
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 PROGRAMS = 300
 QUICK_PROGRAMS = 60

@@ -9,10 +9,10 @@ import numpy as np
 from _results import Claim, at_least, at_most, line_of
 
 from ir_cli.smoothing import measured
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner
 from ir_planner.checks import movement_energy
+from ir_values.arrays import FloatArray
 
 VISIT = ("infeed_pick", "gauge_measure", "home")
 REST = 0.4  # s of standstill around each movement

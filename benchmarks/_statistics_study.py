@@ -18,7 +18,6 @@ from _results import Claim, at_least, at_most, line_of
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from ir_msgs_py.arrays import FloatArray
 from ir_recorder.analysis.intervals import alike, mean_of
 from ir_studies import Means, study_of
 from ir_studies.statistics import EXAMPLE, StatisticsSettings, run_statistics
@@ -26,6 +25,7 @@ from ir_studies.statistics.findings import Comparison
 from ir_studies.statistics.runs import Finished
 from ir_studies.statistics.settings import DRAWN
 from ir_studies.work.results import NAME
+from ir_values.arrays import FloatArray
 
 STATISTICS_PARTS = ("statistics",)
 QUICK = 8  # pairs

@@ -17,12 +17,12 @@ import numpy as np
 from ir_cli.excitation_programme import ProgrammeStep
 from ir_description import Cell, Load
 from ir_kernels.dynamics import DynamicsModel
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.measure import Samples, samples_of
 from ir_recorder.traces import Trace
 from ir_sim_driver.plant import BasePower, Plant, PowerMeter, Work
+from ir_values.arrays import FloatArray
 
 DT = 0.002  # s
 READING = 10  # steps between readings of the meter

@@ -31,7 +31,6 @@ from ir_description import (
     interval_over,
     load_power_data,
 )
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Goal, Planner, PlannerSettings
@@ -39,6 +38,7 @@ from ir_recorder.fit import fit
 from ir_recorder.measure import PowerModel, Samples, planned_samples, samples_of
 from ir_sim_driver.plant import typical_plant
 from ir_studies.simulated_run import SimulatedRun
+from ir_values.arrays import FloatArray
 
 TITLE = "energy before and after a fit, on plants drawn at random"
 CELL = "demo"

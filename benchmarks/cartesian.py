@@ -25,7 +25,6 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation, Slerp
 
 from ir_description import bundled_cells
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import CartesianPath, CartesianSegment
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
@@ -33,6 +32,7 @@ from ir_planner import CartesianPlan, Planner
 from ir_planner.cartesian.path_parts import parts_of
 from ir_planner.cartesian.tool_path import ToolPath, joined
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 # Random paths of the tool in a cell, and an oracle that looks for somebody who can drive a
 # path.

@@ -22,11 +22,11 @@ from _truth_section import Asked
 from scipy.stats import binomtest
 
 from ir_description import Load, PowerParameters, RobotModel, data_sheet_of
-from ir_msgs_py.arrays import FloatArray
 from ir_recorder.fit import Estimate, LeftOut, left_out, median_error, plain_torques, shaft_work
 from ir_recorder.fit.data import without_turns
 from ir_recorder.measure import PowerModel, Samples, samples_of
 from ir_recorder.traces import Trace, read_traces
+from ir_values.arrays import FloatArray
 
 UR3E = "ur3e_rad.csv"
 KR300 = "kr300_r2500_ultra_{}.csv"

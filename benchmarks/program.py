@@ -31,7 +31,6 @@ from _service_stations import margin_at
 
 from ir_description import Cell, cell_to_yaml, load_cell
 from ir_msgs_py.announcements import Event
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement
@@ -42,6 +41,7 @@ from ir_program_runner import Program, ProgramSettings
 from ir_program_runner import requests as ask
 from ir_sim_driver import TrajectoryGoal, make_simulation
 from ir_sim_driver.plant import carried
+from ir_values.arrays import FloatArray
 
 # A planned program on the simulated robot, as the program runner drives it, without real time:
 # what every step takes beside what was planned.

@@ -37,12 +37,12 @@ from sensor_msgs.msg import JointState
 
 from ir_description import cell_to_yaml, load_cell, robot_urdf
 from ir_msgs.msg import ControllerState, PlannedMovement, PowerState, ProgramState
-from ir_msgs_py.arrays import FloatArray
 from ir_recorder.errors import ReadError
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.reading.cdr import Columns
 from ir_recorder.reading.mcap_file import RawChannel, read_raw
 from ir_recorder.recording import CellFiles, RecordingSession, RecordingWriter
+from ir_values.arrays import FloatArray
 
 # The columns of many CDR messages: the project's reader beside mcap-ros2-support and rosbags.
 

@@ -18,7 +18,6 @@ import numpy as np
 from _results import at_most, command_line, finish, line_of
 
 from ir_description import load_cell, load_power_data
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import Mode, TransitionTimes
 from ir_msgs_py.names import NO_LOAD
 from ir_planner.checks.free_space import state_check
@@ -28,6 +27,7 @@ from ir_planner.program.standby import advice
 from ir_planner.scene import PlanningScene, load_text, scene_with
 from ir_sim_driver.controller import SimulationSettings, make_simulation
 from ir_sim_driver.power import IdleTimes
+from ir_values.arrays import FloatArray
 
 # Exhaustive search over sequences of power modes with timers, each simulated event by event;
 # shares no code with the planner.

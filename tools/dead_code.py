@@ -42,6 +42,7 @@ KNOWN = (
     ("*", "enable_signed_distance", "the interface of Coal"),
     ("*", "gjk_tolerance", "the interface of Coal"),
     ("*", "generate_launch_description", "the interface of launch"),
+    ("src/*/contract/conftest.py", "pytest_*", "hooks of pytest"),
     ("benchmarks/*", "*_*", "columns of a table, read by the names of the fields"),
     ("benchmarks/_regional_toppra.py", "identical", "the interface of TOPP-RA"),
     ("tests/*", "*", "fixtures and hooks that pytest finds; ruff looks at the rest"),

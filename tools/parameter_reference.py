@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ir_cli.ros.node_parameters import FIXED, NODE_SETTINGS
-from ir_msgs_py.settings import settings_table
 from ir_planner.search import registered
+from ir_values.settings import settings_table
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "parameters.md"

@@ -19,7 +19,6 @@ from _pictures import folder_asked
 from scipy.spatial import ConvexHull
 
 from ir_description import load_cell, load_power_data
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_planner.configurations.ccd_search import InteractionSettings
 from ir_planner.configurations.interaction_point import searched_configurations
@@ -28,6 +27,7 @@ from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.service.exit import Exit
 from ir_planner.service.modified_ga import ModifiedGa, Walk, withdraw
 from ir_planner.service.service_movement import ServicePlan, ServiceRequest, plan_service
+from ir_values.arrays import FloatArray
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt

@@ -10,7 +10,7 @@ from ir_cli.errors import DemonstrationError
 from ir_cli.output import Progress
 from ir_cli.ros.demo import LONGEST_PAUSE, Demonstration
 from ir_description import load_cell
-from ir_msgs_py.errors import RequestRefusedError
+from ir_values.errors import RequestRefusedError
 
 STORY = {
     "_plan": RequestRefusedError("no path", -1),

@@ -22,7 +22,7 @@ import pytest
 
 from ir_cli.view.drawing import look_at
 from ir_description import Cell, load_cell
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 TOOL = Path(__file__).resolve().parents[2] / "tools" / "_chromium.py"
 PATIENCE = 60.0  # s: a busy machine

@@ -22,8 +22,8 @@ from ir_description.files import convex_pieces as convex
 from ir_description.files import solid_mesh
 from ir_description.files import solid_mesh as piece_cache
 from ir_description.files.convex_pieces import ConvexPieces, contains, protrusion, winding
-from ir_description.files.mesh import is_closed
 from ir_description.files.solid_mesh import pieces_of, triangles_from_obj
+from ir_description.files.stl_mesh import is_closed
 from ir_description.shapes import point_distance
 from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError

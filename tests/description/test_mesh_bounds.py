@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from ir_description.files.making import Meshes
-from ir_description.files.mesh import triangles_from_stl
 from ir_description.files.solid_mesh import read_solid, triangles_from_obj
+from ir_description.files.stl_mesh import triangles_from_stl
 from ir_values.arrays import number_of
 from ir_values.errors import InvalidValueError
 

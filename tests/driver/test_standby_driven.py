@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from ir_description import load_cell, load_power_data
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import Mode, TransitionTimes
 from ir_msgs_py.names import NO_LOAD
 from ir_planner.program.pauses import Step, rests_at
@@ -22,6 +21,7 @@ from ir_planner.scene import scene_with
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.controller.simulation import make_simulation
 from ir_sim_driver.power import IdleTimes
+from ir_values.arrays import FloatArray
 
 CELL = load_cell("demo")
 POWER = load_power_data()

@@ -9,13 +9,13 @@ from typing import cast
 
 import pytest
 
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.plc import magic_packet, send_packet, wakes
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_sim_driver.errors import LinkError
 from ir_sim_driver.plc import Controller, WakeOnLan
 from ir_sim_driver.plc.modbus import ModbusTcp
-from ir_sim_driver.plc.wake_on_lan import WakeListener
+from ir_sim_driver.plc.wake_listener import WakeListener
+from ir_values.errors import InvalidValueError
 
 MAC = "02:00:00:c4:02:10"
 PACKET = magic_packet(MAC)

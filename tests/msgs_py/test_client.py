@@ -13,7 +13,6 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 from ir_msgs.action import ExecuteTrajectory, RunProgram
 from ir_msgs.msg import PowerState, Station, Status
 from ir_msgs.srv import GetTrajectory, SetCell
-from ir_msgs_py.errors import CallTimedOutError, RequestRefusedError, ServiceUnavailableError
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.ros import client as client_module
 from ir_msgs_py.ros.client import Client
@@ -22,6 +21,7 @@ from ir_msgs_py.ros.rclpy_inside import PatientActionServer
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_values.errors import CallTimedOutError, RequestRefusedError, ServiceUnavailableError
 
 TRAJECTORY = JointTrajectory(JOINT_NAMES, [0, 10**9], np.zeros((2, 6)))
 

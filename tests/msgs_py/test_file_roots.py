@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from ir_msgs_py.errors import FileRefusedError
-from ir_msgs_py.file_roots import ENVIRONMENT, FileRoots
+from ir_values.errors import FileRefusedError
+from ir_values.files import ENVIRONMENT, FileRoots
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from ir_msgs_py.errors import ParameterError
 from ir_msgs_py.ros.network import CHOICES, apply_network, network_variables, profile
 from ir_msgs_py.ros.testing import PATIENCE
+from ir_values.errors import ParameterError
 
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 PEERS = "ROS_STATIC_PEERS"

@@ -24,7 +24,6 @@ from ir_msgs.srv import (
     SetLoad,
 )
 from ir_msgs_py import names
-from ir_msgs_py.errors import RequestRefusedError
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import time_from_msg, trajectory_from_msg
 from ir_msgs_py.ros.plan_conversions import report_from_msg
@@ -34,6 +33,7 @@ from ir_msgs_py.ros.topics import COMMANDS, LATCHED
 from ir_planner.node.node import PlannerNode
 from ir_sim_driver.controller import surroundings
 from ir_sim_driver.node import SimDriver, announcements
+from ir_values.errors import RequestRefusedError
 
 DEMO = load_cell("demo")
 

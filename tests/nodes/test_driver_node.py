@@ -20,7 +20,6 @@ from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import PlcInputs, PlcOutputs, PowerMode, PowerState
 from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, StartPause
 from ir_msgs_py import names
-from ir_msgs_py.errors import RequestRefusedError
 from ir_msgs_py.plc import magic_packet
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
@@ -30,6 +29,7 @@ from ir_sim_driver.controller.mains import Mains
 from ir_sim_driver.node import SimDriver, streams
 from ir_sim_driver.plant import plant_to_yaml, typical_plant
 from ir_sim_driver.plc.modbus import COILS
+from ir_values.errors import RequestRefusedError
 
 MAC = "02:00:00:c4:02:10"
 QUICK = {

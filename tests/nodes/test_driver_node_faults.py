@@ -19,12 +19,12 @@ from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import JointTolerance, PlcInputs
 from ir_msgs.srv import QueryModes, SetPlcInput, StartPause
 from ir_msgs_py import names
-from ir_msgs_py.errors import RequestRefusedError
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.node import SimDriver, node
+from ir_values.errors import RequestRefusedError
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 

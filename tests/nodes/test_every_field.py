@@ -25,7 +25,6 @@ from rclpy.parameter import Parameter
 
 from ir_cli.ros.processes import NodeProcesses, cell_nodes
 from ir_msgs.msg import Status
-from ir_msgs_py.errors import CallTimedOutError
 from ir_msgs_py.names import NODES, hidden_node
 from ir_msgs_py.ros import client as client_module
 from ir_msgs_py.ros.client import Client
@@ -33,6 +32,7 @@ from ir_msgs_py.ros.messages import interface_type
 from ir_program_runner.node import ProgramRunnerNode
 from ir_recorder.node.recorder import RecorderNode
 from ir_sim_driver.node import SimDriver
+from ir_values.errors import CallTimedOutError
 
 DRIVER = {"backend": "ideal", "wake_port": 0}
 # of each service and action; of all

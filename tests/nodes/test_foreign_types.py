@@ -17,12 +17,12 @@ from rclpy.parameter import Parameter
 from ir_msgs.msg import PowerState
 from ir_msgs.srv import QueryModes
 from ir_msgs_py import names
-from ir_msgs_py.errors import CallTimedOutError, ServiceUnavailableError
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.node import SimDriver
+from ir_values.errors import CallTimedOutError, ServiceUnavailableError
 
 TOPICS = (names.POWER_STATE, names.CELL, names.PLC_INPUTS, names.CARRIED_LOAD)
 

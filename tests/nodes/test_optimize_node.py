@@ -12,7 +12,6 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
 
 from ir_msgs.srv import OptimizeTrajectory, PlanRegionalMovement
-from ir_msgs_py.errors import RequestRefusedError
 from ir_msgs_py.names import JOINT_NAMES, OPTIMIZE_TRAJECTORY, PLANNED_TRAJECTORY
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.ros.client import Client
@@ -21,6 +20,7 @@ from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.node.node import PlannerNode
+from ir_values.errors import RequestRefusedError
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 AWAY = np.radians([60.0, -90.0, 100.0, 0.0, 20.0, 0.0])

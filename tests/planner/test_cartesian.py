@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import CartesianPath, CartesianSegment
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner import CartesianPlan, Planner
+from ir_values.arrays import FloatArray
+from ir_values.errors import InvalidValueError
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # the judge of paths
 from _second_opinion import SecondOpinion

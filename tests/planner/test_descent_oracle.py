@@ -10,11 +10,11 @@ import numpy as np
 import pinocchio
 
 from ir_description import robot_urdf
-from ir_msgs_py.arrays import FloatArray
 from ir_planner.configurations.ccd_search import InteractionSettings, descend
 from ir_planner.configurations.interaction_point import random_starts
 from ir_planner.request.context import Work
 from ir_planner.scene.planning_scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 SWEEPS = 6
 THIRDS = np.array([0.0, 2.0, 4.0]) * np.pi / 3.0

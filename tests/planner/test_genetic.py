@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from ir_description import cell_from_yaml, load_cell, load_power_data
 from ir_kernels.collision import FREE
-from ir_msgs_py.errors import ParameterError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner.checks.free_space import FreeSpace
@@ -36,6 +35,7 @@ from ir_planner.search.genetic import Genetic
 from ir_planner.search.population import _Breeder, evolve, path_matrix
 from ir_planner.search.registry import SEARCHES
 from ir_planner.search.variety import evenly, first_different
+from ir_values.errors import ParameterError
 
 FloatArray = NDArray[np.float64]
 SceneOf = Callable[[str], PlanningScene]

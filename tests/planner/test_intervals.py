@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_description import PowerParameters, load_power_data, load_power_parameters
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner, PlannerSettings
@@ -20,6 +19,7 @@ from ir_planner.checks.intervals import Sampled, energy_and_slope, holding_slope
 from ir_planner.program.standby import plan_standby
 from ir_planner.request import Goal
 from ir_planner.scene import Drives, PlanningScene
+from ir_values.arrays import FloatArray
 
 SHEET = load_power_parameters()
 Z90 = 1.6449  # of a normal distribution: half the width of its 90 % interval

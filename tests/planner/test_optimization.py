@@ -14,7 +14,6 @@ import pytest
 from numpy.typing import NDArray
 
 from ir_description import PowerData
-from ir_msgs_py.errors import JointNamesError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -33,6 +32,7 @@ from ir_planner.trajectories.optimization import (
     optimize_trajectory,
 )
 from ir_planner.trajectories.through_points import Reference
+from ir_values.errors import JointNamesError
 
 FloatArray = NDArray[np.float64]
 SceneOf = Callable[[str], PlanningScene]

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import CartesianPath, CartesianSegment
 from ir_planner import Planner
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 MARGIN = 0.02  # m
 _TURN = 0.15  # rad that an axis turns in one step of the oracle, at most

@@ -17,7 +17,6 @@ import pytest
 
 from ir_description import Cell, PowerData, cell_from_yaml, cell_to_yaml, load_cell
 from ir_kernels import Chain
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind
 from ir_msgs_py.search_log import (
@@ -32,6 +31,7 @@ from ir_planner.errors import RequestError
 from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
 from ir_planner.request.context import Work
 from ir_planner.service import ModifiedGa
+from ir_values.arrays import FloatArray
 from ir_values.errors import DescriptionError
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))

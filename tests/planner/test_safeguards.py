@@ -15,12 +15,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from oracles import torques
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner
 from ir_planner.regional import MovementPlan
 from ir_planner.request.context import Work
 from ir_planner.scene.planning_scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 SceneOf = Callable[[str], PlanningScene]
 CELLS = st.sampled_from(["demo", "cnc_door", "deep_box", "open"])

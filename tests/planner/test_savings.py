@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from ir_description import Cell, PowerData
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_planner import Planner
@@ -27,6 +26,7 @@ from ir_planner.request import Journal, Work
 from ir_planner.search.registry import registered
 from ir_planner.service.withdrawals import EXIT_SEARCHES
 from ir_planner.settings import PlannerSettings
+from ir_values.arrays import FloatArray
 
 STATIONS = ("home", "infeed_pick", "gauge_measure", "park")
 

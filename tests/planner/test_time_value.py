@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from ir_description import bundled_robots, load_robot
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.options import ROBOTS_TIME_VALUE, PlanOptions
 from ir_planner import Goal, Planner
 from ir_planner.request import Context, Work
 from ir_planner.timing import baseline
+from ir_values.errors import InvalidValueError
 
 BENCHES = ("kr6_bench", "ur10e_bench", "kr300_pallets", "open")
 

@@ -18,11 +18,11 @@ from rclpy.serialization import serialize_message
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
 
-from ir_msgs_py.file_roots import FileRoots
 from ir_recorder.errors import PathError, WriteError
 from ir_recorder.format.schemas import SchemaLibrary
 from ir_recorder.reading.mcap_file import read_raw
 from ir_recorder.recording.writer import RecordingWriter, messages_on_disk
+from ir_values.files import FileRoots
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 

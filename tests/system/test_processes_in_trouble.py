@@ -19,11 +19,11 @@ from sensor_msgs.msg import JointState
 from ir_cli.ros.processes import NodeProcesses, cell_nodes
 from ir_msgs.srv import CheckState, QueryModes, SetCell, StartRecording
 from ir_msgs_py import names
-from ir_msgs_py.errors import CallTimedOutError, ServiceUnavailableError
 from ir_msgs_py.names import NODES
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.status import StatusCode
 from ir_recorder.reading.mcap_file import read_raw
+from ir_values.errors import CallTimedOutError, ServiceUnavailableError
 
 pytestmark = pytest.mark.long
 

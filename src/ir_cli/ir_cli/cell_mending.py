@@ -17,9 +17,9 @@ import numpy as np
 from ir_cli.planning import CEILING
 from ir_cli.station_access import MARGIN, Line, Visit, lines_of, visits
 from ir_description import AllowedContact, Cell, Equipment, Station, cell_to_yaml
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner
+from ir_values.arrays import FloatArray
 
 DISTANCES = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6)  # m of approach that are tried
 _PAD = 2e-3  # m that a suggested zone is larger than it must be

@@ -25,13 +25,13 @@ from ir_description import (
     load_cell,
 )
 from ir_description.files import read_regular_file
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Goal, Planner
 from ir_recorder.measure import PowerModel, planned_samples
+from ir_values.arrays import FloatArray
+from ir_values.errors import InvalidValueError
 from ir_values.output_files import write_file
 from ir_values.yaml_items import Item, read_items
 

@@ -11,7 +11,7 @@ from ir_cli.robot_shapes import SAFETY, floor_below, lowest_points
 from ir_description import Cell, RobotModel, UnknownNameError, is_path, robot_named
 from ir_description.files import read_cell
 from ir_kernels import Chain, CollisionModel
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 TEXT = """\
 format: ir_cell/1

@@ -10,7 +10,7 @@ from ir_cli.robot_shapes import FLOOR_ROOM, SAFETY, Pairs, floor_below, lowest_p
 from ir_description import Capsule, InvalidValueError
 from ir_description.files.making import UrdfArm, holding_torques
 from ir_kernels import Chain, CollisionModel
-from ir_msgs_py.arrays import BoolArray, FloatArray
+from ir_values.arrays import BoolArray, FloatArray
 
 USUAL = (
     (0, 0, 0, 0, 0, 0),

@@ -104,13 +104,12 @@ def _expected_errors() -> tuple[type[Exception], ...]:
     """Errors that carry a sentence for people; anything else is a fault of ours and shows its
     trace.
     """
-    from ir_msgs_py.errors import MsgsError
     from ir_recorder.errors import RecorderError
     from ir_studies.errors import StudyError
-    from ir_values.errors import DescriptionError
+    from ir_values.errors import DescriptionError, IrError
 
     # OSError: a full disk, no permission, no descriptor left
-    return (CommandError, DescriptionError, MsgsError, OSError, RecorderError, StudyError)
+    return (CommandError, DescriptionError, IrError, OSError, RecorderError, StudyError)
 
 
 if __name__ == "__main__":

@@ -16,12 +16,12 @@ from ir_cli.errors import CommandError, InputError, nearest, unknown_name
 from ir_cli.output import Row
 from ir_description import Cell, DescriptionError, UnknownNameError, load_cell
 from ir_krl import KrlError
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.options import OBJECTIVES, ROBOTS_TIME_VALUE, PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.savings import one_sided
 from ir_planner import Goal, Planner, PlannerSettings, RequestError, parse_goal
+from ir_values.arrays import FloatArray
+from ir_values.errors import InvalidValueError
 
 FAILED = 1
 CEILING = 600.0  # s: what is asked at a terminal ends with its work, or with Ctrl-C

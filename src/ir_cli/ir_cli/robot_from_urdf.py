@@ -32,7 +32,7 @@ from ir_description.files.making import (
     with_home,
     with_masses,
 )
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 from ir_values.output_files import write_file
 
 BYTES_MAX = 8_000_000

@@ -23,7 +23,7 @@ from ir_kernels import (
     InputError as KernelInputError,
 )
 from ir_kernels.wrist_geometry import arm_lines
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 MARGIN = 0.02  # m, the default of a request
 POSTURES = 2000  # random ones in which the drives hold the arm, and links keep their distance

@@ -13,7 +13,7 @@ from ir_description.files.convex_pieces import halved
 from ir_description.files.making import CapsuleFit, LinkBody, UrdfArm, encloses, fitted
 from ir_description.robot import ReducedDistance
 from ir_kernels import Chain, CollisionModel
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 WRITTEN = 1e-9  # m: by which the digits of a file may move a capsule
 _LONG = 5e-3  # m: a link without a body that is shorter needs no capsule

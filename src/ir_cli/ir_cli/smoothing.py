@@ -19,9 +19,9 @@ import numpy as np
 from scipy.interpolate import make_lsq_spline
 
 from ir_cli.errors import InputError
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.program import Progress, nobody
+from ir_values.arrays import FloatArray
 
 BANDWIDTHS = (8.0, 11.0, 16.0, 22.0)  # Hz
 # Hz: below it the movement itself is smoothed away

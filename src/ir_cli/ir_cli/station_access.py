@@ -12,13 +12,13 @@ import numpy as np
 
 from ir_cli.output import Columns, Row, number, text
 from ir_description import AllowedContact, Cell, Finding, Station
-from ir_msgs_py.arrays import FloatArray
 from ir_planner.configurations import free_configurations, no_configuration
 from ir_planner.program.steps import Route, Scenes, placed_steps
 from ir_planner.scene import PlanningScene, tcp_inside
 from ir_planner.service import line_poses
 from ir_planner.settings import PlannerSettings
 from ir_planner.timing import need_of
+from ir_values.arrays import FloatArray
 
 # Situations at a station, and the configurations that reach it.
 

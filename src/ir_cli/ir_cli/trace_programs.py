@@ -11,7 +11,6 @@ import numpy as np
 from ir_cli.errors import InputError
 from ir_cli.traces import motion_of
 from ir_description import Cell, Equipment
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner
 from ir_planner.before_after import Stretch, Today
@@ -20,6 +19,7 @@ from ir_recorder import read_recording
 from ir_recorder.errors import RecorderError
 from ir_recorder.reading.recording import TextEvent
 from ir_recorder.traces import read_mapping, read_traces
+from ir_values.arrays import FloatArray
 
 # How the doors stood in a recording: the states of machines that the driver published.
 

@@ -21,8 +21,6 @@ from ir_cli.errors import InputError
 from ir_cli.output import Row
 from ir_cli.smoothing import BANDWIDTHS, Measured, measured, smoothed
 from ir_description import RobotModel
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner
 from ir_planner.checks import movement_energy
@@ -30,6 +28,8 @@ from ir_planner.program import Progress
 from ir_recorder.errors import RecorderError
 from ir_recorder.traces import Trace, TraceMapping, column_names, read_mapping, read_traces
 from ir_recorder.traces.trace import ACCELERATION, EFFORT, GAP_FACTOR, VELOCITY
+from ir_values.arrays import FloatArray
+from ir_values.errors import IrError
 from ir_values.output_files import replacing_text
 
 ENDINGS = ("", VELOCITY, ACCELERATION)
@@ -121,7 +121,7 @@ def read_motion(
         found = JointTrajectory.from_seconds(
             joint_names, times, positions, velocities, accelerations
         )
-    except MsgsError as error:
+    except IrError as error:
         raise InputError(f"{trace.source}: {error}") from error
     _check_speeds(trace.source, found)
     return found

@@ -41,7 +41,7 @@ from ir_krl.write.parts import (
     WrittenSignals,
 )
 from ir_krl.write.program import GRIP, Texts
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 # Frames: a UR's flange is KUKA's, turned a quarter about z.
 

@@ -14,13 +14,13 @@ from ir_description import (
     load_cell,
 )
 from ir_msgs_py.announcements import DATA, DRIVER, CarriedLoad, ControllerTimers, MachineState
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import TransitionTimes
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.program import Doors
 from ir_planner.scene import Drives, PlanningScene, load_text, scene_with
+from ir_values.arrays import FloatArray
 
 
 class Heard:

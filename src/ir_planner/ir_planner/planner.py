@@ -18,9 +18,7 @@ from typing import TypedDict, Unpack
 import numpy as np
 
 from ir_description import Cell, CellPath, PowerData, is_path
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import CartesianPath
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -85,6 +83,8 @@ from ir_planner.state_queries import StatesCheck, asked_state, asked_states
 from ir_planner.store import StoredProgram, program_store, trajectory_store
 from ir_planner.trajectories import OptimizationPlan, Reference, optimize_trajectory, plan_through
 from ir_planner.waiting_postures import standby_at
+from ir_values.arrays import FloatArray
+from ir_values.errors import InvalidValueError
 
 Place = Goal | str | FloatArray
 """Where to: a station, a posture or a text of values; joint values (n,) rad; a pose (4, 4) of the

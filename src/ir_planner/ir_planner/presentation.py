@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_values.arrays import FloatArray
 
 _DIGITS = 10  # of a mm, at most
 _SAMPLES = 400  # of a plotted trajectory: finer than a screen shows

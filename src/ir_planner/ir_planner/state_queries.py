@@ -6,7 +6,6 @@ import numpy as np
 
 from ir_description import LIMIT_TOLERANCE
 from ir_kernels.collision import MinDistance
-from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.status import StatusCode
 from ir_planner.checks import StateCheck, state_check
@@ -14,6 +13,7 @@ from ir_planner.errors import RequestError
 from ir_planner.program import with_doors
 from ir_planner.request import bounded, joint_values, safety_distance, within_limits
 from ir_planner.scene import END_TOLERANCE, PlanningScene
+from ir_values.arrays import BoolArray, FloatArray
 
 PAIRS_MAX = 1000
 STATES_MAX = 10_000

@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ir_description import Cell
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import TransitionTimes
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import StatusCode
@@ -15,6 +14,7 @@ from ir_planner.program import Lengths, Standby, Trip, best_posture, lengths_of
 from ir_planner.regional import MovementPlan
 from ir_planner.request import POSTURES, Goal, parse_goal
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 POSTURES_MAX = 20  # two movements are planned for each
 Plan = Callable[[FloatArray, Goal], MovementPlan]

@@ -22,8 +22,6 @@ from rclpy.node import Node
 from ir_description import DescriptionError, is_path
 from ir_msgs.action import RunStudy
 from ir_msgs_py import names
-from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.file_roots import FileRoots
 from ir_msgs_py.ros.diagnostics import OK, Condition, Diagnostics
 from ir_msgs_py.ros.node_process import run_node
 from ir_msgs_py.ros.parameters import Parameters
@@ -35,6 +33,8 @@ from ir_studies.errors import SettingsError, StoppedError, StudyError
 from ir_studies.settings import StudiesSettings
 from ir_studies.studies import Answer, study_of
 from ir_studies.work import Means
+from ir_values.errors import IrError
+from ir_values.files import FileRoots
 
 
 def declared_settings(node: Node) -> StudiesSettings:
@@ -170,7 +170,7 @@ def _known(error: Exception) -> Status | None:
         return Status(StatusCode.PREEMPTED, "stopped; the same goal goes on from there")
     if isinstance(error, SettingsError):
         return Status(StatusCode.INVALID_GOAL_CONSTRAINTS, str(error))
-    if isinstance(error, (StudyError, RecorderError, MsgsError, DescriptionError, OSError)):
+    if isinstance(error, (StudyError, RecorderError, IrError, DescriptionError, OSError)):
         return Status(StatusCode.FAILURE, str(error))
     return None
 
@@ -182,7 +182,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         StudiesNode,
         arguments,
         executor=lambda: MultiThreadedExecutor(num_threads=_THREADS),
-        refusals=(StudyError, MsgsError),
+        refusals=(StudyError, IrError),
         about="Studies of a cell: where things should stand, planners against each other.",
     )
 

@@ -25,7 +25,6 @@ from ir_cli.ros.processes import NodeProcesses, cell_nodes
 from ir_description import Cell, cell_to_yaml, load_cell
 from ir_msgs.srv import StartRecording, StopRecording
 from ir_msgs_py import names
-from ir_msgs_py.errors import MsgsError, RequestRefusedError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.plc import magic_packet, send_packet
 from ir_msgs_py.ros.client import Client, ProgramPlan
@@ -47,6 +46,7 @@ from ir_recorder.report import write_report
 from ir_recorder.report.number_text import interval, number
 from ir_recorder.report.picture import write_picture
 from ir_recorder.report.tables import savings_lines
+from ir_values.errors import IrError, RequestRefusedError
 from ir_values.output_files import write_file
 
 # Results by the recording: movements, checks, the report and the picture.
@@ -266,7 +266,7 @@ class Demonstration:
         try:
             self._tour(client)
             self._drive(client, plan)
-        except (DemonstrationError, MsgsError) as error:
+        except (DemonstrationError, IrError) as error:
             self._progress.end("ended early")
             return str(error)
         return ""
@@ -358,7 +358,7 @@ def _naming_the_dead(nodes: NodeProcesses) -> Iterator[None]:
     """A request that fails because a node ended says which node, and why."""
     try:
         yield
-    except (DemonstrationError, MsgsError):
+    except (DemonstrationError, IrError):
         nodes.check()
         raise
     nodes.check()

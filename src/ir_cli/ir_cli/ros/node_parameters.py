@@ -12,10 +12,8 @@ from typing import Any
 import yaml
 
 from ir_cli.errors import CommandError, unknown_name
-from ir_msgs_py.errors import ParameterError
 from ir_msgs_py.modes import PREFIX, TransitionTimes
 from ir_msgs_py.names import NODES
-from ir_msgs_py.settings import Setting, tree
 from ir_planner import PlannerSettings
 from ir_program_runner import LinkSettings, ProgramSettings
 from ir_recorder.recording.settings import RecorderSettings
@@ -31,6 +29,8 @@ from ir_sim_driver import (
 from ir_sim_driver.controller import SupervisionSettings
 from ir_sim_driver.node.parameters import NodeSettings
 from ir_studies.settings import StudiesSettings
+from ir_values.errors import ParameterError
+from ir_values.settings import Setting, tree
 
 FIXED = "fixed: "  # the node takes these at its start only
 NODE_SETTINGS: dict[str, tuple[tuple[str, Callable[[], Any]], ...]] = {

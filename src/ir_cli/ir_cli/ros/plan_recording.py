@@ -19,7 +19,6 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.ros.conversions import status_to_msg, trajectory_to_msg
 from ir_msgs_py.ros.plan_conversions import plan_options_to_msg, program_savings_to_msg
 from ir_msgs_py.ros.power_conversions import cell_state_to_msg
-from ir_msgs_py.settings import tree
 from ir_planner import Planner, ProgramPlan
 from ir_planner.before_after import assumed_doors
 from ir_planner.node.answers import fill_program
@@ -28,6 +27,7 @@ from ir_recorder.format import contents
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.recording import CellFiles, RecordingSession, RecordingWriter
 from ir_values.files import ANYWHERE, FileRoots
+from ir_values.settings import tree
 
 _DOORS = "doors_at_the_start"
 _DOORS_ARE = "doors at the start are "

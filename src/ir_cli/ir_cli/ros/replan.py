@@ -27,12 +27,10 @@ from ir_description import DescriptionError
 from ir_description.files import power_from_yaml
 from ir_msgs.msg import RecordedCall
 from ir_msgs_py import names
-from ir_msgs_py.errors import InvalidValueError, MsgsError
 from ir_msgs_py.ros.conversions import configuration_from_msg
 from ir_msgs_py.ros.messages import interface_type
 from ir_msgs_py.ros.plan_conversions import machine_states_from_msg
 from ir_msgs_py.ros.power_conversions import carried_load_from_msg, controller_timers_from_msg
-from ir_msgs_py.settings import changed, tree
 from ir_msgs_py.status import StatusCode
 from ir_planner import Planner, PlannerSettings
 from ir_planner.node.inputs import MEASURED, LastState
@@ -44,6 +42,8 @@ from ir_recorder.reading.mcap_file import RawRecording, chosen_namespace, read_r
 from ir_recorder.reading.planner_answers import completed
 from ir_recorder.recording.arithmetic import arithmetic
 from ir_recorder.recording.session import PACKAGES, data_of_cell, installed_version
+from ir_values.errors import InvalidValueError, IrError
+from ir_values.settings import changed, tree
 
 # The recorded planner: cell, settings, changes and requests.
 
@@ -267,7 +267,7 @@ def _unless_refused(learn: Callable[[Planner], None]) -> Callable[[Planner], Non
     def learn_or_ignore(planner: Planner) -> None:
         try:
             learn(planner)
-        except (MsgsError, DescriptionError):
+        except (IrError, DescriptionError):
             return
 
     return learn_or_ignore

@@ -14,10 +14,10 @@ from ir_cli.view.clearance import StationAccess, station_accesses
 from ir_cli.view.playback import PlayedMotion, motion_of
 from ir_description import Cell, DescriptionError
 from ir_kernels.errors import KernelError
-from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
 from ir_planner import CancelledError, Goal, Planner, PlannerError
+from ir_values.errors import IrError
 
 # The latest action of each kind counts: a quick hand drags a machine through a hundred places a
 # second, and only the last that waits is looked at.
@@ -138,7 +138,7 @@ class PlanWorker:
                 self._work(asked)
             except CancelledError:
                 continue
-            except (DescriptionError, KernelError, MsgsError, PlannerError) as error:
+            except (DescriptionError, KernelError, IrError, PlannerError) as error:
                 self._post(
                     "planned",
                     self._listener.planned,

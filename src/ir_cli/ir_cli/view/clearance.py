@@ -11,10 +11,10 @@ import numpy as np
 from ir_cli.station_access import MARGIN, Visit, visits
 from ir_description import Cell, PartPlaces
 from ir_kernels import CollisionModel
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import PlannedMovement
 from ir_planner.configurations import free_configurations, no_configuration
 from ir_recorder.analysis.clearance import allowed_pairs, collision_model
+from ir_values.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,9 +17,9 @@ from ir_cli.view.moves import placed
 from ir_cli.view.playback import PlayedMotion
 from ir_description import Body, Cell, PartPlaces
 from ir_kernels import Chain
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR
 from ir_recorder.report.shapes import Mesh, body_mesh, capsule_mesh, robot_parts
+from ir_values.arrays import FloatArray
 
 Colour = tuple[int, int, int]
 KINDS: dict[str, Colour] = {

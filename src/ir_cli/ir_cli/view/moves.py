@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from ir_description import Cell
 from ir_description.poses import abc_from_rotation, composed, inverse, pose_of, rotation_from_abc
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 # Poses between the cell, viser and the grid of millimetres and tenths of a degree.
 

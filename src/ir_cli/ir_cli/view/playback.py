@@ -9,11 +9,11 @@ import numpy as np
 
 from ir_description import Cell, PartPlaces, cell_in
 from ir_kernels import Chain
-from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.report import PlannedMovement
 from ir_planner.checks import movement_energy
 from ir_planner.scene import PlanningScene
 from ir_recorder.analysis.clearance import places_after
+from ir_values.arrays import FloatArray, IntArray
 
 RATE = 25.0  # Hz
 PAUSE_SHOWN = 1.0

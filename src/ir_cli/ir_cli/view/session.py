@@ -27,9 +27,9 @@ from ir_cli.view.panel import (
 )
 from ir_cli.view.playback import Playback
 from ir_description import Cell, DescriptionError, PartPlaces, cell_to_yaml
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.report import PlannedMovement
+from ir_values.arrays import FloatArray
+from ir_values.errors import InvalidValueError
 
 # The picture: the cell, the robot with what it holds, and in red what is wrong.
 

@@ -11,7 +11,7 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from ir_description.files.mesh import TRIANGLES_MAX
+from ir_description.files.stl_mesh import TRIANGLES_MAX
 from ir_values.arrays import FloatArray, IntArray
 from ir_values.errors import InvalidValueError, shown
 

@@ -19,7 +19,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
-from ir_description.files.mesh import HULL_VERTICES_MAX, open_edges
+from ir_description.files.stl_mesh import HULL_VERTICES_MAX, open_edges
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 from ir_values.errors import InvalidValueError
 

@@ -31,7 +31,9 @@ from ir_description.cell import (
     station_at,
     zone_around,
 )
-from ir_description.files.mesh import (
+from ir_description.files.robot_file import inertia_matrix
+from ir_description.files.solid_mesh import SolidReader, piece_names
+from ir_description.files.stl_mesh import (
     CELL_TRIANGLES_MAX,
     CORNERS_MAX,
     HULL_VERTICES_MAX,
@@ -40,8 +42,6 @@ from ir_description.files.mesh import (
     mesh_path,
     read_stl,
 )
-from ir_description.files.robot_file import inertia_matrix
-from ir_description.files.solid_mesh import SolidReader, piece_names
 from ir_description.poses import (
     pose_of,
     rotation_from_abc,

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ir_description.files.collada import triangles_from_collada
-from ir_description.files.mesh import (
+from ir_description.files.stl_mesh import (
     BYTES_MAX,
     CELL_TRIANGLES_MAX,
     TRIANGLES_MAX,

@@ -18,9 +18,9 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from ir_description.cell import Cell, Equipment, NameRegister
-from ir_description.files.mesh import is_closed
 from ir_description.files.moveit_scene import SceneObject, scene_objects
 from ir_description.files.solid_mesh import PIECES, SUFFIXES, piece_names, pieces_of, read_solid
+from ir_description.files.stl_mesh import is_closed
 from ir_description.poses import abc_from_rotation, composed, pose_of, rotation_from_abc
 from ir_description.shapes import Body
 from ir_values.arrays import FloatArray, number_of

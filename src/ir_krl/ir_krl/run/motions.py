@@ -43,7 +43,7 @@ from ir_krl.run.values import (
     number,
     pose,
 )
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 # Assignments as statements: to variables, to outputs and to the groups of signals that name
 # them.

@@ -19,7 +19,7 @@ from ir_krl.run.notes import Effect, Note, worst_first
 from ir_krl.run.standing import AXES_NOW, PLACE_NOW, Kinematics, Standing
 from ir_krl.run.system import Assumption, assumed_variables, system_variables
 from ir_krl.run.values import Array, Unknown, Value, copied, typed
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 # Routines of several files: those of the same file come first, as on the controller.
 

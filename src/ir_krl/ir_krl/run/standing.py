@@ -12,7 +12,7 @@ from ir_description.poses import inverse, pose_of, rotation_from_abc
 from ir_krl.errors import Place
 from ir_krl.run.commands import Command, Motion, SplineBlock, Target
 from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES, Structure, Value, frame
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 _MM = 1e-3  # m
 AXES_NOW = ("$AXIS_ACT", "$AXIS_ACT_MEAS")

@@ -8,7 +8,7 @@ import numpy as np
 
 from ir_krl.run.notes import Effect
 from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES, Array, Structure, Symbol, Value, frame
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 AXES = 6
 FULL = 100.0  # %

@@ -11,7 +11,7 @@ import numpy as np
 
 from ir_description.poses import abc_from_rotation, pose_of, rotation_from_abc
 from ir_krl.errors import KrlRunError, Place
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 # Values of KRL: numbers, truth values, texts, enumeration values, structures and arrays.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ir_krl.errors import Place
 from ir_krl.run.values import FRAME_NAMES, components, frame
 from ir_krl.write.parts import Style, WrittenMove
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 # The texts after ";%{" tell the editor which form it is; the lines below them are what the form
 # makes of its data, so that both say the same.

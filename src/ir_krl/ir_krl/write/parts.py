@@ -9,7 +9,7 @@ import numpy as np
 
 from ir_krl.errors import KrlError
 from ir_krl.run.commands import Payload
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 Style = Literal["spline", "kss8", "krc2", "urscript"]
 STYLES: tuple[Style, ...] = ("spline", "kss8", "krc2")

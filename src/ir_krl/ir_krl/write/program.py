@@ -23,7 +23,7 @@ from ir_krl.write.parts import (
     WrittenSignals,
     WrittenSpline,
 )
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 GRIP = "GRIP"
 """The output that closes the gripper."""

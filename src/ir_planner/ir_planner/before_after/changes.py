@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.savings import Change, Hop, Saving, Side
 from ir_planner.checks import Interval, interval, movement_energy, robots, total_report
 from ir_planner.program import ProgramRequest, Spreads
 from ir_planner.scene import PlanningScene, scene_with
+from ir_values.arrays import FloatArray
 
 # Intervals of peak powers: what the drawn robots take in the instants that take most.
 

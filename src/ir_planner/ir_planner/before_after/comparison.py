@@ -7,7 +7,6 @@ import numpy as np
 
 from ir_description import ProgramStep
 from ir_msgs_py.announcements import MachineState
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
@@ -25,6 +24,7 @@ from ir_planner.before_after.today_steps import (
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
 from ir_planner.program import AUTO, ProgramPlan, ProgramRequest, Progress, Spreads, nobody
+from ir_values.arrays import FloatArray
 
 TODAY = "today"
 SAME = "same cycle time"

@@ -7,15 +7,15 @@ import numpy as np
 
 from ir_description import CellPath, Load
 from ir_krl import PLC_DONE, Place
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import LINE, CartesianPath
-from ir_msgs_py.errors import InvalidValueError
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.errors import RequestError
 from ir_planner.krl import DrivenStep, EvaluatedProgram, EvaluatedStep, ToolMotion, is_named
 from ir_planner.program import Doors
+from ir_values.arrays import FloatArray
+from ir_values.errors import InvalidValueError
 
 # What today's program works along: processes of a KRL program as paths of the tool.
 #

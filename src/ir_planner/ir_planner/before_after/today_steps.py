@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_description import Cell, CellPath, Equipment, ProgramStep, Signal, Station, Zone
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_planner.before_after.today import Stretch, Today, driven_as, nothing_moves, same_poses
 from ir_planner.checks import evaluate_trajectory
@@ -21,6 +20,7 @@ from ir_planner.program import (
     spent,
 )
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 # Where today's program stops to work, as steps that a planner can be asked for.
 #

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_msgs_py.status import StatusCode
 from ir_planner.cartesian.path_parts import about_tool
 from ir_planner.cartesian.tool_path import NoChainError, PathRefusedError, ToolPath
 from ir_planner.checks import FreeSpace, pair_value
 from ir_planner.presentation import in_mm
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 # Configurations along a path: at samples of it, for angles about the tool's axis, all of them.
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_msgs_py.status import StatusCode
 from ir_planner.cartesian.chains import (
     JUMP,
@@ -23,6 +22,7 @@ from ir_planner.cartesian.joint_curve import singularity
 from ir_planner.cartesian.path_parts import about_tool
 from ir_planner.cartesian.tool_path import Asked, NoChainError, PathRefusedError
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 # Why no chain of configurations leads on along a path: collisions, an axis limit or a
 # singularity.

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import StatusCode
 from ir_planner.cartesian.chains import JUMP, Chain, turned_towards
 from ir_planner.cartesian.path_parts import Rates, about_tool, rates_of
 from ir_planner.cartesian.tool_path import PathRefusedError, StrayedError, ToolPath
 from ir_planner.checks import FreeSpace
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import CIRCLE, CONSTANT, LENGTH_MAX, LINE, CartesianPath, CartesianSegment
 from ir_msgs_py.status import StatusCode
 from ir_planner.curves import RotationSpline, rotation_of, rotation_vector, turn_of
 from ir_planner.errors import RequestError
+from ir_values.arrays import FloatArray
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import NS_PER_S, JointTrajectory
 from ir_planner.cartesian.joint_curve import JointCurve, singularity
@@ -29,6 +28,7 @@ from ir_planner.cartesian.speed_ramps import (
 )
 from ir_planner.cartesian.tool_path import PathRefusedError
 from ir_planner.scene import MotionLimits, PlanningScene, torque_use
+from ir_values.arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline

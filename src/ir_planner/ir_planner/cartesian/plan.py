@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.cartesian import TANGENT, CartesianPath
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlanningInfo, TrajectoryReport
@@ -40,6 +39,7 @@ from ir_planner.errors import RequestError
 from ir_planner.presentation import plot_trajectory, result_text
 from ir_planner.request import Context, checked_options, chosen, within_limits
 from ir_planner.timing import Movement
+from ir_values.arrays import BoolArray, FloatArray
 
 # What a request for a Cartesian path is answered with.
 

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray
 from ir_planner.cartesian.joint_curve import JointCurve
 from ir_planner.cartesian.path_times import TimedStroke, fitting, instants, refused
 from ir_planner.cartesian.speed_ramps import ENOUGH, Span, law_of, use_of
 from ir_planner.scene import MotionLimits, PlanningScene
+from ir_values.arrays import FloatArray
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline

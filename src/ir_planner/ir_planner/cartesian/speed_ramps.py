@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_planner.cartesian.joint_curve import JointCurve
 from ir_planner.scene import MotionLimits, PlanningScene, lasting_longer, torque_use
+from ir_values.arrays import BoolArray, FloatArray
 
 # The tool's speed over time: constant along each part, and between two speeds a ramp without jumps
 # of acceleration. A ramp lies in the faster part, so the tool is nowhere faster than asked for.

@@ -5,13 +5,13 @@ from dataclasses import astuple, dataclass
 import numpy as np
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.cartesian.joint_curve import Angle, tool_poses
 from ir_planner.cartesian.path_times import SentPath
 from ir_planner.cartesian.tool_path import ToolPath
 from ir_planner.curves import extremes
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 # Bounds of the tool's motion on each segment of a trajectory, from those of its axes.
 #

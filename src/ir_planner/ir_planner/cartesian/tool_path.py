@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.cartesian import TANGENT, CartesianPath
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.cartesian.path_parts import ArcLength, Part, Rates, about_tool, rates_of
 from ir_planner.checks import FreeSpace
 from ir_planner.curves import turn_of
 from ir_planner.request import Context
+from ir_values.arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline

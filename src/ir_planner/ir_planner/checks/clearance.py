@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ir_kernels.collision import FREE, Witnesses
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import motion_at
 from ir_planner.scene import PlanningScene, Stops
+from ir_values.arrays import FloatArray
 
 # s between the samples of a profile, and how many of them
 _STEP = 0.01

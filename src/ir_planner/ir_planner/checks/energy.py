@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_kernels import DcBus, dc_bus
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import extremes, motion_at
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 STEP_S = 1e-3
 _PIECE = 20_000  # samples at a time: an hour has millions

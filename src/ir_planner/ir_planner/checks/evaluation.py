@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status
 from ir_msgs_py.trajectory import JointTrajectory
@@ -17,6 +16,7 @@ from ir_planner.checks.energy import MovementEnergy, movement_energy, peak_power
 from ir_planner.checks.verification import Verification, verify
 from ir_planner.presentation import plot_profiles, report_text, status_text
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, Stops
+from ir_values.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_kernels.collision import FREE, Certificates
-from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks.clearance import nearest_pairs, pair_value
 from ir_planner.presentation import in_mm, status_text
 from ir_planner.request import Work
 from ir_planner.scene import END_TOLERANCE, PROOF_TOLERANCE, PlanningScene
+from ir_values.arrays import BoolArray, FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,10 +18,10 @@ import numpy as np
 
 from ir_description import AXIS_UNITS, IDLE, PowerParameters, interval_over
 from ir_kernels import DcBus, dc_bus, portable
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory, Samples
 from ir_planner.curves import motion_at
 from ir_planner.scene import RUNNING, PlanningScene
+from ir_values.arrays import FloatArray
 
 STEP_S = 8e-3  # intervals need no finer samples than these
 _MOST = 20_000  # samples: what lasts longer is sampled more coarsely

@@ -11,7 +11,6 @@ import numpy as np
 
 from ir_kernels import portable
 from ir_kernels.collision import COLLIDES, FREE
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -27,6 +26,7 @@ from ir_planner.scene import (
     tcp_inside,
     torque_use,
 )
+from ir_values.arrays import FloatArray
 
 SLACK = 1e-6  # relative: what rounding of a limit that is reached exactly may cost
 POSITION_SLACK = 1e-9  # rad

@@ -14,10 +14,10 @@ import numpy as np
 
 from ir_kernels import CcdSettings, ccd, portable
 from ir_kernels.reference.ccd import best_value
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
-from ir_msgs_py.settings import check_settings, setting
 from ir_planner.request import Work
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import BoolArray, FloatArray, IntArray
+from ir_values.settings import check_settings, setting
 
 # The set-back of a joint that ends in collision, eqs. (4) and (5). As printed a joint goes back by
 # d'/d of its step: nothing where bodies touch, and farther in where they overlap. Read as a secant

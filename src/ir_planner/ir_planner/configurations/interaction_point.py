@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.report import IkSolution, PlanningInfo
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.configurations.ccd_search import InteractionSettings, descend
@@ -24,6 +23,7 @@ from ir_planner.errors import RequestError
 from ir_planner.presentation import status_text
 from ir_planner.request import Context, Goal, Work
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, movement_cost
+from ir_values.arrays import FloatArray, IntArray
 
 STARTS_MAX = 10_000
 _SIGMAS = 3.0  # mid-range to limit, in standard deviations: sigma is a sixth of the range

@@ -12,13 +12,13 @@ import numpy as np
 
 from ir_kernels import portable
 from ir_kernels.collision import MinDistance
-from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.report import IkSolution
 from ir_msgs_py.search_log import ConfigurationLog, Track
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import nearest_pair
 from ir_planner.presentation import in_mm
 from ir_planner.scene import END_TOLERANCE, PlanningScene, movement_cost
+from ir_values.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,6 @@ from ir_krl import (
     Wait,
     WaitFor,
 )
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.krl.geometry import Arm
@@ -31,6 +30,7 @@ from ir_planner.krl.splines import ToolMotion, block_curve, timed_block, tool_mo
 from ir_planner.krl.surroundings import Surroundings, nothing_around
 from ir_planner.scene import STILL, PlanningScene
 from ir_planner.timing import standing
+from ir_values.arrays import FloatArray
 
 # Which motions of a program are its process: what the tool does between switching an output on and
 # off.

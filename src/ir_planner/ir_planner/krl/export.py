@@ -29,7 +29,6 @@ from ir_krl import (
     plc_table,
     structured_text,
 )
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import TransitionTimes
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_msgs_py.status import StatusCode
@@ -46,6 +45,7 @@ from ir_planner.krl.surroundings import Surroundings, payload_of
 from ir_planner.krl.timed_splines import DEVIATION_MAX, deviation_in_time, fitted_spline
 from ir_planner.program import Charge, Pause, spent, switch_times
 from ir_planner.scene import STILL, PlanningScene
+from ir_values.arrays import FloatArray
 
 __all__ = ["DEVIATION_MAX", "KrlExport", "attached", "export"]
 

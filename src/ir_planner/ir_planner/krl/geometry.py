@@ -7,8 +7,8 @@ import numpy as np
 from ir_description.poses import abc_from_rotation, inverse, rotation_from_abc
 from ir_kernels import Chain, portable
 from ir_krl import FRAME_NAMES, KrlMotionError, Place, Target
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 # Status and turn, S and T: which of the configurations that reach a pose a position means.
 #

@@ -8,7 +8,6 @@ import numpy as np
 
 from ir_kernels import portable
 from ir_krl import KrlError, Style, WrittenMove
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -17,6 +16,7 @@ from ir_planner.krl.geometry import Arm, status_turn, tool_in_flange
 from ir_planner.krl.judged import Judge, ReadBack, called, points_of
 from ir_planner.krl.strokes import one_after_the_other
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 # Inline forms can't keep a planned spline. What they keep is that nothing is touched: as few points
 # of the planned movement are taken as the chain of motions needs to be certified again: wherever it

@@ -18,8 +18,8 @@ from ir_krl import (
     written,
 )
 from ir_krl.urscript import JointLimits, follow_urscript, written_urscript
-from ir_msgs_py.arrays import FloatArray
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 _AXES = 6
 Header = Callable[[Texts], Sequence[str]] | Sequence[str]

@@ -10,13 +10,13 @@ from scipy.interpolate import BSpline
 
 from ir_kernels import portable
 from ir_krl import Blend, KrlMotionError, Motion, Place, Speeds
-from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.cartesian import Arc, Line, arc_through
 from ir_planner.curves import turn_of, turned_evenly
 from ir_planner.krl.geometry import Arm
 from ir_planner.scene import STILL, MotionLimits, PlanningScene, torque_use
 from ir_planner.timing import GRID_NS, GRID_S, TimeLaw, free_law
+from ir_values.arrays import FloatArray, IntArray
 
 # What motions draw: straight lines of the axes, and lines, arcs and splines of the tool as joint
 # curves.

@@ -20,7 +20,6 @@ from ir_krl import (
     follow,
 )
 from ir_krl.urscript import follow_urscript
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import TransitionTimes
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
@@ -40,6 +39,7 @@ from ir_planner.program import Charge, Pause, Scenes, spent
 from ir_planner.request import POSTURES, safety_distance
 from ir_planner.scene import PlanningScene, load_text
 from ir_planner.timing import standing
+from ir_values.arrays import FloatArray
 
 # What a driven program costs in the cell: seconds, joules and clearance of every step, and its
 # stations. Movements take what the capacitor holds, pauses are spent in the modes that a PLC asks

@@ -9,7 +9,6 @@ from scipy.optimize import linprog
 from ir_description.poses import inverse
 from ir_kernels import portable
 from ir_krl import Blend, KrlMotionError, Motion, Speeds, SplineBlock, Target, TimeBlock
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import (
     CIRCLE,
     LINE,
@@ -26,6 +25,7 @@ from ir_planner.krl.geometry import Arm, tool_in_flange
 from ir_planner.krl.motions import AxisCurve, drawn_from, followed, through_axes, tool_ends
 from ir_planner.scene import PlanningScene, torque_use
 from ir_planner.timing import GRID_NS, GRID_S
+from ir_values.arrays import FloatArray
 
 # When a PTP_SPLINE passes its points: near the planned times as far as the limits allow.
 #

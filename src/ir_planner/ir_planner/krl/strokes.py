@@ -9,7 +9,6 @@ from scipy.spatial import cKDTree
 
 from ir_kernels import portable
 from ir_krl import WrittenPath
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -17,6 +16,7 @@ from ir_planner.errors import RequestError
 from ir_planner.krl.geometry import Arm, tool_in_flange
 from ir_planner.krl.judged import ReadBack
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 # A movement along a path of the tool as KRL: one SPLINE of the tool from rest to rest, at its
 # speed.

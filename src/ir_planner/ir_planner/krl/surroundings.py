@@ -12,10 +12,10 @@ from ir_description import Cell, InvalidValueError, Load, PartPlaces, ProgramSte
 from ir_description.poses import abc_from_rotation, rotation_from_abc
 from ir_kernels import portable
 from ir_krl import GRIP, KrlMotionError, Note, Payload, Place, SignalRange
-from ir_msgs_py.arrays import FloatArray
 from ir_planner.krl.geometry import tool_in_flange
 from ir_planner.program import Doors, Scenes, doors_along
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 # Loads as KRL gives them, in KUKA's flange: mass, centre, and the axes of inertia.
 

@@ -5,7 +5,6 @@ from scipy.interpolate import PchipInterpolator
 
 from ir_kernels import portable
 from ir_krl import WrittenSpline
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -13,6 +12,7 @@ from ir_planner.errors import RequestError
 from ir_planner.krl.judged import Judge, ReadBack, called, points_of
 from ir_planner.krl.splines import passing_times
 from ir_planner.timing import GRID_S
+from ir_values.arrays import FloatArray
 
 # A movement becomes a PTP_SPLINE through points of its trajectory with a TIME_BLOCK that gives each
 # its time. As many points are taken as the movement needs to stay certified and near to what was

@@ -11,9 +11,7 @@ from sensor_msgs.msg import JointState
 
 from ir_description import Cell, CellPath
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.cartesian import POSES_MAX, CartesianPath, CartesianSegment
-from ir_msgs_py.errors import InvalidValueError, PoseError
 from ir_msgs_py.names import BASE_FRAME
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.ros.conversions import (
@@ -34,7 +32,8 @@ from ir_planner.planner import Planner
 from ir_planner.request import POSITION_MAX, Goal, one_goal
 from ir_planner.state_queries import STATES_MAX
 from ir_planner.trajectories import POINTS_MAX, Reference
-from ir_values.errors import JointNamesError
+from ir_values.arrays import FloatArray
+from ir_values.errors import InvalidValueError, JointNamesError, PoseError
 
 # What requests say, as values: states, goals, poses, options, trajectories. Nothing here is
 # planned.

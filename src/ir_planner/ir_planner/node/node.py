@@ -45,7 +45,6 @@ from ir_msgs.srv import (
     SetEquipment,
 )
 from ir_msgs_py import names
-from ir_msgs_py.errors import InvalidValueError, MsgsError
 from ir_msgs_py.ros.conversions import configuration_from_msg, trajectory_to_msg
 from ir_msgs_py.ros.diagnostics import OK, WARN, Condition, Diagnostics
 from ir_msgs_py.ros.node_process import run_node
@@ -66,6 +65,7 @@ from ir_planner.node.topics import Announcements, ShownMarkers
 from ir_planner.planner import Planner
 from ir_planner.service import ServicePlan, service_shapes
 from ir_planner.settings import PlannerSettings
+from ir_values.errors import InvalidValueError, IrError
 
 _PUBLISHERS = 16  # of joint_states beside the robot's, without pushing its message out
 _GOALS_WAITING = 100  # beyond, a client is in a loop: each takes seconds
@@ -271,7 +271,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         PlannerNode,
         arguments,
         executor=lambda: MultiThreadedExecutor(num_threads=_THREADS),
-        refusals=(PlannerError, MsgsError),
+        refusals=(PlannerError, IrError),
         about="Plans certified movements and programs of a robot cell, with their joules.",
     )
 

@@ -10,8 +10,6 @@ import numpy as np
 
 from ir_description import DescriptionError, UnknownNameError, cell_to_yaml, is_path, robot_urdf
 from ir_kernels import KernelError
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import MsgsError, PoseError
 from ir_msgs_py.names import PLANNER
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.search_conversions import searches_to_msg
@@ -51,6 +49,8 @@ from ir_planner.planner import Planner
 from ir_planner.program import ProgramPlan, lengths_of
 from ir_planner.request import chosen
 from ir_planner.service import ServicePlan
+from ir_values.arrays import FloatArray
+from ir_values.errors import IrError, PoseError
 
 
 def known_status(error: Exception) -> Status | None:  # noqa: PLR0911
@@ -63,7 +63,7 @@ def known_status(error: Exception) -> Status | None:  # noqa: PLR0911
         return Status(error.code, str(error))
     if isinstance(error, UnknownNameError):
         return Status(StatusCode.INVALID_OBJECT_NAME, str(error))
-    if isinstance(error, (DescriptionError, MsgsError)):
+    if isinstance(error, (DescriptionError, IrError)):
         return Status(StatusCode.INVALID_GOAL_CONSTRAINTS, str(error))
     if isinstance(error, (PlannerError, KernelError)):
         return Status(StatusCode.FAILURE, str(error))

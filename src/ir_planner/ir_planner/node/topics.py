@@ -15,7 +15,6 @@ from ir_msgs.msg import ControllerTimers as ControllerTimersMsg
 from ir_msgs.msg import MachineStates as MachineStatesMsg
 from ir_msgs_py import names
 from ir_msgs_py.announcements import CellState
-from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.ros.conversions import pose_to_msg
 from ir_msgs_py.ros.plan_conversions import machine_states_from_msg
 from ir_msgs_py.ros.power_conversions import (
@@ -26,6 +25,7 @@ from ir_msgs_py.ros.power_conversions import (
 from ir_msgs_py.ros.topics import LATCHED
 from ir_planner.checks import Shape
 from ir_planner.planner import Planner
+from ir_values.errors import IrError
 
 # What planner and driver announce to each other: cell out; timers, load and machines in;
 # latched.
@@ -85,7 +85,7 @@ class Announcements:
     def _understood(self, convert: Callable[[Any], _T], message: Any, topic: str) -> _T | None:
         try:
             return convert(message)
-        except MsgsError as error:
+        except IrError as error:
             self._node.get_logger().warning(f"{topic} is ignored: {error}")
             return None
 

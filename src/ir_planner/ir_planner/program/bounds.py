@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_kernels import SplineCost, SplineTerms, portable
-from ir_msgs_py.arrays import FloatArray
 from ir_planner.curves import UniformSpline, along_path, fewest_seconds
 from ir_planner.request import Context
 from ir_planner.scene import MotionLimits, PlanningScene
 from ir_planner.timing import objective_weights
+from ir_values.arrays import FloatArray
 
 # What a movement costs at least, whatever its path: proved from limits, friction and weight.
 #

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.configurations import INTERACTION, InteractionSettings
 from ir_planner.program.bounds import MARGIN, CoarseCost, least_cost
@@ -26,6 +25,7 @@ from ir_planner.program.stops import Node, path_nodes, posture_nodes, station_no
 from ir_planner.request import Context
 from ir_planner.scene import STILL, movement_cost, path_cost
 from ir_planner.service import ExitSearch, ServiceLine
+from ir_values.arrays import FloatArray
 
 # What the parts of hops cost: lower bounds first, then coarse solutions, then the planner's
 # movements.

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import clearance_violation
@@ -18,6 +17,7 @@ from ir_planner.program.steps import PlacedStep, Route, Scenes, signal_text
 from ir_planner.program.time_values import Ladder
 from ir_planner.scene import PlanningScene
 from ir_planner.timing import Movement
+from ir_values.arrays import FloatArray
 
 # Which states of machines a movement relies on: those without which its clearance would be
 # violated.

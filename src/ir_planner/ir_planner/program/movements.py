@@ -6,7 +6,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.search_log import SearchLog
 from ir_msgs_py.status import Status, StatusCode
@@ -21,6 +20,7 @@ from ir_planner.regional import Searches, search_regional
 from ir_planner.request import Context, Journal, Work
 from ir_planner.service import timed_service
 from ir_planner.timing import Movement, best_stretch, stretched
+from ir_values.arrays import FloatArray
 
 # Movements that are known, made again for another value of a second: near the path of one, from
 # its own time scaling.

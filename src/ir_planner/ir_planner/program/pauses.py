@@ -7,7 +7,6 @@ from itertools import combinations
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import DEEPER, REST_MODES, TransitionTimes, modes_of
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_planner.checks import (
@@ -19,6 +18,7 @@ from ir_planner.checks import (
     standing_slope,
 )
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 # The modes that a robot can rest in at a posture, and what a sequence of them costs.
 #

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.report import MovementKind, PlannedMovement, PlanningInfo
 from ir_msgs_py.savings import ProgramSavings
@@ -37,6 +36,7 @@ from ir_planner.request import Context, Journal, Work, noted
 from ir_planner.scene import PlanningScene
 from ir_planner.service import ExitPath, exit_searches, lines_free, service_lines
 from ir_planner.timing import at_the_mains
+from ir_values.arrays import FloatArray
 
 # What the searches that a cell asks for at its stations and steps did for the chain that was
 # chosen.

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ir_description import Cell, Finding, PowerData, ProgramStep
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement, PlanningInfo, TrajectoryReport
@@ -19,6 +18,7 @@ from ir_planner.request import bounded, chosen
 from ir_planner.search import not_installed
 from ir_planner.service import EXIT_SEARCHES
 from ir_planner.settings import PlannerSettings
+from ir_values.arrays import FloatArray
 
 # What a program is asked as, and what its answer is.
 

@@ -6,7 +6,6 @@ from typing import TypeVar
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import ProgramSavings, Saving
 from ir_planner.checks import ROBOTS, interval
@@ -20,6 +19,7 @@ from ir_planner.program.station_graph import ACROSS, Chain, Part
 from ir_planner.program.time_values import FASTEST
 from ir_planner.scene import movement_cost
 from ir_planner.timing import Movement, baseline, straight_steps
+from ir_values.arrays import FloatArray
 
 # The common program: what a commissioned robot would do at the same stations, to hold savings
 # against.

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import REST_MODES, Mode, PowerMode, TransitionTimes
 from ir_msgs_py.status import StatusCode
 from ir_planner.checks import Interval, interval, spread
@@ -26,6 +25,7 @@ from ir_planner.program.pauses import (
     same_steps,
 )
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 # How long a pause lasts: known, or as equally likely lengths, or as quantiles; checked at the
 # door.

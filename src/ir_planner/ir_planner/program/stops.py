@@ -8,7 +8,6 @@ import numpy as np
 
 from ir_description import Station
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.cartesian import HeadingError, PathRefusedError, choices_along, heading_status
 from ir_planner.checks import FreeSpace, too_near
@@ -36,6 +35,7 @@ from ir_planner.service import (
     withdrawal,
 )
 from ir_planner.timing import Movement
+from ir_values.arrays import FloatArray
 
 # A configuration at a stop with its service line: what the layers of the station graph consist
 # of.

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from ir_kernels.collision import FREE
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import DistancePair, PlanningInfo, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -26,6 +25,7 @@ from ir_planner.presentation import plot_trajectory, result_text
 from ir_planner.request import OUTSIDE_MAX, Context, joint_values
 from ir_planner.scene import END_TOLERANCE, PROOF_TOLERANCE, PlanningScene, polynomials_between
 from ir_planner.timing import GRID_S, StepLaws, TimedPath, blended, fastest
+from ir_values.arrays import FloatArray
 
 DEEPER = 1e-5  # m that a pair may get nearer within a step: what the proof of it needs
 _SLOW = 0.1  # of the speeds and accelerations that the request allows

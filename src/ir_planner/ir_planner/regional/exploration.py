@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.optimize import QUICK, THOROUGH, Portfolio, Refinement
 from ir_planner.request import Context
 from ir_planner.search import SEARCHES, Ends, Search, correction_log, guesses, quick
+from ir_values.arrays import FloatArray
 
 Searches = Mapping[str, Search]
 Path = tuple[str, FloatArray]  # the search that found it, and its waypoints (M, n)

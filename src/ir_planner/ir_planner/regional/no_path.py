@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from ir_description import Body, Capsule, RobotModel
 from ir_kernels import portable
-from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import FreeSpace
 from ir_planner.scene import PlanningScene
 from ir_planner.search import Ends
+from ir_values.arrays import BoolArray, FloatArray
 
 # A grid of cubes says where a ball of the robot may be; the clearance on it is never below the true
 # one within a cube. A point fixed to a link moves on a continuous curve, within the reach of the

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from ir_kernels.collision import FREE
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import PlanningInfo, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -40,6 +39,7 @@ from ir_planner.timing import (
     check_requested,
     with_less_reserve,
 )
+from ir_values.arrays import FloatArray
 
 # What a request for a movement is answered with.
 

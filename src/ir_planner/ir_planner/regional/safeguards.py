@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import Status
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import RequestError, TimingError
@@ -28,6 +27,7 @@ from ir_planner.timing import (
     baseline_costs_at_least,
     straight_steps,
 )
+from ir_values.arrays import FloatArray
 
 Answer = tuple[str, Movement]  # the search that found it
 _OPTIMISED_AGAIN = (

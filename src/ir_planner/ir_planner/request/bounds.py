@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import ROBOTS_TIME_VALUE, PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import extremes
 from ir_planner.errors import RequestError
+from ir_values.arrays import FloatArray
 
 SAFETY_DISTANCE_MAX = 1.0  # m
 DURATION_MIN = 1e-3  # s: shorter than any movement, and long enough for its square to be a number

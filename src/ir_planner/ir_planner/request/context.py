@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import ROBOTS_TIME_VALUE, PlanOptions
 from ir_msgs_py.report import PlanningInfo, PlanningStage, Rejection
 from ir_msgs_py.search_log import ConfigurationLog, SearchLog
 from ir_planner.errors import CancelledError
 from ir_planner.scene import MotionLimits, PlanningScene
+from ir_values.arrays import FloatArray
 
 # How much work a request may cost: counted in certified edges, with time only as a ceiling, and
 # how to stop it.

@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 STILL = 1e-9  # rad: nothing moves
 

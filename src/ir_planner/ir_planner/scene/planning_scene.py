@@ -32,11 +32,11 @@ from ir_kernels import (
     portable,
 )
 from ir_kernels.power import Regeneration
-from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.scene.motion_limits import MotionLimits
+from ir_values.arrays import BoolArray, FloatArray
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,12 @@ import numpy as np
 
 from ir_kernels import portable
 from ir_kernels.collision import FREE, Certificates
-from ir_msgs_py.arrays import FloatArray, IntArray
 from ir_msgs_py.search_log import CorrectionLog
 from ir_planner.checks import FreeSpace, first_too_near
 from ir_planner.scene import PlanningScene, path_cost
 from ir_planner.search.population import SAMPLES_MAX, Evolution, GeneticSettings, batch_work, evolve
 from ir_planner.search.variety import evenly, first_different
+from ir_values.arrays import FloatArray, IntArray
 
 _SPACING = 0.02  # rad between samples of a path in search of what collides
 _WIDER = 4.0  # by how much each further attempt widens the margin

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.settings import check_settings, setting
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.search.port import Ends, Found
 from ir_planner.search.variety import NEAREST_GOALS, different_paths
+from ir_values.arrays import FloatArray
+from ir_values.settings import check_settings, setting
 
 _SHARES = (0.25, 0.5, 0.75, 1.0)  # of the joint step to a posture by which the arm is retracted
 _SPREADS = (0.15, 0.35, 0.7)  # rad: how far vias are scattered around the straight movement

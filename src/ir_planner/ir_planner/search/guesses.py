@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
+from ir_values.arrays import FloatArray
 
 # rad by which the first five joints bulge, once in the middle, or at a quarter and at three
 # quarters

@@ -15,12 +15,12 @@ import numpy as np
 
 from ir_kernels import portable
 from ir_kernels.collision import FREE, Certificates
-from ir_msgs_py.arrays import FloatArray, IntArray
-from ir_msgs_py.errors import ParameterError
-from ir_msgs_py.settings import check_settings, setting
 from ir_planner.checks import FreeSpace
 from ir_planner.curves import spline_through, to_ppoly, virtual_knots
 from ir_planner.scene import movement_cost, path_cost
+from ir_values.arrays import FloatArray, IntArray
+from ir_values.errors import ParameterError
+from ir_values.settings import check_settings, setting
 
 SAMPLES_MAX = 200
 

@@ -1,6 +1,6 @@
 """The port of a search for free paths: what it is asked, what it answers, and what it may cost.
 
-A search is a frozen dataclass whose fields are its settings (`ir_msgs_py.settings.setting`).
+A search is a frozen dataclass whose fields are its settings (`ir_values.settings.setting`).
 Registered under a name (registry.py) it is accepted as `planner_id`, its settings are ROS
 parameters under that name, and the documentation lists it.
 """
@@ -8,10 +8,10 @@ parameters under that name, and the documentation lists it.
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from ir_msgs_py.arrays import FloatArray
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.search.correction import Correction
+from ir_values.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,12 +14,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
-from ir_msgs_py.settings import check_settings, setting
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.search.port import Ends, Found
 from ir_planner.search.variety import NEAREST_GOALS
+from ir_values.arrays import BoolArray, FloatArray, IntArray
+from ir_values.settings import check_settings, setting
 
 # Two trees of configurations whose edges are tested only when they join both. A node of tree 0
 # leads back to the start, one of tree 1 to a goal. An edge that proves blocked moves the nodes

@@ -11,10 +11,10 @@ import numpy as np
 
 from ir_description import Body, Station, Zone
 from ir_kernels import CollisionModel
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Context, Work
 from ir_planner.scene import PlanningScene, tcp_inside
+from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 # A service movement begins in the machine's forbidden zone. Outside means that every capsule from
 # link 3 to the tool is farther than S_m from the zone. D of eq. (7) is the sum of the metric

@@ -16,10 +16,10 @@ import numpy as np
 
 from ir_kernels import portable
 from ir_kernels.collision import FREE
-from ir_msgs_py.arrays import BoolArray, FloatArray, IntArray
-from ir_msgs_py.settings import check_settings, setting
 from ir_planner.request import Work
 from ir_planner.service.exit import Exit, ExitsFound, WalkRecord
+from ir_values.arrays import BoolArray, FloatArray, IntArray
+from ir_values.settings import check_settings, setting
 
 
 @dataclass(eq=False)

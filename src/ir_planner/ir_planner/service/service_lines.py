@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ir_description import Station
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import FreeSpace, first_too_near
 from ir_planner.errors import TimingError
@@ -21,6 +20,7 @@ from ir_planner.request import Context
 from ir_planner.scene import MotionLimits
 from ir_planner.service.withdrawals import ExitPath
 from ir_planner.timing import Movement, best_stretch, stretched, time_spline, within_torque
+from ir_values.arrays import FloatArray
 
 SPACING = (
     0.03  # m between points of the line: in between, the tool leaves it by less than a millimetre

@@ -15,7 +15,6 @@ import numpy as np
 
 from ir_description import Station
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.report import PlanningInfo, ServiceCandidate, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import CLOSEST, PATH, ZONES, Colour, FreeSpace, Shape, nearest_pair, too_near
@@ -34,6 +33,7 @@ from ir_planner.service.withdrawals import (
     withdrawal,
 )
 from ir_planner.timing import Movement, objective_value
+from ir_values.arrays import FloatArray
 
 EXIT = "exit"
 ENTRY = "entry"

@@ -12,8 +12,6 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.settings import check_settings, describe, setting
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.request import Journal, Work
@@ -21,8 +19,10 @@ from ir_planner.scene import path_cost
 from ir_planner.search import EXIT, connect, fewest_corners, first_different, joint_scale
 from ir_planner.service.exit import Exit, ExitSearch, ExitsFound
 from ir_planner.service.modified_ga import ModifiedGa
+from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError
 from ir_values.extensions import Registry
+from ir_values.settings import check_settings, describe, setting
 
 # Exit paths by two trees: one grows from the interaction configuration, the other from
 # configurations outside.

@@ -9,9 +9,9 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_planner.request import Context
 from ir_planner.scene import PlanningScene, torque_use
+from ir_values.arrays import FloatArray
 
 _SLOW = 0.05  # of the speed limits: friction counts in full
 _ROOM = 0.06  # share of the torque that accelerations get

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from ir_kernels import portable
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlanningInfo, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
@@ -28,6 +27,7 @@ from ir_planner.request import DURATION_MAX, Context, Journal, Work, bounded, wi
 from ir_planner.scene import STILL, PlanningScene
 from ir_planner.search import fewest_corners
 from ir_planner.timing import Movement, at_the_mains, request_cost
+from ir_values.arrays import FloatArray
 
 # Time against energy: certified movements between the fastest and the one of least energy at the
 # mains.

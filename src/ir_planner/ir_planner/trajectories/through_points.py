@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
@@ -34,6 +33,7 @@ from ir_planner.timing import (
     with_less_reserve,
     within_torque,
 )
+from ir_values.arrays import FloatArray
 
 POINTS_MAX = 1000
 _AT_STOPS = ("clearance", "position")  # violations that straight steps avoid

@@ -17,8 +17,6 @@ from rclpy.node import Node
 from ir_msgs.srv import StartRecording, StopRecording
 from ir_msgs_py import names
 from ir_msgs_py.checks import one_line
-from ir_msgs_py.errors import MsgsError
-from ir_msgs_py.file_roots import FileRoots
 from ir_msgs_py.ros.diagnostics import ERROR, OK, WARN, Condition, Diagnostics
 from ir_msgs_py.ros.node_process import CommandLineError, own_words, run_node
 from ir_msgs_py.ros.parameters import Parameters
@@ -50,6 +48,8 @@ from ir_recorder.recording.settings import RecorderSettings
 from ir_recorder.recording.topics import TopicSelection, checked_topics, single_type
 from ir_recorder.recording.worker import Act, Message, RecordingWorker
 from ir_recorder.recording.writer import OpenWriter, RecordingSummary, RecordingWriter, open_writer
+from ir_values.errors import IrError
+from ir_values.files import FileRoots
 
 # Answers to ~/start and ~/stop: a refusal is a status, and no request ends the node.
 
@@ -121,7 +121,7 @@ class Services:
 
 
 def _known(error: Exception) -> Status | None:
-    if isinstance(error, (RecorderError, MsgsError)):
+    if isinstance(error, (RecorderError, IrError)):
         return Status(StatusCode.FAILURE, str(error))
     return None
 
@@ -485,7 +485,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     def ended() -> bool:
         return fails() and not any(node.recording for node in recorders)
 
-    refusals = (RecorderError, MsgsError)
+    refusals = (RecorderError, IrError)
     code = run_node(
         "ir-record", start, everything, refusals=refusals, goes_on=lambda node: not ended()
     )

@@ -10,13 +10,13 @@ from importlib.resources import files
 from pathlib import Path
 
 from ir_description import DescriptionError, cell_from_yaml, cell_to_yaml, load_cell, robot_urdf
-from ir_msgs_py.errors import InvalidValueError
 from ir_recorder.errors import LostFileError, PathError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import Split, part_facts, part_path
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.recording.arithmetic import arithmetic
 from ir_recorder.recording.writer import RecordingSummary, RecordingWriter, checked_path
+from ir_values.errors import InvalidValueError
 from ir_values.extensions import installed_extensions
 
 # What a further file of a recording repeats, so that it can be read alone.

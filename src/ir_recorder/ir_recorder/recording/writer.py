@@ -22,10 +22,10 @@ from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
-from ir_msgs_py.errors import FileRefusedError
 from ir_recorder.errors import LostFileError, PathError, WriteError
 from ir_recorder.format.qos import QosOffer, offers_to_yaml
 from ir_recorder.format.schemas import SchemaLibrary
+from ir_values.errors import FileRefusedError
 from ir_values.files import ANYWHERE, FileRoots, check_kind, opened
 from ir_values.output_files import FileLock, beside, sync_folder
 

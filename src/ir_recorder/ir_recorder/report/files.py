@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ir_msgs_py.errors import FileRefusedError
-from ir_msgs_py.file_roots import FileRoots
 from ir_recorder.errors import PathError
+from ir_values.errors import FileRefusedError
+from ir_values.files import FileRoots
 
 
 def write_output(path: str | Path, content: bytes, replaces: bytes, roots: FileRoots) -> Path:

@@ -13,7 +13,6 @@ from ir_description import Body, Cell
 from ir_kernels.collision import CollisionModel
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.announcements import Contact, MachineState
-from ir_msgs_py.arrays import BoolArray, FloatArray
 from ir_msgs_py.report import DistancePair
 from ir_sim_driver.controller.cell_scene import (
     ALLOWED_DEPTH,
@@ -27,6 +26,7 @@ from ir_sim_driver.controller.safety import Safety
 from ir_sim_driver.motion import Executor, ToolPoint, TrajectoryGoal
 from ir_sim_driver.notices import Level, Notices
 from ir_sim_driver.plant import Backend, Carried
+from ir_values.arrays import BoolArray, FloatArray
 
 # Period of the looks: as often as speed and clearance ask for.
 #

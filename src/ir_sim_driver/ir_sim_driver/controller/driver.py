@@ -15,8 +15,6 @@ from ir_description import Capsule, Cell, FramePose, fixed_frames, moving_frames
 from ir_kernels.chain import Chain
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.announcements import ControllerTimers
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.modes import Mode, PowerMode
 from ir_msgs_py.names import END_REST
 from ir_msgs_py.plc import OperatingMode, PlcInputs
@@ -33,6 +31,8 @@ from ir_sim_driver.motion import ExecutionSettings, Following, Outcome, Trajecto
 from ir_sim_driver.notices import Level, Notice
 from ir_sim_driver.plant import Carried, Plant
 from ir_sim_driver.plc import STOP_BIT
+from ir_values.arrays import FloatArray
+from ir_values.errors import IrError
 
 
 def try_cell(simulation: Simulation, cell: Cell) -> str:
@@ -308,7 +308,7 @@ class Driver:
                 return plc.raw, ""
             try:
                 plc.raw.with_bit(name, level)
-            except MsgsError as error:
+            except IrError as error:
                 raise RequestRefusedError(StatusCode.INVALID_OBJECT_NAME, str(error)) from error
             if name in OperatingMode.__members__:
                 plc.turn_switch(writer, OperatingMode[name])

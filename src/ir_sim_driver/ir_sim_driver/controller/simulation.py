@@ -11,7 +11,6 @@ import numpy as np
 
 from ir_description import Cell, PowerData, load_cell
 from ir_kernels.dynamics import DynamicsModel
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.modes import OFF_THE_NETWORK, READY, Mode
 from ir_msgs_py.plc import OperatingMode, PlcOutputs
 from ir_msgs_py.status import StatusCode
@@ -54,6 +53,7 @@ from ir_sim_driver.plant import (
 )
 from ir_sim_driver.plc import Plc, Watchdog
 from ir_sim_driver.power import IdleTimes
+from ir_values.arrays import FloatArray
 
 # Outcomes of goals: energy, load finding and contact.
 

@@ -17,7 +17,7 @@ from ir_sim_driver.plc.inputs import (
 )
 from ir_sim_driver.plc.port import STOP_BIT, Controller, Link, OpenLink, Readout
 from ir_sim_driver.plc.stop import StopMachine, StopState
-from ir_sim_driver.plc.wake_on_lan import WakeOnLan
+from ir_sim_driver.plc.wake_listener import WakeOnLan
 
 __all__ = [
     "BITS",

@@ -16,7 +16,7 @@ from ir_sim_driver.notices import Level, Notices
 from ir_sim_driver.plc.modbus import ModbusTcp
 from ir_sim_driver.plc.port import STOP_BIT, Link
 from ir_sim_driver.plc.stop import StopMachine
-from ir_sim_driver.plc.wake_on_lan import WakeOnLan
+from ir_sim_driver.plc.wake_listener import WakeOnLan
 from ir_values.errors import InvalidValueError, shown
 from ir_values.extensions import Registry
 from ir_values.settings import check_settings, describe, setting

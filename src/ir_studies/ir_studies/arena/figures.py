@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_studies.arena.settings import Entry
 from ir_studies.work import Row
+from ir_values.arrays import FloatArray
 
 NUMBERS = (
     "first_path_s", "first_s", "final_s", "duration_s", "energy_j", "drives_j", "cost_j", "movement_cost",  # noqa: E501

@@ -13,8 +13,6 @@ from scipy.spatial import ConvexHull
 
 from ir_description import Cell, is_path, load_cell
 from ir_kernels import Chain
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.file_roots import ANYWHERE
 from ir_planner.search import SEARCHES
 from ir_planner.search.with_ompl import needs_ompl
 from ir_recorder.report.charts import Point, front_chart
@@ -39,6 +37,8 @@ from ir_studies.arena.figures import (
 )
 from ir_studies.arena.settings import PORTFOLIO, ArenaSettings, settings_text
 from ir_studies.page import BUTTON, page
+from ir_values.arrays import FloatArray
+from ir_values.files import ANYWHERE
 
 # A small picture of a cell: bodies and robot as shaded outlines, seen from a corner above.
 

@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from ir_studies.arena.figures import Run, asked_alike, blocked_and_free, figures
-from ir_studies.arena.planner_arena import write_outputs, write_settings
+from ir_studies.arena.planner_arena_database import write_outputs, write_settings
 from ir_studies.arena.settings import ArenaSettings, Entry, entries, read_by
 from ir_studies.errors import StoppedError, StudyError, WorkerError
 from ir_studies.work import Means, Results, Task

@@ -12,7 +12,6 @@ import numpy as np
 import yaml
 
 from ir_description import Cell, DescriptionError, cell_hash, is_path, load_cell, load_power_data
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import ROBOTS_TIME_VALUE, TIMINGS
 from ir_planner import PlannerError
 from ir_planner.scene import scene_with
@@ -28,6 +27,7 @@ from ir_studies.work import (
     settings_values,
 )
 from ir_studies.work.results import task_digests
+from ir_values.arrays import FloatArray
 
 # Tasks of a cell, there and back.
 

@@ -15,8 +15,6 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from ir_description import Cell, cell_to_yaml
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.file_roots import ANYWHERE
 from ir_planner.checks import Interval
 from ir_recorder.report.files import write_output
 from ir_recorder.report.number_text import DASH, joules, millimetres, percent, text
@@ -29,6 +27,8 @@ from ir_studies.layout.search import GIVEN
 from ir_studies.layout.settings import Condition, LayoutSettings
 from ir_studies.layout.summary import Final, cost_words, ends, of_condition, sentences
 from ir_studies.page import page
+from ir_values.arrays import FloatArray
+from ir_values.files import ANYWHERE
 
 # The cell from above, with a dot at every place, coloured by its cost.
 

@@ -15,9 +15,9 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ir_description import Body, Cell, Equipment, Load
 from ir_description.poses import composed, inverse, pose_of, rotation_from_abc
-from ir_msgs_py.arrays import FloatArray
 from ir_recorder.report.shapes import body_mesh, capsule_mesh
 from ir_studies.work import Job, Row
+from ir_values.arrays import FloatArray
 
 # Overlap of two convex bodies, and its depth: is there a plane between them? Curved bodies are
 # taken by points on their surface, and all bodies a millimetre smaller than they are. The robot's

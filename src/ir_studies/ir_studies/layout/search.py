@@ -23,7 +23,6 @@ import numpy as np
 from scipy.stats import qmc
 
 from ir_description import Cell, DescriptionError, cell_from_yaml
-from ir_msgs_py.errors import MsgsError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner import PlannerError, PlannerSettings, ProgramPlan, RequestError
@@ -32,6 +31,7 @@ from ir_planner.request import Work
 from ir_studies.layout.placement import Known, Placement, Placing, deeper, overlaps
 from ir_studies.layout.settings import LayoutSettings
 from ir_studies.work import Job, Row
+from ir_values.errors import IrError
 
 BATCH = 16  # placements that are planned before the bound is looked at again
 _LINE = 3  # placements that make a line
@@ -231,7 +231,7 @@ class Maker:
             return self._plan(words)
         except RequestError as error:
             return refused(error.status)
-        except (PlannerError, MsgsError, DescriptionError) as error:
+        except (PlannerError, IrError, DescriptionError) as error:
             return {"solved": False, "kind": "beyond limits", "message": str(error)}
 
     def _look(self, values: Mapping[str, float], payloads: list[Mapping[str, float]]) -> Row:

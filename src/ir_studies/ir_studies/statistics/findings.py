@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
 from ir_recorder.analysis.intervals import (
     ALIKE,
     Mean,
@@ -22,6 +21,7 @@ from ir_recorder.analysis.intervals import (
     spread_of,
 )
 from ir_studies.work import Row
+from ir_values.arrays import FloatArray
 
 SYNCHRONOUS = "synchronous"
 ASYNCHRONOUS = "asynchronous"

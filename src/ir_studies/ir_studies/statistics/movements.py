@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ir_description import Cell, cell_hash, data_sheet_of, load_cell
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.options import TIMINGS, PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Goal, MovementPlan, Planner, PlannerError
@@ -24,6 +23,7 @@ from ir_studies.simulated_run import READING, SimulatedRun
 from ir_studies.statistics.settings import StatisticsSettings
 from ir_studies.work import Row
 from ir_studies.work.results import PLANT, digest_of_tasks, refuse_others
+from ir_values.arrays import FloatArray
 
 # Places: ends of the withdrawals from the stations, ends of the tasks, and home.
 

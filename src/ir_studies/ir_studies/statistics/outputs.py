@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from ir_msgs_py.file_roots import ANYWHERE
 from ir_recorder.analysis.intervals import ALIKE, Mean
 from ir_recorder.report.files import write_output
 from ir_recorder.report.number_text import DASH, text
@@ -18,6 +17,7 @@ from ir_studies.statistics.dots import dots
 from ir_studies.statistics.findings import ASYNCHRONOUS, SYNCHRONOUS, Comparison, Findings, number
 from ir_studies.statistics.settings import DRAWN, StatisticsSettings
 from ir_studies.work import Row
+from ir_values.files import ANYWHERE
 
 _CSV_START = b"pair,"
 _NUMBERS = (

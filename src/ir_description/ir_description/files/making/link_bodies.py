@@ -20,8 +20,8 @@ from ir_description.files.collada import triangles_from_collada
 from ir_description.files.making.capsule_fit import CapsuleFit
 from ir_description.files.making.urdf_arm import PlacedShape, SideMotion
 from ir_description.files.making.urdf_tree import UrdfShape
-from ir_description.files.mesh import TRIANGLES_MAX, refuse_surfaces, triangles_from_stl
 from ir_description.files.solid_mesh import triangles_from_obj
+from ir_description.files.stl_mesh import TRIANGLES_MAX, refuse_surfaces, triangles_from_stl
 from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError, shown
 from ir_values.files import read_regular_file

@@ -21,11 +21,11 @@ from importlib.util import find_spec
 from multiprocessing.connection import Connection
 from multiprocessing.reduction import send_handle
 
-from ir_msgs_py.arrays import FloatArray
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.request import Work
 from ir_planner.scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 STOP = "stop"
 """Sent after the problem, when the time is over: the answer is what was found so far."""

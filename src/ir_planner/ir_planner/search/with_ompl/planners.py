@@ -5,8 +5,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from ir_msgs_py.arrays import FloatArray
-from ir_msgs_py.settings import check_settings, setting
 from ir_msgs_py.status import StatusCode
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import RequestError
@@ -15,6 +13,8 @@ from ir_planner.search.port import Ends, Found
 from ir_planner.search.tree import connect
 from ir_planner.search.variety import NEAREST_GOALS
 from ir_planner.search.with_ompl.host import Parameters, Problem, asked, check_installed
+from ir_values.arrays import FloatArray
+from ir_values.settings import check_settings, setting
 
 _SHARE = (
     0.75  # of the work that is left goes into OMPL's checks: its path is certified, and improved

@@ -11,13 +11,13 @@ from contextlib import closing, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
-from ir_msgs_py.file_roots import ANYWHERE
 from ir_recorder.report.files import write_output
 from ir_recorder.report.step_table import PARQUET_START, write_columns
 from ir_studies.arena.figures import Run, columns
 from ir_studies.arena.page import write_page
 from ir_studies.arena.settings import FORMAT, ArenaSettings, read_settings, settings_text
 from ir_studies.errors import FolderError, SettingsError
+from ir_values.files import ANYWHERE
 
 _TABLES = """
 CREATE TABLE experiments (id INTEGER PRIMARY KEY AUTOINCREMENT, name VARCHAR(512), totaltime REAL,
