@@ -165,6 +165,7 @@ def _more_time(knots: FloatArray, tau: FloatArray, use: FloatArray) -> FloatArra
     count = len(knots) - _DEGREE - 1
     at = np.clip(np.arange(count) - _DEGREE // 2, 0, len(worst) - 1)
     over = np.maximum(_MORE * worst[at] - 1.0, 0.0)
-    window = np.hanning(2 * _AROUND + 3)[1:-1]
+    apart = np.arange(-_AROUND, _AROUND + 1) / (_AROUND + 1)
+    window = (1.0 - apart * apart) * (1.0 - apart * apart)
     widest = maximum_filter1d(over, 2 * _AROUND + 1)
     return np.asarray(1.0 + convolve1d(widest, window / window.sum(), mode="nearest"))
