@@ -344,7 +344,8 @@ NAN = np.where(np.arange(3) == 0, np.nan, CUBE)
         ("mesh: x.obj, unit: mm", "v 0 zero 0\n", "line 1 of the OBJ"),
         ("mesh: x.obj, unit: mm", "v 0 0\n", "line 1 of the OBJ"),
         ("mesh: x.glb, unit: m", "glTF", "can't be read"),
-        ("mesh: x.stl, unit: m", "solid", "0 triangles"),
+        ("mesh: x.stl, unit: m", "solid\nendsolid", "0 triangles"),
+        ("mesh: x.stl, unit: m", "solid", "was it cut?"),
     ],
 )
 def test_what_is_no_machine_is_refused_by_a_sentence_at_its_line(

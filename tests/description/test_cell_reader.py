@@ -326,7 +326,7 @@ def test_nothing_leads_out_of_the_cell_s_folder(tmp_path: Path, name: str) -> No
         (b"solid x\nendsolid x", "the mesh has 0 triangles, must have 4 to 200000"),
         (b"solid x\nvertex 1 2 3\nendsolid", "has 1 vertices, must have three to a triangle"),
         (
-            b"solid x\nvertex a b c\nvertex 1 2 3\nvertex 1 2 3\n",
+            b"solid x\nvertex a b c\nvertex 1 2 3\nvertex 1 2 3\nendsolid",
             "a vertex that is not three numbers",
         ),
         (binary_stl(np.full((4, 3, 3), np.nan)), "not finite"),

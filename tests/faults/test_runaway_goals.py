@@ -19,7 +19,7 @@ from ir_sim_driver import (
     TrajectoryGoal,
     make_simulation,
 )
-from ir_sim_driver.motion.trajectory_checks import rounded
+from ir_sim_driver.motion.corner_rounding import rounded
 
 BARE = replace(
     load_cell("open"), floor=False, equipment=(), stations=(), parts=(), program=(), tasks=()
@@ -176,12 +176,15 @@ def test_positions_alone_are_executed_within_the_limits_and_arrive(simulation: S
 
 def test_rounded_corners_are_the_mean_over_the_blend_time(simulation: Simulation) -> None:
     q = simulation.backend.q
-    given = trajectory(simulation, [0.5, 1.0, 1.5], [q, q + 0.1, q])
-    blend = 0.02
-    smooth = rounded(given, blend)
+    given = trajectory(simulation, [0.5, 1.0, 1.5], [q, q + 0.015, q])
+    settings = ExecutionSettings()
+    blend = settings.blend_time
+    executed = rounded(given, simulation.robot, settings)
+    assert executed.window == blend
+    smooth = executed.trajectory
     for instant in (0.51, 0.8, 1.0, 1.005, 1.013, 1.02, 1.3, 1.5, 1.51):
         u = instant - blend + (np.arange(2000) + 0.5) * blend / 2000.0
-        first = q + (u[:, None] - 0.5) * 0.2  # before the first point the first line goes on
+        first = q + (u[:, None] - 0.5) * 0.03  # before the first point the first line goes on
         line = np.where(u[:, None] < 0.5, first, given.sample(u).q)
         assert np.abs(smooth.sample(np.array([instant])).q[0] - line.mean(axis=0)).max() < 1e-8
 

@@ -61,7 +61,7 @@ COLUMNS: Columns = {
 
 def add_compare(compare: argparse.ArgumentParser) -> None:
     """Arguments of `ir compare`."""
-    from ir_recorder.arguments import add_locale
+    from ir_recorder.report.number_text import add_locale
 
     add_cell(compare)
     words = (

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from ir_recorder.report.number_text import ENGLISH, LOCALES
 from ir_values.files import ANYWHERE, FileRoots
 
 
@@ -22,12 +21,6 @@ def roots_of(folders: Sequence[str]) -> FileRoots:
     folders only. Roots by default are for nodes, whose requests come from elsewhere.
     """
     return FileRoots.of(folders) if folders else ANYWHERE
-
-
-def add_locale(parser: argparse.ArgumentParser) -> None:
-    """Adds --locale: how tables write their decimals."""
-    words = "of a .csv: de writes decimals with a comma and columns apart by semicolons (en)"
-    parser.add_argument("--locale", choices=LOCALES, default=ENGLISH, help=words)
 
 
 def record_parser() -> argparse.ArgumentParser:

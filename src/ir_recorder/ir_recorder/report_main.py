@@ -17,7 +17,7 @@ from ir_description import (
 )
 from ir_recorder.analysis import Analysis, analyse, findings
 from ir_recorder.analysis.meter import with_meter
-from ir_recorder.arguments import add_locale, add_roots, roots_of
+from ir_recorder.arguments import add_roots, roots_of
 from ir_recorder.errors import ReadError, RecorderError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import is_further_part
@@ -27,6 +27,7 @@ from ir_recorder.reading.recording import Recording
 from ir_recorder.report import write_report
 from ir_recorder.report.compare import MOST, write_comparison
 from ir_recorder.report.costs import read_costs
+from ir_recorder.report.number_text import add_locale
 from ir_recorder.report.picture import write_picture
 from ir_recorder.report.step_table import write_table
 from ir_recorder.traces import read_mapping

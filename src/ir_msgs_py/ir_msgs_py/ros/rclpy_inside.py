@@ -286,9 +286,9 @@ UNDISCOVERED = 0.09
 (0.1 s).
 """
 
-SENDS = 10
-"""A second: more than a busy machine takes to discover a client, and no longer than a dead one may
-hold up the others.
+SENDS = 50
+"""Five seconds: more than a busy machine takes to discover a client. One that dies undiscovered
+holds up the others once for so long.
 """
 
 
@@ -302,15 +302,19 @@ class PatientSender:
     """
 
     def __init__(
-        self, send: Callable[[Any, Any], None], clock: Callable[[], float] = time.monotonic
+        self,
+        send: Callable[[Any, Any], None],
+        clock: Callable[[], float] = time.monotonic,
+        sends: int = SENDS,
     ) -> None:
         self._send = send
+        self._sends = sends
         self._clock = clock
         self._patient = True
 
     def send(self, response: Any, header: Any) -> None:
-        """Send it, for about a second at most; raises what the last attempt raised."""
-        for _ in range(SENDS if self._patient else 1):
+        """Send it, for about five seconds at most; raises what the last attempt raised."""
+        for _ in range(self._sends if self._patient else 1):
             begun = self._clock()
             failure: Exception | None = None
             try:

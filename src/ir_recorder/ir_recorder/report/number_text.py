@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import math
 from html import escape
 from unicodedata import category
@@ -114,3 +115,9 @@ def text(value: object) -> str:
         "\ufffd" if category(c) in _UNSEEN and c not in "\n\t" else c for c in str(value)
     )
     return escape(seen, quote=True)
+
+
+def add_locale(parser: argparse.ArgumentParser) -> None:
+    """Adds --locale: how tables write their decimals."""
+    words = "of a .csv: de writes decimals with a comma and columns apart by semicolons (en)"
+    parser.add_argument("--locale", choices=LOCALES, default=ENGLISH, help=words)

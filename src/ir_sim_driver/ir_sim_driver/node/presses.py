@@ -51,6 +51,7 @@ PERIOD = 0.004  # s between two looks while nothing comes
 TURN = 64  # messages of a topic that one look takes, or requests that it answers: 2 ms
 _REQUESTS = 512  # that one look takes, about as long
 _LAST = 1.0  # s for the last answer
+_SENDS = 10  # of an answer, a second: those behind it wait as long
 _SAID_AGAIN = 60.0  # s between two warnings of one kind
 _PRESSED = f"{STOP_BIT} = TRUE"
 _KEPT_LEVELS = 256  # messages whose levels are remembered
@@ -432,7 +433,7 @@ class PolledService:
                 service_type, name, lambda request, response: handler(request, response, 0)
             )
         self._calls = Calls.of(owner)
-        self._sender = PatientSender(aside_sender(self._service))
+        self._sender = PatientSender(aside_sender(self._service), sends=_SENDS)
         self._waiting: deque[tuple[Any, Any, int]] = deque()
         self._answers = _Answers()
 
