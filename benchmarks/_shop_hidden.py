@@ -114,9 +114,13 @@ class Hidden:
     def pallet(self) -> None:
         """Rows and columns about a corner, with whole numbers that are divided as REALs."""
         name, at = self._point()
-        rows, columns = self._whole(1, 4), self._whole(1, 4)
-        pitch, lift = self._whole(50, 120), self._whole(101, 199)
-        p, r, c = self._name("P"), self._name("R"), self._name("C")
+        rows = self._whole(1, 4)
+        columns = self._whole(1, 4)
+        pitch = self._whole(50, 120)
+        lift = self._whole(101, 199)
+        p = self._name("P")
+        r = self._name("R")
+        c = self._name("C")
         self.data += [f"DECL E6POS {p}", f"DECL REAL {p}LIFT={lift}", f"DECL INT {r},{c}"]
         self.lines += [f"FOR {r}=1 TO {rows}", f"FOR {c}={columns} TO 1 STEP -1", f"{p}={name}"]
         self.lines += [f"{p}.X={p}.X+({r}-1)*{pitch}", f"{p}.Y={p}.Y-{pitch}*({c}-1)/4"]
@@ -140,7 +144,8 @@ class Hidden:
 
     def enumerated(self) -> None:
         """SWITCH of an enumeration, and of a number with lists of cases."""
-        kind, state = self._name("KIND"), self._name("STATE")
+        kind = self._name("KIND")
+        state = self._name("STATE")
         chosen = self._whole(0, 3)
         word = ("EMPTY", "HALF", "FULL")[chosen]
         self.data += [f"ENUM {kind} EMPTY,HALF,FULL", f"DECL {kind} {state}=#EMPTY"]
@@ -154,7 +159,9 @@ class Hidden:
 
     def parameters(self) -> None:
         """A routine that gets values and gives one back; its own variables hide others."""
-        routine, n, k = self._name("GO"), self._name("N"), self._name("K")
+        routine = self._name("GO")
+        n = self._name("N")
+        k = self._name("K")
         start = self._whole(2, 9)
         self.data += [f"DECL INT {n}", f"DECL REAL {k}=1"]
         self.lines += [f"{n}={start}", f"{routine}({n},{n}/2.0)", f"WAIT SEC {n}+{k}"]
@@ -194,7 +201,8 @@ class Hidden:
 
     def signals(self) -> None:
         """Outputs by number, by name, and as a group."""
-        name, group = self._name("S"), self._name("G")
+        name = self._name("S")
+        group = self._name("G")
         number = self._whole(10, 4000)
         bits = self._whole(0, 8)
         self.data += [f"SIGNAL {name} $OUT[{number}]"]
@@ -231,7 +239,8 @@ class Hidden:
         turn = 90 * self._whole(0, 4)
         self.data.append(f"DECL FRAME {frame}={{X {x},Y 10,Z 5,A {turn},B 0,C 0}}")
         self.lines += [f"LIN {frame}:{{X 100,Y 30,Z 7,A 0,B 0,C 0}}"]
-        c, s = round(math.cos(math.radians(turn))), round(math.sin(math.radians(turn)))
+        c = round(math.cos(math.radians(turn)))
+        s = round(math.sin(math.radians(turn)))
         angle = float(turn if turn <= 180 else turn - 360)
         place = [x + 100.0 * c - 30.0 * s, 10.0 + 100.0 * s + 30.0 * c, 12.0, angle, 0.0, 0.0]
         self._known_place(place)
@@ -262,7 +271,8 @@ class Hidden:
 
     def records(self) -> None:
         """An array of records with a place, a time and a mark."""
-        kind, list_ = self._name("REC"), self._name("LIST")
+        kind = self._name("REC")
+        list_ = self._name("LIST")
         count = self._whole(1, 4)
         self.data += [f"STRUC {kind} E6POS WHERE,REAL LASTS,BOOL USED", f"DECL {kind} {list_}[5]"]
         k = self._name("K")

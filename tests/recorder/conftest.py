@@ -4,11 +4,14 @@ power.
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import re
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -414,3 +417,24 @@ def data_of() -> Callable[[str], dict[str, Any]]:
         return json.loads(found[1])
 
     return read
+
+
+CHROMIUM = Path(__file__).resolve().parents[2] / "tools" / "_chromium.py"
+
+
+def _tool() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("_chromium", CHROMIUM)
+    assert spec is not None
+    assert spec.loader is not None
+    module = sys.modules["_chromium"] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    tool = _tool()
+    if tool.chromium() is None:
+        pytest.skip("needs Chromium: apt install chromium")
+    with tool.Browser() as started:
+        yield started

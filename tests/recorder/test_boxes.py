@@ -6,13 +6,10 @@ Needs Chromium. Without it these tests say `not checked: browser`; where CI=true
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import axe_core_python
@@ -30,7 +27,6 @@ from ir_studies.arena.figures import Run
 from ir_studies.arena.page import page_html as arena_html
 from ir_studies.arena.settings import ArenaSettings, Entry
 
-TOOL = Path(__file__).resolve().parents[2] / "tools" / "_chromium.py"
 BOXES = Path(__file__).with_name("page_boxes.js").read_text()
 AXE = (Path(axe_core_python.__file__).parent / "axe.min.js").read_text(encoding="utf-8")
 FOUND = """axe.run(document, {resultTypes: ['violations']}).then(
@@ -39,24 +35,6 @@ FOUND = """axe.run(document, {resultTypes: ['violations']}).then(
 """
 SIZES = {"desk": (1400, 900), "phone": (390, 844), "paper": (703, 1047)}
 OPEN = "document.querySelectorAll('details').forEach((each) => { each.open = true; })"
-
-
-def _tool() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("_chromium", TOOL)
-    assert spec is not None
-    assert spec.loader is not None
-    module = sys.modules["_chromium"] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    tool = _tool()
-    if tool.chromium() is None:
-        pytest.skip("needs Chromium: apt install chromium")
-    with tool.Browser() as started:
-        yield started
 
 
 @cache

@@ -6,14 +6,11 @@ Needs Chromium. Without it these tests say `not checked: browser`; where CI=true
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -28,31 +25,12 @@ from ir_recorder.report import report_html
 from ir_recorder.report.compare import comparison_html
 
 T = TypeVar("T")
-TOOL = Path(__file__).resolve().parents[2] / "tools" / "_chromium.py"
 CONTROLS = Path(__file__).with_name("page_controls.js").read_text().strip().split("\n\n")
 DESK = (1400, 600)
 TABLET = (768, 1024)
 PHONE = (390, 844)
 WAIT_SECONDS = 60.0  # a busy machine
 EVIL = "</script><img src=x onerror=document.title='EVIL'><b>&quot;</b>"
-
-
-def _tool() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("_chromium", TOOL)
-    assert spec is not None
-    assert spec.loader is not None
-    module = sys.modules["_chromium"] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    tool = _tool()
-    if tool.chromium() is None:
-        pytest.skip("needs Chromium: apt install chromium")
-    with tool.Browser() as started:
-        yield started
 
 
 @pytest.fixture(scope="module")
