@@ -106,6 +106,12 @@ def test_lines_that_are_too_fast_are_slowed_and_absurd_ones_refused(
         start(simulation, plan([1.0, 1.01, 1.02], home, there, home, velocities=False))
 
 
+@pytest.mark.parametrize("times", [[0.0, 1e-9, 3600.0], [0.0, 3599.0, 3599.000000001]])
+def test_a_jump_within_a_nanosecond_is_refused_by_its_speed(make, start, plan, home, times):
+    with pytest.raises(TrajectoryRefusedError, match=r"driven [\d.e+]+ times slower"):
+        start(make(), plan(times, home, home + 0.2, home, velocities=False))
+
+
 def test_gentle_lines_run_as_sent_without_a_word(make, start, run_out, plan, home):
     simulation = make("pybullet")
     start(simulation, plan([1.0, 2.0, 3.0], home, home + 0.01, home + 0.02, velocities=False))

@@ -43,7 +43,9 @@ def with_less_reserve(
     asked = context.scene.drives.torque_reserve
     need = need_of(lines, context.scene)
     there = max(1.0 - need - _ROOM, 0.0)
-    for left in (there, 0.0) if 0.0 < there < asked else (0.0,) if asked > 0.0 else ():
+    for left in sorted({there, 0.0}, reverse=True):
+        if left >= asked:
+            continue
         context.journal.note(
             "torque reserve",
             f"{context.scene.load_text} needs {need:.3f} of the torque to be moved slowly: "

@@ -34,7 +34,7 @@ class Rounded:
     """What is executed of positions alone.
 
     window [s]: of the mean. passed [rad]: how far the points are passed by, at most, any joint.
-    slowed: factor of all times, 1: as sent.
+    slowed: factor of all times, 1: as sent; above SLOWEST the trajectory is the one that was sent.
     """
 
     trajectory: JointTrajectory
@@ -71,7 +71,12 @@ def rounded(
     speed = np.abs(_slopes(trajectory)) / (robot.velocity_max * _WITHIN)
     slowed = max(1.0, float(speed.max()))
     most = robot.acceleration_max * _WITHIN * share
+    executed = trajectory
+    window = 0.0
+    passed = 0.0
     for _ in range(_ROUNDS):
+        if slowed > SLOWEST:  # nobody drives it
+            break
         slow = _stretched(trajectory, slowed)
         window = _window(slow, most, settings.blend_time)
         executed = _mean(slow, window)
