@@ -9,11 +9,10 @@ from typing import cast
 import numpy as np
 import pytest
 
-from ir_description import Cell, PowerData
+from ir_description import ROBOTS, Cell, PowerData
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_planner import Planner
-from ir_planner.checks import ROBOTS
 from ir_planner.program.chain import layers_of
 from ir_planner.program.choice import Choice
 from ir_planner.program.movements import Movements

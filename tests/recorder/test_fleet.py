@@ -28,7 +28,6 @@ from ir_recorder.report.fleet import (
     recordings_below,
     robots_of,
     write_fleet_table,
-    year_of,
 )
 from ir_values.files import FileRoots
 
@@ -48,7 +47,7 @@ def test_the_sums_are_those_of_the_members(member: Member) -> None:
     other = replace(member, robot="right", cycle=replace(cycle, modes=modes, **energies))
     robots = robots_of([member, other], costs)
     assert [robot.name for robot in robots] == ["right", "left"]
-    assert robots[0].yearly.value == pytest.approx(2.0 * year_of(member, costs).value)
+    assert robots[0].yearly.value == pytest.approx(2.0 * costs.energy_of_year(member.cycle).value)
     by_robot = {robot.name: robot.yearly.value for robot in robots}
     found = by_mode([member, other], costs)
     for robot, yearly in by_robot.items():

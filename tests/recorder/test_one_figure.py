@@ -9,8 +9,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ir_description import PowerParameters, data_sheet_of, drawn_robots
 from ir_recorder import Analysis, analyse, findings
+from ir_recorder.analysis.loads import carried
+from ir_recorder.analysis.predicted_power import (
+    BRAKES,
+    MOTORS,
+    left_alone_joules,
+    pause_joules,
+    recorded_power_data,
+    resting_watts,
+)
 from ir_recorder.analysis.production import levers, production_of
+from ir_recorder.analysis.results import FullPause
 from ir_recorder.report import report_html
 from ir_recorder.report.compare import comparison_html
 from ir_recorder.report.costs import J_PER_KWH, Costs, money
@@ -71,6 +82,44 @@ def test_modes_and_steps_are_parts_of_the_cycle(found: Analysis) -> None:
     assert sum(sum(own.values()) for own in years.values()) == pytest.approx(robot.yearly.value)
     columns = fleet_columns([member])
     assert columns["energy_j"][0] == cycle.energy
+
+
+def test_full_pauses_save_within_the_interval_of_drawn_robots(found: Analysis) -> None:
+    """What each drawn robot saves is computed for it alone, from its own data."""
+    full = found.program.unshortened if found.program is not None else None
+    if full is None or not full.added or found.cell is None:
+        pytest.skip("no pause is shortened")
+    cell = found.cell
+    data, _ = recorded_power_data(found.recording)
+    parameters = data_sheet_of(cell.robot, data)
+    timer = data.motors_to_brakes_in_program
+    joints = found.recording.joints
+    assert joints is not None
+
+    def changed(mode: str) -> float:
+        return data.mode(mode).time_to_pause + data.mode(mode).regular_time_to_operate
+
+    def saved(own: PowerParameters, pause: FullPause) -> float:
+        step = found.steps[pause.step].step
+        length = found.steps[pause.step].seconds + pause.seconds
+        loads = own.loads_with(carried(cell, step.movement.load))
+        there = replace(cell, robot=own.robot_with(cell.robot))
+        q = joints.position[np.searchsorted(joints.time, step.start)]
+        powers = [
+            resting_watts(mode, q, there, loads, own.power_with(data))
+            for mode in (MOTORS, BRAKES, step.movement.power_mode)
+        ]
+        alone = left_alone_joules(powers[0], powers[1], length, timer, changed(BRAKES))
+        mode = step.movement.power_mode
+        if mode == MOTORS or length < changed(mode):
+            return 0.0
+        return alone - pause_joules(powers[2], powers[0], length, changed(mode))
+
+    for pause in full.added:
+        nominal = saved(parameters, pause)
+        for row, added in list(zip(drawn_robots(parameters), pause.saved_added, strict=True))[:40]:
+            own = saved(replace(parameters, mean=row), pause)
+            assert nominal + added == pytest.approx(own, rel=0.01, abs=5.0)
 
 
 def test_savings_are_of_the_cycle_that_is_counted(found: Analysis) -> None:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from ir_recorder import Analysis, analyse
@@ -70,7 +71,11 @@ def test_a_pause_of_several_modes_lasts_longer_in_its_last_one() -> None:
     """200 s through the brakes to the bus' rest took 60 kJ; 500 s more are spent there, at 205
     W.
     """
-    movement = SimpleNamespace(is_pause=True, power_mode="STAND_ON_BRAKES>BUS_POWER_OFF")
+    movement = SimpleNamespace(
+        is_pause=True,
+        power_mode="STAND_ON_BRAKES>BUS_POWER_OFF",
+        report=SimpleNamespace(energy=60_000.0),
+    )
     step = SimpleNamespace(movement=movement, start=0.0, end=200.0)
     pause = SimpleNamespace(step=step, seconds=200.0, energy=60_000.0)
     meter = SimpleNamespace(energy=lambda start, end: 60_000.0)
@@ -81,6 +86,7 @@ def test_a_pause_of_several_modes_lasts_longer_in_its_last_one() -> None:
         lambda mode: CHANGE,
         TIMER,
         lambda mode, result: watts[mode],
+        lambda mode, result: np.zeros(1),
         cast(Any, meter),
     )
     assert full is not None

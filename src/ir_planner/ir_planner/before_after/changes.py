@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_description import drawn_robots
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.savings import Change, Hop, Saving, Side
-from ir_planner.checks import Interval, interval, movement_energy, robots, total_report
+from ir_planner.checks import Interval, interval, movement_energy, total_report
 from ir_planner.program import ProgramRequest, Spreads
 from ir_planner.scene import PlanningScene, scene_with
 from ir_values.arrays import FloatArray
@@ -45,7 +46,7 @@ def peak_interval(steps: Sequence[PlannedMovement], request: ProgramRequest) -> 
 
 def _drawn(scene: PlanningScene) -> list[PlanningScene]:
     """The same scene with each of the drawn robots."""
-    sets = [replace(scene.parameters, mean=row) for row in robots(scene.parameters)[:ROBOTS]]
+    sets = [replace(scene.parameters, mean=row) for row in drawn_robots(scene.parameters)[:ROBOTS]]
     return [
         replace(
             scene, drives=replace(scene.drives, parameters=one), power=one.power_with(scene.power)

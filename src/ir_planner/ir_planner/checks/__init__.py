@@ -25,13 +25,11 @@ from ir_planner.checks.free_space import (
     too_near_sentence,
 )
 from ir_planner.checks.intervals import (
-    ROBOTS,
     Interval,
     energy_and_slope,
     holding_slope,
     interval,
     movement_spread,
-    robots,
     spread,
     standing_slope,
 )
@@ -59,7 +57,6 @@ __all__ = [
     "AT_REST",
     "CLOSEST",
     "PATH",
-    "ROBOTS",
     "SLACK",
     "ZONES",
     "Colour",
@@ -91,7 +88,6 @@ __all__ = [
     "nearest_pairs",
     "pair_value",
     "peak_power",
-    "robots",
     "spread",
     "standing_slope",
     "state_check",

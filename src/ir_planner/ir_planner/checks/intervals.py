@@ -16,7 +16,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ir_description import AXIS_UNITS, IDLE, PowerParameters, interval_over
+from ir_description import AXIS_UNITS, IDLE, PowerParameters, drawn_robots, interval_over
 from ir_kernels import DcBus, dc_bus, portable
 from ir_msgs_py.trajectory import JointTrajectory, Samples
 from ir_planner.curves import motion_at
@@ -170,10 +170,6 @@ def _carried(at: _States, scene: PlanningScene) -> FloatArray:
     return at.torque - scene.unloaded.inverse_dynamics(*at.motion[:3])
 
 
-ROBOTS = 1000  # drawn: the ends of a 90 % interval are then known to some 5 % of its width
-SEED = 90
-
-
 @dataclass(frozen=True)
 class Interval:
     """5 % and 95 % quantile, J."""
@@ -183,17 +179,11 @@ class Interval:
 
 
 @lru_cache(maxsize=16)
-def robots(parameters: PowerParameters) -> FloatArray:
-    """The drawn robots (ROBOTS, P); always the same for the same parameters."""
-    return parameters.draws(ROBOTS, SEED)
-
-
-@lru_cache(maxsize=16)
 def expected(parameters: PowerParameters) -> PowerParameters:
     """The mean of the drawn robots: more than the parameters' mean where a loss can only be
     larger.
     """
-    return replace(parameters, mean=robots(parameters).mean(axis=0))
+    return replace(parameters, mean=drawn_robots(parameters).mean(axis=0))
 
 
 @lru_cache(maxsize=64)
@@ -206,7 +196,7 @@ def expected_scene(scene: PlanningScene) -> PlanningScene:
 
 def spread(slope: FloatArray, parameters: PowerParameters) -> FloatArray:
     """What the drawn robots add (ROBOTS,) J to an energy that is linear with this slope (P,)."""
-    return portable.matmul(robots(parameters) - parameters.mean, slope)
+    return portable.matmul(drawn_robots(parameters) - parameters.mean, slope)
 
 
 def movement_spread(trajectory: JointTrajectory, scene: PlanningScene) -> FloatArray:
@@ -214,7 +204,7 @@ def movement_spread(trajectory: JointTrajectory, scene: PlanningScene) -> FloatA
     at = Sampled.of(trajectory)
     there = expected_scene(scene)
     expected_energy, slope = energy_and_slope(at, there)
-    drawn = robots(scene.parameters) - there.parameters.mean
+    drawn = drawn_robots(scene.parameters) - there.parameters.mean
     return expected_energy - sampled_energy(at, scene) + portable.matmul(drawn, slope)
 
 

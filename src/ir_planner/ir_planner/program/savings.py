@@ -6,9 +6,10 @@ from typing import TypeVar
 
 import numpy as np
 
+from ir_description import ROBOTS
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import ProgramSavings, Saving
-from ir_planner.checks import ROBOTS, interval
+from ir_planner.checks import interval
 from ir_planner.errors import RequestError, TimingError
 from ir_planner.program.choice import Choice, Steps, duration_of
 from ir_planner.program.cycle_plan import timed_choice

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ir_description import (
+    ROBOTS,
     Cell,
     DescriptionError,
     PowerData,
@@ -53,6 +54,7 @@ from ir_recorder.analysis.results import (
 from ir_recorder.analysis.steps import ExecutedStep, executed_steps
 from ir_recorder.format import contents
 from ir_recorder.reading.recording import Recording
+from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError
 
 # The program as a whole: movements, pauses and waiting, planned and measured, and the cycle
@@ -60,6 +62,8 @@ from ir_values.errors import InvalidValueError
 
 Watts = Callable[[str, StepResult], float]
 """W of a mode in the posture and with the load of a step, by the data."""
+Added = Callable[[str, StepResult], FloatArray]
+"""What drawn robots add (N,) W to it."""
 
 
 def program_totals(
@@ -90,6 +94,7 @@ def unshortened_cycle(
     change: Callable[[str], float],
     timer: float,
     watts: Watts,
+    added_watts: Added,
     meter: Meter,
 ) -> Unshortened | None:
     """The cycle with its pauses at full length, computed from what was measured; None where none is
@@ -111,7 +116,7 @@ def unshortened_cycle(
     if len(pauses) != len(lengths):
         return Unshortened(NAN, NAN, run_pauses, sum(lengths))
     added = tuple(
-        _full_pause(place, result, length, change, timer, watts)
+        _full_pause(place, result, length, change, timer, watts, added_watts)
         for (place, result), length in zip(pauses, lengths, strict=True)
     )
     start = results[0].step.start
@@ -132,26 +137,37 @@ def _full_pause(
     change: Callable[[str], float],
     timer: float,
     watts: Watts,
+    added_watts: Added,
 ) -> FullPause:
     """What `length` [s] adds to a pause of the run, and to that of the common program."""
     sequence = result.step.movement.power_mode
+    planned = result.step.movement.report.energy
     mode = deepest(sequence)
     motors = watts(MOTORS, result)
     brakes = watts(BRAKES, result)
+    motors_added = added_watts(MOTORS, result)
+    longer = length - result.seconds
 
     def left_alone(seconds: float) -> float:
         return left_alone_joules(motors, brakes, seconds, timer, change(BRAKES))
 
-    if mode != sequence and length >= result.seconds:
-        # one mode after the other: the last one lasts longer
-        full = result.energy + (length - result.seconds) * watts(mode, result)
-    elif mode == MOTORS or length < change(mode):
-        full = left_alone(length)
+    common_added = left_alone_joules(
+        motors_added, added_watts(BRAKES, result), length, timer, change(BRAKES)
+    )
+    common = left_alone(length) - left_alone(result.seconds)
+    if mode == MOTORS or length < change(mode):
         mode = BRAKES if length > timer + change(BRAKES) else MOTORS
+        full = left_alone(length)
+        saved_added = np.zeros_like(motors_added)
     else:
         full = pause_joules(watts(mode, result), motors, length, change(mode))
-    common = left_alone(length) - left_alone(result.seconds)
-    return FullPause(place, mode, length - result.seconds, full - result.energy, common)
+        own = pause_joules(added_watts(mode, result), motors_added, length, change(mode))
+        saved_added = common_added - own
+    energy, predicted = full - result.energy, full - planned
+    if deepest(sequence) != sequence and longer >= 0.0:
+        # one mode after the other: the last one lasts longer
+        energy = predicted = longer * watts(mode, result)
+    return FullPause(place, mode, longer, energy, predicted, common, saved_added)
 
 
 def _measured(name: str, results: Sequence[StepResult]) -> Share:
@@ -291,11 +307,21 @@ class _Analyser:
             own = self.data.resting(mode)
             return own.time_to_pause + own.regular_time_to_operate
 
-        timer = self.data.motors_to_brakes_in_program
-        return unshortened_cycle(results, fact, change, timer, watts, meter)
+        parameters = self.parameters or data_sheet_of(cell.robot, self.data)
+        predictor = Predictor(cell.robot, self.data.dc_link, cell.base_pose, parameters)
 
-    def _resting(self, mode: str, step: ExecutedStep, cell: Cell | None) -> float:
-        """W at rest where a step begins, by the data; NaN where posture or cell are missing."""
+        def added(mode: str, result: StepResult) -> FloatArray:
+            q = self._posture(result.step, cell)
+            if q is None:
+                return np.full(ROBOTS, NAN)
+            name = self.data.resting(mode).name
+            return predictor.added_at_rest(name, q, carried(cell, result.step.movement.load))
+
+        timer = self.data.motors_to_brakes_in_program
+        return unshortened_cycle(results, fact, change, timer, watts, added, meter)
+
+    def _posture(self, step: ExecutedStep, cell: Cell | None) -> FloatArray | None:
+        """Joint values (n,) where a step begins; None where posture or cell are missing."""
         joints = self.recording.joints
         if (
             cell is None
@@ -303,10 +329,17 @@ class _Analyser:
             or joints.position.shape[1] != cell.robot.n
             or not len(joints.time)
         ):
-            return NAN
+            return None
         row = int(np.clip(np.searchsorted(joints.time, step.start), 0, len(joints.time) - 1))
+        return np.asarray(joints.position[row])
+
+    def _resting(self, mode: str, step: ExecutedStep, cell: Cell | None) -> float:
+        """W at rest where a step begins, by the data; NaN where posture or cell are missing."""
+        q = self._posture(step, cell)
+        if cell is None or q is None:
+            return NAN
         loads = carried(cell, step.movement.load)
-        return resting_watts(mode, joints.position[row], cell, loads, self.data)
+        return resting_watts(mode, q, cell, loads, self.data)
 
     def _results(
         self, steps: Sequence[ExecutedStep], meter: Meter | None, cell: Cell | None

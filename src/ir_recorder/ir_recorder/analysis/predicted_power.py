@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 import yaml
@@ -15,6 +16,7 @@ from ir_description import (
     PowerData,
     PowerParameters,
     RobotModel,
+    drawn_robots,
     interval_over,
     load_power_data,
 )
@@ -92,9 +94,12 @@ def resting_watts(
     return float(watts + data.drives_and_brake_release + model.axis_power(still, held).sum())
 
 
+Power = TypeVar("Power", float, FloatArray)
+
+
 def left_alone_joules(
-    motors: float, brakes: float, seconds: float, timer: float, change: float
-) -> float:
+    motors: Power, brakes: Power, seconds: float, timer: float, change: float
+) -> Power:
     """J of a pause on motors: after `timer` [s] the controller closes the brakes by itself.
 
     motors, brakes [W]: at rest in the two modes; change [s]: closing and opening, at `motors`.
@@ -104,7 +109,7 @@ def left_alone_joules(
     return motors * (timer + change) + brakes * (seconds - timer - change)
 
 
-def pause_joules(watts: float, motors: float, seconds: float, change: float) -> float:
+def pause_joules(watts: Power, motors: Power, seconds: float, change: float) -> Power:
     """J of a pause of `seconds` in a mode of `watts`; `change` [s] of it, in and out, at `motors`
     [W].
     """
@@ -115,8 +120,6 @@ def pause_joules(watts: float, motors: float, seconds: float, change: float) -> 
 #
 # The plan's own figures are of the parameters that it was planned with.
 
-_DRAWS = 400
-
 
 class Predictor:
     """Energies of movements of one robot, mounted at base_pose (4, 4), by these parameters."""
@@ -126,7 +129,7 @@ class Predictor:
     ) -> None:
         self._model = PowerModel(robot, link, base_pose, parameters)
         self._parameters = parameters
-        self._draws = parameters.draws(_DRAWS, 0)
+        self._draws = drawn_robots(parameters)
 
     def report(
         self, planned: TrajectoryReport, trajectory: JointTrajectory, loads: Sequence[Load]
@@ -146,11 +149,20 @@ class Predictor:
         """Power [W] while it stands at q (n,) on motors, with the ends of its 90 % interval."""
         return self._energies(standing_sample(q, loads, self._parameters.modes))
 
+    def added_at_rest(self, mode: str, q: FloatArray, loads: Sequence[Load]) -> FloatArray:
+        """W (N,) that the drawn robots add to the power of standing at q (n,) in a mode."""
+        return self._added(standing_sample(q, loads, self._parameters.modes, mode))[1]
+
     def _energies(self, samples: Samples) -> tuple[float, float, float]:
         """Energy [J] of samples, and the ends of its 90 % interval."""
+        energy, added = self._added(samples)
+        return energy, *interval_over(energy, added)
+
+    def _added(self, samples: Samples) -> tuple[float, FloatArray]:
+        """Energy [J] of samples, and what the drawn robots add (N,) to it."""
         prepared = self._model.prepare(samples)
         expected = self._draws.mean(axis=0)
         energy = samples.step * float(self._model.watts(self._parameters.mean, prepared).sum())
         watts, slopes = self._model.watts_and_slopes(expected, prepared)
         drawn = samples.step * (watts.sum() + (self._draws - expected) @ slopes.sum(axis=0))
-        return energy, *interval_over(energy, drawn - energy)
+        return energy, np.asarray(drawn - energy)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ir_description import interval_over
 from ir_msgs_py.modes import REST_MODES
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.report import PlannedMovement
@@ -60,7 +61,9 @@ class Amount:
 
 
 def saved_amount(saving: Saving) -> Amount:
-    """What is saved [J]."""
+    """What is saved [J]; without an interval its ends are the value."""
+    if saving.saved_low == saving.saved_high:
+        return Amount(saving.saved, saving.saved, saving.saved)
     return Amount(saving.saved, saving.saved_low, saving.saved_high)
 
 
@@ -239,33 +242,26 @@ def _summed(rows: Iterable[tuple[str, float, float]], cycles: float = 1.0) -> di
 def _full_savings(
     savings: ProgramSavings | None, full: Unshortened | None
 ) -> ProgramSavings | None:
-    """The savings with pauses at full length: the intervals grow as what is saved."""
-    if savings is None or full is None:
+    """The savings with pauses at full length, predicted: the interval of the pauses is over the
+    robots that the planner's are over; that of the total adds the ends of its parts.
+    """
+    if savings is None or full is None or not full.added:
         return savings
     rested = savings.pauses
-    pauses = _stretched(
-        rested,
-        Saving(
-            rested.common + sum(pause.common_energy for pause in full.added),
-            rested.planned + sum(pause.energy for pause in full.added),
-            rested.seconds + sum(pause.seconds for pause in full.added),
-        ),
+    pauses = Saving(
+        rested.common + sum(pause.common_energy for pause in full.added),
+        rested.planned + sum(pause.predicted_energy for pause in full.added),
+        rested.seconds + sum(pause.seconds for pause in full.added),
     )
-    total = savings.total
-    low = total.saved_low + pauses.saved_low - rested.saved_low
-    high = total.saved_high + pauses.saved_high - rested.saved_high
-    return replace(savings, pauses=pauses, total_low=low, total_high=high)
-
-
-def _stretched(before: Saving, after: Saving) -> Saving:
-    """`after` with the interval of `before`, as wide in proportion to the watts that rests differ
-    by.
-    """
-    if before.saved == 0.0:
-        return replace(after, saved_low=after.saved, saved_high=after.saved)
-    times = after.saved / before.saved
-    ends = sorted((before.saved_low * times, before.saved_high * times))
-    return replace(after, saved_low=ends[0], saved_high=ends[1])
+    added = np.sum([pause.saved_added for pause in full.added], axis=0)
+    low, high = interval_over(pauses.saved, np.asarray(added))
+    moved = savings.movements
+    return replace(
+        savings,
+        pauses=replace(pauses, saved_low=low, saved_high=high),
+        total_low=moved.saved_low + low,
+        total_high=moved.saved_high + high,
+    )
 
 
 # Beside the cycle: the largest quarter of an hour, and rest while nobody works.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -161,15 +161,19 @@ class StationUse:
 class FullPause:
     """What the full length of a shortened pause adds to the run, computed.
 
-    step: its place among the results; mode: where the time is spent. energy [J]; common_energy [J]:
-    the same for the common program, whose controller closes the brakes by its own timer.
+    step: its place among the results; mode: where the time is spent. energy [J]: beyond what was
+    measured; predicted_energy [J]: beyond what was planned; common_energy [J]: the same for the
+    common program, whose controller closes the brakes by its own timer. saved_added (N,) J: what
+    drawn robots add to what is saved in the whole pause at its full length.
     """
 
     step: int
     mode: str
     seconds: float
     energy: float
+    predicted_energy: float
     common_energy: float
+    saved_added: FloatArray = field(compare=False)
 
 
 @dataclass(frozen=True)

@@ -271,14 +271,16 @@ def planned_samples(
     return Samples(step, middles, at.q, at.qd, at.qdd, mode, load, on, none, held)
 
 
-def standing_sample(q: FloatArray, loads: Sequence[Load], modes: Sequence[str]) -> Samples:
-    """One second of standing at q (n,) on motors, without a meter."""
+def standing_sample(
+    q: FloatArray, loads: Sequence[Load], modes: Sequence[str], mode: str = _MOTORS
+) -> Samples:
+    """One second of standing at q (n,) in a mode, without a meter."""
     still = np.zeros((1, len(q)))
     (held, load) = one_load(loads, 1)
-    mode = np.full(1, list(modes).index(_MOTORS))
-    on = np.ones(1, bool)
+    number = np.full(1, list(modes).index(mode))
+    on = np.full(1, mode == _MOTORS)
     return Samples(
-        1.0, np.full(1, 0.5), q[None], still, still, mode, load, on, np.full(1, np.nan), held
+        1.0, np.full(1, 0.5), q[None], still, still, number, load, on, np.full(1, np.nan), held
     )
 
 

@@ -15,14 +15,28 @@ import numpy as np
 from ir_msgs_py.savings import ProgramSavings
 from ir_recorder.analysis import Analysis, Finding, summary
 from ir_recorder.analysis.flows import energy_flows
-from ir_recorder.analysis.production import planned_clearance, planned_share, production_of
+from ir_recorder.analysis.production import (
+    Production,
+    planned_clearance,
+    planned_share,
+    production_of,
+)
 from ir_recorder.analysis.results import ProgramTotals, Share
 from ir_recorder.analysis.steps import step_label
 from ir_recorder.report.charts import Point, front_chart
-from ir_recorder.report.costs import Costs, money
+from ir_recorder.report.costs import Costs, given_and_assumed, money
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import plant_of
-from ir_recorder.report.number_text import DASH, joules, millimetres, percent, seconds, text, watts
+from ir_recorder.report.number_text import (
+    DASH,
+    joules,
+    kilowatt_hours,
+    millimetres,
+    percent,
+    seconds,
+    text,
+    watts,
+)
 from ir_recorder.report.page import PAGE_START, asset
 from ir_recorder.report.series import Curves, Json, packed
 from ir_recorder.report.tables import table
@@ -56,7 +70,8 @@ def comparison_html(compared: Sequence[Compared], costs: Costs | None = None) ->
         "title": text(f"{len(analyses)} recordings compared"),
         "subtitle": text(f"{names[0]} is what the others are held against"),
         "problems": _problems(analyses, names),
-        "figures": _figures(compared, names, costs or Costs()),
+        "paid": _paid(compared, names, costs or Costs()),
+        "figures": _figures(compared, names),
         "front": front_chart(_points(analyses, names)),
         "steps": _steps(analyses, names),
         "style": asset("page.css"),
@@ -90,12 +105,66 @@ def _problems(analyses: Sequence[Analysis], names: Sequence[str]) -> str:
     return f'<div class="problems"><b>Notes</b><ul>{"".join(items)}</ul></div>' if items else ""
 
 
-def _figures(compared: Sequence[Compared], names: Sequence[str], costs: Costs) -> str:
+def _paid(compared: Sequence[Compared], names: Sequence[str], costs: Costs) -> str:
+    """The figures for those who pay, as the report of each recording has them."""
+    cycles = [production_of(analysis) for analysis, _ in compared]
+    rows = [
+        ("plant", *(text(plant_of(a)) for a, _ in compared)),
+        ("checks", *(text(summary(tuple(checks))[1]) for _, checks in compared)),
+        ("a year of such cycles", *(_year(cycle, cycles[0], costs) for cycle in cycles)),
+        ("saved by its plan, a year", *(_year_saved(cycle, costs) for cycle in cycles)),
+        ("a cycle", *(_cycle(cycle) for cycle in cycles)),
+    ]
+    hint = (
+        "A year is one cycle after the other, pauses at full length. What a plan saves is "
+        "predicted, against the same stations by PTP at full speed and the controller's own "
+        f"timers; intervals hold 90 %. {given_and_assumed(costs)}"
+    )
+    shown = table(("", *(f">{name}" for name in names)), rows, "For those who pay")
+    return f'{shown}<p class="hint">{text(hint)}</p>'
+
+
+def _year(cycle: Production | None, first: Production | None, costs: Costs) -> str:
+    if cycle is None:
+        return DASH
+    year = costs.energy_of_year(cycle).value
+    shown = (
+        f"<b>{text(money(costs.money(year), costs.currency))}</b>"
+        f"<small>{kilowatt_hours(year)}</small>"
+    )
+    if first is None or first is cycle:
+        return shown
+    return f"{shown}<small>{percent(year / costs.energy_of_year(first).value - 1.0)}</small>"
+
+
+def _year_saved(cycle: Production | None, costs: Costs) -> str:
+    amount = costs.saving_of_year(cycle) if cycle is not None else None
+    if cycle is None or cycle.savings is None or amount is None:
+        return DASH
+    word, gain = amount.gain()
+    price = gain.of(costs.money)
+    lines = [
+        f"{kilowatt_hours(gain.value)}{' more' if word == 'more' else ''}",
+        cycle.savings.total.change,
+    ]
+    if price.high > price.low:
+        lines.insert(0, f"{money(price.low, '').strip()} to {money(price.high, costs.currency)}")
+    small = "".join(f"<small>{text(line)}</small>" for line in lines)
+    return f"<b>{text(money(price.value, costs.currency))}</b>{small}"
+
+
+def _cycle(cycle: Production | None) -> str:
+    if cycle is None:
+        return DASH
+    return (
+        f"<b>{kilowatt_hours(cycle.energy)}</b><small>{seconds(cycle.seconds)}</small>"
+        f"<small>{text(cycle.name)}</small>"
+    )
+
+
+def _figures(compared: Sequence[Compared], names: Sequence[str]) -> str:
     rows = [_measured_row(name, unit, value, compared) for name, unit, value in _VALUES]
-    rows.insert(0, ("plant", *(text(plant_of(a)) for a, _ in compared)))
-    rows.append(("checks", *(text(summary(tuple(checks))[1]) for _, checks in compared)))
-    rows.append(("energy of a year", *(_yearly(analysis, costs) for analysis, _ in compared)))
-    return table(("", *(f">{name}" for name in names)), rows, "Figures")
+    return table(("", *(f">{name}" for name in names)), rows, "Runs in figures")
 
 
 def _measured_row(
@@ -113,15 +182,6 @@ def _against(value: float, first: float, unit: Callable[[float], str], own: bool
     if own or not math.isfinite(value) or not math.isfinite(first) or first == 0.0:
         return shown
     return f"{shown}<small>{percent(value / first - 1.0)}</small>"
-
-
-def _yearly(analysis: Analysis, costs: Costs) -> str:
-    cycle = production_of(analysis)
-    if cycle is None:
-        return DASH
-    return text(
-        money(costs.money(cycle.energy * costs.cycles_per_year(cycle.seconds)), costs.currency)
-    )
 
 
 def _of_program(part: str, value: str) -> Callable[[Analysis], float]:
@@ -148,7 +208,12 @@ def _flow(name: str) -> Callable[[Analysis], float]:
 
 
 def _saved(of: Callable[[ProgramSavings], float]) -> Callable[[Analysis], float]:
-    return lambda analysis: of(analysis.savings) if analysis.savings is not None else math.nan
+    def value(analysis: Analysis) -> float:
+        cycle = production_of(analysis)
+        savings = cycle.savings if cycle is not None else analysis.savings
+        return of(savings) if savings is not None else math.nan
+
+    return value
 
 
 def _least(analysis: Analysis) -> float:
@@ -172,9 +237,9 @@ _VALUES: tuple[tuple[str, Callable[[float], str], Callable[[Analysis], float]], 
     ("brake resistor", joules, _flow("resistor")),
     ("motors and inverters", joules, _flow("motors")),
     ("friction", joules, _flow("friction")),
-    ("planned in the common program's time", joules, _saved(lambda s: s.total.planned)),
-    ("common program", joules, _saved(lambda s: s.total.common)),
-    ("saved by the plan", joules, _saved(lambda s: s.total.saved)),
+    ("planned, pauses at full length", joules, _saved(lambda s: s.total.planned)),
+    ("common program, pauses at full length", joules, _saved(lambda s: s.total.common)),
+    ("saved by its plan", joules, _saved(lambda s: s.total.saved)),
     ("peak power", watts, _peak),
     ("least clearance", millimetres, _least),
 )

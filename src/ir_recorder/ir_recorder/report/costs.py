@@ -153,6 +153,18 @@ class Costs:
         """Cycles of so many seconds in a year."""
         return self.cycles_per_shift(seconds) * self.shifts_per_day * self.days_per_year
 
+    def energy_of_year(self, cycle: Production) -> Amount:
+        """Joules of a year of such cycles, one after the other."""
+        amount = Amount(cycle.energy, cycle.low, cycle.high)
+        return amount.times(self.cycles_per_year(cycle.seconds))
+
+    def saving_of_year(self, cycle: Production) -> Amount | None:
+        """Joules of a year that the plan saves of them; None where it is not known."""
+        if cycle.savings is None:
+            return None
+        saved = saved_amount(cycle.savings.total)
+        return saved.times(self.cycles_per_year(cycle.seconds))
+
 
 SETTINGS: tuple[Setting, ...] = tuple(each for each in describe(Costs) if each.name != "given")
 NAMES = tuple(each.name for each in SETTINGS)
@@ -369,13 +381,10 @@ def clock_section(analysis: Analysis, costs: Costs) -> str:
 
 def _payback(cycle: Production, costs: Costs) -> str:
     """How much work the saving of a year pays."""
-    if cycle.savings is None or costs.engineer_hour <= 0.0:
+    year = costs.saving_of_year(cycle)
+    if year is None or year.value <= 0.0 or costs.engineer_hour <= 0.0:
         return ""
-    cycles = costs.cycles_per_year(cycle.seconds)
-    saved = costs.money(cycle.savings.total.saved * cycles)
-    if saved <= 0.0:
-        return ""
-    hours = saved / costs.engineer_hour
+    hours = costs.money(year.value) / costs.engineer_hour
     return (
         f"What the plan saves in a year pays {hours:.2g} h of an engineer at "
         f"{text(money(costs.engineer_hour, costs.currency))} an hour."

@@ -19,7 +19,6 @@ from ir_recorder.analysis.production import (
     levers,
     mean_of,
     production_of,
-    saved_amount,
     sum_of,
     without_production,
 )
@@ -253,7 +252,8 @@ def robots_of(members: Sequence[Member], costs: Costs) -> list[Robot]:
     found = []
     for name in dict.fromkeys(member.robot for member in members):
         own = [member for member in members if member.robot == name]
-        saved = [amount for member in own if (amount := saved_of(member, costs)) is not None]
+        savings = [costs.saving_of_year(member.cycle) for member in own]
+        saved = [amount for amount in savings if amount is not None]
         found.append(
             Robot(
                 name,
@@ -262,27 +262,11 @@ def robots_of(members: Sequence[Member], costs: Costs) -> list[Robot]:
                 len(own),
                 sum(member.cycle.seconds for member in own) / len(own),
                 sum(member.cycle.energy for member in own) / len(own),
-                mean_of([year_of(member, costs) for member in own]),
+                mean_of([costs.energy_of_year(member.cycle) for member in own]),
                 mean_of(saved) if saved else None,
             )
         )
     return sorted(found, key=lambda robot: -robot.yearly.value)
-
-
-def year_of(member: Member, costs: Costs) -> Amount:
-    """Joules of a year, one cycle after the other."""
-    cycle = member.cycle
-    amount = Amount(cycle.energy, cycle.low, cycle.high)
-    return amount.times(costs.cycles_per_year(cycle.seconds))
-
-
-def saved_of(member: Member, costs: Costs) -> Amount | None:
-    """Joules of a year that the plan saves, by prediction; None where the recording has none."""
-    savings = member.cycle.savings
-    if savings is None:
-        return None
-    total = savings.total
-    return saved_amount(total).times(costs.cycles_per_year(member.cycle.seconds))
 
 
 def by_mode(members: Sequence[Member], costs: Costs) -> dict[str, dict[str, float]]:

@@ -258,7 +258,7 @@ def _yearly(analysis: Analysis, costs: Costs) -> Tile | None:
     cycle = production_of(analysis)
     if cycle is None:
         return None
-    energy = cycle.energy * costs.cycles_per_year(cycle.seconds)
+    energy = costs.energy_of_year(cycle).value
     co2 = f"{kilowatt_hours(energy)}, {number(costs.co2(energy), 'kg')} CO2"
     assumed = (
         "prices and shifts assumed"
