@@ -38,6 +38,10 @@ night_to: 5
 price_night: 0.5
 demand_price: 80
 engineer_hour: 90
+line_robots: 30
+line_stand_by: 10
+line_technology: 20
+line_infrastructure: 40
 """
 
 
@@ -74,6 +78,7 @@ def test_a_file_says_what_a_joule_costs(tmp_path: Path) -> None:
             "format: ir_costs/1\nshift_hours: 12\nshifts_per_day: 3",
             "together they must be at most 24 h a day",
         ),
+        ("format: ir_costs/1\nline_robots: 30", r"add up to 104.5 %, must be 100 %"),
         ('format: ir_costs/1\ncurrency: "a\\nb"', "at most 12 characters in one line"),
         ("format: ir_costs/1\ncurrency: '  '", "at most 12 characters in one line"),
     ],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 from ir_cli.errors import InputError
@@ -111,6 +112,7 @@ def run_compare(arguments: argparse.Namespace) -> int:
     """Compare, write the page, print the figures."""
     from ir_recorder.report.costs import Costs, read_costs
     from ir_recorder.report.program_comparison import write_before_after, write_before_after_table
+    from ir_recorder.report.whole_line import of_saving
 
     costs = read_costs(arguments.costs) if arguments.costs else Costs()
     with sentences(), ProgressLine() as line:
@@ -121,14 +123,19 @@ def run_compare(arguments: argparse.Namespace) -> int:
     if arguments.table:
         locale = arguments.locale
         table = write_before_after_table(found, arguments.table, costs, locale=locale)
+    whole = of_saving(found.planned.saving, costs)
     rows = [row_of(side) for side in (found.today, *found.sides)]
     if arguments.json:
-        print_json({"today": found.name, "kind": found.kind, "programs": rows, **_rest(found)})
+        shares = {"whole_line": asdict(whole) if whole is not None else None}
+        print_json(
+            {"today": found.name, "kind": found.kind, "programs": rows, **_rest(found), **shares}
+        )
     elif arguments.csv:
         print_csv(rows)
     else:
         print_table(rows, COLUMNS)
-        sys.stdout.write("\n".join(_sentences(found)) + "\n")
+        said = [*_sentences(found), *([whole.sentence] if whole is not None else [])]
+        sys.stdout.write("\n".join(said) + "\n")
         sys.stdout.write("".join(f"{path}\n" for path in (page, table) if path is not None))
     return 0
 

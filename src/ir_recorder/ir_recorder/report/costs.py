@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeGuard
 
-from ir_description import DescriptionFileError
+from ir_description import DescriptionFileError, load_power_data
 from ir_description.files import plain_yaml
 from ir_msgs_py.savings import ProgramSavings, Saving
 from ir_recorder.analysis import Analysis
@@ -46,11 +46,31 @@ _CURRENCY_MAX = 12  # characters
 J_PER_KWH = 3.6e6
 _DAY = 24.0  # h
 _YEAR = 365.0  # days
+_OTHER = "technology"
+_GROUPS = {
+    "robot_drives": "robots",
+    "line_stand_by": "stand_by",
+    "factory_environment": "infrastructure",
+}
+_WHOLE = 0.5  # %: shares of a line are rounded, their sum may be so far from 100
+
+
+def table_1_shares() -> dict[str, float]:
+    """The paper's Table I in four groups [%]: robots, stand_by, technology (welding, gluing, PLCs
+    and their network), infrastructure (the factory's environment).
+    """
+    shares = {"robots": 0.0, "stand_by": 0.0, _OTHER: 0.0, "infrastructure": 0.0}
+    for row in load_power_data().table_1:
+        shares[_GROUPS.get(row.consumer, _OTHER)] += row.percent
+    return shares
+
+
+_TABLE_1 = table_1_shares()
 
 
 @dataclass(frozen=True)
 class Costs:
-    """Price, shifts and grid."""
+    """Price, shifts and grid, and the shares of a line's energy."""
 
     price: float = setting(
         0.20, "Price of a kilowatt-hour, taxes as you count them.", minimum=0.0, maximum=1e4
@@ -91,6 +111,31 @@ class Costs:
     engineer_hour: float = setting(
         60.0, "What an hour of an engineer costs.", minimum=0.0, maximum=1e4
     )
+    line_robots: float = setting(
+        _TABLE_1["robots"],
+        "Robots' share of the energy of the line with its hall; this and the next three are by "
+        "default Table I of the paper and add up to 100.",
+        unit="%",
+        minimum=0.0,
+        maximum=100.0,
+    )
+    line_stand_by: float = setting(
+        _TABLE_1["stand_by"], "Share of the line's stand-by.", unit="%", minimum=0.0, maximum=100.0
+    )
+    line_technology: float = setting(
+        _TABLE_1[_OTHER],
+        "Share of technology: welding, gluing, PLCs and their network.",
+        unit="%",
+        minimum=0.0,
+        maximum=100.0,
+    )
+    line_infrastructure: float = setting(
+        _TABLE_1["infrastructure"],
+        "Share of the hall: light, air, heating.",
+        unit="%",
+        minimum=0.0,
+        maximum=99.0,
+    )
     given: tuple[str, ...] = setting((), "Names that a file gave; the others are assumptions.")
 
     def __post_init__(self) -> None:
@@ -100,6 +145,17 @@ class Costs:
                 f"shift_hours is {self.shift_hours:g} h and shifts_per_day "
                 f"{self.shifts_per_day:g}: together they must be at most {_DAY:g} h a day"
             )
+        if abs(sum(self.line.values()) - 100.0) > _WHOLE:
+            named = ", ".join(f"line_{name} {share:g} %" for name, share in self.line.items())
+            raise InvalidValueError(
+                f"{named}: they add up to {sum(self.line.values()):g} %, must be 100 %; what a "
+                "file does not name stays as in Table I, so name all that differ"
+            )
+
+    @property
+    def line(self) -> dict[str, float]:
+        """Shares [%] of the energy of a line with its hall, by consumer."""
+        return {name: float(getattr(self, f"line_{name}")) for name in _TABLE_1}
 
     @property
     def production_hours(self) -> float:

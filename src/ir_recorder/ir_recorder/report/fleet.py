@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -44,6 +45,7 @@ from ir_recorder.report.number_text import (
 from ir_recorder.report.page import PAGE_START, asset, folded
 from ir_recorder.report.step_table import TableValue, write_columns
 from ir_recorder.report.tables import table
+from ir_recorder.report.whole_line import WholeLine, line_section, of_whole_line
 from ir_values.errors import IrError
 from ir_values.files import ANYWHERE, FileRoots
 
@@ -269,6 +271,23 @@ def robots_of(members: Sequence[Member], costs: Costs) -> list[Robot]:
     return sorted(found, key=lambda robot: -robot.yearly.value)
 
 
+def fleet_of_line(members: Sequence[Member], costs: Costs) -> WholeLine | None:
+    """What all plans together save in a year, as a share of the line and of the factory; None where
+    no recording says it. Several recordings of a robot are averaged.
+    """
+    known = [(m.robot, m.cycle) for m in members if m.cycle.savings is not None]
+    count = Counter(robot for robot, _ in known)
+    saved = []
+    common = 0.0
+    for robot, cycle in known:
+        amount = costs.saving_of_year(cycle)
+        if amount is not None and cycle.savings is not None:
+            saved.append(amount.times(1.0 / count[robot]))
+            cycles = costs.cycles_per_year(cycle.seconds) / count[robot]
+            common += cycle.savings.total.common * cycles
+    return of_whole_line(sum_of(saved), common, costs)
+
+
 def by_mode(members: Sequence[Member], costs: Costs) -> dict[str, dict[str, float]]:
     """Joules of a year by robot and power mode."""
     return _summed(
@@ -331,6 +350,7 @@ def fleet_html(
     robots = robots_of(members, prices)
     sections = [
         _section("Robots", _robots(robots, prices)),
+        line_section(fleet_of_line(members, prices), prices),
         _section("Peak, and when nobody works", _around_the_clock(members, robots, prices)),
         _section("Month by month: driven and predicted", _months(members)),
         folded(_section("By power mode", _matrix("mode", by_mode(members, prices), robots))),

@@ -32,6 +32,7 @@ from ir_recorder.report.tables import (
     step_table,
     warning_table,
 )
+from ir_recorder.report.whole_line import recorded_line_section
 from ir_values.files import ANYWHERE, FileRoots
 
 # Charts and tables that the page shows of an analysis: a new one is a function, and a line here.
@@ -109,6 +110,7 @@ def report_html(
         "front": folded(front_section(analysis, front)),
         "levers": lever_section(analysis, costs or Costs()),
         "around": clock_section(analysis, costs or Costs()),
+        "line": recorded_line_section(analysis, costs or Costs()),
         "checks": check_table(checks),
         "style": asset("page.css"),
         "data": page_data(analysis, drawn),

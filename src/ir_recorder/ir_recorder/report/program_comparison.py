@@ -32,6 +32,7 @@ from ir_recorder.report.page import PAGE_START, asset
 from ir_recorder.report.series import long_rests
 from ir_recorder.report.step_table import TableValue, write_columns
 from ir_recorder.report.tables import table
+from ir_recorder.report.whole_line import line_section, of_saving
 from ir_values.files import ANYWHERE, FileRoots
 
 # Joules of a cycle as those of a shift and a year, and as money and CO2, bounds included.
@@ -331,6 +332,7 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
         "tiles": tiles(found, prices),
         "figures": figure_table(found, prices),
         "assumptions": assumptions(found, prices),
+        "line": line_section(of_saving(found.planned.saving, prices), prices),
         "changes": change_table(found, prices),
         "hops": hop_table(found),
         "front": front_chart([_point(side) for side in there]),

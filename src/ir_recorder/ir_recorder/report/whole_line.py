@@ -1,0 +1,122 @@
+"""A saving of the robots as a share of the whole line and of the factory.
+
+The shares are those of Table I of the paper, or one's own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ir_msgs_py.savings import Saving
+from ir_recorder.analysis import Analysis
+from ir_recorder.analysis.production import Amount, production_of, saved_amount
+from ir_recorder.report.costs import Costs
+from ir_recorder.report.number_text import text
+from ir_recorder.report.tables import table
+
+_NAMES = {
+    "robots": "robots",
+    "stand_by": "line stand-by",
+    "technology": "technology (welding, gluing, PLCs)",
+    "infrastructure": "infrastructure (the hall)",
+}
+
+
+@dataclass(frozen=True)
+class WholeLine:
+    """What a saving of the robots is of more than robots, each in percent with its 90 % interval.
+
+    robots: of their own energy; line: of all consumers of the line without the hall; factory: with
+    the hall. shares [%]: of each consumer before, all together 100; after [%]: of the same whole,
+    with the saving. Consumers other than robots stay as they are: a robot that works better does
+    not make a welding gun or the hall take less, and stand-by of the line's other machines is not
+    that of its robots.
+    """
+
+    robots: Amount
+    line: Amount
+    factory: Amount
+    shares: dict[str, float]
+    after: dict[str, float]
+
+    @property
+    def sentence(self) -> str:
+        """All of it in words, with the limit that the shares set."""
+        word = self.line.gain()[0]
+        robots = f"{self.shares['robots']:g} %"
+        return (
+            f"of the whole line: {_with_ends(self.robots)} {word} of the robots' energy is "
+            f"{_with_ends(self.line)} of the line's and {_with_ends(self.factory)} of the "
+            f"factory's, where robots take {robots} and the hall "
+            f"{self.shares['infrastructure']:g} %: no plan of robots saves more than their "
+            f"{robots}, and none of the hall's"
+        )
+
+
+def _with_ends(share: Amount) -> str:
+    """A saved share as people say it, with its 90 % interval where there is one."""
+    _, amount = share.gain()
+    shown = f"{amount.value:.1f} %"
+    return f"{shown} ({amount.low:.1f} to {amount.high:.1f})" if amount.low < amount.high else shown
+
+
+def of_whole_line(saved: Amount, robots: float, costs: Costs) -> WholeLine | None:
+    """What `saved` of the energy `robots` [J] of the robots, at the mains with their pauses, is of
+    the line and of the factory; None where they take nothing.
+    """
+    if robots <= 0.0:
+        return None
+    shares = costs.line
+    whole = sum(shares.values())
+    own = saved.times(100.0 / robots)
+    factory = own.times(shares["robots"] / whole)
+    line = own.times(shares["robots"] / (whole - shares["infrastructure"]))
+    after = {**shares, "robots": shares["robots"] * (1.0 - own.value / 100.0)}
+    return WholeLine(own, line, factory, shares, after)
+
+
+def of_saving(saving: Saving, costs: Costs) -> WholeLine | None:
+    """The same of a program's saving."""
+    return of_whole_line(saved_amount(saving), saving.common, costs)
+
+
+def recorded_line_section(analysis: Analysis, costs: Costs) -> str:
+    """The section of a recording's plan; "" where it says nothing of a saving."""
+    cycle = production_of(analysis)
+    if cycle is None or cycle.savings is None:
+        return ""
+    return line_section(of_saving(cycle.savings.total, costs), costs)
+
+
+def line_section(found: WholeLine | None, costs: Costs) -> str:
+    """The saving among all consumers of a line, as a section of a page; "" where there is none."""
+    if found is None:
+        return ""
+    rows = [
+        (_NAMES[name], _percent(share), f"<b>{_percent(found.after[name])}</b>")
+        for name, share in found.shares.items()
+    ]
+    before = sum(found.shares.values())
+    after = sum(found.after.values())
+    hall = found.shares["infrastructure"]
+    for name, less in (("the line, without its hall", hall), ("the factory", 0.0)):
+        cells = (f"<b>{name}</b>", _percent(before - less), f"<b>{_percent(after - less)}</b>")
+        rows.append(cells)
+    own = [name for name in costs.given if name.startswith("line_")]
+    origin = (
+        "Shares as your file gives them."
+        if own
+        else "Shares by Table I of the paper, of one production line: give your own in the file of "
+        "costs (line_robots, line_stand_by, line_technology, line_infrastructure)."
+    )
+    sentence = f"{found.sentence[0].upper()}{found.sentence[1:]}"
+    hint = f"{sentence}. Other consumers are taken to stay as they are. {origin}"
+    heads = ("consumer", ">today", ">as planned")
+    return (
+        f'<section id="whole-line"><h2>Of the whole line</h2><p class="hint">{text(hint)}</p>'
+        f"{table(heads, rows, 'Of the whole line')}</section>"
+    )
+
+
+def _percent(share: float) -> str:
+    return f"{share:.1f} %"
