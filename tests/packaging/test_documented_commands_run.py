@@ -64,13 +64,18 @@ def recordings(folder: Path) -> None:
 
 
 def mesh(folder: Path) -> None:
-    """A box of 400 x 300 x 200 mm."""
+    """A box of 400 x 300 x 200 mm as a mesh, and its corners as a cloud."""
     text = ["solid press"]
     for a, b, c, d in FACES:
         for corners in ((a, b, c), (a, c, d)):
             places = "".join(f"vertex {CUBE[k][0]} {CUBE[k][1]} {CUBE[k][2]}\n" for k in corners)
             text.append(f"facet normal 0 0 0\nouter loop\n{places}endloop\nendfacet")
     (folder / "press.stl").write_text("\n".join([*text, "endsolid press\n"]))
+    head = (
+        f"ply\nformat ascii 1.0\nelement vertex {len(CUBE)}\n"
+        "property float x\nproperty float y\nproperty float z\nend_header\n"
+    )
+    (folder / "bin.ply").write_text(head + "".join(f"{x} {y} {z}\n" for x, y, z in CUBE))
 
 
 def world(folder: Path) -> None:

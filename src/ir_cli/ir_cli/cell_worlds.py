@@ -1,4 +1,4 @@
-"""`ir cell import` and `export`: meshes from CAD, worlds of simulators, glTF."""
+"""`ir cell import` and `export`: meshes from CAD, point clouds, worlds of simulators, glTF."""
 
 from __future__ import annotations
 
@@ -15,13 +15,23 @@ import numpy as np
 from ir_cli.errors import InputError
 from ir_cli.output import print_json
 from ir_cli.planning import add_cell, sentences
-from ir_description import Cell, Equipment, InvalidValueError, cell_to_yaml, load_cell, robot_named
+from ir_description import (
+    Cell,
+    CellFileError,
+    Equipment,
+    InvalidValueError,
+    cell_to_yaml,
+    load_cell,
+    robot_named,
+)
 from ir_description.cell import shape_register, zone_around
+from ir_description.files import point_cloud
 from ir_description.files.solid_mesh import PIECES, PIECES_MAX, UNITS, SolidReader, pieces_of
 from ir_description.files.worlds import IMPORTERS, WRITERS, read_world
 from ir_recorder.report.shapes import body_mesh
 from ir_values.errors import one_line
 from ir_values.output_files import write_file
+from ir_values.yaml_items import read_items
 
 _Z_UP = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
 """Column by column: glTF's y axis points up, the cell's z."""
@@ -174,9 +184,28 @@ _NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
 def add_import(command: argparse.ArgumentParser) -> None:
     """Arguments of `ir cell import`."""
     command.add_argument(
-        "file", metavar="FILE", help="a mesh: .stl, .obj, .glb, .gltf; a world: .sdf, .urdf, .scene"
+        "file",
+        metavar="FILE",
+        help="a mesh: .stl, .obj, .glb, .gltf; a point cloud or height map: .ply, .pcd, .npy; "
+        "a world: .sdf, .urdf, .scene",
     )
-    command.add_argument("--unit", choices=tuple(UNITS), help="of a mesh; never guessed")
+    command.add_argument("--unit", choices=tuple(UNITS), help="of a mesh or cloud; never guessed")
+    command.add_argument(
+        "--margin",
+        type=float,
+        metavar="M",
+        help="radius [m] about each point of a cloud that is kept free",
+    )
+    command.add_argument(
+        "--voxel",
+        type=float,
+        default=point_cloud.VOXEL,
+        metavar="M",
+        help=f"edge [m] of the cubes of a cloud ({point_cloud.VOXEL})",
+    )
+    command.add_argument(
+        "--pitch", type=float, metavar="M", help="distance [m] of the samples of a height map"
+    )
     command.add_argument(
         "--pieces", type=_pieces, default=PIECES, help=f"at most so many ({PIECES})"
     )
@@ -196,10 +225,12 @@ def run_import(arguments: argparse.Namespace) -> int:
         return run_world(path, arguments.robot, arguments.visuals)
     if arguments.unit is None:
         raise InputError(f"say the unit of {path.name[:60]!a}: --unit {' or '.join(UNITS)}")
+    if path.suffix.lower() in point_cloud.SUFFIXES:
+        return _run_cloud(path, arguments)
     with sentences():
         triangles = SolidReader(path.parent).triangles(path.name, arguments.unit)
         found = pieces_of(triangles, arguments.pieces)
-    name = _NO_NAME.sub("_", path.stem).strip("_-0123456789")[:60] or "mesh"
+    name = _name_of(path, "mesh")
     pieces = "" if arguments.pieces == PIECES else f", pieces: {arguments.pieces}"
     line = f"- {{name: {name}, mesh: {path.name}, unit: {arguments.unit}{pieces}}}"
     if arguments.json:
@@ -209,6 +240,42 @@ def run_import(arguments: argparse.Namespace) -> int:
         )
     else:
         sys.stdout.write(f"{line}\n# {found.sentence}\n")
+    return 0
+
+
+def _name_of(path: Path, other: str) -> str:
+    return _NO_NAME.sub("_", path.stem).strip("_-0123456789")[:60] or other
+
+
+def _run_cloud(path: Path, arguments: argparse.Namespace) -> int:
+    """Print the line of a point cloud or height map, and what its boxes cost."""
+    entry = {"name": _name_of(path, "cloud"), "cloud": path.name, "unit": arguments.unit}
+    if arguments.margin is None:
+        raise InputError(
+            "say how far from its points the surface may lie, in m: --margin 0.01 "
+            "(half the distance between points, and the sensor's noise)"
+        )
+    entry["margin"] = f"{arguments.margin:g}"
+    if arguments.voxel != point_cloud.VOXEL:
+        entry["voxel"] = f"{arguments.voxel:g}"
+    if arguments.pitch is not None:
+        entry["pitch"] = f"{arguments.pitch:g}"
+    text = ", ".join(f"{key}: {value}" for key, value in entry.items())
+    with sentences():
+        table = read_items(f"{{{text}}}", path.name, CellFileError).table(tuple(entry))
+        boxes = point_cloud.CloudReader(path.parent).read(table)
+    if arguments.json:
+        print_json(
+            {
+                "line": f"- {{{text}}}",
+                "boxes": len(boxes.lower),
+                "protrusion": boxes.protrusion,
+                "notes": list(boxes.notes),
+            }
+        )
+        return 0
+    notes = "".join(f"# {note}\n" for note in boxes.notes)
+    sys.stdout.write(f"- {{{text}}}\n# {boxes.sentence}\n{notes}")
     return 0
 
 

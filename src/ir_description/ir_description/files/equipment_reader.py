@@ -31,6 +31,7 @@ from ir_description.cell import (
     station_at,
     zone_around,
 )
+from ir_description.files.point_cloud import CloudReader
 from ir_description.files.robot_file import inertia_matrix
 from ir_description.files.solid_mesh import SolidReader, piece_names
 from ir_description.files.stl_mesh import (
@@ -50,6 +51,7 @@ from ir_description.poses import (
 )
 from ir_description.robot import MASS_MAX, Load
 from ir_description.shapes import KINDS, SIZE_MAX, Body, Capsule
+from ir_kernels import portable
 from ir_values.arrays import FloatArray, solid_box_inertia
 from ir_values.errors import InvalidValueError
 from ir_values.yaml_items import Item, Table
@@ -95,23 +97,26 @@ class BodyReader:
         self._count = self._corners = self._triangles = 0
         self._meshes: dict[tuple[str, bool], FloatArray] = {}
         self._solids = SolidReader(folder)
+        self._clouds = CloudReader(folder)
         self.pieces: dict[str, tuple[str, ...]] = {}
-        """Names of the bodies that stand for a mesh, by its name."""
+        """Names of the bodies that stand for a mesh or a point cloud, by its name."""
 
     def all(self, items: Iterable[Item]) -> tuple[Body, ...]:
         """Return the bodies of a list; a mesh from CAD becomes one body for each of its convex
-        pieces.
+        pieces, a point cloud one for each of its boxes.
         """
         found: list[Body] = []
         for item in items:
             if item.holds("mesh"):
                 found += self._divided(item)
+            elif item.holds("cloud"):
+                found += self._boxes(item)
             else:
                 found.append(self.read(item))
         return tuple(found)
 
     def named(self, names: Iterable[str]) -> tuple[str, ...]:
-        """Return names of bodies, with the pieces of a mesh instead of its name."""
+        """Return names of bodies, with the pieces of a mesh or a cloud instead of its name."""
         return tuple(piece for name in names for piece in self.pieces.get(name, (name,)))
 
     def at_pieces(self, stop: _Stop) -> _Stop:
@@ -125,21 +130,41 @@ class BodyReader:
 
     def _divided(self, item: Item) -> list[Body]:
         table = item.table(("name", "mesh", "unit"), (*POSE_KEYS, "pieces"))
-        name = table["name"].name()
-        with table["name"].blamed():
-            self._shapes.add(name)
         pose = pose_in(table)
         solid = self._solids.read(table)
-        names = piece_names(name, len(solid))
+        names = self._named_pieces(table, len(solid))
         bodies = []
-        for number, (piece, vertices) in enumerate(zip(names, solid, strict=True)):
-            with table["name"].blamed():
-                if number or piece != name:
-                    self._shapes.add(piece)
+        for name, vertices in zip(names, solid, strict=True):
             self._counted(item, len(vertices))
-            bodies.append(Body(piece, "mesh", pose, np.zeros(3), vertices))
-        self.pieces[name] = names
+            bodies.append(Body(name, "mesh", pose, np.zeros(3), vertices))
         return bodies
+
+    def _boxes(self, item: Item) -> list[Body]:
+        table = item.table(
+            ("name", "cloud", "unit", "margin"), (*POSE_KEYS, "voxel", "pitch", "crop")
+        )
+        pose = pose_in(table)
+        boxes = self._clouds.read(table)
+        bodies = []
+        for number, name in enumerate(self._named_pieces(table, len(boxes.lower))):
+            self._counted(item, 0)
+            lower = boxes.lower[number]
+            upper = boxes.upper[number]
+            at = portable.matmul(pose, pose_of((lower + upper) / 2.0))
+            bodies.append(Body(name, "box", at, upper - lower))
+        return bodies
+
+    def _named_pieces(self, table: Table, count: int) -> tuple[str, ...]:
+        """Take the name of an entry, and those of the bodies that stand for it."""
+        name = table["name"].name()
+        names = piece_names(name, count)
+        with table["name"].blamed():
+            self._shapes.add(name)
+            for piece in names:
+                if piece != name:
+                    self._shapes.add(piece)
+        self.pieces[name] = names
+        return names
 
     def _counted(self, item: Item, corners: int) -> None:
         """Refuse what is too much."""
