@@ -147,10 +147,12 @@ class TrackedRun:
     def _standing(self, stretch: _Stretch) -> tuple[float, float]:
         """W of everything but the axes, and the tool's part of it."""
         loads = self._loads[stretch.load]
-        self._base.set_tool(
-            sum(load.watts_always for load in loads), sum(load.watts_drive_bus for load in loads)
+        self._base.set_load(
+            sum(load.watts_always for load in loads),
+            sum(load.watts_drive_bus for load in loads),
+            sum(load.mass for load in loads),
         )
-        return self._base.of(stretch.mode), self._base.tool(stretch.mode)
+        return self._base.of(stretch.mode, stretch.q[-1]), self._base.tool(stretch.mode)
 
     def _torques(self, stretch: _Stretch) -> FloatArray:
         """Motor torque (N, n) [Nm] at the joints; warms the gears."""

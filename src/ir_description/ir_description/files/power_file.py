@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
@@ -20,6 +20,8 @@ from ir_description.robot import (
     PlcBit,
     PowerData,
     PowerParameters,
+    RestRow,
+    RestTable,
     parameter_unit,
     without_table,
 )
@@ -84,6 +86,7 @@ def figure(item: Item) -> Item:
 
 
 FORMAT = "ir_description/power/1"
+_RESTS_MAX = 500
 
 
 def power_from_yaml(text: str, source: str = "<text>") -> PowerData:
@@ -107,7 +110,7 @@ def power_of(root: Item) -> PowerData:
             "table_2_w",
             "table_1_percent",
         ),
-        ("table_2_robot",),
+        ("table_2_robot", "rests"),
     )
     top["format"].choice((FORMAT,))
     modes = tuple(_mode(item) for item in top["modes"].list(1, 20))
@@ -130,8 +133,29 @@ def power_of(root: Item) -> PowerData:
             table_2=tuple(_table_2_row(item, names) for item in top["table_2_w"].list(0, 100)),
             table_1=tuple(_table_1_row(item) for item in top["table_1_percent"].list(0, 100)),
             table_2_robot=top["table_2_robot"].name() if "table_2_robot" in top else "",
+            rest_table=_rest_table(top["rests"], names) if "rests" in top else None,
             marks=marks_of(root.node),
         )
+
+
+def _rest_table(item: Item, modes: tuple[str, ...]) -> RestTable:
+    """Measured rests: every row has the same modes, all of them with the brakes closed."""
+    rows = [entry.table(("posture_deg", "load_kg", "watts")) for entry in item.list(1, _RESTS_MAX)]
+    resting = modes[1:]
+    known = [name for name in resting if name in rows[0]["watts"].table((), modes)]
+    if not known:
+        rows[0]["watts"].fail(f"names no saving mode: known are {', '.join(resting)}")
+    return RestTable(tuple(known), tuple(_rest_row(row, known) for row in rows))
+
+
+def _rest_row(row: Table, modes: Sequence[str]) -> RestRow:
+    angles = row["posture_deg"].list(1, 20)
+    watts = row["watts"].table(tuple(modes))
+    return RestRow(
+        tuple(float(np.radians(angle.number(-3600.0, 3600.0, "deg"))) for angle in angles),
+        row["load_kg"].number(0.0, 1e4, "kg"),
+        tuple(watts[mode].number(0.0, 1e5, "W") for mode in modes),
+    )
 
 
 def _mode(item: Item) -> ControllerMode:

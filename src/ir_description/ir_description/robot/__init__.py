@@ -26,6 +26,7 @@ from ir_description.robot.power_parameters import (
     physical_bounds,
     prior,
 )
+from ir_description.robot.rest_table import RestRow, RestTable
 from ir_description.robot.robot import (
     LIMIT_TOLERANCE,
     MASS_MAX,
@@ -63,6 +64,8 @@ __all__ = [
     "PowerData",
     "PowerParameters",
     "ReducedDistance",
+    "RestRow",
+    "RestTable",
     "RobotModel",
     "drawn_robots",
     "fixed_frames",

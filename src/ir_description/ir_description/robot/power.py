@@ -4,9 +4,10 @@ II.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from ir_description.robot.rest_table import RestTable
 from ir_values.arrays import in_range
 from ir_values.errors import InvalidValueError, UnknownNameError
 
@@ -98,6 +99,8 @@ class PowerData:
     """All of a controller's power figures; tool watts belong to the tool (Load).
 
     table_2_robot: the robot that Table II was measured with, "" where there is no such table.
+    rest_table: power of the saving modes by posture and load, as it was measured; None: each draws
+    the same at every posture, and what is attached adds its own watts.
     marks: how sure each figure is, by its place in the file.
     """
 
@@ -114,6 +117,7 @@ class PowerData:
     table_2: tuple[MeasuredPower, ...]
     table_1: tuple[EnergyShare, ...]
     table_2_robot: str = ""
+    rest_table: RestTable | None = None
     marks: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -123,6 +127,8 @@ class PowerData:
             raise InvalidValueError("a power mode is named twice")
         for row in self.table_2:
             self.mode(row.mode)
+        for name in self.rest_table.modes if self.rest_table is not None else ():
+            self.mode(name)
 
     @property
     def dc_link_capacity_energy(self) -> float:
@@ -144,6 +150,28 @@ class PowerData:
     def resting(self, name: str) -> ControllerMode:
         """The mode of that name; where there is no table that of standing on motors."""
         return self.mode(name) if self.has_table else self.modes[0]
+
+    def measured_rest(self, name: str) -> RestTable | None:
+        """The table of measured rests, where it knows the mode of that name."""
+        table = self.rest_table
+        return table if table is not None and name in table.modes else None
+
+    def rest_remark(self, posture: Sequence[float], load: float) -> str:
+        """What the power of the saving modes at a posture (n,) [rad] with a load [kg] rests on, as
+        a sentence.
+        """
+        if self.rest_table is None:
+            return (
+                "saving modes draw the same at every posture, and with a load its own watts more: "
+                "no table by posture and load was measured"
+            )
+        beyond = self.rest_table.outside(posture, load)
+        rows = f"{len(self.rest_table.rows)} measured rests"
+        return (
+            f"saving modes draw by {rows}, outside of them: {beyond}, their nearest values count"
+            if beyond
+            else f"saving modes draw by {rows}"
+        )
 
     def measured(self, payload: float, mode: str) -> float:
         """Return Table II's watts for a payload of 0 or 155 kg in a mode."""

@@ -179,6 +179,12 @@ class RobotModel:
         self._check_signs()
         self._check_envelope()
         self._check_names(n)
+        rests = self.controller.rest_table
+        if rests is not None and rests.n != n:
+            raise InvalidValueError(
+                f"the table of rests of its controller has postures of {rests.n} joints, the robot "
+                f"has {n}"
+            )
         try:
             _ = self.coupling
         except InputError as error:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_msgs_py.modes import modes_of
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.report import MovementKind, PlannedMovement, PlanningInfo
 from ir_msgs_py.savings import ProgramSavings
@@ -33,7 +34,7 @@ from ir_planner.program.station_graph import Part, Settled, StationGraph
 from ir_planner.program.steps import Route, Scenes, doors_advice, doors_text, placed_steps, steps_of
 from ir_planner.program.stops import Node, leaves_zone
 from ir_planner.request import Context, Journal, Work, noted
-from ir_planner.scene import PlanningScene
+from ir_planner.scene import PlanningScene, scene_with
 from ir_planner.service import ExitPath, exit_searches, lines_free, service_lines
 from ir_planner.timing import at_the_mains
 from ir_values.arrays import FloatArray
@@ -188,9 +189,11 @@ def _answered(
     plan = replace(_planned(steps), gap=answer.gap)
     for log in logs_of(choice, steps):
         context.journal.keep(log)
+    said = _beyond_rests(steps, request)
     if choice.parts and request.options.objective == "energy" and cycle <= 0.0:
-        moving = plan.report.duration - standing
-        plan = replace(plan, status=Status.success(_SLOW.format(moving)))
+        said = [_SLOW.format(plan.report.duration - standing), *said]
+    if said:
+        plan = replace(plan, status=Status.success("; ".join(said[:_SENTENCES])))
     if request.savings:
         comparison = held_against_common(choice, steps, cycle, standing, spreads, progress)
         if isinstance(comparison, str):
@@ -206,6 +209,26 @@ def _answered(
             front = front_of(choice, request.front_points, standing, progress)
         plan = replace(plan, front=tuple(_planned(point.steps) for point in front))
     return plan
+
+
+def _beyond_rests(steps: Steps, request: ProgramRequest) -> list[str]:
+    """Of each place where the program rests beyond the controller's table of measured rests: what
+    counts there.
+    """
+    table = request.power.rest_table
+    q = request.start
+    said: dict[str, str] = {}
+    for step in steps if table is not None else ():
+        if step.trajectory is not None:
+            q = step.trajectory.positions[-1]
+        elif table is not None and any(
+            mode.name in table.modes for mode in modes_of(step.power_mode)
+        ):
+            load = scene_with(request.cell, step.load, request.power).load_mass
+            if table.outside(q.tolist(), load):
+                where = step.from_station or "start"
+                said.setdefault(where, f"at {where} {request.power.rest_remark(q.tolist(), load)}")
+    return list(said.values())
 
 
 def _with_reason(status: Status, work: Work) -> Status:

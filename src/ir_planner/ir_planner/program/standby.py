@@ -259,7 +259,7 @@ class Standby:
     worst, clairvoyant [J]: mean and largest energy, and the mean with each length known at the
     start. late, latest [s]: mean and largest time from the end of the pause until the robot is
     ready. posture: where to wait, "": where the robot stands; posture_energies [J]: at each of the
-    postures; trips: what moving there takes, in words.
+    postures; trips: what moving there takes, in words; remark: what the modes' power rests on.
     """
 
     chosen: PowerMode
@@ -282,6 +282,7 @@ class Standby:
     saving_low: float = 0.0
     saving_high: float = 0.0
     trips: tuple[str, ...] = ()
+    remark: str = ""
 
     def __repr__(self) -> str:
         return f"Standby({self.sentence})"
@@ -310,7 +311,7 @@ class Standby:
                 f"{self.worst:.0f} J, {self.clairvoyant:.0f} J if the end were known; ready "
                 f"{self.late:.1f} s after it, at worst {self.latest:.1f} s"
             )
-        return "; ".join((*parts, *self.trips))
+        return "; ".join((*parts, *self.trips, *filter(None, (self.remark,))))
 
     @property
     def _within(self) -> str:
@@ -376,6 +377,7 @@ def advice(
         energies=_alone(rests, lengths, by_itself),
         modes=modes,
         switch_times=switches,
+        remark=scene.power.rest_remark(q.tolist(), scene.load_mass) if rests.modes else "",
         **cost._asdict(),
     )
 

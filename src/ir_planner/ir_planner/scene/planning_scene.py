@@ -226,6 +226,11 @@ class PlanningScene:
             self.power.mode(RUNNING).controller_watts + self.power.drives_and_brake_release + tool
         )
 
+    @property
+    def load_mass(self) -> float:
+        """Mass [kg] of what is attached, as it is declared."""
+        return float(sum(load.mass for load in self.loads))
+
     def tool_watts(self, *, drive_bus: bool) -> float:
         """Watts of what is attached, with its share of the drive bus where that is up."""
         loads = self._attached

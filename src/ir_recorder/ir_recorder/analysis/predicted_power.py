@@ -81,8 +81,11 @@ def resting_watts(
     mode: str, q: FloatArray, cell: Cell, loads: tuple[Load, ...], data: PowerData
 ) -> float:
     """W at the mains in a mode at q (n,): controller, tool, and with motors on drives and holding
-    torque.
+    torque; of a saving mode that was measured by posture and load, what its table says.
     """
+    table = data.measured_rest(mode)
+    if table is not None:
+        return table.watts(mode, q.tolist(), float(sum(load.mass for load in loads)))
     watts = data.resting(mode).controller_watts + sum(load.watts_always for load in loads)
     if mode in _BUS_UP:
         watts += sum(load.watts_drive_bus for load in loads)

@@ -11,6 +11,7 @@ from ir_msgs_py.savings import ProgramSavings, Saving
 from ir_recorder.analysis import Analysis, Finding, Verdict
 from ir_recorder.analysis.checks import row_name
 from ir_recorder.analysis.indirect import Agreement
+from ir_recorder.analysis.predicted_power import recorded_power_data
 from ir_recorder.analysis.production import production_of, saved_amount
 from ir_recorder.analysis.results import Share, StepResult
 from ir_recorder.format import contents
@@ -186,7 +187,14 @@ def resting_table(analysis: Analysis) -> str:
         ">Table II",
         ">over",
     )
-    return table(heads, rows, "Power at rest")
+    data, _ = recorded_power_data(analysis.recording)
+    remark = ""
+    if analysis.plateaus and analysis.cell is not None and data.has_table:
+        home = analysis.cell.machine_home.tolist()
+        masses = [row.payload for row in analysis.plateaus if math.isfinite(row.payload)]
+        said = (data.rest_remark(home, mass) for mass in masses or [0.0])
+        remark = f'<p class="hint">{text("; ".join(dict.fromkeys(said)))}.</p>'
+    return f"{table(heads, rows, 'Power at rest')}{remark}"
 
 
 def fact_table(analysis: Analysis) -> str:

@@ -35,7 +35,7 @@ class Mains:
         """Count a load's own consumption from now on."""
         self._count()
         for base in (self.base, self._known):
-            base.set_tool(load.watts_always, load.watts_drive_bus)
+            base.set_load(load.watts_always, load.watts_drive_bus, load.mass)
 
     def step(self, level: Mode) -> None:
         """Count one step at this level: STAND_ON_MOTORS or a rest."""
@@ -57,9 +57,10 @@ class Mains:
         """Let the meter count the steps at the present level."""
         if self._steps:
             level = self._level
+            base = self.base.of(level, self._backend.q)
             self.meter.add(
-                self.base.of(level),
-                self.base.tool(level),
+                base,
+                min(self.base.tool(level), base),
                 level is Mode.STAND_ON_MOTORS,
                 self._steps,
             )
@@ -72,9 +73,9 @@ class Mains:
 
     def standing_power(self, level: Mode, dynamics: DynamicsModel) -> float:
         """Watts at the mains that the controller expects of a mode at the present posture."""
-        watts = self._known.of(level)
+        q = self._backend.q[None]
+        watts = self._known.of(level, q[0])
         if level is Mode.STAND_ON_MOTORS:
-            q = self._backend.q[None]
             still = np.zeros_like(q)
             hold = dynamics.inverse_dynamics(q, still, still)
             watts += float(dynamics.axis_power(still, hold).sum())

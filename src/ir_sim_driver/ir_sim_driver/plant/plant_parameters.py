@@ -14,6 +14,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ir_description import InvalidValueError, PowerData, RobotModel
+from ir_description.robot import RestTable
 from ir_msgs_py.modes import MODES, Mode
 from ir_values.arrays import FloatArray
 
@@ -134,12 +135,14 @@ class LinkFigures:
 @dataclass(frozen=True)
 class StandingWatts:
     """Watts [W] of the controller by mode and of the drives while motors are on; tool: factor on
-    the data's watts of the tool.
+    the data's watts of the tool; rest_table: what the cabinet draws in saving modes by posture and
+    load, where that was measured.
     """
 
     controller: Mapping[Mode, float]
     drives: float
     tool: float = 1.0
+    rest_table: RestTable | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +172,8 @@ def torque_constants(robot: RobotModel, voltage: float) -> FloatArray:
 def standing_watts(data: PowerData) -> StandingWatts:
     """What the data say."""
     controller = {row.mode: data.resting(row.mode.name).controller_watts for row in MODES}
-    return StandingWatts(controller, data.drives_and_brake_release)
+    watts = data.drives_and_brake_release
+    return StandingWatts(controller, watts, rest_table=data.rest_table)
 
 
 def nominal_plant(robot: RobotModel, data: PowerData) -> Plant:

@@ -198,6 +198,7 @@ def _watts(nominal: Plant, marks: Mapping[str, str], n: int, draw: _Draw) -> Sta
         },
         known.drives * draw.one(marks.get("drives_and_brake_release_w", UNMARKED)) - switching,
         draw.one("M"),
+        known.rest_table,
     )
 
 
@@ -374,6 +375,7 @@ def _watts_plant_file(item: Item | None, nominal: StandingWatts) -> StandingWatt
         controller,
         nominal.drives if drives is None else drives.number(0.0, 1e5, "W"),
         nominal.tool if tool is None else tool.number(0.0, 10.0),
+        nominal.rest_table,
     )
 
 

@@ -27,10 +27,13 @@ class BasePower:
         self._figures = watts
         self._controller = dict(watts.controller)
         self._controller[Mode.STAND_ON_MOTORS] += watts.drives
-        self.set_tool(0.0, 0.0)
+        self.set_load(0.0, 0.0, 0.0)
 
-    def set_tool(self, always: float, drive_bus: float) -> None:
-        """Take the tool's watts as declared: always, and more while the drive bus is up."""
+    def set_load(self, always: float, drive_bus: float, mass: float) -> None:
+        """Take a load as declared: its watts always, and more while the drive bus is up, and its
+        mass [kg].
+        """
+        self._mass = mass
         factor = self._figures.tool
         self._tool = dict.fromkeys(self._controller, factor * always)
         for level in (Mode.STAND_ON_MOTORS, Mode.STAND_ON_BRAKES):
@@ -39,8 +42,11 @@ class BasePower:
             level: watts + self._tool[level] for level, watts in self._controller.items()
         }
 
-    def of(self, level: Mode) -> float:
-        """Watts in STAND_ON_MOTORS or a rest, without holding torque."""
+    def of(self, level: Mode, q: FloatArray) -> float:
+        """Watts in STAND_ON_MOTORS or a rest at q (n,), without holding torque."""
+        table = self._figures.rest_table
+        if table is not None and level.name in table.modes:
+            return table.watts(level.name, q.tolist(), self._mass)
         return self._watts[level]
 
     def tool(self, level: Mode) -> float:
