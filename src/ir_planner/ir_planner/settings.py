@@ -14,7 +14,7 @@ from ir_description import (
 from ir_kernels.power import Regeneration
 from ir_msgs_py.modes import TransitionTimes
 from ir_planner.configurations import InteractionSettings
-from ir_planner.scene import Drives
+from ir_planner.scene import Drives, LinkVoltage
 from ir_planner.search import Search, registered
 from ir_planner.service import ModifiedGa
 from ir_values.files import FileRoots
@@ -53,6 +53,19 @@ class PlannerSettings:
         "as its data.",
         minimum=0.0,
         maximum=0.5,
+    )
+    torque_limits: str = setting(
+        "envelope",
+        "What bounds the torque: the envelope of the data, or current_voltage, eq. (8) with the "
+        "current of the drive and the voltage of the DC link.",
+        choices=("envelope", "current_voltage"),
+    )
+    dc_voltage: float = setting(
+        0.0,
+        "Voltage of the DC link for current_voltage; 0: that of the controller's data.",
+        unit="V",
+        minimum=0.0,
+        maximum=2000.0,
     )
     power_parameters: str = setting(
         "",
@@ -119,7 +132,12 @@ class PlannerSettings:
         if self.power_parameters not in ("", DATA_SHEET):
             text = power_parameters_text(self.power_parameters)
             parameters = _parameters(text, self.power_parameters, robot)
-        return Drives(cast(Regeneration, self.regeneration), self.torque_reserve, parameters)
+        bounds = None
+        if self.torque_limits == "current_voltage":
+            nominal = robot.controller.dc_link.voltage
+            bounds = LinkVoltage(nominal, self.dc_voltage or nominal)
+        regeneration = cast(Regeneration, self.regeneration)
+        return Drives(regeneration, self.torque_reserve, parameters, bounds)
 
     def read(self) -> None:
         """Read the file of power parameters, which is needed no more from now on."""

@@ -38,6 +38,7 @@ from ir_description.robot.robot import (
     RobotModel,
     fixed_frames,
     moving_frames,
+    torque_constants,
     total_mass,
 )
 
@@ -75,6 +76,7 @@ __all__ = [
     "parameter_unit",
     "physical_bounds",
     "prior",
+    "torque_constants",
     "total_mass",
     "without_table",
 ]

@@ -5,6 +5,7 @@ With it the loads of its flange, and the tree of frames from the cell to the too
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -337,6 +338,21 @@ class Load:
             inertia=(inertia + inertia.T) / 2.0,
             capsules=tuple(capsule.placed(pose) for capsule in self.capsules),
         )
+
+
+VOLTAGE_SHARE = 0.9
+"""Share of the largest sine voltage that the back-EMF takes at full speed (an estimate): the rest
+drives the current.
+"""
+
+
+def torque_constants(robot: RobotModel, voltage: float) -> FloatArray:
+    """Torque constants (n,) [Nm/A rms] for which the back-EMF at full speed needs VOLTAGE_SHARE of
+    what an inverter makes of the DC voltage [V]: k_t = 3 E / w, E = share U / sqrt(6), both rms per
+    phase.
+    """
+    speed = np.array(robot.velocity_max) * np.array(robot.gear_ratio)
+    return 3.0 * VOLTAGE_SHARE * voltage / (math.sqrt(6.0) * speed)
 
 
 def total_mass(loads: tuple[Load, ...]) -> float:

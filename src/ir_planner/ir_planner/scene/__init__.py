@@ -2,6 +2,7 @@
 W.
 """
 
+from ir_planner.scene.actuators import LinkVoltage
 from ir_planner.scene.motion_limits import STILL, Dynamics, MotionLimits, lasting_longer, torque_use
 from ir_planner.scene.planning_scene import (
     END_TOLERANCE,
@@ -25,6 +26,7 @@ __all__ = [
     "STILL",
     "Drives",
     "Dynamics",
+    "LinkVoltage",
     "MotionLimits",
     "PlanningScene",
     "Stops",

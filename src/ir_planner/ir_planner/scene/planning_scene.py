@@ -35,6 +35,7 @@ from ir_kernels.power import Regeneration
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError, UnknownNameError
+from ir_planner.scene.actuators import LinkVoltage, within_current_and_voltage
 from ir_planner.scene.motion_limits import MotionLimits
 from ir_values.arrays import BoolArray, FloatArray
 
@@ -42,12 +43,14 @@ from ir_values.arrays import BoolArray, FloatArray
 @dataclass(frozen=True)
 class Drives:
     """regeneration: what the bus does with braking energy. torque_reserve: share of the torque
-    envelope that plans leave to the feedback. parameters: None, as the data have them.
+    envelope that plans leave to the feedback. parameters: None, as the data have them. voltage:
+    where current and voltage bound the torque, eq. (8), not the envelope of the data.
     """
 
     regeneration: Regeneration = "shared"
     torque_reserve: float = 0.0
     parameters: PowerParameters | None = None
+    voltage: LinkVoltage | None = None
 
     @property
     def rectifier_efficiency(self) -> float:
@@ -55,19 +58,24 @@ class Drives:
         return 1.0 if self.parameters is None else self.parameters.value("rectifier_efficiency")
 
     def robot(self, robot: RobotModel) -> RobotModel:
-        """The robot with the friction, losses and masses of the parameters. Raises RequestError for
-        those of another robot.
+        """The robot with the friction, losses and masses of the parameters, and the torque that is
+        available. Raises RequestError for parameters of another robot, and for a voltage that does
+        not reach full speed.
         """
         own = self.parameters
         if own is None:
-            return robot
+            return self._within(robot)
         if (own.robot, own.joints) != (robot.name, robot.joint_names):
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
                 f"power parameters {own.name!r} are of robot {own.robot!r}: the cell has "
                 f"{robot.name!r}",
             )
-        return own.robot_with(robot)
+        return self._within(own.robot_with(robot))
+
+    def _within(self, robot: RobotModel) -> RobotModel:
+        """The robot with the torque that current and voltage leave, where these bound it."""
+        return robot if self.voltage is None else within_current_and_voltage(robot, self.voltage)
 
     def loads(self, loads: Iterable[Load]) -> tuple[Load, ...]:
         """Loads with the masses and watts of the parameters."""

@@ -7,22 +7,17 @@ sources: docs/plant.md.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
 import numpy as np
 
 from ir_description import InvalidValueError, PowerData, RobotModel
-from ir_description.robot import RestTable
+from ir_description.robot import RestTable, torque_constants
 from ir_msgs_py.modes import MODES, Mode
 from ir_values.arrays import FloatArray
 
 NOMINAL = "nominal"
-VOLTAGE_SHARE = 0.9
-"""Share of the largest sine voltage that the back-EMF takes at full speed (an estimate): the rest
-drives the current.
-"""
 HEAT_CAPACITY = 4.0
 """J/K of gear, oil and housing per Nm of peak torque (an estimate): 26 kJ/K at A1, about 55 kg of
 steel.
@@ -158,15 +153,6 @@ class Plant:
     gears: GearFigures
     link: LinkFigures
     watts: StandingWatts
-
-
-def torque_constants(robot: RobotModel, voltage: float) -> FloatArray:
-    """Torque constants (n,) [Nm/A rms] for which the back-EMF at full speed needs VOLTAGE_SHARE of
-    what an inverter makes of the DC voltage [V]: k_t = 3 E / w, E = share U / sqrt(6), both rms per
-    phase.
-    """
-    speed = np.array(robot.velocity_max) * np.array(robot.gear_ratio)
-    return 3.0 * VOLTAGE_SHARE * voltage / (math.sqrt(6.0) * speed)
 
 
 def standing_watts(data: PowerData) -> StandingWatts:
