@@ -95,7 +95,8 @@ def round_trip(steps: Sequence[DrivenStep], planner: Planner) -> tuple[int, floa
         elif step.trajectory.duration > 0.0:
             parts.append(WrittenPause("stands", step.trajectory.duration))
         if step.outputs:
-            parts.append(WrittenSignals((), tuple((f"OUTPUT_{n}", on) for n, on in step.outputs)))
+            named = tuple((f"OUTPUT_{n}", on) for n, on, _ in step.outputs)
+            parts.append(WrittenSignals((), named))
     again_text = written("AGAIN", moving[0].positions[0], parts, attached(scene), [])
     texts = [parse(again_text.source, "again.src"), parse(again_text.data, "again.dat")]
     again = drive(

@@ -112,11 +112,6 @@ ASSUMED = {
         "no $APO is set: as BAS(#INITMOV) sets it, 50 % and 3 mm",
         Effect.SPEEDS,
     ),
-    "when a trigger acts": (
-        "TRIGGER WHEN PATH=-20 DELAY=0 DO $OUT[1]=TRUE\nPTP {A1 1}",
-        "a TRIGGER acts at an end of its motion: path and delay aren't modelled",
-        Effect.TIMES,
-    ),
     "where it stands at first": (
         "SPTP $AXIS_ACT\nIF $AXIS_ACT.A1>5 THEN\nENDIF",
         "$AXIS_ACT is read before the first motion: the robot stands in the cell's home",
@@ -132,10 +127,15 @@ ASSUMED = {
         "$CIRC_TYPE #PATH: the tool is turned evenly in the base instead",
         Effect.PLACES,
     ),
-    "a wait beside a motion": (
-        "TRIGGER WHEN DISTANCE=0 DELAY=0 DO BLOW( )\nPTP {A1 1}\nEND\nDEF BLOW( )\nWAIT SEC 1",
-        "a wait beside a motion, as a TRIGGER asks for: the robot goes on",
-        Effect.TIMES,
+    "a motion beside a motion": (
+        "TRIGGER WHEN DISTANCE=0 DELAY=0 DO BLOW( )\nPTP {A1 1}\nEND\nDEF BLOW( )\nPTP {A1 9}",
+        "a motion in what a TRIGGER calls: a controller refuses it, it isn't driven",
+        Effect.MOTIONS,
+    ),
+    "a stop beside a motion": (
+        "TRIGGER WHEN DISTANCE=0 DELAY=0 DO BLOW( )\nPTP {A1 1}\nEND\nDEF BLOW( )\nBRAKE",
+        "BRAKE in what a TRIGGER calls stops the robot: not followed",
+        Effect.MOTIONS,
     ),
     "a wait for nothing": (
         "WAIT FOR FALSE",

@@ -53,7 +53,15 @@ from ir_krl import (
     worst_first,
 )
 from ir_planner import Planner
-from ir_planner.krl import EvaluatedProgram, evaluate_krl, export_krl, follow_krl, follow_ur
+from ir_planner.krl import (
+    EvaluatedProgram,
+    EvaluatedStep,
+    Switched,
+    evaluate_krl,
+    export_krl,
+    follow_krl,
+    follow_ur,
+)
 from ir_values.output_files import write_file
 
 UR = ".script"
@@ -322,9 +330,11 @@ def rows_of(found: EvaluatedProgram) -> list[Row]:
                         one.found.verification.status.message,
                         one.power_mode or _waiting(one.step.waits_for),
                         _handled(one.step.handled),
+                        _under_way(one),
                     ),
                 )
             ),
+            "outputs": "; ".join(_spoken(output) for output in one.step.outputs),
         }
         for one in found.steps
     ]
@@ -344,6 +354,18 @@ def totals_of(found: EvaluatedProgram) -> Row:
 
 def _waiting(condition: str) -> str:
     return f"waits for {condition}" if condition else ""
+
+
+def _spoken(output: Switched) -> str:
+    level = "on" if output.value else "off"
+    return f"$OUT[{output.number}] {level} at {output.seconds:.3f} s"
+
+
+def _under_way(one: EvaluatedStep) -> str:
+    """Outputs that a movement sets before it ends."""
+    end = one.step.trajectory.duration
+    moving = [each for each in one.step.outputs if one.step.moves and each.seconds < end]
+    return ", ".join(_spoken(each) for each in moving)
 
 
 def _handled(part: str) -> str:

@@ -147,9 +147,26 @@ class Stop:
 
 
 @dataclass(frozen=True)
+class Switch:
+    """When a TRIGGER acts: at the end of part `part` of its motion (from_start: at its start), or
+    `path` [m] of the tool's path after that place (None: WHEN DISTANCE), `delay` [s] later, and
+    `waited` [s] that the routine which it calls has waited. ahead: its motion is the next one among
+    the commands, else the one before.
+    """
+
+    ahead: bool
+    from_start: bool
+    path: float | None
+    delay: float
+    part: int = 0
+    waited: float = 0.0
+
+
+@dataclass(frozen=True)
 class SetOutput:
     """A digital output is set; `pulse` [s] later it goes back, 0 = it stays. on_path: while the
-    robot moves (by a TRIGGER, or after CONTINUE), so that it needn't stop.
+    robot moves (by a TRIGGER, or after CONTINUE), so that it needn't stop. switch: when a TRIGGER
+    sets it.
     """
 
     number: int
@@ -157,6 +174,7 @@ class SetOutput:
     place: Place
     pulse: float = 0.0
     on_path: bool = False
+    switch: Switch | None = None
 
 
 Command: TypeAlias = Motion | SplineBlock | Wait | WaitFor | SetOutput | Stop

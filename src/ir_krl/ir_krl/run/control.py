@@ -8,7 +8,7 @@ from typing import Any
 
 from ir_krl.errors import KrlRunError, Place
 from ir_krl.language import Tree, Word, place_of
-from ir_krl.run.commands import Command, Motion, SplineBlock, Stop, Wait, WaitFor
+from ir_krl.run.commands import Command, Motion, SplineBlock, Stop, Switch, Wait, WaitFor
 from ir_krl.run.expressions import Expressions
 from ir_krl.run.memory import INPUT, Memory, Signals, Step, Watched
 from ir_krl.run.notes import Effect, Note
@@ -67,7 +67,7 @@ class Control:
     notes: list[Note] = field(default_factory=list)
     statements: int = 0
     continuing: bool = False  # CONTINUE was the statement before
-    triggered: bool = False  # statements run beside a motion, as a TRIGGER asks for
+    triggered: Switch | None = None  # statements run beside a motion, as a TRIGGER asks for
     expressions: Expressions = field(init=False)
     _signals: Signals = field(init=False)
     _guessed_exits: int = 0  # times that an assumed value decided about leaving a loop
@@ -102,7 +102,7 @@ class Control:
         self.statements += 1
         self._check_budget(statement)
         getattr(self, f"_{statement.data}")(statement)
-        self.continuing = self.triggered or statement.data == "continue_"
+        self.continuing = self._beside or statement.data == "continue_"
 
     def _turns_back(self, between: Sequence[Tree], jump: Jump, turns: dict[str, _Turn]) -> bool:
         """Whether a jump back is followed: not for ever, where nothing that is known ends it."""
@@ -150,6 +150,11 @@ class Control:
                 self.note_at(place, f"{why} stops the advance run: the motion before ends at rest")
 
     @property
+    def _beside(self) -> bool:
+        """Whether what runs is called by a TRIGGER: the robot goes on meanwhile."""
+        return self.triggered is not None
+
+    @property
     def _rounding(self) -> bool:
         """Whether the last motion is to be left for a next one that didn't come yet."""
         for command in reversed(self.commands):
@@ -163,7 +168,7 @@ class Control:
         """A condition, and whether it hangs on an assumed value or on nothing at all."""
         before = self.memory.guesses
         holds = self.expressions.truth(tree, what)
-        self.continuing = self.triggered
+        self.continuing = self._beside
         return holds, self.memory.guesses > before or _constant(tree)
 
     def _if_(self, tree: Tree) -> None:
@@ -292,7 +297,7 @@ class Control:
         subject, *cases, default = tree.children
         before = self.memory.guesses
         value = self.memory.guess(self.expressions.value(subject), 0, self.place(tree))
-        self.continuing = self.triggered
+        self.continuing = self._beside
         open_ = self.memory.guesses > before
         self._count_exits(tree, open_=open_)
         for case in cases:
@@ -341,9 +346,9 @@ class Control:
                 f"WAIT SEC {seconds:g}: a wait is read up to {WAIT_MAX:g} s, a week",
                 self.place(tree),
             )
-        if self.triggered:
-            text = "a wait beside a motion, as a TRIGGER asks for: the robot goes on"
-            self.note(tree, text, Effect.TIMES)
+        if self.triggered is not None:  # the robot goes on; what follows is done later
+            waited = self.triggered.waited + max(seconds, 0.0)
+            self.triggered = replace(self.triggered, waited=waited)
         elif seconds > 0.0:
             self.commands.append(Wait(seconds, self.place(tree)))
         else:  # passed at once, as on the controller; yet the advance run stops

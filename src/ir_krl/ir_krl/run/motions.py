@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar, get_args
 
@@ -18,6 +18,7 @@ from ir_krl.run.commands import (
     SetOutput,
     Speeds,
     SplineBlock,
+    Switch,
     Target,
     TimeBlock,
 )
@@ -96,7 +97,8 @@ class Assigning(Control):
             raise KrlRunError(
                 f"$OUT[{number:g}]: outputs have whole numbers from 1 to {SIGNALS}", place
             )
-        self.commands.append(SetOutput(int(number), level, place, pulse, self.continuing))
+        output = SetOutput(int(number), level, place, pulse, self.continuing, self.triggered)
+        self.commands.append(output)
         if pulse == 0.0:
             self.memory.set(((OUTPUT, (int(number),)),), level, place)
 
@@ -357,33 +359,76 @@ def _is(child: object, data: str) -> bool:
 # WITH.
 
 _Built = TypeVar("_Built", Motion, SplineBlock)
+_MS = 1e-3  # s
+
+
+@dataclass(frozen=True, eq=False)
+class _Trigger:
+    """A TRIGGER that waits for its motion."""
+
+    switch: Switch
+    action: Tree
+
+    def of_part(self, part: int) -> _Trigger:
+        """The same of a part of a spline."""
+        return replace(self, switch=replace(self.switch, part=part))
+
+    def behind(self) -> _Trigger:
+        """The same, whose motion stands before it among the commands."""
+        return replace(self, switch=replace(self.switch, ahead=False))
+
+
+def _ahead(output: SetOutput) -> SetOutput:
+    assert output.switch is not None  # a TRIGGER sets it
+    return replace(output, switch=replace(output.switch, ahead=True))
 
 
 class Moving(Assigning):
     """Runs motions; what they are is built by `_motions`."""
 
     _motions: Motions
-    _triggers: list[tuple[float, Tree]]
+    _triggers: list[_Trigger]
+    _part: int = 0  # of the spline that is built: a TRIGGER is of the part that follows
 
     def _trigger(self, tree: Tree) -> None:
-        when, where, delay, action = tree.children[0], *tree.children[1:4]
+        when, where, from_start, delay, action, priority = tree.children
         at = self.expressions.number(where, str(when))
-        shifted = at != 0.0 if str(when) == "PATH" else str(when) != "DISTANCE"
-        if shifted or self.expressions.number(delay, "DELAY") != 0.0:
-            self.note(
-                tree,
-                "a TRIGGER acts at an end of its motion: path and delay aren't modelled",
-                Effect.TIMES,
+        if str(when) not in ("PATH", "DISTANCE"):
+            raise KrlRunError(f"TRIGGER WHEN {when}: PATH and DISTANCE are read", self.place(tree))
+        if str(when) == "DISTANCE" and at not in (0.0, 1.0):
+            raise KrlRunError(
+                f"TRIGGER WHEN DISTANCE={at:g}: 0 is the start of a motion, 1 its end",
+                self.place(tree),
             )
-        self._triggers.append((at if str(when) == "DISTANCE" else 1.0, action))
+        along = str(when) == "PATH"
+        begins = from_start is not None if along else at == 0.0
+        seconds = _MS * self.expressions.number(delay, "DELAY")
+        switch = Switch(begins, begins, _MM * at if along else None, seconds, self._part)
+        self._triggers.append(_Trigger(switch, action))
+        if priority is not None and action.data == "call":
+            level = self.expressions.number(priority, "PRIO")
+            text = (
+                f"{action.children[0]} runs as an interrupt of priority {level:g}, as a TRIGGER "
+                "asks for: the robot goes on"
+            )
+            self.note(tree, text)
 
     def _ptp(self, tree: Tree) -> None:
+        if self._not_beside(tree):
+            return
         due = self._triggers
         self._triggers = []
-        self._act(action for at, action in due if at == 0.0)
+        self._act(one for one in due if one.switch.ahead)
         built = self._with_settings(tree, lambda: self._motions.motion(tree))
         self.commands.append(self._in_advance(built))
-        self._act(action for at, action in due if at != 0.0)
+        self._act(one for one in due if not one.switch.ahead)
+
+    def _not_beside(self, tree: Tree) -> bool:
+        """Whether a motion stands in what a TRIGGER calls: a controller doesn't take it there."""
+        if self._beside:
+            text = "a motion in what a TRIGGER calls: a controller refuses it, it isn't driven"
+            self.note(tree, text, Effect.MOTIONS)
+        return self._beside
 
     def _in_advance(self, built: _Built) -> _Built:
         """A motion as far as it is known in advance: $ADVANCE=0 rounds no corner."""
@@ -395,12 +440,14 @@ class Moving(Assigning):
             self.note_at(built.place, f"$ADVANCE=0: {built.blend.how} has no effect")
         return replace(built, blend=None)
 
-    def _act(self, actions: Iterable[Tree]) -> None:
+    def _act(self, due: Iterable[_Trigger]) -> None:
         """What triggers do while the robot moves."""
-        for action in actions:
-            self.continuing = self.triggered = True
-            getattr(self, f"_{action.data}")(action)
-        self.continuing = self.triggered = False
+        for one in due:
+            self.continuing = True
+            self.triggered = one.switch
+            getattr(self, f"_{one.action.data}")(one.action)
+        self.continuing = False
+        self.triggered = None
 
     _lin = _circ = _ptp
 
@@ -408,21 +455,27 @@ class Moving(Assigning):
         """A block with its triggers: what they switch on first counts from its start, the rest from
         its end, so that no part of a process is taken for positioning.
         """
+        if self._not_beside(tree):
+            return
         due = self._triggers
         self._triggers = []
         block = self._in_advance(self._with_settings(tree, lambda: self._block(tree)))
         inside = self._triggers
         self._triggers = []
-        self._act(action for at, action in due if at == 0.0)
+        last = len(block.parts) - 1
+        due = [one.of_part(0 if one.switch.from_start else last) for one in due]
+        inside = [one.of_part(min(one.switch.part, last)) for one in inside]
+        self._act(one for one in due if one.switch.ahead)
         before = len(self.commands)
-        self._act(action for _, action in inside)
-        made = self.commands[before:]
+        self._act(one.behind() for one in inside)
+        made = [one for one in self.commands[before:] if isinstance(one, SetOutput)]
         self.commands[before:] = []
-        first = {one.number: one for one in reversed(made) if isinstance(one, SetOutput)}
+        first = {one.number: one for one in reversed(made)}
         early = [one for one in first.values() if one.value]
         late = [one for one in made if one not in early]
-        self.commands += [*reversed(early), block, *late]
-        self._act(action for at, action in due if at != 0.0)
+        self.commands += [_ahead(one) for one in reversed(early)]
+        self.commands += [block, *late]
+        self._act(one for one in due if not one.switch.ahead)
 
     def _with_settings(self, tree: Tree, build: Callable[[], _Built]) -> _Built:
         """Build with what stands after WITH; it holds for this motion only."""
@@ -475,6 +528,8 @@ class Moving(Assigning):
                     getattr(self, f"_{part.data}")(part)
                 case _:
                     motions.append(self._with_settings(part, partial(self._motions.motion, part)))
+            self._part = len(motions)
+        self._part = 0
         if not motions:
             raise KrlRunError("a spline block without motions", self.place(tree))
         axis = str(word) == "PTP_SPLINE"

@@ -196,7 +196,7 @@ class _Run(Moving):
         self._calling = False  # a call as a statement begins
         self.expressions = Expressions(memory, self._signals, self._called)
         self._motions = Motions(self.expressions, memory, self.note_at)
-        self._triggers: list[tuple[float, Tree]] = []
+        self._triggers = []
 
     @property
     def signals(self) -> dict[str, SignalRange]:
@@ -430,4 +430,9 @@ class _Run(Moving):
     def _interrupt_switched(self, tree: Tree) -> None:
         """Interrupts aren't followed: their declaration says so."""
 
-    _brake = _resume = _interrupt_switched
+    _resume = _interrupt_switched
+
+    def _brake(self, tree: Tree) -> None:
+        if self._beside:
+            text = "BRAKE in what a TRIGGER calls stops the robot: not followed"
+            self.note(tree, text, Effect.MOTIONS)

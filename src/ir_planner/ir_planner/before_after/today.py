@@ -208,7 +208,8 @@ class Stretch:
     move them. process: the path of the tool that it drives, alone or with neighbours that have the
     same one. power_mode: in which a standstill is spent, "" as the controller does by itself.
     awaited, signals: of the cell, waited for in it and set at its end; handled: the part that is
-    taken ("+gear") or left ("-gear") there.
+    taken ("+gear") or left ("-gear") there. at_rest: whether it begins and ends at rest: not where
+    it is cut because something changes in its course.
     """
 
     trajectory: JointTrajectory | None
@@ -222,6 +223,7 @@ class Stretch:
     awaited: tuple[Signal, ...] = ()
     signals: tuple[Signal, ...] = ()
     handled: str = ""
+    at_rest: tuple[bool, bool] = (True, True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -315,4 +317,5 @@ def _stretch(one: EvaluatedStep, process: CellPath | None) -> Stretch:
         awaited=step.awaited,
         signals=step.signals,
         handled=step.handled,
+        at_rest=step.at_rest,
     )

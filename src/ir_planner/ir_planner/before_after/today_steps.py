@@ -272,7 +272,11 @@ class _Costing:
         names = [there] if along else [station.name for station in scene.cell.stations]
         contacts = tuple(dict.fromkeys(name for name in (here, there) if name in names))
         found = evaluate_trajectory(
-            stretch.trajectory, scene, self._request.options.safety_distance, contacts
+            stretch.trajectory,
+            scene,
+            self._request.options.safety_distance,
+            contacts,
+            stretch.at_rest,
         )
         step = PlannedMovement(
             kind=MovementKind.CARTESIAN if along else MovementKind.REGIONAL,

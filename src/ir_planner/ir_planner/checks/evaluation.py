@@ -13,7 +13,7 @@ from ir_msgs_py.status import Status
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.clearance import ClearanceProfile, clearance_profile
 from ir_planner.checks.energy import MovementEnergy, movement_energy, peak_power
-from ir_planner.checks.verification import Verification, verify
+from ir_planner.checks.verification import AtRest, Verification, verify
 from ir_planner.presentation import plot_profiles, report_text, status_text
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, Stops
 from ir_values.arrays import FloatArray
@@ -64,12 +64,16 @@ class Evaluation:
 
 
 def evaluate_trajectory(
-    trajectory: JointTrajectory, scene: PlanningScene, safety_distance: float, station: Stops = ""
+    trajectory: JointTrajectory,
+    scene: PlanningScene,
+    safety_distance: float,
+    station: Stops = "",
+    at_rest: AtRest = (True, True),
 ) -> Evaluation:
     """Verify and measure a trajectory with the loads of the scene. station: whose contacts are
     allowed; of a hop between two stations both, each in its own zone.
     """
-    verification = verify(trajectory, scene, safety_distance, station)
+    verification = verify(trajectory, scene, safety_distance, station, at_rest)
     energy = movement_energy(trajectory, scene)
     return measured(trajectory, scene, safety_distance, station, verification, energy)
 

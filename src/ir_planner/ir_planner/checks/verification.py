@@ -77,7 +77,13 @@ def position_violation(
     return Violation(float(trajectory.times[k]), k, "position", float(excess[k, j]), sentence)
 
 
-def rest_violation(trajectory: JointTrajectory, scene: PlanningScene) -> Violation | None:
+AtRest = tuple[bool, bool]
+"""Whether a movement must start and end at rest: not where it is a part of another."""
+
+
+def rest_violation(
+    trajectory: JointTrajectory, scene: PlanningScene, at_rest: AtRest = (True, True)
+) -> Violation | None:
     """Where the movement does not start or end at rest."""
     ends = trajectory.sample(trajectory.times[[0, -1]])
     names = scene.cell.robot.joint_names
@@ -86,7 +92,12 @@ def rest_violation(trajectory: JointTrajectory, scene: PlanningScene) -> Violati
         return None
     first = (coefficients[0, :, 1], 2.0 * coefficients[0, :, 2])
     final = (ends.qd[-1], ends.qdd[-1])
-    for (speed, acceleration), k in ((first, 0), (final, len(durations))):
+    for (speed, acceleration), k, needed in (
+        (first, 0, at_rest[0]),
+        (final, len(durations), at_rest[1]),
+    ):
+        if not needed:
+            continue
         for what, values, unit in (
             ("velocity", speed, "rad/s"),
             ("acceleration", acceleration, "rad/s^2"),
@@ -325,13 +336,17 @@ class TorqueProof:
 
 
 def verify(
-    trajectory: JointTrajectory, scene: PlanningScene, safety_distance: float, station: Stops = ""
+    trajectory: JointTrajectory,
+    scene: PlanningScene,
+    safety_distance: float,
+    station: Stops = "",
+    at_rest: AtRest = (True, True),
 ) -> Verification:
     """Check a trajectory against the robot's limits and S_m (or what `station` allows its
     pairs).
     """
     clearance = clearance_violation(trajectory, scene, safety_distance, station)
-    return verified(trajectory, scene, clearance, torque_proof(trajectory, scene))
+    return verified(trajectory, scene, clearance, torque_proof(trajectory, scene), at_rest)
 
 
 def verified(
@@ -339,6 +354,7 @@ def verified(
     scene: PlanningScene,
     clearance: Violation | None,
     torque: TorqueProof,
+    at_rest: AtRest = (True, True),
 ) -> Verification:
     """The verification of a trajectory whose clearance and torque have been examined."""
     largest = extremes(*trajectory.coefficients())
@@ -351,7 +367,7 @@ def verified(
     }
     found = [
         position_violation(trajectory, largest, scene),
-        rest_violation(trajectory, scene),
+        rest_violation(trajectory, scene, at_rest),
         jump_violation(trajectory, robot.joint_names),
         torque.violation,
         *(

@@ -1,6 +1,6 @@
 """Programs in KUKA's language: as a KR C4 drives them in the cell, and written for it."""
 
-from ir_planner.krl.execution import DrivenStep
+from ir_planner.krl.execution import DrivenStep, Switched
 from ir_planner.krl.export import DEVIATION_MAX, KrlExport
 from ir_planner.krl.geometry import tool_in_flange
 from ir_planner.krl.requests import (
@@ -23,6 +23,7 @@ __all__ = [
     "EvaluatedProgram",
     "EvaluatedStep",
     "KrlExport",
+    "Switched",
     "ToolMotion",
     "evaluate_krl",
     "export_krl",

@@ -1,13 +1,16 @@
 """Execution of a KRL program as on a KR C4: movements between standstills, waits, outputs."""
 
+from bisect import insort
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ir_krl import (
     Blend,
     Command,
+    Effect,
     Followed,
     KrlMotionError,
     Motion,
@@ -23,13 +26,14 @@ from ir_krl import (
     WaitFor,
 )
 from ir_msgs_py.plc import Signal
-from ir_msgs_py.trajectory import JointTrajectory
+from ir_msgs_py.trajectory import NS_PER_S, JointTrajectory
 from ir_planner.krl.geometry import Arm
 from ir_planner.krl.motions import AxisLine, Curve, Move, move, overlap, tool_curve, trajectory
 from ir_planner.krl.splines import ToolMotion, block_curve, timed_block, tool_motion, tool_spline
 from ir_planner.krl.surroundings import Surroundings, nothing_around
+from ir_planner.krl.triggers import Stage, along_path, instant, stages_at, stages_of
 from ir_planner.scene import STILL, PlanningScene
-from ir_planner.timing import standing
+from ir_planner.timing import GRID_NS, GRID_S, standing
 from ir_values.arrays import FloatArray
 
 # Which motions of a program are its process: what the tool does between switching an output on and
@@ -69,29 +73,41 @@ def _target_of(command: Motion | SplineBlock) -> Target:
 _BLENDED_JERK = 0.5  # of the limit: while two moves overlap their jerks add up
 
 
+class Switched(NamedTuple):
+    """An output that a step sets, `seconds` after it began."""
+
+    number: int
+    value: bool
+    seconds: float
+
+
 @dataclass(frozen=True, eq=False)
 class DrivenStep:
-    """One step from standstill to standstill: a movement, or a wait.
+    """One step from standstill to standstill: a movement, or a wait. A movement in whose course
+    something else is carried or a door begins to move is two steps or more.
 
-    places: of its motions in the program; outputs: set at its end, number and value; waits_for: a
-    condition that ends a wait; tool: for each motion what the tool draws, None for a PTP and where
-    no segment describes it; process: places of the motions that belong to a process. scene: in
-    which it is driven; handled: the part that is taken ("+gear") or left ("-gear") at its end;
-    awaited, signals: of the cell, that it waits for and that are set at its end.
+    places: of its motions in the program; outputs: that are set in it; waits_for: a condition that
+    ends a wait; tool: for each motion what the tool draws, None for a PTP and where no segment
+    describes it; process: places of the motions that belong to a process. scene: in which it is
+    driven; handled: the part that is taken ("+gear") or left ("-gear") at its end; awaited,
+    signals: of the cell, that it waits for and that are set until its end. at_rest: whether it
+    begins and ends at rest; between: where the whole movement begins and ends (2, n).
     """
 
     trajectory: JointTrajectory
     moves: bool
     places: tuple[Place, ...]
-    outputs: tuple[tuple[int, bool], ...] = ()
+    outputs: tuple[Switched, ...] = ()
     waits_for: str = ""
     tool: tuple[ToolMotion | None, ...] = ()
     process: tuple[Place, ...] = ()
     handled: str = ""
     awaited: tuple[Signal, ...] = ()
     signals: tuple[Signal, ...] = ()
+    at_rest: tuple[bool, bool] = (True, True)
     _: KW_ONLY
     scene: PlanningScene
+    between: FloatArray
 
 
 def drive(
@@ -106,11 +122,58 @@ def drive(
     around = among if isinstance(among, Surroundings) else nothing_around(among)
     run = _Drive(around, np.array(start), list(program.notes))
     process = process_motions(program.commands)
+    triggered = _triggered(program.commands)
     for k, command in enumerate(program.commands):
         run.working = k in process
-        run.take(command)
+        run.take(command, triggered.get(k, ()))
     run.finish()
     return tuple(run.steps), (*run.notes, *around.notes)
+
+
+def _triggered(commands: Sequence[Command]) -> dict[int, list[SetOutput]]:
+    """What triggers set, by the place of their motion in `commands`."""
+    found: dict[int, list[SetOutput]] = {}
+    waiting: list[SetOutput] = []
+    last = -1
+    for k, command in enumerate(commands):
+        if isinstance(command, Motion | SplineBlock):
+            found[k] = waiting
+            waiting = []
+            last = k
+        elif isinstance(command, SetOutput) and command.switch is not None:
+            (waiting if command.switch.ahead or last < 0 else found[last]).append(command)
+    return found
+
+
+class _Event(NamedTuple):
+    """What happens in a step, `at` s after it began: an output is set, or the next motion says what
+    it carries.
+    """
+
+    at: float
+    change: SetOutput | Motion
+
+
+@dataclass
+class _Piece:
+    """What has happened since the movement was cut last, at `begin` s."""
+
+    begin: float = 0.0
+    outputs: list[Switched] = field(default_factory=list)
+    signals: list[Signal] = field(default_factory=list)
+
+
+@dataclass(frozen=True, eq=False)
+class _Driven:
+    """A motion that is driven through: the law of its curve, what the program says of it, and what
+    triggers set in it.
+    """
+
+    move: Move
+    command: Motion | SplineBlock
+    drawn: ToolMotion | None
+    working: bool
+    triggered: Sequence[SetOutput]
 
 
 @dataclass
@@ -121,12 +184,10 @@ class _Drive:
     here: FloatArray
     notes: list[Note]
     steps: list[DrivenStep] = field(default_factory=list)
-    _moves: list[Move] = field(default_factory=list)
+    _through: list[_Driven] = field(default_factory=list)
     _overlaps: list[int] = field(default_factory=list)
-    _places: list[Place] = field(default_factory=list)
     _outputs: list[SetOutput] = field(default_factory=list)  # set while the robot moves
-    _tool: list[ToolMotion | None] = field(default_factory=list)
-    _process: list[Place] = field(default_factory=list)
+    _later: list[_Event] = field(default_factory=list)  # seconds after the last step
     working: bool = False  # the command belongs to a process
     _on_path: bool = False  # the first motion has led to the programmed path
     _blend: Blend | None = None  # of the last motion; None: it ends at rest
@@ -136,27 +197,31 @@ class _Drive:
         self._among(self.around.scene(None, Place()))
 
     def _carry(self, payload: Payload | None, place: Place) -> None:
-        """What a motion from rest carries; one that is blended goes on with the load before."""
-        if not self._moves:
-            self._payload = payload
-            self._among(self.around.scene(payload, place))
+        """What the motions from here on carry."""
+        self._payload = payload
+        self._among(self.around.scene(payload, place))
 
     def _among(self, scene: PlanningScene) -> None:
         """Drive in this scene from here on."""
         self.scene = scene
         self.arm = Arm(scene)
 
-    def take(self, command: Command) -> None:
-        """Drive one command."""
+    def take(self, command: Command, triggered: Sequence[SetOutput] = ()) -> None:
+        """Drive one command; what triggers set in it, where it is a motion."""
         match command:
             case Motion():
-                self._carry(command.payload, command.place)
-                self._motion(command)
+                self._motion(command, triggered)
             case SplineBlock():
-                self._carry(command.parts[0].payload, command.place)
-                self._block(command)
-            case SetOutput() if command.on_path and self._moves:
+                self._block(command, triggered)
+            case SetOutput() if command.switch is not None:
+                pass  # belongs to its motion
+            case SetOutput() if command.on_path and self._through:
                 self._outputs.append(command)
+                text = (
+                    "an output after CONTINUE is set by the advance run: taken as set when the "
+                    "motion before ends"
+                )
+                self.notes.append(Note(command.place, text, Effect.TIMES))
             case SetOutput():
                 self.finish()
                 self._set(command)
@@ -174,31 +239,72 @@ class _Drive:
 
     def finish(self) -> None:
         """Come to rest: what is being driven through becomes a step."""
-        if not self._moves:
+        if not self._through:
             return
-        names = self.scene.cell.robot.joint_names
-        self._step(trajectory(self._moves, self._overlaps, names), tuple(self._places), moves=True)
-        self.steps[-1] = replace(
-            self.steps[-1],
-            tool=tuple(self._tool),
-            process=tuple(self._process),
-        )
-        self._moves = []
+        through = self._through
+        moves = [one.move for one in through]
+        driven = trajectory(moves, self._overlaps, self.scene.cell.robot.joint_names)
+        events = self._events(driven, stages_of(moves, self._overlaps))
+        self._through = []
         self._overlaps = []
-        self._places = []
         self._blend = None
-        for output in self._outputs:
-            self._set(output)
+        outputs = self._outputs
         self._outputs = []
-        self._tool = []
-        self._process = []
+        self._carry(_payload_of(through[0].command), through[0].command.place)
+        self._step(
+            driven,
+            tuple(one.command.place for one in through),
+            events,
+            moves=True,
+            tool=tuple(one.drawn for one in through),
+            process=tuple(one.command.place for one in through if one.working),
+        )
+        for output in outputs:
+            self._set(output)
 
-    def _set(self, command: SetOutput) -> None:
-        """An output is set at the end of the last step, where the robot stands."""
+    def _events(self, driven: JointTrajectory, stages: Sequence[Sequence[Stage]]) -> list[_Event]:
+        """What happens while a movement is driven."""
+        found = []
+        for one, parts in zip(self._through, stages, strict=True):
+            if one is not self._through[0]:
+                rounded = 0.5 * (parts[0].earliest + parts[0].free)
+                found.append(_Event(rounded, _first_part(one.command)))
+            found += self._triggers(driven, one.command, parts, one.triggered)
+        return found
+
+    def _triggers(
+        self,
+        driven: JointTrajectory,
+        command: Motion | SplineBlock,
+        stages: Sequence[Stage],
+        triggered: Sequence[SetOutput],
+    ) -> list[_Event]:
+        """When the triggers of a motion act."""
+        if not triggered:
+            return []
+        shifted = along_path(driven, _target_of(command), self.arm)
+        found = []
+        for one in triggered:
+            assert one.switch is not None  # as triggers have
+            at, limited = instant(one.switch, stages[one.switch.part], shifted)
+            found.append(_Event(at, one))
+            if limited:
+                text = "a TRIGGER would act beyond its motion: it acts at the last place there"
+                self.notes.append(Note(one.place, text, Effect.TIMES))
+            if one.switch.path and _is_axis(command):
+                text = "PATH before an axis motion, which controllers refuse: the tool's path there"
+                self.notes.append(Note(one.place, text, Effect.TIMES))
+        return found
+
+    def _set(self, command: SetOutput, q: FloatArray | None = None, *, listed: bool = True) -> None:
+        """An output is set at the end of the last step, where the robot stands; at q (n,) where
+        that isn't where the motions so far lead.
+        """
         if not self.steps and self._on_path:
             self._stand(0.0, command.place, "")
         signals = self.around.signalled(command.number, command.value)
-        handled = self.around.gripped(command.number, command.value, self.here, command.place)
+        here = self.here if q is None else q
+        handled = self.around.gripped(command.number, command.value, here, command.place)
         if handled:  # until a motion says what $LOAD is then
             self._payload = None
         before = self.steps[-1].handled if self.steps else ""
@@ -209,15 +315,26 @@ class _Drive:
             handled = ""
         if self.steps:
             last = self.steps[-1]
-            outputs = (*last.outputs, (command.number, command.value))
+            set_now = Switched(command.number, command.value, last.trajectory.duration)
             self.steps[-1] = replace(
                 last,
-                outputs=outputs,
+                outputs=(*last.outputs, set_now) if listed else last.outputs,
                 handled=handled or last.handled,
                 signals=(*last.signals, *signals),
             )
+        self._goes_back(command, 0.0)
 
-    def _motion(self, motion: Motion) -> None:
+    def _goes_back(self, command: SetOutput, at: float) -> None:
+        """A pulse that is set at `at` s ends by itself. A gripper's stays: its valve keeps its
+        side.
+        """
+        if command.pulse > 0.0 and not self.around.grips(command.number):
+            back = replace(command, value=not command.value, pulse=0.0)
+            insort(self._later, _Event(at + command.pulse, back), key=_at)
+
+    def _motion(self, motion: Motion, triggered: Sequence[SetOutput]) -> None:
+        if not self._through:
+            self._carry(motion.payload, motion.place)
         if not self._on_path:
             if motion.kind != "ptp":
                 raise KrlMotionError(
@@ -226,29 +343,46 @@ class _Drive:
                 )
             self.here = self.arm.reached(motion.target, self.here, motion.place)
             self._on_path = True
+            self._at_once(triggered)
             return
         if motion.kind == "ptp":
             end = self.arm.reached(motion.target, self.here, motion.place)
             if np.abs(end - self.here).max() < STILL:
+                self._at_once(triggered)
                 return
-            curve = AxisLine(self.here, end)
-            self._drive(curve, motion, motion.speeds, None)
+            curve: Curve = AxisLine(self.here, end)
+            drawn = None
         else:
-            line = tool_curve(motion, self.here, self.arm)
-            if max(line.length, line.turning) < STILL:
+            curve = tool_curve(motion, self.here, self.arm)
+            if max(curve.length, curve.turning) < STILL:
+                self._at_once(triggered)
                 return
-            self._drive(line, motion, motion.speeds, tool_motion(motion, self.here, self.arm))
+            drawn = tool_motion(motion, self.here, self.arm)
+        self._drive(curve, motion, motion.speeds, drawn, triggered)
 
-    def _block(self, block: SplineBlock) -> None:
+    def _at_once(self, triggered: Sequence[SetOutput]) -> None:
+        """What triggers of a motion set that leads nowhere."""
+        for one in triggered:
+            if self._through:
+                self._outputs.append(one)
+            else:
+                self._set(one)
+
+    def _block(self, block: SplineBlock, triggered: Sequence[SetOutput]) -> None:
+        if not self._through:
+            self._carry(block.parts[0].payload, block.place)
         if not self._on_path:
             raise KrlMotionError(
                 "the first motion must be a PTP: where does the robot stand before?", block.place
             )
-        driven = timed_block(block, self.here, self.arm)
-        if driven is not None:
+        timed = timed_block(block, self.here, self.arm)
+        if timed is not None:
             self.finish()
+            driven, times = timed
+            self._carry(block.parts[0].payload, block.place)
+            events = self._triggers(driven, block, stages_at(times), triggered)
             self.here = driven.positions[-1]
-            self._step(driven, (block.place,), moves=True)
+            self._step(driven, (block.place,), events, moves=True)
             return
         curve = block_curve(block, self.here, self.arm)
         if any(part.speeds != block.parts[0].speeds for part in block.parts):
@@ -257,7 +391,7 @@ class _Drive:
             )
         least = sum(one.seconds for one in block.times) / block.parts[0].speeds.override
         drawn = None if block.axis else tool_spline(block, self.here, self.arm)
-        self._drive(curve, block, block.parts[0].speeds, drawn, least)
+        self._drive(curve, block, block.parts[0].speeds, drawn, triggered, least)
 
     def _drive(
         self,
@@ -265,38 +399,161 @@ class _Drive:
         command: Motion | SplineBlock,
         speeds: Speeds,
         drawn: ToolMotion | None,
+        triggered: Sequence[SetOutput],
         least: float = 0.0,
     ) -> None:
+        self._carry(_payload_of(command), command.place)
         share = 1.0 if self._blend is None and command.blend is None else _BLENDED_JERK
-        made = move(curve, speeds, self.scene, command.place, least=least, jerk_share=share)
-        made = replace(made, tool=_target_of(command).tool)
-        if self._moves and self._blend is not None:
-            steps = overlap(self._moves[-1], made, self._blend, self.arm)
+        target = _target_of(command)
+        made = move(curve, speeds, self.scene, target, command.place, least=least, jerk_share=share)
+        if self._through and self._blend is not None:
+            steps = overlap(self._through[-1].move, made, self._blend, self.arm)
             if steps > 0:
                 self._overlaps.append(steps)
             else:
                 self.finish()
-        self._moves.append(made)
-        self._places.append(command.place)
-        self._tool.append(drawn)
-        self._process += [command.place] if self.working else []
+        self._through.append(_Driven(made, command, drawn, self.working, triggered))
         self._blend = command.blend
         self.here = made.at(np.array([made.law.total]))[0][0]
         if self._blend is None:
             self.finish()
 
     def _stand(self, seconds: float, place: Place, condition: str) -> None:
-        names = self.scene.cell.robot.joint_names
-        self._step(standing(self.here, names, seconds), (place,), moves=False, waits_for=condition)
+        self._carry(self._payload, place)
+        still = standing(self.here, self.scene.cell.robot.joint_names, seconds)
+        self._step(still, (place,), [], moves=False, waits_for=condition)
 
     def _step(
         self,
         driven: JointTrajectory,
         places: tuple[Place, ...],
+        events: Sequence[_Event],
         *,
         moves: bool,
         waits_for: str = "",
+        tool: tuple[ToolMotion | None, ...] = (),
+        process: tuple[Place, ...] = (),
     ) -> None:
-        if not self._moves:
-            self._among(self.around.scene(self._payload, places[0]))
-        self.steps.append(DrivenStep(driven, moves, places, (), waits_for, scene=self.scene))
+        """A step, cut where what it moves among changes in its course."""
+        self._before(driven, places[0], events)
+        whole = DrivenStep(
+            driven,
+            moves,
+            places,
+            waits_for=waits_for,
+            tool=tool,
+            process=process,
+            scene=self.scene,
+            between=driven.positions[[0, -1]],
+        )
+        end = driven.duration
+        self._later = sorted([*self._later, *(one for one in events if one.at > _SAME)], key=_at)
+        piece = _Piece()
+        at_end: list[tuple[SetOutput, bool]] = []
+        while self._later and self._later[0].at <= end + _SAME:
+            event = self._later.pop(0)
+            if isinstance(event.change, SetOutput) and event.at > end - _SAME:
+                at_end.append((event.change, True))
+                continue
+            if isinstance(event.change, Motion):
+                handled = ""
+                self._payload = event.change.payload
+            else:
+                handled = self._under_way(event.at, event.change, whole, piece, at_end)
+            place = event.change.place
+            if self.around.scene(self._payload, place) is not self.scene:
+                self._cut(whole, piece, event.at, handled)
+                self._carry(self._payload, place)
+        self._cut(whole, piece, end, "")
+        self._later = [one._replace(at=one.at - end) for one in self._later]
+        for output, listed in at_end:
+            self._set(output, listed=listed)
+
+    def _before(self, driven: JointTrajectory, place: Place, events: Sequence[_Event]) -> None:
+        """What is set where a step begins, before it."""
+        carried = self._payload
+        for one in events:
+            if isinstance(one.change, SetOutput) and one.at <= _SAME:
+                self._set(one.change, driven.positions[0])
+        self._carry(carried, place)
+
+    def _under_way(
+        self,
+        at: float,
+        output: SetOutput,
+        whole: DrivenStep,
+        piece: _Piece,
+        at_end: list[tuple[SetOutput, bool]],
+    ) -> str:
+        """An output is set in the course of a step; the part that is taken or left there.
+
+        A gripper that closes or opens on its last way to a station needs its time as well: the part
+        is taken or left at the end.
+        """
+        piece.outputs.append(Switched(output.number, output.value, at - piece.begin))
+        q = whole.trajectory.sample([at]).q[0]
+        if whole.moves and self.around.acts_later(output.number, output.value, q, whole.between[1]):
+            at_end.append((replace(output, pulse=0.0), False))
+            done = "closes" if output.value else "opens"
+            text = (
+                f"the gripper {done} {1e3 * (whole.trajectory.duration - at):.0f} ms before the "
+                "motion ends: the part is taken or left at its end"
+            )
+            self.notes.append(Note(output.place, text, Effect.TIMES))
+            return ""
+        piece.signals += self.around.signalled(output.number, output.value)
+        self._goes_back(output, at)
+        handled = self.around.gripped(output.number, output.value, q, output.place)
+        if handled:
+            self._payload = None
+        return handled
+
+    def _cut(self, whole: DrivenStep, piece: _Piece, at: float, handled: str) -> None:
+        """The step ends here, or goes on as another one."""
+        end = whole.trajectory.duration
+        part = whole
+        if piece.begin > 0.0 or at < end:
+            resting = (piece.begin <= 0.0 or not whole.moves, at >= end or not whole.moves)
+            driven = _between(whole.trajectory, piece.begin, at)
+            drawn = whole.tool if piece.begin <= 0.0 else ()
+            part = replace(whole, trajectory=driven, at_rest=resting, tool=drawn)
+        self.steps.append(
+            replace(
+                part,
+                scene=self.scene,
+                outputs=tuple(piece.outputs),
+                signals=tuple(piece.signals),
+                handled=handled,
+            )
+        )
+        piece.begin = at
+        piece.outputs = []
+        piece.signals = []
+
+
+_SAME = 0.5 * GRID_S  # s: instants that are one
+
+
+def _at(event: _Event) -> float:
+    return event.at
+
+
+def _between(driven: JointTrajectory, begin: float, end: float) -> JointTrajectory:
+    """The part of a trajectory from one instant to another [s], which are grid steps."""
+    first, last = (round(one / GRID_S) * GRID_NS for one in (begin, end))
+    inner = driven.times_ns[(driven.times_ns > first) & (driven.times_ns < last)]
+    times = np.array([first, *inner, last])
+    found = driven.sample(times / NS_PER_S)
+    return JointTrajectory(driven.joint_names, times - first, found.q, found.qd, found.qdd)
+
+
+def _payload_of(command: Motion | SplineBlock) -> Payload | None:
+    return _first_part(command).payload
+
+
+def _first_part(command: Motion | SplineBlock) -> Motion:
+    return command if isinstance(command, Motion) else command.parts[0]
+
+
+def _is_axis(command: Motion | SplineBlock) -> bool:
+    return command.kind == "ptp" if isinstance(command, Motion) else command.axis

@@ -93,9 +93,11 @@ class Arm:
 
     def tool_pose(self, target: Target, q: FloatArray) -> FloatArray:
         """Where the target's tool is at q (n,), in the target's base (4, 4)."""
-        return np.asarray(
-            portable.matmul(inverse(target.base), self.flange(q[None])[0], target.tool)
-        )
+        return np.asarray(self.tool_poses(target, q[None])[0])
+
+    def tool_poses(self, target: Target, q: FloatArray) -> FloatArray:
+        """The same (N, 4, 4) of q (N, n)."""
+        return np.asarray(portable.matmul(inverse(target.base), self.flange(q), target.tool))
 
     def pose(self, target: Target, now: FloatArray) -> FloatArray:
         """The target's frame as a pose (4, 4) [m] in its base; what it leaves open is as in `now`

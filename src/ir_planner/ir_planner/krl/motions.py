@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from ir_kernels import portable
-from ir_krl import Blend, KrlMotionError, Motion, Place, Speeds
+from ir_krl import Blend, KrlMotionError, Motion, Place, Speeds, Target
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.cartesian import Arc, Line, arc_through
 from ir_planner.curves import turn_of, turned_evenly
@@ -40,6 +40,10 @@ class Curve(Protocol):
     def turning(self) -> float:
         """Of the tool along the path [rad]."""
 
+    @property
+    def marks(self) -> FloatArray:
+        """s (P - 1,) at which the parts of a spline end, but for the last."""
+
     def at(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """q and its first three derivatives by s, (M, n) each, at s (M,)."""
 
@@ -52,6 +56,7 @@ class AxisLine:
     end: FloatArray
     length: float = 0.0
     turning: float = 0.0
+    marks: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def at(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """q and its first three derivatives by s, (M, n) each, at s (M,)."""
@@ -67,6 +72,7 @@ class AxisCurve:
     spline: BSpline
     length: float
     turning: float
+    marks: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def at(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """q and its first three derivatives by s, (M, n) each, at s (M,)."""
@@ -79,9 +85,8 @@ def through_axes(points: FloatArray) -> AxisCurve:
     steps = np.abs(np.diff(points, axis=0)).max(axis=1)
     u = np.concatenate([[0.0], np.cumsum(np.maximum(steps, 1e-9))])
     u /= u[-1]
-    return AxisCurve(
-        portable.interpolating_spline(u, points, min(_DEGREE, len(points) - 1)), 0.0, 0.0
-    )
+    spline = portable.interpolating_spline(u, points, min(_DEGREE, len(points) - 1))
+    return AxisCurve(spline, 0.0, 0.0, u[1:-1])
 
 
 def tool_ends(
@@ -170,13 +175,16 @@ TORQUE = 0.98  # of the envelope: between samples it needs a little more
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """A curve and the law that drives it; tool: the pose (4, 4) [m] of what is led, in the
-    flange.
-    """
+    """A curve and the law that drives it; target: where it leads what."""
 
     curve: Curve
     law: TimeLaw
-    tool: FloatArray = field(default_factory=lambda: np.eye(4))
+    target: Target
+
+    def passing(self) -> IntArray:
+        """Grid steps (P,) at which the ends of its parts are passed; the last is its end."""
+        inner = np.searchsorted(self.law.at(np.arange(self.law.total + 1))[0], self.curve.marks)
+        return np.append(inner, self.law.total).astype(np.int64)
 
     def switches(self) -> IntArray:
         """Grid steps (M,) at which a trajectory needs points, ascending."""
@@ -206,6 +214,7 @@ def move(
     curve: Curve,
     speeds: Speeds,
     scene: PlanningScene,
+    target: Target,
     place: Place,
     *,
     least: float = 0.0,
@@ -220,9 +229,8 @@ def move(
     slower = 1.0
     for _ in range(_ROUNDS):
         v, a, j = bounds
-        made = Move(
-            curve, free_law((v / slower, a / (slower * slower), j / ((slower * slower) * slower)))
-        )
+        law = free_law((v / slower, a / (slower * slower), j / ((slower * slower) * slower)))
+        made = Move(curve, law, target)
         needed = max(_excess(made, limits, scene), least / max(made.law.total * GRID_S, GRID_S))
         if needed <= 1.0 + 1e-9:
             return made
@@ -333,7 +341,7 @@ def _near(move: Move, distance: float, arm: Arm, *, ends: bool) -> float:
     """
     share = np.linspace(0.0, _HALF, _NEAR_SAMPLES)
     q = move.curve.at(1.0 - share if ends else share)[0]
-    places = portable.matmul(arm.flange(q), move.tool)[:, :3, 3]
+    places = arm.tool_poses(move.target, q)[:, :3, 3]
     away = np.linalg.norm(places - places[0], axis=1)
     beyond = np.flatnonzero(away > distance)
     if not len(beyond):

@@ -28,7 +28,7 @@ from ir_planner.certificates import in_scene
 from ir_planner.checks import Evaluation, evaluate_trajectory, total_report
 from ir_planner.curves import turn_of
 from ir_planner.errors import RequestError
-from ir_planner.krl.execution import DrivenStep, drive
+from ir_planner.krl.execution import DrivenStep, Switched, drive
 from ir_planner.krl.export import KrlExport, export
 from ir_planner.krl.geometry import Arm, tool_in_flange
 from ir_planner.krl.judged import judge_of
@@ -95,9 +95,9 @@ class _PlcPauses:
     asked: SignalRange | None
     _number: int = 0
 
-    def heard(self, outputs: Sequence[tuple[int, bool]]) -> None:
+    def heard(self, outputs: Sequence[Switched]) -> None:
         """The program has set outputs."""
-        for number, value in outputs:
+        for number, value, _ in outputs:
             if self.asked is not None and number in self.asked.numbers:
                 bit = 1 << (number - self.asked.first)
                 self._number = self._number | bit if value else self._number & ~bit
@@ -158,8 +158,9 @@ def _evaluated(
     scene = step.scene
     ends = [step.trajectory.positions[k] for k in (0, -1)]
     first, last = (station_at(scene, q) for q in ends)
-    stops = tuple(dict.fromkeys(name for name in (first, last) if name))
-    found = evaluate_trajectory(step.trajectory, scene, margin, stops)
+    between = (station_at(scene, q) for q in step.between)
+    stops = tuple(dict.fromkeys(name for name in between if name))
+    found = evaluate_trajectory(step.trajectory, scene, margin, stops, step.at_rest)
     first = first or posture_at(scene, ends[0])
     last = last or posture_at(scene, ends[1])
     if step.moves:

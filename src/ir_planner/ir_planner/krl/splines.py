@@ -180,9 +180,11 @@ def block_curve(block: SplineBlock, start: FloatArray, arm: Arm) -> AxisCurve:
     return _tool_spline(block, start, arm)
 
 
-def timed_block(block: SplineBlock, start: FloatArray, arm: Arm) -> JointTrajectory | None:
+def timed_block(
+    block: SplineBlock, start: FloatArray, arm: Arm
+) -> tuple[JointTrajectory, FloatArray] | None:
     """The trajectory from `start` (n,) of a PTP_SPLINE whose TIME_BLOCK times all its parts, at an
-    override of 100 %; else None.
+    override of 100 %, and when it passes its points (parts + 1,) [s]; else None.
     """
     whole = [one for one in block.times if one.first == 0 and one.last == len(block.parts)]
     if not block.axis or len(block.times) != 1 or not whole:
@@ -205,7 +207,8 @@ def timed_block(block: SplineBlock, start: FloatArray, arm: Arm) -> JointTraject
     qd[[0, -1]] = qdd[[0, -1]] = 0.0
     q[0] = points[0]
     q[-1] = points[-1]
-    return JointTrajectory(arm.scene.cell.robot.joint_names, steps * GRID_NS, q, qd, qdd)
+    driven = JointTrajectory(arm.scene.cell.robot.joint_names, steps * GRID_NS, q, qd, qdd)
+    return driven, times
 
 
 def _passing_times(block: TimeBlock, parts: int) -> FloatArray | None:
@@ -233,12 +236,13 @@ def _axis_points(block: SplineBlock, start: FloatArray, arm: Arm) -> FloatArray:
     return np.array(points)
 
 
-def spline_poses(block: SplineBlock, start: FloatArray, arm: Arm) -> FloatArray:
+def spline_poses(block: SplineBlock, start: FloatArray, arm: Arm) -> tuple[FloatArray, list[int]]:
     """Poses (N, 4, 4) of the tool in its base that a SPLINE passes, from the configuration `start`
-    (n,). Raises KrlMotionError.
+    (n,), and at which of them its parts end. Raises KrlMotionError.
     """
     first = block.parts[0]
     poses = [arm.tool_pose(first.target, start)]
+    ends = []
     for part in block.parts:
         if part.kind == "ptp":
             raise KrlMotionError("a SPLINE has SPL, SLIN and SCIRC parts only, no SPTP", part.place)
@@ -247,7 +251,8 @@ def spline_poses(block: SplineBlock, start: FloatArray, arm: Arm) -> FloatArray:
         ):
             raise KrlMotionError("a SPLINE keeps its tool and its base", part.place)
         poses += _part(part, poses[-1], arm)
-    return np.array(poses)
+        ends.append(len(poses) - 1)
+    return np.array(poses), ends
 
 
 def _part(part: Motion, now: FloatArray, arm: Arm) -> list[FloatArray]:
@@ -274,7 +279,7 @@ def _part(part: Motion, now: FloatArray, arm: Arm) -> list[FloatArray]:
 def _tool_spline(block: SplineBlock, start: FloatArray, arm: Arm) -> AxisCurve:
     """The spline of the tool through the ends of the parts, followed by the axes."""
     first = block.parts[0]
-    stacked = spline_poses(block, start, arm)
+    stacked, ends = spline_poses(block, start, arm)
     steps = np.linalg.norm(np.diff(stacked[:, :3, 3], axis=0), axis=1)
     if steps.min() <= 0.0:
         raise KrlMotionError("a SPLINE goes to the same place twice in a row", block.place)
@@ -287,7 +292,8 @@ def _tool_spline(block: SplineBlock, start: FloatArray, arm: Arm) -> AxisCurve:
     along[:, :3, :3] = RotationSpline(u, stacked[:, :3, :3])(fine)
     q = followed(along, first, start, arm)
     turning = float(turn_of(portable.matmul(stacked[0, :3, :3].T, stacked[-1, :3, :3])))
-    return AxisCurve(portable.interpolating_spline(fine, q, _DEGREE), length, turning)
+    spline = portable.interpolating_spline(fine, q, _DEGREE)
+    return AxisCurve(spline, length, turning, u[ends[:-1]])
 
 
 # Motions of the tool as segments of a path of the cell's tcp, with the speed that the program
@@ -338,7 +344,7 @@ def tool_motion(motion: Motion, start: FloatArray, arm: Arm) -> ToolMotion | Non
 def tool_spline(block: SplineBlock, start: FloatArray, arm: Arm) -> ToolMotion | None:
     """A SPLINE block from the configuration `start` (n,); None where no segment describes it."""
     first = block.parts[0]
-    poses = spline_poses(block, start, arm)
+    poses, _ = spline_poses(block, start, arm)
     length = float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).sum())
     turns = portable.matmul(poses[:-1, :3, :3].transpose(0, 2, 1), poses[1:, :3, :3])
     turning = float(turn_of(turns).sum())

@@ -11,7 +11,7 @@ import numpy as np
 from ir_description import Cell, InvalidValueError, Load, PartPlaces, ProgramStep, Signal
 from ir_description.poses import abc_from_rotation, rotation_from_abc
 from ir_kernels import portable
-from ir_krl import GRIP, KrlMotionError, Note, Payload, Place, SignalRange
+from ir_krl import GRIP, Effect, KrlMotionError, Note, Payload, Place, SignalRange
 from ir_planner.krl.geometry import tool_in_flange
 from ir_planner.program import Doors, Scenes, doors_along
 from ir_planner.scene import PlanningScene
@@ -203,6 +203,23 @@ class Surroundings:
         station = self.station_at(self.scenes.of(self.places, self.doors), q)
         return self._taken(station, place) if value else self._left(station, place)
 
+    def grips(self, number: int) -> bool:
+        """Whether an output closes the gripper."""
+        return number == self.wires.grip and number != 0
+
+    def acts_later(self, number: int, value: bool, q: FloatArray, end: FloatArray) -> bool:
+        """Whether the gripper is told at q (n,) to take or to leave a part at the station where the
+        motion ends, at `end` (n,).
+        """
+        if not self.grips(number) or self.fixed is not None:
+            return False
+        scene = self.scenes.of(self.places, self.doors)
+        there = self.station_at(scene, end)
+        if not there or self.station_at(scene, q):
+            return False
+        lies = there in self.places.lying.values()
+        return lies and not self.places.held if value else bool(self.places.held)
+
     def _taken(self, station: str, place: Place) -> str:
         lying = [part for part, at in self.places.lying.items() if station and at == station]
         if self.places.held or not lying:
@@ -214,14 +231,15 @@ class Surroundings:
         held = self.places.held
         if not held:
             return ""
+        if not station:
+            self.places = PartPlaces("", {**self.places.lying, held: ""})
+            text = f"{held} is left where no station is: taken as gone from the cell"
+            self.notes.append(Note(place, text, Effect.PLACES))
+            return f"-{held}"
         try:
             self.places = self.places.after(ProgramStep("STATION", station, detach=held))
         except InvalidValueError as error:
             raise KrlMotionError(str(error), place) from error
-        if not station:
-            self.notes.append(
-                Note(place, f"{held} is left where no station is: taken as gone from the cell")
-            )
         return f"-{held}"
 
     def _next(self, step: ProgramStep) -> None:
