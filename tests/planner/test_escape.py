@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ir_description import OUTSIDE_MAX
 from ir_msgs_py.status import StatusCode
 from ir_planner import EscapePlan, Planner, RequestError
 from ir_planner.regional.escape import DEEPER
-from ir_planner.request import OUTSIDE_MAX
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # the judge
 from _kernels_peers import Coal

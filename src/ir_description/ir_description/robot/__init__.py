@@ -30,6 +30,7 @@ from ir_description.robot.rest_table import RestRow, RestTable
 from ir_description.robot.robot import (
     LIMIT_TOLERANCE,
     MASS_MAX,
+    OUTSIDE_MAX,
     TOOL0,
     Counterbalance,
     FramePose,
@@ -49,6 +50,7 @@ __all__ = [
     "LIMIT_TOLERANCE",
     "MASS_MAX",
     "NO_TABLE",
+    "OUTSIDE_MAX",
     "RELATIVE_DEVIATION",
     "ROBOTS",
     "SCALARS",

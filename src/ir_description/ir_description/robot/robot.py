@@ -282,6 +282,8 @@ class RobotModel:
 
 LIMIT_TOLERANCE = 1e-4
 """rad beyond a position limit that count as at it: what encoders and held axes leave."""
+OUTSIDE_MAX = 0.35
+"""rad beyond a limit from where a way back in is planned and driven: twice what a stop leaves."""
 MASS_MAX = 2000.0
 """Largest mass [kg] a load may claim; what the robot carries is limited by
 RobotModel.rated_payload.

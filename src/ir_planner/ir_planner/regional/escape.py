@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ir_description import OUTSIDE_MAX
 from ir_kernels.collision import FREE
 from ir_msgs_py.report import DistancePair, PlanningInfo, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
@@ -22,7 +23,7 @@ from ir_planner.checks import measured, movement_energy, pair_value, torque_proo
 from ir_planner.curves import extremes
 from ir_planner.errors import RequestError, TimingError
 from ir_planner.presentation import plot_trajectory, result_text
-from ir_planner.request import OUTSIDE_MAX, Context, joint_values
+from ir_planner.request import Context, joint_values
 from ir_planner.scene import END_TOLERANCE, PROOF_TOLERANCE, PlanningScene, polynomials_between
 from ir_planner.timing import GRID_S, StepLaws, TimedPath, blended, fastest
 from ir_values.arrays import FloatArray

@@ -11,7 +11,6 @@ from ir_planner.request.bounds import (
 )
 from ir_planner.request.context import Clock, Context, Journal, Work, noted
 from ir_planner.request.goals import (
-    OUTSIDE_MAX,
     POSTURES,
     Goal,
     joint_values,
@@ -23,7 +22,6 @@ from ir_planner.request.goals import (
 
 __all__ = [
     "DURATION_MAX",
-    "OUTSIDE_MAX",
     "POSITION_MAX",
     "POSTURES",
     "Clock",

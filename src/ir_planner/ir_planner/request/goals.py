@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ir_description import LIMIT_TOLERANCE, Cell
+from ir_description import LIMIT_TOLERANCE, OUTSIDE_MAX, Cell
 from ir_description.poses import rotation_from_abc
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError, UnknownNameError
@@ -23,7 +23,6 @@ _WORDS = re.compile(r"[A-Za-z]+\d*|\S+")
 _TEXT_MAX = 300
 _LENGTH_MAX = 100.0  # m
 _NO_ANGLE = 1e6  # rad
-OUTSIDE_MAX = 0.35  # rad beyond a limit, from where a way out is planned: twice what a stop leaves
 
 
 @dataclass(frozen=True, eq=False)

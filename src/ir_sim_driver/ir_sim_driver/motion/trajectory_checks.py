@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ir_description import RobotModel
+from ir_description import OUTSIDE_MAX, RobotModel
 from ir_kernels import Extrema, polynomial_extrema
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.trajectory import JointTrajectory
@@ -47,6 +47,18 @@ class Range(NamedTuple):
     def including(self, q: FloatArray) -> Range:
         """This range and q (n,): who is outside may come back, and go no farther out."""
         return Range(np.minimum(self.low, q), np.maximum(self.high, q))
+
+    @classmethod
+    def along(cls, trajectory: JointTrajectory, robot: RobotModel) -> Range:
+        """The robot's own; a joint that begins at most OUTSIDE_MAX beyond it and ends in it leads
+        back, and goes no farther out. Whether the robot stands there is checked at the start.
+        """
+        own = cls.of(robot)
+        first = trajectory.positions[0]
+        last = trajectory.positions[-1]
+        near = (first >= own.low - OUTSIDE_MAX) & (first <= own.high + OUTSIDE_MAX)
+        back = near & (last >= own.low) & (last <= own.high)
+        return own.including(np.where(back, first, own.low))
 
 
 class _Excess(NamedTuple):
@@ -386,7 +398,9 @@ def _check_segments(
 ) -> None:
     with np.errstate(over="ignore", invalid="ignore"):
         coefficients, durations = trajectory.coefficients()
-    check_limits(coefficients, durations, float(trajectory.times[0]), robot, dynamics, settings)
+    start = float(trajectory.times[0])
+    allowed = Range.along(trajectory, robot)
+    check_limits(coefficients, durations, start, robot, dynamics, settings, allowed)
 
 
 def checked_route(
@@ -436,11 +450,12 @@ def _check_points(
 ) -> None:
     """Name the point that is outside: more use to its sender than the instant between points."""
     q = trajectory.positions
-    over = np.maximum(q - robot.position_max, robot.position_min - q) > settings.position_slack
+    allowed = Range.along(trajectory, robot)
+    over = np.maximum(q - allowed.high, allowed.low - q) > settings.position_slack
     if over.any():
         k, j = (int(i) for i in np.argwhere(over)[0])
-        low = robot.position_min[j]
-        high = robot.position_max[j]
+        low = allowed.low[j]
+        high = allowed.high[j]
         excess = max(q[k, j] - high, low - q[k, j])
         raise _invalid(
             f"point {k} joint {j} ({trajectory.joint_names[j]}) is at {q[k, j]:.6f} rad: the "
