@@ -12,14 +12,11 @@ import sys
 from _chromium import Browser
 from _pictures import folder_asked
 
-SIZE = 1200, 800
+SIZE = 1200, 1000
 PATIENCE = 120.0  # s
 
 
-PLANNED = "document.body.innerText.includes('at the mains')"
-NO_NOTICE = (
-    "document.querySelector('.mantine-Notification-closeButton')?.click()"  # of software rendering
-)
+PLANNED = "document.getElementById('link').textContent === 'planned'"
 
 
 def main() -> None:
@@ -32,8 +29,7 @@ def main() -> None:
         with Browser() as browser:
             page = browser.open(view.stdout.readline().strip(), *SIZE)
             page.wait(PLANNED, PATIENCE)
-            page.run(NO_NOTICE)
-            page.wait("!document.querySelector('.mantine-Notification-closeButton')", PATIENCE)
+            page.frame()
             page.picture(path, whole=False)
     finally:
         view.send_signal(signal.SIGINT)

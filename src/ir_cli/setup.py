@@ -14,7 +14,6 @@ setup(
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
     install_requires=["setuptools", "numpy", "PyYAML"],
-    extras_require={"view": ["viser"]},
     zip_safe=False,
     maintainer="The maintainers",
     maintainer_email="maintainers@example.org",

@@ -9,30 +9,25 @@ import signal
 import subprocess
 import sys
 import time
-import urllib.error
-import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from websockets.exceptions import InvalidStatus
 
 from ir_cli.main import main
-from ir_cli.view import server as loopback
 from ir_cli.view.background import Inbox
-from ir_cli.view.cell_file import STILL, Watched
+from ir_cli.view.cell_file import STILL, Recorded, Watched
 from ir_cli.view.clearance import names_in
-from ir_cli.view.panel import legend_html
 from ir_cli.view.playback import motion_of
-from ir_cli.view.server import closed, opened
-from ir_cli.view.session import Session
+from ir_cli.view.session import Session, Stage
 from ir_description import load_cell
 from ir_planner import Planner
+from ir_recorder.report.data import side_content
 
 PATIENCE = 60.0  # s: a busy machine
-DIRECT = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # what is here needs no proxy
+REFUSED = ("can't stand there", "is no machine")
 CELL = """\
 format: ir_cell/1
 name: small  # a comment
@@ -62,71 +57,85 @@ def _module(name: str) -> Any:
 
 
 FakeBrowser = _module("fake_browser").FakeBrowser
-TOKEN = "a-token_of-the-test"
 
 
 class View:
     """A session and a browser that looks at it."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.server = opened(0, TOKEN)
-        self.session = Session(self.server, Watched(str(path)))
-        self.port = self.server.get_port()
-        self.browser = FakeBrowser(self.port, TOKEN)
+    def __init__(self, shown: Any) -> None:
+        self.session = Session(shown)
+        self.port = self.session.server.port
+        self.token = self.session.server.guard.token
+        self.browser = FakeBrowser(self.port, self.token)
 
-    def until(self, condition: Callable[[], bool]) -> None:
+    @property
+    def stage(self) -> Stage:
+        assert self.session._stage is not None
+        return self.session._stage
+
+    def until(self, condition: Callable[[], object]) -> None:
         deadline = time.monotonic() + PATIENCE
         while not condition():
             assert time.monotonic() < deadline, self.browser.text
             self.session.run(time.monotonic() + 0.02)
 
     def shows(self, *words: str) -> None:
-        """Wait until the panel says all of this."""
+        """Wait until the page says all of this."""
         self.until(lambda: all(word in self.browser.text for word in words))
 
-    def draws(self, *names: str) -> None:
-        """Wait until all these are in the scene."""
-        self.until(lambda: set(names) <= set(self.browser.nodes))
-
-    def change(self, label: str, value: Any) -> None:
-        """Give a control another value as soon as it is there."""
-        labels = lambda: {each.get("label") for each in list(self.browser.controls.values())}  # noqa: E731
-        self.until(lambda: label in labels())
-        self.browser.change(label, value)
-
-    def write(self, text: str) -> None:
-        """Save the file, as an editor does."""
-        new = self.path.with_suffix(".new")
-        new.write_text(text)
-        new.replace(self.path)
+    def planned(self) -> None:
+        """Wait until a plan is shown."""
+        self.until(lambda: (self.browser.state.get("plan") or {}).get("state") == "planned")
 
     def close(self) -> None:
         self.browser.close()
         self.session.close()
-        closed(self.server)
+
+
+def write(path: Path, text: str) -> None:
+    """Save a file, as an editor does."""
+    new = path.with_suffix(".new")
+    new.write_text(text)
+    new.replace(path)
 
 
 @pytest.fixture
-def view(tmp_path: Path) -> Iterator[View]:
+def path(tmp_path: Path) -> Path:
     path = tmp_path / "small.yaml"
     path.write_text(CELL)
-    started = View(path)
+    return path
+
+
+@pytest.fixture
+def view(path: Path) -> Iterator[View]:
+    started = View(Watched(str(path)))
     yield started
     started.close()
 
 
+def names(scene: dict[str, Any]) -> set[str]:
+    """Bodies and stations that are drawn."""
+    drawn = scene["scene"]
+    return {each["name"] for each in (*drawn["bodies"], *drawn["stations"])}
+
+
 def test_the_cell_is_drawn_checked_and_planned(view: View) -> None:
-    view.shows("pick with none", "at the mains", "nearest ", " mm: ")
-    view.draws("/machines/table/top", "/machines/table/zone", "/machines/table/station_pick")
-    view.draws("/path", *(f"/robot/link_{k}" for k in range(7)))
-    view.until(lambda: view.browser.nodes["/path"].get("visible") is True)
+    view.shows("pick with none", "cycle", "energy a cycle", "clearance and limits proved")
+    view.planned()
+    scene = view.browser.scene()
+    assert names(scene) == {"top", "pick"}
+    assert scene["scene"]["frames"] > 2
+    assert scene["power"] is not None
+    assert [joint["name"] for joint in scene["joints"]] == list(view.stage.cell.robot.joint_names)
 
 
-def test_a_saved_file_is_shown_and_one_with_errors_keeps_the_last_cell(view: View) -> None:
-    view.shows("at the mains")
-    view.write(
-        CELL.replace("size: [0.4, 0.6, 0.2]", "size: [0.4, -0.6, 0.2]").replace("dwell", "dwel")
+def test_a_saved_file_is_shown_and_one_with_errors_keeps_the_last_cell(
+    view: View, path: Path
+) -> None:
+    view.planned()
+    write(
+        path,
+        CELL.replace("size: [0.4, 0.6, 0.2]", "size: [0.4, -0.6, 0.2]").replace("dwell", "dwel"),
     )
     view.shows(
         "the last cell that could be read is shown",
@@ -134,167 +143,172 @@ def test_a_saved_file_is_shown_and_one_with_errors_keeps_the_last_cell(view: Vie
         "small.yaml:13",
         "dwel",
     )
-    view.draws("/machines/table/top")
+    assert names(view.browser.scene()) == {"top", "pick"}
     renamed = CELL.replace("name: top", "name: other_top").replace("name: pick", "name: place")
-    view.write(renamed.replace("station: pick", "station: place"))
-    view.shows("place with none", "at the mains")
-    view.until(lambda: "can&#x27;t be read" not in view.browser.text)
-    view.draws("/machines/table/other_top")
-    view.until(lambda: "/machines/table/top" not in view.browser.nodes)
+    write(path, renamed.replace("station: pick", "station: place"))
+    view.shows("place with none")
+    view.until(lambda: not view.browser.state.get("errors"))
+    view.planned()
+    assert names(view.browser.scene()) == {"other_top", "place"}
 
 
-@pytest.mark.long
 def test_a_file_that_is_wrong_from_the_start_is_shown_as_soon_as_it_can_be_read(
-    tmp_path: Path,
+    path: Path,
 ) -> None:
-    path = tmp_path / "small.yaml"
-    path.write_text(
-        CELL.replace("robot: kr6_r900_2", "robot: kr6_r900_3 # <img src=x onerror=alert(1)>")
-    )
-    view = View(path)
+    path.write_text(CELL.replace("robot: kr6_r900_2", "robot: kr6_r900_3"))
+    view = View(Watched(str(path)))
     try:
         view.shows("kr6_r900_3", "is unknown")
-        assert "<img" not in view.browser.text
-        view.write(CELL)
-        view.shows("at the mains")
+        assert view.browser.get("/scene")[0] == 404
+        write(path, CELL)
+        view.planned()
     finally:
         view.close()
 
 
-def test_what_cannot_be_reached_says_why_and_shows_the_pair_in_red(view: View) -> None:
-    view.write(CELL.replace("0.1, 0.45]", "0.1, 0.16]"))
+def test_what_cannot_be_reached_says_why_and_shows_the_pair_in_red(view: View, path: Path) -> None:
+    write(path, CELL.replace("0.1, 0.45]", "0.1, 0.16]"))
     view.shows("0 of ", "none is free", "not planned")
-    view.until(lambda: "top" in view.browser.red())
-    view.until(lambda: any(name.startswith("l") for name in view.browser.red()))
+    view.until(lambda: "top" in view.browser.state["blamed"])
+    assert any(name.startswith("l") for name in view.browser.state["blamed"])
 
 
 def test_sliders_move_the_robot_and_the_nearest_pair(view: View) -> None:
-    view.shows("at the mains")
-    view.until(lambda: "position" in view.browser.nodes.get("/robot/link_6", {}))
-    before = view.browser.nodes["/robot/link_6"]["position"]
-    view.change("A2", -20.0)
-    view.until(lambda: abs(view.session._stage.q[1] - np.radians(-20.0)) < 1e-9)
-    view.until(lambda: view.browser.nodes["/robot/link_6"]["position"] != before)
-    view.shows("top")  # it comes down to the table
-    cell = load_cell(view.path)
-    view.until(lambda: view.session._stage.near is not None)
-    assert set(view.session._stage.near.names) <= {c.name for c in cell.capsules()} | {
-        "top",
-        "floor",
-    }
-    view.change("A2", float("nan"))  # from a program that is no browser
-    view.change("A1", 10.0)
-    view.until(lambda: abs(view.session._stage.q[0] - np.radians(10.0)) < 1e-9)
+    view.planned()
+    view.browser.press("joints", [0.0, -20.0, 90.0, 0.0, 45.0, 0.0])
+    view.until(lambda: view.browser.state.get("hand") is True)
+    assert view.stage.q[1] == pytest.approx(np.radians(-20.0))
+    view.shows("nearest ")
+    view.browser.press("at", "pick")
+    view.shows("robot at pick")
+    view.browser.press("joints", [1.0])
+    view.shows("the robot has 6 joints")
+    far = view.stage.cell.robot.position_max
+    view.browser.press("joints", [9999.0] * 6)
+    view.until(lambda: np.allclose(view.stage.q, far))
 
 
-def test_a_machine_is_dragged_checked_planned_and_saved_with_its_comments(
+def test_a_machine_is_moved_checked_planned_and_saved_with_its_comments(
     view: View, tmp_path: Path
 ) -> None:
-    view.shows("at the mains")
-    view.change("drag", "machine table")
-    view.until(lambda: "/drag" in view.browser.nodes)
+    view.planned()
+    before = view.browser.state["scene"]
     for k in range(200):  # a quick hand
-        view.browser.drag((0.6 + 0.0001 * k, 0.05, 0.0))
-    view.browser.drag((0.62004, 0.1, 0.0))
-    view.shows("pose: {xyz: [0.62, 0.1, 0]}", "at the mains")
-    view.change("Save as a new file", True)
+        view.browser.press("move", ["machine table", 0.6 + 0.0001 * k, 0.05, 0.0, 0.0, 0.0, 0.0])
+    view.browser.press("move", ["machine table", 0.62004, 0.1, 0.0, 0.0, 0.0, 0.0])
+    view.shows("pose: {xyz: [0.62, 0.1, 0]}")
+    assert "table" in view.browser.state["moved"]
+    assert "pick" in view.browser.state["stood"]
+    view.until(lambda: view.browser.state["scene"] != before)
+    view.planned()
+    assert view.browser.state["moved"] == {}  # the new scene has it there
+    view.browser.press("save")
     view.shows("written: ")
     saved = tmp_path / "small_moved.yaml"
     assert saved.read_text() == CELL.replace(
         "pose: {xyz: [0.6, 0, 0]}", "pose: {xyz: [0.62, 0.1, 0]}"
     )
-    view.change("Undo all moves", True)
+    view.browser.press("undo")
     view.until(lambda: "pose: {" not in view.browser.text)
-    view.browser.drag((float("nan"), 0.0, 0.0))
-    view.shows("can&#x27;t stand there")
+    for wrong in (["machine table", 1e8, 0, 0, 0, 0, 0], ["machine table", 1], ["table"], []):
+        view.browser.press("move", wrong)
+        view.until(lambda: any(each in view.browser.text for each in REFUSED))
+        view.browser.press("joints", [0.0, -90.0, 90.0, 0.0, 45.0, 0.0])
+        view.until(lambda: view.browser.state["note"] == "")
 
 
-@pytest.mark.long
-def test_a_station_is_dragged_in_its_machine(view: View) -> None:
-    view.shows("at the mains")
-    view.change("drag", "station pick")
-    view.until(lambda: "/drag" in view.browser.nodes)
-    wxyz = view.browser.nodes["/drag"]["wxyz"]
-    view.browser.drag((0.55, 0.1, 0.5), wxyz)
-    view.shows(
-        "# station pick", "pose: {xyz: [-0.05, 0.1, 0.5], abc_deg: [0, 90, 0]}", "at the mains"
-    )
+def test_a_station_is_moved_in_its_machine(view: View) -> None:
+    view.planned()
+    pose = list(view.browser.state["poses"]["station pick"])
+    view.browser.press("move", ["station pick", *pose[:2], pose[2] + 0.05, *pose[3:]])
+    view.shows("# station pick", "pose: {xyz: [-0.05, 0.1, 0.5], abc_deg: [0, 90, 0]}")
+    view.planned()
 
 
-@pytest.mark.long
-def test_planning_is_cancelled_and_asked_for_again(view: View) -> None:
-    view.change("Cancel planning", True)
+def test_planning_is_cancelled_and_asked_for_again(view: View, path: Path) -> None:
+    view.browser.press("cancel")
     view.shows("planning was cancelled")
-    view.change("Plan again", True)
-    view.shows("at the mains")
-    view.write(CELL.replace("0.45]", "0.46]"))  # while it is planned
-    view.write(CELL.replace("0.45]", "0.47]"))
-    view.until(lambda: abs(view.session._stage.cell.station("pick").pose[2, 3] - 0.47) < 1e-9)
-    view.shows("at the mains")
+    view.browser.press("plan")
+    view.planned()
+    write(path, CELL.replace("0.45]", "0.46]"))  # while it is planned
+    write(path, CELL.replace("0.45]", "0.47]"))
+    view.until(lambda: abs(view.stage.cell.station("pick").pose[2, 3] - 0.47) < 1e-9)
+    view.planned()
 
 
-@pytest.mark.long
-def test_the_motion_is_played_with_power_and_nearest_pair(view: View) -> None:
-    view.shows("at the mains")
-    view.change("Play", True)
-    view.shows("regional", " kW")
-    view.until(lambda: view.session._playback.time > 0.3)
-    view.change("Stop", True)
-    view.until(lambda: not view.session._playback.runs)
+def test_a_time_of_the_motion_has_its_step_power_and_nearest_pair(view: View) -> None:
+    view.planned()
+    view.browser.press("time", 0.5)
+    view.shows("regional", " kW", "nearest ")
+    assert view.browser.state["hand"] is False
 
 
-@pytest.mark.long
+def test_it_is_compared_with_what_a_robot_does_today(view: View) -> None:
+    view.planned()
+    view.browser.press("compare")
+    view.shows("same cycle time", "against today", "Assumed: price")
+
+
 def test_viewers_come_and_go(view: View) -> None:
-    view.shows("at the mains")
-    others = [FakeBrowser(view.port, TOKEN) for _ in range(5)]
-    view.until(lambda: all("at the mains" in each.text for each in others))
+    view.planned()
+    others = [FakeBrowser(view.port, view.token) for _ in range(5)]
+    view.until(lambda: all("cycle" in each.text for each in others))
     for each in others:
-        each._socket.socket.close()  # without a word
-    view.change("A1", 20.0)
-    view.until(lambda: abs(view.session._stage.q[0] - np.radians(20.0)) < 1e-9)
-
-
-def test_pages_from_elsewhere_are_refused_and_nothing_is_published(view: View) -> None:
-    with pytest.raises(InvalidStatus):
-        FakeBrowser(view.port, TOKEN, "http://evil.example")
-    FakeBrowser(view.port, TOKEN, f"http://localhost:{view.port}").close()
-    handled = view.server._websock_server._incoming_handlers
-    shared = [
-        handlers for message, handlers in handled.items() if message.__name__.startswith("ShareUrl")
-    ]
-    assert [handlers for handlers in shared if handlers] == []
-    assert view.server.get_host() == "127.0.0.1"
-
-
-def _asked(url: str, cookie: str = "") -> tuple[int, str]:
-    """Status of a page and the cookie that it sets."""
-    request = urllib.request.Request(url, headers={"Cookie": cookie} if cookie else {})
-    try:
-        with DIRECT.open(request, timeout=PATIENCE) as answer:
-            return answer.status, answer.headers.get("Set-Cookie", "")
-    except urllib.error.HTTPError as error:
-        with error:
-            return error.code, error.headers.get("Set-Cookie", "")
+        each.close()
+    view.browser.press("joints", [20.0, -90.0, 90.0, 0.0, 45.0, 0.0])
+    view.until(lambda: abs(view.stage.q[0] - np.radians(20.0)) < 1e-9)
 
 
 def test_only_who_has_the_address_with_its_token_gets_an_answer(view: View) -> None:
-    page = f"http://127.0.0.1:{view.port}/"
-    name = f"ir_view_{view.port}"
-    for url, cookie in (
-        (page, ""),
-        (page + "?token=", ""),
-        (page + "?token=guessed", ""),
-        (page + "?token=" + TOKEN[:-1], f"{name}="),
-        (page + "assets/any.js", f"{name}=guessed"),
-        (page, f"{name}_=" + TOKEN),
-        (page, "\xff; ;=" + TOKEN),
-    ):
-        assert _asked(url, cookie) == (403, ""), (url, cookie)
-    status, cookie = _asked(page + "?token=" + TOKEN)
-    assert (status, cookie) == (200, f"{name}={TOKEN}; Path=/; HttpOnly; SameSite=Strict")
-    assert _asked(page, cookie.split(";")[0]) == (200, "")
-    with pytest.raises(InvalidStatus):
-        FakeBrowser(view.port, "guessed")
+    host = f"127.0.0.1:{view.port}"
+    for token in ("", "guessed", view.token[:-1]):
+        stranger = FakeBrowser(view.port, token)
+        assert stranger.answer.status == 403
+        assert stranger.get("/scene")[0] == 403
+        assert stranger.press("plan")[0] == 403
+    assert FakeBrowser(view.port, view.token, Origin="http://evil.example").answer.status == 403
+    assert FakeBrowser(view.port, view.token, Host="evil.example").answer.status == 403
+    status, page = FakeBrowser(view.port, "").get("/")
+    assert status == 200
+    assert b"kr6_r900" not in page  # nothing of the cell
+    assert view.session.server.address == f"http://{host}/#{view.token}"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "status"),
+    [
+        ("plan", None, 400),
+        ("plan", {"a": 1}, 400),
+        ("joints", [None], 400),
+        ("joints", [0.0] * 65, 400),
+        ("at", "x" * 201, 400),
+        ("time", 1e300, 400),
+        ("plan", "now", 200),
+        ("time", True, 200),
+        ("reboot", True, 200),
+    ],
+)
+def test_what_no_control_sends_is_refused(view: View, name: str, value: Any, status: int) -> None:
+    found, answer = view.browser.press(name, value)
+    assert found == status
+    assert not answer.get("done")
+
+
+def test_a_recording_is_replayed_and_its_cell_planned(tmp_path: Path) -> None:
+    planned = tmp_path / "plan.mcap"
+    path = tmp_path / "small.yaml"
+    path.write_text(CELL)
+    assert main(["plan", str(path), "-o", str(planned)]) == 0
+    view = View(Recorded(str(planned)))
+    try:
+        view.until(lambda: (view.browser.state.get("plan") or {}).get("state") == "recorded")
+        assert names(view.browser.scene()) == {"top", "pick"}
+        view.browser.press("plan")
+        view.planned()
+        view.browser.press("recorded")
+        view.until(lambda: view.browser.state["plan"]["state"] == "recorded")
+    finally:
+        view.close()
 
 
 def test_the_latest_of_each_kind_waits_in_the_order_in_which_it_came() -> None:
@@ -339,6 +353,7 @@ def test_sentences_name_bodies_and_capsules() -> None:
     ("words", "sentence"),
     [
         (["demon"], "did you mean"),
+        (["nowhere.mcap"], "is not a file"),
         (["nowhere.yaml"], "is not a file"),
         (["demo", "--port", "70000"], "0 .. 65535"),
         (["demo", "--seconds", "soon"], "number of seconds"),
@@ -355,20 +370,12 @@ def test_what_makes_no_sense_is_refused(
     assert sentence in capsys.readouterr().err
 
 
-def test_without_viser_it_says_what_to_install(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(loopback, "find_spec", lambda name: None)
-    assert main(["view", "demo"]) == 2
-    assert 'pip install "ir_cli[view]"' in capsys.readouterr().err
-
-
 def test_a_taken_port_is_refused_and_two_views_stand_side_by_side(
-    view: View, capsys: pytest.CaptureFixture[str]
+    view: View, path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["view", str(view.path), "--port", str(view.port), "--seconds", "0"]) == 1
-    assert "is taken" in capsys.readouterr().err
-    assert main(["view", str(view.path), "--seconds", "0"]) == 0
+    assert main(["view", str(path), "--port", str(view.port), "--seconds", "0"]) == 1
+    assert "can't be listened on" in capsys.readouterr().err
+    assert main(["view", str(path), "--seconds", "0"]) == 0
     assert capsys.readouterr().out.startswith("http://127.0.0.1:")
 
 
@@ -390,11 +397,19 @@ def test_ctrl_c_ends_it_and_what_it_plans() -> None:
     assert said == ""
 
 
-def test_the_legend_says_the_peak_of_the_plan() -> None:
+def test_the_hottest_colour_is_the_peak_of_the_plan() -> None:
     """As `ir plan` and a comparison say it, not the largest of the samples that are drawn."""
     planner = Planner("open", clock=lambda: 0.0)
     plan = planner.plan_program(stations=("p1", "home"), start=planner.cell.machine_home)
-    motion = motion_of(plan.movements, planner.cell, planner.scene)
+    motion = motion_of(plan.movements, planner.cell)
     assert motion is not None
-    assert motion.watts.max() <= motion.peak == plan.report.peak_power
-    assert f"to {plan.report.peak_power / 1e3:.1f} kW at the mains" in legend_html(motion)
+    content = side_content(motion.side, planner.cell)
+    assert content["peak"] == plan.report.peak_power >= motion.side.watts.max()
+
+
+@pytest.mark.parametrize("words", [["live", "demo"], ["view"], ["view", "demo", "--live"]])
+def test_a_cell_or_the_running_one_has_to_be_named(
+    words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(words) == 2
+    assert "or --live" in capsys.readouterr().err

@@ -1,4 +1,5 @@
-"""`ir view` in a real browser: it draws, its controls work, and nothing is asked of a network.
+"""`ir view` in a real browser: it draws, its controls work, nothing is cut or lies on another, and
+nothing is asked of a network.
 
 Needs Chromium. Without it this says `not checked: browser`; where CI=true it has to be there.
 """
@@ -6,30 +7,40 @@ Needs Chromium. Without it this says `not checked: browser`; where CI=true it ha
 from __future__ import annotations
 
 import importlib.util
-import re
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
+import axe_core_python
 import pytest
 
-from ir_cli.view.drawing import look_at
-from ir_description import Cell, load_cell
-from ir_values.arrays import FloatArray
+from ir_description import load_cell
 
-TOOL = Path(__file__).resolve().parents[2] / "tools" / "_chromium.py"
+ROOT = Path(__file__).resolve().parents[2]
+TOOL = ROOT / "tools" / "_chromium.py"
+BOXES = (ROOT / "tests" / "recorder" / "page_boxes.js").read_text()
+AXE = (Path(axe_core_python.__file__).parent / "axe.min.js").read_text(encoding="utf-8")
+FOUND = """axe.run(document, {resultTypes: ['violations']}).then(
+    (found) => found.violations.map((one) =>
+        `${one.id}: ${one.nodes.slice(0, 3).map((node) => node.html.slice(0, 120)).join(' | ')}`))
+"""
+LABELS = """(() => {
+  const shown = [...document.querySelectorAll('.stage .machine, .stage .station')].filter((e) => !e.hidden);
+  const boxes = shown.map((e) => e.getBoundingClientRect()), faults = [];
+  boxes.forEach((a, i) => boxes.slice(i + 1).forEach((b, k) => {
+    const across = Math.min(a.right, b.right) - Math.max(a.left, b.left), down = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
+    if (across > 2 && down > 2) faults.push(`${shown[i].textContent} | ${shown[i + 1 + k].textContent}`);
+  }));
+  return [shown.length, faults];
+})()"""  # noqa: E501
+SIZES = {"desk": (1400, 900), "phone": (390, 844), "paper": (703, 1047)}
 PATIENCE = 60.0  # s: a busy machine
-# px
-SMALL = (500, 400)
-LARGE = (900, 700)
-says = "document.body.innerText.includes({!r})".format
+PLANNED = "document.getElementById('link').textContent === 'planned'"
 CELL = """\
 format: ir_cell/1
 name: small
@@ -59,119 +70,114 @@ def browser() -> Iterator[Any]:
 
 
 @contextmanager
-def viewed(browser: Any, path: Path, wide: int, high: int) -> Iterator[Any]:
-    """The page of a cell file whose program is planned and drawn."""
-    command = [sys.executable, "-m", "ir_cli.main", "view", str(path), "--port", "0"]
+def viewed(shown: str) -> Iterator[str]:
+    """The address of a cell's page."""
+    command = [sys.executable, "-m", "ir_cli.main", "view", shown, "--port", "0"]
     view = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         assert view.stdout is not None
-        address = view.stdout.readline().strip()
-        assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\?token=[\w-]{32}", address)
-        page = browser.open(address, wide, high)
-        page.wait(says("at the mains"), PATIENCE)
-        page.wait("document.querySelector('canvas') !== null", PATIENCE)
-        yield page
-        assert [fault for fault in page.faults if "THREE.Clock" not in fault] == []
-        assert [
-            asked for asked in page.requests if not asked.startswith(address.split("?")[0])
-        ] == []
-        page.close()
+        yield view.stdout.readline().strip()
     finally:
         view.send_signal(signal.SIGINT)
         assert view.wait(PATIENCE) == 130
+
+
+def own(page: Any, address: str) -> None:
+    """No error was reported, and nothing was asked of anybody else."""
+    assert page.faults == []
+    assert [asked for asked in page.requests if not asked.startswith(address.split("#")[0])] == []
 
 
 @pytest.mark.long
 def test_the_page_draws_plays_and_follows_the_file(browser: Any, tmp_path: Path) -> None:
     path = tmp_path / "small.yaml"
     path.write_text(CELL)
-    with viewed(browser, path, *SMALL) as page:
-        drawn = page.picture(tmp_path / "first.png").read_bytes()
-        buttons = (
-            "[...document.querySelectorAll('button')].find((b) => b.innerText === {!r})".format
-        )
-        page.run(f"{buttons('Play')}.click()")
-        page.wait(says("kW"), PATIENCE)
-        page.wait(f"Boolean({buttons('Stop')})", PATIENCE)
+    with viewed(str(path)) as address:
+        page = browser.open(address, 900, 700)
+        page.wait(PLANNED, PATIENCE)
+        page.wait("document.getElementById('no-motion').hidden", PATIENCE)
+        drawn = page.run("document.getElementById('view').toDataURL()")
+        page.run("document.getElementById('play').click()")
+        page.wait("document.getElementById('now-shown').textContent.includes('kW')", PATIENCE)
         deadline = time.monotonic() + PATIENCE
-        while page.picture(tmp_path / "second.png").read_bytes() == drawn:
+        while page.run("document.getElementById('view').toDataURL()") == drawn:
             assert time.monotonic() < deadline, "the robot is not drawn anew"
         path.write_text(CELL.replace("size: [0.4,", "size: [-0.4,"))
-        page.wait(says("the last cell that could be read is shown"), PATIENCE)
+        page.wait("document.getElementById('problem').textContent.includes('last cell')", PATIENCE)
         path.write_text(
             CELL.replace("name: pick", "name: place").replace("station: pick", "station: place")
         )
-        page.wait(says("place with none"), PATIENCE)
-
-
-def on_screen(cell: Cell, wide: int, high: int) -> Callable[[FloatArray], tuple[float, float]]:
-    """Where the first view shows a point (3,) [m] of the cell [px]: a camera of three.js, 75
-    degrees high.
-    """
-    server = SimpleNamespace(initial_camera=SimpleNamespace())
-    look_at(server, cell)
-    eye = server.initial_camera.position
-    ahead = normalised(server.initial_camera.look_at - eye)
-    right = normalised(np.cross(ahead, [0.0, 0.0, 1.0]))
-    up = np.cross(right, ahead)
-    pixels = 0.5 * high / np.tan(np.radians(75.0) / 2.0)
-
-    def place(point: FloatArray) -> tuple[float, float]:
-        ray = point - eye
-        scale = pixels / (ray @ ahead)
-        return 0.5 * wide + scale * float(ray @ right), 0.5 * high - scale * float(ray @ up)
-
-    return place
-
-
-def normalised(vector: FloatArray) -> FloatArray:
-    return vector / np.linalg.norm(vector)
-
-
-def choose_to_move(page: Any, what: str) -> None:
-    """Open the folder Move, and choose a target there."""
-    last = "[...document.querySelectorAll({!r})].filter((e) => {}).at(-1)".format
-    page.run(last("*", "e.textContent.trim() === 'Move'") + ".click()")
-    page.frame()
-    page.run(last("input", "e.type === 'text' && e.value === 'nothing'") + ".click()")
-    option = last("[role=option]", f"e.innerText === {what!r}")
-    page.wait(option, PATIENCE)
-    page.run(f"{option}.click()")
-    page.wait(
-        "document.body.textContent.includes('/drag')", PATIENCE
-    )  # the handle, in the tree of the scene
-    page.frame()
+        page.wait("document.getElementById('stations').textContent.includes('place')", PATIENCE)
+        assert page.run("location.hash") == ""
+        own(page, address)
+        page.close()
 
 
 @pytest.mark.long
-def test_a_station_that_the_mouse_drags_is_planned_anew(browser: Any, tmp_path: Path) -> None:
-    """The arrow of its handle that points down, by 150 mm; nothing but its height changes."""
+def test_a_machine_that_the_mouse_drags_is_planned_anew(browser: Any, tmp_path: Path) -> None:
+    """Along the floor and by a key; nothing but its place changes."""
     path = tmp_path / "small.yaml"
     path.write_text(CELL)
-    cell = load_cell(path)
-    pose = cell.station("pick").pose
-    with viewed(browser, path, *LARGE) as page:
-        choose_to_move(page, "station pick")
-        wide, high = page.run(
-            "((c) => [c.clientWidth, c.clientHeight])(document.querySelector('canvas'))"
+    before = load_cell(path).machine("table").pose[:3, 3]
+    with viewed(str(path)) as address:
+        page = browser.open(address, 1400, 900)
+        page.wait(PLANNED, PATIENCE)
+        page.wait("document.getElementById('no-motion').hidden", PATIENCE)
+        page.run(
+            "(() => { document.getElementById('move').open = true; const t = "
+            "document.getElementById('target'); t.value = 'machine table'; "
+            "t.dispatchEvent(new Event('change')); })()"
         )
-        assert wide < LARGE[0] - 200  # the panel stands beside the picture
-        at = on_screen(cell, wide, high)
-        begin, end = (at(pose[:3, 3] + along * pose[:3, 0]) for along in (0.4, 0.55))
-        before = page.run("document.body.innerText.match(/cycle ([0-9.]+) s/)[1]")
-        page.pointer("mouseMoved", *begin)
-        page.pointer("mousePressed", *begin)
-        for share in np.linspace(0.1, 1.0, 10):
-            step = np.add(begin, share * np.subtract(end, begin))
-            page.pointer("mouseMoved", *step.tolist(), button="left", buttons=1)
-            page.frame()
-        page.pointer("mouseReleased", *end)
-        page.wait(says("# station pick"), PATIENCE)
-        page.wait(f"document.body.innerText.match(/cycle ([0-9.]+) s/)?.[1] > {before}", PATIENCE)
-        page.picture(tmp_path / "dragged.png", whole=False)
-        (x, y, z) = page.run(r"document.body.innerText.match(/pose: \{xyz: \[([^\]]*)/)[1]").split(
-            ", "
-        )
-        assert (x, y) == ("-0.05", "0.1")
-        assert float(z) == pytest.approx(0.45 - 0.15, abs=0.02)
+        page.wait("!document.querySelector('.handle').hidden", PATIENCE)
+        page.frame()
+        x, y, _, _ = page.middle(".handle")
+        page.drag((x, y), (x + 30, y + 12))
+        page.wait("!document.getElementById('snippet').hidden", PATIENCE)
+        page.run("document.querySelector('.handle').focus()")
+        page.key("PageUp")
+        page.wait("/, 0.01\\]/.test(document.getElementById('snippet').textContent)", PATIENCE)
+        page.wait(PLANNED, PATIENCE)
+        found = page.run("document.getElementById('snippet').textContent")
+        place = [float(word) for word in found.split("[")[1].split("]")[0].split(", ")]
+        assert 0.02 < max(abs(place[k] - before[k]) for k in (0, 1)) < 0.5
+        assert "abc_deg" not in found
         assert path.read_text() == CELL
+        own(page, address)
+        page.close()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("shown", ["demo", "small"])
+def test_nothing_of_the_view_is_cut_overlaps_or_scrolls_and_axe_finds_nothing(
+    browser: Any, tmp_path: Path, shown: str
+) -> None:
+    if shown == "small":
+        path = tmp_path / "small.yaml"
+        path.write_text(CELL)
+        shown = str(path)
+    faults: dict[str, Any] = {}
+    with viewed(shown) as address:
+        for size, (wide, high) in SIZES.items():
+            page = browser.open(address, wide, high, touch=size == "phone", dark=size == "phone")
+            page.wait(PLANNED, PATIENCE)
+            page.wait("document.getElementById('no-motion').hidden", PATIENCE)
+            page.run(
+                "document.querySelectorAll('details').forEach((each) => { each.open = true; })"
+            )
+            page.run(
+                "(() => { const t = document.getElementById('target'); t.selectedIndex = 1; "
+                "t.dispatchEvent(new Event('change')); })()"
+            )
+            if size == "paper":
+                page.call("Emulation.setEmulatedMedia", media="print")
+                page.run("dispatchEvent(new Event('beforeprint'))")
+            page.frame()
+            faults[size] = page.run(BOXES)
+            if size != "paper":
+                count, faults[f"{size}, names"] = page.run(LABELS)
+                assert count
+                page.run(f"{AXE}; 0")
+                faults[f"{size}, axe"] = page.run(FOUND)
+            own(page, address)
+            page.close()
+    assert {size: found for size, found in faults.items() if found} == {}

@@ -1,4 +1,4 @@
-"""`ir ros live` and a real driver: what it says reaches a browser, a browser's buttons reach its
+"""`ir view --live` and a real driver: what it says reaches a browser, a browser's buttons reach its
 PLC.
 """
 
@@ -175,7 +175,7 @@ def test_strange_messages_become_bounded_values_and_a_flood_twenty_records_a_sec
 
 @pytest.fixture
 def command() -> Iterator[subprocess.Popen[str]]:
-    words = [sys.executable, "-m", "ir_cli.main", "ros", "live", "--port", "0"]
+    words = [sys.executable, "-m", "ir_cli.main", "view", "--live", "--port", "0"]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     yield process
     process.kill()

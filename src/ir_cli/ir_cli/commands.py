@@ -119,10 +119,12 @@ COMMANDS = (
     Command(
         "view",
         "ir_cli.view.command:add_view",
-        "look at a cell in a browser, move it about, plan it",
-        "Serves a cell in a browser of this machine until Ctrl-C; it is planned again whenever its "
-        "file changes or something is moved.",
+        "a cell in a browser: planned, moved about, replayed, or as it drives (--live)",
+        "Serves a cell in a browser of this machine until Ctrl-C: a file is planned again whenever "
+        "it changes or something is moved, a recording is replayed, with --live running nodes are "
+        "watched.",
         "ir view demo",
+        ("live", "ros live"),
     ),
     Command(
         "demo",
@@ -281,15 +283,6 @@ COMMANDS = (
         ros=True,
     ),
     Command(
-        "ros live",
-        "ir_cli.ros.live:add_live",
-        "watch the running cell in a browser, until Ctrl-C",
-        "Serves the running cell in a browser of this machine until Ctrl-C.",
-        "ir ros live",
-        ("live",),
-        ros=True,
-    ),
-    Command(
         "ros call",
         "ir_cli.ros.graph:add_call",
         "call a service: call /ir_planner/get_cell '{}'",
@@ -426,6 +419,8 @@ OLD = {
     "cell check": "check",
 }
 """Old names and the new ones. `ir check CELL STATE` is an old one, too: `ir ask state`."""
+IMPLIED = {"live": "--live", "ros live": "--live"}
+"""Options that an old name stands for."""
 QUIET = ("cell new", "cell check")
 """Names that stay beside the short ones: they run without a notice."""
 NAMES = (*(each.path for each in COMMANDS if not each.group), *GROUPS)
@@ -475,8 +470,17 @@ def renamed(words: Sequence[str]) -> tuple[str, int, str]:
                 return "ask state", 1, _notice("check CELL STATE", "ask state CELL STATE")
             return name, count, ""
         if name in OLD:
-            return OLD[name], count, "" if name in QUIET else _notice(name, OLD[name])
+            new = f"{OLD[name]} {IMPLIED.get(name, '')}".strip()
+            return OLD[name], count, "" if name in QUIET else _notice(name, new)
     return "", 0, ""
+
+
+def without_name(words: Sequence[str], count: int) -> list[str]:
+    """The words after the `count` that name a command, with the option that an old name stands
+    for.
+    """
+    option = IMPLIED.get(" ".join(words[:count]), "")
+    return [*([option] if option else []), *words[count:]]
 
 
 def with_cell(words: Sequence[str], parser: argparse.ArgumentParser) -> list[str]:

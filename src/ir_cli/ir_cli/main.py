@@ -17,6 +17,7 @@ from ir_cli.commands import (
     group_page,
     renamed,
     with_cell,
+    without_name,
 )
 from ir_cli.errors import CommandError, unknown_name
 
@@ -37,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     sys.stderr.write(notice)
     command = BY_PATH[path]
     parser = command.parser()
-    parsed = parser.parse_args(with_cell(words[count:], parser))
+    parsed = parser.parse_args(with_cell(without_name(words, count), parser))
     # a background job of a shell ignores SIGINT, and SIGTERM would leave child processes behind
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGTERM, signal.default_int_handler)

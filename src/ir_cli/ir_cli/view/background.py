@@ -15,8 +15,11 @@ from ir_cli.view.playback import PlayedMotion, motion_of
 from ir_description import Cell, DescriptionError
 from ir_kernels.errors import KernelError
 from ir_msgs_py.options import PlanOptions
-from ir_msgs_py.report import PlannedMovement
+from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_planner import CancelledError, Goal, Planner, PlannerError
+from ir_planner.before_after import before_after_common
+from ir_recorder.report.costs import Costs
+from ir_recorder.report.program_comparison import assumptions, change_table, figure_table
 from ir_values.errors import IrError
 
 # The latest action of each kind counts: a quick hand drags a machine through a hundred places a
@@ -56,7 +59,8 @@ QUIET = 0.4
 @dataclass(frozen=True, eq=False)
 class ViewRequest:
     """A cell to check, those stations first, and to plan: `stations`, none: its program, or its
-    tasks.
+    tasks. plan: False for a recording, whose motion is known; compare: held against PTP at 100 %
+    instead.
     """
 
     number: int
@@ -64,17 +68,21 @@ class ViewRequest:
     first: frozenset[str] = frozenset()
     stations: tuple[str, ...] = ()
     quiet: float = 0.0
+    plan: bool = True
+    compare: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """A plan as it is played (None: there is none), what is known about it, and why it was not
-    found.
+    """A plan as it is played (None: there is none), its report, what is known about it, and why it
+    was not found. compared: tables of a comparison, as HTML, in place of a plan.
     """
 
     motion: PlayedMotion | None
     lines: tuple[str, ...] = ()
     failure: str = ""
+    report: TrajectoryReport | None = None
+    compared: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,12 +158,19 @@ class PlanWorker:
                 return
 
     def _work(self, asked: ViewRequest) -> None:
+        if asked.compare:
+            answer = self._compared(asked)
+            self._stop_if_old(asked)
+            self._post("planned", self._listener.planned, asked.number, answer)
+            return
         found: list[StationAccess] = []
         for each in station_accesses(asked.cell, asked.first):
             found.append(each)
             self._post("checked", self._listener.checked, asked.number, tuple(found), False)
             self._stop_if_old(asked)
         self._post("checked", self._listener.checked, asked.number, tuple(found), True)
+        if not asked.plan:
+            return
         with self._changed:
             self._changed.wait_for(lambda: self._latest != asked.number, asked.quiet)
         self._stop_if_old(asked)
@@ -184,9 +199,9 @@ class PlanWorker:
             )
             if not plan.status.ok:
                 return Planned(None, failure=plan.status.message)
-            return Planned(
-                motion_of(plan.movements, cell, planner.scene), tuple(sentences_of(plan, cell)[:2])
-            )
+            moving, _, *others = sentences_of(plan, cell)
+            lines = (moving, *others[:-1])  # the cycle stands in figures; what is saved, compared
+            return Planned(motion_of(plan.movements, cell), lines, report=plan.report)
         movements = []
         failures = []
         for each in _tasks(planner, progress, old):
@@ -194,7 +209,23 @@ class PlanWorker:
                 failures.append(each)
             else:
                 movements.append(each)
-        return Planned(motion_of(movements, cell, planner.scene), (), "; ".join(failures))
+        return Planned(motion_of(movements, cell), (), "; ".join(failures))
+
+    def _compared(self, asked: ViewRequest) -> Planned:
+        """Today's program against the planner's, as the page of `ir compare` has it."""
+        cell = asked.cell
+        planner = Planner(cell.name, clock=time.monotonic, read_cell=lambda text, file: cell)
+
+        def progress(phase: str, done: int, total: int, cost: float) -> None:
+            self._stop_if_old(asked)
+            self._post("progress", self._listener.progress, asked.number, phase, done, total)
+
+        options = PlanOptions(planning_time=CEILING)
+        start = cell.posture("park")
+        found = before_after_common(planner, asked.stations, start, 0.0, options, progress)
+        costs = Costs()
+        tables = (figure_table(found, costs), change_table(found, costs), assumptions(found, costs))
+        return Planned(None, compared="".join(tables))
 
     def _stop_if_old(self, asked: ViewRequest) -> None:
         if self._latest != asked.number:

@@ -73,6 +73,25 @@ class Watched:
             found = (cell_file_errors(self.path) if self.path is not None else ()) or (error,)
             return Reading(None, tuple(map(str, found[:MOST_ERRORS])))
 
+    @property
+    def source(self) -> str:
+        """What is looked at, as the page says it."""
+        return str(self.path) if self.path is not None else f"bundled cell {self.name}"
+
+    @property
+    def stem(self) -> str:
+        """What a new file's name begins with."""
+        return self.path.stem if self.path is not None else self.name
+
+    @property
+    def text(self) -> str:
+        """The file's text."""
+        if self.path is not None:
+            return self.path.read_text(encoding="utf-8")
+        return (files("ir_description") / "data" / "cells" / f"{self.name}.yaml").read_text(
+            encoding="utf-8"
+        )
+
     def changed(self, now: float) -> bool:
         """Whether it was saved since it was read, and is not being written any more; now: a clock
         [s].
@@ -114,6 +133,37 @@ def _beside(folder: Path) -> Iterator[str]:
                 yield os.path.join(root, name)
 
 
+class Recorded:
+    """The cell of a recording, which never changes, and its motion. Raises InputError where it has
+    no cell.
+    """
+
+    def __init__(self, name: str) -> None:
+        from ir_recorder.analysis import analyse
+        from ir_recorder.reading import read_recording
+
+        if not Path(name).is_file():
+            raise InputError(f"{name[:200]!a} is not a file")
+        self.name = name
+        self.analysis = analyse(read_recording(name))
+        self.folder = Path(name).parent
+        self.stem = Path(name).stem
+        self.source = f"recording {name}"
+        self.text = self.analysis.recording.cell_yaml
+        if self.analysis.cell is None:
+            words = "; ".join(self.analysis.problems) or "it holds no cell"
+            raise InputError(f"{name[:200]}: nothing can be drawn: {words}")
+        self._cell = self.analysis.cell
+
+    def read(self) -> Reading:
+        """The cell as it was recorded."""
+        return Reading(self._cell)
+
+    def changed(self, now: float) -> bool:
+        """It never does."""
+        return False
+
+
 MOST_COPIES = 1_000
 
 
@@ -121,14 +171,14 @@ class SavingError(Exception):
     """Why nothing was written."""
 
 
-def save(watched: Watched, cell: Cell, moves: Moves) -> Path:
+def save(watched: Watched | Recorded, cell: Cell, moves: Moves) -> Path:
     """The new file: the text of the old one, comments and all, with the moves. Raises SavingError.
 
     cell: as the file has it. No file is ever overwritten, and what was written is read back and
     compared.
     """
     try:
-        text = edited(_text(watched), cell, moves)
+        text = edited(watched.text, cell, moves)
         path = _written(watched, text)
         if cell_to_yaml(load_cell(path)) != cell_to_yaml(cell_with(cell, moves)):
             path.unlink()
@@ -140,21 +190,12 @@ def save(watched: Watched, cell: Cell, moves: Moves) -> Path:
     return path
 
 
-def _text(watched: Watched) -> str:
-    if watched.path is not None:
-        return watched.path.read_text(encoding="utf-8")
-    return (files("ir_description") / "data" / "cells" / f"{watched.name}.yaml").read_text(
-        encoding="utf-8"
-    )
-
-
-def _written(watched: Watched, text: str) -> Path:
-    stem = watched.path.stem if watched.path is not None else watched.name
+def _written(watched: Watched | Recorded, text: str) -> Path:
     for number in range(1, MOST_COPIES):
-        path = watched.folder / f"{stem}_moved{'' if number == 1 else f'_{number}'}.yaml"
+        path = watched.folder / f"{watched.stem}_moved{'' if number == 1 else f'_{number}'}.yaml"
         try:
             write_file(path, text, new=True)
         except FileExistsError:
             continue
         return path.resolve()
-    raise SavingError(f"there are {MOST_COPIES - 1} files {stem}_moved already")
+    raise SavingError(f"there are {MOST_COPIES - 1} files {watched.stem}_moved already")

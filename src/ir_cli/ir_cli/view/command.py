@@ -1,4 +1,4 @@
-"""`ir view`: a cell in a browser of this machine, until Ctrl-C."""
+"""`ir view`: a cell in a browser of this machine, planned, replayed or driven, until Ctrl-C."""
 
 from __future__ import annotations
 
@@ -7,15 +7,29 @@ import math
 import sys
 import time
 
-from ir_cli.planning import add_cell
-from ir_cli.view.server import HOST, PORT, address, check_installed, closed, new_token, opened
+from ir_cli.errors import InputError
+from ir_cli.ports import TCP, free_port, is_free
+from ir_recorder.live.server import ADDRESS
+
+PORT = 8880
+OPEN_IT = "open it in a browser of this machine; who has the address may use its controls; Ctrl-C ends it\n"  # noqa: E501
 
 
 def add_view(view: argparse.ArgumentParser) -> None:
     """Arguments of `ir view`."""
-    add_cell(view)
-    words = f"on {HOST}; 0: a free one ({PORT}, or a free one where that is taken)"
+    view.add_argument(
+        "cell",
+        nargs="?",
+        default="",
+        metavar="CELL",
+        help="a cell file, the name of a bundled one, or a recording (.mcap)",
+    )
+    words = f"on {ADDRESS}; 0: a free one ({PORT}, or a free one where that is taken)"
     view.add_argument("--port", type=_port, help=words)
+    view.add_argument("--live", action="store_true", help="the cell whose nodes run, as they drive")
+    view.add_argument(
+        "--namespace", default="", help="with --live: of the cell's nodes: cell_1 (none)"
+    )
     view.add_argument(
         "--stations", nargs="+", default=[], metavar="NAME", help="visit these instead"
     )
@@ -27,24 +41,31 @@ def add_view(view: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Serve the page until SIGINT, SIGTERM or the end of the given time."""
-    check_installed()
-    from ir_cli.view.cell_file import Watched
+    if bool(arguments.cell) == arguments.live:
+        raise InputError("give a CELL or a recording, or --live for the cell whose nodes run")
+    port = arguments.port
+    if port is None:
+        port = PORT if is_free(PORT, TCP, ADDRESS) else free_port(TCP)
+    if arguments.live:
+        if arguments.stations or arguments.seconds != math.inf:
+            raise InputError(
+                "--stations and --seconds are of a cell that is planned: not of --live"
+            )
+        from ir_cli.ros.live import run_live
+
+        return run_live(port, arguments.namespace)
+    from ir_cli.view.cell_file import Recorded, Watched
     from ir_cli.view.session import Session
 
-    watched = Watched(arguments.cell)
-    token = new_token()
-    server = opened(arguments.port, token)
-    session = None
+    name = arguments.cell
+    shown = Recorded(name) if name.endswith(".mcap") else Watched(name)
+    session = Session(shown, tuple(arguments.stations), port)
     try:
-        session = Session(server, watched, tuple(arguments.stations))
-        sys.stdout.write(f"{address(HOST, server.get_port(), token)}\n")
-        sys.stdout.write("open it in a browser of this machine; Ctrl-C ends it\n")
+        sys.stdout.write(f"{session.server.address}\n{OPEN_IT}")
         sys.stdout.flush()
         session.run(time.monotonic() + arguments.seconds)
     finally:
-        if session is not None:
-            session.close()
-        closed(server)
+        session.close()
     return 0
 
 

@@ -1,4 +1,4 @@
-"""Machines and stations moved by hand: the handle, the moved cell, the edited text of its file.
+"""Machines and stations moved by hand: the moved cell, and the edited text of its file.
 
 Only the numbers of the poses are replaced in the text: comments, order and layout stay. The result
 is read again and compared with the picture before it is kept.
@@ -6,9 +6,8 @@ is read again and compared with the picture before it is kept.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import yaml
@@ -18,33 +17,32 @@ from ir_description import Cell
 from ir_description.poses import abc_from_rotation, composed, inverse, pose_of, rotation_from_abc
 from ir_values.arrays import FloatArray
 
-# Poses between the cell, viser and the grid of millimetres and tenths of a degree.
+# Poses of a hand on the grid of millimetres and tenths of a degree.
 
 MILLIMETRE = 3  # digits of m
 TENTH = 1  # digits of deg
 _SAME_PLACE = 2e-6  # m: a browser's numbers have 24 bits
 _SAME_TURN = 1e-5  # rad
+FARTHEST = 100.0
+"""m: beyond, nothing of a cell stands."""
 
 
-def quaternion(rotation: FloatArray) -> FloatArray:
-    """w, x, y, z of a rotation (3, 3)."""
-    x, y, z, w = Rotation.from_matrix(rotation).as_quat()
-    return np.array([w, x, y, z])
+def numbers_of(pose: FloatArray) -> list[float]:
+    """x, y, z [m], A, B, C [deg] of a pose (4, 4)."""
+    abc = abc_from_rotation(pose[:3, :3])
+    return [round(float(value), 6) for value in (*pose[:3, 3], *abc)]
 
 
-def placed(handle: Any, pose: FloatArray) -> None:
-    """Puts what is drawn at a pose (4, 4) in its parent."""
-    handle.wxyz = quaternion(pose[:3, :3])
-    handle.position = np.array(pose[:3, 3])
-
-
-def pose_of_handle(handle: Any) -> FloatArray:
-    """The pose (4, 4) of what was dragged. Raises ValueError for numbers that are none."""
-    w, x, y, z = (float(value) for value in handle.wxyz)
-    xyz = np.array([float(value) for value in handle.position])
-    if not np.isfinite([w, x, y, z, *xyz]).all():
-        raise ValueError("a pose must be finite")
-    return pose_of(xyz, Rotation.from_quat([x, y, z, w]).as_matrix())
+def pose_of_numbers(values: Sequence[float]) -> FloatArray:
+    """The pose (4, 4) of x, y, z [m], A, B, C [deg]. Raises ValueError for numbers that are
+    none.
+    """
+    numbers = np.array(values, dtype=float)
+    if numbers.shape != (6,) or not np.isfinite(numbers).all():
+        raise ValueError("a pose must be six finite numbers: x, y, z in m, A, B, C in degrees")
+    if np.abs(numbers[:3]).max() > FARTHEST:
+        raise ValueError(f"a pose must be within {FARTHEST:g} m of the world's origin")
+    return pose_of(numbers[:3], rotation_from_abc(numbers[3:]))
 
 
 def meant(dragged: FloatArray, before: FloatArray) -> FloatArray:
@@ -217,48 +215,11 @@ def _number(value: float) -> str:
     return repr(value + 0.0).removesuffix(".0")
 
 
-SIZE = 0.6  # m
-
-
-class Dragging:
-    """At most one handle; `dragged` is called by any thread, with whether it was let go."""
-
-    def __init__(self, scene: Any, dragged: Callable[[bool], None]) -> None:
-        self._scene = scene
-        self._dragged = dragged
-        self.target: Target | None = None
-        self._handle: Any = None
-
-    def choose(self, target: Target | None, cell: Cell) -> None:
-        """Show the handle at a target, None: nowhere."""
-        if self._handle is not None:
-            self._handle.remove()
-        self.target = target
-        self._handle = None
-        if target is not None:
-            self._handle = self._scene.add_transform_controls("/drag", scale=SIZE, depth_test=False)
-            self.settle(cell)
-            self._handle.on_update(lambda event: self._dragged(event.phase == "end"))
-
-    def settle(self, cell: Cell) -> None:
-        """Put the handle where its target stands."""
-        if self.target is not None:
-            kind = self.target.kind
-            name = self.target.name
-            placed(
-                self._handle,
-                cell.machine(name).pose if kind == "equipment" else cell.station(name).pose,
-            )
-
-    def pose(self, cell: Cell, file: Cell) -> FloatArray:
-        """The target's pose (4, 4) where the handle is, on the grid of what is written; file: as it
-        was.
-
-        Raises ValueError or InvalidValueError for a pose that is none.
-        """
-        assert self.target is not None
-        pose = pose_of_handle(self._handle)
-        if self.target.kind != "equipment":
-            machine = cell.machine(cell.station(self.target.name).equipment)
-            pose = composed(inverse(machine.pose), pose)
-        return meant(pose, pose_in(file, self.target))
+def moved_pose(target: Target, pose: FloatArray, cell: Cell, file: Cell) -> FloatArray:
+    """The pose (4, 4) of a move that puts a target at `pose` in the world, on the grid of what is
+    written; file: as it was.
+    """
+    if target.kind != "equipment":
+        machine = cell.machine(cell.station(target.name).equipment)
+        pose = composed(inverse(machine.pose), pose)
+    return meant(pose, pose_in(file, target))

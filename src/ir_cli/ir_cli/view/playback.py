@@ -1,116 +1,88 @@
-"""Playback of a plan: joint values, power and the tool's place over time."""
+"""Playback of a plan: where the robot is at a time, what it holds, and where parts lie."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ir_description import Cell, PartPlaces, cell_in
-from ir_kernels import Chain
 from ir_msgs_py.report import PlannedMovement
-from ir_planner.checks import movement_energy
-from ir_planner.scene import PlanningScene
+from ir_msgs_py.savings import Side
 from ir_recorder.analysis.clearance import places_after
-from ir_values.arrays import FloatArray, IntArray
-
-RATE = 25.0  # Hz
-PAUSE_SHOWN = 1.0
-"""Longest pause [s] that is played; longer ones are shortened."""
+from ir_recorder.report.motion_scene import side_of_steps
+from ir_values.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class PlayedStep:
-    """A movement or a pause: what it is, its true seconds and joules, what is held and where parts
-    lie meanwhile, and the cell with its machines in their states.
+    """A movement or a pause from `begin` [s] on: what it is, what is held and where parts lie
+    meanwhile, and the cell with its machines in their states. q (n,): where the robot stands
+    before it.
     """
 
+    begin: float
     label: str
-    seconds: float
-    joules: float
-    clearance: float | None
     load: str
     places: PartPlaces
     movement: PlannedMovement
     cell: Cell
+    q: FloatArray
+
+    def at(self, time: float) -> FloatArray:
+        """Joint values (n,) at a time of the program [s]."""
+        trajectory = self.movement.trajectory
+        if trajectory is None:
+            return self.q
+        own = trajectory.reordered(self.cell.robot.joint_names)
+        inside = min(max(time - self.begin + own.times[0], own.times[0]), own.duration)
+        return np.asarray(own.sample([inside]).q[0])
 
 
 @dataclass(frozen=True, eq=False)
 class PlayedMotion:
-    """time (N,) s from 0, q (N, n) rad, watts (N,) W at the mains, tool (N, 3) m in the world, step
-    (N,) of steps. shortened: whether pauses are played shorter than they are.
-    """
+    """A program with its power, and its steps one after the other."""
 
-    time: FloatArray
-    q: FloatArray
-    watts: FloatArray
-    tool: FloatArray
-    step: IntArray
+    side: Side
     steps: tuple[PlayedStep, ...]
-    shortened: bool
 
-    @property
-    def duration(self) -> float:
-        """Seconds that it is played."""
-        return float(self.time[-1])
+    def step(self, time: float) -> PlayedStep:
+        """The step that runs at a time [s]."""
+        begins = [step.begin for step in self.steps]
+        place = int(np.searchsorted(begins, time, side="right")) - 1
+        return self.steps[min(max(place, 0), len(self.steps) - 1)]
 
-    @property
-    def peak(self) -> float:
-        """Largest power at the mains [W], as the plan's reports have it; samples lie below."""
-        return max(step.movement.report.peak_power for step in self.steps)
-
-    def at(self, time: float) -> int:
-        """The sample that is shown at a time [s]."""
-        return min(int(np.searchsorted(self.time, time)), len(self.time) - 1)
-
-    def segments(self) -> IntArray:
-        """Samples k (M,) whose successor belongs to the same movement: the pieces of the tool's
-        path.
-        """
-        moves = np.abs(np.diff(self.tool, axis=0)).max(axis=1, initial=0.0) > 1e-6
-        return np.flatnonzero(moves & (np.diff(self.step) == 0))
+    def watts(self, time: float) -> float:
+        """Power at the mains [W]."""
+        return float(np.interp(time, self.side.time, self.side.watts))
 
 
-def motion_of(
-    movements: Sequence[PlannedMovement], cell: Cell, scene_of: Callable[[str], PlanningScene]
-) -> PlayedMotion | None:
-    """The movements one after the other; None where there is none. scene_of: with a load."""
-    chain = Chain(cell.robot, cell.base_pose, cell.tcp)
-    places = cell.parts_at_start()
-    begin = 0.0
-    shortened = False
-    states = MachineStates(cell)
-    q = next((m.trajectory.sample([0.0]).q[0] for m in movements if m.trajectory is not None), None)
-    if q is None:
+def motion_of(movements: Sequence[PlannedMovement], cell: Cell) -> PlayedMotion | None:
+    """The movements one after the other; None where nothing moves."""
+    ordered = [
+        movement.trajectory.reordered(cell.robot.joint_names)
+        for movement in movements
+        if movement.trajectory is not None
+    ]
+    side = side_of_steps(movements, cell)
+    if side is None:
         return None
-    times = []
-    qs = []
-    watts = []
-    numbers = []
+    places = cell.parts_at_start()
+    states = MachineStates(cell)
+    q = np.asarray(ordered[0].positions[0])
+    begin = 0.0
     steps = []
-    for number, movement in enumerate(movements):
-        shown = min(movement.duration, PAUSE_SHOWN) if movement.is_pause else movement.duration
-        shortened |= shown < movement.duration
-        local = np.linspace(0.0, shown, max(int(np.ceil(shown * RATE)), 1) + 1)
-        if movement.trajectory is None:
-            qs.append(np.repeat(q[None], len(local), axis=0))
-            watts.append(np.full(len(local), movement.report.energy / max(movement.duration, 1e-9)))
-        else:
-            trajectory = movement.trajectory.reordered(cell.robot.joint_names)
-            qs.append(trajectory.sample(local).q)
-            energy = movement_energy(trajectory, scene_of(movement.load))
-            watts.append(np.interp(local, energy.times, energy.watts))
-            q = qs[-1][-1]
-        times.append(begin + local)
-        numbers.append(np.full(len(local), number))
-        steps.append(_step(movement, places, states.during(movement)))
-        begin += shown
+    for movement in movements:
+        step = PlayedStep(
+            begin, _label(movement), movement.load, places, movement, states.during(movement), q
+        )
+        steps.append(step)
+        begin += movement.duration
+        q = step.at(begin)
         places = places_after(cell, places, movement)
         states.after(movement)
-    poses = chain.tcp_poses(np.concatenate(qs))
-    time, joints, power, step = (np.concatenate(each) for each in (times, qs, watts, numbers))
-    return PlayedMotion(time, joints, power, poses[:, :3, 3], step, tuple(steps), shortened)
+    return PlayedMotion(side, tuple(steps))
 
 
 class MachineStates:
@@ -148,39 +120,7 @@ class MachineStates:
             self._now[machine] = state
 
 
-def _step(movement: PlannedMovement, places: PartPlaces, cell: Cell) -> PlayedStep:
+def _label(movement: PlannedMovement) -> str:
     ends = (movement.from_station, movement.to_station)
     label = f"{movement.kind} {' to '.join(dict.fromkeys(filter(None, ends)))}"
-    if movement.power_mode:
-        label += f" ({movement.power_mode})"
-    clearance = None if movement.is_pause else movement.report.min_clearance
-    joules = movement.report.energy
-    return PlayedStep(
-        label, movement.duration, joules, clearance, movement.load, places, movement, cell
-    )
-
-
-class Playback:
-    """A motion and the time [s] at which it stands."""
-
-    def __init__(self, motion: PlayedMotion | None = None) -> None:
-        self.motion = motion
-        self.time = 0.0
-        self.runs = False
-
-    @property
-    def sample(self) -> int:
-        """The sample that is shown."""
-        return 0 if self.motion is None else self.motion.at(self.time)
-
-    @property
-    def step(self) -> PlayedStep | None:
-        """The step that is shown."""
-        return (
-            None if self.motion is None else self.motion.steps[int(self.motion.step[self.sample])]
-        )
-
-    def advance(self, seconds: float) -> None:
-        """Go on by so many seconds; after the end from the beginning."""
-        if self.motion is not None and self.motion.duration > 0.0:
-            self.time = (self.time + seconds) % self.motion.duration
+    return f"{label} ({movement.power_mode})" if movement.power_mode else label

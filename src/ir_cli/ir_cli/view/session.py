@@ -1,37 +1,71 @@
-"""Session of `ir view`: picture, panel, dragged machines and plans, all in one thread."""
+"""Session of `ir view`: what the page shows, moved machines and plans, all in one thread."""
 
 from __future__ import annotations
 
 import time
-from contextlib import AbstractContextManager
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ir_cli.station_access import MARGIN
 from ir_cli.view.background import QUIET, Inbox, Listener, Planned, PlanWorker, ViewRequest
-from ir_cli.view.cell_file import SavingError, Watched, save
+from ir_cli.view.cell_file import Recorded, SavingError, Watched, save
 from ir_cli.view.clearance import Nearest, NearestPairs, StationAccess, names_in
-from ir_cli.view.drawing import Drawing, look_at
-from ir_cli.view.moves import Dragging, Target, cell_with, snippet, targets
-from ir_cli.view.panel import (
-    NOBODY,
-    SPEEDS,
-    Actions,
-    Panel,
-    bad,
-    box,
-    legend_html,
-    plain,
-    stations_html,
+from ir_cli.view.moves import (
+    Target,
+    cell_with,
+    moved_pose,
+    numbers_of,
+    pose_of_numbers,
+    snippet,
+    targets,
 )
-from ir_cli.view.playback import Playback
+from ir_cli.view.playback import PlayedMotion
+from ir_cli.view.scene import planned_content, recorded_content, still_content
 from ir_description import Cell, DescriptionError, PartPlaces, cell_to_yaml
-from ir_msgs_py.report import PlannedMovement
+from ir_description.poses import composed, inverse
+from ir_msgs_py.report import PlannedMovement, TrajectoryReport
+from ir_recorder.live.server import Answer, LiveServer, Site
+from ir_recorder.live.stream import Stream
+from ir_recorder.report.cell_scene import matrix
+from ir_recorder.report.data import page_content
+from ir_recorder.report.number_text import joules, kilowatt_hours, millimetres, seconds, watts
+from ir_recorder.report.series import Json
 from ir_values.arrays import FloatArray
-from ir_values.errors import InvalidValueError
+from ir_values.errors import InvalidValueError, one_line
 
-# The picture: the cell, the robot with what it holds, and in red what is wrong.
+# What a control may send: no more than a hand can say.
+
+MOST_WORDS = 200
+MOST_NUMBERS = 64
+
+
+def is_value(value: object) -> bool:
+    """Whether it is true or false, a number, a text, or a short list of numbers and texts."""
+    if isinstance(value, list):
+        return len(value) <= MOST_NUMBERS and all(_is_plain(each) for each in value)
+    return isinstance(value, bool) or _is_plain(value)
+
+
+def _is_plain(value: object) -> bool:
+    if isinstance(value, str):
+        return len(value) <= MOST_WORDS
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e9
+
+
+CELL_SITE = Site(
+    "view_cell.html",
+    ("player.js", "view.js"),
+    is_value,
+    "true, a number, a text, or a list of these",
+    private=True,
+)
+"""Of a cell file or a recording: nobody looks without the token."""
+
+# The cell with its robot, what it holds, and what is wrong.
 
 
 class Stage:
@@ -40,12 +74,10 @@ class Stage:
     found, failure and errors say what is wrong with it, note what happened last.
     """
 
-    def __init__(self, server: Any, cell: Cell, source: str, q: FloatArray) -> None:
-        self._server = server
-        self._source = source
+    def __init__(self, cell: Cell, q: FloatArray) -> None:
         self._pairs = NearestPairs()
         self.cell = cell
-        self._now = cell
+        self.now = cell
         self.q = q
         self.held = cell.tool.name if cell.tool is not None else ""
         self.places = cell.parts_at_start()
@@ -53,64 +85,33 @@ class Stage:
         self.found: tuple[StationAccess, ...] = ()
         self.errors: tuple[str, ...] = ()
         self.failure = self.note = ""
-        self.drawing = Drawing(server.scene, cell)
-        self.drawing.lie(self.places, self.held)
-
-    def together(self) -> AbstractContextManager[None]:
-        """What is changed inside the block is seen at once."""
-        context: AbstractContextManager[None] = self._server.atomic()
-        return context
 
     def move(self, cell: Cell) -> None:
         """Another version of the same cell: machines and stations stand elsewhere."""
-        self.cell = self._now = cell
-        self.drawing.move(cell)
-        self.drawing.states(cell)
-        self.drawing.lie(self.places, self.held)
-        self.drawing.path(None)
+        self.cell = self.now = cell
+        self.found = ()
+        self.failure = self.note = ""
 
     def hold(self, load: str, places: PartPlaces, cell: Cell | None = None) -> None:
         """What the robot holds, where the parts lie, and the cell with its machines in other
         states.
         """
-        now = cell or self.cell
-        if now is not self._now:
-            self._now = now
-            self.drawing.states(now)
-        if (load, places) != (self.held, self.places):
-            self.held = load
-            self.places = places
-            self.drawing.lie(places, load)
+        self.now = cell or self.cell
+        self.held = load
+        self.places = places
 
     def stand(self, q: FloatArray, movement: PlannedMovement | None = None) -> None:
         """Put the robot at q (n,), on its course in a movement or by hand."""
         self.q = q
-        self.drawing.stand(q)
-        self.near = near = self._pairs.at(self._now, q, self.held, self.places, movement)
-        if near is not None:
-            self.drawing.nearest(near.point_a, near.point_b, near.text, near.distance < MARGIN)
-        self.blame()
+        self.near = self._pairs.at(self.now, q, self.held, self.places, movement)
 
-    def blame(self) -> None:
-        """Show in red what is too near or obstructs."""
+    def blamed(self) -> list[str]:
+        """Bodies and capsules that are too near or obstruct."""
         names = set(names_in(f"{self.failure} {' '.join(self.errors)}", self.cell))
         names.update(name for each in self.found if not each.free for name in each.pair)
         if self.near is not None and self.near.distance < MARGIN:
             names.update(self.near.names)
-        self.drawing.highlight(names)
-
-    def lines(self) -> str:
-        """The state of the file, the nearest pair, and what happened last, as HTML."""
-        lines = [f"{plain(self.cell.name)}, {plain(self._source)}"]
-        if self.errors:
-            lines.append(bad("the file can't be read; the last cell that could be read is shown:"))
-            lines += map(plain, self.errors)
-        if self.near is not None:
-            words = bad if self.near.distance < MARGIN else plain
-            lines.append(words(f"nearest {self.near.text}"))
-        if self.note:
-            lines.append(plain(self.note))
-        return box(lines)
+        return sorted(names)
 
     def configuration(self, name: str) -> FloatArray | None:
         """Joint values (n,) of a posture, or of the best configuration at a station with what is
@@ -127,35 +128,61 @@ class Stage:
         return chosen.q
 
 
-TICK = 0.04
-"""Seconds between two pictures of a playback."""
 LOOK = 0.3
 """Seconds between two looks at the file."""
-SLIDERS = 0.25
-"""Seconds between two updates of the sliders while a motion is played."""
+BEAT = 1.0
+"""Seconds after which the page hears that the view goes on."""
+_LINE = 400  # characters of a sentence on the page
+_SAME = 1e-9  # m, of poses
+
+
+@dataclass(frozen=True)
+class Control:
+    """What a control does, in the session's thread, and what kind of value it takes."""
+
+    act: Callable[[Any], None]
+    kind: tuple[type, ...] = (bool,)
 
 
 class Session:
-    """Shows a cell until `run` returns; `close` ends its thread."""
+    """Shows a cell until `run` returns; `close` ends its threads. LiveError where the port is
+    taken.
+    """
 
-    def __init__(self, server: Any, watched: Watched, stations: tuple[str, ...] = ()) -> None:
-        self._server = server
-        self._watched = watched
+    def __init__(
+        self, shown: Watched | Recorded, stations: tuple[str, ...] = (), port: int = 0
+    ) -> None:
+        self._shown = shown
         self._stations = stations
         self._inbox = Inbox()
+        self._stream = Stream()
+        self._scene = b""
+        self._number = self._scenes = 0
+        self._motion: PlayedMotion | None = None
+        self._moves: dict[Target, FloatArray] = {}
+        self._file: Cell | None = None
+        self._drawn: Cell | None = None  # as the scene has it
+        self._stage: Stage | None = None
+        self._looked = self._beat = time.monotonic()
+        self._controls = {
+            "joints": Control(self._joints, (list,)),
+            "at": Control(self._at, (str,)),
+            "time": Control(self._time, (int, float)),
+            "move": Control(self._move, (list,)),
+            "undo": Control(self._undo),
+            "save": Control(self._save),
+            "plan": Control(lambda _: self._ask()),
+            "cancel": Control(self._cancel),
+            "compare": Control(self._compare),
+            "recorded": Control(self._replay),
+        }
+        self.server = LiveServer(
+            self._stream, self._press, lambda: self._scene, port, site=CELL_SITE
+        )
         self._worker = PlanWorker(
             self._inbox, Listener(self._checked, self._progress, self._planned)
         )
-        self._number = 0
-        self._playback = Playback()
-        self._slid = 0.0
-        self._passed = self._looked = time.monotonic()
-        self._moves: dict[Target, FloatArray] = {}
-        self._file: Cell | None = None
-        self._stage: Stage
-        self._panel: Panel
-        self._dragging = Dragging(server.scene, self._post_drag)
-        self._start = server.gui.add_html("")
+        self._say(name=one_line(shown.name, MOST_WORDS), source=one_line(shown.source, _LINE))
         self._read()
 
     def run(self, until: float = np.inf) -> None:
@@ -163,148 +190,246 @@ class Session:
         [s].
         """
         while (now := time.monotonic()) < until:
-            for action in self._inbox.take(TICK if self._playback.runs else LOOK / 3.0):
+            for action in self._inbox.take(LOOK / 3.0):
                 action()
-            if self._playback.runs and self._server.get_clients():
-                self._tick(now - self._passed, now)
-            self._passed = now
+            if now - self._beat >= BEAT:
+                self._beat = now
+                self._stream.add({})
             if now - self._looked >= LOOK:
                 self._looked = now
-                if self._watched.changed(now):
+                if self._shown.changed(now):
                     self._read()
 
     def close(self) -> None:
-        """End what is planned."""
+        """End what is planned, and the server."""
         self._worker.close()
+        self.server.close()
+
+    def _press(self, name: str, value: Any) -> Answer:
+        """What a browser asks for: refused, or done by the session's thread."""
+        control = self._controls.get(name)
+        if control is None:
+            known = ", ".join(self._controls)
+            return Answer(False, f"{name[:60]!r} is no control of this page: known are {known}")
+        if not isinstance(value, control.kind) or (
+            bool not in control.kind and isinstance(value, bool)
+        ):
+            kinds = " or ".join(kind.__name__ for kind in control.kind)
+            return Answer(False, f"{name} must have a value of the kind {kinds}")
+        self._inbox.post(name, partial(control.act, value))
+        return Answer(True, "")
+
+    def _say(self, **values: Json) -> None:
+        self._stream.add(values, always=("q", "hand") if values.get("hand") else ())
+
+    # the cell, its file and its picture
 
     def _read(self) -> None:
         """Take the file as it is now; where it has errors, these stand beside the cell that it
         had.
         """
-        reading = self._watched.read()
+        reading = self._shown.read()
         cell = reading.cell
         file = self._file
+        errors = [one_line(error, _LINE) for error in reading.errors]
         if cell is not None and (file is None or cell_to_yaml(cell) != cell_to_yaml(file)):
-            note = "read again; what was dragged is dropped" if self._moves else ""
-            self._show(cell)
-            self._stage.note = note
-        if self._file is None:
-            self._start.content = box([bad("the file can't be read:"), *map(plain, reading.errors)])
+            note = "read again; what was moved is dropped" if self._moves else ""
+            self._show(cell, note)
+        if self._stage is None:
+            self._say(errors=["the file can't be read:", *errors])
             return
-        self._stage.errors = reading.errors
-        self._stage.blame()
-        self._say()
+        self._stage.errors = tuple(reading.errors)
+        first = "the file can't be read; the last cell that could be read is shown:"
+        self._say(errors=[first, *errors] if errors else [], blamed=list(self._stage.blamed()))
 
-    def _show(self, cell: Cell) -> None:
+    def _show(self, cell: Cell, note: str) -> None:
         """Another cell from the file: everything is drawn again."""
         other = self._file is None or self._file.robot.document != cell.robot.document
         other |= self._file is not None and self._file.robot.name != cell.robot.name
-        q = np.array(cell.machine_home) if other else self._stage.q
+        before = self._stage
+        q = np.array(cell.machine_home) if other or before is None else before.q
         self._file = cell
         self._moves = {}
-        self._playback = Playback()
-        self._dragging.choose(None, cell)
-        with self._server.atomic():
-            self._server.scene.reset()
-            self._stage = Stage(self._server, cell, self._watched.name, q)
-            if other:
-                self._new_panel(cell)
-            self._panel.of_cell(cell.name, [each.text for each in targets(cell)], cell.stations)
-            self._show_chosen()
-            self._stage.stand(q)
-            self._say_moves()
-        self._slide()
-        look_at(self._server, cell)
-        self._ask(quiet=0.0)
+        self._stage = stage = Stage(cell, q)
+        stage.note = note
+        stage.stand(q)
+        self._say(name=one_line(cell.name, MOST_WORDS), compared="", stations=[], tiles=[])
+        if isinstance(self._shown, Recorded):
+            self._replay(True)
+        else:
+            self._draw(still_content(cell))
+            self._by_hand()
+            self._ask()
 
-    def _new_panel(self, cell: Cell) -> None:
-        self._server.gui.reset()
-        do = Actions(
-            joints=self._joints_moved,
-            play=self._play,
-            time=self._time_moved,
-            at=self._at,
-            target=self._target_chosen,
-            undo=self._undo,
-            save=self._save,
-            plan=self._ask,
-            cancel=self._cancel,
-            show=self._show_chosen,
-        )
-        self._panel = Panel(self._server.gui, cell.robot, self._inbox.post, do)
+    def _draw(self, scene: bytes) -> None:
+        """Another scene, of the cell as it stands now."""
+        stage = self._stage
+        assert stage is not None
+        self._scene = scene
+        self._drawn = stage.cell
+        self._scenes += 1
+        self._say(scene=str(self._scenes), **self._standing())
 
-    def _say(self) -> None:
-        self._panel.status.content = self._stage.lines()
-
-    def _show_chosen(self) -> None:
-        for what, checkbox in self._panel.shown.items():
-            self._stage.drawing.show(what, bool(checkbox.value))
+    def _standing(self) -> dict[str, Json]:
+        """Where machines and stations stand: in the world, and against the scene."""
+        stage = self._stage
+        drawn = self._drawn
+        assert stage is not None
+        assert drawn is not None
+        cell = stage.cell
+        poses: dict[str, Json] = {}
+        for target in targets(cell):
+            here = (
+                cell.machine(target.name).pose
+                if target.kind == "equipment"
+                else cell.station(target.name).pose
+            )
+            poses[target.text] = list(numbers_of(here))
+        moved: dict[str, Json] = {}
+        for machine in cell.equipment:
+            before = drawn.machine(machine.name).pose
+            if np.abs(machine.pose - before).max() > _SAME:
+                moved[machine.name] = matrix(composed(machine.pose, inverse(before)))
+        stood: dict[str, Json] = {
+            station.name: matrix(station.pose)
+            for station in cell.stations
+            if np.abs(station.pose - drawn.station(station.name).pose).max() > _SAME
+        }
+        return {"poses": poses, "moved": moved, "stood": stood, "snippet": snippet(self._moves)}
 
     # the robot by hand
 
-    def _joints_moved(self) -> None:
-        degrees = np.nan_to_num([float(slider.value) for slider in self._panel.joints])
-        self._halt()  # and leave the sliders: a hand may have moved one since
-        robot = self._stage.cell.robot
-        self._stage.stand(np.clip(np.radians(degrees), robot.position_min, robot.position_max))
-        self._say()
+    def _by_hand(self) -> None:
+        """Show the robot where it was put."""
+        stage = self._stage
+        assert stage is not None
+        lies: dict[str, Json] = {
+            name: matrix(stage.cell.station(at).pose)
+            for name, at in stage.places.lying.items()
+            if at
+        }
+        q: list[Json] = [round(float(value), 5) for value in stage.q]
+        self._say(hand=True, q=q, held=stage.held, lies=lies, **self._near())
 
-    def _slide(self) -> None:
-        """Put the sliders where the robot is."""
-        for slider, value in zip(self._panel.joints, np.degrees(self._stage.q), strict=True):
-            slider.value = float(np.clip(round(float(value), 1), slider.min, slider.max))
+    def _near(self) -> dict[str, Json]:
+        stage = self._stage
+        assert stage is not None
+        near = stage.near
+        shown: Json = None
+        if near is not None:
+            points = [round(float(x), 4) for x in (*near.point_a, *near.point_b)]
+            shown = [round(near.distance, 5), *points, near.text]
+        return {
+            "near": shown,
+            "blamed": list(stage.blamed()),
+            "note": one_line(stage.note, _LINE),
+        }
 
-    def _at(self) -> None:
-        name = self._panel.at.value
-        if name == NOBODY:
+    def _joints(self, degrees: list[Any]) -> None:
+        stage = self._stage
+        if stage is None:
             return
-        self._stop()
-        q = self._stage.configuration(name)
-        if q is not None:
-            self._stage.stand(q)
-            self._slide()
-        self._say()
+        robot = stage.cell.robot
+        if len(degrees) != robot.n or not all(isinstance(each, int | float) for each in degrees):
+            self._say(note=f"the robot has {robot.n} joints: so many numbers in degrees are needed")
+            return
+        stage.note = ""
+        q = np.clip(np.radians(degrees), robot.position_min, robot.position_max)
+        stage.now = stage.cell
+        stage.stand(q)
+        self._by_hand()
+
+    def _at(self, name: str) -> None:
+        stage = self._stage
+        if stage is None:
+            return
+        stage.note = ""
+        stage.now = stage.cell
+        q = stage.configuration(name)
+        if q is None:
+            self._say(note=one_line(stage.note, _LINE))
+            return
+        stage.stand(q)
+        stage.note = f"robot at {name}"
+        self._by_hand()
+
+    # the motion
+
+    def _time(self, at: float) -> None:
+        """What is near at a time [s] of the plan; a recording has that in its scene."""
+        stage = self._stage
+        motion = self._motion
+        if stage is None or motion is None:
+            self._say(hand=False, note="")
+            return
+        step = motion.step(float(at))
+        stage.hold(step.load, step.places, step.cell)
+        stage.stand(step.at(float(at)), step.movement)
+        stage.note = f"{step.label}, {motion.watts(float(at)) / 1e3:.1f} kW"
+        self._say(hand=False, nearNow=True, **self._near())
+
+    def _replay(self, _: bool) -> None:
+        """Show the recorded motion again."""
+        shown = self._shown
+        stage = self._stage
+        if not isinstance(shown, Recorded) or stage is None:
+            return
+        analysis = shown.analysis
+        known = np.isfinite(analysis.safety_distance)
+        content = page_content(analysis, analysis.safety_distance if known else MARGIN)
+        self._motion = None
+        self._draw(recorded_content(content, stage.cell))
+        recording = analysis.recording
+        program = analysis.program
+        energy = program.whole.energy if program is not None else analysis.energy
+        length = program.whole.seconds if program is not None else analysis.seconds
+        tiles: list[Json] = [
+            ["this run", kilowatt_hours(energy), f"{joules(energy)} in {seconds(length)}"],
+            ["peak power", watts(analysis.peak_power), "of a 10 ms reading"],
+        ]
+        kind = "Simulated, not measured" if recording.origin == "simulated" else "Measured"
+        lines: list[Json] = ["The recording as it was driven; Plan again plans its cell."]
+        self._say(
+            origin=kind,
+            recorded=True,
+            hand=False,
+            near=None,
+            tiles=tiles,
+            plan={"state": "recorded", "lines": lines, "share": 0.0},
+        )
+        self._ask(plan=False)
 
     # machines and stations by hand
 
-    def _target_chosen(self) -> None:
-        cell = self._stage.cell
-        wanted = self._panel.target.value
-        self._dragging.choose(
-            next((each for each in targets(cell) if each.text == wanted), None), cell
-        )
-
-    def _post_drag(self, ended: bool) -> None:
-        self._inbox.post("drag", lambda: self._dragged(ended))
-
-    def _dragged(self, ended: bool) -> None:
-        target = self._dragging.target
+    def _move(self, words: list[Any]) -> None:
+        stage = self._stage
         file = self._file
-        if target is None or file is None:
+        if stage is None or file is None:
+            return
+        name = str(words[0]) if words else ""
+        target = next((each for each in targets(stage.cell) if each.text == name), None)
+        if target is None:
+            self._say(note=f"{name[:60]!r} is no machine or station of this cell")
             return
         try:
-            moves = {**self._moves, target: self._dragging.pose(self._stage.cell, file)}
+            pose = moved_pose(target, pose_of_numbers(words[1:]), stage.cell, file)
+            moves = {**self._moves, target: pose}
             cell = cell_with(file, moves)
-        except (DescriptionError, InvalidValueError, ValueError) as error:
-            self._stage.note = f"{target.text} can't stand there: {error}"
-            self._say()
+        except (DescriptionError, InvalidValueError, TypeError, ValueError) as error:
+            self._say(note=one_line(f"{name} can't stand there: {error}", _LINE))
             return
         self._take(cell, moves, target)
-        if ended:
-            self._dragging.settle(cell)
 
     def _take(self, cell: Cell, moves: dict[Target, FloatArray], target: Target | None) -> None:
         """Show and plan the cell with these moves; target: what moved last."""
+        stage = self._stage
+        assert stage is not None
         self._moves = moves
-        self._stage.note = ""
-        self._stop()
-        self._stage.found = ()
-        self._stage.failure = ""
-        with self._server.atomic():
-            self._stage.move(cell)
-            self._stage.stand(self._stage.q)
-            self._say_moves()
-        self._say()
+        self._motion = None
+        stage.move(cell)
+        stage.stand(stage.q)
+        self._say(stations=[], tiles=[], compared="", **self._standing())
+        self._by_hand()
         first = [
             station.name
             for station in cell.stations
@@ -312,117 +437,114 @@ class Session:
         ]
         self._ask(frozenset(first), QUIET)
 
-    def _undo(self) -> None:
+    def _undo(self, _: bool) -> None:
         if self._file is not None:
             self._take(self._file, {}, None)
-            self._dragging.settle(self._file)
 
-    def _save(self) -> None:
+    def _save(self, _: bool) -> None:
         if self._file is None or not self._moves:
             return
         try:
-            self._stage.note = f"written: {save(self._watched, self._file, self._moves)}"
+            note = f"written: {save(self._shown, self._file, self._moves)}"
         except SavingError as error:
-            self._stage.note = f"nothing was written: {error}"
-        self._say()
-
-    def _say_moves(self) -> None:
-        there = bool(self._moves)
-        text = (
-            f"<pre style='white-space:pre-wrap'>{plain(snippet(self._moves))}</pre>"
-            if there
-            else ""
-        )
-        self._panel.moves_text.content = box([text] if there else [])
-        self._panel.save.visible = self._panel.undo.visible = there
+            note = f"nothing was written: {error}"
+        self._say(note=one_line(note, _LINE))
 
     # what is planned
 
-    def _ask(self, first: frozenset[str] = frozenset(), quiet: float = 0.0) -> None:
+    def _ask(
+        self,
+        first: frozenset[str] = frozenset(),
+        quiet: float = 0.0,
+        *,
+        plan: bool = True,
+        compare: bool = False,
+    ) -> None:
+        stage = self._stage
+        if stage is None:
+            return
         self._number += 1
-        self._playback = Playback()
-        self._panel.working(True)
-        self._panel.plan_text.content = box(["planning …"])
-        self._worker.ask(ViewRequest(self._number, self._stage.cell, first, self._stations, quiet))
+        if plan:
+            self._planning("comparing …" if compare else "planning …", 0.0)
+        asked = ViewRequest(
+            self._number, stage.cell, first, self._stations, quiet, plan=plan, compare=compare
+        )
+        self._worker.ask(asked)
 
-    def _cancel(self) -> None:
+    def _compare(self, _: bool) -> None:
+        self._ask(compare=True)
+
+    def _planning(self, words: str, share: float) -> None:
+        self._say(plan={"state": "planning", "lines": [words], "share": round(share, 2)})
+
+    def _cancel(self, _: bool) -> None:
         self._worker.cancel()
         self._number += 1
-        self._panel.working(False)
-        self._panel.plan_text.content = box(["planning was cancelled"])
+        self._say(plan={"state": "cancelled", "lines": ["planning was cancelled"], "share": 0.0})
 
     def _checked(self, number: int, found: tuple[StationAccess, ...], complete: bool) -> None:
-        if number == self._number:
-            self._stage.found = found
-            self._stage.blame()
-            self._panel.stations_text.content = stations_html(found, complete)
+        stage = self._stage
+        if number != self._number or stage is None:
+            return
+        stage.found = found
+        rows: list[Json] = [_access(each) for each in found]
+        self._say(stations=rows, checked=complete, blamed=list(stage.blamed()))
 
     def _progress(self, number: int, phase: str, done: int, total: int) -> None:
         if number == self._number:
-            self._panel.progress.value = 100.0 * done / max(total, 1)
-            self._panel.plan_text.content = box([plain(f"planning: {phase} {done} of {total}")])
+            self._planning(f"planning: {phase} {done} of {total}", done / max(total, 1))
 
     def _planned(self, number: int, plan: Planned) -> None:
-        if number != self._number:
-            return
-        motion = plan.motion
-        self._stage.failure = plan.failure
-        self._playback = Playback(motion)
-        self._panel.working(False)
-        lines = [bad(f"not planned: {plan.failure}")] if plan.failure else []
-        lines += map(plain, plan.lines)
-        if motion is None and not plan.failure:
-            lines.append("the cell has neither program nor tasks: nothing was planned")
-        self._panel.plan_text.content = box(lines) + (
-            legend_html(motion) if motion is not None else ""
-        )
-        self._panel.time.max = round(motion.duration, 2) if motion is not None else 1.0
-        self._panel.time.value = 0.0
-        self._stage.drawing.path(motion)
-        self._stage.blame()
-
-    # what is played
-
-    def _play(self) -> None:
-        if self._playback.motion is None:
-            return
-        if self._playback.runs:
-            self._stop()
-            return
-        self._playback.runs = True
-        self._panel.play.label = "Stop"
-
-    def _stop(self) -> None:
-        self._halt()
-        self._slide()
-
-    def _halt(self) -> None:
-        self._playback.runs = False
-        self._panel.play.label = "Play"
-
-    def _time_moved(self) -> None:
-        if self._playback.motion is not None:
-            self._playback.time = float(np.nan_to_num(self._panel.time.value))
-            self._picture()
-
-    def _tick(self, seconds: float, now: float) -> None:
-        self._playback.advance(min(seconds, 1.0) * SPEEDS.get(self._panel.speed.value, 1.0))
-        self._picture()
-        if now - self._slid >= SLIDERS:
-            self._slid = now
-            self._panel.time.value = round(self._playback.time, 2)
-            self._slide()
-
-    def _picture(self) -> None:
-        """Draw the robot as the motion has it now."""
-        motion = self._playback.motion
-        step = self._playback.step
         stage = self._stage
-        if motion is None or step is None:
+        if number != self._number or stage is None:
             return
-        k = self._playback.sample
-        stage.note = f"{step.label}, {motion.watts[k] / 1e3:.1f} kW"
-        with self._server.atomic():
-            stage.hold(step.load, step.places, step.cell)
-            stage.stand(motion.q[k], step.movement)
-        self._say()
+        stage.failure = plan.failure
+        if plan.compared:
+            lines: list[Json] = ["compared: the figures stand below"]
+            self._say(
+                compared=plan.compared, plan={"state": "planned", "lines": lines, "share": 1.0}
+            )
+            return
+        lines = [one_line(line, _LINE) for line in plan.lines]
+        state = "planned"
+        if plan.failure:
+            state = "failed"
+            lines = [one_line(f"not planned: {plan.failure}", _LINE), *lines]
+        elif plan.motion is None:
+            state = "none"
+            lines = ["the cell has neither program nor tasks: nothing was planned"]
+        self._motion = plan.motion
+        if plan.motion is not None:
+            self._draw(planned_content(plan.motion.side, stage.cell))
+            self._say(hand=False, near=None, note="", origin="Predicted, not driven")
+        tiles = _tiles(plan.report) if plan.report is not None else []
+        self._say(
+            tiles=tiles,
+            blamed=list(stage.blamed()),
+            plan={"state": state, "lines": lines, "share": 1.0},
+        )
+
+
+def _access(each: StationAccess) -> list[Json]:
+    """A station with one load: how many configurations are free, or why none is."""
+    words = f"{each.free} of {each.reached} free"
+    if each.free and each.clearance is not None:
+        words += f", {1e3 * each.clearance:.1f} mm"
+    return [each.station, each.load, words, each.free > 0, one_line(each.sentence, _LINE)]
+
+
+def _tiles(report: TrajectoryReport) -> list[Json]:
+    """The figures of a plan, as every page has them."""
+    within = f"90 % interval {joules(report.energy_low)} to {joules(report.energy_high)}"
+    return [
+        ["cycle", seconds(report.duration), "planned"],
+        ["energy a cycle", kilowatt_hours(report.energy), f"{joules(report.energy)}, {within}"],
+        ["peak power", watts(report.peak_power), "at the mains, predicted"],
+        ["least clearance", millimetres(report.min_clearance), "without pairs that may touch"],
+        [
+            "clearance and limits",
+            "proved" if report.certified else "not certified",
+            "at every instant",
+            not report.certified,
+        ],
+    ]

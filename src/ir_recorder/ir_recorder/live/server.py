@@ -1,10 +1,10 @@
-"""The server of the live view: one page, the cell's scene, a stream of events, and requests of its
-buttons.
+"""The server of `ir view`: one page, the cell's scene, a stream of events, and requests of its
+controls.
 
-    GET /        the page
+    GET /        the page, which holds nothing of the cell
     GET /scene   the cell as JSON (404 while it isn't known)
     GET /events  server-sent events: `start` with what is kept, then `records`
-    POST /press  {"name": "ab", "value": true}: a bit of the PLC, with the token
+    POST /press  {"name": "ab", "value": true}: a bit of the PLC, or what a hand did; with the token
 
 It listens on 127.0.0.1 alone. Every connection has a thread that only reads what is kept, so a
 browser that is slow or dead costs its own connection and nothing else. Those that watch have places
@@ -74,40 +74,70 @@ class Guard:
             return "another page's requests are not answered"
         return ""
 
-    def command_refusal(self, headers: Mapping[str, str]) -> str:
-        """Why a request that acts is not answered, "" where it is."""
+    def token_refusal(self, headers: Mapping[str, str]) -> str:
+        """Why a request without the token is not answered, "" where it has it."""
         given = headers.get(TOKEN_HEADER, "").encode("utf-8", "replace")
         if not compare_digest(given, self.token.encode()):
-            return "the buttons need the address that `ir ros live` printed: it ends with a token"
+            return "this needs the address that `ir view` printed: it ends with a token"
+        return ""
+
+    def command_refusal(self, headers: Mapping[str, str]) -> str:
+        """Why a request that acts is not answered, "" where it is."""
+        if refusal := self.token_refusal(headers):
+            return refusal
         if headers.get("Content-Type", "").partition(";")[0].strip() != "application/json":
             return "a request has to be application/json"
         return ""
 
 
-# The page of the live view: the report's styles, charts and 3D view, and what feeds them.
+# The pages: the report's styles, charts and 3D view, what stands beside them, and what feeds them.
 
-SCRIPTS = (
-    "charts.js",
-    "renderer.js",
-    "motion.js",
-    "export.js",
-    "live_motion.js",
-    "live_panel.js",
-    "live.js",
-)
 NONCE = secrets.token_urlsafe(18)
 """Of this process: only the page's own script and style run."""
+_SHOWN = ("charts.js", "renderer.js", "motion.js", "export.js", "live_panel.js")
 
 
 @cache
-def live_page() -> str:
-    """The page as text; it holds nothing of the cell."""
-    parts = {
+def _page(parts_of: str, scripts: tuple[str, ...]) -> str:
+    """The page with the parts of a file, each below a comment with its name."""
+    found = re.findall(r"<!-- (\w+) -->\n(.*?)(?=<!-- |\Z)", asset(parts_of), re.DOTALL)
+    parts = {name: words if words.startswith(" ") else words.strip() for name, words in found}
+    parts |= {
         "nonce": NONCE,
-        "style": asset("page.css") + asset("live.css"),
-        "script": "\n".join(asset(script) for script in SCRIPTS),
+        "style": asset("page.css") + asset("view.css"),
+        "script": "\n".join(asset(script) for script in (*_SHOWN, *scripts)),
     }
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("live.html"))
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("view.html"))
+
+
+@dataclass(frozen=True)
+class Site:
+    """A page and what its controls may ask for.
+
+    parts, scripts: files of the page. accepts: whether something is a value of a control; values:
+    what that is, in words. private: even who only watches needs the token.
+    """
+
+    parts: str
+    scripts: tuple[str, ...]
+    accepts: Callable[[object], bool]
+    values: str
+    private: bool
+
+    @property
+    def page(self) -> str:
+        """The page as text; it holds nothing of the cell."""
+        return _page(self.parts, self.scripts)
+
+
+LIVE = Site(
+    "view_live.html",
+    ("live_motion.js", "live.js"),
+    lambda value: isinstance(value, bool),
+    "true or false",
+    private=False,
+)
+"""Of a cell whose nodes run: whoever is on this machine may watch; buttons need the token."""
 
 
 MOST_WATCHING = 32
@@ -127,19 +157,27 @@ class Answer(NamedTuple):
     sentence: str
 
 
-Press = Callable[[str, bool], Answer]
-"""Asks for a level of a PLC bit and waits for the answer; called from a connection's thread."""
+Press = Callable[[str, Any], Answer]
+"""Asks for what a control says, a level of a PLC bit, and waits for the answer; called from a
+connection's thread.
+"""
 
 
 class LiveServer:
     """Serves a stream to browsers from a thread of its own until it is closed.
 
-    press: does what a button asks for; scene: the cell as JSON, b"" while it isn't known. LiveError
-    where the port is taken. port 0: a free one.
+    press: does what a control asks for; scene: the cell as JSON, b"" while it isn't known; site:
+    the page. LiveError where the port is taken. port 0: a free one.
     """
 
     def __init__(
-        self, stream: Stream, press: Press, scene: Callable[[], bytes], port: int = 0
+        self,
+        stream: Stream,
+        press: Press,
+        scene: Callable[[], bytes],
+        port: int = 0,
+        *,
+        site: Site = LIVE,
     ) -> None:
         try:
             self._server = _Server((ADDRESS, port), _Handler)
@@ -150,6 +188,7 @@ class LiveServer:
         self._server.stream = stream
         self._server.press = press
         self._server.scene = scene
+        self._server.site = site
         self._stream = stream
         self._thread = threading.Thread(
             target=self._server.serve_forever, args=(0.1,), name="live", daemon=True
@@ -182,6 +221,7 @@ class _Server(ThreadingHTTPServer):
     stream: Stream
     press: Press
     scene: Callable[[], bytes]
+    site: Site
 
     def __init__(self, *arguments: Any) -> None:
         self._places = threading.Lock()
@@ -259,10 +299,16 @@ class _Handler(BaseHTTPRequestHandler):
     error_content_type = "text/plain; charset=utf-8"
 
     def do_GET(self) -> None:
-        if refusal := self.server.guard.refusal(self.headers):  # type: ignore[arg-type]
+        guard = self.server.guard
+        headers = self.headers
+        site = self.server.site
+        refusal = guard.refusal(headers)  # type: ignore[arg-type]
+        if not refusal and site.private and self.path != "/":
+            refusal = guard.token_refusal(headers)  # type: ignore[arg-type]
+        if refusal:
             self._say(HTTPStatus.FORBIDDEN, refusal)
         elif self.path == "/":
-            self._send(HTTPStatus.OK, "text/html; charset=utf-8", live_page().encode())
+            self._send(HTTPStatus.OK, "text/html; charset=utf-8", site.page.encode())
         elif self.path == "/scene":
             scene = self.server.scene()
             found = HTTPStatus.OK if scene else HTTPStatus.NOT_FOUND
@@ -288,8 +334,9 @@ class _Handler(BaseHTTPRequestHandler):
                 HTTPStatus.BAD_REQUEST,
                 f"a request has a Content-Length of at most {MOST_BODY} bytes",
             )
-        elif (command := _command(self.rfile.read(int(length)))) is None:
-            self._say(HTTPStatus.BAD_REQUEST, 'a request is {"name": TEXT, "value": true or false}')
+        elif (command := _command(self.rfile.read(int(length)), self.server.site)) is None:
+            words = f'a request is {{"name": TEXT, "value": {self.server.site.values}}}'
+            self._say(HTTPStatus.BAD_REQUEST, words)
         else:
             self.server.keep(self.connection)
             answer = self.server.press(*command)
@@ -352,8 +399,8 @@ class _Handler(BaseHTTPRequestHandler):
         """Nothing is logged: addresses hold no news, and their text is a stranger's."""
 
 
-def _command(body: bytes) -> tuple[str, bool] | None:
-    """Name and level of a bit; None for anything else."""
+def _command(body: bytes, site: Site) -> tuple[str, Any] | None:
+    """Name and value of a control; None for anything else."""
     try:
         content = json.loads(body)
     except (ValueError, RecursionError):
@@ -362,7 +409,7 @@ def _command(body: bytes) -> tuple[str, bool] | None:
         return None
     name = content["name"]
     value = content["value"]
-    return (name, value) if isinstance(name, str) and isinstance(value, bool) else None
+    return (name, value) if isinstance(name, str) and site.accepts(value) else None
 
 
 # What browsers ask for, handed from their threads to the node's and answered there.

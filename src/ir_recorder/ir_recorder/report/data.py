@@ -7,6 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ir_description import Cell
+from ir_msgs_py.savings import Side
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.clearance import StepClearance
 from ir_recorder.analysis.results import mode_name
@@ -46,7 +48,13 @@ MOST_CLEARANCES = 6_000  # per movement: 2 minutes at the 50 Hz of the profile
 
 def page_data(analysis: Analysis, safety_distance: float) -> str:
     """Safe inside a script element."""
-    content: dict[str, Json] = {
+    content = page_content(analysis, safety_distance)
+    return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def page_content(analysis: Analysis, safety_distance: float) -> dict[str, Json]:
+    """What the charts and the picture in 3D show of a recording, or of its plan."""
+    return {
         "end": analysis.recording.duration,
         "power": _power(analysis),
         "lanes": list(_lanes(analysis)),
@@ -59,10 +67,14 @@ def page_data(analysis: Analysis, safety_distance: float) -> str:
         "axes": axis_curves(analysis),
         "rests": long_rests([_rests(analysis)]),
         "scene": scene(analysis),
+        "peak": _number(analysis.peak_power),
         "blamed": [] if analysis.cell is None else blamed(analysis.cell, analysis.problems),
         **_planned(analysis),
     }
-    return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def _number(value: float) -> float | None:
+    return value if np.isfinite(value) else None
 
 
 def _rests(analysis: Analysis) -> list[Span]:
@@ -79,13 +91,22 @@ def _planned(analysis: Analysis) -> dict[str, Json]:
         return {}
     side = planned_side(analysis)
     if side is not None:
-        power = _curve(side.time, side.watts)
-        drawn = planned_scene(side, analysis.cell)
-        shown: dict[str, Json] = {"power": power, "lanes": lanes(side), "scene": drawn}
-        return {**shown, "end": side.report.duration, "rests": long_rests([rests_of(side)])}
+        return side_content(side, analysis.cell)
     if analysis.recording.planned:
         return {}  # the steps of a file, without their trajectories
     return {"end": 1.0, "scene": failed_scene(analysis.cell)}
+
+
+def side_content(side: Side, cell: Cell) -> dict[str, Json]:
+    """The same of a program that was not driven."""
+    return {
+        "end": side.report.duration,
+        "power": _curve(side.time, side.watts),
+        "lanes": lanes(side),
+        "peak": max(step.report.peak_power for step in side.movements),
+        "scene": planned_scene(side, cell),
+        "rests": long_rests([rests_of(side)]),
+    }
 
 
 def _power(analysis: Analysis) -> dict[str, Json] | None:

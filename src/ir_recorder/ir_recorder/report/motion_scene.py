@@ -227,12 +227,16 @@ def planned_side(analysis: Analysis) -> Side | None:
     is not known.
     """
     cell = analysis.cell
-    steps = analysis.recording.planned
-    if cell is None or not any(step.trajectory is not None for step in steps):
+    return None if cell is None else side_of_steps(analysis.recording.planned, cell)
+
+
+def side_of_steps(steps: Sequence[PlannedMovement], cell: Cell) -> Side | None:
+    """Steps of a plan with the power [W] that they are predicted to take; None where none moves."""
+    if not any(step.trajectory is not None for step in steps):
         return None
     time, watts = _power_planned_motion(steps, cell)
     report = TrajectoryReport(duration=sum(step.duration for step in steps))
-    return Side("planned", 0.0, steps, report, time=time, watts=watts)
+    return Side("planned", 0.0, tuple(steps), report, time=time, watts=watts)
 
 
 def planned_scene(side: Side, cell: Cell) -> dict[str, Json]:

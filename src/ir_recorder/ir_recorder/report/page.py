@@ -59,7 +59,7 @@ CHARTS: Mapping[str, Chart] = {
 
 _ASSETS = files("ir_recorder") / "report" / "assets"
 PAGE_START = b"<!doctype html>"
-SCRIPTS = ("charts.js", "axes.js", "renderer.js", "motion.js", "export.js", "app.js")
+SCRIPTS = ("charts.js", "axes.js", "renderer.js", "motion.js", "player.js", "export.js", "app.js")
 
 
 def write_report(

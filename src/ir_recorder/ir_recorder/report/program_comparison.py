@@ -297,7 +297,15 @@ def _between(low: float, high: float, show: Show) -> str:
 # One HTML file: today's program and the planner's, for those who pay and for those who change
 # programs.
 
-SCRIPTS = ("charts.js", "axes.js", "renderer.js", "motion.js", "export.js", "before_after.js")
+SCRIPTS = (
+    "charts.js",
+    "axes.js",
+    "renderer.js",
+    "motion.js",
+    "player.js",
+    "export.js",
+    "before_after.js",
+)
 
 
 def write_before_after(

@@ -11,42 +11,20 @@
   let motion = null;
   if (data.scene) {
     motion = new Motion(find("view"), timeline, data.scene, data.safetyDistance);
+    if (data.peak) motion.scale(data.peak);
     motion.blamed = data.blamed; /* bodies that a problem names: in red */
-    find("trail-max").textContent = `${motion.mostPower} W`;
+    find("trail-max").textContent = `${Math.round(motion.mostPower)} W`;
   } else {
     find("no-motion").hidden = false;
     find("trail-legend").hidden = true;
   }
 
-  /* playing */
-  let playing = false, last = 0;
-  const play = (on) => {
-    playing = on;
-    find("play").textContent = on ? "❚❚" : "▶";
-    find("play").setAttribute("aria-label", on ? "pause" : "play");
-    if (on) {
-      if (timeline.now >= timeline.end - 1e-6) timeline.seek(0);
-      last = performance.now();
-      requestAnimationFrame(step);
-    }
-  };
-  const step = (now) => {
-    if (!playing) return;
-    timeline.seek(timeline.now + (now - last) / 1000 * Number(find("speed").value));
-    last = now;
-    if (timeline.now >= timeline.end - 1e-6) play(false); else requestAnimationFrame(step);
-  };
-  find("play").addEventListener("click", () => play(!playing));
-  find("seek").max = timeline.end;
-  find("seek").addEventListener("input", () => { play(false); timeline.seek(Number(find("seek").value)); });
-  document.addEventListener("keydown", (e) => {
-    if (e.code === "Space" && !/BUTTON|INPUT|SELECT|SUMMARY/.test(e.target.tagName)) { e.preventDefault(); play(!playing); }
-  });
+  const player = new Player(timeline);
   for (const button of document.querySelectorAll("button.go")) {
     button.addEventListener("click", () => {
       timeline.seek(Number(button.dataset.time));
       find("motion").scrollIntoView({ behavior: "smooth" });
-      play(true);
+      player.play(true);
     });
   }
 
@@ -57,8 +35,6 @@
       ["mode", power.inLane("mode", now)], ["step", power.inLane("program", now)], ["load", shown.load], ["nearest", shown.nearest]];
   };
   timeline.onChange(() => {
-    find("seek").value = timeline.now;
-    find("clock").textContent = `${timeline.now.toFixed(2)} s`;
     const hud = find("hud");
     hud.textContent = "";
     for (const [name, value] of rows()) {
@@ -78,28 +54,8 @@
     }
   }
 
-  /* paper: in light colours, with everything that is folded away */
-  const root = document.documentElement;
-  let theme = "";
-  addEventListener("beforeprint", () => {
-    theme = root.dataset.theme || "";
-    root.dataset.theme = "light";
-    for (const chart of [power, clearance, ...axes]) chart.paint();
-    if (motion) { motion.recolour(); motion.draw(); }
-  });
-  addEventListener("afterprint", () => {
-    if (theme) root.dataset.theme = theme; else delete root.dataset.theme;
-    repaint();
-  });
-
-  /* light and dark */
-  const repaint = () => { for (const chart of [power, clearance, ...axes]) chart.schedule(); if (motion) motion.recolour(); };
-  find("theme").addEventListener("click", () => {
-    const dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
-    root.dataset.theme = dark ? "light" : "dark";
-    repaint();
-  });
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
+  themes(() => { for (const chart of [power, clearance, ...axes]) chart.schedule(); if (motion) motion.recolour(); },
+    () => { for (const chart of [power, clearance, ...axes]) chart.paint(); if (motion) { motion.recolour(); motion.draw(); } });
 
   /* a link into what is folded away opens it */
   const unfold = () => {

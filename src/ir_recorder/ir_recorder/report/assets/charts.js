@@ -320,16 +320,16 @@ class PowerChart extends TimeChart {
     const y = (watts) => this.height - this.bottom - watts / most * (this.height - this.bottom - this.top);
     this.valueAxis(g, 0, most, "W", y);
     this.plot(g);
-    /* one column of pixels shows the span of all readings in it */
+    /* one column of pixels shows the span of all readings in it, between the first and the last of them */
     const columns = [];
     for (let i = first; i <= until; i++) {
       const x = Math.round(this.x(time[i]) * 2) / 2, end = columns[columns.length - 1];
-      if (end && end.x === x) { end.low = Math.min(end.low, low[i]); end.high = Math.max(end.high, high[i]); }
-      else columns.push({ x, low: low[i], high: high[i], apart: i > first && time[i] - time[i - 1] > this.gap });
+      if (end && end.x === x) { end.low = Math.min(end.low, low[i]); end.high = Math.max(end.high, high[i]); end.last = high[i]; }
+      else columns.push({ x, low: low[i], high: high[i], first: high[i], last: high[i], apart: i > first && time[i] - time[i - 1] > this.gap });
     }
     g.beginPath();
     g.moveTo(columns[0].x, y(0));
-    for (const c of columns) g.lineTo(c.x, y(c.high));
+    for (const c of columns) for (const watts of [c.first, c.high, c.last]) g.lineTo(c.x, y(watts));
     g.lineTo(columns[columns.length - 1].x, y(0));
     g.fillStyle = css("--accent");
     g.globalAlpha = 0.13;
@@ -339,8 +339,8 @@ class PowerChart extends TimeChart {
     g.lineWidth = 1.3;
     g.beginPath();
     columns.forEach((c, k) => {
-      if (k === 0 || c.apart) g.moveTo(c.x, y(c.high)); else g.lineTo(c.x, y(c.high));
-      if (c.high > c.low) g.lineTo(c.x, y(c.low));
+      if (k === 0 || c.apart) g.moveTo(c.x, y(c.first)); else g.lineTo(c.x, y(c.first));
+      if (c.high > c.low) for (const watts of [c.high, c.low, c.last]) g.lineTo(c.x, y(watts));
     });
     g.stroke();
     g.lineWidth = 1;
@@ -407,4 +407,21 @@ class ClearanceChart extends TimeChart {
     const part = this.parts.find((p) => time >= p.time[0] && time <= p.time[p.time.length - 1]);
     return part ? `${this.timeline.label(time)}\n${(part.low[floorIndex(part.time, time)] * 1000).toFixed(1)} mm\n${part.label}` : "";
   }
+}
+
+/* Light and dark, and paper in light: `repaint` draws everything anew, `paint` at once. */
+function themes(repaint, paint) {
+  const root = document.documentElement, scheme = matchMedia("(prefers-color-scheme: dark)");
+  let theme = "";
+  addEventListener("beforeprint", () => { theme = root.dataset.theme || ""; root.dataset.theme = "light"; paint(); });
+  addEventListener("afterprint", () => {
+    if (theme) root.dataset.theme = theme; else delete root.dataset.theme;
+    repaint();
+  });
+  document.getElementById("theme").addEventListener("click", () => {
+    const dark = root.dataset.theme ? root.dataset.theme === "dark" : scheme.matches;
+    root.dataset.theme = dark ? "light" : "dark";
+    repaint();
+  });
+  scheme.addEventListener("change", repaint);
 }

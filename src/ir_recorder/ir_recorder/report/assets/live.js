@@ -120,7 +120,7 @@ class LiveClearanceChart extends ClearanceChart {
 }
 
 (() => {
-  const find = (id) => document.getElementById(id), root = document.documentElement;
+  const find = (id) => document.getElementById(id);
   const timeline = new LiveTimeline(), history = new History();
   const data = { lanes: [], power: null, clearance: [], safetyDistance: 0.02 };
   const power = new LivePowerChart(find("power"), timeline, find("tip"), data);
@@ -246,13 +246,9 @@ class LiveClearanceChart extends ClearanceChart {
     find(`show-${name}`).addEventListener("change", (e) => { if (motion) { motion.show[name] = e.target.checked; motion.schedule(); } });
   }
   find("show-nearest").addEventListener("change", (e) => { if (motion) { motion.pairs = e.target.checked; motion.schedule(); } });
-  const repaint = () => { for (const chart of [power, clearance]) chart.schedule(); if (motion) motion.recolour(); };
-  find("theme").addEventListener("click", () => {
-    const dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
-    root.dataset.theme = dark ? "light" : "dark";
-    repaint();
-  });
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
+  const painted = [power, clearance];
+  themes(() => { for (const chart of painted) chart.schedule(); if (motion) motion.recolour(); },
+    () => { for (const chart of painted) chart.paint(); if (motion) { motion.recolour(); motion.draw(); } });
   exportButtons();
   connect();
 })();

@@ -10,13 +10,6 @@ class LiveMotion extends Motion {
     this.history = history;
     this.show.plan = true;
   }
-  /* Another cell, or the same with a door that moved; the eye stays where it is. */
-  change(scene) {
-    for (const label of this.labels) label.element.remove();
-    for (const { mesh } of [...this.shapes, ...this.bodies, ...this.parts.flatMap((p) => p.meshes)]) this.renderer.forget(mesh);
-    this.take(scene);
-    this.schedule();
-  }
   frame(time) { return this.history ? this.history.index(time) : 0; }
   record(k) { return this.history ? this.history.records[k] : undefined; }
   posesOf(q) {

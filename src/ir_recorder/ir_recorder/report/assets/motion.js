@@ -34,6 +34,13 @@ class Motion {
     this.path = this.toolPath();
     this.labels = this.machineLabels();
   }
+  /* Another scene, or the same with a door that moved; the eye stays where it is. */
+  change(scene) {
+    for (const label of this.labels) label.element.remove();
+    for (const { mesh } of [...this.shapes, ...this.bodies, ...this.parts.flatMap((p) => p.meshes)]) this.renderer.forget(mesh);
+    this.take(scene);
+    this.recolour();
+  }
   upload(shape) {
     const scaled = (text, step) => Float32Array.from(shorts(text), (v) => v * step);
     return this.renderer.mesh(scaled(shape.points, 5e-4), scaled(shape.normals, 1 / 32767), words(shape.triangles));
@@ -50,6 +57,11 @@ class Motion {
   powerTint(watts) {
     const x = Math.min(Math.max(watts / this.mostPower, 0), 1) * (this.ramp.length - 1), k = Math.min(Math.floor(x), this.ramp.length - 2);
     return this.ramp[k].map((v, i) => v + (this.ramp[k + 1][i] - v) * (x - k));
+  }
+  /* The watts of the hottest colour: the peak that the page names. */
+  scale(watts) {
+    this.mostPower = watts;
+    this.recolour();
   }
   frame(time) { return Math.min(Math.max((time - this.scene.start) / this.scene.step, 0), this.frames - 1); }
   /* Poses of all links, the base first; joint values are interpolated between frames. */
@@ -182,20 +194,33 @@ class Motion {
       return { element, point };
     });
   }
+  /* The nearest ones first: a name that would lie on another one stands above it, or is left out. */
   placeLabels(view, box) {
-    for (const { element, point } of this.labels) {
-      const [x, y, , w] = M4.point(view, point);
+    const placed = [], seen = this.labels.map((label) => ({ label, at: M4.point(view, this.pointOf(label)) })).sort((a, b) => a.at[3] - b.at[3]);
+    for (const { label: { element }, at: [x, y, , w] } of seen) {
       element.hidden = w < 0.1 || Math.abs(x) > w || Math.abs(y) > w;
-      element.style.left = `${(x / w * 0.5 + 0.5) * box.width}px`;
-      element.style.top = `${(0.5 - y / w * 0.5) * box.height}px`;
+      if (element.hidden) continue;
+      const wide = element.offsetWidth / 2 + 2, high = element.offsetHeight + 1;
+      const left = Math.min(Math.max((x / w * 0.5 + 0.5) * box.width, wide), box.width - wide);
+      let top = Math.max((0.5 - y / w * 0.5) * box.height, high);
+      const hit = () => placed.find(([l, t, half, h]) => Math.abs(l - left) < half + wide && top > t - h && t > top - high);
+      for (let k = 0; k < 3 && hit(); k++) top = hit()[1] - hit()[3];
+      element.hidden = Boolean(hit()) || top < high;
+      element.style.left = `${left}px`;
+      element.style.top = `${top}px`;
+      if (!element.hidden) placed.push([left, top, wide, high]);
     }
   }
+  /* Where a machine's body, zone or name is now: where the scene has it. */
+  poseOf(thing) { return thing.pose; }
+  pointOf(label) { return label.point; }
   items(time, frame) {
     const poses = this.linkPoses(frame), load = this.load(time).split("+"), items = [];
     const bad = (name) => name && (this.blamed || []).includes(name);
-    for (const { mesh, pose, shown, sweep, name } of this.bodies) {
+    for (const body of this.bodies) {
+      const { mesh, shown, sweep, name } = body;
       const tint = bad(name) ? this.tints.bad : sweep ? this.tints.zone : this.tints.machine;
-      if (this.there(shown, time)) items.push({ mesh, model: pose, tint });
+      if (this.there(shown, time)) items.push({ mesh, model: this.poseOf(body), tint });
     }
     const look = this.show.capsules ? "robot" : "capsules";
     for (const { mesh, link, kind, owner, look: own, name } of this.shapes) {
@@ -253,7 +278,7 @@ class Motion {
     for (const zone of this.scene.zones) {
       if (!zone.mesh) zone.mesh = this.renderer.mesh(...unitBox(zone.size));
       const tint = zone.kind === "OPEN" ? this.tints.a3 : zone.kind === "CLOSED" ? this.tints.bad : this.tints.zone;
-      this.renderer.drawMesh(zone.mesh, zone.pose, tint, 0.16, 1);
+      this.renderer.drawMesh(zone.mesh, this.poseOf(zone), tint, 0.16, 1);
     }
   }
   describe() {
