@@ -7,7 +7,17 @@ from pathlib import Path
 
 import pytest
 
-from ir_cli.commands import BY_PATH, COMMANDS, GROUPS, NAMES, OLD, QUIET, first_page, renamed
+from ir_cli.commands import (
+    BY_PATH,
+    COMMANDS,
+    GROUPS,
+    IMPLIED,
+    NAMES,
+    OLD,
+    QUIET,
+    first_page,
+    renamed,
+)
 from ir_cli.main import main
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "commands.md"
@@ -81,4 +91,5 @@ def test_the_cell_has_one_option_everywhere(capsys: pytest.CaptureFixture[str]) 
 def test_the_page_has_every_old_and_new_name() -> None:
     text = PAGE.read_text("utf-8")
     for old, new in OLD.items():
-        assert f"| `ir {old}` | `ir {new}` |" in text
+        now = f"{new} {IMPLIED.get(old, '')}".strip()
+        assert f"| `ir {old}` | `ir {now}` |" in text
