@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -196,13 +197,30 @@ def test_a_comparison_carries_what_load_says(
     assert any("carries what $LOAD says" in note for note in answer.notes)
 
 
-def test_a_load_that_changes_on_the_way_is_named(
-    planner: Planner, followed: Callable[..., Followed]
+@pytest.mark.parametrize(
+    ("more", "carried"),
+    [
+        ("$LOAD.M=90\n", ["$LOAD", "$LOAD_2"]),
+        ("$LOAD={M -1}\n", ["$LOAD", "$LOAD_2"]),  # as the cell has it
+        ("$LOAD.M=90\nPTP {A1 20}\n$LOAD.M=50\n", ["$LOAD", "$LOAD_2", "$LOAD"]),
+    ],
+)
+def test_a_load_that_changes_on_the_way_is_costed_where_it_is_carried(
+    more: str, carried: list[str], planner: Planner, followed: Callable[..., Followed]
 ) -> None:
-    found = evaluate_krl(planner, followed(CARRIED.format(mass=50, more="$LOAD.M=90\n")))
-    today = today_of_krl(found)
-    assert today.load is None
-    assert "put them right in the cell" in today.notes[-1]
+    """Law: movement by movement the same joules in `ir krl import` and `ir compare`, and the same
+    loads in every program of the comparison.
+    """
+    found = evaluate_krl(planner, followed(CARRIED.format(mass=50, more=more)))
+    answer = before_after(planner, today_of_krl(found))
+    moving = [step.report.energy for step in found.steps if step.step.moves]
+    compared = [step.report.energy for step in answer.today.movements if not step.is_pause]
+    assert compared == pytest.approx(moving, rel=1e-9)
+    assert answer.today.report.energy == pytest.approx(found.report.energy, rel=1e-9)
+    for side in (answer.today, *answer.sides):
+        loads = [step.load for step in side.movements if not step.is_pause]
+        assert [key for key, _ in itertools.groupby(loads)] == carried
+    assert any("carries what $LOAD says, movement by movement" in note for note in answer.notes)
 
 
 @pytest.mark.parametrize("name", ["grip", "Grip", "IR_PAUSE", "ir_done"])

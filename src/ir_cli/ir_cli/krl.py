@@ -301,6 +301,8 @@ def run_export(arguments: argparse.Namespace) -> int:
         f"joints at most {written.deviation:.2g} rad apart\n"
         f"with its pauses: {written.seconds:.2f} s, {written.joules:.0f} J\n"
     )
+    for said in filter(None, (plan.status.message, written.remark)):
+        sys.stdout.write(f"note: {said}\n")
     if written.plc_table:
         sys.stdout.write(
             f"{table.name} and {text.name}: the PLC's part, it spends pauses in power modes in "

@@ -291,6 +291,8 @@ class Cell:
 
     park and machine_home (n,) [rad] are the two named postures. base_contacts: pairs of a capsule
     of base_link and a body that touch for good (a pedestal); `ignored_pairs` adds the floor.
+    whole_loads: each stands for the tool and a part together where a program says what it carries
+    ($LOAD), the first at the start; none: tool and parts as they are.
     """
 
     name: str
@@ -310,6 +312,7 @@ class Cell:
     floor: bool = True
     base_contacts: tuple[tuple[str, str], ...] = ()
     description: str = field(default="")
+    whole_loads: tuple[Load, ...] = ()
 
     def __post_init__(self) -> None:
         n = self.robot.n
@@ -421,7 +424,18 @@ class Cell:
 
     def parts_at_start(self) -> PartPlaces:
         """Return where the parts are before the program's first step."""
-        return PartPlaces("", {part.name: part.station for part in self.parts})
+        carrying = self.whole_loads[0].name if self.whole_loads else ""
+        return PartPlaces("", {part.name: part.station for part in self.parts}, carrying)
+
+    def loads_at(self, places: PartPlaces) -> tuple[Load, ...]:
+        """Return what is carried while the parts are at `places`."""
+        if places.carrying:
+            return (self.whole_load(places.carrying),)
+        return self.loads(places.held)
+
+    def whole_load(self, name: str) -> Load:
+        """Return the whole load of that name."""
+        return _named(self.whole_loads, "load", name)
 
     def with_equipment(
         self,

@@ -7,7 +7,7 @@ pause stays where the step before it ended.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from ir_msgs_py.modes import REST_MODES
@@ -57,7 +57,7 @@ class ProgramStep:
     dwell [s] after arrival, or the length of a pause. attach and detach name a part ("" for none).
     power_mode is one of PAUSE_POWER_MODES for a pause and "" otherwise; AUTO leaves the choice to
     whoever plans. planner: which search looks for the regional movement to the target, "": as the
-    request says.
+    request says. carries: which of the cell's whole loads is carried from then on, "": as before.
     """
 
     kind: StepKind
@@ -69,6 +69,7 @@ class ProgramStep:
     set_signals: tuple[Signal, ...] = ()
     power_mode: str = ""
     planner: str = ""
+    carries: str = ""
 
     def __post_init__(self) -> None:
         in_range(self.dwell, 0.0, PAUSE_MAX, "s", "dwell")
@@ -95,14 +96,19 @@ class ProgramStep:
 @dataclass(frozen=True)
 class PartPlaces:
     """Where the parts are between two steps: the held one and the station each lies at; "" is
-    none.
+    none. carrying: the one of the cell's whole loads that stands for tool and part, "" for none.
     """
 
     held: str
     lying: Mapping[str, str]
+    carrying: str = ""
 
     def after(self, step: ProgramStep) -> PartPlaces:
         """Return where they are after a step; a step that can't be done is refused."""
+        moved = self._handled(step)
+        return replace(moved, carrying=step.carries) if step.carries else moved
+
+    def _handled(self, step: ProgramStep) -> PartPlaces:
         if step.attach:
             where = self._station_of(step.attach)
             if self.held:
@@ -112,7 +118,7 @@ class PartPlaces:
                     f"{step.attach} can't be attached at {step.target}, it lies at "
                     f"{where or 'no station'}"
                 )
-            return PartPlaces(step.attach, {**self.lying, step.attach: ""})
+            return replace(self, held=step.attach, lying={**self.lying, step.attach: ""})
         if step.detach:
             self._station_of(step.detach)
             if self.held != step.detach:
@@ -124,7 +130,7 @@ class PartPlaces:
                     raise InvalidValueError(
                         f"{step.detach} can't be detached at {station}, {part} lies there"
                     )
-            return PartPlaces("", {**self.lying, step.detach: step.target})
+            return replace(self, held="", lying={**self.lying, step.detach: step.target})
         return self
 
     def _station_of(self, part: str) -> str:

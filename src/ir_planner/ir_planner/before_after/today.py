@@ -12,7 +12,15 @@ from ir_msgs_py.plc import Signal
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.errors import RequestError
-from ir_planner.krl import DrivenStep, EvaluatedProgram, EvaluatedStep, ToolMotion, is_named
+from ir_planner.krl import (
+    LOAD_NAME,
+    DrivenStep,
+    EvaluatedProgram,
+    EvaluatedStep,
+    ToolMotion,
+    is_named,
+    whole_load,
+)
 from ir_planner.program import Doors
 from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError
@@ -209,7 +217,8 @@ class Stretch:
     same one. power_mode: in which a standstill is spent, "" as the controller does by itself.
     awaited, signals: of the cell, waited for in it and set at its end; handled: the part that is
     taken ("+gear") or left ("-gear") there. at_rest: whether it begins and ends at rest: not where
-    it is cut because something changes in its course.
+    it is cut because something changes in its course. load: the name of what is carried in it where
+    the program says what that is, "" where the cell does.
     """
 
     trajectory: JointTrajectory | None
@@ -224,12 +233,14 @@ class Stretch:
     signals: tuple[Signal, ...] = ()
     handled: str = ""
     at_rest: tuple[bool, bool] = (True, True)
+    load: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class Today:
     """A program as it runs, from `start` (n,) [rad]; kind: what it is read from; notes: what was
-    assumed; load: what it carries all along, None: what the cell says.
+    assumed; loads: what it carries, tool and part in one, the first at its start; none: what the
+    cell says.
     """
 
     name: str
@@ -237,7 +248,7 @@ class Today:
     start: FloatArray
     stretches: tuple[Stretch, ...]
     notes: tuple[str, ...] = ()
-    load: Load | None = None
+    loads: tuple[Load, ...] = ()
 
     @property
     def doors(self) -> Doors | None:
@@ -267,7 +278,11 @@ def today_of_krl(found: EvaluatedProgram, process: Lines | None = None) -> Today
     if not any(one.step.moves for one in found.steps):
         raise nothing_moves(found.name)
     paths = process_paths([one.step for one in found.steps], process)
-    stretches = tuple(_stretch(one, path) for one, path in zip(found.steps, paths, strict=True))
+    loads, carried = _loads([one.step for one in found.steps])
+    stretches = tuple(
+        replace(_stretch(one, path), load=load)
+        for one, path, load in zip(found.steps, paths, carried, strict=True)
+    )
     start = np.asarray(found.steps[0].step.trajectory.positions[0])
     notes = [str(note) for note in found.notes]
     waits = [
@@ -278,26 +293,35 @@ def today_of_krl(found: EvaluatedProgram, process: Lines | None = None) -> Today
             f"{len(waits)} waits for machines count no time: how long they take is not in a program"
         )
     notes += process_notes([one.step for one in found.steps], paths)
-    load, said = _load([one.step for one in found.steps if one.step.moves])
-    return Today(found.name, "KRL program", start, stretches, (*notes, *said), load)
+    if loads:
+        notes.append(
+            "every program of this comparison carries what $LOAD says, movement by movement: "
+            + ", ".join(f"{load.mass:.6g} kg" for load in loads)
+        )
+    return Today(found.name, "KRL program", start, stretches, tuple(notes), loads)
 
 
-def _load(steps: Sequence[DrivenStep]) -> tuple[Load | None, list[str]]:
-    """What $LOAD says instead of the cell, where it says the same all along, and what else must be
-    told.
-    """
-    scenes = [step.scene for step in steps]
-    named = [scene.loads[0] for scene in scenes if scene.loads[:1] and is_named(scene.loads[0])]
-    masses = {load.mass for load in named}
-    handled = any(step.handled for step in steps)
-    if len(named) == len(scenes) and len(masses) == 1 and not handled:
-        return named[0], ["every program of this comparison carries what $LOAD says"]
-    if named:
-        return None, [
-            "$LOAD is another one than the cell's in a part of the program: every program of this "
-            "comparison is costed with the cell's loads; put them right in the cell"
-        ]
-    return None, []
+def _loads(steps: Sequence[DrivenStep]) -> tuple[tuple[Load, ...], list[str]]:
+    """What a program carries, and which of it in each step, where $LOAD says it anywhere."""
+    if not any(map(is_named, (load for step in steps for load in step.scene.loads))):
+        return (), [""] * len(steps)
+    found: list[Load] = []
+    carried = []
+    for step in steps:
+        load = whole_load(step.scene.loads, step.places[0])
+        same = next((one for one in found if _same_load(one, load)), None)
+        if same is None:
+            name = LOAD_NAME if not found else f"{LOAD_NAME}_{len(found) + 1}"
+            same = replace(load, name=name)
+            found.append(same)
+        carried.append(same.name)
+    return tuple(found), carried
+
+
+def _same_load(a: Load, b: Load) -> bool:
+    names = [[capsule.name for capsule in one.capsules] for one in (a, b)]
+    figures = [np.concatenate([[one.mass], one.com, one.inertia.ravel()]) for one in (a, b)]
+    return names[0] == names[1] and np.array_equal(figures[0], figures[1])
 
 
 def _stretch(one: EvaluatedStep, process: CellPath | None) -> Stretch:

@@ -69,6 +69,7 @@ def asked_program(today: Today, scene: PlanningScene) -> AskedProgram:
             if after is not None and after.process is not None:
                 continue  # the beginning of a path is no stop of its own
             waits = after is not None and after.trajectory is None
+            waits = waits or (after is not None and after.load != one.load)
             name = stops.name(one.q, needed=one.works or waits or k == last)
             if name:
                 steps.append(Asked(stops.step(name), tuple(moves)))
@@ -81,6 +82,7 @@ def asked_program(today: Today, scene: PlanningScene) -> AskedProgram:
     if not any(step.step.kind != "PAUSE" for step in steps):
         raise nothing_moves(today.name)
     steps, notes = _at_stops(steps, today, scene)
+    steps = _carried(steps, today)
     cell = replace(stops.cell(), program=tuple(step.step for step in steps))
     return AskedProgram(cell, tuple(steps), (*stops.notes(), *notes))
 
@@ -99,10 +101,26 @@ def _at_stops(
 
 def _carrying(today: Today, scene: PlanningScene) -> PlanningScene:
     """The scene with what today's program says that it carries."""
-    if today.load is None:
+    if not today.loads:
         return scene
-    cell = replace(scene.cell, tool=today.load)
+    cell = replace(scene.cell, tool=today.loads[0], whole_loads=today.loads)
     return replace(scene, cell=cell, loads=cell.loads())
+
+
+def _carried(steps: list[Asked], today: Today) -> list[Asked]:
+    """The steps with what is carried after each, where today's program says it."""
+    if not today.loads:
+        return steps
+    now = today.loads[0].name
+    result = []
+    for k, one in enumerate(steps):
+        following = (stretch for each in steps[k + 1 :] for stretch in each.stretches)
+        carries = next((stretch.load for stretch in following), now)
+        changes = carries != now
+        step = replace(one.step, carries=carries) if changes else one.step
+        result.append(replace(one, step=step))
+        now = carries
+    return result
 
 
 def _with_signals(steps: list[Asked]) -> list[Asked]:

@@ -15,10 +15,11 @@ from ir_planner.krl.requests import (
     station_at,
 )
 from ir_planner.krl.splines import ToolMotion
-from ir_planner.krl.surroundings import is_named
+from ir_planner.krl.surroundings import LOAD_NAME, is_named, whole_load
 
 __all__ = [
     "DEVIATION_MAX",
+    "LOAD_NAME",
     "DrivenStep",
     "EvaluatedProgram",
     "EvaluatedStep",
@@ -34,4 +35,5 @@ __all__ = [
     "posture_at",
     "station_at",
     "tool_in_flange",
+    "whole_load",
 ]

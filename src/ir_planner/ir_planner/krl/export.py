@@ -39,7 +39,7 @@ from ir_planner.krl.execution import drive
 from ir_planner.krl.geometry import tool_in_flange
 from ir_planner.krl.inline_moves import fitted_moves
 from ir_planner.krl.judged import Judge, ReadBack, called, points_of
-from ir_planner.krl.makes import Make, make_of
+from ir_planner.krl.makes import Make, make_of, make_remark
 from ir_planner.krl.strokes import deviation_along, fitted_path, one_after_the_other
 from ir_planner.krl.surroundings import Surroundings, payload_of
 from ir_planner.krl.timed_splines import DEVIATION_MAX, deviation_in_time, fitted_spline
@@ -65,7 +65,8 @@ class KrlExport:
 
     plc_table, plc_text: the pauses that the PLC spends in power modes, as CSV and as structured
     text; "" where it spends none. seconds, joules: of the whole cycle with its pauses. steps: of
-    each step of the plan what the controller drives, as its comment in the source says.
+    each step of the plan what the controller drives, as its comment in the source says. remark:
+    that the robot is another maker's, "" where it isn't.
     """
 
     source: str
@@ -78,6 +79,7 @@ class KrlExport:
     seconds: float = 0.0
     joules: float = 0.0
     steps: tuple[PlannedMovement, ...] = ()
+    remark: str = ""
 
 
 def export(
@@ -159,6 +161,7 @@ class _Job:
             sum(one.duration for one in after),
             sum(one.report.energy for one in after),
             tuple(after),
+            make_remark(self._style, self._scene.cell.robot),
         )
 
     def _fitted(self, step: PlannedMovement) -> tuple[list[_Motion], int]:
@@ -313,6 +316,8 @@ class _Job:
             "not proved: the way from where the robot stands to the first point; another override, "
             "cell, tool or load",
         ]
+        if remark := make_remark(self._style, cell.robot):
+            lines.append(f"note: {remark}")
         if cell_hash := next(
             (one.report.cell_hash for one in self._steps if one.report.cell_hash), ""
         ):

@@ -5,6 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
+from ir_description import RobotModel
 from ir_krl import (
     PLC_THERE,
     Attached,
@@ -104,6 +105,20 @@ class Ur:
     def followed(self, texts: Texts, scene: PlanningScene) -> Followed:
         """The script."""
         return follow_urscript(texts.source, "export.script", np.eye(4), self._limits)
+
+
+_MAKERS: dict[str, str] = {"KUKA": "KRL", "Universal Robots": "URScript"}
+
+
+def make_remark(style: Style, robot: RobotModel) -> str:
+    """A sentence where a program is written in the language of another maker's controller than the
+    robot's; "" where it isn't, or nobody knows whose the robot is.
+    """
+    language = "URScript" if style == "urscript" else "KRL"
+    own = next((_MAKERS[maker] for maker in _MAKERS if robot.title.startswith(maker)), language)
+    if own == language:
+        return ""
+    return f"the cell's robot is a {robot.title}, whose controller takes {own}, not {language}"
 
 
 def joint_limits(scene: PlanningScene) -> JointLimits:

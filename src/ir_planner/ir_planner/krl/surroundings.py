@@ -20,7 +20,8 @@ from ir_values.arrays import FloatArray
 # Loads as KRL gives them, in KUKA's flange: mass, centre, and the axes of inertia.
 
 _TINY = 1e-6  # kg, kg m^2: what carries nothing still needs a mass
-_NAMED = "$LOAD"
+LOAD_NAME = "$LOAD"
+"""Of a load that a program gives by $LOAD."""
 _SAME = 0.005  # share of the mass, and kg, m: two loads that are the same but for rounding
 
 
@@ -56,7 +57,15 @@ def same_payload(a: Payload, b: Payload) -> bool:
 
 def is_named(load: Load) -> bool:
     """Whether a load is what a program's $LOAD says."""
-    return load.name == _NAMED
+    return load.name == LOAD_NAME
+
+
+def whole_load(loads: tuple[Load, ...], place: Place) -> Load:
+    """Loads as one, with their shapes and watts."""
+    if len(loads) == 1:
+        return loads[0]
+    (one,) = loads_with(payload_of(loads), loads, place)
+    return one
 
 
 def loads_with(payload: Payload, loads: tuple[Load, ...], place: Place) -> tuple[Load, ...]:
@@ -72,7 +81,7 @@ def loads_with(payload: Payload, loads: tuple[Load, ...], place: Place) -> tuple
     inertia = portable.matmul(axes, np.diag(moments), axes.T)
     try:
         one = Load(
-            _NAMED,
+            LOAD_NAME,
             "tool",
             max(payload.mass, _TINY),
             portable.matmul(back, np.array(payload.centre)),

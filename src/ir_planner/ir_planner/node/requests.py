@@ -306,10 +306,9 @@ class Requests:
             movements = self.planner.programs.get(request.program_id).movements
         else:
             movements = one_movement(self.planner, request.trajectory_id)
-        fill_export(
-            response, export_krl(self.planner, movements, request.name, style=request.style)
-        )
-        return Status.success()
+        written = export_krl(self.planner, movements, request.name, style=request.style)
+        fill_export(response, written)
+        return Status.success(written.remark)
 
     def evaluate_trajectory(self, request: Any, response: Any) -> Status:
         """What a trajectory costs and where it first breaks a bound."""

@@ -275,8 +275,8 @@ def planned_pause(pause: Pause, times: TransitionTimes) -> PlannedMovement:
     mode = pause.requested
     if pause.requested == AUTO:
         mode = DEEPER.join(step.rest.name for step in rests.known(pause.seconds)[1]) or MOTORS
-    elif not np.isfinite(_rested(pause, mode, rests)) and rests.cost((), pause.seconds)[1] > 0.0:
-        mode = BRAKES
+    elif not np.isfinite(_rested(pause, mode, rests)):
+        mode = BRAKES if rests.cost((), pause.seconds)[1] > 0.0 else MOTORS
     return _spent(pause, mode, rests)
 
 
@@ -318,9 +318,7 @@ def _rested(pause: Pause, mode: str, rests: Rests) -> float:
 
 def _spent(pause: Pause, mode: str, rests: Rests) -> PlannedMovement:
     energy = _rested(pause, mode, rests)
-    if not np.isfinite(
-        energy
-    ):  # on motors, also where it is asked for by name though it is too short
+    if not np.isfinite(energy):  # on motors
         energy = rests.cost((), pause.seconds)[0]
     report = TrajectoryReport(
         duration=pause.seconds, energy=energy, base_energy=energy, certified=True

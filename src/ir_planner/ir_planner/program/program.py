@@ -20,6 +20,7 @@ from ir_planner.program.choice import Choice, Steps
 from ir_planner.program.cycle_plan import front_of
 from ir_planner.program.more_work import best_answer
 from ir_planner.program.movements import Movements
+from ir_planner.program.pauses import AUTO, MOTORS
 from ir_planner.program.request import (
     ProgramPlan,
     ProgramRequest,
@@ -143,6 +144,7 @@ def _blocked(q: FloatArray, both: tuple[Context, Context]) -> str:
 # of, each with what is held at that moment.
 
 _SENTENCES = 4  # of a failure
+_SAME_PAUSE = 1e-6  # s
 _ENDED = "{}; {} ended before all was tried: more of it may help"
 _SLOW = (
     "objective energy counts the drives alone, which take least when they are slow: the "
@@ -189,7 +191,7 @@ def _answered(
     plan = replace(_planned(steps), gap=answer.gap)
     for log in logs_of(choice, steps):
         context.journal.keep(log)
-    said = _beyond_rests(steps, request)
+    said = [*_other_rests(steps, route, request), *_beyond_rests(steps, request)]
     if choice.parts and request.options.objective == "energy" and cycle <= 0.0:
         said = [_SLOW.format(plan.report.duration - standing), *said]
     if said:
@@ -209,6 +211,26 @@ def _answered(
             front = front_of(choice, request.front_points, standing, progress)
         plan = replace(plan, front=tuple(_planned(point.steps) for point in front))
     return plan
+
+
+def _other_rests(steps: Steps, route: Route, request: ProgramRequest) -> list[str]:
+    """Of each pause that can't be spent in the mode that it asks for: where it is planned."""
+    times = request.settings.transitions
+    asked = [placed.step for placed in route.steps if placed.step.kind == "PAUSE"]
+    pausing = iter(step for step in steps if step.is_pause)
+    said = []
+    for one in asked:
+        fits = (step for step in pausing if abs(step.duration - one.dwell) <= _SAME_PAUSE)
+        given = next(fits, None)
+        mode = one.power_mode
+        if given is None or mode in (AUTO, given.power_mode):
+            continue
+        reason = "longer than the controller stands on motors"
+        if mode != MOTORS:
+            needed = times.enter(mode) + times.minimum_stay(mode) + times.leave(mode)
+            reason = f"too short for {mode}, which takes {needed:g} s to enter, stay in and leave"
+        said.append(f"a pause of {one.dwell:g} s is {reason}: it is planned in {given.power_mode}")
+    return list(dict.fromkeys(said))
 
 
 def _beyond_rests(steps: Steps, request: ProgramRequest) -> list[str]:

@@ -157,7 +157,7 @@ class Scenes:
     power: PowerData
     drives: Drives = field(default_factory=Drives)
     bare: bool = False
-    _built: dict[tuple[str, tuple[tuple[str, str], ...], Doors], PlanningScene] = field(
+    _built: dict[tuple[str, str, tuple[tuple[str, str], ...], Doors], PlanningScene] = field(
         default_factory=dict
     )
 
@@ -171,10 +171,10 @@ class Scenes:
 
     def of(self, places: PartPlaces, doors: Doors = ()) -> PlanningScene:
         """The scene while the parts are at `places`."""
-        key = (places.held, tuple(sorted(places.lying.items())), doors)
+        key = (places.held, places.carrying, tuple(sorted(places.lying.items())), doors)
         if key not in self._built:
             cell = cell_in(with_parts(self.cell, places), dict(doors))
-            loads = () if self.bare else cell.loads(places.held)
+            loads = () if self.bare else cell.loads_at(places)
             self._built[key] = PlanningScene(cell, loads, self.power, self.drives)
         return self._built[key]
 

@@ -347,6 +347,8 @@ def scene_with(
 
     Raises UnknownNameError (the known loads) or RequestError (two parts at once).
     """
+    if load in [one.name for one in cell.whole_loads]:
+        return PlanningScene(cell, (cell.whole_load(load),), power, drives or Drives())
     names = [] if load == NO_LOAD else load.split(LOAD_SEPARATOR)
     tool = {cell.tool.name: cell.tool} if cell.tool is not None else {}
     held = [name for name in names if name not in tool]
