@@ -362,3 +362,27 @@ def test_a_program_has_the_work_of_one_movement_for_each_of_its_steps(demo_cell:
         for stations in (("park",), ("park", "home", "park"))
     )
     assert one <= most < three <= 3 * most
+
+
+@pytest.mark.parametrize(
+    ("seconds", "mode", "planned", "said"),
+    [
+        (60.0, "HIBERNATION", "STAND_ON_BRAKES", "a pause of 60 s is too short for HIBERNATION"),
+        (1.0, "BUS_POWER_OFF", "STAND_ON_MOTORS", "a pause of 1 s is too short for BUS_POWER_OFF"),
+        (100.0, "STAND_ON_MOTORS", "STAND_ON_BRAKES", "longer than the controller stands on"),
+        (90.0, "BUS_POWER_OFF", "BUS_POWER_OFF", ""),
+        (60.0, "AUTO", "STAND_ON_BRAKES", ""),
+    ],
+)
+def test_a_pause_that_is_planned_in_another_mode_is_said(
+    seconds: float, mode: str, planned: str, said: str
+) -> None:
+    cell = load_cell("open")
+    home = ProgramStep("POSTURE", "home")
+    pause = ProgramStep("PAUSE", dwell=seconds, power_mode=mode)
+    planner = Planner(replace(cell, program=(home, pause)), clock=lambda: 0.0)
+    plan = planner.plan_program(start=planner.cell.posture("park"))
+    (rest,) = (step for step in plan.movements if step.is_pause)
+    assert rest.power_mode == planned
+    assert said in plan.status.message
+    assert ("it is planned in" in plan.status.message) == bool(said)

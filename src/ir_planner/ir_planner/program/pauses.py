@@ -268,15 +268,16 @@ class Pause:
 
 def planned_pause(pause: Pause, times: TransitionTimes) -> PlannedMovement:
     """In the mode that is asked for, where the pause is long enough for it, the sequence of least
-    energy (AUTO), or on motors; longer than the controller stands on motors: on brakes, which it
-    would close anyway, so that they are open again in time.
+    energy (AUTO), or on motors ("" where nothing is asked for); longer than the controller stands
+    on motors: on brakes, which it would close anyway, so that they are open again in time.
     """
     rests = rests_at(pause.q, pause.scene, times)
     mode = pause.requested
     if pause.requested == AUTO:
         mode = DEEPER.join(step.rest.name for step in rests.known(pause.seconds)[1]) or MOTORS
     elif not np.isfinite(_rested(pause, mode, rests)):
-        mode = BRAKES if rests.cost((), pause.seconds)[1] > 0.0 else MOTORS
+        closed = rests.cost((), pause.seconds)[1] > 0.0
+        mode = BRAKES if closed else mode and MOTORS
     return _spent(pause, mode, rests)
 
 
