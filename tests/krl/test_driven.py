@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -242,3 +243,66 @@ def test_a_time_block_is_as_slow_as_the_override(
         steps, _ = drive(program, planner.scene("none"), planner.cell.machine_home)
         took.append(sum(step.trajectory.duration for step in steps) * override / 100)
     assert took[1:] == pytest.approx(took[:1] * 2, rel=5e-3)
+
+
+# A tool that stands in the cell: the frame is that of the tool in the workpiece at the flange
+
+WORKPIECE = (-250.0, 120.0, 400.0, 20.0, -170.0, 10.0)
+FIXED = (1200.0, 700.0, 600.0, 30.0, 5.0, -8.0)
+
+
+def matrix(values: tuple[float, ...]) -> np.ndarray:
+    found = np.eye(4)
+    found[:3, :3] = rotation_from_abc(values[3:])
+    found[:3, 3] = 1e-3 * np.array(values[:3])
+    return found
+
+
+def spelled(values: Any) -> str:
+    return ",".join(f"{n} {v:.9f}" for n, v in zip("XYZABC", values, strict=False))
+
+
+def in_workpiece(arm: Arm, q: np.ndarray) -> np.ndarray:
+    """Where the fixed tool is, seen from the workpiece."""
+    held = arm.flange(q[None])[0] @ matrix(WORKPIECE)
+    return np.asarray(np.linalg.solve(held, matrix(FIXED)))
+
+
+def taught(arm: Arm, q: np.ndarray) -> str:
+    pose = in_workpiece(arm, q)
+    values = (*(1e3 * pose[:3, 3]), *abc_from_rotation(pose[:3, :3]))
+    status, turn = status_turn(arm.scene.chain, q)
+    return f"{spelled(values)},S {status},T {turn}"
+
+
+DIRECT = f"$TOOL={{{spelled(WORKPIECE)}}}\n$BASE={{{spelled(FIXED)}}}\n$IPO_MODE=#TCP\n"
+INLINE = (
+    f"TOOL_DATA[3]={{{spelled(WORKPIECE)}}}\nBASE_DATA[5]={{{spelled(FIXED)}}}\n"
+    "FP1={TOOL_NO 3,BASE_NO 5,IPO_FRAME #TCP}\nFDAT_ACT=FP1\nBAS(#FRAMES)\n"
+)
+
+
+@pytest.mark.parametrize("frames", [DIRECT, INLINE])
+def test_a_tool_that_stands_in_the_cell(
+    frames: str, planner: Planner, followed: Follow, home: np.ndarray
+) -> None:
+    """Law: a taught point is reached, $POS_ACT shows it, a LIN is straight in the workpiece."""
+    arm = Arm(planner.scene("none"))
+    first, second = (home + np.array(one) for one in ([0.3, 0.2, 0.1, 0.2, 0.5, 0.1], [0.1] * 6))
+    program = followed(
+        f"{frames}PTP XHOME\nPTP {{{taught(arm, first)}}}\nPTP {{{taught(arm, second)}}}\n"
+        "$VEL.CP=0.2\nLIN_REL {X 60,Y -90}\nHERE=$POS_ACT\nPTP XHOME\nPTP HERE",
+        kinematics=arm,
+    )
+    one, two, line, _, again = steps_of(program, planner)
+    assert np.abs(one.positions[-1] - first).max() < 1e-6
+    assert np.abs(two.positions[-1] - second).max() < 1e-6
+    times = np.linspace(0.0, line.duration, 400)
+    places = np.array([in_workpiece(arm, q)[:3, 3] for q in line.sample(times).q])
+    assert places[-1] - places[0] == pytest.approx([0.06, -0.09, 0.0], abs=1e-6)
+    along = (places - places[0]) @ (places[-1] - places[0])
+    straight = places[0] + np.outer(along, places[-1] - places[0]) / along[-1]
+    assert np.linalg.norm(places - straight, axis=1).max() < 1e-5
+    speed = np.linalg.norm(np.gradient(places, times, axis=0), axis=1)
+    assert speed[100:300].max() == pytest.approx(0.2, rel=5e-3)
+    assert np.abs(again.positions[-1] - line.positions[-1]).max() < 1e-6

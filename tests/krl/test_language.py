@@ -137,11 +137,7 @@ REFUSED = {
     "LIN to axis angles": ("LIN {A1 0}", "1:1", "LIN goes to a frame"),
     "a speed of nothing": ("$VEL.CP=0\nLIN {X 1}", "2:1", "$VEL.CP is 0; it must be above 0"),
     "a share above all": ("$VEL_AXIS[2]=120\nPTP {A1 0}", "2:1", "$VEL_AXIS is 120 %"),
-    "a tool that stands in the cell": (
-        "$IPO_MODE=#TCP",
-        "1:1",
-        "a tool that stands in the cell isn't read",
-    ),
+    "an interpolation of nothing": ("$IPO_MODE=#NOBODY", "1:1", "it is #BASE or #TCP"),
     "EXIT outside of a loop": ("EXIT", None, "EXIT stands outside of a loop"),
     "a REAL beyond its range": ("WAIT SEC 1E400", "1:10", "a REAL is at most"),
     "an INT beyond its range": ("WAIT SEC 99999*99999", "1:10", "an INT is at most 2147483647"),

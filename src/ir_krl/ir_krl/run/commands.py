@@ -5,10 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
+import numpy as np
+
+from ir_kernels import portable
 from ir_krl.errors import Place
 from ir_values.arrays import FloatArray
 
 Kind = Literal["ptp", "lin", "circ", "spl"]
+
+
+def _inverse(pose: FloatArray) -> FloatArray:
+    """The inverses of poses (..., 4, 4)."""
+    turned = np.swapaxes(pose[..., :3, :3], -1, -2)
+    found = np.zeros_like(pose)
+    found[..., :3, :3] = turned
+    found[..., :3, 3] = -(turned * pose[..., None, :3, 3]).sum(axis=-1)
+    found[..., 3, 3] = 1.0
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +33,9 @@ class Target:
     those
     that are given: the rest stays as it is. status, turn: S and T, None where not given. relative:
     from where the robot stands; in_tool: in the directions of the tool instead of the base's. base,
-    tool: poses (4, 4) [m] of $BASE in the robot's foot and of $TOOL at the flange.
+    tool: poses (4, 4) [m] of $BASE in the robot's foot and of $TOOL at the flange. external: the
+    tool stands in the cell, at $BASE, and $TOOL is the workpiece at the flange ($IPO_MODE #TCP):
+    the frame is that of the tool in the workpiece.
     """
 
     axes: dict[str, float] | None
@@ -32,6 +47,22 @@ class Target:
     base: FloatArray
     tool: FloatArray
     name: str = ""
+    external: bool = False
+
+    def flange(self, pose: FloatArray) -> FloatArray:
+        """The flange (..., 4, 4) [m] in the robot's foot where the tool is at `pose` (..., 4, 4) in
+        the base, or in the workpiece.
+        """
+        led = _inverse(pose) if self.external else pose
+        return np.asarray(portable.matmul(self.base, led, _inverse(self.tool)))
+
+    def pose(self, flange: FloatArray) -> FloatArray:
+        """The converse."""
+        if self.external:
+            return np.asarray(
+                portable.matmul(_inverse(portable.matmul(flange, self.tool)), self.base)
+            )
+        return np.asarray(portable.matmul(_inverse(self.base), flange, self.tool))
 
 
 @dataclass(frozen=True)

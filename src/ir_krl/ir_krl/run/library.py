@@ -254,12 +254,9 @@ class Library:
         self._take_tool(round(self._noted("FDAT_ACT", "TOOL_NO", 0.0, place)))
         self._take_base(round(self._noted("FDAT_ACT", "BASE_NO", 0.0, place)))
         mode = noted.fields.get("IPO_FRAME", Symbol("BASE"))
-        if mode != Symbol("BASE"):
-            raise KrlRunError(
-                f"IPO_FRAME {kind_of(mode)}: a tool that stands in the cell isn't read, teach the "
-                "motion with the tool at the flange",
-                place,
-            )
+        if mode not in (Symbol("BASE"), Symbol("TCP")):
+            raise KrlRunError(f"IPO_FRAME is {kind_of(mode)}: it is #BASE or #TCP", place)
+        self._set("$IPO_MODE", mode)
 
     def _take_tool(self, index: int) -> None:
         self._set("$TOOL", self._tool(index))

@@ -78,15 +78,11 @@ class Assigning(Control):
             self.memory.set(((other, None),), follows, where)
 
     def _check_effect(self, name: str, value: Value, where: Place) -> None:
-        """Note what isn't modelled of a system variable. Raises KrlRunError for a tool that stands
-        in the cell.
+        """Note what isn't modelled of a system variable. Raises KrlRunError for an interpolation
+        that no controller has.
         """
-        if name == "$IPO_MODE" and value != Symbol("BASE"):
-            raise KrlRunError(
-                f"$IPO_MODE {kind_of(value)}: a tool that stands in the cell isn't read, teach the "
-                "motion with the tool at the flange",
-                where,
-            )
+        if name == "$IPO_MODE" and value not in (Symbol("BASE"), Symbol("TCP")):
+            raise KrlRunError(f"$IPO_MODE is {kind_of(value)}: it is #BASE or #TCP", where)
         known = MODELLED | HARMLESS | SITUATION.keys()
         if name.startswith("$") and name not in known:
             self.note_at(where, f"{name} isn't modelled", _effect_of(name))
@@ -195,7 +191,7 @@ class Motions:
         """Where an expression leads to."""
         place = place_of(tree, self._expressions.file)
         if tree.data == "access" and str(tree.children[0]) in STANDING:
-            return self._here(str(tree.children[0]), place)
+            return self.here(str(tree.children[0]), place)
         value = self._expressions.value(tree)
         if isinstance(value, Unknown):
             raise KrlRunError(value.refusal("a motion"), place)
@@ -205,7 +201,10 @@ class Motions:
         base, tool = self.frames(place)
         name = str(tree.children[0]) if tree.data == "access" else ""
         if is_axis_value(value):
-            return Target(axes(value, place), None, None, None, relative, in_tool, base, tool, name)
+            given = axes(value, place)
+            return Target(
+                given, None, None, None, relative, in_tool, base, tool, name, self._external_tool
+            )
         frame = components(value, FRAME_NAMES, place)
         if not frame:
             raise KrlRunError(f"a motion can't go to {kind_of(value)}", place)
@@ -215,7 +214,9 @@ class Motions:
             integer(value.fields[part], part, place) if part in value.fields else None
             for part in ("S", "T")
         )
-        return Target(None, frame, status, turn, relative, in_tool, base, tool, name)
+        return Target(
+            None, frame, status, turn, relative, in_tool, base, tool, name, self._external_tool
+        )
 
     def _check_components(self, value: Structure, relative: bool, place: Place) -> None:
         """Raise KrlRunError for a component that no position has; note external axes."""
@@ -237,7 +238,7 @@ class Motions:
                 text = f"{name} stays at {now:g}: external axes are taken as part of the cell"
                 self._noted(place, text, Effect.PLACES)
 
-    def _here(self, name: str, place: Place) -> Target:
+    def here(self, name: str, place: Place) -> Target:
         """Where the robot stands: PTP $AXIS_ACT, as programs begin."""
         if name.startswith("$AXIS"):
             axis: dict[str, float] | None = {"A1": 0.0}
@@ -245,7 +246,12 @@ class Motions:
         else:
             axis = None
             frame = dict.fromkeys(FRAME_NAMES[:3], 0.0)
-        return Target(axis, frame, None, None, True, False, *self.frames(place), name)
+        base, tool = self.frames(place)
+        return Target(axis, frame, None, None, True, False, base, tool, name, self._external_tool)
+
+    @property
+    def _external_tool(self) -> bool:
+        return self._memory.peek("$IPO_MODE") == Symbol("TCP")
 
     def frames(self, place: Place) -> tuple[FloatArray, FloatArray]:
         """$BASE and $TOOL as poses (4, 4) [m]."""

@@ -249,8 +249,7 @@ class _Run(Moving):
         if name in AXES_NOW:
             memory.hold(name, self.standing.axes())
         elif name in PLACE_NOW:
-            base, tool = self._motions.frames(place)
-            memory.hold(name, self.standing.place(base, tool))
+            memory.hold(name, self.standing.place(self._motions.here(name, place)))
 
     def _at(self, file: str) -> None:
         """Statements of this file run from here on."""

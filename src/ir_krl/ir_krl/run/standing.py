@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ir_description.poses import inverse, pose_of, rotation_from_abc
+from ir_description.poses import pose_of, rotation_from_abc
 from ir_krl.errors import Place
 from ir_krl.run.commands import Command, Motion, SplineBlock, Target
 from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES, Structure, Value, frame
@@ -58,8 +58,8 @@ class Standing:
         angles = dict(zip(AXIS_NAMES, map(float, np.degrees(q)), strict=True))
         return Structure({**angles}, "E6AXIS")
 
-    def place(self, base: FloatArray, tool: FloatArray) -> Value | None:
-        """$POS_ACT with $BASE and $TOOL (4, 4) [m]; None where it isn't known."""
+    def place(self, frames: Target) -> Value | None:
+        """$POS_ACT with the base and the tool of `frames`; None where it isn't known."""
         target = self._last()
         if target is not None and _is_whole(target):
             flange = _written(target)
@@ -72,7 +72,7 @@ class Standing:
             flange = self.kinematics.flange(q[None])[0]
             status, turn = self.kinematics.status_turn(q)
             state = {"S": status, "T": turn}
-        found = frame(inverse(base) @ flange @ tool)
+        found = frame(frames.pose(flange))
         return Structure({**found.fields, **state}, "E6POS")
 
     def _last(self) -> Target | None:
@@ -122,4 +122,4 @@ def _written(target: Target) -> FloatArray:
     given = target.frame or {}
     xyz = [_MM * given[name] for name in FRAME_NAMES[:3]]
     pose = pose_of(xyz, rotation_from_abc([given[name] for name in FRAME_NAMES[3:]]))
-    return np.asarray(target.base @ pose @ inverse(target.tool))
+    return target.flange(pose)

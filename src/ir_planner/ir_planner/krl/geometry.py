@@ -97,7 +97,7 @@ class Arm:
 
     def tool_poses(self, target: Target, q: FloatArray) -> FloatArray:
         """The same (N, 4, 4) of q (N, n)."""
-        return np.asarray(portable.matmul(inverse(target.base), self.flange(q), target.tool))
+        return target.pose(self.flange(q))
 
     def pose(self, target: Target, now: FloatArray) -> FloatArray:
         """The target's frame as a pose (4, 4) [m] in its base; what it leaves open is as in `now`
@@ -132,7 +132,7 @@ class Arm:
         """All configurations (m, n) within the limits for each tool pose (N, 4, 4) in the target's
         base.
         """
-        tcp = self.tcp(portable.matmul(target.base, poses, inverse(target.tool)))
+        tcp = self.tcp(target.flange(poses))
         found = self.scene.inverse_kinematics.solve(tcp)
         return [found.of_pose(k) for k in range(len(poses))]
 

@@ -6,7 +6,6 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.optimize import linprog
 
-from ir_description.poses import inverse
 from ir_kernels import portable
 from ir_krl import Blend, KrlMotionError, Motion, Speeds, SplineBlock, Target, TimeBlock
 from ir_msgs_py.cartesian import (
@@ -246,8 +245,10 @@ def spline_poses(block: SplineBlock, start: FloatArray, arm: Arm) -> tuple[Float
     for part in block.parts:
         if part.kind == "ptp":
             raise KrlMotionError("a SPLINE has SPL, SLIN and SCIRC parts only, no SPTP", part.place)
-        if not np.array_equal(part.target.base, first.target.base) or not np.array_equal(
-            part.target.tool, first.target.tool
+        if (
+            not np.array_equal(part.target.base, first.target.base)
+            or not np.array_equal(part.target.tool, first.target.tool)
+            or part.target.external != first.target.external
         ):
             raise KrlMotionError("a SPLINE keeps its tool and its base", part.place)
         poses += _part(part, poses[-1], arm)
@@ -358,13 +359,15 @@ def tool_spline(block: SplineBlock, start: FloatArray, arm: Arm) -> ToolMotion |
 
 def _in_cell(poses: FloatArray, target: Target, arm: Arm) -> FloatArray:
     """The cell's tcp (N, 4, 4) where the target's tool has `poses` (N, 4, 4) in its base."""
-    return arm.tcp(portable.matmul(target.base, poses, inverse(target.tool)))
+    return arm.tcp(target.flange(poses))
 
 
 def _described(target: Target, turning: float, speed: float, arm: Arm) -> bool:
     """Whether the cell's tcp draws what the program's tool does, at a speed that a path may
     have.
     """
+    if target.external:
+        return False
     own = tool_in_flange(arm.scene.chain.tcp)
     same = turning < _EVEN or float(np.abs(target.tool - own).max()) < _SAME_TOOL
     return same and SPEED_MIN <= speed <= SPEED_MAX
