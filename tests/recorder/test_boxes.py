@@ -15,6 +15,7 @@ from typing import Any
 import axe_core_python
 import pytest
 
+from ir_description import load_cell
 from ir_msgs_py.savings import BeforeAfter
 from ir_planner import Planner
 from ir_planner.before_after import before_after_common
@@ -26,6 +27,13 @@ from ir_recorder.report.program_comparison import before_after_html
 from ir_studies.arena.figures import Run
 from ir_studies.arena.page import page_html as arena_html
 from ir_studies.arena.settings import ArenaSettings, Entry
+from ir_studies.layout.page import page_html as layout_html
+from ir_studies.layout.placement import Known, Placement, payloads_of
+from ir_studies.layout.settings import LayoutSettings
+from ir_studies.layout.summary import Final
+from ir_studies.statistics.findings import findings_of
+from ir_studies.statistics.outputs import page_html as statistics_html
+from ir_studies.statistics.settings import StatisticsSettings
 
 BOXES = Path(__file__).with_name("page_boxes.js").read_text()
 AXE = (Path(axe_core_python.__file__).parent / "axe.min.js").read_text(encoding="utf-8")
@@ -87,6 +95,53 @@ def arena(_: Analysis) -> str:
     return arena_html(runs, settings)
 
 
+def statistics(_: Analysis) -> str:
+    rows = []
+    for k in range(12):
+        pair: dict[str, Any] = {"start": "a", "goal": "b"}
+        for timing, share in (("synchronous", 0.0), ("asynchronous", 0.01 * (k % 5 - 2))):
+            joules = 12_345.6 * (1.0 + share)
+            pair[timing] = {
+                **{"solved": k != 3, "timing": timing, "trajectory_id": f"{timing}{k}"},
+                **{"message": "no path found between the two", "duration_s": 2.0 + share},
+                **{"direct_j": joules, "indirect_j": 0.95 * joules, "predicted_j": 0.95 * joules},
+                **{"predicted_low_j": 0.95 * joules, "predicted_high_j": 1.2 * joules},
+                **{"peak_w": 5000.0, "path_m": 4.0, "movement_cost": 13_460.0},
+                "torque_share": 0.7,
+            }
+        rows.append(pair)
+    return statistics_html(findings_of(rows), StatisticsSettings("open"))
+
+
+def layout(_: Analysis) -> str:
+    """Three placements of a robot, of which one is impossible."""
+    settings = LayoutSettings(
+        cell="open",
+        stations=("p1", "home"),
+        base={"x": (-0.5, 0.5), "y": (-0.5, 0.5)},
+        keep=1,
+        seeds=1,
+    )
+    cell = load_cell("open")
+    conditions = settings.conditions
+    known = []
+    for x, solved in ((0.0, True), (0.3, True), (-0.4, False)):
+        placement = Placement({"base.x": x, "base.y": 0.5 * x})
+        row = {
+            **{"solved": solved, "energy_j": 1000.0 - x, "moving_j": 900.0, "duration_s": 4.0},
+            **{"clearance_m": 0.02, "cost_j": 2000.0 - 100.0 * x, "robots": [0.0, 1.0]},
+            **{"message": "too near the table", "kind": "station"},
+            "coarse": [1900.0] * len(payloads_of(conditions)),
+        }
+        plans = dict.fromkeys(conditions, row) if solved else {}
+        known.append(Known(placement, row, plans, conditions))
+    finals = [
+        [Final(one.placement, condition, (row,)) for condition, row in one.plans.items()]
+        for one in known[:2]
+    ]
+    return layout_html(known, finals, settings, cell)
+
+
 PAGES: dict[str, Callable[[Analysis], str]] = {
     "report": report,
     "empty report": empty,
@@ -94,6 +149,8 @@ PAGES: dict[str, Callable[[Analysis], str]] = {
     "fleet": fleet,
     "before and after": before_and_after,
     "arena": arena,
+    "statistics": statistics,
+    "layout": layout,
 }
 
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+import axe_core_python
 import numpy as np
 import pytest
 
@@ -29,6 +30,13 @@ CONTROLS = Path(__file__).with_name("page_controls.js").read_text().strip().spli
 DESK = (1400, 600)
 TABLET = (768, 1024)
 PHONE = (390, 844)
+PAPER = (703, 1047)
+BOXES = Path(__file__).with_name("page_boxes.js").read_text()
+AXE = (Path(axe_core_python.__file__).parent / "axe.min.js").read_text(encoding="utf-8")
+FOUND = """axe.run(document, {resultTypes: ['violations']}).then(
+    (found) => found.violations.map((one) =>
+        `${one.id}: ${one.nodes.slice(0, 3).map((node) => node.html.slice(0, 120)).join(' | ')}`))
+"""
 WAIT_SECONDS = 60.0  # a busy machine
 EVIL = "</script><img src=x onerror=document.title='EVIL'><b>&quot;</b>"
 
@@ -347,4 +355,24 @@ def test_the_live_view_on_a_phone_only_watches_without_the_token(
     page.run("document.getElementById('hold').click()")
     assert pressed == []
     assert page.faults == []
+    page.close()
+
+
+@pytest.mark.parametrize("size", [DESK, PHONE, PAPER])
+def test_nothing_of_the_live_view_is_cut_overlaps_or_scrolls_and_axe_finds_nothing(
+    browser: Any, live: tuple[LiveServer, Stream, list[tuple[str, bool]]], size: tuple[int, int]
+) -> None:
+    server, _, _ = live
+    page = browser.open(server.address, *size, touch=size == PHONE, dark=size == PHONE)
+    page.wait(
+        "document.getElementById('no-motion').hidden && document.querySelector('[data-bit=ab]')"
+    )
+    if size == PAPER:
+        page.call("Emulation.setEmulatedMedia", media="print")
+        page.run("dispatchEvent(new Event('beforeprint'))")
+    page.frame()
+    assert page.run(BOXES) == []
+    if size != PAPER:
+        page.run(f"{AXE}; 0")
+        assert page.run(FOUND) == []
     page.close()

@@ -38,6 +38,7 @@ TRANSITION = "#c3ccd6"
 PICTURE_START = b"\x89PNG\r\n\x1a\n"
 MOST_POINTS = 4000  # more than twice the picture's pixels
 
+_LABELS = 150.0  # pt: height of the drawing of joules, shared by the names of its rows
 _LINE = 150  # characters of a line below the drawings: wider ones are cut
 
 
@@ -107,7 +108,8 @@ def _joules(axes: Axes, analysis: Analysis) -> None:
     planned = [result.step.movement.report.energy for result in moved]
     axes.barh(rows - 0.18, found, height=0.36, color="#e8590c", label=analysis.recording.origin)
     axes.barh(rows + 0.18, planned, height=0.36, color="#a9b4c0", label="predicted")
-    axes.set_yticks(rows, [f"{r.step.index + 1} {r.step.label}" for r in moved], fontsize=8)
+    size = min(8.0, _LABELS / max(len(moved), 1))
+    axes.set_yticks(rows, [f"{r.step.index + 1} {r.step.label}" for r in moved], fontsize=size)
     axes.invert_yaxis()
     axes.set(xlabel="energy at the mains [J]", title="Joules per movement")
     _plain(axes)

@@ -43,7 +43,7 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str, kin
     caption: for screen readers, and the name of the CSV file that the page writes of it.
     """
     columns = "".join(
-        f'<th scope="col"{_number(head)}>{text(head.lstrip(">"))}</th>' if head else "<td></td>"
+        f'<th scope="col"{_number(head)}>{_words(head)}</th>' if head else "<td></td>"
         for head in heads
     )
     cells = [_cells(heads, row) for row in rows]
@@ -57,6 +57,11 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str, kin
         f'<div class="scroll" tabindex="0" role="region" aria-label="{text(caption)}"><table '
         f'class="{f"{kind} {wide}".strip()}">{named}{head}<tbody>{body}</tbody></table></div>'
     )
+
+
+def _words(head: str) -> str:
+    """A head, which may be broken where a long name has an underscore."""
+    return text(head.lstrip(">")).replace("_", "_<wbr>")
 
 
 def step_table(analysis: Analysis) -> str:

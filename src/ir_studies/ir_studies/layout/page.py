@@ -90,8 +90,14 @@ class PlanView:
         self._outlines = [("was", one) for one in outlines(given)]
         self._outlines += [("best", one) for one in (outlines(best) if best is not None else ())]
         around = max(_AROUND * float(np.ptp(places, axis=0).max()), _LEAST_M)
-        self._low = places.min(axis=0) - around
+        low = places.min(axis=0) - around
         high = places.max(axis=0) + around
+        for _, points in self._outlines:  # what stands at these places is seen as a whole
+            inside = (points >= low) & (points <= high)
+            if inside.all(axis=1).mean() > _MOSTLY:
+                low = np.minimum(low, points.min(axis=0))
+                high = np.maximum(high, points.max(axis=0))
+        self._low = low
         self.across, up = (float(one) for one in high - self._low)
         self._scale = (WIDTH - 2 * _MARGIN) / max(self.across, up / _TALLEST)
         self._height = self._scale * up + 2 * _MARGIN
@@ -151,6 +157,7 @@ _CHART = 340.0
 _HIGH = 190.0
 _LEFT = 52.0
 _BELOW = 30.0
+_MOSTLY = 0.5  # of the corners of an outline
 _MACHINE = "equipment."  # before the name of an owner that is one
 _SENTENCE = 300  # characters of a reason
 _HEADS = (

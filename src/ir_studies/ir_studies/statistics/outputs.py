@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ir_recorder.analysis.intervals import ALIKE, Mean
 from ir_recorder.report.files import write_output
-from ir_recorder.report.number_text import DASH, text
+from ir_recorder.report.number_text import DASH, significant, text
 from ir_recorder.report.page import PAGE_START
 from ir_recorder.report.step_table import write_columns
 from ir_recorder.report.tables import table
@@ -242,7 +242,10 @@ def _row(each: Comparison) -> tuple[str, ...]:
     return (
         text(each.name),
         str(each.pairs),
-        *(f"{level:.4g} {each.unit}" if math.isfinite(level) else DASH for level in each.levels),
+        *(
+            f"{significant(level, 4)} {each.unit}" if math.isfinite(level) else DASH
+            for level in each.levels
+        ),
         _with_interval(each.mean, "b" if each.shown else "span"),
         _with_interval(each.median, "span"),
         f"{each.less} / {equal} / {each.more}" if each.count else DASH,
