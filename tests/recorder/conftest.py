@@ -392,6 +392,12 @@ def new_run() -> Callable[[], Run]:
 
 
 @pytest.fixture(scope="session")
+def new_runs() -> Callable[[], Run]:
+    """The same, for recordings that a whole module reads; what their plans save is known."""
+    return lambda: Run(savings=[SAVINGS])
+
+
+@pytest.fixture(scope="session")
 def cell_yaml() -> str:
     return CELL_YAML
 

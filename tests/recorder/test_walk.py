@@ -1,0 +1,203 @@
+"""Law: figures of one name are rounded from one value, wherever they stand: every tile and table
+of report, comparison and fleet, their CSV and workbooks, and the sentences of a plan.
+"""
+
+from __future__ import annotations
+
+import csv
+import importlib.util
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ir_msgs.msg import PlannedMovement
+from ir_msgs_py.modes import Mode
+from ir_recorder import Analysis, analyse, findings, read_recording
+from ir_recorder.analysis.production import Production, demand_watts, levers, production_of
+from ir_recorder.report import report_html
+from ir_recorder.report.compare import comparison_html
+from ir_recorder.report.costs import Costs
+from ir_recorder.report.fleet import fleet_columns, fleet_html, member_of
+from ir_recorder.report.step_table import write_table
+
+
+def _reader() -> ModuleType:
+    path = Path(__file__).with_name("page_figures.py")
+    spec = importlib.util.spec_from_file_location("page_figures", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = sys.modules["page_figures"] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+READ = _reader()
+HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
+AWAY = np.radians([25.0, -70.0, 95.0, 0.0, 55.0, 20.0])
+SEEDS = range(4)
+
+
+def drawn(new_run: Callable[[], Any], seed: int) -> Any:
+    """A run of drawn length: without movements, of one motion, or of several and pauses."""
+    draw = np.random.default_rng(seed)
+    run = new_run()
+    run.rest(0.3, Mode.STAND_ON_MOTORS, HOME, "gripper")
+    movements = (0, 1, 2, 4)[seed]
+    for k in range(movements):
+        ends = (HOME, AWAY) if k % 2 == 0 else (AWAY, HOME)
+        step = PlannedMovement(kind="regional", from_station=f"s{k}", to_station=f"s{k + 1}")
+        run.move(float(draw.uniform(0.8, 2.0)), *ends, "gripper", step)
+    stands = HOME if movements % 2 == 0 else AWAY
+    for mode in ("STAND_ON_MOTORS", "BUS_POWER_OFF"):
+        run.pause(float(draw.uniform(0.3, 1.0)), Mode[mode], stands, "gripper", "home", mode)
+    return run
+
+
+@pytest.fixture(scope="module", params=SEEDS)
+def walked(
+    request: pytest.FixtureRequest,
+    new_runs: Callable[[], Any],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Analysis:
+    """Recordings of drawn programs, with pauses at full length or shortened."""
+    path = tmp_path_factory.mktemp("walk") / "robot.mcap"
+    recording = read_recording(drawn(new_runs, request.param).record(path))
+    facts = (("unshortened_pauses", "600 s, 1800 s"),) if request.param % 2 else ()
+    return analyse(replace(recording, facts=facts))
+
+
+def costs_of(seed: int) -> Costs:
+    draw = np.random.default_rng(seed).uniform
+    return Costs(price=draw(0.1, 0.4), shift_hours=draw(4.0, 8.0), demand_price=draw(10.0, 100.0))
+
+
+def quantities(analysis: Analysis, cycle: Production, costs: Costs) -> dict[str, float]:
+    """What the pages show under these names, computed once, here."""
+    cycles = costs.shift_hours * 3600.0 * costs.availability / cycle.seconds
+    year = cycles * costs.shifts_per_day * costs.days_per_year
+    price = costs.production_price / 3.6e6
+    found = {
+        "a year of such cycles": cycle.energy * year * price,
+        "costs a year": cycle.energy * year * price,
+        "robot: costs a year": cycle.energy * year * price,
+        f"{cycle.name}: a year": cycle.energy * year * price,
+        f"{cycle.name}: a shift": cycle.energy * cycles * price,
+        f"{cycle.name}: a cycle": cycle.energy,
+        "a cycle: robot": cycle.energy,
+        "robot: energy a part": cycle.energy / costs.parts_per_cycle,
+        "energy a year": cycle.energy * year,
+        "robot: energy a year": cycle.energy * year,
+        "all: energy a year": cycle.energy * year,
+        "robot: cycle": cycle.seconds,
+        "robot: largest quarter of an hour": demand_watts(analysis, cycle),
+        "peak power": analysis.peak_power,
+        "peak power: robot": analysis.peak_power,
+        "a year of such cycles: robot": cycle.energy * year * price,
+    }
+    for lever in levers(analysis):
+        found[f"{lever.name}: of a cycle, at most"] = lever.joules
+        found[f"{lever.name}: a year, at most"] = lever.joules * year * price
+        found[f"{lever.name}: a year, at most a year"] = lever.joules * year * price
+        found[f"{lever.name}: all a year"] = lever.joules * year
+    if cycle.savings is not None:
+        saved = abs(cycle.savings.total.saved) * year * price
+        found |= {
+            "saved together: a year": saved,
+            "saved by its plan, a year: robot": saved,
+            "robot: saved a year, predicted": saved,
+            "saved a year by plans, predicted": saved,
+        }
+    if analysis.program is not None:
+        found["program: robot"] = analysis.program.whole.energy
+        found["its time: robot"] = analysis.program.whole.seconds
+    return found
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_figures_of_one_name_are_one_value_on_every_page(walked: Analysis, seed: int) -> None:
+    costs = costs_of(seed)
+    checks = findings(walked)
+    cycle = production_of(walked)
+    member = member_of(walked, "robot")
+    assert cycle is not None
+    assert member is not None
+    own = replace(walked, recording=replace(walked.recording, path=Path("robot.mcap")))
+    other = replace(walked, recording=replace(walked.recording, path=Path("other.mcap")))
+    pages = {
+        "report": report_html(walked, checks, costs=costs),
+        "compare": comparison_html([(own, checks), (other, checks)], costs=costs),
+        "fleet": fleet_html([member], costs=costs),
+    }
+    shown = {name: READ.figures_of(page) for name, page in pages.items()}
+    exact = quantities(walked, cycle, costs)
+    seen = set()
+    for name, figures in shown.items():
+        assert len(figures) > 10, name
+        for figure in figures:
+            if figure.name in exact and figure.kind != "%":
+                seen.add(figure.name)
+                assert figure.shows(exact[figure.name]), (name, figure, exact[figure.name])
+    assert {"a year of such cycles", "robot: costs a year", "a cycle: robot"} <= seen
+    once = [figure for figures in shown.values() for figure in figures if _once(figure, figures)]
+    for figure in once:
+        alike = [each for each in READ.called(once, figure.name) if each.kind == figure.kind]
+        assert all(figure.agrees(each) for each in alike), (figure, alike)
+
+
+def _once(figure: Any, figures: list[Any]) -> bool:
+    """Whether one place of a page has this name: rows of one name are several steps or flows."""
+    return sum((each.name, each.kind) == (figure.name, figure.kind) for each in figures) == 1
+
+
+def test_steps_are_the_same_on_pages_and_in_files(walked: Analysis, tmp_path: Path) -> None:
+    page = report_html(walked, findings(walked))
+    every = READ.figures_of(page)
+    write_table([walked], tmp_path / "steps.csv")
+    write_table([walked], tmp_path / "steps_de.csv", locale="de")
+    with (tmp_path / "steps.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    with (tmp_path / "steps_de.csv").open(newline="", encoding="utf-8-sig") as file:
+        german = list(csv.DictReader(file, delimiter=";"))
+    assert len(rows) == len(german) == len(walked.steps)
+    origin = walked.recording.origin
+    for row, other, result in zip(rows, german, walked.steps, strict=True):
+        assert float(row["energy_j"]) == result.energy
+        assert float(other["energy_j"].replace(",", ".")) == result.energy
+        cells = READ.called(every, f"{row['step']}: {origin}")
+        assert any(cell.shows(result.energy) for cell in cells if cell.kind == "J"), row
+
+
+def test_robots_and_months_of_a_fleet_are_sums_of_their_recordings(walked: Analysis) -> None:
+    costs = costs_of(1)
+    member = member_of(walked, "robot")
+    cycle = production_of(walked)
+    assert member is not None
+    assert cycle is not None
+    fleet = [
+        replace(member, robot=robot, month=month)
+        for robot in ("first", "second")
+        for month in ("2026-01", "2026-02", "2026-03")
+    ]
+    found = READ.figures_of(fleet_html(fleet, costs=costs))
+    year = costs.energy_of_year(cycle).value
+    (one,) = [f for f in READ.called(found, "first: energy a year") if f.kind == "J"]
+    (both,) = [f for f in READ.called(found, "all: energy a year") if f.kind == "J"]
+    assert one.shows(year)
+    assert both.shows(2.0 * year)
+    for month in ("2026-01", "2026-02", "2026-03"):
+        driven = READ.called(found, f"{month}: driven")
+        if np.isfinite(member.driven - member.predicted):
+            assert [figure.shows(2.0 * member.driven) for figure in driven] == [True]
+    columns = fleet_columns(fleet)
+    whole = [
+        energy
+        for what, energy in zip(columns["what"], columns["energy_j"], strict=True)
+        if what == "cycle"
+    ]
+    assert whole == [cycle.energy] * 6
