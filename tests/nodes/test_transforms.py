@@ -126,3 +126,18 @@ def test_markers_are_the_capsules_wherever_the_robot_stands(driver):
             assert (cylinder.type, balls.type) == (Marker.CYLINDER, Marker.SPHERE_LIST)
             assert cylinder.scale.x == balls.scale.x == 2.0 * capsule.radius
             assert cylinder.header.stamp.sec == balls.header.stamp.sec == k
+
+
+def test_a_load_that_is_put_down_is_no_longer_drawn(driver):
+    """Every message deletes what an earlier, larger load has left, and nothing that is shown."""
+    robot, load = driver.capsules()
+    poses = driver.link_poses(np.zeros(6))
+    kept = {("robot", k) for k in range(2 * len(robot))}
+    markers = RobotMarkers(robot, load)
+    for left in (load[:1], load[:2], load[:0]):
+        markers = RobotMarkers(robot, left, markers.loads)
+        found = markers.at(poses, Time()).markers
+        shown = {(m.ns, m.id) for m in found if m.action == Marker.ADD}
+        gone = {(m.ns, m.id) for m in found if m.action == Marker.DELETE}
+        assert shown == kept | {("load", k) for k in range(2 * len(left))}
+        assert gone == {("load", k) for k in range(2 * len(left), 2 * len(load))}

@@ -145,6 +145,7 @@ class SimDriver(Node):
     def _open_topics(self) -> None:
         self._streams = Streams(self, self._driver.joint_names)
         self._markers = self.create_publisher(MarkerArray, names.ROBOT_MARKERS, 1)
+        self._robot = RobotMarkers((), ())
         self._diagnostics = Diagnostics(self)
         self._drained = 0  # the last stop of before which no goal waits any more
         self._trajectory_topic = TrajectoryTopic(self, self._driver, self._admit)
@@ -328,7 +329,7 @@ class SimDriver(Node):
     # slow topics out
 
     def _load_changed(self) -> None:
-        self._robot = RobotMarkers(*self._driver.capsules())
+        self._robot = RobotMarkers(*self._driver.capsules(), self._robot.loads)
         if self._transforms is not None:
             self._transforms.publish_fixed(self.now_msg())
 

@@ -27,9 +27,13 @@ _COLOURS = {"robot": (1.0, 0.45, 0.1), "load": (0.35, 0.4, 0.45)}  # KUKA orange
 
 
 class RobotMarkers:
-    """Markers of the capsules of robot and load, made once: 20 times a second they only move."""
+    """Markers of the capsules of robot and load, made once: 20 times a second they only move.
 
-    def __init__(self, robot: Sequence[Capsule], load: Sequence[Capsule]) -> None:
+    loads: capsules of the largest load that was shown; those that are no longer there are deleted
+    in every message, as a view that missed one would keep them.
+    """
+
+    def __init__(self, robot: Sequence[Capsule], load: Sequence[Capsule], loads: int = 0) -> None:
         capsules = (*robot, *load)
         axes = np.array([capsule.p1 - capsule.p0 for capsule in capsules]).reshape(-1, 3)
         lengths = np.linalg.norm(axes, axis=1)
@@ -41,7 +45,11 @@ class RobotMarkers:
         self._pairs = [
             _pair(name, k, capsule) for name, part in parts for k, capsule in enumerate(part)
         ]
-        self._message = MarkerArray(markers=[each for pair in self._pairs for each in pair])
+        self.loads = max(len(load), loads)
+        gone = range(2 * len(load), 2 * self.loads)
+        deleted = [Marker(ns="load", id=k, action=Marker.DELETE) for k in gone]
+        shown = [each for pair in self._pairs for each in pair]
+        self._message = MarkerArray(markers=[*shown, *deleted])
 
     def at(self, link_poses: FloatArray, stamp: Time) -> MarkerArray:
         """All markers where the links stand (n+1, 4, 4); the same message in every call."""
