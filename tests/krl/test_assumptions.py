@@ -513,3 +513,31 @@ def test_what_the_submit_program_sets_is_assumed(lines: str) -> None:
     assert angles(program) == moves
     said = "READY is set by sps.sub: taken as it is at the start"
     assert (said in texts(program)) is named
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        "SPTP XP1 WITH $TOOL=STOOL2(FP1),$BASE=SBASE(FP1.BASE_NO)",
+        "PTP XHOME\nSLIN XP1 WITH $BASE=SBASE(FP1.BASE_NO),$TOOL=STOOL2(FP1)",
+        "$TOOL=STOOL(14)\n$BASE=SBASE(5)\nPTP XP1",
+        "$TOOL=TOOL_DATA[14]\n$BASE=BASE_DATA[5]\nPTP XP1",
+        "FDAT_ACT=FP1\nBAS(#FRAMES)\nPTP XP1",
+        "BAS(#TOOL,14)\nBAS(#BASE,5)\nPTP XP1",
+    ],
+)
+def test_frames_without_data_are_assumed_in_every_form(form: str, followed: Follow) -> None:
+    """Inline forms of KSS 8.3 took the cell's tool and the robot's foot without a word."""
+    data = (
+        "DECL E6POS XP1={X 1500,Y 0,Z 1200,A 0,B 90,C 0,S 2,T 10}\n"
+        "DECL FDAT FP1={TOOL_NO 14,BASE_NO 5,IPO_FRAME #BASE}"
+    )
+    said = {note.text for note in followed(form, data).notes if note.effect == Effect.PLACES}
+    missing = {
+        "TOOL_DATA[14] isn't in the files: the cell's tool",
+        "BASE_DATA[5] isn't in the files: the robot's foot",
+    }
+    assert said >= missing
+    assert not any("chosen" in text for text in said)
+    given = f"TOOL_DATA[14]={{X 0,Y 0,Z 90}}\nBASE_DATA[5]={{X 10,Y 0,Z 0}}\n{data}"
+    assert not missing & {note.text for note in followed(form, given).notes}

@@ -10,7 +10,7 @@ from ir_description.poses import inverse
 from ir_krl.errors import KrlRunError, Place
 from ir_krl.run.memory import Memory, Step
 from ir_krl.run.notes import Effect
-from ir_krl.run.system import AXES, DEFAULTS, FULL, NULL, Assumption, all_axes
+from ir_krl.run.system import AXES, DEFAULTS, FULL, NULL, all_axes
 from ir_krl.run.values import (
     Array,
     Structure,
@@ -75,7 +75,6 @@ class Library:
 
     def __init__(self, memory: Memory) -> None:
         self._memory = memory
-        self.chosen: dict[str, Assumption | None] = {}  # what is assumed of $TOOL and $BASE
         self._named: dict[str, Callable[[Arguments, Place], Value]] = {
             "BAS": self._bas,
             "SVEL_JOINT": self._joint_velocity,
@@ -278,7 +277,7 @@ class Library:
 
     def _frame(self, name: str, index: int, used: str) -> Value:
         value = self._memory.peek(name, index) if index > 0 else None
-        self.chosen[used] = self._memory.assumed.get(f"{name}[{index}]")
+        self._memory.chosen[used] = self._memory.assumed.get(f"{name}[{index}]")
         return Structure(dict(NULL)) if value is None else copied(value)
 
     def _noted(self, variable: str, component: str, otherwise: float, place: Place) -> float:
@@ -291,7 +290,7 @@ class Library:
     def _set(self, name: str, value: Value) -> None:
         """A system variable; of an array of axes all of them."""
         variable, _, component = name.partition(".")
-        chosen = self.chosen.get(name)
+        chosen = self._memory.chosen.pop(name, None)
         held = self._memory.shared.get(variable)
         if isinstance(held, Array):
             for j in range(1, AXES + 1):

@@ -52,12 +52,13 @@ class Memory:
     """`shared` holds what is known everywhere, `modules` the data lists by the names of their
     modules, `scopes` the calls that run. module: whose statements run; listed: all names that data
     lists declare; types: components of structures; assumed: values that the program didn't bring,
-    by name or name[index]; noted: hears of those that are used; guesses: how many were; watched:
-    see `watch`.
+    by name or name[index]; chosen: the same of $TOOL and $BASE that a function has just found;
+    noted: hears of those that are used; guesses: how many were; watched: see `watch`.
     """
 
     shared: dict[str, Value]
     assumed: dict[str, Assumption] = field(default_factory=dict)
+    chosen: dict[str, Assumption | None] = field(default_factory=dict)
     noted: Noted = lambda place, text, effect: None
     guesses: int = 0
     watched: list[Watched] = field(default_factory=list)

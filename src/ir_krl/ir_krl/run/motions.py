@@ -56,6 +56,7 @@ class Assigning(Control):
     def _assignment(self, tree: Tree) -> None:
         access, expression = tree.children
         path = self.expressions.path(access)
+        self.memory.chosen.clear()
         value = self.expressions.value(expression)
         (name, index), where = path[0], self.place(tree)
         if name in self._signals.groups and index is None:
@@ -74,6 +75,9 @@ class Assigning(Control):
             return
         self._check_effect(name, value, where)
         self.memory.set(path, value, where)
+        assumed = self.memory.chosen.pop(name, None)
+        if assumed is not None:  # of STOOL2, SBASE
+            self.memory.assumed[name] = assumed
         for other, follows in mode_variables(name, value).items():
             self.memory.set(((other, None),), follows, where)
 
