@@ -135,7 +135,7 @@ def ur3e() -> RobotModel:
     peak = np.array([56.0, 56.0, 28.0, 12.0, 12.0, 12.0])
     speed = np.radians([180.0, 180.0, 180.0, 360.0, 360.0, 360.0])
     built = _by_dh(like, rows, bodies, np.eye(4))
-    return _estimated(replace(built, name="ur3e"), peak, speed, without_table(link=BUS_48_V))
+    return estimated(replace(built, name="ur3e"), peak, speed, without_table(link=BUS_48_V))
 
 
 def tx40(folder: Path) -> RobotModel:
@@ -170,10 +170,10 @@ def tx40(folder: Path) -> RobotModel:
         self_pairs=(),
         load_self_capsules=(),
     )
-    return _estimated(built, peak, speed, without_table())
+    return estimated(built, peak, speed, without_table())
 
 
-def _estimated(
+def estimated(
     robot: RobotModel, peak: FloatArray, speed: FloatArray, power: PowerData
 ) -> RobotModel:
     """With drives in proportion to their peak torque (n,) Nm and full speed (n,) rad/s."""

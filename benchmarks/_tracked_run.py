@@ -95,6 +95,11 @@ class TrackedRun:
         meter.settle(Work(stretch.qd, torque))
         return meter.reading().energy
 
+    def metered(self, start: float, end: float) -> float:
+        """J that the meter counted between two times at which it read [s]."""
+        time, joules, _ = zip(*self._readings, strict=True)
+        return float(np.diff(np.interp([start, end], time, joules))[0])
+
     def advance(self, seconds: float, mode: Mode = Mode.STAND_ON_MOTORS) -> None:
         """Stand in a mode."""
         count = READING * max(1, round(seconds / DT / READING))

@@ -136,16 +136,16 @@ class _Rig:
 
     def plant(self, seed: int) -> Plant:
         """Drive, fit, and judge the fit by the tests."""
-        samples, end, spans = self.followed(seed)
+        samples, end, spans, energies = self.followed(seed)
         model = self.model()
         found = fit(samples.part(0.0, end), model, self.prior)
         errors: dict[str, list[float]] = {"before": [], "after": []}
         covered: dict[str, list[bool]] = {"before": [], "after": []}
         power = []
         widths = []
-        for test, span in zip(self.tests, spans, strict=True):
+        for test, span, energy in zip(self.tests, spans, energies, strict=True):
             part = samples.part(*span)
-            watts = float(part.watts.mean())
+            watts = energy / (span[1] - span[0])  # samples need not begin when a movement does
             planned = planned_samples(test.trajectory, self.held[test.load], self.prior.modes)
             prepared = model.prepare(planned)
             for name, each in (("before", self.prior), ("after", found.parameters)):
@@ -167,9 +167,11 @@ class _Rig:
         link = load_power_data(self.prior.controller).dc_link
         return PowerModel(self.cell.robot, link, self.cell.base_pose, self.prior)
 
-    def followed(self, seed: int) -> tuple[Samples, float, list[tuple[float, float]]]:
+    def followed(
+        self, seed: int
+    ) -> tuple[Samples, float, list[tuple[float, float]], list[float]]:
         """What a plant that follows exactly shows, when the programme ended, and from start to end
-        of each test [s].
+        of each test [s] with what the meter counted meanwhile [J].
         """
         plant = typical_plant(self.cell.robot, load_power_data(self.prior.controller), seed)
         run = TrackedRun(self.cell, plant, self.programme.steps[0].load)
@@ -181,7 +183,8 @@ class _Rig:
             run.hold(test.load, self.held[test.load])
             spans.append(run.drive(test.trajectory))
             run.advance(SETTLING)
-        return run.samples(self.prior.modes), end, spans
+        energies = [run.metered(*span) for span in spans]
+        return run.samples(self.prior.modes), end, spans, energies
 
     def stepped(self, seed: int) -> list[float]:
         """The same by the stepped driver: how far the energies of the tests are off [share]."""
@@ -196,7 +199,7 @@ class _Rig:
         trace = run.trace()
         runs = [(-np.inf, np.inf, ())]
         stepped = samples_of(trace, trace, self.prior.joints, self.prior.modes, runs)
-        samples, _, others = self.followed(seed)
+        samples, _, others, _ = self.followed(seed)
         return [
             float(stepped.part(*one).watts.mean() / samples.part(*other).watts.mean() - 1.0)
             for one, other in zip(spans, others, strict=True)

@@ -117,7 +117,14 @@ AT_ZERO = ("iron", "inverter", "gear", "idle_watts")  # in the data sheet
     [
         *(f"{term}.joint_a{j}" for term in ("viscous", "coulomb", "copper") for j in (1, 3)),
         *(f"{term}.joint_a2" for term in ("iron", "inverter", "gear")),
-        *("rotor_inertia", "link_mass", "load_mass", "counterbalance", "rectifier_efficiency"),
+        *(
+            "rotor_inertia",
+            "link_mass",
+            "load_mass",
+            "counterbalance",
+            "rectifier_efficiency",
+            "dc_link",
+        ),
         *("tool_watts", "idle_watts", "drives_watts", "watts.STAND_ON_MOTORS"),
     ],
 )

@@ -17,7 +17,7 @@ import ir_recorder
 from ir_description import load_cell, load_power_data
 from ir_kernels import DcBusParameters, DynamicsModel, dc_bus
 from ir_recorder.measure.arm import arm_torques
-from ir_recorder.measure.power_model import bus_flow
+from ir_recorder.measure.power_model import BusFlow, bus_flow
 from ir_recorder.measure.samples import BANDWIDTH, differentiated, half_width
 
 RECORDER = Path(ir_recorder.__file__).parent
@@ -86,6 +86,23 @@ def test_derivatives_go_through_the_bus(softness: float) -> None:
         more = bus_flow(link, wanted + 1e-4 * slopes[:, p], 0.01, softness=softness).watts
         less = bus_flow(link, wanted - 1e-4 * slopes[:, p], 0.01, softness=softness).watts
         np.testing.assert_allclose(flow.slopes[:, p], (more - less) / 2e-4, atol=1e-4)
+
+
+@pytest.mark.parametrize("softness", [0.0, 0.3, 10.0])
+@pytest.mark.parametrize("size", [0.2, 1.0, 4.0])
+def test_the_size_of_the_link_has_its_derivative(size: float, softness: float) -> None:
+    link = load_power_data().dc_link
+    wanted = np.random.default_rng(5).normal(0.0, 4e3, 300)
+
+    def flow(factor: float) -> BusFlow:
+        none = np.zeros((300, 1))
+        return bus_flow(
+            link, wanted, 0.01, none, softness=softness, size=factor, by_size=np.ones(1)
+        )
+
+    more, less = (flow(size + shift).watts for shift in (1e-6, -1e-6))
+    np.testing.assert_allclose(flow(size).slopes[:, 0], (more - less) / 2e-6, atol=0.1)
+    assert flow(1.5 * size).watts.sum() <= flow(size).watts.sum() + 1e-6
 
 
 @given(st.lists(st.floats(-5e4, 5e4), min_size=1, max_size=60))

@@ -22,18 +22,25 @@ from ir_cli.output import (
     text,
 )
 from ir_cli.planning import add_cell, planner_of, sentences
-from ir_description import load_cell, load_power_parameters, power_parameters_to_yaml
+from ir_description import (
+    centre_deviations,
+    load_cell,
+    load_power_parameters,
+    power_parameters_to_yaml,
+)
 from ir_recorder import analyse, read_recording
 from ir_recorder.analysis.indirect import agreement
 from ir_recorder.fit import (
     BY,
     Estimate,
     Source,
+    doubts,
     fit_data,
     left_out,
     left_out_rows,
     parameter_rows,
     recommendation,
+    result,
     source_cell,
     write_fit_picture,
 )
@@ -125,6 +132,11 @@ def add_fit(fitted: argparse.ArgumentParser) -> None:
         "--power-parameters", default="", metavar="FILE", help="to begin with (the data sheet)"
     )
     add_renamed(fitted, "--prior", prior)
+    fitted.add_argument(
+        "--centres",
+        action="store_true",
+        help="find the links' centres of mass as well; needs postures of all kinds",
+    )
     fitted.add_argument("--name", default="fit", help="of the parameters (fit)")
     fitted.add_argument(
         "-o",
@@ -222,10 +234,13 @@ def run_fit(arguments: argparse.Namespace) -> int:
         for path, beside in zip(arguments.motion, meters, strict=True)
     ]
     with sentences():
-        prior = load_power_parameters(arguments.power_parameters, source_cell(sources[0]).robot)
+        robot = source_cell(sources[0]).robot
+        prior = load_power_parameters(arguments.power_parameters, robot)
+    if arguments.centres:
+        prior = prior.with_centres(centre_deviations(robot))
     data = fit_data(sources, prior, arguments.by)
     estimate = Estimate(data.recordings, data.names, data.model, prior, motors=data.motors)
-    found = estimate.result(arguments.name)
+    found = result(estimate, arguments.name)
     unseen = left_out(estimate)
     named = ", ".join(path.name for path in arguments.motion)[:300]
     page = power_parameters_to_yaml(found.parameters, f"fit on {named}")
@@ -233,7 +248,9 @@ def run_fit(arguments: argparse.Namespace) -> int:
     written = [write_output(arguments.output, page.encode(), PARAMETERS_START, ANYWHERE)]
     if arguments.picture:
         written.append(write_fit_picture(found, prior, arguments.picture))
-    said = (*data.notes, *fit_sentences(found), recommendation(unseen))
+    doubted = doubts(estimate)
+    advised = recommendation(unseen, doubted=bool(doubted))
+    said = (*data.notes, *fit_sentences(found), *doubted, advised)
     rows = parameter_rows(found, prior)
     if arguments.json:
         listed = [asdict(each) for each in found.movements]

@@ -451,6 +451,7 @@ _ADVICE = {
     "gear": "gear: the same movement with and without a load; a cell with a part",
     "load_mass": "load_mass: a part that can be held, or lift the tool over a larger height",
     "tool_watts": "tool_watts: one run without the tool",
+    "dc_link": "dc_link: fast movements of a heavy load that brake one axis after the other",
     "rectifier_efficiency": "rectifier_efficiency: a load of known work; else a meter at the DC "
     "link",
 }

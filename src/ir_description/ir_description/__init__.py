@@ -53,9 +53,11 @@ from ir_description.library import (
 )
 from ir_description.robot import (
     AXIS_UNITS,
+    CENTRES,
     DATA_SHEET,
     IDLE,
     LIMIT_TOLERANCE,
+    LINK,
     OUTSIDE_MAX,
     RELATIVE_DEVIATION,
     ROBOTS,
@@ -65,6 +67,8 @@ from ir_description.robot import (
     PowerData,
     PowerParameters,
     RobotModel,
+    centre_deviations,
+    centre_directions,
     drawn_robots,
     fixed_frames,
     interval_over,
@@ -86,9 +90,11 @@ from ir_values.errors import (
 
 __all__ = [
     "AXIS_UNITS",
+    "CENTRES",
     "DATA_SHEET",
     "IDLE",
     "LIMIT_TOLERANCE",
+    "LINK",
     "OUTSIDE_MAX",
     "RELATIVE_DEVIATION",
     "ROBOTS",
@@ -130,6 +136,8 @@ __all__ = [
     "cell_hash",
     "cell_in",
     "cell_to_yaml",
+    "centre_deviations",
+    "centre_directions",
     "check_cell",
     "data_sheet",
     "data_sheet_of",

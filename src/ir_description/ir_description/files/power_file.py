@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ir_description.robot import (
+    CENTRES,
     USUAL_LINK,
     ControllerMode,
     DcLink,
@@ -234,6 +235,7 @@ def _table_1_row(item: Item) -> EnergyShare:
 PARAMETERS_FORMAT = "ir_description/power_parameters/1"
 _DIGITS = ".9g"
 _BIG = 1e12
+_ROWS = 10_000
 
 
 def power_parameters_from_yaml(
@@ -251,7 +253,10 @@ def power_parameters_from_yaml(
         top["source"].text(400)
     with root.blamed():
         start = data_sheet(top["robot"].name(), top["controller"].name())
-    mean, deviation, sources = _given(top["parameters"], start)
+    rows = top["parameters"]
+    if any(_row_name(entry).partition(".")[0] in CENTRES for entry in rows.list(0, _ROWS)):
+        start = start.with_centres(np.zeros(len(CENTRES) * len(start.joints)))
+    mean, deviation, sources = _given(rows, start)
     correlation = _correlation(top.get("correlation"), start.names)
     with root.blamed():
         return PowerParameters(
@@ -263,7 +268,13 @@ def power_parameters_from_yaml(
             mean=mean,
             covariance=correlation * np.outer(deviation, deviation),
             sources=sources,
+            centres=start.centres,
         )
+
+
+def _row_name(entry: Item) -> str:
+    """The name of a row, "" where it has none that is a text."""
+    return _text(entry.node, "name")
 
 
 def _given(item: Item, start: PowerParameters) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:

@@ -13,12 +13,16 @@ from ir_description.robot.power import (
 )
 from ir_description.robot.power_parameters import (
     AXIS_UNITS,
+    CENTRES,
     DATA_SHEET,
     IDLE,
+    LINK,
     RELATIVE_DEVIATION,
     ROBOTS,
     SCALARS,
     PowerParameters,
+    centre_deviations,
+    centre_directions,
     drawn_robots,
     interval_over,
     parameter_names,
@@ -45,9 +49,11 @@ from ir_description.robot.robot import (
 
 __all__ = [
     "AXIS_UNITS",
+    "CENTRES",
     "DATA_SHEET",
     "IDLE",
     "LIMIT_TOLERANCE",
+    "LINK",
     "MASS_MAX",
     "NO_TABLE",
     "OUTSIDE_MAX",
@@ -70,6 +76,8 @@ __all__ = [
     "RestRow",
     "RestTable",
     "RobotModel",
+    "centre_deviations",
+    "centre_directions",
     "drawn_robots",
     "fixed_frames",
     "interval_over",

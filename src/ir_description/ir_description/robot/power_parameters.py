@@ -113,15 +113,24 @@ SCALARS = (
     "load_mass",
     "counterbalance",
     "tool_watts",
+    "dc_link",
     "rectifier_efficiency",
 )
 """Factors of what the data say (1: as they say), and the share of the mains power that reaches the
 bus.
 """
 
+LINK = "dc_link"
+"""Factor of the braking energy that fits into the DC link."""
+
 IDLE = "idle_watts"
 """W that the inverters of all axes together take from the DC link while the motors are on, whatever
 moves.
+"""
+
+CENTRES = ("centre_1", "centre_2")
+"""Per joint, where they are parameters: m by which the centre of mass of its link lies elsewhere
+than the data say, in the two directions of `centre_directions`.
 """
 
 LEVELS = (0.05, 0.95)
@@ -131,8 +140,20 @@ ROBOTS = 1000
 """Drawn for an interval: its ends are then known to some 5 % of its width."""
 
 _DRAW_SEED = 90
-_HIGHEST = {"gear": 0.9, "rectifier_efficiency": 1.0} | dict.fromkeys(SCALARS[:5], 10.0)
-_LOWEST = {"rectifier_efficiency": 0.5, "rotor_inertia": 0.1, "link_mass": 0.1}
+_FARTHEST = 1.0  # m: of a centre of mass
+_HIGHEST = {
+    "gear": 0.9,
+    "rectifier_efficiency": 1.0,
+    LINK: 1000.0,
+    **dict.fromkeys(SCALARS[:5], 10.0),
+    **dict.fromkeys(CENTRES, _FARTHEST),
+}
+_LOWEST = {
+    "rectifier_efficiency": 0.5,
+    "rotor_inertia": 0.1,
+    "link_mass": 0.1,
+    **dict.fromkeys(CENTRES, -_FARTHEST),
+}
 _MOST = 1e9
 _SYMMETRIC = 1e-9  # relative to the variances: rounding of a file's digits
 
@@ -153,9 +174,11 @@ def drawn_robots(parameters: PowerParameters) -> FloatArray:
     return parameters.draws(ROBOTS, _DRAW_SEED)
 
 
-def parameter_names(joints: Iterable[str], modes: Iterable[str]) -> tuple[str, ...]:
+def parameter_names(
+    joints: Iterable[str], modes: Iterable[str], *, centres: bool = False
+) -> tuple[str, ...]:
     """Names in their order: "viscous.joint_a1" .., the scalars, "idle_watts", "drives_watts",
-    "watts.STAND_ON_MOTORS" ..
+    "watts.STAND_ON_MOTORS" .. and, with centres, "centre_1.joint_a1" ..
     """
     axes = tuple(joints)
     return (
@@ -164,12 +187,29 @@ def parameter_names(joints: Iterable[str], modes: Iterable[str]) -> tuple[str, .
         IDLE,
         "drives_watts",
         *(f"watts.{mode}" for mode in modes),
+        *(f"{term}.{joint}" for term in CENTRES if centres for joint in axes),
     )
+
+
+def centre_directions(robot: RobotModel) -> FloatArray:
+    """The directions (2, n, 3) in which the parameters CENTRES move the links' centres of mass, in
+    the frames of the links: both across the joint's axis, for only these are felt at it.
+    """
+    axes = robot.joint_axis
+    first = np.zeros_like(axes)
+    for row, axis in zip(first, axes, strict=True):
+        least = int(np.argmin(np.abs(axis)))
+        row[least] = 1.0
+        row -= axis[least] * axis
+        row /= np.sqrt(np.square(row).sum())
+    return np.stack([first, np.cross(axes, first)])
 
 
 def parameter_unit(name: str) -> str:
     """The unit of a parameter, "" for factors and shares."""
     kind = name.partition(".")[0]
+    if kind in CENTRES:
+        return "m"
     return "W" if kind in ("watts", "drives_watts", IDLE) else AXIS_UNITS.get(kind, "")
 
 
@@ -185,7 +225,8 @@ class PowerParameters:
     """Mean (P,) and covariance (P, P) of the parameters of a robot and its controller, read-only.
 
     name: what reports call them; robot, controller: whose; joints, modes: their names, which give
-    the order; sources (P,): where each is from ("data M", "fit").
+    the order; sources (P,): where each is from ("data M", "fit"); centres: whether centres of mass
+    are among them.
     """
 
     name: str
@@ -196,6 +237,7 @@ class PowerParameters:
     mean: FloatArray
     covariance: FloatArray
     sources: tuple[str, ...]
+    centres: bool = False
 
     def __post_init__(self) -> None:
         size = len(self.names)
@@ -226,7 +268,7 @@ class PowerParameters:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters, in order."""
-        return parameter_names(self.joints, self.modes)
+        return parameter_names(self.joints, self.modes, centres=self.centres)
 
     @property
     def deviation(self) -> FloatArray:
@@ -248,6 +290,27 @@ class PowerParameters:
         n = len(self.joints)
         at = tuple(AXIS_UNITS).index(term) * n
         return slice(at, at + n)
+
+    def centre_places(self) -> slice:
+        """Where the joints' CENTRES stand in the vector, term by term."""
+        size = len(self.names)
+        return slice(size - (len(CENTRES) * len(self.joints) if self.centres else 0), size)
+
+    def with_centres(self, deviation: FloatArray) -> PowerParameters:
+        """The same with centres of mass as the data have them, with deviations (2 n,) m."""
+        if self.centres:
+            return self
+        size = len(self.mean)
+        covariance = np.zeros((size + len(deviation), size + len(deviation)))
+        covariance[:size, :size] = self.covariance
+        covariance[size:, size:] = np.diag(np.square(deviation))
+        return replace(
+            self,
+            mean=np.concatenate([self.mean, np.zeros(len(deviation))]),
+            covariance=covariance,
+            sources=(*self.sources, *["assumed"] * len(deviation)),
+            centres=True,
+        )
 
     def axis(self, term: str) -> FloatArray:
         """Means (n,) of a term of AXIS_UNITS."""
@@ -279,8 +342,14 @@ class PowerParameters:
         if balance is not None:
             pressure = balance.charge_pressure * max(self.value("counterbalance"), 1e-9)
             balance = replace(balance, charge_pressure=pressure)
+        com = robot.link_com
+        if self.centres:
+            shifts = self.mean[self.centre_places()].reshape(len(CENTRES), robot.n, 1)
+            com = com.copy()
+            com[1:] += (shifts * centre_directions(robot)).sum(axis=0)
         return replace(
             robot,
+            link_com=com,
             friction_viscous=self.axis("viscous"),
             friction_coulomb=self.axis("coulomb"),
             copper_loss=self.axis("copper"),
@@ -363,6 +432,18 @@ with the drives, which they can't exceed; but they come from the DC link, where 
 them.
 """
 
+LINK_KNOWN = 0.25
+LINK_ESTIMATED = 1.0
+"""Of the joules that fit into a DC link: where its capacitance is read, capacitors differ by 20 %
+(their makers' tolerance, and age), mains by 3 % and choppers by 1 % of their volts, which are 13 %
+and 6 % of the joules between the two; where it is an estimate only the order is known.
+"""
+
+CENTRE_SHARE = 0.5
+"""Of a link's length, where its centre of mass may be guessed to lie: it is known by its mark's
+share of that.
+"""
+
 RECTIFIER_LOSS = 0.02
 """Diode rectifier and mains filter; half normal below 1."""
 
@@ -405,7 +486,7 @@ def prior(robot: RobotModel, power: PowerData, marks: Marks) -> PowerParameters:
         * share
         * np.array([_FACTORS.get(name.partition(".")[0], 1.0) for name in names])
     )
-    for name, value in _assumed(robot, power).items():
+    for name, value in _assumed(robot, power, marks).items():
         deviation[names.index(name)] = value
     return PowerParameters(
         name=DATA_SHEET,
@@ -419,8 +500,19 @@ def prior(robot: RobotModel, power: PowerData, marks: Marks) -> PowerParameters:
     )
 
 
-def _assumed(robot: RobotModel, power: PowerData) -> dict[str, float]:
+def centre_deviations(robot: RobotModel) -> FloatArray:
+    """How far (2 n,) m the centres of mass may lie from where the data have them."""
+    length = np.sqrt(np.square(robot.joint_origin[1:, :3, 3]).sum(axis=1))
+    own = np.sqrt(np.square(robot.link_com[1:]).sum(axis=1))
+    size = np.maximum(np.append(length, 0.0), own)
+    marks = [robot.marks.get(f"links.{link}.com_m", "L") for link in robot.link_names[1:]]
+    share = np.array([RELATIVE_DEVIATION[mark] for mark in marks])
+    return np.tile(CENTRE_SHARE * share * size, len(CENTRES))
+
+
+def _assumed(robot: RobotModel, power: PowerData, marks: Marks) -> dict[str, float]:
     """Standard deviations of what the data have no mark for."""
+    read = marks.get("dc_link.capacitance_f", "L") != "L"
     iron = IRON_SHARE * robot.envelope_torque[:, 0] / robot.velocity_max
     return {
         **{
@@ -432,6 +524,7 @@ def _assumed(robot: RobotModel, power: PowerData) -> dict[str, float]:
         "load_mass": LOAD_MASS,
         "counterbalance": COUNTERBALANCE,
         "tool_watts": TOOL_WATTS,
+        LINK: LINK_KNOWN if read else LINK_ESTIMATED,
         "rectifier_efficiency": RECTIFIER_LOSS,
         IDLE: min(IDLE_WATTS * robot.n, power.drives_and_brake_release),
     }

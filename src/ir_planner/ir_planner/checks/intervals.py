@@ -16,11 +16,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from ir_description import AXIS_UNITS, IDLE, PowerParameters, drawn_robots, interval_over
+from ir_description import AXIS_UNITS, IDLE, LINK, PowerParameters, drawn_robots, interval_over
 from ir_kernels import DcBus, dc_bus, portable
 from ir_msgs_py.trajectory import JointTrajectory, Samples
 from ir_planner.curves import motion_at
-from ir_planner.scene import RUNNING, PlanningScene
+from ir_planner.scene import CENTRE_STEP, RUNNING, PlanningScene
 from ir_values.arrays import FloatArray
 
 STEP_S = 8e-3  # intervals need no finer samples than these
@@ -62,6 +62,7 @@ def energy_and_slope(at: Sampled, scene: PlanningScene) -> tuple[float, FloatArr
     energy = _drawn(bus, at.dt) / efficiency + scene.base_watts * at.span
     price = _price(power, bus, scene) * (at.dt / efficiency)
     slope = _axis_slope(_States(at.motion, torque, price), scene)
+    slope[scene.parameters.index(LINK)] = -_emptied(bus, scene) / efficiency
     slope[scene.parameters.index("rectifier_efficiency")] = -_drawn(bus, at.dt) / (
         efficiency * efficiency
     )
@@ -126,6 +127,16 @@ def _price(power: FloatArray, bus: DcBus, scene: PlanningScene) -> FloatArray:
     return np.repeat(known[following][:, None], power.shape[1], axis=1)
 
 
+def _emptied(bus: DcBus, scene: PlanningScene) -> float:
+    """Joules that a link of twice the size would have given (by its slope): what it holds, each
+    time that the mains feed again after it was full.
+    """
+    if scene.dc_bus.regeneration == "none":
+        return 0.0
+    decided = np.where(bus.mains != 0.0, 1, -1)[(bus.mains != 0.0) | (bus.dissipated > 0.0)]
+    return float(np.count_nonzero(np.diff(decided) > 0) * scene.power.dc_link_capacity_energy)
+
+
 def _axis_slope(at: _States, scene: PlanningScene) -> FloatArray:
     """The part of friction, losses and masses; rectifier and constant watts are zero."""
     parameters = scene.parameters
@@ -160,6 +171,9 @@ def _axis_slope(at: _States, scene: PlanningScene) -> FloatArray:
     for name, torque in (*scaled.items(), ("link_mass", body - carried)):
         value = max(parameters.value(name), 1e-9)
         slope[parameters.index(name)] = float((of_torque * torque).sum()) / value
+    for k, (less, more) in scene.moved_centres.items():
+        moved = more.inverse_dynamics(*at.motion[:3]) - less.inverse_dynamics(*at.motion[:3])
+        slope[k] = float((of_torque * moved).sum()) / CENTRE_STEP
     return slope
 
 

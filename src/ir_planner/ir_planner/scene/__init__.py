@@ -5,6 +5,7 @@ W.
 from ir_planner.scene.actuators import LinkVoltage
 from ir_planner.scene.motion_limits import STILL, Dynamics, MotionLimits, lasting_longer, torque_use
 from ir_planner.scene.planning_scene import (
+    CENTRE_STEP,
     END_TOLERANCE,
     PROOF_TOLERANCE,
     RUNNING,
@@ -20,6 +21,7 @@ from ir_planner.scene.planning_scene import (
 from ir_planner.scene.zones import polynomials_between, spans_outside, tcp_inside
 
 __all__ = [
+    "CENTRE_STEP",
     "END_TOLERANCE",
     "PROOF_TOLERANCE",
     "RUNNING",

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from ir_description import (
+    LINK,
     AllowedContact,
     Cell,
     Load,
@@ -56,6 +57,11 @@ class Drives:
     def rectifier_efficiency(self) -> float:
         """Share of the mains power that reaches the bus."""
         return 1.0 if self.parameters is None else self.parameters.value("rectifier_efficiency")
+
+    @property
+    def link_size(self) -> float:
+        """Times the joules that the data of the DC link give it."""
+        return 1.0 if self.parameters is None else self.parameters.value(LINK)
 
     def robot(self, robot: RobotModel) -> RobotModel:
         """The robot with the friction, losses and masses of the parameters, and the torque that is
@@ -119,6 +125,7 @@ PROOF_TOLERANCE = 1e-6  # m: proofs show d > S_m - 1e-6
 END_TOLERANCE = 2e-7  # m: a state is free where d > S_m - 2e-7, so that a proof can begin there
 _TURN = 2.0 * np.pi
 RUNNING = "STAND_ON_MOTORS"
+CENTRE_STEP = 2e-3  # m: between two centres of mass whose torques are compared
 
 
 Stops = str | tuple[str, ...]
@@ -256,6 +263,23 @@ class PlanningScene:
         return self.drives.parameters or data_sheet_of(self.cell.robot, self.power)
 
     @cached_property
+    def moved_centres(self) -> dict[int, tuple[DynamicsModel, DynamicsModel]]:
+        """By the place of each uncertain centre of mass among the parameters: dynamics with it on
+        both sides of where it is, CENTRE_STEP apart.
+        """
+        own = self.parameters
+        places = range(len(own.names))[own.centre_places()]
+        found = {}
+        for k in (k for k in places if own.deviation[k] > 0.0):
+            step = 0.5 * CENTRE_STEP * np.eye(len(own.mean))[k]
+            sides = [replace(own, mean=own.mean + side * step) for side in (-1.0, 1.0)]
+            robots = [side.robot_with(self.cell.robot) for side in sides]
+            pose = self.cell.base_pose
+            less, more = (DynamicsModel(robot, self._attached, pose) for robot in robots)
+            found[k] = (less, more)
+        return found
+
+    @cached_property
     def unloaded(self) -> DynamicsModel:
         """Dynamics without what is attached."""
         return DynamicsModel(self.drives.robot(self.cell.robot), (), self.cell.base_pose)
@@ -263,7 +287,8 @@ class PlanningScene:
     @property
     def dc_bus(self) -> DcBusParameters:
         """What the drives' bus does with braking energy."""
-        return DcBusParameters(self.power.dc_link_capacity_energy, self.drives.regeneration)
+        capacity = self.power.dc_link_capacity_energy * self.drives.link_size
+        return DcBusParameters(capacity, self.drives.regeneration)
 
     def thresholds(self, safety_distance: float, station: Stops = "") -> FloatArray:
         """Distance (Z,) m that each pair must exceed: S_m, less where the robot's data have the

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_description import IDLE, Load, PowerParameters, RobotModel
+from ir_description import IDLE, LINK, Load, PowerParameters, RobotModel
 from ir_description.robot import DcLink
 from ir_recorder.analysis.intervals import Mean, mean_of, spread_of
 from ir_recorder.analysis.results import Analysis
@@ -104,7 +104,7 @@ class IndirectMeter:
         axes = torque * speed + of("copper") * motor**2 + of("inverter") * np.abs(motor)
         value = self._parameters.value
         wanted = (axes + of("iron") * speed**2).sum(axis=1) + value(IDLE)
-        flow = bus_flow(self._link, wanted, step)
+        flow = bus_flow(self._link, wanted, step, size=value(LINK))
         base = value("watts.STAND_ON_MOTORS") + value("drives_watts")
         tool = sum(load.watts_always + load.watts_drive_bus for load in loads)
         bus = flow.watts.mean() / value("rectifier_efficiency")

@@ -1,6 +1,7 @@
 """Power parameters fitted to a meter or to the motors, and what the data say of each."""
 
 from ir_recorder.fit.data import BY, FitData, Source, fit_data, source_cell
+from ir_recorder.fit.doubts import doubts, result
 from ir_recorder.fit.estimate import Estimate, Fit, FittedMovement, fit
 from ir_recorder.fit.left_out import (
     LeftOut,
@@ -20,6 +21,7 @@ __all__ = [
     "FittedMovement",
     "LeftOut",
     "Source",
+    "doubts",
     "fit",
     "fit_data",
     "left_out",
@@ -28,6 +30,7 @@ __all__ = [
     "parameter_rows",
     "plain_torques",
     "recommendation",
+    "result",
     "sentences",
     "shaft_work",
     "source_cell",

@@ -57,8 +57,13 @@ def check_explained(measured: FloatArray, fitted: FloatArray, moving: BoolArray)
         if np.count_nonzero(rows) < _FEWEST:
             continue
         mean = float(measured[rows].mean())
+        if mean <= 0.0:
+            raise RecorderError(
+                f"the meter shows {mean:.0f} W in the mean {what}, a robot takes power: is its "
+                "sign or a clamp turned round?"
+            )
         off = float(np.sqrt(np.mean((measured - fitted)[rows] ** 2)))
-        if off > MOST_UNEXPLAINED * max(mean, 0.0):
+        if off > MOST_UNEXPLAINED * mean:
             raise RecorderError(
                 f"no parameters explain the meter: {what} it shows {mean:.0f} W in the mean, the "
                 f"fit is off by {off:.0f} W (rms). Are the units of power and energy those of "

@@ -269,6 +269,7 @@ class Estimate:
         if self.motors is not None:
             own = self.motors.own_prior(self.prior.mean)
         self._before = np.concatenate([self.prior.mean, own[0]])
+        self.found = self._before  # as far as the fit is
         self.deviation = np.concatenate([self.prior.deviation, own[1]])
         low, high = physical_bounds(prior.names)
         self._low = np.concatenate([low, np.full(extra, -np.inf)])
@@ -332,6 +333,7 @@ class Estimate:
         left = np.sqrt(np.diag(inverse(precision, self._wide))) / safe(self._wide)
         determined = np.asarray(self._free & (left < DETERMINED))
         count = len(self.prior.names)
+        self.found = x
         if self.meter is not None:
             moving = self.meter.group > 0
             check_explained(self.meter.measured, self.meter.predicted(x, 0.0)[0], moving)

@@ -44,16 +44,22 @@ def left_out(estimate: Estimate) -> tuple[LeftOut, ...]:
     return _worked(estimate, parts)
 
 
-def recommendation(rows: Sequence[LeftOut]) -> str:
-    """Which of fit and data sheet to plan with, as a sentence with both medians."""
+def recommendation(rows: Sequence[LeftOut], *, doubted: bool = False) -> str:
+    """Which of fit and data sheet to plan with, as a sentence with both medians; doubted: whether
+    something speaks against the data.
+    """
     medians = {name: 100.0 * median_error(rows, name) for name in METHODS}
     fitted, sheet, regression = (medians[name] for name in METHODS)
+    if not np.isfinite(fitted):
+        return "no movement could be left out: how far this fit can be trusted is not known"
     said = (
         f"what was left out is predicted within {fitted:.1f} % (median) by the fit, {sheet:.1f} % "
         f"by the data sheet, {regression:.1f} % by a plain regression"
     )
     if fitted > sheet:
         return f"{said}: plan with the data sheet, this fit is worse on this robot"
+    if doubted:
+        return f"{said}: settle what speaks against the data before you plan with the fit"
     return f"{said}: plan with the fit"
 
 

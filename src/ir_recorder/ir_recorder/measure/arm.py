@@ -69,6 +69,31 @@ def arm_torques(
     return ArmTorques(links, held, qdd * robot.reflected_inertia, spring_torque(robot, q))
 
 
+def centre_torques(
+    robot: RobotModel, base_pose: FloatArray, motion: FloatArray, directions: FloatArray
+) -> FloatArray:
+    """Torques (2, n, N, n) per metre at motion (3, N, n) by which each link's centre of mass lies
+    farther in its own `directions` (2, n, 3); what grows with its square is left out.
+    """
+    q, qd, qdd = motion
+    N, n = q.shape
+    axes = np.empty((n, N, 3))
+    places = np.empty((n, N, 3))
+    found = np.zeros((len(directions), n, N, n))
+    frame = _base(N, np.asarray(base_pose))
+    for i in range(n):
+        frame, axes[i] = _next(frame, robot, i, q[:, i], qd[:, i], qdd[:, i])
+        places[i] = frame.place
+        mass, inertia = float(robot.link_mass[i + 1]), robot.link_inertia[i + 1]
+        for own, direction in zip(found, directions[:, i], strict=True):
+            for side in (-0.5, 0.5):
+                part = np.zeros((N, n))
+                centre = robot.link_com[i + 1] + side * direction
+                _project(part, frame, axes[: i + 1], places[: i + 1], mass, centre, inertia)
+                own[i] += np.sign(side) * part
+    return found
+
+
 def _base(N: int, pose: FloatArray) -> _Frame:
     none = np.zeros((N, 3))
     up = np.broadcast_to([0.0, 0.0, GRAVITY], (N, 3))

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from math import exp, log1p
 
 import numpy as np
+from scipy.linalg import solve_banded
 
-from ir_description import IDLE, PowerParameters, RobotModel
+from ir_description import IDLE, LINK, PowerParameters, RobotModel, centre_directions
 from ir_description.robot import DcLink
 from ir_recorder.errors import RecorderError
-from ir_recorder.measure.arm import ArmTorques, arm_torques
+from ir_recorder.measure.arm import ArmTorques, arm_torques, centre_torques
 from ir_recorder.measure.samples import Samples
 from ir_values.arrays import FloatArray
 
@@ -44,41 +45,70 @@ def bus_flow(
     slopes: FloatArray | None = None,
     charge: float = 0.0,
     softness: float = 0.0,
+    size: float = 1.0,
+    by_size: FloatArray | None = None,
 ) -> BusFlow:
     """Run the link over N steps of `step` [s] in which the axes together want `wanted` (N,) W.
 
     slopes (N, P): derivatives of `wanted` by parameters. charge [J]: at the start.
     softness [J]: over which rectifier and chopper begin to conduct; 0: at once.
+    size: times the joules that the link's data give it; by_size (P,): its own derivatives.
     """
-    top = 0.5 * (_joules(link, link.chopper_on) + _joules(link, link.chopper_off))
+    given = 0.5 * (_joules(link, link.chopper_on) + _joules(link, link.chopper_off))
     tangents = np.zeros((len(wanted), 0)) if slopes is None else slopes
+    by_top = given * (np.zeros(tangents.shape[1]) if by_size is None else by_size)
     if softness > 0.0:
-        return _soft_flow(top, wanted, step, tangents, charge, softness)
+        return _soft_flow((size * given, by_top), wanted, step, tangents, charge, softness)
+    return _hard_flow((size * given, by_top), wanted, step, tangents, charge)
+
+
+Top = tuple[float, FloatArray]
+"""Joules that the link holds at most, and their derivatives (P,)."""
+
+
+def _hard_flow(
+    limit: Top, wanted: FloatArray, step: float, tangents: FloatArray, charge: float
+) -> BusFlow:
+    """With switches that conduct at once.
+
+    What the rectifier gives is what was wanted since the link was empty or full for the last time,
+    less what it held then.
+    """
+    top, by_top = limit
     given = np.zeros(len(wanted))
-    given_slopes = np.zeros_like(tangents)
     held = np.empty(len(wanted))
-    held_slope = np.zeros(tangents.shape[1])
-    free = False  # whether held_slope is anything but zero
+    since = np.zeros(len(wanted), int)  # the first step that is counted
+    begin = 0
+    was_full = np.zeros(len(wanted), bool)
+    full = False
     for k, joules in enumerate((wanted * step).tolist()):
         rest = charge - joules
+        since[k] = begin
+        was_full[k] = full
         if rest < 0.0:
             given[k] = -rest / step
             charge = 0.0
-            given_slopes[k] = tangents[k] - held_slope / step if free else tangents[k]
-            free = False
+            begin = k + 1
+            full = False
         elif rest > top:
             charge = top
-            free = False
+            begin = k + 1
+            full = True
         else:
             charge = rest
-            held_slope = (held_slope if free else 0.0) - tangents[k] * step
-            free = True
         held[k] = charge
-    return BusFlow(given, given_slopes, held)
+    if not tangents.shape[1]:
+        return BusFlow(given, tangents, held)
+    rows = np.flatnonzero(given)
+    sums = np.concatenate([np.zeros((1, tangents.shape[1])), np.cumsum(tangents, axis=0)])
+    slopes = np.zeros_like(tangents)
+    slopes[rows] = sums[rows + 1] - sums[since[rows]]
+    slopes[rows[was_full[rows]]] -= by_top / step
+    return BusFlow(given, slopes, held)
 
 
 def _soft_flow(
-    top: float,
+    limit: Top,
     wanted: FloatArray,
     step: float,
     tangents: FloatArray,
@@ -90,7 +120,8 @@ def _soft_flow(
 
     No kink stops a descent, however many samples change from one state of the link to another.
     """
-    given, held, conducts, passes = np.empty((4, len(wanted)))
+    top, by_top = limit
+    given, held, conducts, passes, loses = np.empty((5, len(wanted)))
     for k, joules in enumerate((wanted * step).tolist()):
         rest = charge - joules
         filled, filling = _soft(-rest / softness)
@@ -100,12 +131,13 @@ def _soft_flow(
         held[k] = charge
         conducts[k] = filling
         passes[k] = 1.0 - filling - losing
-    slope = np.zeros(tangents.shape[1])
-    given_slopes = np.empty_like(tangents)
-    for k, passed in enumerate(passes.tolist()):
-        given_slopes[k] = slope - tangents[k] * step
-        slope = passed * given_slopes[k]
-    given_slopes *= (-conducts / step)[:, None]
+        loses[k] = losing
+    # the charge's slope s after each step: s[k] - passes[k] s[k - 1] = what the step itself changes
+    own = loses[:, None] * by_top - (step * passes)[:, None] * tangents
+    bands = np.stack([np.ones(len(wanted)), np.append(-passes[1:], 0.0)])
+    after = solve_banded((1, 0), bands, own, check_finite=False)
+    before = np.concatenate([np.zeros((1, tangents.shape[1])), after[:-1]])
+    given_slopes = (-conducts / step)[:, None] * (before - step * tangents)
     return BusFlow(given, given_slopes, held)
 
 
@@ -136,13 +168,15 @@ _BUS_UP = ("STAND_ON_MOTORS", "STAND_ON_BRAKES")  # modes in which the drive bus
 @dataclass(frozen=True, eq=False)
 class Prepared:
     """Samples with the torques of their bodies and the speeds (M, n) of their motors, both as seen
-    at the joints; tool_watts (M,) W of the tool by its declaration.
+    at the joints; tool_watts (M,) W of the tool by its declaration; centres (2 n, M, n) Nm per
+    metre that a link's centre of mass lies elsewhere, none where these are no parameters.
     """
 
     samples: Samples
     torques: ArmTorques
     speed: FloatArray
     tool_watts: FloatArray
+    centres: FloatArray
 
 
 class PowerModel:
@@ -191,18 +225,25 @@ class PowerModel:
                 part[rows] = each
             watts[rows] = sum(load.watts_always for load in loads)
             watts[rows & bus_up] += sum(load.watts_drive_bus for load in loads)
+        centres = np.zeros((0, len(samples), self.robot.n))
+        if self.layout.centres:
+            directions = centre_directions(self.robot)
+            centres = centre_torques(self.robot, self._pose, motion, directions)
+            centres = centres.reshape(-1, len(samples), self.robot.n)
         if self.robot.coupled:
+            centres = centres @ np.linalg.inv(self.robot.motor_turns)
             turns = self.robot.motor_turns
             links, held, _, spring = (part @ np.linalg.inv(turns) for part in parts)
             rotors = (motion[2] @ turns.T) * self.robot.reflected_inertia
             arm = ArmTorques(links, held, rotors, spring)
-            return Prepared(samples, arm, motion[1] @ turns.T, watts)
-        return Prepared(samples, ArmTorques(*parts), motion[1], watts)
+            return Prepared(samples, arm, motion[1] @ turns.T, watts, centres)
+        return Prepared(samples, ArmTorques(*parts), motion[1], watts, centres)
 
     def watts(self, mean: FloatArray, prepared: Prepared) -> FloatArray:
         """Predicted W (M,) at the mains for parameters `mean` (P,)."""
         wanted = self._wanted(mean, prepared, None)
-        flow = bus_flow(self._link, wanted, prepared.samples.step)
+        size = self._one(mean, LINK)
+        flow = bus_flow(self._link, wanted, prepared.samples.step, size=size)
         return self._base(mean, prepared) + flow.watts / self._one(mean, "rectifier_efficiency")
 
     def watts_and_slopes(
@@ -211,7 +252,15 @@ class PowerModel:
         """The same with derivatives (M, P) by all parameters; softness [J]: that of `bus_flow`."""
         slopes = np.zeros((len(prepared.samples), len(mean)))
         wanted = self._wanted(mean, prepared, slopes)
-        flow = bus_flow(self._link, wanted, prepared.samples.step, slopes, softness=softness)
+        flow = bus_flow(
+            self._link,
+            wanted,
+            prepared.samples.step,
+            slopes,
+            softness=softness,
+            size=self._one(mean, LINK),
+            by_size=np.asarray(np.array(self.layout.names) == LINK, float),
+        )
         efficiency = self._one(mean, "rectifier_efficiency")
         result = flow.slopes / efficiency
         result[:, self.layout.index("rectifier_efficiency")] = -flow.watts / efficiency**2
@@ -250,16 +299,23 @@ class PowerModel:
         ):
             slopes[:, axis, of(term).start + axis] = values
         by_body = 1.0 + mean[of("gear")] * np.sign(through) * side
-        for name, body in self._bodies_of(prepared):
+        for name, body in self._bodies_of(mean, prepared):
             slopes[:, :, self.layout.index(name)] = by_body * body
+        centres = self._one(mean, "link_mass") * np.moveaxis(prepared.centres, 0, 2)
+        slopes[:, :, self.layout.centre_places()] = by_body[:, :, None] * centres
         return slopes
 
-    @staticmethod
-    def _bodies_of(prepared: Prepared) -> tuple[tuple[str, FloatArray], ...]:
+    def _bodies_of(
+        self, mean: FloatArray, prepared: Prepared
+    ) -> tuple[tuple[str, FloatArray], ...]:
         """What each factor of inertia or mass weighs, (M, n) Nm."""
         arm = prepared.torques
+        shifts = mean[self.layout.centre_places()]
+        links = arm.links
+        if len(shifts):
+            links = links + np.tensordot(shifts, prepared.centres, 1)
         return (
-            ("link_mass", arm.links),
+            ("link_mass", links),
             ("load_mass", arm.loads),
             ("rotor_inertia", arm.rotors),
             ("counterbalance", -arm.counterbalance),
@@ -273,7 +329,7 @@ class PowerModel:
         viscous, coulomb, gear = (mean[of(term)] for term in ("viscous", "coulomb", "gear"))
         qd = prepared.speed
         through = np.asarray(
-            sum(self._one(mean, name) * body for name, body in self._bodies_of(prepared))
+            sum(self._one(mean, name) * body for name, body in self._bodies_of(mean, prepared))
         )
         side = np.tanh(qd / STILL)
         return through, side, through + viscous * qd + (coulomb + gear * np.abs(through)) * side
@@ -300,7 +356,11 @@ class PowerModel:
             slopes[:, of("inverter")] = on * np.abs(motor)
             slopes[:, of("iron")] = on * qd**2
             by_body = by_torque * (1.0 + gear * np.sign(through) * side)
-            for name, body in self._bodies_of(prepared):
+            for name, body in self._bodies_of(mean, prepared):
                 slopes[:, self.layout.index(name)] = (by_body * body).sum(axis=1)
+            mass = self._one(mean, "link_mass")
+            slopes[:, self.layout.centre_places()] = mass * np.einsum(
+                "mn,kmn->mk", by_body, prepared.centres
+            )
             slopes[:, self.layout.index(IDLE)] = prepared.samples.motors
         return np.asarray((on * axes).sum(axis=1) + self._one(mean, IDLE) * prepared.samples.motors)

@@ -1,0 +1,124 @@
+"""Data that fit badly, but fit, are told: clocks, columns, signs; and centres of mass are found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ir_description import (
+    PowerParameters,
+    RobotModel,
+    centre_deviations,
+    data_sheet_of,
+    load_robot,
+    power_parameters_to_yaml,
+)
+from ir_description.library import power_parameters_of
+from ir_recorder.errors import RecorderError
+from ir_recorder.fit import Estimate, doubts, fit, recommendation, result
+from ir_recorder.measure import PowerModel, Samples
+
+ROBOT = load_robot("kr6_r900_2")
+STEP = 0.01
+SECONDS = 20.0
+
+
+def moved(robot: RobotModel, seed: int) -> Samples:
+    """Rests, and swings of all axes between them."""
+    rng = np.random.default_rng(seed)
+    time = (np.arange(int(SECONDS / STEP)) + 0.5) * STEP
+    q = np.tile(robot.machine_home, (len(time), 1))
+    qd, qdd = np.zeros_like(q), np.zeros_like(q)
+    for begin in np.arange(0.5, SECONDS - 1.5, 1.5):
+        rows = (time >= begin) & (time < begin + 1.2)
+        rate = 2.0 * np.pi / 1.2
+        x = rate * (time[rows] - begin)[:, None]
+        size = rng.uniform(-0.4, 0.4, robot.n)
+        q[rows] += size * (1.0 - np.cos(x))
+        qd[rows] = size * np.sin(x) * rate
+        qdd[rows] = size * np.cos(x) * rate**2
+    none = np.zeros(len(time), int)
+    on = np.ones(len(time), bool)
+    watts = np.full(len(time), np.nan)
+    return Samples(STEP, time, q, qd, qdd, none, none, on, watts, ((),))
+
+
+def model_of(robot: RobotModel, *, centres: bool = False) -> tuple[PowerModel, PowerParameters]:
+    prior = data_sheet_of(robot, robot.controller)
+    if centres:
+        prior = prior.with_centres(centre_deviations(robot))
+    return PowerModel(robot, robot.controller.dc_link, np.eye(4), prior), prior
+
+
+def metered(seed: int) -> Samples:
+    """What a meter shows of a robot that is as its data, at 90 W."""
+    model, prior = model_of(ROBOT)
+    samples = moved(ROBOT, seed)
+    noise = np.random.default_rng(seed).normal(0.0, 2.0, len(samples))
+    return replace(samples, watts=model.watts(prior.mean, model.prepare(samples)) + 90.0 + noise)
+
+
+def doubted(samples: Samples) -> str:
+    model, prior = model_of(ROBOT)
+    estimate = Estimate([samples], ["run"], model, prior)
+    try:
+        result(estimate, "x")
+    except RecorderError as error:
+        return str(error)
+    return " ".join(doubts(estimate))
+
+
+def test_nothing_speaks_against_good_data() -> None:
+    assert doubted(metered(1)) == ""
+
+
+@pytest.mark.parametrize("steps", [-30, 12])
+def test_a_meter_whose_clock_is_off_is_told_with_the_seconds_to_add(steps: int) -> None:
+    samples = metered(2)
+    said = doubted(replace(samples, watts=np.roll(samples.watts, steps)))
+    assert f"add {-steps * STEP:.2f} s to the clock_offset" in said
+
+
+def test_columns_that_were_taken_for_each_other_are_named() -> None:
+    samples = metered(3)
+    order = [0, 2, 1, 3, 4, 5]
+    swapped = replace(
+        samples, q=samples.q[:, order], qd=samples.qd[:, order], qdd=samples.qdd[:, order]
+    )
+    joints = ROBOT.joint_names
+    assert f"the columns of {joints[1]} and {joints[2]} swapped" in doubted(swapped)
+
+
+def test_power_with_the_wrong_sign_is_refused() -> None:
+    samples = metered(4)
+    model, prior = model_of(ROBOT)
+    with pytest.raises(RecorderError, match="a robot takes power"):
+        fit(replace(samples, watts=-samples.watts), model, prior)
+
+
+def test_a_doubted_fit_is_not_recommended_and_neither_is_one_without_movements() -> None:
+    assert "not known" in recommendation([])
+
+
+def test_centres_of_mass_are_found_from_torques_and_planned_with() -> None:
+    robot = load_robot("kr210_r2700_extra")
+    model, prior = model_of(robot, centres=True)
+    places = np.arange(len(prior.names))[prior.centre_places()]
+    mean = prior.mean.copy()
+    mean[places[1:3]] = 0.03, -0.04  # of axes 2 and 3
+    truth = replace(prior, mean=mean)
+    plain = data_sheet_of(robot, robot.controller)
+    moved_robot = truth.robot_with(robot)
+    samples = moved(robot, 5)
+    own = PowerModel(moved_robot, robot.controller.dc_link, np.eye(4), plain)
+    told = replace(samples, effort=own.torque(plain.mean, own.prepare(samples)))
+    errors = []
+    for each, start in ((model, prior), (model_of(robot)[0], plain)):
+        found = fit([told], each, start, motors=True).parameters
+        back = power_parameters_of(power_parameters_to_yaml(found), "x", robot)
+        assert back.names == found.names
+        torque = each.torque(back.mean, each.prepare(samples))
+        errors.append(np.abs(told.effort - torque).max())
+    assert errors[0] < 0.3 * errors[1]
