@@ -145,6 +145,20 @@ def test_slopes_are_those_of_the_energy(name: str) -> None:
     )
 
 
+@pytest.mark.parametrize("name", ["centre_1.joint_a2", "centre_2.joint_a3"])
+def test_slopes_by_centres_of_mass_are_those_of_the_energy(name: str) -> None:
+    sheet = SHEET.with_centres(np.full(12, 0.01))
+    trajectory = movement("p1b->cab")
+    k = sheet.index(name)
+
+    def energy(shift: float) -> float:
+        moved = replace(sheet, mean=sheet.mean + shift * np.eye(len(sheet.mean))[k])
+        return movement_energy(trajectory, scene(moved)).total
+
+    slope = energy_and_slope(Sampled.of(trajectory), scene(sheet))[1][k]
+    assert slope == pytest.approx((energy(1e-3) - energy(-1e-3)) / 2e-3, rel=0.05)
+
+
 def test_holding_slopes_are_those_of_holding_watts() -> None:
     q = np.array(planner().cell.machine_home)
     slope = holding_slope(q, scene())
