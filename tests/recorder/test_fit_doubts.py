@@ -94,7 +94,7 @@ def test_columns_that_were_taken_for_each_other_are_named() -> None:
 def test_power_with_the_wrong_sign_is_refused() -> None:
     samples = metered(4)
     model, prior = model_of(ROBOT)
-    with pytest.raises(RecorderError, match="a robot takes power"):
+    with pytest.raises(RecorderError, match="is a sign or a clamp turned round"):
         fit(replace(samples, watts=-samples.watts), model, prior)
 
 

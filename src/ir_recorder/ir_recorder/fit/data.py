@@ -59,8 +59,8 @@ def check_explained(measured: FloatArray, fitted: FloatArray, moving: BoolArray)
         mean = float(measured[rows].mean())
         if mean <= 0.0:
             raise RecorderError(
-                f"the meter shows {mean:.0f} W in the mean {what}, a robot takes power: is its "
-                "sign or a clamp turned round?"
+                f"no parameters explain the meter: it shows {mean:.0f} W in the mean {what}, a "
+                "robot takes power; is a sign or a clamp turned round?"
             )
         off = float(np.sqrt(np.mean((measured - fitted)[rows] ** 2)))
         if off > MOST_UNEXPLAINED * mean:
