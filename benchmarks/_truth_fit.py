@@ -167,9 +167,7 @@ class _Rig:
         link = load_power_data(self.prior.controller).dc_link
         return PowerModel(self.cell.robot, link, self.cell.base_pose, self.prior)
 
-    def followed(
-        self, seed: int
-    ) -> tuple[Samples, float, list[tuple[float, float]], list[float]]:
+    def followed(self, seed: int) -> tuple[Samples, float, list[tuple[float, float]], list[float]]:
         """What a plant that follows exactly shows, when the programme ended, and from start to end
         of each test [s] with what the meter counted meanwhile [J].
         """
