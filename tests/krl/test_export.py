@@ -12,7 +12,20 @@ import pytest
 
 from ir_cli.main import main
 from ir_description import CellPath
-from ir_krl import SetOutput, WrittenSignals, check_name, follow, parse, written
+from ir_description.poses import rotation_from_abc
+from ir_krl import (
+    Attached,
+    Motion,
+    Payload,
+    SetOutput,
+    Style,
+    WrittenMove,
+    WrittenSignals,
+    check_name,
+    follow,
+    parse,
+    written,
+)
 from ir_krl.write import SignalNames
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement
@@ -231,3 +244,47 @@ def test_one_station_is_nothing_to_plan_between(
     assert (
         "stations recognised: home; --compare plans between at least two" in capsys.readouterr().err
     )
+
+
+@pytest.mark.parametrize("style", ["kss8", "krc2"])
+def test_points_are_written_in_the_bases_of_their_machines(style: Style) -> None:
+    """Law: read back they are where they were; who moves a base moves its points alone."""
+    rng = np.random.default_rng(4)
+    poses = []
+    for _ in range(4):
+        pose = np.eye(4)
+        pose[:3, :3] = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        pose[:3, :3] *= np.sign(np.linalg.det(pose[:3, :3]))
+        pose[:3, 3] = rng.uniform(-2.0, 2.0, 3)
+        poses.append(pose)
+    lathe, washer, *goals = poses
+    none = Payload(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    tool = Attached(np.eye(4), (none,), (("lathe", lathe), ("washer", washer)))
+    moves = [
+        WrittenMove("", goals[k % 2], 2, 10, straight=k == 2, velocity=1, base=k) for k in (1, 2, 0)
+    ]
+    texts = written("P", np.zeros(6), moves, tool, [], style=style)
+    assert dict(texts.bases) == {"lathe": 15, "washer": 14}
+    assert [f"Base[{n}]" in texts.source for n in (15, 14, 0)] == [True] * 3
+
+    def places(data: str) -> list[np.ndarray]:
+        program = follow(
+            [parse(texts.source, "p.src"), parse(data, "p.dat")], np.zeros(6), tool.tool
+        )
+        assert not [note for note in program.notes if "isn't in the files" in note.text]
+        found = [one for one in program.commands if isinstance(one, Motion)][1:]
+        return [one.target.base @ rounded(one.target.frame or {}) for one in found]
+
+    back = places(texts.data)
+    for one, k in zip(back, (1, 2, 0), strict=True):
+        assert one == pytest.approx(goals[k % 2], abs=1e-7)
+    moved = re.sub(r"(IR_BASE_2=\{X )[-\d.]+", r"\g<1>9000.0", texts.data)
+    shifted = [not np.allclose(a, b) for a, b in zip(places(moved), back, strict=True)]
+    assert shifted == [False, True, False]
+
+
+def rounded(frame: dict[str, float]) -> np.ndarray:
+    pose = np.eye(4)
+    pose[:3, 3] = [1e-3 * frame[name] for name in "XYZ"]
+    pose[:3, :3] = rotation_from_abc([frame[name] for name in "ABC"])
+    return pose

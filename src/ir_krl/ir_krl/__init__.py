@@ -35,6 +35,7 @@ from ir_krl.run import (
 )
 from ir_krl.settings import settings_of, stubs
 from ir_krl.write import (
+    BASES_MAX,
     GRIP,
     NAME_MAX,
     PLC_DONE,
@@ -66,6 +67,7 @@ from ir_krl.write import (
 
 __all__ = [
     "ARCHIVES",
+    "BASES_MAX",
     "BYTES_MAX",
     "FRAME_NAMES",
     "GRIP",

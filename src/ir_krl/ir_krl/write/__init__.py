@@ -16,9 +16,19 @@ from ir_krl.write.parts import (
     check_style,
 )
 from ir_krl.write.plc import PlcPause, plc_input, plc_table, read_plc_table, structured_text
-from ir_krl.write.program import GRIP, PLC_DONE, PLC_PAUSE, PLC_THERE, Texts, check_signal, written
+from ir_krl.write.program import (
+    BASES_MAX,
+    GRIP,
+    PLC_DONE,
+    PLC_PAUSE,
+    PLC_THERE,
+    Texts,
+    check_signal,
+    written,
+)
 
 __all__ = [
+    "BASES_MAX",
     "GRIP",
     "NAME_MAX",
     "PLC_DONE",

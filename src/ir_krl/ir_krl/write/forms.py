@@ -24,21 +24,26 @@ class Forms:
         self._data = data
         self._count = 0
 
-    def move(self, part: WrittenMove, tool: int) -> None:
-        """A motion with tool number `tool`, in base 0."""
+    def move(self, part: WrittenMove, tool: int, base: int) -> None:
+        """A motion with these numbers of tool and base, its pose in that base."""
         self._count += 1
         n = self._count
-        self._data += _declared(part, n, tool, self._style)
+        self._data += _declared(part, n, (tool, base), self._style)
         if part.comment:
             self._lines.append(f"; {part.comment}")
         if self._style == "krc2":
-            self._lines += _line_of_krc2(part, n, tool) if part.straight else _ptp(part, n, tool)
+            made = _line_of_krc2 if part.straight else _ptp
         else:
-            self._lines += _slin(part, n, tool) if part.straight else _sptp(part, n, tool)
+            made = _slin if part.straight else _sptp
+        self._lines += made(part, n, (tool, base))
         self._lines.append(";ENDFOLD")
 
 
-def _declared(part: WrittenMove, n: int, tool: int, style: Style) -> list[str]:
+_Numbers = tuple[int, int]
+"""Of tool and base."""
+
+
+def _declared(part: WrittenMove, n: int, numbers: _Numbers, style: Style) -> list[str]:
     if part.straight:
         shape = ",ORI_TYP #VAR" if style == "krc2" else ",ORI_TYP #VAR,CIRC_TYP #BASE,JERK_FAC 50.0"
         motion = (
@@ -54,17 +59,19 @@ def _declared(part: WrittenMove, n: int, tool: int, style: Style) -> list[str]:
     fields = frame_text(part.pose, 6)
     external = ",".join(f"E{k} 0.0" for k in range(1, 7))
     position = f"{{{fields},S {part.status},T {part.turn},{external}}}"
-    form = f'{{TOOL_NO {tool},BASE_NO 0,IPO_FRAME #BASE,POINT2[] " "}}'
+    tool, base = numbers
+    form = f'{{TOOL_NO {tool},BASE_NO {base},IPO_FRAME #BASE,POINT2[] " "}}'
     return [f"DECL E6POS XP{n}={position}", f"DECL FDAT FP{n}={form}", motion]
 
 
-def _title(word: str, part: WrittenMove, n: int, tool: int, unit: str, data: str) -> str:
+def _title(word: str, part: WrittenMove, n: int, numbers: _Numbers, unit: str, data: str) -> str:
     cont = " CONT" if part.rounded else ""
-    return f";FOLD {word} P{n}{cont} Vel={part.velocity:g} {unit} {data} Tool[{tool}] Base[0]"
+    tool, base = numbers
+    return f";FOLD {word} P{n}{cont} Vel={part.velocity:g} {unit} {data} Tool[{tool}] Base[{base}]"
 
 
 def _spline_form(
-    command: str, part: WrittenMove, n: int, tool: int, unit: str, data: str
+    command: str, part: WrittenMove, n: int, numbers: _Numbers, unit: str, data: str
 ) -> list[str]:
     names = (
         ("MoveDataName", "VelocityPath") if part.straight else ("MoveDataPtpName", "VelocityPtp")
@@ -79,7 +86,7 @@ def _spline_form(
         "IlfCommand": command,
     }
     return [
-        f"{_title(command, part, n, tool, unit, data)} ;%{{PE}}",
+        f"{_title(command, part, n, numbers, unit, data)} ;%{{PE}}",
         ";FOLD Parameters ;%{h}",
         f";Params {'; '.join(f'{name}={value}' for name, value in values.items())}",
         ";ENDFOLD",
@@ -93,27 +100,27 @@ def _frames(n: int) -> str:
     )
 
 
-def _sptp(part: WrittenMove, n: int, tool: int) -> list[str]:
+def _sptp(part: WrittenMove, n: int, numbers: _Numbers) -> list[str]:
     return [
-        *_spline_form("SPTP", part, n, tool, "%", f"PDAT{n}"),
+        *_spline_form("SPTP", part, n, numbers, "%", f"PDAT{n}"),
         f"SPTP XP{n} WITH $VEL_AXIS[1] = SVEL_JOINT({part.velocity:.1f}), {_frames(n)}, "
         f"$ACC_AXIS[1] = SACC_JOINT(PPDAT{n}), $APO = SAPO_PTP(PPDAT{n}), "
         f"$GEAR_JERK[1] = SGEAR_JERK(PPDAT{n}), {_CHECK}{' C_SPL' if part.rounded else ''}",
     ]
 
 
-def _slin(part: WrittenMove, n: int, tool: int) -> list[str]:
+def _slin(part: WrittenMove, n: int, numbers: _Numbers) -> list[str]:
     return [
-        *_spline_form("SLIN", part, n, tool, "m/s", f"CPDAT{n}"),
+        *_spline_form("SLIN", part, n, numbers, "m/s", f"CPDAT{n}"),
         f"SLIN XP{n} WITH $VEL = SVEL_CP({part.velocity:g}, , LCPDAT{n}), {_frames(n)}, "
         f"$ACC = SACC_CP(LCPDAT{n}), $ORI_TYPE = SORI_TYP(LCPDAT{n}), $APO = SAPO(LCPDAT{n}), "
         f"$JERK = SJERK(LCPDAT{n}), {_CHECK}{' C_SPL' if part.rounded else ''}",
     ]
 
 
-def _ptp(part: WrittenMove, n: int, tool: int) -> list[str]:
+def _ptp(part: WrittenMove, n: int, numbers: _Numbers) -> list[str]:
     word = "C_PTP" if part.rounded else ""
-    title = _title("PTP", part, n, tool, "%", f"PDAT{n}")
+    title = _title("PTP", part, n, numbers, "%", f"PDAT{n}")
     return [
         f"{title};%{{PE}}%R 5.4.27,%MKUKATPBASIS,%CMOVE,%VPTP,%P 1:PTP, 2:P{n}, 3:{word}, "
         f"5:{part.velocity:g}, 7:PDAT{n}",
@@ -125,9 +132,9 @@ def _ptp(part: WrittenMove, n: int, tool: int) -> list[str]:
     ]
 
 
-def _line_of_krc2(part: WrittenMove, n: int, tool: int) -> list[str]:
+def _line_of_krc2(part: WrittenMove, n: int, numbers: _Numbers) -> list[str]:
     word = "C_DIS" if part.rounded else ""
-    title = _title("LIN", part, n, tool, "m/s", f"CPDAT{n}")
+    title = _title("LIN", part, n, numbers, "m/s", f"CPDAT{n}")
     return [
         f"{title};%{{PE}}%R 5.4.27,%MKUKATPBASIS,%CMOVE,%VLIN,%P 1:LIN, 2:P{n}, 3:{word}, "
         f"5:{part.velocity:g}, 7:CPDAT{n}",

@@ -57,7 +57,8 @@ class WrittenMove:
 
     straight: a line of the tool, else of the axes; velocity: [m/s], else [%]; acceleration [%];
     rounded: how far around its end it is left for the next motion, [mm] (krc2, not straight: [%]),
-    0: exact.
+    0: exact. base: which of the program's bases its frame is written in, from 1 on; 0: the robot's
+    foot.
     """
 
     comment: str
@@ -69,6 +70,7 @@ class WrittenMove:
     acceleration: int = 100
     rounded: float = 0.0
     joints: FloatArray = field(default_factory=lambda: np.zeros(0))
+    base: int = 0
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,10 @@ Part: TypeAlias = (
 
 @dataclass(frozen=True, eq=False)
 class Attached:
-    """The tool: its frame (4, 4) in the flange [m]; loads: what is carried, first at the start."""
+    """The tool: its frame (4, 4) in the flange [m]; loads: what is carried, first at the start;
+    bases: machines with their poses (4, 4) [m] in the robot's foot, for inline forms.
+    """
 
     tool: FloatArray
     loads: tuple[Payload, ...]
+    bases: tuple[tuple[str, FloatArray], ...] = ()

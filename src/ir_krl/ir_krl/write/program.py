@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ir_description.poses import inverse
+from ir_kernels import portable
 from ir_krl.errors import KrlError
 from ir_krl.run.commands import Payload
 from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES
@@ -42,6 +44,8 @@ _OWN_SIGNALS = {
 START_SPEED = 10
 """% of the axes' speed, on the way from wherever the robot stands."""
 _HIGHEST_TOOL = 16  # of TOOL_DATA: inline forms name tools by number, from here downwards
+BASES_MAX = 15
+"""Bases of a program: numbers of BASE_DATA that every controller has."""
 
 
 def check_signal(name: str) -> None:
@@ -56,7 +60,8 @@ def check_signal(name: str) -> None:
 @dataclass(frozen=True)
 class Texts:
     """NAME.src and NAME.dat; assumed: signals whose numbers nobody gave; numbers: of the signals
-    between program and PLC; tools: numbers of TOOL_DATA that the program sets.
+    between program and PLC; tools: numbers of TOOL_DATA that the program sets; bases: of BASE_DATA,
+    by machine.
     """
 
     source: str
@@ -64,6 +69,7 @@ class Texts:
     assumed: tuple[str, ...]
     numbers: Mapping[str, int]
     tools: tuple[int, ...]
+    bases: Mapping[str, int] = field(default_factory=dict)
 
 
 def written(
@@ -98,6 +104,7 @@ def written(
             tuple(body.wiring.assumed),
             body.plc_numbers(),
             tuple(body.tools()),
+            body.bases(),
         )
 
     return texts(header(texts([])) if callable(header) else header)
@@ -166,7 +173,9 @@ class _Body:
                 self._path(part)
             case WrittenMove():
                 assert self._forms is not None  # of another style
-                self._forms.move(part, _HIGHEST_TOOL - self._carried)
+                self._forms.move(
+                    self._in_base(part), _HIGHEST_TOOL - self._carried, self._base_number(part.base)
+                )
             case WrittenPause():
                 self._pause(part)
             case WrittenHandling():
@@ -194,8 +203,28 @@ class _Body:
             "$TOOL=IR_TOOL",
             "$LOAD=IR_LOAD",
             *numbered,
+            *(
+                f"BASE_DATA[{self._base_number(k)}]={_base_name(k)}"
+                for k in range(1, len(self._attached.bases) + 1)
+            ),
             *([f"{PLC_PAUSE}=0"] if self._rests else []),
         ]
+
+    def bases(self) -> dict[str, int]:
+        """Numbers of BASE_DATA by the machines that they stand for."""
+        names = (name for name, _ in self._attached.bases)
+        return {name: self._base_number(k) for k, name in enumerate(names, start=1)}
+
+    @staticmethod
+    def _base_number(k: int) -> int:
+        """Of BASE_DATA, for the k-th base; 0 for the robot's foot."""
+        return BASES_MAX + 1 - k if k else 0
+
+    def _in_base(self, part: WrittenMove) -> WrittenMove:
+        if not part.base:
+            return part
+        _, frame = self._attached.bases[part.base - 1]
+        return replace(part, pose=portable.matmul(inverse(frame), part.pose))
 
     def tools(self) -> list[int]:
         """Numbers of TOOL_DATA that inline forms name, one for each load."""
@@ -205,7 +234,11 @@ class _Body:
     def data(self) -> list[str]:
         """Declarations: tool, loads, signals."""
         loads = [_load(k, one) for k, one in enumerate(self._attached.loads)]
-        return [_tool(self._attached.tool), *loads, *self.wiring.declarations()]
+        bases = [
+            f"DECL FRAME {_base_name(k)}={{{frame_text(frame, 6)}}}"
+            for k, (_, frame) in enumerate(self._attached.bases, start=1)
+        ]
+        return [_tool(self._attached.tool), *loads, *bases, *self.wiring.declarations()]
 
     def plc_numbers(self) -> dict[str, int]:
         """First numbers of the signals between program and PLC; none where it spends no pause."""
@@ -280,6 +313,10 @@ def _axes(q: FloatArray) -> str:
 
 def _tool(tool: FloatArray) -> str:
     return f"DECL FRAME IR_TOOL={{{frame_text(tool, 4)}}}"
+
+
+def _base_name(k: int) -> str:
+    return f"IR_BASE_{k}"
 
 
 def _load_name(k: int) -> str:

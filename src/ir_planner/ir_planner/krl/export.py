@@ -8,7 +8,10 @@ from typing import TypeAlias
 import numpy as np
 
 from ir_description import Cell
+from ir_description.poses import inverse
+from ir_kernels import portable
 from ir_krl import (
+    BASES_MAX,
     Attached,
     Followed,
     Numbers,
@@ -53,6 +56,7 @@ __all__ = ["DEVIATION_MAX", "KrlExport", "attached", "export"]
 # style can't keep of the plan shows in seconds and joules. Modes of pauses are the PLC's.
 
 _PAUSES_MAX = 255
+_WITH_BASES = ("kss8", "krc2")  # styles whose points are touched up, each at its machine
 _IDS = 5  # in a line of the header
 _MANY_JOULES = 100.0  # that one decimal is enough for
 _Motion: TypeAlias = WrittenSpline | WrittenPath | WrittenMove
@@ -135,6 +139,7 @@ class _Job:
         self._make = make_of(style, scene)
         self._pauses = _plc_pauses(steps, times)
         self._loads = _loads(steps, judge)
+        self._bases = self._machines() if style in _WITH_BASES else {}
         self._start = points_of(next(step for step in steps if not step.is_pause)).positions[0]
         fitted = {id(one): self._fitted(one) for one in steps if not one.is_pause}
         self._motions = {key: parts for key, (parts, _) in fitted.items()}
@@ -196,7 +201,11 @@ class _Job:
             self._name,
             self._start,
             parts,
-            Attached(tool_in_flange(self._scene.cell.tcp), tuple(self._loads.values())),
+            Attached(
+                tool_in_flange(self._scene.cell.tcp),
+                tuple(self._loads.values()),
+                tuple(self._bases.items()),
+            ),
             header,
             from_home=from_home,
             numbers=_numbers(self._scene.cell),
@@ -209,7 +218,12 @@ class _Job:
             pause = self._pauses.get(id(step))
             parts.append(WrittenPause(comment, step.duration, pause.number if pause else 0))
         else:
-            first, *others = self._motions[id(step)]
+            base = self._base_of(step)
+            moves = [
+                replace(one, base=base) if isinstance(one, WrittenMove) else one
+                for one in self._motions[id(step)]
+            ]
+            first, *others = moves
             parts += [replace(first, comment=comment), *others]
         if step.attach or step.detach:
             words = f"takes {step.attach}" if step.attach else f"leaves {step.detach}"
@@ -217,6 +231,29 @@ class _Job:
         if step.set_signals:
             parts.append(WrittenSignals(set_signals=_signals(step.set_signals)))
         return parts
+
+    def _machines(self) -> dict[str, FloatArray]:
+        """Machines that the movements lead to, with their poses (4, 4) in the robot's foot: bases
+        that points are taught in.
+        """
+        cell = self._scene.cell
+        named = dict.fromkeys(map(self._machine_of, self._steps))
+        foot = inverse(cell.base_pose)
+        return {
+            name: portable.matmul(foot, cell.machine(name).pose)
+            for name in [one for one in named if one][:BASES_MAX]
+        }
+
+    def _machine_of(self, step: PlannedMovement) -> str:
+        """The machine whose base the points of a movement are written in, "" for the foot."""
+        leaving = step.kind == MovementKind.SERVICE_EXIT
+        name = step.from_station if leaving else step.to_station
+        stations = {one.name: one.equipment for one in self._scene.cell.stations}
+        return "" if step.is_pause else stations.get(name, "")
+
+    def _base_of(self, step: PlannedMovement) -> int:
+        machine = self._machine_of(step)
+        return list(self._bases).index(machine) + 1 if machine in self._bases else 0
 
     def _driven_again(self, texts: Texts) -> dict[int, _Again]:
         """Every movement of the whole program, driven as an import drives it."""
@@ -331,6 +368,9 @@ class _Job:
         if texts.tools:
             tools = ", ".join(map(str, texts.tools))
             lines.append(f"sets TOOL_DATA and LOAD_DATA of the numbers {tools}, for inline forms")
+        if texts.bases:
+            bases = ", ".join(f"{number} ({name})" for name, number in texts.bases.items())
+            lines.append(f"sets BASE_DATA of the numbers {bases}, for inline forms")
         lines += self._pause_lines()
         return lines
 
