@@ -19,6 +19,7 @@ from ir_msgs.msg import RecordedCall
 from ir_msgs.srv import PlanProgram
 from ir_msgs_py.search_log import ConfigurationLog
 from ir_recorder import Analysis, Verdict, analyse, findings, read_recording, summary
+from ir_recorder.analysis.production import planned_interval
 from ir_recorder.reading.mcap_file import RawRecording, read_raw
 from ir_recorder.report import report_html
 from ir_recorder.report.compare import comparison_html
@@ -29,8 +30,11 @@ def assert_planned_figures_are_those_of_the_answer(analysis: Analysis, raw: RawR
     calls = raw.channel("/ir_planner/calls")
     assert calls is not None
     call = deserialize_message(calls.messages[-1], RecordedCall)
-    steps = deserialize_message(bytes(call.response), PlanProgram.Response).movements
+    answer = deserialize_message(bytes(call.response), PlanProgram.Response)
+    steps = answer.movements
     planned = analysis.recording.planned
+    report = answer.report
+    assert planned_interval(analysis.recording) == (report.energy_low, report.energy_high)
     assert [step.report.energy for step in planned] == [step.report.energy for step in steps]
     assert [step.duration for step in planned] == [step.duration for step in steps]
     assert [step.from_station for step in planned] == [step.from_station for step in steps]

@@ -63,6 +63,18 @@ def empty(analysis: Analysis) -> str:
     return report(analyse(bare))
 
 
+def long_names(analysis: Analysis) -> str:
+    """Stations and settings as a large plant calls them."""
+    recording = analysis.recording
+    name = "conveyor_of_the_second_hall_place_3"
+    events = tuple(
+        replace(event, movement=replace(event.movement, from_station=name))
+        for event in recording.events
+    )
+    facts = (("packages", "ir_planner_0.1.0_" * 8), ("pauses", "shortened " * 20))
+    return report(analyse(replace(recording, events=events, facts=facts)))
+
+
 def recordings(analysis: Analysis) -> str:
     checked = (analysis, findings(analysis))
     return comparison_html([checked, checked, checked])
@@ -145,6 +157,7 @@ def layout(_: Analysis) -> str:
 PAGES: dict[str, Callable[[Analysis], str]] = {
     "report": report,
     "empty report": empty,
+    "long names": long_names,
     "recordings": recordings,
     "fleet": fleet,
     "before and after": before_and_after,

@@ -30,6 +30,7 @@ from ir_recorder.analysis.results import (
     mode_name,
 )
 from ir_recorder.analysis.steps import step_label
+from ir_recorder.reading.recording import Recording
 
 ENDED = "ended"  # outcome of a step
 PREDICTED = "predicted"
@@ -348,8 +349,13 @@ def planned_share(steps: Sequence[PlannedMovement], part: str = "whole") -> Shar
     return Share(part, sum(step.duration for step in own), sum(step.report.energy for step in own))
 
 
-def planned_interval(steps: Sequence[PlannedMovement]) -> tuple[float, float] | None:
-    """90 % interval of the whole energy [J], None where the plan has none."""
+def planned_interval(recording: Recording) -> tuple[float, float] | None:
+    """90 % interval of the whole energy [J] of what was planned, as the planner said it; without
+    its word that of the steps' ends added up; None where the plan has none.
+    """
+    if recording.planned_interval is not None:
+        return recording.planned_interval
+    steps = recording.planned
     low, high = (
         sum(getattr(step.report, name) for step in steps) for name in ("energy_low", "energy_high")
     )
@@ -374,7 +380,7 @@ def _planned(analysis: Analysis, planned: Sequence[PlannedMovement]) -> Producti
         for step in planned
     )
     steps = _summed((step_label(step), step.duration, step.report.energy) for step in planned)
-    low, high = planned_interval(planned) or (whole.energy, whole.energy)
+    low, high = planned_interval(analysis.recording) or (whole.energy, whole.energy)
     name = "planned program, predicted"
     return Production(
         name,

@@ -159,24 +159,33 @@ SERVICE = "ir_msgs/srv/PlanProgram"
 MOST_STEPS = 1_000
 
 
-def planned_steps(channel: RawChannel | None) -> tuple[PlannedMovement, ...]:
-    """Steps of the last answer on a planner's calls that has some, without points; empty where none
-    has.
+Interval = tuple[float, float]
+
+
+def planned_program(
+    channel: RawChannel | None,
+) -> tuple[tuple[PlannedMovement, ...], Interval | None]:
+    """Steps of the last answer on a planner's calls that has some, without points, and the 90 %
+    interval of their energy [J], which is not that of the steps' sum; empty where none has.
     """
     definition = result_definition()
     if channel is None or channel.message_encoding != "cdr" or not definition:
-        return ()
+        return (), None
     for answer in answers(channel, (ACTION, SERVICE)):
-        if steps := _steps_of(answer, definition):
-            return steps
-    return ()
+        try:
+            name = f"{ACTION.replace('/action/', '/msg/')}_Result"
+            columns = Columns([answer], name, definition)
+        except ReadError:
+            continue
+        if steps := _steps_of(columns):
+            low, high = (
+                float(columns.numbers(f"report.energy_{end}")[0]) for end in ("low", "high")
+            )
+            return steps, (low, high) if high > low else None
+    return (), None
 
 
-def _steps_of(answer: bytes, definition: str) -> tuple[PlannedMovement, ...]:
-    try:
-        columns = Columns([answer], f"{ACTION.replace('/action/', '/msg/')}_Result", definition)
-    except ReadError:
-        return ()
+def _steps_of(columns: Columns) -> tuple[PlannedMovement, ...]:
     steps: list[PlannedMovement] = []
     for k in range(MOST_STEPS):
         seconds = float(columns.numbers(f"movements[{k}].duration")[0])

@@ -21,7 +21,7 @@ from ir_recorder.reading.cdr import Columns, fitting, joint_groups
 from ir_recorder.reading.limits import ReadLimits
 from ir_recorder.reading.mcap_file import RawChannel, RawRecording, chosen_namespace, read_raw
 from ir_recorder.reading.messages import contact_sentence, decoder_of, movement_from, savings_from
-from ir_recorder.reading.planner_answers import planned_steps, with_plans
+from ir_recorder.reading.planner_answers import planned_program, with_plans
 from ir_recorder.reading.recording import (
     BitSeries,
     ControllerSeries,
@@ -186,10 +186,12 @@ class _Reader:
         found = with_plans(found, self._channel(_CALLS))
         if found.joints is not None or found.power is not None or found.events:
             return found
-        planned = planned_steps(self._channel(_CALLS))
+        planned, interval = planned_program(self._channel(_CALLS))
         missing = {f"{self._prefix}{name} isn't in the recording" for name in _OF_A_RUN}
         kept = tuple(problem for problem in found.problems if problem not in missing)
-        return replace(found, planned=planned, problems=kept) if planned else found
+        if not planned:
+            return found
+        return replace(found, planned=planned, planned_interval=interval, problems=kept)
 
     def _channel(self, name: str) -> RawChannel | None:
         """The channel of a topic, where its messages are of the type that the topic has."""

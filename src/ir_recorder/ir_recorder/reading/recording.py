@@ -148,7 +148,8 @@ class Recording:
     start_ns: node clock of time 0. hardware: the driver's name of its plant ("..., simulated").
     cell_yaml and urdf are "" where none is attached, so are power_yaml (data of the controller) and
     plant_yaml (the simulated plant with its figures). facts: texts by key. planned: steps of the
-    last planned program, where nothing was driven. machines: their states by name, "closed>open"
+    last planned program, where nothing was driven; planned_interval [J]: of its energy, 90 %, None
+    where its answer has none. machines: their states by name, "closed>open"
     while they change; contacts: what the robot touched, by body. savings: of the driven programs,
     or of the last planned one, where their plans are in it. searches: what the searches of the
     driven programs did, or of the last planned one where none was driven, where they keep a log.
@@ -177,6 +178,7 @@ class Recording:
     power_yaml: str = ""
     plant_yaml: str = ""
     planned: tuple[PlannedMovement, ...] = ()
+    planned_interval: tuple[float, float] | None = None
     machines: tuple[TextEvent, ...] = ()
     contacts: tuple[TextEvent, ...] = ()
     searches: tuple[SearchLog, ...] = ()

@@ -154,7 +154,7 @@ def _planned(analysis: Analysis) -> list[Tile]:
         ("pauses", "pauses"),
     ):
         found = planned_share(steps, part)
-        within = planned_interval(steps) if part == "whole" else None
+        within = planned_interval(analysis.recording) if part == "whole" else None
         if found is None:
             continue
         spread = (
