@@ -156,9 +156,15 @@ def unexpected(error: BaseException) -> Status:
 Handler = Callable[[Any, Any], Any]
 
 
-class BoundedService(Waitable):
-    """A service of `node` whose responses have a `status`; at most `waiting` requests wait in it.
+def with_status(response: Any, status: Status) -> None:
+    """Put a status into a response of this project's services."""
+    response.status = status_to_msg(status)
 
+
+class BoundedService(Waitable):
+    """A service of `node`; at most `waiting` requests wait in it.
+
+    put: puts a status into a response, where that has no `status` of ours.
     handler: from request and response to the response; requests are answered in the order in which
     they came. What it raises, and a response that can't be sent, is answered as a failure and
     logged; a client that has gone is a warning. Where rclpy's insides are missing, it is a service
@@ -173,10 +179,12 @@ class BoundedService(Waitable):
         handler: Handler,
         group: CallbackGroup | None = None,
         waiting: int = REQUESTS_WAITING,
+        put: Callable[[Any, Status], None] = with_status,
     ) -> None:
         super().__init__(group or node.default_callback_group)
         self._type = service_type
         self._handler = handler
+        self._put = put
         self._most = waiting
         self._source = node.get_name()
         self._log = node.get_logger().error
@@ -266,7 +274,7 @@ class BoundedService(Waitable):
 
     def _response(self, status: Status) -> Any:
         response = self._type.Response()
-        response.status = status_to_msg(Status(status.code, status.message, self._source))
+        self._put(response, Status(status.code, status.message, self._source))
         return response
 
 

@@ -27,7 +27,7 @@ from ir_sim_driver.controller.outputs import Entry, Frame, Frames, Joints, repor
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.controller.surroundings import PlannedCell
 from ir_sim_driver.errors import BackendError, RequestRefusedError, TrajectoryRefusedError
-from ir_sim_driver.motion import ExecutionSettings, Following, Outcome, TrajectoryGoal
+from ir_sim_driver.motion import ExecutionSettings, Following, Motion, Outcome, TrajectoryGoal
 from ir_sim_driver.notices import Level, Notice
 from ir_sim_driver.plant import Carried, Plant
 from ir_sim_driver.plc import STOP_BIT
@@ -239,6 +239,20 @@ class Driver:
                 return None
             backend = self._simulation.backend
             return self._simulation.executor.following(backend.q, backend.qd)
+
+    def commanded_at(self, stamp_ns: int) -> Motion:
+        """Commanded motion at a time of the plant [ns]. Raises RequestRefusedError: before the
+        movement, off the network.
+        """
+        with self._access.online() as simulation:
+            seconds = (stamp_ns - self._stamp) * 1e-9
+            motion = simulation.executor.motion_in(seconds)
+            if motion is None:
+                raise RequestRefusedError(
+                    StatusCode.INVALID_ROBOT_STATE,
+                    f"the time is {-seconds:.3f} s ago: no movement that runs now had begun",
+                )
+            return motion
 
     def set_speed_scaling(self, factor: float) -> None:
         """Scale the speed of every movement by a factor in [0, 1]."""

@@ -254,6 +254,20 @@ class Executor:
         path = run.route.path.motion(run.s)
         return Motion(self.command, path.qd * v, path.qdd * v**2)
 
+    def motion_in(self, seconds: float) -> Motion | None:
+        """The commanded motion so many seconds from now, before now where below 0, as the movement
+        goes on at its present speed; None before the movement began.
+        """
+        run = self._run
+        if run is None:
+            return None if seconds < 0.0 else self.motion()
+        v = self.path_speed
+        s = run.s + (seconds - run.wait * self._dt) * v
+        if s < 0.0:
+            return None if seconds < 0.0 else self.motion()
+        path = run.route.path.motion(s)
+        return Motion(path.q, path.qd * v, path.qdd * v**2)
+
     def following(self, q: FloatArray, qd: FloatArray) -> Following:
         """How the robot at q, qd (n,) follows."""
         return Following(

@@ -47,6 +47,13 @@ def goal_from_action(goal: Any, max_points: int) -> TrajectoryGoal:
             f"multi_dof_trajectory has {len(multi_dof.points)} points: it must be empty, the robot "
             "has joints only",
         )
+    for name in ("component_path_tolerance", "component_goal_tolerance"):
+        if getattr(goal, name, ()):
+            raise TrajectoryRefusedError(
+                ErrorCode.INVALID_GOAL,
+                f"{name} has {len(getattr(goal, name))} entries: it must be empty, they are of "
+                "multi_dof_trajectory and the robot has joints only",
+            )
     plain = goal_from_trajectory(goal.trajectory, max_points)
     wait = goal.goal_time_tolerance
     states, after_stop = _states(goal)

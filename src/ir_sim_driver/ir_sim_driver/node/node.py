@@ -32,6 +32,11 @@ from ir_sim_driver.controller import Driver, Joints, Simulation, ended_by_stop, 
 from ir_sim_driver.errors import DriverError, LinkError, TrajectoryRefusedError
 from ir_sim_driver.node.announcements import Announcements
 from ir_sim_driver.node.command_topics import TrajectoryTopic
+from ir_sim_driver.node.controller_interface import (
+    StateQueries,
+    control_type,
+    hear_speed_factor,
+)
 from ir_sim_driver.node.messages import condition_of, hardware_id
 from ir_sim_driver.node.parameters import DriverParameters
 from ir_sim_driver.node.presses import (
@@ -68,11 +73,6 @@ def open_links(links: Iterable[Link], driver: Driver) -> dict[str, OpenLink]:
                 driver.forbid_hibernation(f"nothing could wake the controller ({error})")
     return opened
 
-
-try:  # where a ROS installation has it
-    from control_msgs.action import FollowJointTrajectory
-except ImportError:
-    FollowJointTrajectory = None
 
 _NS = 1_000_000_000
 # s
@@ -155,6 +155,7 @@ class SimDriver(Node):
             lambda msg: self._driver.set_speed_scaling(float(msg.data)),
             10,
         )
+        hear_speed_factor(self, self._driver)
         self._markers_timer = self.create_timer(_MARKERS_PERIOD, self._publish_markers)
         self.create_timer(_DIAGNOSTICS_PERIOD, self._publish_diagnostics)
         self._transforms = open_transforms(self, self._driver, self._configuration.node.publish_tf)
@@ -164,10 +165,10 @@ class SimDriver(Node):
 
     def _open_requests(self) -> None:
         self._actions = [self._serve_action(ExecuteTrajectory, names.EXECUTE_TRAJECTORY)]
-        if FollowJointTrajectory is not None:
-            self._actions.append(
-                self._serve_action(FollowJointTrajectory, names.FOLLOW_JOINT_TRAJECTORY)
-            )
+        follow = control_type("action", "FollowJointTrajectory")
+        if follow is not None:
+            self._actions.append(self._serve_action(follow, names.FOLLOW_JOINT_TRAJECTORY))
+        StateQueries(self._driver).offer(self)
         self._answers = answers = Services(self._driver, self.get_name(), self._announcements.look)
         self._presses = OwnParticipant(self, "presses")
         self._requests = OwnParticipant(self, "requests")

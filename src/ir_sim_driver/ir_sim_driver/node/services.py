@@ -109,11 +109,12 @@ class Services:
     def _answer(self, response: Any, work: Callable[[], str]) -> Any:
         """Run `work`; what it returns is the remark, what it raises the refusal."""
         return answered(
-            response, self._source, lambda: Status.success(work()), _known, self._driver.warn
+            response, self._source, lambda: Status.success(work()), known_status, self._driver.warn
         )
 
 
-def _known(error: Exception) -> Status | None:
+def known_status(error: Exception) -> Status | None:
+    """The status of a request that an error ended, None for one that nobody thought of."""
     if isinstance(error, RequestRefusedError):
         return Status(error.code, str(error))
     if isinstance(error, (IrError, DriverError)):

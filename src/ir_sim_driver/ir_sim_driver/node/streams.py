@@ -23,6 +23,7 @@ from ir_msgs_py.ros.power_conversions import (
 )
 from ir_msgs_py.ros.topics import LATCHED
 from ir_sim_driver.controller import Frame, Joints
+from ir_sim_driver.node.controller_interface import ControllerStates
 from ir_sim_driver.node.messages import fill_controller_state, fill_joint_state, fill_load_check
 
 _NS = 1_000_000_000
@@ -44,6 +45,7 @@ class Streams:
         self._controller_states = node.create_publisher(
             ControllerState, names.CONTROLLER_STATE, _STREAM
         )
+        self._states_of_controllers = ControllerStates(node, joint_names, _STREAM)
         self._load_checks = node.create_publisher(LoadCheck, names.LOAD_CHECK, LATCHED)
         self._stop_numbers = node.create_publisher(UInt64, names.STOP_NUMBER, LATCHED)
         self._stop_number = -1
@@ -82,6 +84,7 @@ class Streams:
             state = ControllerState()
             fill_controller_state(state, self._names, stamp_ns, frame.following)
             self._controller_states.publish(state)
+            self._states_of_controllers.publish(stamp_ns, frame.following)
         if frame.outputs is not None:
             msg = plc_outputs_to_msg(frame.outputs)
             msg.header.stamp = time_to_msg(stamp_ns)

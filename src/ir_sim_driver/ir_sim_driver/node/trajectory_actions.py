@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import time
 from collections.abc import Awaitable, Callable, Sequence
+from itertools import takewhile
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -86,16 +87,21 @@ class _Trajectory(ctypes.Structure):
     )
 
 
-class _GoalRequest(ctypes.Structure):
-    """The begin of a SendGoal request whose goal begins with the two trajectories."""
+_HEAD = (
+    ("goal_id", ctypes.c_uint8 * 16),
+    ("trajectory", _Trajectory),
+    ("multi_dof", _Trajectory),
+)
 
-    _fields_ = (
-        ("goal_id", ctypes.c_uint8 * 16),
-        ("trajectory", _Trajectory),
-        ("multi_dof", _Trajectory),
-        ("path_tolerance", _Sequence),
-        ("goal_tolerance", _Sequence),
-    )
+
+def _layout(goal: Any) -> Any:
+    """Begin of a SendGoal request in C whose goal begins with the two trajectories: up to the last
+    of the sequences that follow them, which are tolerances. control_msgs has four, ours has two.
+    """
+    fields = list(goal.get_fields_and_field_types().items())[2:]
+    lists = [name for name, _ in takewhile(lambda each: each[1].startswith("sequence<"), fields)]
+    own = {"_fields_": (*_HEAD, *((name, _Sequence) for name in lists)), "lists": lists}
+    return type("GoalRequest", (ctypes.Structure,), own)
 
 
 class _Point(ctypes.Structure):
@@ -175,9 +181,10 @@ class _CountedRequest:
         self.as_class: Any = request
         if convert is None:
             return
+        layout = _layout(request().goal)
 
         def counted(message: int) -> Any:
-            head = _GoalRequest.from_address(message)
+            head = layout.from_address(message)
             points = head.trajectory.points
             self.admission = Admission()
             if not known(bytes(head.goal_id)):
@@ -193,7 +200,7 @@ class _CountedRequest:
         self.as_class = _lookalike(kind, self._kept)
 
 
-def _judged(head: _GoalRequest, admit: Admit) -> Admission:
+def _judged(head: Any, admit: Admit) -> Admission:
     """What becomes of a goal by its counts alone."""
     trajectory = head.trajectory
     multi_dof = head.multi_dof
@@ -202,11 +209,8 @@ def _judged(head: _GoalRequest, admit: Admit) -> Admission:
             refusal=f"multi_dof_trajectory has {multi_dof.points.size} points: it must be empty, "
             "the robot has joints only"
         )
-    counts = {
-        "joint names": trajectory.joint_names.size,
-        "path tolerances": head.path_tolerance.size,
-        "goal tolerances": head.goal_tolerance.size,
-    }
+    counts = {"joint names": trajectory.joint_names.size}
+    counts |= {_said(name): getattr(head, name).size for name in head.lists}
     for name, count in counts.items():
         if count > _NAMES_MAX:
             return Admission(refusal=f"the goal has {count} {name}: at most {_NAMES_MAX}")
@@ -214,15 +218,16 @@ def _judged(head: _GoalRequest, admit: Admit) -> Admission:
     return admit(points.size, _bytes_of(points))
 
 
-def _emptied(head: _GoalRequest) -> None:
+def _said(field: str) -> str:
+    """A list of tolerances by its name in a sentence."""
+    return f"{field.replace('_', ' ').removesuffix('tolerance')}tolerances"
+
+
+def _emptied(head: Any) -> None:
     """Leave out the points, and what else is too long."""
     head.trajectory.points.size = head.multi_dof.points.size = 0
-    for each in (
-        head.trajectory.joint_names,
-        head.multi_dof.joint_names,
-        head.path_tolerance,
-        head.goal_tolerance,
-    ):
+    names = (head.trajectory.joint_names, head.multi_dof.joint_names)
+    for each in (*names, *(getattr(head, name) for name in head.lists)):
         each.size = each.size if each.size <= _NAMES_MAX else 0
 
 
