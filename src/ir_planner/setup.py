@@ -21,5 +21,10 @@ setup(
     description="Plans collision-free movements and programs with their joules, seconds and "
     "clearance",
     license="Apache-2.0",
-    entry_points={"console_scripts": ["ir_planner = ir_planner.node:main"]},
+    entry_points={
+        "console_scripts": [
+            "ir_planner = ir_planner.node:main",
+            "ir_moveit = ir_planner.node.moveit:main",
+        ]
+    },
 )

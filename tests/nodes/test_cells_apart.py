@@ -17,6 +17,7 @@ from ir_msgs_py import names
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.diagnostics import OK, Condition, Diagnostics
 from ir_msgs_py.ros.testing import PATIENCE
+from ir_msgs_py.status import StatusCode
 from ir_sim_driver.node import SimDriver
 
 QUICK = {
@@ -64,7 +65,8 @@ def test_a_driver_that_nothing_can_wake_refuses_to_hibernate(
     )
     start_driver("cell_2", taken_port)
     with Client("cell_2", context=ros_context, timeout=PATIENCE) as client:
-        answer = client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="hib", value=True))
+        answer = client.call(names.SET_PLC_INPUT, SetPlcInput.Request(name="hib", value=True))
+        assert answer.status.code == StatusCode.INPUT_IGNORED
         assert "HIB is 1 but ignored: nothing could wake the controller" in answer.status.message
         assert str(taken_port) in answer.status.message
         wait_for(lambda: any("HIB ignored: nothing could wake" in text for text in said))

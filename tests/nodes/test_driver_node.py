@@ -24,6 +24,7 @@ from ir_msgs_py.plc import magic_packet
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.testing import PATIENCE
+from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.controller.mains import Mains
 from ir_sim_driver.node import SimDriver, streams
@@ -182,8 +183,9 @@ def test_a_bit_that_is_ignored_says_so_in_the_answer(make_driver, cell_client):
         ).status.message
         == ""
     )
-    answer = cell_client.ask(names.SET_PLC_INPUT, SetPlcInput.Request(name="ab", value=True))
+    answer = cell_client.call(names.SET_PLC_INPUT, SetPlcInput.Request(name="ab", value=True))
     assert answer.inputs.ab
+    assert answer.status.code == StatusCode.INPUT_IGNORED
     assert answer.status.message == "PLC bit AB is 1 but ignored: operating mode is T1, must be EXT"
 
 

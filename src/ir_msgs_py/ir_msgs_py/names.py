@@ -21,6 +21,7 @@ RECORDER: Final = "ir_recorder"
 PLAY: Final = "ir_play"
 LIVE: Final = "ir_live"
 STUDIES: Final = "ir_studies"
+MOVEIT: Final = "ir_moveit"
 CALLS: Final = "calls"  # topic of every node that answers: its requests and answers, for recordings
 
 # of nobody in particular
@@ -101,6 +102,11 @@ CONTROL_PLAYBACK: Final = f"{PLAY}/control"
 
 # ir_studies: action
 RUN_STUDY: Final = f"{STUDIES}/run_study"
+
+# ir_moveit: topics
+MOVEIT_STATUS: Final = f"{MOVEIT}/status"
+MOVEIT_REPORT: Final = f"{MOVEIT}/report"
+MOVEIT_ENERGY: Final = f"{MOVEIT}/energy"
 
 # load texts: names of the cell's loads joined by LOAD_SEPARATOR, or nothing attached
 LOAD_SEPARATOR: Final = "+"

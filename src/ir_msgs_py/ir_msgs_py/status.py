@@ -1,7 +1,7 @@
 """Status of a request: a code, a sentence and its source.
 
 The numbers are those of moveit_msgs/MoveItErrorCodes, so that a client of MoveIt reads them without
-a table.
+a table; INPUT_IGNORED is this project's own.
 """
 
 from __future__ import annotations
@@ -11,9 +11,10 @@ from enum import IntEnum
 
 
 class StatusCode(IntEnum):
-    """Numbers of moveit_msgs/MoveItErrorCodes that occur here."""
+    """Numbers of moveit_msgs/MoveItErrorCodes that occur here, and one more."""
 
     SUCCESS = 1
+    INPUT_IGNORED = 2
     FAILURE = 99999
     PLANNING_FAILED = -1
     INVALID_MOTION_PLAN = -2
@@ -21,11 +22,14 @@ class StatusCode(IntEnum):
     PREEMPTED = -7
     START_STATE_IN_COLLISION = -10
     GOAL_IN_COLLISION = -12
+    INVALID_GROUP_NAME = -15
     INVALID_GOAL_CONSTRAINTS = -16
     INVALID_ROBOT_STATE = -17
+    INVALID_LINK_NAME = -18
     INVALID_OBJECT_NAME = -19
     FRAME_TRANSFORM_FAILURE = -21
     ROBOT_STATE_STALE = -23
+    COMMUNICATION_FAILURE = -25
     START_STATE_INVALID = -26
     GOAL_STATE_INVALID = -27
     NO_IK_SOLUTION = -31

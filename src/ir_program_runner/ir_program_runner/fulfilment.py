@@ -169,7 +169,9 @@ class Fulfilment:
             case ask.SetLoad(load):
                 return await ports.driver.set_load(load)
             case ask.SetPlcInput(name, value):
-                return await ports.driver.set_plc_input(name, value)
+                status = await ports.driver.set_plc_input(name, value)
+                # what counts is the mode that follows, which is waited for
+                return Status.success() if status.code == StatusCode.INPUT_IGNORED else status
             case ask.Drive(trajectory, cell_hash, load, station, states):
                 return await ports.driver.drive(
                     trajectory, self._stop, cell_hash, load, station, states, self._after_stop

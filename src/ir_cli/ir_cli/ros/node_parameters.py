@@ -15,6 +15,7 @@ from ir_cli.errors import CommandError, unknown_name
 from ir_msgs_py.modes import PREFIX, TransitionTimes
 from ir_msgs_py.names import NODES
 from ir_planner import PlannerSettings
+from ir_planner.node.moveit_requests import MoveItSettings
 from ir_program_runner import LinkSettings, ProgramSettings
 from ir_recorder.recording.settings import RecorderSettings
 from ir_sim_driver import (
@@ -50,6 +51,7 @@ NODE_SETTINGS: dict[str, tuple[tuple[str, Callable[[], Any]], ...]] = {
     "ir_program_runner": (("", ProgramSettings), (PREFIX, TransitionTimes), ("", LinkSettings)),
     "ir_recorder": (("", RecorderSettings),),
     "ir_studies": (("", StudiesSettings),),
+    "ir_moveit": (("", MoveItSettings),),
 }
 
 

@@ -297,31 +297,15 @@ class _Reader:
         return self._models, file
 
     def _pieces(self, name: str, triangles: FloatArray, pose: FloatArray) -> list[Body]:
-        """A convex mesh as it is, another one in pieces, an open one as its hull, with a note."""
-        points = np.unique(triangles.reshape(-1, 3), axis=0)
+        """A mesh as bodies; one without a volume is left out."""
         try:
-            hull = ConvexHull(points)
-        except (QhullError, ValueError):
-            self.left_out.append(f"{name}: its mesh spans no volume")
+            bodies, note = mesh_bodies(name, triangles, pose)
+        except InvalidValueError as error:
+            self.left_out.append(str(error))
             return []
-        whole = points[np.sort(hull.vertices)]
-        volume = float(np.linalg.det(triangles).sum()) / 6.0
-        if is_closed(triangles) and volume >= (1.0 - _CONVEX) * hull.volume:
-            vertices: tuple[FloatArray, ...] = (whole,)
-        else:
-            try:
-                vertices = pieces_of(triangles, PIECES).vertices
-            except InvalidValueError as error:
-                self.left_out.append(
-                    f"gaps of {name}: it is filled to its convex hull of {hull.volume:.3g} m^3, "
-                    f"because {error}"
-                )
-                vertices = (whole,)
-        names = piece_names(name, len(vertices))
-        return [
-            Body(piece, "mesh", pose, np.zeros(3), each)
-            for piece, each in zip(names, vertices, strict=True)
-        ]
+        if note:
+            self.left_out.append(note)
+        return bodies
 
     def _name(self, machine: str, name: str) -> str:
         """A name that no other body has."""
@@ -340,6 +324,37 @@ class _Reader:
                 self._names.add(each)
                 return each
         raise InvalidValueError(f"there are too many bodies called {plain}")
+
+
+def mesh_bodies(name: str, triangles: FloatArray, pose: FloatArray) -> tuple[list[Body], str]:
+    """A convex mesh (T, 3, 3) [m] as it is, another one in pieces, an open one as its hull, with a
+    note. Raises InvalidValueError: it has no volume.
+    """
+    points = np.unique(triangles.reshape(-1, 3), axis=0)
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError) as error:
+        raise InvalidValueError(f"{name}: its mesh spans no volume") from error
+    whole = points[np.sort(hull.vertices)]
+    volume = float(np.linalg.det(triangles).sum()) / 6.0
+    note = ""
+    if is_closed(triangles) and volume >= (1.0 - _CONVEX) * hull.volume:
+        vertices: tuple[FloatArray, ...] = (whole,)
+    else:
+        try:
+            vertices = pieces_of(triangles, PIECES).vertices
+        except InvalidValueError as error:
+            note = (
+                f"gaps of {name}: it is filled to its convex hull of {hull.volume:.3g} m^3, "
+                f"because {error}"
+            )
+            vertices = (whole,)
+    names = piece_names(name, len(vertices))
+    bodies = [
+        Body(piece, "mesh", pose, np.zeros(3), each)
+        for piece, each in zip(names, vertices, strict=True)
+    ]
+    return bodies, note
 
 
 def _plain(name: str) -> str:

@@ -32,7 +32,7 @@ class Services:
         self._load_changed = load_changed
 
     def set_plc_input(self, request: Any, response: Any, came_ns: int = 0) -> Any:
-        """Set one bit, or the mode switch by the name of its position; the remark: why it won't
+        """Set one bit, or the mode switch by the name of its position; INPUT_IGNORED where it won't
         count. came_ns: when the request came [ns of the monotonic clock].
         """
 
@@ -40,7 +40,9 @@ class Services:
             value = bool(request.value)
             levels, remark = self._driver.press(SERVICE, request.name, value, came_ns)
             response.inputs = plc_inputs_to_msg(levels)
-            return remark
+            if remark:
+                raise RequestRefusedError(StatusCode.INPUT_IGNORED, remark)
+            return ""
 
         return self._answer(response, work)
 

@@ -1,0 +1,429 @@
+"""MoveIt's services in front of the planner: the node `ir_moveit`.
+
+It plans nothing itself. What MoveIt's messages ask becomes a request to `ir_planner`; its answers
+become theirs, with the planner's report, joules and sentence on topics of their own. It needs
+moveit_msgs, which this project does not ship (docs/ros_interfaces.md).
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.executors import MultiThreadedExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+
+from ir_description import Cell, cell_from_yaml, cell_to_yaml
+from ir_kernels.chain import Chain
+from ir_kernels.inverse_kinematics import inverse_kinematics
+from ir_msgs.msg import Status as StatusMsg
+from ir_msgs.msg import TrajectoryReport
+from ir_msgs.srv import CheckState, GetCell, SetCell
+from ir_msgs_py import names
+from ir_msgs_py.ros.client import Client
+from ir_msgs_py.ros.conversions import (
+    configuration_from_msg,
+    configuration_given,
+    configuration_to_msg,
+    point_from_msg,
+    status_from_msg,
+    status_to_msg,
+)
+from ir_msgs_py.ros.node_process import run_node
+from ir_msgs_py.ros.parameters import Parameters
+from ir_msgs_py.ros.serving import ANY, BoundedService, unexpected
+from ir_msgs_py.ros.topics import LATCHED, LatestMessage
+from ir_msgs_py.status import Status, StatusCode
+from ir_planner.errors import PlannerError, RequestError
+from ir_planner.node.inputs import LastState, has_joints, measured_velocity, of_joints
+from ir_planner.node.moveit_requests import (
+    MoveItSettings,
+    check_free,
+    check_group,
+    ik_pose,
+    ik_request,
+    largest_jump,
+    movement,
+    path_request,
+    robot_state,
+)
+from ir_planner.node.moveit_scene import applied, refusal
+from ir_planner.node.requests import known_status
+from ir_values.arrays import FloatArray
+from ir_values.errors import (
+    CallTimedOutError,
+    InvalidValueError,
+    IrError,
+    ServiceUnavailableError,
+)
+
+_THREADS = 4  # long and quick requests, scenes, a spare
+_PATIENCE = 10.0  # s for an answer beside the planning time
+_PAIRS = 20  # of a state that are looked at
+_ROBOT_LINK, _WORLD_OBJECT, _ATTACHED = range(3)  # of moveit_msgs/ContactInformation
+
+
+class PlannerAnswers:
+    """MoveIt's requests answered by the planner; messages are read and written by their fields.
+
+    ask: calls a service of the planner: name, request, timeout [s]. state: the joints (n,) where
+    the robot is, for these names. report: takes the planner's report of a movement. contact: makes
+    a ContactInformation.
+    """
+
+    def __init__(
+        self,
+        ask: Callable[[str, Any, float], Any],
+        state: Callable[[tuple[str, ...]], FloatArray],
+        report: Callable[[TrajectoryReport], None],
+        contact: Callable[[], Any],
+        settings: Callable[[], MoveItSettings],
+    ) -> None:
+        self._ask = ask
+        self._state = state
+        self._report = report
+        self._contact = contact
+        self._settings = settings
+        self._objects: frozenset[str] = frozenset()
+        self._read: tuple[str, Cell] | None = None
+
+    def cell(self) -> Cell:
+        """The planner's cell as it stands; read anew only where it has changed."""
+        answer = self._ask(names.GET_CELL, GetCell.Request(), _PATIENCE)
+        _check(answer)
+        if self._read is None or self._read[0] != answer.cell_yaml:
+            self._read = answer.cell_yaml, cell_from_yaml(answer.cell_yaml)
+        return self._read[1]
+
+    def plan(self, request: Any, response: Any) -> Status:
+        """GetMotionPlan."""
+        given, answer = request.motion_plan_request, response.motion_plan_response
+        settings = self._settings()
+        cell = self.cell()
+        asked = movement(given, cell, settings.group, settings.safety_distance)
+        status = Status(StatusCode.FAILURE)
+        for one in asked:
+            planned = self._ask(
+                names.PLAN_REGIONAL_MOVEMENT, one, one.options.planning_time + _PATIENCE
+            )
+            status = status_from_msg(planned.status)
+            if status.ok:
+                break
+        if not status.ok:
+            return status
+        answer.group_name = given.group_name or settings.group
+        answer.trajectory.joint_trajectory = planned.trajectory
+        answer.trajectory_start.joint_state = _first(planned.trajectory)
+        answer.planning_time = planned.info.planning_time
+        self._report(planned.report)
+        attempts = given.num_planning_attempts
+        note = f"; {attempts} attempts were asked for, one answer is the best" * (attempts > 1)
+        return Status.success(f"{said(planned.report)}{note}")
+
+    def position_ik(self, request: Any, response: Any) -> Status:
+        """GetPositionIK."""
+        given = request.ik_request
+        settings = self._settings()
+        cell = self.cell()
+        if not given.avoid_collisions:
+            q = self._nearest(ik_pose(given, cell, settings.group), given, cell)
+            response.solution.joint_state = configuration_to_msg(cell.robot.joint_names, q)
+            return Status.success("collisions were not looked at, as asked for")
+        asked = ik_request(given, cell, settings.group, settings.safety_distance)
+        found = self._ask(names.COMPUTE_IK, asked, _PATIENCE)
+        status = status_from_msg(found.status)
+        if status.ok:
+            response.solution.joint_state = found.solutions[0].state
+        return status
+
+    def _nearest(self, pose: FloatArray, given: Any, cell: Cell) -> FloatArray:
+        """Of all configurations at a pose the one nearest to the state of the request."""
+        robot = cell.robot
+        chain = Chain(robot, cell.base_pose, cell.tcp)
+        solver = inverse_kinematics(chain, robot.position_min, robot.position_max)
+        found = solver.solve(pose[None]).q
+        if not len(found):
+            x, y, z = pose[:3, 3]
+            raise RequestError(
+                StatusCode.NO_IK_SOLUTION,
+                f"the tcp can't be brought to ({x:.3f}, {y:.3f}, {z:.3f}) m in this orientation "
+                "within the joint limits",
+            )
+        code = StatusCode.INVALID_ROBOT_STATE
+        seed = robot_state(given.robot_state, cell, "robot_state", code)
+        near = self._joints(seed, cell, code)
+        best: FloatArray = found[int(np.argmin(np.abs(found - near).max(axis=1)))]
+        return best
+
+    def _joints(self, state: Any, cell: Cell, code: StatusCode) -> FloatArray:
+        """Joint values (n,) of a JointState; an empty one: where the robot is."""
+        if not configuration_given(state):
+            return self._state(cell.robot.joint_names)
+        try:
+            return configuration_from_msg(state, cell.robot.joint_names)
+        except InvalidValueError as error:
+            raise RequestError(code, str(error)) from error
+
+    def state_validity(self, request: Any, response: Any) -> Status:
+        """GetStateValidity: valid is what keeps the safety distance; pairs that don't as
+        contacts.
+        """
+        response.valid = False
+        settings = self._settings()
+        check_group(request.group_name, settings.group)
+        check_free(request.constraints, "constraints")
+        cell = self.cell()
+        state = robot_state(
+            request.robot_state, cell, "robot_state", StatusCode.INVALID_ROBOT_STATE
+        )
+        asked = CheckState.Request(
+            state=state, safety_distance=settings.safety_distance, max_pairs=_PAIRS
+        )
+        found = self._ask(names.CHECK_STATE, asked, _PATIENCE)
+        response.valid = bool(found.valid)
+        held = {capsule.name for load in cell.loads() for capsule in load.capsules}
+        robot = {capsule.name for capsule in cell.robot.capsules}
+        for pair in found.pairs:
+            if pair.distance <= settings.safety_distance and not pair.allowed_contact:
+                response.contacts.append(self._contact_of(pair, robot, held))
+        return status_from_msg(found.status)
+
+    def _contact_of(self, pair: Any, robot: set[str], held: set[str]) -> Any:
+        msg = self._contact()
+        a, b = point_from_msg(pair.point_a), point_from_msg(pair.point_b)
+        msg.header.frame_id = names.WORLD_FRAME
+        middle = 0.5 * (a + b)
+        msg.position.x, msg.position.y, msg.position.z = middle.tolist()
+        away = (b - a) * np.sign(pair.distance)
+        length = float(np.linalg.norm(away))
+        if length > 0.0:
+            msg.normal.x, msg.normal.y, msg.normal.z = (away / length).tolist()
+        msg.depth = -float(pair.distance)  # below 0: still so far apart
+        msg.contact_body_1, msg.contact_body_2 = pair.body_a, pair.body_b
+        kinds = [
+            _ROBOT_LINK if name in robot else _ATTACHED if name in held else _WORLD_OBJECT
+            for name in (pair.body_a, pair.body_b)
+        ]
+        msg.body_type_1, msg.body_type_2 = kinds
+        return msg
+
+    def cartesian_path(self, request: Any, response: Any) -> Status:
+        """GetCartesianPath: the whole of it, fraction 1, or nothing, fraction 0."""
+        response.fraction = 0.0
+        settings = self._settings()
+        cell = self.cell()
+        code = StatusCode.START_STATE_INVALID
+        q = self._joints(robot_state(request.start_state, cell, "start_state", code), cell, code)
+        start = configuration_to_msg(cell.robot.joint_names, q)
+        asked = path_request(
+            request,
+            cell,
+            settings.group,
+            start=start,
+            tcp=Chain(cell.robot, cell.base_pose, cell.tcp).tcp_poses(q[None])[0],
+            tool_speed=settings.tool_speed,
+            safety_distance=settings.safety_distance,
+        )
+        planned = self._ask(
+            names.PLAN_CARTESIAN_MOVEMENT, asked, asked.options.planning_time + _PATIENCE
+        )
+        status = status_from_msg(planned.status)
+        if not status.ok:
+            return status
+        jump = largest_jump(planned.trajectory.points)
+        if 0.0 < request.revolute_jump_threshold < jump:
+            raise refusal(
+                f"a joint turns by {jump:.3g} rad between two points",
+                f"revolute_jump_threshold is {request.revolute_jump_threshold:g} rad",
+                StatusCode.PLANNING_FAILED,
+            )
+        response.start_state.joint_state = start
+        response.solution.joint_trajectory = planned.trajectory
+        response.fraction = 1.0
+        self._report(planned.report)
+        note = "; it is free of collisions although avoid_collisions is false"
+        return Status.success(f"{said(planned.report)}{note * (not request.avoid_collisions)}")
+
+    def apply_scene(self, request: Any, response: Any) -> Status:
+        """ApplyPlanningScene: all of it, or nothing."""
+        response.success = False
+        now = applied(request.scene, self.cell(), self._objects)
+        answer = self._ask(
+            names.SET_CELL, SetCell.Request(cell_yaml=cell_to_yaml(now.cell)), 3.0 * _PATIENCE
+        )
+        _check(answer)
+        self._objects = now.objects
+        response.success = True
+        colours = "its colours are not shown" if len(request.scene.object_colors) else ""
+        objects = f"objects: {', '.join(sorted(now.objects)) or 'none'}"
+        return Status.success("; ".join(filter(None, (objects, colours, *now.notes))))
+
+
+def said(report: TrajectoryReport) -> str:
+    """A report in a line."""
+    clearance = 1e3 * report.min_clearance
+    return f"{report.duration:.2f} s, {report.energy:.0f} J, clearance of {clearance:.0f} mm"
+
+
+def _first(trajectory: Any) -> Any:
+    return JointState(name=trajectory.joint_names, position=trajectory.points[0].positions)
+
+
+def _check(answer: Any) -> None:
+    status = status_from_msg(answer.status)
+    if not status.ok:
+        raise RequestError(StatusCode(status.code), status.message)
+
+
+def put_error_code(response: Any, status: Status) -> None:
+    """A status as MoveIt's responses carry it; two of them have no place for it."""
+    holder = getattr(response, "motion_plan_response", response)
+    code = getattr(holder, "error_code", None)
+    if code is not None:
+        code.val = int(status.code)
+        if hasattr(code, "message"):  # not in those before Iron
+            code.message = status.message
+            code.source = status.source
+
+
+def status_of(error: BaseException) -> Status:
+    """The status of a request that an error ended."""
+    if isinstance(error, ServiceUnavailableError):
+        return Status(StatusCode.COMMUNICATION_FAILURE, str(error))
+    if isinstance(error, CallTimedOutError):
+        return Status(StatusCode.TIMED_OUT, str(error))
+    known = known_status(error) if isinstance(error, Exception) else None
+    return known or unexpected(error)
+
+
+SERVICES = (
+    ("GetMotionPlan", "plan_kinematic_path", "plan"),
+    ("GetCartesianPath", "compute_cartesian_path", "cartesian_path"),
+    ("GetPositionIK", "compute_ik", "position_ik"),
+    ("GetStateValidity", "check_state_validity", "state_validity"),
+    ("ApplyPlanningScene", "apply_planning_scene", "apply_scene"),
+)
+"""Type of moveit_msgs, name as MoveIt's move_group has it, and what answers it."""
+_LONG = 2  # of them plan
+
+
+class MoveItNode(Node):
+    """Serves MoveIt's services. Raises IrError where moveit_msgs is missing."""
+
+    def __init__(self, **options: Any) -> None:
+        types = moveit_types()
+        super().__init__(names.MOVEIT, **options)
+        parameters = Parameters(self, MoveItSettings)
+        self._settings = parameters
+        self._client = Client(
+            self.get_namespace(),
+            context=self.context,
+            node_name=names.hidden_node(self.get_name(), "client"),
+            timeout=_PATIENCE,
+        )
+        self._statuses = self.create_publisher(StatusMsg, names.MOVEIT_STATUS, LATCHED)
+        self._reports = self.create_publisher(TrajectoryReport, names.MOVEIT_REPORT, LATCHED)
+        self._energies = self.create_publisher(Float64, names.MOVEIT_ENERGY, LATCHED)
+        self._states = LatestMessage(self, JointState, names.JOINT_STATES, 16)
+        self._last = LastState(offered=lambda: self.count_publishers(names.JOINT_STATES) > 0)
+        answers = PlannerAnswers(
+            self._client.call,
+            self._where,
+            self._publish_report,
+            import_module("moveit_msgs.msg").ContactInformation,
+            lambda: parameters.value,
+        )
+        groups = [MutuallyExclusiveCallbackGroup() for _ in range(2)]
+        for k, (kind, name, handler) in enumerate(SERVICES):
+            BoundedService(
+                self,
+                types[kind],
+                name,
+                self._guarded(name, getattr(answers, handler)),
+                groups[0 if k < _LONG else 1],
+                put=put_error_code,
+            )
+
+    def destroy_node(self) -> None:
+        """Let go of the planner, then of the rest."""
+        self._client.close()
+        super().destroy_node()
+
+    def _guarded(self, name: str, handler: Callable[[Any, Any], Status]) -> Callable[..., Any]:
+        """A service callback: the status goes into the response, to the topic and to the log."""
+
+        def callback(request: Any, response: Any) -> Any:
+            try:
+                status = handler(request, response)
+            except ANY as error:
+                status = status_of(error)
+                if status.code == StatusCode.FAILURE and not isinstance(
+                    error, (PlannerError, IrError)
+                ):
+                    self.get_logger().error(traceback.format_exc())
+            status = Status(status.code, status.message, self.get_name())
+            put_error_code(response, status)
+            self._statuses.publish(status_to_msg(status))
+            if not status.ok:
+                self.get_logger().warning(f"{name}: {status}")
+            return response
+
+        return callback
+
+    def _publish_report(self, report: TrajectoryReport) -> None:
+        self._reports.publish(report)
+        self._energies.publish(Float64(data=report.energy))
+
+    def _where(self, joints: tuple[str, ...]) -> FloatArray:
+        """Joint values (n,) where the robot is, of the last joint_states."""
+
+        def look() -> None:
+            received = self._states.take(lambda message: has_joints(message, joints))
+            if received is None:
+                return
+            try:
+                message = of_joints(received.message, joints)
+                q = configuration_from_msg(message, joints)
+            except InvalidValueError as error:
+                self._last.problem = str(error)
+                return
+            came = time.monotonic() - received.age
+            self._last.take(q, came, measured_velocity(message, joints))
+
+        self._last.look = look
+        return self._last.soon(time.monotonic, self._settings.value.state_max_age)
+
+
+def moveit_types() -> dict[str, Any]:
+    """Types of the services by name. Raises IrError where moveit_msgs is missing."""
+    try:
+        services = import_module("moveit_msgs.srv")
+    except ImportError as error:
+        raise IrError(
+            "moveit_msgs is not installed: docs/ros_interfaces.md says how it is built"
+        ) from error
+    return {kind: getattr(services, kind) for kind, _, _ in SERVICES}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the node until it is stopped."""
+    return run_node(
+        names.MOVEIT,
+        MoveItNode,
+        arguments,
+        executor=lambda: MultiThreadedExecutor(num_threads=_THREADS),
+        refusals=(IrError, PlannerError),
+        about="Answers MoveIt's planning services with ir_planner.",
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())
