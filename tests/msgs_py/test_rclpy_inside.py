@@ -20,7 +20,7 @@ from std_msgs.msg import Int32
 
 from ir_msgs.action import RunProgram
 from ir_msgs.srv import SetPlcInput
-from ir_msgs_py.ros import rclpy_inside, serving
+from ir_msgs_py.ros import rclpy_inside
 from ir_msgs_py.ros.serving import BoundedService, RecordedActionServer
 from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.ros.topics import CommandTopic, LatestMessage, PolledTopic
@@ -168,7 +168,7 @@ def test_a_client_of_a_service_that_has_gone_ends_no_executor(
         found_nobody.append(response)
         gone()
 
-    monkeypatch.setattr(serving, "aside_sender", lambda service: service.send_response)
+    monkeypatch.setattr(rclpy_inside, "aside_sender", lambda service: service.send_response)
     server = Server(ros_context)
     try:
         monkeypatch.setattr(_rclpy.Service, "service_send_response", send)

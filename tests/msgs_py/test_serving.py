@@ -105,6 +105,37 @@ def test_a_client_that_is_never_discovered_costs_a_second_and_no_more() -> None:
     assert middleware.sent == middleware.lost + 1
 
 
+@pytest.mark.parametrize("lost", [SENDS, SENDS + 1, SENDS + 40])
+def test_an_answer_arrives_however_late_its_client_is_discovered_and_holds_up_nobody(
+    lost: int, wait_for: Any
+) -> None:
+    """Clients whose reader the middleware finds after `lost` attempts; the others are known."""
+    middleware = Middleware(lost)
+    taken: list[Any] = []
+
+    def send(response: Any, header: Any) -> None:
+        if header == "late":
+            middleware.send(response, header)
+        if header != "late" or middleware.sent > lost:
+            taken.append(response)
+
+    sender = PatientSender(send, middleware.clock, late=100)
+    sender.send("first", "late")
+    assert middleware.sent >= SENDS
+    sender.send("second", "known")
+    wait_for(lambda: set(taken) == {"first", "second"}, what="both answers are taken")
+    assert middleware.sent == lost + 1  # and none is sent again
+
+
+def test_an_answer_whose_client_never_comes_is_given_up(wait_for: Any) -> None:
+    middleware = Middleware(lost=10**9)
+    sender = PatientSender(middleware.send, middleware.clock, late=7)
+    sender.send("response", "header")
+    wait_for(lambda: middleware.sent == SENDS + 7, what="the last attempt")
+    wait_for(lambda: not sender._busy, what="the thread ends")
+    assert middleware.sent == SENDS + 7
+
+
 @pytest.fixture
 def late_discovery(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
     """The middleware's first two responses of each kind are lost, as rclpy says it; counts by

@@ -291,14 +291,21 @@ SENDS = 50
 holds up the others once for so long.
 """
 
+LATE = 600
+"""Attempts after that, beside everything else: a minute, as long as a client of this project waits.
+The middleware forgets a client that died before, and takes its answer then.
+"""
+_LATE_MOST = 1000  # answers that wait for their clients
+
 
 class PatientSender:
     """Sends a response again where the server has not discovered its client yet.
 
     A client may see the server before the server sees it. The middleware then waits UNDISCOVERED,
     drops the response and warns; only the time it took shows it. A client ignores an answer that it
-    has already. One that is never discovered has died: what follows is sent once, until a client
-    takes its answer at once.
+    has already. One that is not discovered in `sends` attempts may have died: what follows is sent
+    once, until a client takes its answer at once. late: attempts after those, by a thread of its
+    own, so that neither the answer is lost nor anybody waits; 0 where attempts hold Python up.
     """
 
     def __init__(
@@ -306,14 +313,21 @@ class PatientSender:
         send: Callable[[Any, Any], None],
         clock: Callable[[], float] = time.monotonic,
         sends: int = SENDS,
+        late: int = 0,
     ) -> None:
         self._send = send
         self._sends = sends
         self._clock = clock
         self._patient = True
+        self._late = late
+        self._left: deque[tuple[Any, Any, int]] = deque()
+        self._lock = threading.Lock()
+        self._busy = False
 
     def send(self, response: Any, header: Any) -> None:
-        """Send it, for about five seconds at most; raises what the last attempt raised."""
+        """Send it, for about five seconds at most before others get their turn; raises what the
+        last attempt raised.
+        """
         for _ in range(self._sends if self._patient else 1):
             begun = self._clock()
             failure: Exception | None = None
@@ -326,8 +340,49 @@ class PatientSender:
                 break
         else:
             self._patient = False
+            if failure is None:
+                self._go_on(response, header)
         if failure is not None:
             raise failure
+
+    def _go_on(self, response: Any, header: Any) -> None:
+        """Let a thread send it again and again."""
+        if not self._late:
+            return
+        with self._lock:
+            if len(self._left) >= _LATE_MOST:
+                _warn(f"{_LATE_MOST} answers wait for clients that are not discovered: one is lost")
+                return
+            self._left.append((response, header, self._late))
+            begin = not self._busy
+            self._busy = True
+        if begin:
+            threading.Thread(target=self._send_late, name="late answers", daemon=True).start()
+
+    def _send_late(self) -> None:
+        """Send what is left in turns, until it is taken, its client has gone or it is too late."""
+        while True:
+            with self._lock:
+                if not self._left:
+                    self._busy = False
+                    return
+                response, header, attempts = self._left.popleft()
+            begun = self._clock()
+            try:
+                self._send(response, header)
+            except UNSENT:
+                continue
+            if self._clock() - begun < UNDISCOVERED:
+                self._patient = True
+            elif attempts > 1:
+                with self._lock:
+                    self._left.append((response, header, attempts - 1))
+
+
+def patient_sender(service: Any, sends: int = SENDS) -> PatientSender:
+    """What sends the responses of a service, to clients that are discovered late too."""
+    aside = aside_sender(service)
+    return PatientSender(aside, sends=sends, late=LATE if aside != service.send_response else 0)
 
 
 def survive_clients(node: Node) -> None:

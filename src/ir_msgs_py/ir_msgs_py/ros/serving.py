@@ -28,10 +28,9 @@ from ir_msgs_py.ros.conversions import status_to_msg
 from ir_msgs_py.ros.messages import type_name
 from ir_msgs_py.ros.rclpy_inside import (
     PatientActionServer,
-    PatientSender,
-    aside_sender,
     can_take_requests,
     forget_request,
+    patient_sender,
     send_to_whoever_is_left,
     take_request,
 )
@@ -193,7 +192,7 @@ class BoundedService(Waitable):
             service_type, name, handler, qos_profile=SERVICE, callback_group=untouched
         )
         self._calls = Calls.of(node)
-        self._sender = PatientSender(aside_sender(self._service))
+        self._sender = patient_sender(self._service)
         if not can_take_requests(self._service):
             node.destroy_service(self._service)
             self._service = node.create_service(

@@ -32,10 +32,9 @@ from ir_msgs_py.ros.messages import type_name
 from ir_msgs_py.ros.network import RANGE
 from ir_msgs_py.ros.power_conversions import plc_inputs_from_msg
 from ir_msgs_py.ros.rclpy_inside import (
-    PatientSender,
-    aside_sender,
     can_poll,
     keep_only,
+    patient_sender,
     take_bytes,
     take_request,
 )
@@ -433,7 +432,7 @@ class PolledService:
                 service_type, name, lambda request, response: handler(request, response, 0)
             )
         self._calls = Calls.of(owner)
-        self._sender = PatientSender(aside_sender(self._service), sends=_SENDS)
+        self._sender = patient_sender(self._service, _SENDS)
         self._waiting: deque[tuple[Any, Any, int]] = deque()
         self._answers = _Answers()
 
