@@ -39,7 +39,7 @@ def measure(seed: int, quick: bool) -> list[Row]:
     """A row per search: tasks whose straight movement is not free, planner and draw."""
     draws = 5 if quick else DRAWS
     rows = []
-    for place, label, question in _blocked(seed, quick):
+    for place, label, question in blocked(seed, quick):
         for planner in ("prm", *OTHERS):
             for draw in range(draws):
                 found = searched(planner, question, draw + draws * seed, EDGES)
@@ -49,7 +49,7 @@ def measure(seed: int, quick: bool) -> list[Row]:
     return rows
 
 
-def _blocked(seed: int, quick: bool) -> list[tuple[str, str, Question]]:
+def blocked(seed: int, quick: bool) -> list[tuple[str, str, Question]]:
     """Questions whose straight movement is not free: tasks of cells, and among MOST zones of each
     type; each with where it is asked (there and back, and movements among the same zones, are one
     place) and its name.

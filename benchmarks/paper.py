@@ -8,7 +8,8 @@ and CSV in
 --out; the next run goes on with those that are missing, --only measures the named ones anew,
 --again all.
 Then the page is written from everything that is stored: docs/reproduction.md, or with --quick a
-page of its own. Printed are the statements with their intervals, and those with a bound as claims.
+page of its own. A chapter that is not stored stays as the page has it, where it is of the same
+seeds. Printed are the statements with their intervals, and those with a bound as claims.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import itertools
 import json
 import math
 import multiprocessing
+import re
 import resource
 import time
 from collections import Counter
@@ -32,13 +34,16 @@ import _paper_blocked
 import _paper_ccd
 import _paper_cell
 import _paper_cost
+import _paper_drives
 import _paper_genetic
 import _paper_line
 import _paper_modes
 import _paper_prm
+import _paper_ranks
 import _paper_rivals
 import _paper_savings
 import _paper_spline
+import _paper_unmodified
 import _paper_withdrawal
 from _paper_result import HOLDS, JUDGED, Experiment, Row, Statement, judged
 from _results import Claim, add_ending, commit, machine, print_claims, write_json
@@ -86,30 +91,69 @@ class Chapter:
     seconds: float
 
 
+@dataclass(frozen=True)
+class Kept:
+    """A chapter as a page has it: its line of the summary, its text, seconds of processor."""
+
+    summary: str
+    text: str
+    seconds: float
+
+
+def kept_chapters(file: Path, seeds: Sequence[int]) -> dict[str, Kept]:
+    """The chapters of a page by their titles; none where it is not of these seeds."""
+    text = file.read_text("utf-8") if file.exists() else ""
+    if f"with {_named(seeds)} that" not in text:
+        return {}
+    summaries = {
+        found[1]: found[0] for found in re.finditer(r"^\| \[(.*?)\]\(#.*\|$", text, re.MULTILINE)
+    }
+    found = {}
+    for part in re.split(r"^## ", text, flags=re.MULTILINE)[1:]:
+        title = part.partition("\n")[0]
+        body = re.sub(r"\nAll experiments together took .*", "", part).rstrip("\n")
+        line = summaries.get(title, "")
+        seconds = re.search(r"\| (\d+) s \|$", line)
+        if seconds is not None:
+            found[title] = Kept(line, f"## {body}\n", float(seconds[1]))
+    return found
+
+
+def _named(seeds: Sequence[int]) -> str:
+    return f"{'seeds' if len(seeds) > 1 else 'seed'} {' and '.join(map(str, seeds))}"
+
+
 def page(
-    chapters: Sequence[Chapter],
+    chapters: Sequence[Chapter | Kept],
     missing: Sequence[str],
     seeds: Sequence[int],
     machine: str,
     quick: bool,
 ) -> str:
     """The whole page."""
-    named = f"{'seeds' if len(seeds) > 1 else 'seed'} {' and '.join(map(str, seeds))}"
+    named = _named(seeds)
     parts = [HEAD.format(seeds=named, machine=f" on {machine}" if machine else "")]
     if quick:
         parts.append("**Short version**: small samples; nothing here is to be quoted.\n")
     parts.append(_summary(chapters))
     if missing:
         parts.append(f"Not run: {', '.join(f'`{name}`' for name in missing)}.\n")
-    parts += [_chapter(chapter) for chapter in chapters]
+    parts += [one.text if isinstance(one, Kept) else _chapter(one) for one in chapters]
     total = sum(chapter.seconds for chapter in chapters)
     parts.append(f"All experiments together took {total / 60.0:.1f} minutes of processor time.\n")
     return "\n".join(parts)
 
 
-def _summary(chapters: Sequence[Chapter]) -> str:
+def _summary(chapters: Sequence[Chapter | Kept]) -> str:
+    """A line for each chapter, those that are kept as they were."""
     rows: list[Row] = []
     for chapter in chapters:
+        if isinstance(chapter, Kept):
+            cells = [cell.strip() for cell in chapter.summary.strip("|").split("|")]
+            rows.append(
+                dict(zip(("claim", *JUDGED, "no claim", "processor time"), cells, strict=True))
+            )
+            continue
         counted = Counter(one.verdict for one in chapter.statements)
         anchor = chapter.experiment.title.lower()
         anchor = "".join(c for c in anchor if c.isalnum() or c in " -_").replace(" ", "-")
@@ -203,15 +247,19 @@ EXPERIMENTS: dict[str, Experiment] = {
     for experiment in (
         *_paper_rivals.EXPERIMENTS,
         _paper_prm.EXPERIMENT,
+        _paper_ranks.EXPERIMENT,
         _paper_ccd.EXPERIMENT,
         _paper_blocked.EXPERIMENT,
         _paper_withdrawal.EXPERIMENT,
         _paper_genetic.EXPERIMENT,
+        *_paper_unmodified.EXPERIMENTS,
         _paper_cost.EXPERIMENT,
         _paper_spline.EXPERIMENT,
         _paper_savings.EXPERIMENT,
+        *_paper_drives.EXPERIMENTS,
         _paper_line.EXPERIMENT,
         _paper_modes.EXPERIMENT,
+        _paper_cell.PICTURES,
         _paper_cell.EXPERIMENT,
     )
 }
@@ -361,19 +409,23 @@ def main() -> None:
         if name not in asked:
             print(f"{name}: as it is stored", flush=True)
     run_all(asked, given)
-    there = {
-        name: found
-        for name, one in EXPERIMENTS.items()
-        if (found := stored(one, given)) is not None
-    }
     folder = given.page.parent
-    chapters = [
-        chapter(EXPERIMENTS[name], found, folder / "images", folder)
-        for name, found in there.items()
-    ]
-    left = [name for name in EXPERIMENTS if name not in there]
+    kept = kept_chapters(given.page, seeds_of(given))
+    there = {}
+    shown: list[Chapter | Kept] = []
+    left = []
+    for name, one in EXPERIMENTS.items():
+        found = stored(one, given)
+        if found is not None:
+            there[name] = found
+            shown.append(chapter(one, found, folder / "images", folder))
+        elif one.title in kept:
+            shown.append(kept[one.title])
+        else:
+            left.append(name)
+    chapters = [one for one in shown if isinstance(one, Chapter)]
     machines = {found["machine"].split(", load")[0] for found in there.values()}
-    text = page(chapters, left, seeds_of(given), ", ".join(sorted(machines)), given.quick)
+    text = page(shown, left, seeds_of(given), ", ".join(sorted(machines)), given.quick)
     write(text, given.page)
     claims = []
     rows = []
