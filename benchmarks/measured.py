@@ -4,8 +4,9 @@
 
 DIR holds public recordings that a user has fetched (docs/energy.md names them; none is in the
 repository). What is not there is left out, and said. Simulated plants as in `truth.py --only fit`
-follow (not with DIR and --quick), and how often intervals hold over everything together. --page
-writes the table of the recordings into the page's chapter "Measured".
+follow (not with DIR and --quick), and how often intervals hold over everything together; then
+robots that nobody has a file of (`_measured_strangers`), by a meter of ten readings a second.
+--page writes the table of the recordings into the page's chapter "Measured".
 """
 
 from __future__ import annotations
@@ -17,14 +18,24 @@ from typing import Any
 
 import numpy as np
 from _measured_robots import kr300_r2500, tx40, ur3e
+from _measured_strangers import recorded, stranger
 from _results import Claim, at_least, at_most, command_line, finish, line_of
 from _truth_section import Asked
 from scipy.stats import binomtest
 
 from ir_description import Load, PowerParameters, RobotModel, data_sheet_of
-from ir_recorder.fit import Estimate, LeftOut, left_out, median_error, plain_torques, shaft_work
+from ir_recorder.fit import (
+    Estimate,
+    LeftOut,
+    left_out,
+    median_error,
+    plain_torques,
+    recommendation,
+    shaft_work,
+)
 from ir_recorder.fit.data import without_turns
 from ir_recorder.measure import PowerModel, Samples, samples_of
+from ir_recorder.measure.arm import available
 from ir_recorder.traces import Trace, read_traces
 from ir_values.arrays import FloatArray
 
@@ -36,6 +47,7 @@ TX40_STEP = 2e-4  # s
 TX40_THINNED = 10  # rows averaged to one: 2 ms
 PAYLOAD = 150.0  # kg: of the KR 300's recordings, not stated there
 OPEN = 0.3  # deviation of a payload that nobody stated
+STRANGERS = 6
 LAST = 3  # parts of the TX40's recording; the last one is predicted
 START = "<!-- measured -->"
 END = "<!-- end -->"
@@ -92,6 +104,9 @@ def main() -> None:
         claims += plants.claims
         held += sum(inside)
         count += len(inside)
+        own, found = _strangers(2 if asked.quick else STRANGERS)
+        rows += own
+        claims += found
     if count:
         claims += _pooled(held, count)
     for row in rows:
@@ -124,6 +139,38 @@ def _sets(folder: Path) -> Iterator[tuple[list[Row], list[Claim]]]:
         yield _tx40(folder)
     else:
         print(f"left out: {', '.join(TX40)} are not in {folder}")
+
+
+def _strangers(count: int) -> tuple[list[dict[str, Any]], list[Claim]]:
+    """Robots drawn at random: two runs, each predicted by a fit on the other."""
+    if not available():
+        print("left out: strangers, Pinocchio is not installed")
+        return [], []
+    rows = []
+    shares = []
+    misled = 0
+    for seed in range(count):
+        robot = stranger(seed)
+        model, prior = _model(robot.known)
+        runs = [recorded(robot, seconds, run) for run, seconds in enumerate((100.0, 80.0))]
+        estimate = Estimate(runs, ["first", "second"], model, prior)
+        size = estimate.result("stranger").parameters.value("dc_link")
+        found = left_out(estimate)
+        fitted, sheet, plain = (100.0 * median_error(found, method) for method in METHODS)
+        shares.append(fitted / plain)
+        misled += fitted > sheet and "plan with the data sheet" not in recommendation(found)
+        data = f"stranger {seed}, {robot.carries:.0f} kg"
+        rows.append(
+            Row(data, "energy, median %", fitted, sheet, plain).words()
+            | {"link J": model.robot.controller.dc_link.capacity_energy * size}
+            | {"its own J": robot.capacity}
+        )
+    name = f"{count} strangers: error of what was left out beside the regression's"
+    return rows, [
+        at_most(f"{name}, median", float(np.median(shares)), "", 0.8),
+        at_most(f"{name}, worst", max(shares), "", 1.0),
+        at_most("strangers that are worse than their data sheet and not told so", misled, "", 0.0),
+    ]
 
 
 def _model(robot: RobotModel) -> tuple[PowerModel, PowerParameters]:
