@@ -42,25 +42,29 @@ def doubts(estimate: Estimate) -> tuple[str, ...]:
     """
     said: list[str] = []
     if estimate.meter is not None:
-        watts = estimate.meter.watts(estimate.found[: len(estimate.prior.names)])
-        for run, predicted in zip(estimate.runs, watts, strict=True):
-            said += _of_power(estimate, run, predicted)
+        fitted = estimate.meter.watts(estimate.found[: len(estimate.prior.names)])
+        sheet = estimate.meter.watts(estimate.prior.mean)
+        for run, both in zip(estimate.runs, zip(fitted, sheet, strict=True), strict=True):
+            said += _of_power(estimate, run, *both)
     if estimate.motors is not None:
         said += _of_torques(estimate)
     return tuple(said)
 
 
-def _of_power(estimate: Estimate, run: Run, predicted: FloatArray) -> Iterator[str]:
+def _of_power(
+    estimate: Estimate, run: Run, predicted: FloatArray, sheet: FloatArray
+) -> Iterator[str]:
     measured = np.where(run.samples.known, run.samples.watts, np.nan)
-    late = _lateness(measured, predicted, run.samples.step)
+    moving = run.samples.moving & np.isfinite(measured)
+    share = _explained(measured[moving], predicted[moving])
+    # a fit to a clock that is far off explains nothing any more: then the data sheet tells
+    late = _lateness(measured, predicted if share >= EXPLAINED else sheet, run.samples.step)
     if late:
         side = "later" if late > 0.0 else "earlier"
         yield (
             f"{run.name}: the meter shows power {abs(late):.2f} s {side} than the joints explain "
             f"it: add {-late:.2f} s to the clock_offset of its mapping"
         )
-    moving = run.samples.moving & np.isfinite(measured)
-    share = _explained(measured[moving], predicted[moving])
     if share < EXPLAINED:
         yield (
             f"{run.name}: in motion the fit explains {100.0 * max(share, 0.0):.0f} % of what the "
@@ -90,7 +94,7 @@ def _lateness(measured: FloatArray, predicted: FloatArray, step: float) -> float
         known = np.isfinite(later)
         if np.count_nonzero(known) < _FEWEST:
             return 0.0
-        errors[lag] = float(np.sqrt(np.mean((later - sooner)[known] ** 2)))
+        errors[lag] = float((later - sooner)[known].std())
     best = min(errors, key=lambda lag: (errors[lag], abs(lag)))
     if abs(best) * step < _LATE or errors[best] > _GAIN * errors[0]:
         return 0.0

@@ -103,6 +103,7 @@ class Stretch:
     changes with the parameters (P,), and the variance that the meter alone gives it.
     """
 
+    moving: bool
     fold: int
     missing: float
     slope: FloatArray
@@ -118,7 +119,8 @@ def widening(
     stretches: Sequence[Stretch],
 ) -> float:
     """The least factor, 1 or more, on the variance of the noise that explains the stretches, else
-    the likeliest; slopes (R, P) and residual (R,)
+    the likeliest. Movements and rests are explained each: many rests, which are easy, say nothing
+    of how well movements are known. slopes (R, P) and residual (R,)
     are weighted by it, fold (R,) says what is left out together, pull (P, P) is the prior's
     precision, deviation (P,) its deviations.
     """
@@ -133,14 +135,17 @@ def widening(
     while factor < _MOST:
         errors = []
         variances = []
+        moving = []
         for k, (information, pulled) in enumerate(parts):
             without = inverse((whole - information) / factor + pull, deviation)
             shift = without @ pulled / factor
             own = [each for each in stretches if each.fold == k]
             errors += [(each.missing + each.slope @ shift) ** 2 for each in own]
             variances += [each.slope @ without @ each.slope + each.white for each in own]
+            moving += [each.moving for each in own]
         ratios = np.divide(errors, variances)
-        if not errors or ratios.mean() <= 1.0:
+        kinds = (ratios[np.array(moving, bool) == kind] for kind in (True, False))
+        if all(own.mean() <= 1.0 for own in kinds if len(own)):
             return factor
         unlikely = float((ratios + np.log(variances)).mean())
         if unlikely < least:
@@ -563,9 +568,11 @@ class Estimate:
         stretches: list[Stretch] = []
         for run in self.runs:
             inside = run.samples
-            spans = [*movements(inside), *rests(inside)]
-            for first, behind in spans:
-                stretches += self._stretches(run, (first, behind), missing, slopes, fold)
+            spans = [(span, True) for span in movements(inside)]
+            spans += [(span, False) for span in rests(inside)]
+            for span, moving in spans:
+                found = self._stretches(run, span, missing, slopes, fold)
+                stretches += [replace(each, moving=moving) for each in found]
         pull = self._pull.T @ self._pull
         whole = weight[:, None] * slopes
         return widening(whole, weight * missing, fold, pull, self._wide, stretches)
@@ -595,6 +602,7 @@ class Estimate:
             white = self._white(channel, missing[begin - count : begin])[channel.group[within]]
             found += [
                 Stretch(
+                    True,
                     int(np.median(fold[rows[part]])),
                     float(by[part] @ missing[rows[part]]),
                     by[part] @ slopes[rows[part]],
