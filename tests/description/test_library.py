@@ -77,6 +77,7 @@ def test_all_cells_are_there() -> None:
         "cnc_door",
         "deep_box",
         "demo",
+        "flexible",
         "kr300_pallets",
         "kr6_bench",
         "open",

@@ -49,6 +49,7 @@ def check_cell(cell: Cell, power: PowerData | None = None) -> tuple[Finding, ...
         *_signals(cell),
         *_pauses(cell, power or cell.robot.controller),
         *_parts(cell),
+        *_processes(cell),
     ]
     return tuple(sorted(findings, key=lambda finding: finding.severity))
 
@@ -273,3 +274,10 @@ def _parts(cell: Cell) -> Iterator[Finding]:
         state = state.after(step)
     if state.held:
         yield Finding("warning", state.held, "is still held when the program ends")
+
+
+def _processes(cell: Cell) -> Iterator[Finding]:
+    for machine in cell.equipment if cell.route is None else ():
+        if machine.process > 0.0:
+            sentence = f"has a process of {machine.process:g} s, but the cell has no route"
+            yield Finding("warning", machine.name, sentence)

@@ -22,7 +22,13 @@ from ir_description.cell.equipment import (
     station_at,
     zone_around,
 )
-from ir_description.cell.program import POSTURES, CellSignal, PartPlaces, ProgramStep
+from ir_description.cell.program import (
+    POSTURES,
+    CellSignal,
+    PartPlaces,
+    PartRoute,
+    ProgramStep,
+)
 from ir_description.poses import composed, inverse
 from ir_description.robot import Load, RobotModel, total_mass
 from ir_description.shapes import Body, Capsule, floor_body
@@ -250,6 +256,47 @@ def check_program(cell: _Cell) -> None:
         state = check_step(step, state, stations, signals, paths)
 
 
+def check_route(
+    route: PartRoute,
+    parts: Collection[Part],
+    machines: Collection[Equipment],
+    stations: Collection[Station],
+) -> None:
+    """Refuse a route with unknown names, whose part doesn't lie at its begin, of which two stations
+    are at the same equipment, or that doesn't visit exactly the machines with a process.
+    """
+    own = {station.name: station.equipment for station in stations}
+    for station in route.visits:
+        if station not in own:
+            raise UnknownNameError("station", station, own)
+    visited = [own[station] for station in route.visits]
+    for name in visited:
+        if visited.count(name) > 1:
+            raise InvalidValueError(
+                f"the route visits {name} {visited.count(name)} times: a machine is visited once"
+            )
+    for machine in machines:
+        works = machine.name in visited[1:-1]
+        if works and machine.process <= 0.0:
+            raise InvalidValueError(
+                f"the route visits {machine.name}, which has no process: give its time, as "
+                "process: {seconds: 30}"
+            )
+        if machine.process > 0.0 and not works:
+            raise InvalidValueError(
+                f"{machine.name} has a process of {machine.process:g} s, but the route doesn't "
+                "visit it between its first and its last station"
+            )
+    places = {part.name: part.station for part in parts}
+    if route.part not in places:
+        raise UnknownNameError("part", route.part, places)
+    if places[route.part] != route.visits[0]:
+        raise InvalidValueError(
+            f"the route of {route.part} begins at {route.visits[0]}, but it lies at "
+            f"{places[route.part] or 'no station'}"
+        )
+
+
 def check_single_places(parts: Iterable[Part]) -> None:
     """Refuse two parts that lie at one station."""
     register = NameRegister("a part at station")
@@ -293,6 +340,7 @@ class Cell:
     of base_link and a body that touch for good (a pedestal); `ignored_pairs` adds the floor.
     whole_loads: each stands for the tool and a part together where a program says what it carries
     ($LOAD), the first at the start; none: tool and parts as they are.
+    route: what the machines with a process do to the parts, None: there are none.
     """
 
     name: str
@@ -313,6 +361,7 @@ class Cell:
     base_contacts: tuple[tuple[str, str], ...] = ()
     description: str = field(default="")
     whole_loads: tuple[Load, ...] = ()
+    route: PartRoute | None = None
 
     def __post_init__(self) -> None:
         n = self.robot.n
@@ -332,6 +381,8 @@ class Cell:
         check_payload(self)
         check_contacts(self)
         check_program(self)
+        if self.route is not None:
+            check_route(self.route, self.parts, self.equipment, self.stations)
 
     def station(self, name: str) -> Station:
         """Return the station of that name."""

@@ -28,6 +28,8 @@ STARTS_MAX = 10_000
 """Most random starts of a search for configurations."""
 SWITCH_MAX = 3600.0
 """Longest change of a machine's state [s]."""
+PROCESS_MAX = 86_400.0
+"""Longest process of a machine [s]: a day."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +105,7 @@ class Equipment:
 
     A body that no state names is always there; one that states name is there in these states only.
     Where there is a switch, `state` is the one that plans assume and that counts until its signal
-    is heard.
+    is heard. process [s]: how long it works on a part, 0: it doesn't; it holds one part at a time.
     """
 
     name: str
@@ -114,9 +116,11 @@ class Equipment:
     state: str = ""
     enabled: bool = True
     switch: StateSwitch | None = None
+    process: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", frozen_pose(self.pose, f"pose of {self.name}"))
+        in_range(self.process, 0.0, PROCESS_MAX, "s", f"process of {self.name}")
         names = {body.name for body in self.bodies}
         if len(names) != len(self.bodies):
             raise InvalidValueError(f"equipment {self.name} names a body twice")

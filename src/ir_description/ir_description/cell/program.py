@@ -1,4 +1,5 @@
-"""The program of a cell: stations, postures, paths and pauses in order, with what happens at each.
+"""The program of a cell: stations, postures, paths and pauses in order, with what happens at each;
+and the route of its parts.
 
 One step runs in this order: wait for the signals, move, attach or detach, set the signals, dwell. A
 pause stays where the step before it ended.
@@ -23,6 +24,8 @@ NUMBER_MAX = 8192
 """Highest number of an output or input at a KR C4."""
 PAUSE_MAX = 604_800.0
 """Longest pause or dwell [s]: a week."""
+VISITS = 3, 10
+"""Fewest and most stations of a route: infeed, machines, outfeed."""
 
 
 @dataclass(frozen=True)
@@ -137,3 +140,24 @@ class PartPlaces:
         if part not in self.lying:
             raise UnknownNameError("part", part, self.lying)
         return self.lying[part]
+
+
+@dataclass(frozen=True)
+class PartRoute:
+    """What every part goes through: `part` is brought from the first of `visits` (stations) to the
+    next and so on. A machine works on it at each but the first, where the next one always lies, and
+    the last, which takes it away. handling [s]: of the gripper, at each end of each transport.
+    """
+
+    part: str
+    visits: tuple[str, ...]
+    handling: float = 0.0
+
+    def __post_init__(self) -> None:
+        in_range(len(self.visits), *VISITS, "", "number of visits")
+        in_range(self.handling, 0.0, PAUSE_MAX, "s", "handling")
+        for station in self.visits:
+            if self.visits.count(station) > 1:
+                raise InvalidValueError(
+                    f"the route visits {station} twice, at most once is planned"
+                )

@@ -21,6 +21,7 @@ from ir_description.cell import (
     NameRegister,
     Part,
     PartPlaces,
+    PartRoute,
     ProgramStep,
     Station,
     check_base_contact,
@@ -30,6 +31,7 @@ from ir_description.cell import (
     check_part_mass,
     check_path,
     check_posture,
+    check_route,
     check_step,
     check_switch,
     shape_register,
@@ -44,6 +46,7 @@ from ir_description.files.equipment_reader import (
 from ir_description.files.program_reader import (
     PATHS_MAX,
     read_paths,
+    read_route,
     read_signals,
     read_step,
     read_tasks,
@@ -78,6 +81,7 @@ _OPTIONAL = (
     "program",
     "tasks",
     "paths",
+    "route",
 )
 
 
@@ -150,6 +154,7 @@ class _CellReader:
         self._check_contacts(placed, paths, equipment, parts)
         signals = self._signals()
         self._check_switches(equipment, signals)
+        route = self._route(parts, equipment, stations)
         home = self._posture("home", robot.machine_home)
         with self._root.blamed():
             return Cell(
@@ -170,6 +175,7 @@ class _CellReader:
                 paths=paths,
                 floor=table["floor"].boolean() if "floor" in table else True,
                 base_contacts=self._base_contacts(equipment, parts),
+                route=route,
             )
 
     def _list(self, key: str, high: int) -> list[Item]:
@@ -278,6 +284,20 @@ class _CellReader:
         for item, machine in zip(self._list("equipment", 10_000), equipment, strict=True):
             with dict(item.pairs()).get("switch", item).blamed():
                 check_switch(machine, known)
+
+    def _route(
+        self,
+        parts: tuple[Part, ...],
+        equipment: tuple[Equipment, ...],
+        stations: tuple[Station, ...],
+    ) -> PartRoute | None:
+        item = self._table.get("route")
+        if item is None:
+            return None
+        with item.blamed():
+            route = read_route(item)
+            check_route(route, parts, equipment, stations)
+        return route
 
     def _posture(self, name: str, default: FloatArray) -> FloatArray:
         given = [key for key in (name, f"{name}_deg") if key in self._table]

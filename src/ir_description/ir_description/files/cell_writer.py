@@ -17,6 +17,7 @@ from ir_description.cell import (
     CellSignal,
     Equipment,
     Part,
+    PartRoute,
     ProgramStep,
     StateSwitch,
     Station,
@@ -77,6 +78,8 @@ def _cell(cell: Cell) -> Iterator[str]:
         ),
     )
     yield from _block("paths", (path_lines(path, _pose, _number) for path in cell.paths))
+    if cell.route is not None:
+        yield f"route: {_route(cell.route)}"
 
 
 def _load(load: Load) -> Iterator[str]:
@@ -120,6 +123,8 @@ def _machine(machine: Equipment, stations: list[Station]) -> Iterator[str]:
         yield f"state: {machine.state}"
     if machine.switch is not None:
         yield f"switch: {_switch(machine.switch)}"
+    if machine.process:
+        yield f"process: {{seconds: {_number(machine.process)}}}"
     yield "bodies:" if machine.bodies else "bodies: []"
     yield from _entries([_body(body)] for body in machine.bodies)
     yield from _block("stations", (_station(station) for station in stations))
@@ -199,6 +204,11 @@ def _step(step: ProgramStep) -> str:
     return f"{{{', '.join(fields)}}}"
 
 
+def _route(route: PartRoute) -> str:
+    visits = ", ".join(route.visits)
+    return f"{{part: {route.part}, visits: [{visits}], handling: {_number(route.handling)}}}"
+
+
 def _signals(signals: Sequence[Signal]) -> str:
     return f"[{', '.join(signal.text for signal in signals)}]"
 
@@ -265,8 +275,8 @@ _LENGTH = 16  # hexadecimal digits, as ids of trajectories have
 
 
 def cell_hash(cell: Cell) -> str:
-    """Hash of bodies, poses, states, zones, stations, loads and robot; its program and its texts
-    don't count.
+    """Hash of bodies, poses, states, zones, stations, loads and robot; its program, its route with
+    the machines' times, and its texts don't count.
 
     The state of a machine that a signal switches doesn't count either: doors move while a program
     runs, and a movement that relies on a state says so. The file of a cell, written and read again,
@@ -274,13 +284,21 @@ def cell_hash(cell: Cell) -> str:
     """
     machines = tuple(_unswitched(machine) for machine in cell.equipment)
     place = replace(
-        cell, description="", equipment=machines, program=(), signals=(), tasks=(), paths=()
+        cell,
+        description="",
+        equipment=machines,
+        program=(),
+        signals=(),
+        tasks=(),
+        paths=(),
+        route=None,
     )
     content = f"{cell_to_yaml(place)}\n{cell.robot!r}"
     return hashlib.sha256(content.encode()).hexdigest()[:_LENGTH]
 
 
 def _unswitched(machine: Equipment) -> Equipment:
+    machine = replace(machine, process=0.0)
     if machine.switch is None:
         return machine
     return replace(machine, state=machine.states[0].name, switch=None)

@@ -14,6 +14,7 @@ from ir_description.cell import (
     APPROACH_MAX,
     BODIES_MAX,
     CONFIGURATION_SEARCHES,
+    PROCESS_MAX,
     STARTS_MAX,
     SWITCH_MAX,
     ZONE_KINDS,
@@ -268,14 +269,13 @@ def _size(table: Table, kind: str) -> FloatArray:
     return lengths
 
 
+_MACHINE_KEYS = ("pose", "zone", "states", "state", "switch", "enabled", "process", "stations")
 _SEARCH_KEYS = ("configurations", "starts", "withdrawal")
 
 
 def read_equipment(item: Item, bodies: BodyReader) -> tuple[Equipment, list[tuple[Item, Station]]]:
     """Return a machine and its stations, each with the item it came from."""
-    table = item.table(
-        ("name", "bodies"), ("pose", "zone", "states", "state", "switch", "enabled", "stations")
-    )
+    table = item.table(("name", "bodies"), _MACHINE_KEYS)
     read = bodies.all(table["bodies"].list(0, BODIES_MAX))
     states = _states(table, bodies)
     machine = Equipment(
@@ -287,6 +287,7 @@ def read_equipment(item: Item, bodies: BodyReader) -> tuple[Equipment, list[tupl
         state=_state(table, states),
         enabled=table["enabled"].boolean() if "enabled" in table else True,
         switch=_switch(table["switch"], states) if "switch" in table else None,
+        process=_process(table["process"]) if "process" in table else 0.0,
     )
     items = table["stations"].list(0, 10_000) if "stations" in table else []
     stations = [_station(station, machine) for station in items]
@@ -346,6 +347,10 @@ def _switch(item: Item, states: tuple[EquipmentState, ...]) -> StateSwitch:
     time = table["time"].number(0.0, SWITCH_MAX, "s") if "time" in table else 0.0
     with item.blamed():
         return StateSwitch(table["signal"].name(), on, off, time)
+
+
+def _process(item: Item) -> float:
+    return item.table(("seconds",))["seconds"].number(0.0, PROCESS_MAX, "s", above=True)
 
 
 def _station(item: Item, machine: Equipment) -> Station:

@@ -11,9 +11,11 @@ from ir_description.cell import (
     PAUSE_MAX,
     PAUSE_POWER_MODES,
     POSTURES,
+    VISITS,
     CellPath,
     CellSignal,
     NameRegister,
+    PartRoute,
     ProgramStep,
     Task,
     check_posture,
@@ -126,6 +128,15 @@ def read_step(item: Item) -> ProgramStep:
         detach=table["detach"].name() if "detach" in table else "",
         **moving,
     )
+
+
+def read_route(item: Item) -> PartRoute:
+    """Return the route of a part."""
+    table = item.table(("part", "visits"), ("handling",))
+    visits = [visit.name() for visit in table["visits"].list(*VISITS)]
+    handling = table["handling"].number(0.0, PAUSE_MAX, "s") if "handling" in table else 0.0
+    with table["visits"].blamed():
+        return PartRoute(table["part"].name(), tuple(visits), handling)
 
 
 def _signals(table: Table, key: str) -> tuple[Signal, ...]:

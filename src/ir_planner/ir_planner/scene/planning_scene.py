@@ -362,7 +362,7 @@ class PlanningScene:
 def with_parts(cell: Cell, parts: PartPlaces) -> Cell:
     """The cell while a program is under way: parts lie where they are between two steps."""
     moved = tuple(replace(part, station=parts.lying[part.name]) for part in cell.parts)
-    return replace(cell, parts=moved, program=())
+    return replace(cell, parts=moved, program=(), route=None)
 
 
 def scene_with(
@@ -383,7 +383,7 @@ def scene_with(
         *(tool[name] for name in names if name in tool),
         *(cell.part(name).held(cell.tcp) for name in held),
     )
-    standing = cell if not held else replace(cell, parts=parts, program=())
+    standing = cell if not held else replace(cell, parts=parts, program=(), route=None)
     return PlanningScene(standing, loads, power, drives or Drives())
 
 
