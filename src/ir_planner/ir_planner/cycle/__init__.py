@@ -1,5 +1,32 @@
 """The cheapest steady cycle: mixed-integer linear programs, and what is made of them."""
 
 from ir_planner.cycle.linear import LinearAnswer, LinearProgram
+from ir_planner.cycle.steady import (
+    UNITS_MAX,
+    Curve,
+    SteadyCycle,
+    SteadyProblem,
+    Visit,
+    Wait,
+    WaitMode,
+    cheapest_cycle,
+    fastest_cycle,
+    in_turn,
+    shared_among,
+)
 
-__all__ = ["LinearAnswer", "LinearProgram"]
+__all__ = [
+    "UNITS_MAX",
+    "Curve",
+    "LinearAnswer",
+    "LinearProgram",
+    "SteadyCycle",
+    "SteadyProblem",
+    "Visit",
+    "Wait",
+    "WaitMode",
+    "cheapest_cycle",
+    "fastest_cycle",
+    "in_turn",
+    "shared_among",
+]

@@ -1,0 +1,155 @@
+"""Brute force over the cycles of a robot that tends machines: an independent judge.
+
+It knows nothing of linear programs over orders: every order is tried, every choice of modes, and
+durations on a grid, or (where the grid would be too large) times by a linear program of SciPy's for
+that one order and those modes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise, permutations, product
+
+import numpy as np
+from scipy.optimize import linprog
+
+from ir_planner.cycle import SteadyProblem, WaitMode
+
+NONE = WaitMode("", 0.0, 0.0, 0.0, 0.0)
+
+
+def orders(activities: int) -> Iterator[tuple[int, ...]]:
+    """All cyclic orders, activity 0 first."""
+    for rest in permutations(range(1, activities)):
+        yield (0, *rest)
+
+
+def least_by_orders(problem: SteadyProblem, period: float) -> float:
+    """Least joules of a cycle of one unit: every order, every choice of a mode at every wait."""
+    best = np.inf
+    modes = [(*modes, NONE) for modes in problem.before]
+    for order in orders(len(problem.activities)):
+        for chosen in product(*(modes[a] for a in order)):
+            best = min(best, _least_of_order(problem, period, order, chosen))
+    return best
+
+
+def _least_of_order(
+    problem: SteadyProblem,
+    period: float,
+    order: tuple[int, ...],
+    chosen: tuple[WaitMode, ...],
+) -> float:
+    """Least joules of one order, with these modes before its activities. Unknown: for each place in
+    the order the seconds and joules of activity and hop, and the wait before the activity.
+    """
+    n = len(order)
+    cost = np.zeros(5 * n)
+    rows: list[np.ndarray] = []
+    right: list[float] = []
+    bounds = []
+    for k, a in enumerate(order):
+        hop = problem.hops.get((a, order[(k + 1) % n]))
+        for base, curve in ((5 * k, problem.activities[a]), (5 * k + 2, hop)):
+            if curve is None:
+                bounds += [(0.0, 0.0), (0.0, 0.0)]
+                continue
+            bounds += [(curve.seconds[0], curve.seconds[-1]), (None, None)]
+            cost[base + 1] = 1.0
+            corners = list(zip(curve.seconds, curve.joules, strict=True))
+            for (s0, j0), (s1, j1) in pairwise(corners):
+                slope = (j1 - j0) / (s1 - s0)
+                row = np.zeros(5 * n)
+                row[base] = slope
+                row[base + 1] = -1.0
+                rows.append(row)
+                right.append(slope * s0 - j0)
+            if len(corners) == 1:
+                bounds[-1] = (corners[0][1], None)
+        cost[5 * k + 4] = chosen[k].watts
+        bounds.append((chosen[k].shortest, chosen[k].longest))
+    whole = np.ones(5 * n)
+    whole[1::5] = 0.0
+    whole[3::5] = 0.0
+    rows.append(whole)
+    right.append(period)
+    place = {a: k for k, a in enumerate(order)}
+    for machine, process in enumerate(problem.process):
+        # from the end of the activity that loads to the begin of the one that unloads
+        row = np.zeros(5 * n)
+        k = place[machine]
+        row[5 * k + 2] = -1.0
+        while True:
+            k = (k + 1) % n
+            row[5 * k + 4] -= 1.0
+            if order[k] == machine + 1:
+                break
+            row[5 * k] -= 1.0
+            row[5 * k + 2] -= 1.0
+        rows.append(row)
+        right.append(-process)
+    fixed = sum(mode.joules for mode in chosen)
+    answer = linprog(cost, A_ub=np.array(rows), b_ub=right, bounds=bounds, method="highs")
+    return float(answer.fun) + fixed if answer.status == 0 else np.inf
+
+
+def least_on_grid(problem: SteadyProblem, period: float, points: int, step: float) -> float:
+    """Least joules of a cycle of one unit: every order, every activity and hop at `points`
+    durations, the wait before activity 0 at every `step` s; the other waits as short as the machines allow,
+    each in its cheapest mode. Two machines at most.
+    """
+    best = np.inf
+    for order in orders(len(problem.activities)):
+        n = len(order)
+        curves = []
+        for k, a in enumerate(order):
+            curves += [problem.activities[a], problem.hops.get((a, order[(k + 1) % n]))]
+        grids = [
+            np.array([0.0]) if c is None else np.linspace(c.seconds[0], c.seconds[-1], points)
+            for c in curves
+        ]
+        rest = np.arange(0.0, max(problem.process) + step, step)
+        *lengths, first = np.meshgrid(*grids, rest, indexing="ij")
+        joules = sum(
+            np.interp(length, c.seconds, c.joules)
+            for c, length in zip(curves, lengths, strict=True)
+            if c is not None
+        )
+        moving = sum(lengths)
+        waits = _waits(problem, order, lengths, first)
+        for a, wait in zip(order, waits, strict=True):
+            joules = joules + _cheapest(problem.before[a], wait)
+        late = moving + sum(waits) > period + 1e-9
+        best = min(best, float(np.where(late, np.inf, joules).min()))
+    return best
+
+
+def _waits(
+    problem: SteadyProblem, order: tuple[int, ...], lengths: list[np.ndarray], first: np.ndarray
+) -> list[np.ndarray]:
+    """The shortest waits before the activities of a steady cycle, with `first` before activity 0,
+    by letting it run until nothing changes.
+    """
+    n = len(order)
+    waits = [first, *(np.zeros_like(first) for _ in order[1:])]
+    for _ in range(4 * n):
+        for k, a in enumerate(order):
+            if a == 0:
+                continue
+            since = np.zeros_like(lengths[0])
+            i = order.index(a - 1)
+            since = since + lengths[2 * i + 1]
+            i = (i + 1) % n
+            while i != k:
+                since = since + waits[i] + lengths[2 * i] + lengths[2 * i + 1]
+                i = (i + 1) % n
+            waits[k] = np.maximum(problem.process[a - 1] - since, 0.0)
+    return waits
+
+
+def _cheapest(modes: tuple[WaitMode, ...], seconds: np.ndarray) -> np.ndarray:
+    best = np.where(seconds <= 1e-12, 0.0, np.inf)
+    for mode in modes:
+        fits = (seconds >= mode.shortest) & (seconds <= mode.longest)
+        best = np.minimum(best, np.where(fits, mode.joules + mode.watts * seconds, np.inf))
+    return best

@@ -1,0 +1,183 @@
+"""The cheapest steady cycle against brute force, and the laws that it keeps, on drawn machines,
+curves and modes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from steady_judge import least_by_orders, least_on_grid
+
+from ir_planner.cycle import (
+    Curve,
+    SteadyCycle,
+    SteadyProblem,
+    WaitMode,
+    cheapest_cycle,
+    fastest_cycle,
+    in_turn,
+    shared_among,
+)
+
+MODES = (
+    WaitMode("motors", 0.0, 20.0, 0.0, 900.0),
+    WaitMode("brakes", 1.5, 1e4, 900.0, 300.0),
+)
+EXACT = 1e-6  # both are exact: what solvers round
+
+
+def drawn_curve(rng: np.random.Generator, low: float, points: int) -> Curve:
+    """Energy that falls with the square of the speed, and watts that are always there."""
+    begin = rng.uniform(low, 3.0 * low)
+    seconds = begin + np.concatenate([[0.0], np.cumsum(rng.uniform(0.3, 1.5, points - 1))])
+    joules = rng.uniform(800.0, 6000.0) * (begin / seconds) ** 2 + rng.uniform(200, 600) * seconds
+    return Curve.below(zip(seconds.tolist(), joules.tolist(), strict=True))
+
+
+def drawn(seed: int, machines: int, points: int = 4) -> SteadyProblem:
+    rng = np.random.default_rng([seed, machines])
+    count = machines + 1
+    return SteadyProblem(
+        activities=tuple(drawn_curve(rng, 2.0, points) for _ in range(count)),
+        hops={
+            (j, i): drawn_curve(rng, 1.0, points)
+            for j in range(count)
+            for i in range(count)
+            if i not in (j, j + 1)
+        },
+        after=((),) * count,
+        before=(MODES,) * count,
+        process=tuple(rng.uniform(2.0, 30.0, machines).tolist()),
+    )
+
+
+def cheapest(problem: SteadyProblem, period: float, units: int = 1) -> SteadyCycle:
+    cycle = cheapest_cycle(problem, period=period, units=units)
+    assert cycle is not None
+    return cycle
+
+
+def shortest(problem: SteadyProblem) -> float:
+    cycle = fastest_cycle(problem)
+    assert cycle is not None
+    return cycle.period
+
+
+def faults(problem: SteadyProblem, cycle: SteadyCycle) -> list[str]:
+    """What a cycle that runs on and on would do wrong, from its visits alone."""
+    found = []
+    here = 0.0
+    for visit, following in zip(cycle.visits, (*cycle.visits[1:], cycle.visits[0]), strict=True):
+        waits = (*visit.after, *following.before)
+        here += visit.seconds + visit.hop + sum(wait.seconds for wait in waits)
+        begin = cycle.period if following is cycle.visits[0] else following.start
+        if abs(here - begin) > 1e-5:
+            found.append(f"activity {following.activity} is reached at {here}, not at {begin}")
+    rounds = range(4)
+    for machine, process in enumerate(problem.process):
+        loads, unloads = (
+            sorted(
+                (visit.start + k * cycle.period, visit.seconds)
+                for visit in cycle.visits
+                for k in rounds
+                if visit.activity == activity
+            )
+            for activity in (machine, machine + 1)
+        )
+        first = loads[0][0] + loads[0][1]
+        unloads = [each for each in unloads if each[0] >= first - 1e-6]
+        for load, following, unload in zip(loads[:-1], loads[1:], unloads, strict=False):
+            if unload[0] - load[0] - load[1] < process - 1e-5:
+                found.append(f"machine {machine} has {unload[0] - load[0] - load[1]} s")
+            if unload[0] + unload[1] > following[0] + 1e-5:
+                found.append(f"machine {machine} is full when the next part comes")
+    return found
+
+
+@pytest.mark.parametrize(("machines", "seed"), [(2, 0), (2, 1), (2, 2), (3, 0), (3, 1)])
+@pytest.mark.parametrize("over", [1.0001, 1.3])
+def test_brute_force_over_all_orders_and_modes_agrees(
+    machines: int, seed: int, over: float
+) -> None:
+    problem = drawn(seed, machines, 3)
+    period = over * shortest(problem)
+    cycle = cheapest(problem, period)
+    assert cycle.joules == pytest.approx(least_by_orders(problem, period), rel=EXACT)
+    assert cycle.bound == pytest.approx(cycle.joules, rel=EXACT)
+    assert faults(problem, cycle) == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(3))
+def test_brute_force_agrees_for_four_machines(seed: int) -> None:
+    problem = replace(drawn(seed, 4, 3), before=(MODES[:1],) * 5)
+    period = 1.05 * shortest(problem)
+    expected = least_by_orders(problem, period)
+    assert cheapest(problem, period).joules == pytest.approx(expected, rel=EXACT)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_fine_grid_of_durations_agrees(seed: int) -> None:
+    problem = drawn(seed, 2, 2)
+    period = 1.05 * shortest(problem)
+    least = least_on_grid(problem, period, 4, 0.25)
+    found = cheapest(problem, period).joules
+    assert found <= least * (1.0 + EXACT)
+    assert found == pytest.approx(least, rel=0.005)
+
+
+@pytest.mark.parametrize(("seed", "machines", "units"), [(0, 2, 1), (1, 3, 1), (2, 2, 2)])
+def test_energy_per_part_never_rises_when_the_throughput_falls(
+    seed: int, machines: int, units: int
+) -> None:
+    problem = drawn(seed, machines)
+    least = np.inf
+    for over in (1.0001, 1.05, 1.2, 1.6, 3.0):
+        cycle = cheapest(problem, over * shortest(problem), units)
+        assert faults(problem, cycle) == []
+        assert cycle.joules / units <= least * (1.0 + EXACT)
+        least = cycle.joules / units
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_faster_machine_never_makes_the_cycle_dearer(seed: int) -> None:
+    problem = drawn(seed, 3)
+    period = 1.02 * shortest(problem)
+    before = cheapest(problem, period).joules
+    for machine in range(3):
+        process = list(problem.process)
+        process[machine] *= 0.6
+        faster = replace(problem, process=tuple(process))
+        assert cheapest(faster, period).joules <= before * (1.0 + EXACT)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_two_units_are_never_dearer_than_one(seed: int) -> None:
+    problem = drawn(seed, 2)
+    period = 1.02 * shortest(problem)
+    two = cheapest(problem, period, 2)
+    assert two.joules / 2.0 <= cheapest(problem, period).joules * (1.0 + EXACT)
+    assert faults(problem, two) == []
+
+
+def test_a_period_that_is_too_short_has_no_cycle() -> None:
+    problem = drawn(0, 2)
+    assert cheapest_cycle(problem, period=0.99 * shortest(problem)) is None
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_movements_in_turn_take_the_least_energy_of_their_time_together(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    curves = [drawn_curve(rng, 1.0, 4) for _ in range(3)]
+    together = in_turn(curves)
+    for seconds in np.linspace(together.seconds[0], together.seconds[-1], 7):
+        taken = shared_among(curves, float(seconds))
+        joules = sum(curve.at(each) for curve, each in zip(curves, taken, strict=True))
+        assert sum(taken) == pytest.approx(seconds)
+        assert joules == pytest.approx(together.at(float(seconds)))
+        for _ in range(50):
+            other = [rng.uniform(curve.seconds[0], curve.seconds[-1]) for curve in curves]
+            spent = sum(curve.at(each) for curve, each in zip(curves, other, strict=True))
+            assert spent >= together.at(sum(other)) - 1e-6
