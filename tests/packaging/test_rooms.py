@@ -18,8 +18,8 @@ ROOMS = {
     "ir_planner": (
         "errors", "presentation", "cycle", "curves", "scene", "request", "checks", "configurations", "timing", "search", "optimize",  # noqa: E501
         "cartesian", "regional", "trajectories", "service", "settings", "program", "store",
-        "current_cell", "certificates", "state_queries", "waiting_postures", "planner", "krl",
-        "before_after", "what_if", "node", "contract",
+        "current_cell", "certificates", "state_queries", "waiting_postures", "flexible", "planner",
+        "krl", "before_after", "what_if", "node", "contract",
     ),
     "ir_description": (
         "poses", "shapes", "robot", "cell", "files", "library",

@@ -95,8 +95,8 @@ def _least_of_order(
 
 def least_on_grid(problem: SteadyProblem, period: float, points: int, step: float) -> float:
     """Least joules of a cycle of one unit: every order, every activity and hop at `points`
-    durations, the wait before activity 0 at every `step` s; the other waits as short as the machines allow,
-    each in its cheapest mode. Two machines at most.
+    durations, one wait at every `step` s, whichever it is; the other waits as short as the
+    machines allow, each in its cheapest mode. Two machines at most.
     """
     best = np.inf
     for order in orders(len(problem.activities)):
@@ -109,30 +109,38 @@ def least_on_grid(problem: SteadyProblem, period: float, points: int, step: floa
             for c in curves
         ]
         rest = np.arange(0.0, max(problem.process) + step, step)
-        *lengths, first = np.meshgrid(*grids, rest, indexing="ij")
+        *lengths, more = np.meshgrid(*grids, rest, indexing="ij")
         joules = sum(
             np.interp(length, c.seconds, c.joules)
             for c, length in zip(curves, lengths, strict=True)
             if c is not None
         )
         moving = sum(lengths)
-        waits = _waits(problem, order, lengths, first)
-        for a, wait in zip(order, waits, strict=True):
-            joules = joules + _cheapest(problem.before[a], wait)
-        late = moving + sum(waits) > period + 1e-9
-        best = min(best, float(np.where(late, np.inf, joules).min()))
+        for longer in range(n):
+            waits = _waits(problem, order, lengths, longer, more)
+            standing = sum(
+                _cheapest(problem.before[a], wait) for a, wait in zip(order, waits, strict=True)
+            )
+            late = moving + sum(waits) > period + 1e-9
+            best = min(best, float(np.where(late, np.inf, joules + standing).min()))
     return best
 
 
 def _waits(
-    problem: SteadyProblem, order: tuple[int, ...], lengths: list[np.ndarray], first: np.ndarray
+    problem: SteadyProblem,
+    order: tuple[int, ...],
+    lengths: list[np.ndarray],
+    longer: int,
+    more: np.ndarray,
 ) -> list[np.ndarray]:
-    """The shortest waits before the activities of a steady cycle, with `first` before activity 0,
-    by letting it run until nothing changes.
+    """The shortest waits before the activities of a steady cycle, the one at place `longer` longer
+    by `more`, by letting it run until nothing changes.
     """
     n = len(order)
-    waits = [first, *(np.zeros_like(first) for _ in order[1:])]
-    for _ in range(4 * n):
+    added = [more if k == longer else np.zeros_like(more) for k in range(n)]
+    waits = added
+    for _ in range(2 * n):
+        waits = list(waits)
         for k, a in enumerate(order):
             if a == 0:
                 continue
@@ -143,7 +151,7 @@ def _waits(
             while i != k:
                 since = since + waits[i] + lengths[2 * i] + lengths[2 * i + 1]
                 i = (i + 1) % n
-            waits[k] = np.maximum(problem.process[a - 1] - since, 0.0)
+            waits[k] = np.maximum(problem.process[a - 1] - since, added[k])
     return waits
 
 

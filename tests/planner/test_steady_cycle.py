@@ -122,7 +122,7 @@ def test_brute_force_agrees_for_four_machines(seed: int) -> None:
 def test_a_fine_grid_of_durations_agrees(seed: int) -> None:
     problem = drawn(seed, 2, 2)
     period = 1.05 * shortest(problem)
-    least = least_on_grid(problem, period, 4, 0.25)
+    least = least_on_grid(problem, period, 4, 0.1)
     found = cheapest(problem, period).joules
     assert found <= least * (1.0 + EXACT)
     assert found == pytest.approx(least, rel=0.005)

@@ -37,6 +37,7 @@ from ir_cli.planning import (
     sentences,
     supply,
 )
+from ir_cli.steady import OUTPUTS, add_steady, run_steady
 from ir_description import Cell
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
@@ -89,6 +90,7 @@ def add_plan(plan: argparse.ArgumentParser) -> None:
     )
     add_renamed(plan, "--record", output)
     add_renamed(plan, "--html", output)
+    add_steady(plan)
     add_options(plan)
     add_parameters(plan)
     add_formats(plan)
@@ -98,13 +100,16 @@ def add_plan(plan: argparse.ArgumentParser) -> None:
 def _output(text: str) -> Path:
     """A file whose ending says what is written."""
     path = Path(text)
-    if path.suffix not in (".mcap", ".html"):
-        raise argparse.ArgumentTypeError(f"{text[:60]!r} must end in .mcap or .html")
+    if path.suffix not in OUTPUTS:
+        raise argparse.ArgumentTypeError(f"{text[:60]!r} must end in one of {', '.join(OUTPUTS)}")
     return path
 
 
 def run_plan(arguments: argparse.Namespace) -> int:
     """Plan and print; exit code 1 where nothing is found."""
+    if arguments.parts_per_hour is not None:
+        return run_steady(arguments, lambda *what: _report(arguments, *what))
+    _check_steady_options(arguments)
     with sentences(), ProgressLine() as line:
         planner = _planner(arguments)
         stations = tuple(arguments.stations)
@@ -137,6 +142,24 @@ def run_plan(arguments: argparse.Namespace) -> int:
         print_table(rows, COLUMNS)
         sys.stdout.write("\n".join(sentences_of(plan, planner.cell)) + f"{said}\n")
     return 0
+
+
+def _report(
+    arguments: argparse.Namespace, output: Path, plan: ProgramPlan, planner: Planner
+) -> None:
+    """Write the recording or the page of a steady cycle."""
+    options = options_of(arguments)
+    if output.suffix == ".html":
+        _page(output, arguments, plan, planner, options)
+    else:
+        sys.stderr.write(f"ir: {_record(str(output), arguments, plan, planner, options)}\n")
+
+
+def _check_steady_options(arguments: argparse.Namespace) -> None:
+    """Raise InputError for what belongs to a steady cycle alone."""
+    files = [str(each) for each in arguments.output if each.suffix not in (".mcap", ".html")]
+    for given in (["--front"] if arguments.front else []) + files:
+        raise InputError(f"{given} belongs to a steady cycle: give --parts-per-hour as well")
 
 
 def _planner(arguments: argparse.Namespace) -> Planner:

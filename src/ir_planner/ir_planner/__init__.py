@@ -20,6 +20,7 @@ from ir_planner.errors import (
     TimingError,
     UnknownNameError,
 )
+from ir_planner.flexible import SteadyPlan
 from ir_planner.planner import Planner
 from ir_planner.program import ProgramPlan, Standby
 from ir_planner.regional import EscapePlan, MovementPlan
@@ -49,6 +50,7 @@ __all__ = [
     "ServicePlan",
     "Standby",
     "StateCheck",
+    "SteadyPlan",
     "StoredProgram",
     "TimingError",
     "UnknownNameError",

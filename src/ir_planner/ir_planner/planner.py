@@ -17,7 +17,7 @@ from typing import TypedDict, Unpack
 
 import numpy as np
 
-from ir_description import Cell, CellPath, PowerData, is_path
+from ir_description import Cell, CellPath, PowerData, cell_hash, is_path
 from ir_msgs_py.cartesian import CartesianPath
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
@@ -40,6 +40,7 @@ from ir_planner.configurations import (
 )
 from ir_planner.current_cell import CurrentCell, Heard, ReadCell, read_cell_here
 from ir_planner.errors import RequestError, UnknownNameError
+from ir_planner.flexible import SteadyPlan, plan_steady_cycle
 from ir_planner.program import (
     Lengths,
     ProgramPlan,
@@ -475,6 +476,44 @@ class Planner:
         for program in (*plan.front, plan.compared, plan):
             if program is not None and program.status.ok:
                 self._remember(program)
+        return replace(plan, info=noted(plan.info, note))
+
+    def plan_steady_cycle(
+        self,
+        *,
+        parts_per_hour: float = 0.0,
+        options: PlanOptions | None = None,
+        cancelled: Cancelled = _NEVER,
+        saving: bool = False,
+        front_points: int = 0,
+        **changes: Unpack[OptionFields],
+    ) -> SteadyPlan:
+        """The cheapest cycle of the cell's route that makes at least so many parts an hour, 0: as
+        many as possible. saving: hold it against the common cycle; front_points: so many cycles
+        from the fastest to the cheapest.
+        """
+        options, note = self._checked(options_with(options, changes))
+        cell = self.cell
+        request = ProgramRequest(
+            cell,
+            self._current.power(cell),
+            (),
+            cell.park,
+            options,
+            settings=replace(self.settings, transitions=self.heard.transitions),
+            doors=self.heard.doors(cell),
+        )
+        stops = 3 * len(cell.route.visits) if cell.route is not None else 1
+        work = self._work(options, cancelled, stops)
+        plan = plan_steady_cycle(
+            request, parts_per_hour, work, saving=saving, front_points=front_points
+        )
+        if plan.program is not None and plan.request is not None and plan.cell is not None:
+            spreads = Spreads(plan.request)
+            source = self.heard.source
+            program = program_in(plan.program, cell_hash(plan.cell), source, spreads)
+            self._remember(program)
+            plan = replace(plan, program=program)
         return replace(plan, info=noted(plan.info, note))
 
     def _goal(self, goal: Place) -> Goal:

@@ -4,6 +4,7 @@ The text says what is asked first: found or why not, seconds, joules, minimum cl
 and the id that other requests take.
 """
 
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from typing import Any
 
@@ -109,6 +110,11 @@ def plot_steps(movements: tuple[PlannedMovement, ...], title: str) -> Any:
     """The steps of a program as bars: from begin to end, as high as their mean power."""
     figure, (axes,) = _figure(1)
     figure.suptitle(title, wrap=True, fontsize="medium")
+    _power_bars(axes, movements)
+    return figure
+
+
+def _power_bars(axes: Any, movements: Sequence[PlannedMovement]) -> None:
     begin = 0.0
     for step in movements:
         if step.duration > 0.0:
@@ -118,7 +124,6 @@ def plot_steps(movements: tuple[PlannedMovement, ...], title: str) -> Any:
         begin += step.duration
     axes.set_xlabel("time [s]")
     axes.set_ylabel("mean power [W]")
-    return figure
 
 
 def plot_choices(names: list[str], energies: list[float], title: str) -> Any:
@@ -128,4 +133,45 @@ def plot_choices(names: list[str], energies: list[float], title: str) -> Any:
     axes.bar(names, [each if np.isfinite(each) else 0.0 for each in energies])
     axes.tick_params(axis="x", rotation=30)
     axes.set_ylabel("energy [J]")
+    return figure
+
+
+_KINDS = {"transport": "tab:blue", "hop": "tab:cyan", "wait": "tab:gray"}
+_WORKING = "tab:orange"
+
+
+def plot_cycle(
+    robot: Sequence[tuple[str, float, float, str]],
+    machines: Mapping[str, Sequence[tuple[float, float]]],
+    movements: Sequence[PlannedMovement],
+    title: str,
+) -> Any:
+    """Gantt chart of a cycle. robot: name, begin, length [s] and kind of what it does; machines:
+    begin and length [s] of their work; below, the mean power of each step.
+    """
+    figure, (chart, power) = _figure(2)
+    figure.suptitle(title, wrap=True, fontsize="medium")
+    figure.set_size_inches(11, 6)
+    rows = ["robot", *machines]
+    for name, begin, length, kind in robot:
+        colour = _KINDS.get(kind, _KINDS["wait"])
+        chart.broken_barh([(begin, length)], (-0.4, 0.8), color=colour, edgecolor="white")
+        if kind not in _KINDS:
+            chart.text(begin, 0.45, name.lower(), fontsize="x-small", va="bottom", clip_on=True)
+    for row, works in enumerate(machines.values(), start=1):
+        chart.broken_barh(list(works), (row - 0.4, 0.8), color=_WORKING, edgecolor="white")
+    chart.set_yticks(range(len(rows)), rows)
+    chart.invert_yaxis()
+    _power_bars(power, movements)
+    chart.sharex(power)
+    return figure
+
+
+def plot_throughputs(points: Sequence[tuple[float, float]], title: str) -> Any:
+    """Joules a part over parts an hour, as a matplotlib figure."""
+    figure, (axes,) = _figure(1)
+    figure.suptitle(title, wrap=True, fontsize="medium")
+    axes.plot([parts for parts, _ in points], [joules for _, joules in points], "o-")
+    axes.set_xlabel("parts an hour")
+    axes.set_ylabel("energy a part [J]")
     return figure

@@ -195,9 +195,7 @@ def fastest_cycle(
 class _Model:
     """The linear program of a problem within a period [s] of the whole cycle."""
 
-    def __init__(
-        self, problem: SteadyProblem, units: int, period: float, *, fastest: bool
-    ) -> None:
+    def __init__(self, problem: SteadyProblem, units: int, period: float, *, fastest: bool) -> None:
         self.problem = problem
         self.units = units
         self.most = period
@@ -335,7 +333,7 @@ class _Model:
             return None
         values = answer.values
         following = {a: b for (a, b), taken in self.taken.items() if values[taken] > 0.5}
-        visits = []
+        visits: list[Visit] = []
         node = self.first
         while len(visits) < len(self.nodes):
             hop = self.hop[node, following[node]]

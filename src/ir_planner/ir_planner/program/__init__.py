@@ -2,27 +2,38 @@
 modes.
 """
 
+from ir_planner.program.chain import cheapest_chain
+from ir_planner.program.choice import Choice
+from ir_planner.program.movements import Movements
 from ir_planner.program.pauses import (
     AUTO,
+    MOTORS,
     Charge,
     Pause,
+    Rests,
+    at_once,
     pause_by_itself,
+    rests_at,
     spent,
     switch_times,
 )
-from ir_planner.program.program import Outlook, outlook, plan_program
+from ir_planner.program.program import Outlook, outlook, plan_program, program_of
 from ir_planner.program.request import (
     ProgramPlan,
     ProgramRequest,
     Progress,
+    StageError,
     nobody,
     unknown_searches,
 )
+from ir_planner.program.savings import common_program
 from ir_planner.program.spreads import Spreads, with_intervals
 from ir_planner.program.standby import Lengths, Standby, Trip, best_posture, lengths_of
+from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Chain, Part
 from ir_planner.program.steps import (
     Doors,
     PlacedStep,
+    Route,
     Scenes,
     doors_advice,
     doors_along,
@@ -30,23 +41,43 @@ from ir_planner.program.steps import (
     placed_steps,
     with_doors,
 )
+from ir_planner.program.stops import Node, station_nodes
+from ir_planner.program.time_values import Ladder, Point, TimeValues
 
 __all__ = [
+    "ACROSS",
     "AUTO",
+    "ENTER",
+    "LEAVE",
+    "MOTORS",
+    "Chain",
     "Charge",
+    "Choice",
     "Doors",
+    "Ladder",
     "Lengths",
+    "Movements",
+    "Node",
     "Outlook",
+    "Part",
     "Pause",
     "PlacedStep",
+    "Point",
     "ProgramPlan",
     "ProgramRequest",
     "Progress",
+    "Rests",
+    "Route",
     "Scenes",
     "Spreads",
+    "StageError",
     "Standby",
+    "TimeValues",
     "Trip",
+    "at_once",
     "best_posture",
+    "cheapest_chain",
+    "common_program",
     "doors_advice",
     "doors_along",
     "doors_text",
@@ -56,7 +87,10 @@ __all__ = [
     "pause_by_itself",
     "placed_steps",
     "plan_program",
+    "program_of",
+    "rests_at",
     "spent",
+    "station_nodes",
     "switch_times",
     "unknown_searches",
     "with_doors",

@@ -188,7 +188,7 @@ def _answered(
             f"the program has no movement: cycle_time (is {cycle:g} s) and front_points "
             f"(is {request.front_points}) must be 0",
         )
-    plan = replace(_planned(steps), gap=answer.gap)
+    plan = replace(program_of(steps), gap=answer.gap)
     for log in logs_of(choice, steps):
         context.journal.keep(log)
     said = [*_other_rests(steps, route, request), *_beyond_rests(steps, request)]
@@ -201,15 +201,15 @@ def _answered(
         if isinstance(comparison, str):
             plan = replace(plan, savings=ProgramSavings(sentence=comparison))
         else:
-            compared = _planned(comparison.steps)
+            compared = program_of(comparison.steps)
             savings = named(comparison.savings, compared.program_id, comparison.compared)
             plan = replace(
-                plan, savings=savings, compared=compared, common=_planned(comparison.common)
+                plan, savings=savings, compared=compared, common=program_of(comparison.common)
             )
     if request.front_points:
         with context.journal.stage("pareto front"):
             front = front_of(choice, request.front_points, standing, progress)
-        plan = replace(plan, front=tuple(_planned(point.steps) for point in front))
+        plan = replace(plan, front=tuple(program_of(point.steps) for point in front))
     return plan
 
 
@@ -269,8 +269,8 @@ def _advised(status: Status, route: Route) -> Status:
     return replace(status, message="; ".join(sentences[:_SENTENCES]))
 
 
-def _planned(steps: Steps) -> ProgramPlan:
-    """A program with the report of all its movements."""
+def program_of(steps: Steps) -> ProgramPlan:
+    """The answer of these steps, with the report of all of them."""
     elapsed = np.concatenate([[0.0], np.cumsum([step.duration for step in steps])[:-1]])
     report = total_report(tuple(step.report for step in steps), tuple(elapsed.tolist()))
     return ProgramPlan(Status.success(), PlanningInfo(), program_hash(steps), steps, report)

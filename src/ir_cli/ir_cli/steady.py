@@ -1,0 +1,186 @@
+"""`ir plan CELL --parts-per-hour R`: the cheapest steady cycle of a flexible cell."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from dataclasses import asdict
+from io import BytesIO
+from pathlib import Path
+
+from ir_cli.errors import CommandError, InputError
+from ir_cli.output import Columns, Row, number, print_csv, print_json, print_table, text
+from ir_cli.planning import failed, options_of, planner_of, predicted, sentences
+from ir_description import cell_to_yaml
+from ir_planner import Planner, ProgramPlan, SteadyPlan
+from ir_recorder.report.files import write_output
+from ir_values.files import ANYWHERE
+
+HOUR = 3600.0
+PICTURES = (".yaml", ".png")
+OUTPUTS = (*PICTURES, ".mcap", ".html")
+_FRONT = 8  # cycles of a front
+_PICTURE = b"\x89PNG"
+_CELL = b"format: "
+COLUMNS: Columns = {
+    "begin": ("begin s", number(2)),
+    "seconds": ("s", number(2)),
+    "joules": ("J", number(0)),
+    "what": ("robot", text),
+    "mode": ("mode", text),
+    "wait_for": ("waits for", text),
+    "set_signals": ("sets", text),
+    "load": ("load", text),
+}
+FRONT_COLUMNS: Columns = {
+    "parts_per_hour": ("parts/h", number(2)),
+    "period": ("s", number(2)),
+    "joules": ("J a part", number(0)),
+    "gap": ("gap %", number(2)),
+}
+
+
+def add_steady(plan: argparse.ArgumentParser) -> None:
+    """Arguments of `ir plan` for a cell with a route."""
+    words = (
+        "the cheapest steady cycle of the cell's route that makes at least so many parts an hour; "
+        "0: as many as possible; -o FILE.yaml is its program as a cell, FILE.png the chart"
+    )
+    plan.add_argument("--parts-per-hour", type=float, default=None, metavar="R", help=words)
+    plan.add_argument(
+        "--front",
+        action="store_true",
+        help="with --parts-per-hour: also cycles from the fastest to the cheapest",
+    )
+
+
+Report = Callable[[Path, ProgramPlan, Planner], None]
+"""Writes the recording (.mcap) or the page (.html) of a program in the cell of a planner."""
+
+
+def run_steady(arguments: argparse.Namespace, report: Report) -> int:
+    """Plan and print; exit code 1 where nothing is found."""
+    _check(arguments)
+    with sentences():
+        planner = planner_of(arguments.cell, arguments.power_parameters)
+        plan = planner.plan_steady_cycle(
+            parts_per_hour=arguments.parts_per_hour,
+            options=options_of(arguments),
+            saving=arguments.saving,
+            front_points=_FRONT if arguments.front else 0,
+        )
+    if plan.cycle is None or plan.program is None or plan.cell is None:
+        return failed(plan.status.message)
+    for output in arguments.output:
+        if output.suffix in PICTURES:
+            sys.stderr.write(f"ir: {_written(plan, output, front=arguments.front)}\n")
+    planner.set_cell(plan.cell)
+    for output in arguments.output:
+        if output.suffix not in PICTURES:
+            report(output, plan.program, planner)
+    rows = _rows(plan)
+    front = [asdict(point) for point in plan.front]
+    if arguments.json:
+        saving = None if plan.saving is None else asdict(plan.saving)
+        print_json({**_totals(plan), "steps": rows, "front": front, "saving": saving})
+    elif arguments.csv:
+        print_csv(front or rows)
+    else:
+        print_table(rows, COLUMNS)
+        if front:
+            print_table(front, FRONT_COLUMNS)
+        sys.stdout.write("\n".join(_sentences(plan)) + "\n")
+    return 0
+
+
+def _check(arguments: argparse.Namespace) -> None:
+    """Raise InputError for what doesn't belong to a steady cycle."""
+    if not arguments.cell:
+        raise InputError("--parts-per-hour needs a CELL with a route, such as flexible")
+    for given, name in (
+        (arguments.stations, "--stations"),
+        (arguments.cycle_time, "--cycle-time"),
+        (arguments.start != "park", "--start"),
+    ):
+        if given:
+            raise InputError(f"{name} doesn't belong to --parts-per-hour: the route says it")
+
+
+def _written(plan: SteadyPlan, path: Path, *, front: bool) -> Path:
+    """Write the cell with the program of the cycle, or the chart (front: of the front)."""
+    assert plan.cell is not None
+    try:
+        if path.suffix == ".yaml":
+            return write_output(path, cell_to_yaml(plan.cell).encode(), _CELL, ANYWHERE)
+        picture = BytesIO()
+        figure = plan.plot_front() if front else plan.plot()
+        figure.savefig(picture, format="png")
+        return write_output(path, picture.getvalue(), _PICTURE, ANYWHERE)
+    except ImportError as error:
+        raise CommandError(str(error)) from error
+
+
+def _rows(plan: SteadyPlan) -> list[Row]:
+    """One row per step of the cycle, SI units."""
+    assert plan.program is not None
+    rows: list[Row] = []
+    begin = 0.0
+    for step in plan.program.movements:
+        to = "" if step.is_pause else f" {step.to_station}"
+        rows.append(
+            {
+                "begin": begin,
+                "seconds": step.duration,
+                "joules": step.report.energy,
+                "what": f"{step.kind}{to}",
+                "mode": (step.power_mode or "STAND_ON_MOTORS") if step.is_pause else "",
+                "wait_for": " ".join(step.wait_for),
+                "set_signals": " ".join(step.set_signals),
+                "load": step.load,
+            }
+        )
+        begin += step.duration
+    return rows
+
+
+def _totals(plan: SteadyPlan) -> Row:
+    """Figures of the cycle."""
+    assert plan.cycle is not None
+    assert plan.program is not None
+    report = plan.program.report
+    return {
+        "program_id": plan.program.program_id,
+        "parts_per_hour": HOUR / plan.cycle.period,
+        "period": plan.cycle.period,
+        "fastest_period": plan.fastest,
+        "order": [plan.machines[visit.activity] for visit in plan.cycle.visits],
+        "joules": report.energy,
+        "joules_low": report.energy_low,
+        "joules_high": report.energy_high,
+        "gap": plan.gap,
+        "certified": report.certified,
+        "planning_seconds": plan.info.planning_time,
+        "truncated": plan.info.truncated,
+    }
+
+
+def _sentences(plan: SteadyPlan) -> list[str]:
+    """The totals for people."""
+    totals = _totals(plan)
+    assert plan.program is not None
+    proof = "free of collision and within all limits at every instant, proved"
+    lines = [
+        f"order: a part from {', '.join(totals['order'])}, each to the next station of the route",
+        f"{totals['parts_per_hour']:.2f} parts an hour, a cycle of {totals['period']:.2f} s "
+        f"(the shortest: {totals['fastest_period']:.2f} s)",
+        f"{totals['joules'] / 1e3:.2f} kJ a part from the mains, predicted: "
+        f"{predicted(plan.program.report)}; {proof if totals['certified'] else 'NOT certified'}",
+        f"at most {totals['gap']:.2f} % above the cheapest cycle of these configurations, without "
+        "what the capacitor carries from one movement to the next",
+    ]
+    if totals["truncated"]:
+        lines.append("cut by --planning-time: more time may give a better cycle")
+    if plan.saving is not None:
+        lines.append(f"saving: {plan.saving.sentence}")
+    return lines

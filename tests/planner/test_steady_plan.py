@@ -1,0 +1,127 @@
+"""The cheapest steady cycle of the bundled flexible cell: certified, in step with its machines,
+within its throughput; and the laws that it keeps.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from ir_description import Cell, cell_from_yaml, cell_to_yaml, check_cell, load_cell
+from ir_planner import Planner, RequestError, SteadyPlan
+
+CELL = load_cell("flexible")
+ROUNDING = 1e-3  # s: durations are whole nanoseconds, slowed down by millionths
+SETTLED = 0.005  # of the energy: two plans of slightly different durations, each within its gap
+
+
+@cache
+def planned(parts_per_hour: float, lathe: float = 95.0, *, saving: bool = False) -> SteadyPlan:
+    machines = tuple(
+        replace(machine, process=lathe) if machine.name == "lathe" else machine
+        for machine in CELL.equipment
+    )
+    planner = Planner(replace(CELL, equipment=machines), clock=lambda: 0.0)
+    return planner.plan_steady_cycle(parts_per_hour=parts_per_hour, saving=saving)
+
+
+def test_every_movement_is_certified_and_the_robot_is_back_where_it_began() -> None:
+    plan = planned(30.0)
+    assert plan.program is not None
+    assert plan.cycle is not None
+    moves = [step for step in plan.program.movements if step.trajectory is not None]
+    assert all(step.report.certified for step in moves)
+    ends = [(s.trajectory.positions[0], s.trajectory.positions[-1]) for s in moves if s.trajectory]
+    for (_, end), (begin, _) in zip(ends, [*ends[1:], ends[0]], strict=True):
+        assert np.abs(end - begin).max() < 1e-9
+    assert plan.program.report.duration == pytest.approx(plan.cycle.period, abs=ROUNDING)
+    assert plan.cycle.period <= 120.0 + ROUNDING
+    assert plan.gap < 1.0
+
+
+def test_the_program_waits_for_every_machine_at_least_as_long_as_it_works() -> None:
+    """From the steps alone, in a cycle that runs on and on."""
+    plan = planned(30.0)
+    assert plan.program is not None
+    here = 0.0
+    started: dict[str, float] = {}
+    awaited: dict[str, float] = {}
+    for step in plan.program.movements:
+        awaited |= {name.removesuffix(".done"): here for name in step.wait_for}
+        here += step.duration
+        started |= {name.removesuffix(".start"): here for name in step.set_signals}
+    process = {machine.name: machine.process for machine in CELL.equipment if machine.process}
+    assert set(started) == set(awaited) == set(process)
+    for name, seconds in process.items():
+        after = (awaited[name] - started[name]) % here
+        assert after >= seconds - ROUNDING
+
+
+def test_energy_per_part_never_rises_when_the_throughput_falls() -> None:
+    joules = [plan.cycle.joules for rate in (33.4, 30.0, 20.0) if (plan := planned(rate)).cycle]
+    assert len(joules) == 3
+    for faster, slower in itertools.pairwise(joules):
+        assert slower <= faster * (1.0 + SETTLED)
+
+
+def test_a_faster_machine_never_makes_it_dearer() -> None:
+    faster = planned(30.0, 80.0).cycle
+    slower = planned(30.0).cycle
+    assert faster is not None
+    assert slower is not None
+    assert faster.joules <= slower.joules * (1.0 + SETTLED)
+
+
+def test_more_than_the_machines_can_make_is_refused_with_the_most() -> None:
+    with pytest.raises(
+        RequestError, match=r"parts_per_hour is 40, .* at most 33\.\d+ are possible"
+    ):
+        planned(40.0)
+    with pytest.raises(RequestError, match=r"parts_per_hour is -1: it must be in \[0, 3600\]"):
+        planned(-1.0)
+
+
+def test_a_cell_without_a_route_is_refused_with_what_to_write() -> None:
+    with pytest.raises(RequestError, match="cell demo has no route: say which stations"):
+        Planner("demo").plan_steady_cycle(parts_per_hour=1.0)
+
+
+def test_the_saving_names_its_baseline_and_holds_zero_only_where_it_says_so() -> None:
+    saving = planned(30.0, saving=True).saving
+    assert saving is not None
+    assert saving.low <= saving.common - saving.joules <= saving.high
+    assert saving.joules < saving.common < saving.on_motors
+    assert "the controller's own timers" in saving.sentence
+
+
+def test_the_cycle_is_written_as_a_cell_that_is_planned_as_a_program() -> None:
+    plan = planned(30.0)
+    assert plan.cell is not None
+    assert plan.cycle is not None
+    again = cell_from_yaml(cell_to_yaml(plan.cell))
+    assert [finding.severity for finding in check_cell(again)].count("error") == 0
+    assert len([step for step in again.program if step.attach]) == len(plan.cycle.visits)
+    program = Planner(again, clock=lambda: 0.0).plan_program()
+    assert program.status.ok, program.status.message
+
+
+def routed(cell: Cell, visits: tuple[str, ...]) -> Cell:
+    assert cell.route is not None
+    names = [cell.station(name).equipment for name in visits[1:-1]]
+    machines = tuple(
+        machine if machine.name in names else replace(machine, process=0.0)
+        for machine in cell.equipment
+    )
+    return replace(cell, equipment=machines, route=replace(cell.route, visits=visits))
+
+
+def test_one_machine_alone_is_tended_too() -> None:
+    cell = routed(CELL, ("infeed_pick", "gauge_seat", "outfeed_place"))
+    plan = Planner(cell, clock=lambda: 0.0).plan_steady_cycle()
+    assert plan.cycle is not None
+    assert plan.cycle.order == ((0, 0), (1, 0))
+    assert plan.cycle.period >= 12.0
