@@ -56,6 +56,7 @@ def check(trace: Trace, step: float) -> None:
         ("time", "A{} [rad]", 1, 1.0, 1.0),
         ("time", "a{} (deg)", 1, 180 / np.pi, 1.0),
         ("time_ms", "J{}", 1, 180 / np.pi, 1e3),
+        ("header.tm", "feedBack.joints.joints.{}", 0, 180 / np.pi, 1e3),
     ],
 )
 def test_headings_of_makers(
@@ -209,3 +210,103 @@ def test_power_of_a_ur_is_its_voltage_times_its_current(tmp_path: Path) -> None:
     trace = read(tmp_path / "log.csv")
     check(trace, 0.008)
     assert trace.columns["power"] == pytest.approx(volts * amperes)
+
+
+def test_files_of_one_axis_each_are_joined(tmp_path: Path) -> None:
+    rows = degrees()
+    for k in range(6):
+        one = np.tile(rows[:, k : k + 1], (1, 6))
+        path = kuka_trace(tmp_path / f"run_A{k + 1}.dat", one, "Torque {}", "Nm")
+        path.write_text(path.read_text().replace("200,Torque 1\n202,Nm", "200,AXIS_ACT\n202,deg"))
+    trace = read(tmp_path / "run_A4.dat")
+    check(trace, 0.012)
+    assert any("run_A1.dat .. run_A6.dat are joined" in each for each in trace.problems)
+    third = tmp_path / "run_A3.dat"
+    third.write_text(third.read_text().replace("241,0.012", "241,0.004"))
+    with pytest.raises(RecorderError, match=r"run_A3\.dat: its instants are not those"):
+        read(tmp_path / "run_A1.dat")
+
+
+def test_runs_that_are_counted_are_not_joined(tmp_path: Path) -> None:
+    for k in range(1, 7):
+        kuka_trace(tmp_path / f"run_{k}.dat", degrees() + k)
+    trace = read(tmp_path / "run_2.dat")
+    assert trace.columns["joint_a5"] == pytest.approx(np.radians(degrees()[:, 4] + 2))
+    assert not any("joined" in each for each in trace.problems)
+
+
+def varint(value: int) -> bytes:
+    out = b""
+    while value > 0x7F:
+        out += bytes([value & 0x7F | 0x80])
+        value >>= 7
+    return out + bytes([value])
+
+
+def field(number: int, value: int | bytes) -> bytes:
+    if isinstance(value, int):
+        return varint(number << 3) + varint(value)
+    return varint(number << 3 | 2) + varint(len(value)) + value
+
+
+def egm(number: int, joints: np.ndarray, *, clock: bool, packed: bool = False) -> bytes:
+    """A message EgmRobot, by the numbers of ABB's egm.proto."""
+    values = (
+        field(1, np.asarray(joints, "<f8").tobytes())
+        if packed
+        else b"".join(b"\x09" + np.float64(each).tobytes() for each in joints)
+    )
+    seconds, rest = divmod(1_700_000_000_000 + 4 * number, 1000)
+    time = field(4, field(1, seconds) + field(2, 1000 * rest)) if clock else b""
+    header = field(1, number) + field(2, 4 * number) + field(3, 2)
+    pose = field(2, field(1, b"\x09" + bytes(8)))
+    return (
+        field(1, header) + field(2, field(1, values) + pose + time) + field(10, b"\x09" + bytes(8))
+    )
+
+
+FRAMES = {
+    "varint": lambda each: varint(len(each)) + each,
+    "little": lambda each: len(each).to_bytes(4, "little") + each,
+    "big": lambda each: len(each).to_bytes(4, "big") + each,
+    "none": lambda each: each,
+}
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+@pytest.mark.parametrize("clock", [True, False])
+def test_messages_of_egm(tmp_path: Path, frame: str, clock: bool) -> None:
+    messages = [
+        FRAMES[frame](egm(k, row, clock=clock, packed=clock)) for k, row in enumerate(degrees())
+    ]
+    path = tmp_path / "log.egm"
+    path.write_bytes(b"".join(messages))
+    trace = read(path)
+    check(trace, 0.004)
+    assert any("joints in degrees" in each for each in trace.problems)
+    late = [*messages[:5], messages[6], messages[5], *messages[7:]]
+    path.write_bytes(b"".join(late) + messages[-1] + messages[3][:20])
+    trace = read(path)
+    check(trace, 0.004)
+    said = " ".join(trace.problems)
+    assert "1 messages came late" in said
+    assert "have the time of another one" in said
+    assert "bytes at the end" in said
+
+
+def test_what_is_no_log_of_a_robots_egm_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "log.egm"
+    whole = [egm(k, row, clock=True) for k, row in enumerate(degrees())]
+    command = [field(1, field(1, k) + field(3, 3)) + field(2, b"") for k in range(9)]
+    seven = [egm(k, np.append(row, 0.0), clock=True) for k, row in enumerate(degrees())]
+    cases = {
+        b"".join(varint(len(each)) + each for each in command): "no feedback of the robot",
+        b"".join(varint(len(each)) + each for each in seven): "must be 6 finite numbers",
+        b"time,j1,j2\n0,1,2\n" * 9: "is no log of EGM",
+        b"\xff\xff" + b"".join(whole): "is no log of EGM",
+        b"": "is no log of EGM",
+    }
+    for content, said in cases.items():
+        path.write_bytes(content)
+        with pytest.raises(RecorderError, match=said):
+            read(path)

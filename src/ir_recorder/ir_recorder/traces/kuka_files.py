@@ -1,4 +1,5 @@
-"""Logs of KUKA controllers: packets of RSI as XML, and traces (a header `.dat` with its `.r64`).
+"""Logs of KUKA controllers: packets of RSI as XML, and traces (a header `.dat` with its `.r64`),
+also those that keep one file for each axis.
 
 RSI sends the axes in degrees (AIPos) and the time in ms (IPOC). A trace is a data set of DIAdem:
 the header names every channel with its unit, and where its numbers stand in the binary file.
@@ -10,6 +11,7 @@ import math
 import os
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -97,6 +99,17 @@ def read_kuka_trace(
     path: Path, wanted: Wanted, mapping: TraceMapping, joint_names: Sequence[str]
 ) -> Trace:
     """The channels of a trace that are wanted; RecorderError where header and numbers disagree."""
+    axes = _files_of_axes(path, len(joint_names))
+    table = _joined([_table(each) for each in axes], axes) if axes else {}
+    if not table:
+        return table_trace(path, _table(path), wanted, mapping, joint_names)
+    trace = table_trace(path, table, wanted, mapping, joint_names)
+    said = f"{axes[0].name} .. {axes[-1].name} are joined, a file for each axis"
+    return replace(trace, problems=(said, *trace.problems))
+
+
+def _table(path: Path) -> dict[str, FloatArray]:
+    """Numbers (N,) of all channels of a file, by names with units."""
     content = _content(path)
     if b"#BEGINCHANNELHEADER" not in content or len(content) > _HEADER_BYTES:
         raise RecorderError(f"{path}: is no header of a KUKA trace: it has no #BEGINCHANNELHEADER")
@@ -112,7 +125,53 @@ def read_kuka_trace(
     lengths = {len(values) for values in table.values()}
     if len(lengths) > 1:
         raise RecorderError(f"{path}: its channels have different lengths: {sorted(lengths)}")
-    return table_trace(path, table, wanted, mapping, joint_names)
+    return table
+
+
+# Files of one axis each: their names differ in the number of the axis only.
+
+_TIMES = ("time", "zeit", "t")
+_POSITIONS = ("$axis_act", "axis_act", "axisact", "aipos", "position", "actual position", "pos_act")
+_AXIS_OF = ("", *(f"{each}_" for each in _POSITIONS))
+_NUMBERED = re.compile(r"\d+")
+
+
+def _files_of_axes(path: Path, count: int) -> Sequence[Path]:
+    """The files of all axes where `path` is that of one, else none."""
+    beside = {each.name.lower(): each for each in path.parent.iterdir()}
+    for found in reversed(list(_NUMBERED.finditer(path.stem))):
+        before, after = path.stem[: found.start()], path.stem[found.end() :]
+        numbers = [f"{k:0{len(found[0])}d}" for k in range(1, count + 1)]
+        names = [f"{before}{number}{after}.dat".lower() for number in numbers]
+        if path.name.lower() in names and all(name in beside for name in names):
+            return [beside[name] for name in names]
+    return ()
+
+
+def _joined(
+    tables: Sequence[Mapping[str, FloatArray]], paths: Sequence[Path]
+) -> dict[str, FloatArray]:
+    """One table of the files of all axes, as A1, A2, ..; empty where they hold no position of one
+    axis each. RecorderError where their instants differ.
+    """
+    result: dict[str, FloatArray] = {}
+    for k, (table, path) in enumerate(zip(tables, paths, strict=True), 1):
+        plain = {name.partition("[")[0].strip().lower(): name for name in table}
+        known = (*_POSITIONS, *(f"{each}a{k}" for each in _AXIS_OF))
+        time, position = (
+            next((plain[name] for name in names if name in plain), "") for names in (_TIMES, known)
+        )
+        others = {f"{each}a{j}" for j in range(1, len(paths) + 1) for each in _AXIS_OF if j != k}
+        if not time or not position or others & set(plain):
+            return {}
+        first = result.setdefault(time, table[time])
+        if len(first) != len(table[time]) or not np.allclose(first, table[time]):
+            raise RecorderError(
+                f"{path}: its instants are not those of {paths[0].name}: files of one axis each "
+                "are joined where their times are the same"
+            )
+        result[f"A{k}{''.join(position.partition(' [')[1:])}"] = table[position]
+    return result
 
 
 def _channels(text: str) -> Sequence[Channel]:

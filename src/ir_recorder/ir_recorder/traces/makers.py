@@ -1,9 +1,9 @@
 """Columns of logs as controllers name them: whose they are, and in which units.
 
 A unit in a heading counts. Without one the unit is the documented one of the maker's format (UR's
-RTDE: rad, s and A; KUKA's AIPos and $AXIS_ACT: degrees, IPOC: ms). Plain names as A1 or J1 are of
-no format: they are degrees where that is proved, as axis 2 or 3 would turn farther than an arm can
-if they were rad. Whatever is taken is said.
+RTDE: rad, s and A; KUKA's AIPos and $AXIS_ACT: degrees, IPOC: ms; ABB's EGM: degrees, tm: ms).
+Plain names as A1 or J1 are of no format: they are degrees where that is proved, as axis 2 or 3
+would turn farther than an arm can if they were rad. Whatever is taken is said.
 """
 
 from __future__ import annotations
@@ -53,6 +53,11 @@ _FAMILIES = (
         _Family(f"{word}{sign}a{{}}", 1, "deg", "KUKA's $AXIS_ACT", ("ipoc", "ms"))
         for word in ("$axis_act", "axis_act", "axisact")
         for sign in (".", "_", " ")
+    ),
+    *(
+        _Family(f"feedback{path}{{}}", first, "deg", "ABB's EGM", (f"header{path[:1]}tm", "ms"))
+        for path in (".joints.joints.", ".joints.", "_joints_joints_", "_joints_")
+        for first in (0, 1)
     ),
     *(
         _Family(name, first, "", "")

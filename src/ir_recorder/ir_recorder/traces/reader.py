@@ -18,6 +18,7 @@ from ir_recorder.reading.reader import TYPES, read_recording
 from ir_recorder.reading.recording import JointSeries, PowerSeries, Recording
 from ir_recorder.traces.bag_files import read_bag, types_of
 from ir_recorder.traces.columns import TraceMapping, Wanted
+from ir_recorder.traces.egm_files import read_egm
 from ir_recorder.traces.kuka_files import read_kuka_trace, read_rsi
 from ir_recorder.traces.table_files import read_csv, read_parquet
 from ir_recorder.traces.trace import (
@@ -93,7 +94,7 @@ def _rows(columns: Mapping[str, FloatArray], kept: FloatArray) -> Mapping[str, F
     return MappingProxyType({name: values[kept] for name, values in columns.items()})
 
 
-ENDINGS_READ = (".csv", ".txt", ".parquet", ".mcap", ".db3", ".xml", ".dat")
+ENDINGS_READ = (".csv", ".txt", ".parquet", ".mcap", ".db3", ".xml", ".dat", ".egm", ".pb")
 ReadTraces = Callable[[Path], Sequence[Trace]]
 
 
@@ -138,6 +139,8 @@ def read_traces(
         found: tuple[Trace, ...] = (tables[ending](path, wanted, mapping, joint_names),)
     elif ending == ".xml":
         found = (read_rsi(path, joint_names),)
+    elif ending in (".egm", ".pb"):
+        found = (read_egm(path, joint_names),)
     elif ending == ".db3":
         found = _of_bag(path)
     elif ending == ".mcap":
