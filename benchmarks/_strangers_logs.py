@@ -154,6 +154,47 @@ def tables(rng: np.random.Generator, folder: Path) -> Iterator[tuple[str, Path, 
         yield name, path, q, readable
 
 
+def _egm(number: int, joints: np.ndarray) -> bytes:
+    """A message of ABB's EGM: header (number, ms, data) and the joints in degrees."""
+    ms = round(1e3 * STEP * number)
+    header = b"".join(bytes([tag]) + _varint(v) for tag, v in ((8, number), (16, ms), (24, 2)))
+    values = b"".join(b"\x09" + struct.pack("<d", each) for each in np.degrees(joints))
+    feedback = b"\x0a" + _varint(len(values)) + values
+    return b"\x0a" + _varint(len(header)) + header + b"\x12" + _varint(len(feedback)) + feedback
+
+
+def _varint(value: int) -> bytes:
+    out = b""
+    while value > 0x7F:
+        out += bytes([value & 0x7F | 0x80])
+        value >>= 7
+    return out + bytes([value])
+
+
+def messages(
+    rng: np.random.Generator, folder: Path
+) -> Iterator[tuple[str, Path, np.ndarray, bool]]:
+    """Logs of EGM: name, file, positions (COUNT, 6) at the steps, and whether it may be read."""
+    q = motion(rng)
+    whole = [_egm(k, row) for k, row in enumerate(q)]
+    counted = [_varint(len(each)) + each for each in whole]
+    files = {
+        "datagrams": (b"".join(whole), True),
+        "lengths before them": (b"".join(counted), True),
+        "shuffled": (b"".join(counted[k] for k in rng.permutation(COUNT)), True),
+        "cut": (b"".join(counted)[:-9], True),
+        "some are gone": (b"".join(counted[:50] + counted[60:]), True),
+        "seven joints": (b"".join(_egm(k, np.append(row, 0)) for k, row in enumerate(q)), False),
+        "a joint of nan": (b"".join([*whole[:9], _egm(9, np.append(q[9, :5], np.nan))]), False),
+        "text": (b"time,j1\n0,0\n" * COUNT, False),
+        "noise": (rng.bytes(4000), False),
+    }
+    for name, (content, readable) in files.items():
+        path = folder / f"{name.replace(' ', '_')}.egm"
+        path.write_bytes(content)
+        yield name, path, q, readable
+
+
 def misread_log(path: Path, q: np.ndarray) -> str:
     """What was read otherwise, "" where nothing was. Raises RecorderError."""
     (trace,) = read_traces(path, None, NAMES)

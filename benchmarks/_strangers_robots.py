@@ -82,6 +82,11 @@ FINGER = (
     '<origin xyz="0.05 0.1 0"/><axis xyz="0 1 0"/><limit lower="0" upper="0.1" effort="9" '
     'velocity="1"/>{}</joint>'
 )
+FOLLOWER = re.sub(
+    r"<limit[^>]*/></joint>$",
+    "</joint>",
+    FINGER.replace("prismatic", "continuous").format('<mimic joint="j6" multiplier="-0.5"/>'),
+)
 BALL = "a ball of 0.05 m at 0.05 0.1 0 of link 6"
 CHANGES: dict[str, tuple[str, str]] = {
     "a limit of nan": (r'lower="-2.5"', 'lower="nan"'),
@@ -111,6 +116,7 @@ def urdfs(rng: np.random.Generator, folder: Path) -> Iterator[tuple[str, Path, A
         "a box as a second shape": text_of(arm, link_6=box),
         "a finger on a prismatic joint": text_of(arm, FINGER.format("")),
         "a finger that mimics": text_of(arm, FINGER.format('<mimic joint="j6" multiplier="2"/>')),
+        "a finger that turns as another joint": text_of(arm, FOLLOWER),
         "comments and CRLF": text_of(arm).replace("\n", "\r\n<!-- <link/> -->\r\n"),
     }
     for name, text in kept.items():
@@ -210,6 +216,11 @@ def meshes(rng: np.random.Generator, folder: Path) -> Iterator[tuple[str, Path, 
         "ascii.stl": (text, True),
         "corners from the end.obj": (obj(triangles, backwards=True), True),
         "CRLF and comments.obj": (faces.replace(b"\n", b"\r\n# v 9 9 9\r\n"), True),
+        "an underscore.obj": (re.sub(rb"^v (-?\d)", rb"v \g<1>_0", faces, count=1), False),
+        "an underscore.stl": (re.sub(rb"vertex (-?\d)", rb"vertex \g<1>_0", text, count=1), False),
+        "a count that is missing.stl": (whole[:80] + whole[84:], False),
+        "zero bytes.obj": (b"\0" * 400, False),
+        "the drawing of a CAD system.sldprt": (whole, False),
         "cut.stl": (whole[:-25], False),
         "count too large.stl": (whole[:80] + struct.pack("<I", 10**6) + whole[84:], False),
         "cut ascii.stl": (text[: len(text) // 2].rsplit(b"\n", 1)[0], False),

@@ -1,4 +1,4 @@
-"""Are files of other people read right, or refused with a sentence: URDFs, meshes, bags, tables?
+"""Are files of strangers read right, or refused with a sentence: URDFs, meshes, bags, tables, EGM?
 
     python benchmarks/strangers.py [--seeds N] [--quick] [--json FILE]
 
@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 from _results import Claim, add_ending, at_least, at_most, finish, line_of
-from _strangers_logs import bags, misread_log, tables
+from _strangers_logs import bags, messages, misread_log, tables
 from _strangers_robots import meshes, misread_mesh, misread_robot, urdfs
 
 from ir_cli.errors import CommandError
@@ -40,6 +40,8 @@ def cases(rng: np.random.Generator, folder: Path) -> Iterator[Case]:
         yield "bag", name, readable, lambda p=path, q=q: misread_log(p, q)
     for name, path, q, readable in tables(rng, folder):
         yield "table", name, readable, lambda p=path, q=q: misread_log(p, q)
+    for name, path, q, readable in messages(rng, folder):
+        yield "egm", name, readable, lambda p=path, q=q: misread_log(p, q)
 
 
 def row_of(kind: str, name: str, readable: bool, reading: Callable[[], str]) -> dict[str, Any]:

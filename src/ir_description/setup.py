@@ -25,7 +25,11 @@ setup(
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
     install_requires=["setuptools", "numpy", "scipy", "PyYAML"],
-    extras_require={"cad": ["trimesh", "networkx", "coacd"], "xacro": ["xacro"]},
+    extras_require={
+        "cad": ["trimesh", "networkx", "coacd", "fast-simplification"],
+        "step": ["trimesh", "networkx", "coacd", "cascadio"],
+        "xacro": ["xacro"],
+    },
     zip_safe=False,
     maintainer="The ir maintainers",
     maintainer_email="maintainers@example.org",

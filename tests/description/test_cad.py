@@ -14,6 +14,7 @@ import coal
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import ConvexHull
 
 from ir_cli.main import main
 from ir_description import Body, CellFileError, cell_from_yaml, cell_to_yaml, load_cell
@@ -229,7 +230,7 @@ def test_dividing_again_gives_the_same_bytes(divided: ConvexPieces) -> None:
 def test_a_broken_cache_is_not_believed(
     divided: ConvexPieces, cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(convex, "convex_pieces", lambda triangles, most: divided)
+    monkeypatch.setattr(convex, "convex_pieces", lambda *_: divided)
     for content in (b"", b"PK\x03\x04 nothing"):
         for path in (cache / "pieces").glob("*.npz"):
             path.write_bytes(content)
@@ -343,6 +344,7 @@ NAN = np.where(np.arange(3) == 0, np.nan, CUBE)
         ("mesh: x.obj, unit: mm", "v 0 0 0\nf 1 2 3\n", "line 2 of the OBJ"),
         ("mesh: x.obj, unit: mm", "v 0 zero 0\n", "line 1 of the OBJ"),
         ("mesh: x.obj, unit: mm", "v 0 0\n", "line 1 of the OBJ"),
+        ("mesh: x.obj, unit: mm", "v 0 1_5 0\n", "line 1 of the OBJ"),
         ("mesh: x.glb, unit: m", "glTF", "can't be read"),
         ("mesh: x.stl, unit: m", "solid\nendsolid", "0 triangles"),
         ("mesh: x.stl, unit: m", "solid", "was it cut?"),
@@ -368,6 +370,41 @@ def test_a_mesh_is_named_in_a_file_and_is_a_regular_one(tmp_path: Path) -> None:
     for name in ("pipe.obj", "link.stl"):
         with pytest.raises(InvalidValueError):
             solid_mesh.read_solid(tmp_path, name)
+
+
+def test_a_mesh_of_very_many_triangles_is_simplified_and_all_of_it_is_contained(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pytest.importorskip("fast_simplification")
+    dense = c_frame()
+    for _ in range(4):
+        dense = convex._cut(dense)
+    monkeypatch.setattr(convex, "TRIANGLES_MAX", 2_000)
+    monkeypatch.setattr(convex, "SIMPLE", 200)
+    pieces = convex.convex_pieces(dense, 8)
+    assert pieces.simplified == len(dense)
+    assert f"all of its {len(dense)}" in pieces.sentence
+    assert contains(pieces.vertices, dense)
+    assert pieces.volume == pytest.approx(np.linalg.det(c_frame()).sum() / 6.0)
+    assert pieces.protrusion >= protrusion(pieces.vertices, c_frame()) / 1.2
+    monkeypatch.setattr(convex, "find_spec", lambda name: None)
+    with pytest.raises(InvalidValueError, match="export it coarser"):
+        convex.convex_pieces(dense, 8)
+
+
+def test_a_convex_solid_with_very_many_corners_is_one_piece_with_few() -> None:
+    turn = np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False)
+    ring = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(400)])
+    points = np.concatenate([0.4 * ring, 0.4 * ring + [0.0, 0.0, 0.5]])
+    hull = ConvexHull(points)
+    triangles = points[hull.simplices]
+    inwards = np.linalg.det(triangles - points.mean(axis=0)) < 0.0
+    triangles[inwards] = triangles[inwards][:, ::-1]
+    pieces = convex.convex_pieces(triangles, 8)
+    (only,) = pieces.vertices
+    assert len(only) <= 1000
+    assert contains(pieces.vertices, triangles)
+    assert pieces.of_pieces <= 1.06 * pieces.volume
 
 
 def test_a_division_that_crashes_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -426,11 +463,11 @@ def test_shells_that_touch_are_divided_one_by_one(monkeypatch: pytest.MonkeyPatc
         return [triangles.reshape(-1, 3)]
 
     monkeypatch.setattr(convex, "decomposed", one_piece)
-    column = np.asarray(trimesh.creation.cylinder(0.15, 0.52, sections=200).triangles)
+    column = np.asarray(trimesh.creation.annulus(0.1, 0.15, 0.52, sections=60).triangles)
     column = column + np.array([0.0, 0.0, 0.3])
     plates = shell((-0.3, -0.3, 0.0), (0.3, 0.3, 0.04)), shell((-0.2, -0.2, 0.56), (0.2, 0.2, 0.6))
     found = convex.convex_pieces(np.concatenate([plates[0], column, plates[1]]), 8)
-    assert asked == [(6, 1)]  # for the column alone, which has more corners than a piece
+    assert asked == [(6, 1)]  # for the hollow column alone: the plates are convex
     assert len(found.vertices) == 3
     assert contains(found.vertices, np.concatenate([*plates, column]))
 

@@ -40,12 +40,12 @@ def test_an_obj_of_too_many_triangles_is_refused_and_not_cut() -> None:
         triangles_from_obj("\n".join(lines).encode(), 4)
 
 
-@pytest.mark.parametrize("name", ["part.step", "part.STP", "part.igs"])
-def test_curved_surfaces_are_refused_with_the_remedy(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["part.x_t", "part.SLDPRT", "part.sat"])
+def test_files_of_cad_systems_alone_are_refused_with_the_remedy(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text("ISO-10303-21;\n")
-    with pytest.raises(InvalidValueError, match=r"export it from CAD as \.stl"):
+    with pytest.raises(InvalidValueError, match=r"as \.stl, \.obj or \.glb"):
         read_solid(tmp_path, name)
-    with pytest.raises(InvalidValueError, match=r"export it from CAD as \.stl"):
+    with pytest.raises(InvalidValueError, match=r"as \.stl, \.obj or \.glb"):
         Meshes(tmp_path, None).triangles(name)
 
 
@@ -59,7 +59,7 @@ def test_a_large_mesh_of_a_link_is_contained_and_told(
     (tmp_path / "link.obj").write_text("\n".join(lines))
     monkeypatch.setattr(sys.modules[Meshes.__module__], "TRIANGLES_MAX", 500)
     meshes = Meshes(tmp_path, None)
-    slabs = meshes.triangles("link.obj")
+    slabs, _ = meshes.triangles("link.obj")
     assert "600 triangles are taken as the hulls of 32 slabs" in meshes.notes[0]
     assert {tuple(p) for p in slabs.reshape(-1, 3)} <= {tuple(p) for p in triangles.reshape(-1, 3)}
     low, high = slabs.reshape(-1, 3).min(axis=0), slabs.reshape(-1, 3).max(axis=0)

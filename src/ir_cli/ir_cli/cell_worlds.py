@@ -26,7 +26,8 @@ from ir_description import (
 )
 from ir_description.cell import shape_register, zone_around
 from ir_description.files import point_cloud
-from ir_description.files.solid_mesh import PIECES, PIECES_MAX, UNITS, SolidReader, pieces_of
+from ir_description.files.curved_surfaces import KINDS as SURFACES
+from ir_description.files.solid_mesh import PIECES, PIECES_MAX, UNITS, SolidReader
 from ir_description.files.worlds import IMPORTERS, WRITERS, read_world
 from ir_recorder.report.shapes import body_mesh
 from ir_values.errors import one_line
@@ -186,7 +187,7 @@ def add_import(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "file",
         metavar="FILE",
-        help="a mesh: .stl, .obj, .glb, .gltf; a point cloud or height map: .ply, .pcd, .npy; "
+        help="a mesh: .stl, .obj, .glb, .gltf, .step, .iges; a point cloud or height map: .ply, .pcd, .npy; "
         "a world: .sdf, .urdf, .scene",
     )
     command.add_argument("--unit", choices=tuple(UNITS), help="of a mesh or cloud; never guessed")
@@ -223,16 +224,17 @@ def run_import(arguments: argparse.Namespace) -> int:
     path = Path(arguments.file)
     if path.suffix.lower() in WORLDS or path.suffix.lower().removeprefix(".") in IMPORTERS:
         return run_world(path, arguments.robot, arguments.visuals)
-    if arguments.unit is None:
+    if arguments.unit is None and path.suffix.lower() not in SURFACES:
         raise InputError(f"say the unit of {path.name[:60]!a}: --unit {' or '.join(UNITS)}")
     if path.suffix.lower() in point_cloud.SUFFIXES:
         return _run_cloud(path, arguments)
     with sentences():
-        triangles = SolidReader(path.parent).triangles(path.name, arguments.unit)
-        found = pieces_of(triangles, arguments.pieces)
+        reader = SolidReader(path.parent)
+        found = reader.pieces(path.name, arguments.unit or "", arguments.pieces)
     name = _name_of(path, "mesh")
     pieces = "" if arguments.pieces == PIECES else f", pieces: {arguments.pieces}"
-    line = f"- {{name: {name}, mesh: {path.name}, unit: {arguments.unit}{pieces}}}"
+    unit = f", unit: {arguments.unit}" if arguments.unit else ""
+    line = f"- {{name: {name}, mesh: {path.name}{unit}{pieces}}}"
     if arguments.json:
         measures = {"margin": found.margin, "protrusion": found.protrusion, "volume": found.volume}
         print_json(

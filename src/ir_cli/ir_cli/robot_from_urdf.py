@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -42,7 +42,7 @@ BYTES_MAX = 8_000_000
 class RobotSource:
     """What a robot file is made from: a URDF or xacro file, a drive sheet or a payload [kg], the
     mass [kg] of the arm; tip: link at the flange ("": found); without: links that are left out;
-    packages: a folder below which packages lie.
+    packages: a folder below which packages lie. settings: arguments of a xacro file by name.
     """
 
     urdf: Path
@@ -52,6 +52,7 @@ class RobotSource:
     tip: str = ""
     without: tuple[str, ...] = ()
     packages: Path | None = None
+    settings: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +91,7 @@ def _made(source: RobotSource) -> MadeRobot:
     names = link_names(arm, sheet)
     shapes = capsules_of(arm, bodies, names, sheet.radii)
     low, high = (np.radians(sheet.values[f"position_{end}_deg"].numbers) for end in ("min", "max"))
+    _check_leaders(arm, low, high)
     pairs = pairs_of(arm, shapes.capsules, bodies, low, high)
     notes = [*arm.notes, *meshes.notes, *masses, *sheet.notes]
     if "machine_home_deg" not in sheet.values:
@@ -99,6 +101,18 @@ def _made(source: RobotSource) -> MadeRobot:
     )
     robot = robot_from_yaml(text, f"the robot made from {urdf}", _folder(source))
     return MadeRobot(text, robot, arm, bodies, shapes, pairs, tuple(notes))
+
+
+def _check_leaders(arm: UrdfArm, low: FloatArray, high: FloatArray) -> None:
+    """Raise InvalidValueError where joints turn farther than what follows them was swept."""
+    for joint, lower, upper in zip(arm.joints, low, high, strict=True):
+        if joint.name in arm.leaders and (lower < joint.lower or upper > joint.upper):
+            limits = [f"{np.degrees(each):g}" for each in (lower, upper, joint.lower, joint.upper)]
+            raise InvalidValueError(
+                f"joint {joint.name} turns from {limits[0]} to {limits[1]} deg by the drive sheet, "
+                f"but other joints follow it (<mimic>), and the URDF turns it from {limits[2]} to "
+                f"{limits[3]} deg: write the same limits into both"
+            )
 
 
 def _home(
@@ -135,7 +149,9 @@ def _sheet(source: RobotSource, arm: UrdfArm) -> DriveSheet:
 def _urdf_text(source: RobotSource) -> str:
     text = _text(source.urdf)
     if source.urdf.suffix == ".xacro" or "<xacro:" in text:
-        return expanded(source.urdf, source.packages)
+        return expanded(source.urdf, source.packages, source.settings)
+    if source.settings:
+        raise InputError(f"{source.urdf}: --set is for arguments of a xacro file, this is a URDF")
     return text
 
 

@@ -39,6 +39,7 @@ def capsules_of(
     sentences: list[str] = []
     for k, own in enumerate(bodies):
         to = arm.origin[k] if k < len(arm.origin) else np.zeros(3)
+        beside = max((body.beside for body in own), default=0.0)
         if own:
             fits, said = _fits(own, to)
         else:
@@ -47,7 +48,7 @@ def capsules_of(
                 sentences.append(f"{names[k]}: no body; nothing of it is checked")
         for n, (fit, how) in enumerate(zip(fits, said, strict=True)):
             name = f"{names[k]}_{n}"
-            radius = fit.radius + arm.rounding + WRITTEN
+            radius = fit.radius + arm.rounding + beside + WRITTEN
             capsules.append(Capsule(name=name, link=k, p0=fit.p0, p1=fit.p1, radius=radius))
             sentences.append(f"{name}: radius {1e3 * radius:.0f} mm, {how}")
     return Shapes(tuple(capsules), tuple(sentences))

@@ -94,6 +94,8 @@ def _add_figures(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--without", action="append", default=[], metavar="LINK", help=words)
     words = "folder below which package://NAME/.. is found (that of the URDF and those above)"
     parser.add_argument("--packages", default="", metavar="FOLDER", help=words)
+    words = "an argument of a xacro file; repeatable"
+    parser.add_argument("--set", action="append", default=[], metavar="NAME:=VALUE", help=words)
 
 
 def _source(urdf: Path, arguments: argparse.Namespace) -> RobotSource:
@@ -112,7 +114,16 @@ def _source(urdf: Path, arguments: argparse.Namespace) -> RobotSource:
         tip=arguments.tip,
         without=tuple(arguments.without),
         packages=Path(arguments.packages) if arguments.packages else None,
+        settings=dict(map(_setting, arguments.set)),
     )
+
+
+def _setting(text: str) -> tuple[str, str]:
+    """Name and value of an argument of a xacro file. Raises InputError."""
+    name, sign, value = text.partition(":=")
+    if not name or not sign:
+        raise InputError(f"--set {text[:60]!a}: must be NAME:=VALUE, as ur_type:=ur10e")
+    return name, value
 
 
 def run_new(arguments: argparse.Namespace) -> int:

@@ -17,9 +17,9 @@ from importlib.util import find_spec
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull, QhullError, cKDTree
+from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError, cKDTree
 
-from ir_description.files.stl_mesh import HULL_VERTICES_MAX, open_edges
+from ir_description.files.stl_mesh import HULL_VERTICES_MAX, TRIANGLES_MAX, open_edges
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 from ir_values.errors import InvalidValueError
 
@@ -229,10 +229,79 @@ def main() -> None:
     sys.stdout.buffer.write(stream.getvalue())
 
 
+SIMPLE = 50_000
+"""Triangles that a mesh of more than TRIANGLES_MAX is simplified to before it is divided."""
+SIMPLIFY = f"from {__name__} import simplify; simplify()"
+_FINE = 0.01  # of a mesh's size, between points at which two surfaces are compared
+
+
+def simplified(triangles: FloatArray) -> FloatArray:
+    """About SIMPLE triangles (T, 3, 3) near a closed mesh, in a process of its own. Raises
+    InvalidValueError.
+    """
+    if find_spec("fast_simplification") is None:
+        raise InvalidValueError(
+            f"the mesh has {len(triangles)} triangles; from {TRIANGLES_MAX} on it is simplified by "
+            'fast-simplification, which is missing: pip install "ir_description[cad]", or export '
+            "it coarser: chords of about 1 mm are enough"
+        )
+    corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    stream = io.BytesIO()
+    np.savez(stream, corners=corners, faces=index.reshape(-1, 3).astype(np.int32), most=SIMPLE)
+    process = subprocess.run(
+        [sys.executable, "-c", SIMPLIFY], input=stream.getvalue(), capture_output=True
+    )
+    if process.returncode != 0:
+        raise InvalidValueError(
+            f"the mesh of {len(triangles)} triangles can't be simplified (code "
+            f"{process.returncode}): export it coarser, chords of about 1 mm are enough"
+        )
+    with np.load(io.BytesIO(process.stdout), allow_pickle=False) as found:
+        result: FloatArray = np.asarray(found["corners"], dtype=np.float64)[found["faces"]]
+    return result
+
+
+def simplify() -> None:
+    """Read a mesh from standard input, and write one of fewer triangles to standard output."""
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    resource.setrlimit(resource.RLIMIT_CPU, (PROCESSOR_SECONDS, PROCESSOR_SECONDS))
+    import fast_simplification
+
+    with np.load(io.BytesIO(sys.stdin.buffer.read()), allow_pickle=False) as given:
+        corners, faces = fast_simplification.simplify(
+            given["corners"], given["faces"], target_count=int(given["most"])
+        )
+    stream = io.BytesIO()
+    np.savez(stream, corners=corners, faces=faces)
+    sys.stdout.buffer.write(stream.getvalue())
+
+
+def _apart(first: FloatArray, second: FloatArray) -> float:
+    """A bound [m] of the distance of any point of a surface (T, 3, 3) from another one."""
+    points = second.reshape(-1, 3)
+    step = _FINE * float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
+    own = _fine(first, step)
+    centres = own.mean(axis=1)
+    radius = np.linalg.norm(own - centres[:, None], axis=2).max(axis=1)
+    distance, _ = cKDTree(_fine(second, step).mean(axis=1)).query(centres)
+    return float((distance + radius).max())
+
+
+def _fine(triangles: FloatArray, step: float) -> FloatArray:
+    """The same surface in triangles (T, 3, 3) without an edge longer than step [m]."""
+    while len(long := np.flatnonzero(_longest(triangles) > step)):
+        kept = np.delete(triangles, long, axis=0)
+        triangles = np.concatenate([kept, halved(triangles[long])])
+    return triangles
+
+
 MARGINS = (0.0005, 0.001, 0.002, 0.004, 0.008, 0.016)
 """Metres by which pieces are widened; the first is taken with which they contain the mesh."""
 _WIDENED = np.sqrt(3.0) * np.concatenate([np.eye(3), -np.eye(3)])
 """Corners of an octahedron that contains the unit ball."""
+_AROUND = 200
+_FLAT = 20
+"""Directions of the faces of a piece that would have too many corners, and of its flattest ones."""
 _CUTS = 16
 _CONVEX = 1e-6  # of its volume that a shell's hull may have more
 _TRIANGLES = 100_000  # that are looked at in one cut
@@ -241,9 +310,10 @@ _TRIANGLES = 100_000  # that are looked at in one cut
 @dataclass(frozen=True, eq=False)
 class ConvexPieces:
     """vertices: corners (V, 3) [m] of each piece. margin [m]: by which they were widened at least,
-    to contain the mesh. protrusion [m]: a bound of the distance from any point of them to the
-    solid. volume, of_pieces [m^3]: of the solid, and of the pieces, what several of them share
-    counted for each.
+    to contain the mesh, and what may be beside it. protrusion [m]: a bound of the distance from any
+    point of them to the solid. volume, of_pieces [m^3]: of the solid, and of the pieces, what
+    several of them share counted for each. simplified: triangles of a mesh that was divided as one
+    of fewer, 0: as it is.
     """
 
     vertices: tuple[FloatArray, ...]
@@ -251,24 +321,53 @@ class ConvexPieces:
     protrusion: float
     volume: float
     of_pieces: float
+    simplified: int = 0
 
     @property
     def sentence(self) -> str:
         """For people."""
         more = 100.0 * (self.of_pieces / self.volume - 1.0)
+        whole = f" with all of its {self.simplified} triangles" if self.simplified else ""
         return (
-            f"{len(self.vertices)} convex pieces contain it, widened by {1e3 * self.margin:g} mm: "
-            f"they protrude by at most {1e3 * self.protrusion:.1f} mm, "
+            f"{len(self.vertices)} convex pieces contain it{whole}, widened by "
+            f"{1e3 * self.margin:g} mm: they protrude by at most {1e3 * self.protrusion:.1f} mm, "
             f"their volume is {more:+.1f} % of its {self.volume:.4g} m^3"
         )
 
 
-def convex_pieces(triangles: FloatArray, most: int) -> ConvexPieces:
-    """At most `most` pieces that contain a mesh (T, 3, 3) [m]. Raises InvalidValueError with the
-    reason.
+def convex_pieces(triangles: FloatArray, most: int, error: float = 0.0) -> ConvexPieces:
+    """At most `most` pieces that contain all within `error` [m] of a mesh (T, 3, 3) [m]. Raises
+    InvalidValueError with the reason.
     """
-    triangles = triangles[np.linalg.norm(_normals(triangles), axis=1) > 0.0]
-    volume = float(np.linalg.det(triangles).sum()) / 6.0
+    whole = triangles[np.linalg.norm(_normals(triangles), axis=1) > 0.0]
+    _check_closed(whole)
+    solid = whole
+    beside = error
+    if len(whole) > TRIANGLES_MAX:
+        solid = simplified(whole)
+        solid = solid[np.linalg.norm(_normals(solid), axis=1) > 0.0]
+        _check_closed(solid)
+        beside += _apart(solid, whole)
+    raw = [_sorted(piece) for piece in _divided(solid, most)]
+    for margin in MARGINS:
+        if contains([_widened(piece, margin) for piece in raw], whole):
+            pieces = [_widened(piece, margin + error) for piece in raw]
+            bound = protrusion(pieces, solid) + beside
+            total = sum(float(ConvexHull(piece).volume) for piece in pieces)
+            count = len(whole) if len(whole) > len(solid) else 0
+            return ConvexPieces(tuple(pieces), margin + error, bound, _volume(whole), total, count)
+    raise InvalidValueError(
+        f"its convex pieces leave out more than {1e3 * MARGINS[-1]:g} mm of it: "
+        "give more pieces, or a simpler mesh"
+    )
+
+
+def _volume(triangles: FloatArray) -> float:
+    return float(np.linalg.det(triangles).sum()) / 6.0
+
+
+def _check_closed(triangles: FloatArray) -> None:
+    """Raise InvalidValueError for a mesh (T, 3, 3) that encloses no volume."""
     wrong = open_edges(triangles)
     if not len(triangles) or len(wrong):
         where = f"{len(wrong)} edges, one at {_place(wrong[0])} m" if len(wrong) else "no triangles"
@@ -277,21 +376,10 @@ def convex_pieces(triangles: FloatArray, most: int) -> ConvexPieces:
             "agree which side is outside): close it in CAD or with trimesh.repair (docs/cad.md, "
             "Repair), or take kind: mesh with convex_hull: true"
         )
-    if volume <= 0.0:
+    if _volume(triangles) <= 0.0:
         raise InvalidValueError(
-            f"the mesh has {volume:.3g} m^3: its triangles must be seen from outside"
+            f"the mesh has {_volume(triangles):.3g} m^3: its triangles must be seen from outside"
         )
-    raw = [_sorted(piece) for piece in _divided(triangles, most)]
-    for margin in MARGINS:
-        pieces = [_widened(piece, margin) for piece in raw]
-        if contains(pieces, triangles):
-            bound = protrusion(pieces, triangles)
-            total = sum(float(ConvexHull(piece).volume) for piece in pieces)
-            return ConvexPieces(tuple(pieces), margin, bound, volume, total)
-    raise InvalidValueError(
-        f"its convex pieces leave out more than {1e3 * MARGINS[-1]:g} mm of it: "
-        "give more pieces, or a simpler mesh"
-    )
 
 
 def _divided(triangles: FloatArray, most: int) -> list[FloatArray]:
@@ -325,7 +413,7 @@ def closed_shells(triangles: FloatArray) -> list[FloatArray]:
 
 
 def _hull_of_convex(shell: FloatArray) -> FloatArray | None:
-    """Corners (V, 3) of a shell (T, 3, 3) that is convex and has few of them; None for others."""
+    """Corners (V, 3) of a shell (T, 3, 3) that is convex; None for others."""
     points = _sorted(shell.reshape(-1, 3))
     try:
         hull = ConvexHull(points)
@@ -333,7 +421,7 @@ def _hull_of_convex(shell: FloatArray) -> FloatArray | None:
         return None
     volume = float(np.linalg.det(shell).sum()) / 6.0
     convex = float(hull.volume) <= (1.0 + _CONVEX) * volume
-    return points[hull.vertices] if convex and len(hull.vertices) <= CORNERS else None
+    return points[hull.vertices] if convex else None
 
 
 def _place(point: FloatArray) -> str:
@@ -347,7 +435,8 @@ def contains(pieces: Sequence[FloatArray], triangles: FloatArray) -> bool:
     planes = [ConvexHull(piece).equations for piece in pieces]
     left = triangles
     for _ in range(_CUTS):
-        left = left[~_inside(planes, left)]
+        parts = np.array_split(left, len(left) // _TRIANGLES + 1)
+        left = np.concatenate([part[~_inside(planes, part)] for part in parts])
         if not len(left):
             return True
         if len(left) > _TRIANGLES:
@@ -390,6 +479,27 @@ def _widened(piece: FloatArray, margin: float) -> FloatArray:
         corners = _sorted(points[ConvexHull(points).vertices])
     except QhullError as error:
         raise InvalidValueError("one of its convex pieces is too thin") from error
+    return corners if len(corners) <= HULL_VERTICES_MAX else _rounded(corners)
+
+
+def _rounded(piece: FloatArray) -> FloatArray:
+    """Corners (V, 3) of a convex body with few faces around a piece (V, 3) with many: tangent to it
+    where it is flattest, and all around.
+    """
+    hull = ConvexHull(piece)
+    a, b, c = (piece[hull.simplices[:, k]] for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    flattest = hull.equations[np.argsort(-area, kind="stable")[:_FLAT], :3]
+    k = np.arange(_AROUND) + 0.5
+    height = 1.0 - 2.0 * k / _AROUND
+    turn = np.pi * (1.0 + np.sqrt(5.0)) * k
+    flat = np.sqrt(1.0 - height**2)
+    around = np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1)
+    normals = np.unique(np.concatenate([np.eye(3), -np.eye(3), flattest, around]), axis=0)
+    offsets = (piece @ normals.T).max(axis=0)
+    planes = np.column_stack([normals, -offsets])
+    points = HalfspaceIntersection(planes, piece.mean(axis=0)).intersections
+    corners = _sorted(points[ConvexHull(points).vertices])
     if len(corners) > HULL_VERTICES_MAX:
         raise InvalidValueError(
             f"one of its convex pieces has {len(corners)} corners, must have at most "

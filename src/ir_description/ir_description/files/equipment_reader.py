@@ -130,7 +130,7 @@ class BodyReader:
         return replace(stop, allowed_contacts=tuple(contacts))
 
     def _divided(self, item: Item) -> list[Body]:
-        table = item.table(("name", "mesh", "unit"), (*POSE_KEYS, "pieces"))
+        table = item.table(("name", "mesh"), (*POSE_KEYS, "unit", "pieces"))
         pose = pose_in(table)
         solid = self._solids.read(table)
         names = self._named_pieces(table, len(solid))

@@ -268,7 +268,7 @@ def _pair(item: Item) -> tuple[tuple[str, str], ReducedDistance | None]:
     table = item.table(("pair", "safety_distance_m", "reason"))
     first, second = table["pair"].list(2, 2)
     pair = first.name(), second.name()
-    distance = table["safety_distance_m"].number(-1, 1, "m")
+    distance = table["safety_distance_m"].number(-10, 1, "m")
     return pair, ReducedDistance(*pair, distance, table["reason"].text(400))
 
 

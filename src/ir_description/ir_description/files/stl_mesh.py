@@ -8,15 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ir_values.arrays import FloatArray, frozen
+from ir_values.arrays import FloatArray, frozen, number_of
 from ir_values.errors import InvalidValueError, shown
 from ir_values.files import read_regular_file
 
 if TYPE_CHECKING:
     from scipy.spatial import ConvexHull
 
-BYTES_MAX = 20_000_000
+BYTES_MAX = 120_000_000
 TRIANGLES_MAX = 200_000
+READ_MAX = 2_000_000
+"""Triangles of a mesh that is simplified after it was read."""
 HULL_VERTICES_MAX = 1_000
 CORNERS_MAX = 50_000
 """Corners of all meshes of a cell together: each is compared with the robot, drawn and
@@ -54,16 +56,16 @@ def mesh_path(folder: Path, name: str, suffixes: tuple[str, ...] = (".stl",)) ->
     return resolved
 
 
-SURFACES = (".step", ".stp", ".iges", ".igs", ".sat", ".x_t", ".prt", ".sldprt", ".catpart")
-"""Files of CAD systems with curved surfaces instead of triangles."""
+SURFACES = (".sat", ".x_t", ".x_b", ".prt", ".sldprt", ".catpart", ".ipt", ".f3d", ".3dm", ".dwg")
+"""Files of CAD systems that only these read."""
 
 
 def refuse_surfaces(path: Path) -> None:
-    """Raise InvalidValueError for a file of a CAD system that has no triangles."""
+    """Raise InvalidValueError for a file that only a CAD system reads."""
     if path.suffix.lower() in SURFACES:
         raise InvalidValueError(
-            f"mesh file {shown(path.name)} has curved surfaces, which are not read: export it from "
-            "CAD as .stl, .obj or .glb, with chords of about 1 mm"
+            f"mesh file {shown(path.name)} is read by its CAD system only: export it from there as "
+            ".step, or as .stl, .obj or .glb with chords of about 1 mm"
         )
 
 
@@ -105,7 +107,8 @@ def _ascii_triangles(content: bytes) -> FloatArray:
             f"the ASCII STL has {len(found)} vertices, must have three to a triangle"
         )
     try:
-        return np.array(found, dtype=np.float64).reshape(-1, 3, 3)
+        numbers = [number_of(word.decode("latin-1")) for vertex in found for word in vertex]
+        return np.array(numbers, dtype=np.float64).reshape(-1, 3, 3)
     except ValueError as error:
         raise InvalidValueError("the ASCII STL has a vertex that is not three numbers") from error
 

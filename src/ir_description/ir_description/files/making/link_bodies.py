@@ -17,11 +17,19 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from ir_description.files.collada import triangles_from_collada
+from ir_description.files.curved_surfaces import KINDS as SURFACES
+from ir_description.files.curved_surfaces import triangles_of_surfaces
 from ir_description.files.making.capsule_fit import CapsuleFit
 from ir_description.files.making.urdf_arm import PlacedShape, SideMotion
 from ir_description.files.making.urdf_tree import UrdfShape
 from ir_description.files.solid_mesh import triangles_from_obj
-from ir_description.files.stl_mesh import TRIANGLES_MAX, refuse_surfaces, triangles_from_stl
+from ir_description.files.stl_mesh import (
+    BYTES_MAX,
+    READ_MAX,
+    TRIANGLES_MAX,
+    refuse_surfaces,
+    triangles_from_stl,
+)
 from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError, shown
 from ir_values.files import read_regular_file
@@ -31,22 +39,21 @@ SIZE_MAX = 20.0
 """Farthest corner [m] of a mesh from its origin: beyond, its scale is hardly meant."""
 _SWEEP = np.radians(15.0)  # between two postures of a joint that sweeps
 _FOLDERS_MAX = 20_000
-_BYTES_MAX = 120_000_000
-_TRIANGLES_MAX = 2_000_000
 _SLABS = 32  # of a mesh of more than TRIANGLES_MAX triangles
 
 
 @dataclass(frozen=True, eq=False)
 class LinkBody:
     """place: which shape it is, for people. triangles (T, 3, 3) [m] in the planned link contain its
-    surface. exact: the capsule that it is, None for others. slack [m]: how far the triangles stand
-    out from the shape at most.
+    surface but for `beside` [m]. exact: the capsule that it is, None for others. slack [m]: how far
+    the triangles stand out from the shape at most.
     """
 
     place: str
     triangles: FloatArray
     exact: CapsuleFit | None = None
     slack: float = 0.0
+    beside: float = 0.0
 
 
 class Meshes:
@@ -57,25 +64,31 @@ class Meshes:
     def __init__(self, folder: Path, packages: Path | None) -> None:
         self._folder = folder.resolve()
         self._packages = packages.resolve() if packages else None
-        self._known: dict[str, FloatArray] = {}
+        self._known: dict[str, tuple[FloatArray, float]] = {}
         self._homes: dict[str, Path | None] = {}
         self.notes: list[str] = []
 
-    def triangles(self, name: str) -> FloatArray:
-        """Triangles (T, 3, 3) of a mesh as its file has them (Collada: in metres). Raises
-        InvalidValueError.
+    def triangles(self, name: str) -> tuple[FloatArray, float]:
+        """Triangles (T, 3, 3) of a mesh as its file has them (Collada, STEP: in metres), and how
+        far [m] its surface may be beside them. Raises InvalidValueError.
         """
         if name not in self._known:
             path = self._path(name)
             try:
-                triangles = self._bounded(_read(path), path)
+                read, beside = _read(path)
+                triangles = self._bounded(read, path)
             except InvalidValueError as error:
                 raise InvalidValueError(f"{path}: {error}") from error
             if not len(triangles) or not np.isfinite(triangles).all():
                 raise InvalidValueError(
                     f"{path}: the mesh is empty, or has corners that are not finite"
                 )
-            self._known[name] = triangles
+            if beside:
+                self.notes.append(
+                    f"{path.name}: triangles within {1e3 * beside:g} mm of its curved surfaces are "
+                    "taken, and capsules around them are wider by that"
+                )
+            self._known[name] = triangles, beside
         return self._known[name]
 
     def _bounded(self, triangles: FloatArray, path: Path) -> FloatArray:
@@ -142,16 +155,24 @@ def _is_package(folder: Path, name: str) -> bool:
     return folder.name == name and folder.is_dir()
 
 
-def _read(path: Path) -> FloatArray:
+def _read(path: Path) -> tuple[FloatArray, float]:
+    """Triangles (T, 3, 3) of a file, and how far [m] its surfaces may be beside them."""
+    suffix = path.suffix.lower()
+    if suffix in SURFACES:
+        return triangles_of_surfaces(read_regular_file(path, BYTES_MAX), suffix, READ_MAX)
+    return _read_triangles(path), 0.0
+
+
+def _read_triangles(path: Path) -> FloatArray:
     refuse_surfaces(path)
-    content = read_regular_file(path, _BYTES_MAX)
+    content = read_regular_file(path, BYTES_MAX)
     suffix = path.suffix.lower()
     if suffix == ".stl":
-        return triangles_from_stl(content, _TRIANGLES_MAX)
+        return triangles_from_stl(content, READ_MAX)
     if suffix == ".dae":
         return triangles_from_collada(content)
     if suffix == ".obj":
-        return triangles_from_obj(content, _TRIANGLES_MAX)
+        return triangles_from_obj(content, READ_MAX)
     try:
         import trimesh
     except ImportError as error:
@@ -181,8 +202,14 @@ def _body(placed: PlacedShape, meshes: Meshes) -> LinkBody:
         middle = shape.pose[:3, 3]
         exact = CapsuleFit(middle - half, middle + half, float(radius), 0.0)
         return LinkBody(shape.place, np.zeros((0, 3, 3)), exact)
+    beside = 0.0
     try:
-        triangles = _triangles(shape, meshes)
+        if shape.kind == "mesh":
+            triangles, beside = meshes.triangles(shape.file)
+            triangles = triangles * shape.size
+            beside *= float(np.abs(shape.size).max())
+        else:
+            triangles = _triangles(shape)
     except InvalidValueError as error:
         raise InvalidValueError(f"{shape.place}: {error}") from error
     triangles = np.asarray(triangles @ shape.pose[:3, :3].T + shape.pose[:3, 3])
@@ -197,13 +224,11 @@ def _body(placed: PlacedShape, meshes: Meshes) -> LinkBody:
     slack = (
         shape.size[0] / np.cos(np.pi / AROUND) - shape.size[0] if shape.kind == "cylinder" else 0.0
     )
-    return LinkBody(shape.place, triangles, slack=float(slack))
+    return LinkBody(shape.place, triangles, slack=float(slack), beside=beside)
 
 
-def _triangles(shape: UrdfShape, meshes: Meshes) -> FloatArray:
-    """Triangles (T, 3, 3) of a shape in its own frame."""
-    if shape.kind == "mesh":
-        return meshes.triangles(shape.file) * shape.size
+def _triangles(shape: UrdfShape) -> FloatArray:
+    """Triangles (T, 3, 3) of a shape that is no mesh, in its own frame."""
     if shape.kind == "box":
         return _hull(np.array(list(itertools.product(*((-s / 2, s / 2) for s in shape.size)))))
     radius, length, _ = shape.size

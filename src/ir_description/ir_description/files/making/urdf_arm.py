@@ -94,7 +94,8 @@ class UrdfArm:
     """joints: the moving ones; origin (6, 3) [m] of each in the frame of the link before, axis (6,
     3) in its own; flange (3, 3): the last frame in the base at q = 0. links: 7, in these frames.
     rounding [m]: by which right angles that were written with few digits move any point, at most.
-    notes: what was read otherwise than it stands there, in words.
+    notes: what was read otherwise than it stands there, in words. leaders: names of planned joints
+    whose limits bound bodies that follow them.
     """
 
     name: str
@@ -105,6 +106,7 @@ class UrdfArm:
     links: tuple[ArmLink, ...]
     rounding: float = 0.0
     notes: tuple[str, ...] = ()
+    leaders: frozenset[str] = frozenset()
 
     @property
     def joint_origin(self) -> FloatArray:
@@ -168,6 +170,7 @@ def urdf_arm(text: str, source: str, tip: str = "", without: Collection[str] = (
         tuple(links),
         rounding if rounding > SAID else 0.0,
         tuple(notes),
+        frozenset(gathering.leaders),
     )
 
 
@@ -213,11 +216,19 @@ def _tip(tree: UrdfTree, tip: str, source: str) -> str:
         )
     known = [name for suffix in TIPS for name in tree.links if name.endswith(suffix)]
     six = [name for name in known if _turning(tree, name) == AXES]
-    return tip or (six or known or [max(tree.links, key=lambda name: _turning(tree, name))])[0]
+    if tip or six or known:
+        return tip or (six or known)[0]
+    return max(tree.links, key=lambda name: (_turning(tree, name), -_followers(tree, name)))
 
 
 def _turning(tree: UrdfTree, name: str) -> int:
-    return sum(joint.kind in MOVING for joint in tree.path(name))
+    """Turning joints of its own before a link."""
+    return sum(joint.kind in MOVING and not joint.mimic for joint in tree.path(name))
+
+
+def _followers(tree: UrdfTree, name: str) -> int:
+    """Joints before a link that follow others."""
+    return sum(bool(joint.mimic) for joint in tree.path(name))
 
 
 def _path(tree: UrdfTree, tip: str, source: str) -> list[UrdfJoint]:
@@ -325,7 +336,9 @@ class _Gathering:
         self._source = source
         self._without = without
         self._planned = planned
+        self._joints = {joint.name: joint for joint in tree.above.values()}
         self.notes: list[str] = []
+        self.leaders: set[str] = set()
         for name in without:
             if name not in tree.links:
                 raise RobotFileError(
@@ -379,12 +392,23 @@ class _Gathering:
                 f"joint {joint.name} is {joint.kind}: what it carries may be anywhere; "
                 f"--without {joint.child} leaves that out",
             )
-        lower, upper = joint.lower, joint.upper
+        lower, upper = self._range(joint)
         endless = joint.kind == "continuous" and not lower < upper
         if endless or (joint.kind != "prismatic" and upper - lower > 2.0 * np.pi):
             lower, upper = -np.pi, np.pi
         kind = "prismatic" if joint.kind == "prismatic" else "revolute"
         return SideMotion(joint.name, kind, joint.pose, joint.axis, lower, upper)
+
+    def _range(self, joint: UrdfJoint, depth: int = 0) -> tuple[float, float]:
+        """From where to where a joint moves: by its limits, or as what it follows does."""
+        leader = self._joints.get(joint.mimic)
+        if joint.lower < joint.upper or leader is None or depth > len(self._joints):
+            return joint.lower, joint.upper
+        if leader.name in self._planned and leader.lower < leader.upper:
+            self.leaders.add(leader.name)
+        lower, upper = self._range(leader, depth + 1)
+        ends = [joint.multiplier * each + joint.offset for each in (lower, upper)]
+        return min(ends), max(ends)
 
     def _below(self, name: str) -> Iterator[UrdfLink]:
         yield self._tree.links[name]

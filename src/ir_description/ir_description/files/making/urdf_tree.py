@@ -69,7 +69,7 @@ class UrdfLink:
 @dataclass(frozen=True, eq=False)
 class UrdfJoint:
     """A joint, the pose (4, 4) of its frame in the parent link, limits [rad or m, rad/s, Nm], 0:
-    not given. mimic: the joint that it follows, "" for none.
+    not given. mimic: the joint that it follows, "" for none, times multiplier plus offset.
     """
 
     name: str
@@ -84,6 +84,8 @@ class UrdfJoint:
     effort: float
     mimic: str = ""
     line: int = 0
+    multiplier: float = 1.0
+    offset: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -242,6 +244,10 @@ class _Reader:
             ends.append(place.get("link", ""))
         mimic = element.find("mimic")
         followed = "" if mimic is None else mimic.get("joint", "") or "another joint"
+        multiplier, offset = (
+            _number(mimic, key, f"<mimic> of joint {name}", default) if mimic is not None else value
+            for key, default, value in (("multiplier", "1", 1.0), ("offset", "0", 0.0))
+        )
         lower, upper, velocity, effort = self._limits(element, name, kind)
         return UrdfJoint(
             name,
@@ -256,6 +262,8 @@ class _Reader:
             effort,
             followed,
             getattr(element, "line", 0),
+            multiplier,
+            offset,
         )
 
     def _limits(self, element: Xml.Element, name: str, kind: str) -> list[float]:

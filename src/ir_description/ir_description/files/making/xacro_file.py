@@ -5,9 +5,11 @@ expressions are Python.
 from __future__ import annotations
 
 import json
+import re
 import resource
 import subprocess
 import sys
+from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
@@ -19,18 +21,21 @@ PROGRAM = f"from {__name__} import main; main()"
 SECONDS = 60
 MEMORY_BYTES = 2_000_000_000
 _FINDS_FROM = "ament_index_python.packages"
+_UNSET = re.compile(r"Undefined substitution argument (\w+)")
 
 
-def expanded(path: Path, packages: Path | None) -> str:
-    """The URDF that a xacro file describes, with the defaults of its arguments; packages: a folder
-    below which $(find NAME) looks beside those above the file. Raises InvalidValueError.
+def expanded(path: Path, packages: Path | None, settings: Mapping[str, str]) -> str:
+    """The URDF that a xacro file describes, its arguments by `settings`, else by their defaults;
+    packages: a folder below which $(find NAME) looks beside those above the file. Raises
+    InvalidValueError.
     """
     if find_spec("xacro") is None:
         raise InvalidValueError(
             f"{path}: a xacro file is expanded by the package xacro, which is missing: pip install "
             "xacro, or expand it elsewhere (xacro FILE > robot.urdf)"
         )
-    given = json.dumps([str(path.resolve()), str(packages.resolve()) if packages else ""])
+    folder = str(packages.resolve()) if packages else ""
+    given = json.dumps([str(path.resolve()), folder, dict(settings)])
     found = subprocess.run(
         [sys.executable, "-c", PROGRAM], input=given.encode(), capture_output=True
     )
@@ -38,6 +43,9 @@ def expanded(path: Path, packages: Path | None) -> str:
         text = found.stderr.decode(errors="replace").strip()
         said = one_line(text.partition("Traceback")[0] or text.splitlines()[-1] if text else "")
         said = said[:300] or f"code {found.returncode}"
+        unset = _UNSET.search(said)
+        if unset:
+            said = f"its argument {unset[1]} has no default: give --set {unset[1]}:=VALUE"
         raise InvalidValueError(f"{path}: xacro can't expand it: {said}")
     return found.stdout.decode()
 
@@ -46,7 +54,7 @@ def main() -> None:
     """Read the names of a file and a folder from standard input, and write the URDF."""
     resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
-    file, packages = json.loads(sys.stdin.buffer.read())
+    file, packages, settings = json.loads(sys.stdin.buffer.read())
     homes = Meshes(Path(file).parent, Path(packages) if packages else None)
 
     def share(name: str) -> str:
@@ -67,7 +75,7 @@ def main() -> None:
     import xacro
 
     try:
-        document = xacro.process_file(file)
+        document = xacro.process_file(file, mappings=settings)
     except Exception as error:  # of xacro and of the file's own expressions, of any kind
         sys.exit(f"{type(error).__name__}: {error}")
     sys.stdout.write(document.toprettyxml(indent=" "))
