@@ -187,8 +187,8 @@ def add_import(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "file",
         metavar="FILE",
-        help="a mesh: .stl, .obj, .glb, .gltf, .step, .iges; a point cloud or height map: .ply, .pcd, .npy; "
-        "a world: .sdf, .urdf, .scene",
+        help="a mesh: .stl, .obj, .glb, .gltf, .step, .iges; a point cloud or height map: "
+        ".ply, .pcd, .npy; a world: .sdf, .urdf, .scene",
     )
     command.add_argument("--unit", choices=tuple(UNITS), help="of a mesh or cloud; never guessed")
     command.add_argument(
