@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -297,3 +298,61 @@ def test_a_gripper_that_is_told_early_takes_the_part_where_it_lies() -> None:
     ((_, _, at),) = taken.step.outputs
     assert at == pytest.approx(taken.report.duration - 0.08, abs=STEP)
     assert any("closes 80 ms before the motion ends" in note.text for note in read.notes)
+
+
+def drawn(seed: int) -> tuple[str, str, list[tuple[int, bool]]]:
+    """A chain of motions with triggers and without, and what is set in it, in any order."""
+    rng = np.random.default_rng(seed)
+    plain = ["BAS(#INITMOV,0)", "PTP XHOME", "$APO.CDIS=60", "$APO.CPTP=70"]
+    lines = list(plain)
+    outputs = []
+    for k in range(6):
+        for _ in range(rng.integers(0, 3)):
+            when = rng.choice(
+                ["DISTANCE=0", "DISTANCE=1", "PATH=-80", "PATH=40", "PATH=30 ONSTART"]
+            )
+            number = int(rng.choice([1, 5, 17]))
+            value = bool(rng.integers(2))
+            outputs.append((number, value))
+            lines.append(
+                f"TRIGGER WHEN {when} DELAY={rng.integers(-300, 300)} DO "
+                f"$OUT[{number}]={'TRUE' if value else 'FALSE'}"
+            )
+        angle = 12 * (k + 1) * (1 if k % 2 else -1)
+        word = rng.choice(["", "C_DIS", "C_PTP"])
+        motion = f"PTP {{A1 {angle},A2 {-85 + 3 * k},A5 {20 + 4 * k}}} {word}"
+        plain.append(motion)
+        lines.append(motion)
+        if rng.integers(4) == 0:
+            plain.append("WAIT SEC 0.2")
+            lines.append("WAIT SEC 0.2")
+    return "\n".join(plain), "\n".join(lines), outputs
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_triggers_change_no_motion(seed: int) -> None:
+    """Law, on generated chains: with triggers the same motions, cut without a gap; everything is
+    set once; what nothing changes costs the same.
+    """
+    plain, lines, outputs = drawn(seed)
+    planner, bare = tending(plain)
+    _, program = tending(lines)
+    one, other = (evaluate_krl(planner, each) for each in (bare, program))
+    assert other.report.duration == pytest.approx(one.report.duration, abs=2e-3 * len(outputs))
+    found = [(number, value) for step in other.steps for number, value, _ in step.step.outputs]
+    assert sorted(found) == sorted(outputs)
+    assert other.report.energy == pytest.approx(one.report.energy, rel=5e-3)
+    steps = [step.step for step in other.steps]
+    for before, after in pairwise(steps):
+        last, first = before.trajectory.sample([before.trajectory.duration]), after.trajectory
+        assert np.abs(last.q[0] - first.positions[0]).max() < 1e-9
+        if not before.at_rest[1]:
+            assert not after.at_rest[0]
+            assert np.abs(last.qd[0] - first.sample([0.0]).qd[0]).max() < 1e-6
+    for step in steps:
+        assert all(0.0 <= at <= step.trajectory.duration + 1e-9 for _, _, at in step.outputs)
+
+
+def test_a_trigger_without_a_motion_is_said(followed: Follow) -> None:
+    program = followed("PTP XHOME\nTRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE")
+    assert any("it never acts" in note.text for note in program.notes)

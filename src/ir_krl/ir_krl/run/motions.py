@@ -423,6 +423,11 @@ class Moving(Assigning):
             )
             self.note(tree, text)
 
+    def without_motion(self) -> None:
+        """Note the triggers behind which no motion stands."""
+        for one in self._triggers:
+            self.note(one.action, "a TRIGGER with no motion behind it: it never acts")
+
     def _ptp(self, tree: Tree) -> None:
         if self._not_beside(tree):
             return

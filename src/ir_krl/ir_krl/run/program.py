@@ -148,6 +148,7 @@ def follow(
             for body in source.data:
                 run.settings(body, source.file)
         run.routine(first, [], Place(first.file))
+        run.without_motion()
     except Endless:
         pass  # a note says so
     except RecursionError:

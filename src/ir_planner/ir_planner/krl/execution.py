@@ -300,16 +300,16 @@ class _Drive:
         """An output is set at the end of the last step, where the robot stands; at q (n,) where
         that isn't where the motions so far lead.
         """
-        if not self.steps and self._on_path:
-            self._stand(0.0, command.place, "")
-        signals = self.around.signalled(command.number, command.value)
         here = self.here if q is None else q
+        if not self.steps and self._on_path:
+            self._stand(0.0, command.place, "", here)
+        signals = self.around.signalled(command.number, command.value)
         handled = self.around.gripped(command.number, command.value, here, command.place)
         if handled:  # until a motion says what $LOAD is then
             self._payload = None
         before = self.steps[-1].handled if self.steps else ""
         if handled and before and handled[1:] != before[1:]:  # another part at the same stop
-            self._stand(0.0, command.place, "")
+            self._stand(0.0, command.place, "", here)
         elif handled and before:  # left and taken again
             self.steps[-1] = replace(self.steps[-1], handled="")
             handled = ""
@@ -418,9 +418,13 @@ class _Drive:
         if self._blend is None:
             self.finish()
 
-    def _stand(self, seconds: float, place: Place, condition: str) -> None:
+    def _stand(
+        self, seconds: float, place: Place, condition: str, q: FloatArray | None = None
+    ) -> None:
+        """Stand where the motions so far lead, or at q (n,)."""
         self._carry(self._payload, place)
-        still = standing(self.here, self.scene.cell.robot.joint_names, seconds)
+        here = self.here if q is None else q
+        still = standing(here, self.scene.cell.robot.joint_names, seconds)
         self._step(still, (place,), [], moves=False, waits_for=condition)
 
     def _step(
