@@ -456,6 +456,7 @@ class _Drive:
         at_end: list[tuple[SetOutput, bool]] = []
         while self._later and self._later[0].at <= end + _SAME:
             event = self._later.pop(0)
+            event = event._replace(at=round(event.at / GRID_S) * GRID_S)  # where it may be cut
             if isinstance(event.change, SetOutput) and event.at > end - _SAME:
                 at_end.append((event.change, True))
                 continue
