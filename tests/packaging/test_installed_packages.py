@@ -134,5 +134,5 @@ def test_worlds_and_logs_are_read_by_their_endings(tmp_path: Path) -> None:
     assert read_world(file, shape_register(load_robot())).machines[0].name == "m"
     (trace,) = read_traces(file, None, ("joint_a1",))
     assert len(trace.time) == 3
-    with pytest.raises(RecorderError, match=r"\.dat, \.blob"):
+    with pytest.raises(RecorderError, match=r"\.pb, \.blob"):
         read_traces(tmp_path / "thing.else", None, ("joint_a1",))
