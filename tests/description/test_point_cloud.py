@@ -194,6 +194,14 @@ def test_what_lies_below_a_height_map_is_covered(
     assert boxes.upper[:, 2].max() <= np.nanmax(heights) + voxel + margin + 1e-6
 
 
+def test_three_columns_are_heights_where_their_distance_is_given(tmp_path: Path) -> None:
+    (tmp_path / "map.npy").write_bytes(npy(np.full((5, 3), 0.2)))
+    boxes = cloud_boxes(tmp_path, "map.npy", CloudSettings("m", 0.05, 0.0, 0.1))
+    assert boxes.upper.max(axis=0) == pytest.approx([0.25, 0.45, 0.25], abs=1e-6)
+    points = cloud_boxes(tmp_path, "map.npy", CloudSettings("m", 0.05, 0.0))
+    assert len(points.lower) == 1
+
+
 def test_a_wall_is_one_box(tmp_path: Path) -> None:
     y, z = np.meshgrid(np.arange(0.01, 2.0, 0.02), np.arange(0.01, 1.0, 0.02))
     wall = np.stack([np.full(y.size, 0.01), y.ravel(), z.ravel()], axis=1)
@@ -364,7 +372,7 @@ def test_the_line_that_import_prints_is_read(
         ("cloud: scan.npy, unit: m", "margin"),
         ("cloud: scan.npy, unit: m, margin: -1", "must be in [0, 1] m"),
         ("cloud: ../scan.npy, unit: m, margin: 0.1", "in the cell file's folder"),
-        ("cloud: scan.npy, unit: m, margin: 0.1, pitch: 0.1", "has no pitch"),
+        ("cloud: scan.pcd, unit: m, margin: 0.1, pitch: 0.1", "has no pitch"),
         ("cloud: scan.npy, unit: m, margin: 0.1, crop: [[0, 0, 0], [0, 1, 1]]", "lower corner"),
         (
             "cloud: scan.npy, unit: m, margin: 0.1, crop: [[50, 0, 0], [51, 1, 1]]",
@@ -375,6 +383,7 @@ def test_the_line_that_import_prints_is_read(
 )
 def test_a_wrong_entry_is_refused_with_its_place(tmp_path: Path, keys: str, words: str) -> None:
     (tmp_path / "scan.npy").write_bytes(npy(scan(1, 10)))
+    (tmp_path / "scan.pcd").write_bytes(pcd(scan(1, 10), "binary"))
     path = tmp_path / "cell.yaml"
     path.write_text(CELL.format(line=f"{{name: scan, {keys}}}"))
     with pytest.raises(CellFileError, match="yaml:7") as caught:

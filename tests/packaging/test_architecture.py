@@ -18,7 +18,7 @@ BASE_KNOWS: dict[str, set[str]] = {
     "ir_description": {"ir_values", "ir_msgs_py", "ir_kernels"},
 }
 BASE = set(BASE_KNOWS)
-LANGUAGE = {"ir_krl": {"ir_values", "ir_msgs_py", "ir_description"}}
+LANGUAGE = {"ir_krl": BASE}
 ROOMS = {"ir_planner", "ir_sim_driver", "ir_program_runner", "ir_recorder"}
 KNOWS = {
     **BASE_KNOWS,

@@ -20,6 +20,10 @@ import pytest
 from _documented import PAGES, ROOT, walked
 
 from ir_description import load_robot, robot_urdf
+from ir_studies.cells import written
+
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # drawn cells
+from _cells_drawn import drawn
 
 CELLS = Path(str(files("ir_description") / "data" / "cells"))
 KRL = "DEF OLD( )\nPTP XHOME\nPTP {A1 30,A5 40}\nWAIT SEC 5\nPTP XHOME\nEND\n"
@@ -41,6 +45,23 @@ def krl(folder: Path) -> None:
 def exported(folder: Path) -> None:
     """A program whose stops are stations of the cell."""
     shell(folder, "ir krl export demo -o old.src")
+
+
+def robots_folder(folder: Path) -> None:
+    """A program that calls another, its data lists, and the same as a controller keeps them."""
+    lists = "$TOOL={X 0,Y 0,Z 100,A 0,B 0,C 0}\n$BASE={X 0,Y 0,Z 0,A 0,B 0,C 0}\n"
+    inside = folder / "KRC" / "R1" / "Program"
+    inside.mkdir(parents=True)
+    for place in (folder, inside):
+        (place / "main.src").write_text(
+            f"DEF main()\n{lists}PTP {{A1 0,A2 -90,A3 90,A4 0,A5 0,A6 0}}\nsub()\nEND\n"
+        )
+        (place / "sub.src").write_text("DEF sub()\nPTP {A1 10,A2 -90,A3 90,A4 0,A5 10,A6 0}\nEND\n")
+        (place / "$config.dat").write_text("DEFDAT $CONFIG PUBLIC\nENDDAT\n")
+
+
+def public_cells(folder: Path) -> None:
+    (folder / "cells.xml").write_text(written([drawn(1, 3, 3)]))
 
 
 def costs(folder: Path) -> None:
@@ -93,7 +114,8 @@ PREPARED: dict[str, tuple[Prepare, ...]] = {
     "README.md": (cell, krl),
     "cad.md": (mesh, world),
     "compare.md": (cell, krl, costs, trace),
-    "krl.md": (exported, costs),
+    "flexible.md": (public_cells,),
+    "krl.md": (exported, robots_folder, costs),
     "recording.md": (recordings,),
     "report.md": (recordings, costs),
     "robot_guide.md": (robot,),

@@ -122,7 +122,7 @@ class CloudReader:
 
 def cloud_boxes(folder: Path, name: str, settings: CloudSettings) -> CloudBoxes:
     """Return the boxes of a file beside the cell file. Raises InvalidValueError."""
-    measured = read_cloud(folder, name)
+    measured = read_cloud(folder, name, heights=settings.pitch is not None)
     scale = UNITS[settings.unit]
     if measured.heights is not None:
         if settings.pitch is None:
@@ -253,16 +253,17 @@ def _joined(low: IntArray, high: IntArray, axes: tuple[int, ...]) -> tuple[IntAr
 # Files
 
 
-def read_cloud(folder: Path, name: str) -> Measured:
+def read_cloud(folder: Path, name: str, *, heights: bool = False) -> Measured:
     """Return what a file beside the cell file holds; nothing outside the folder is opened.
 
-    Raises InvalidValueError.
+    heights: whether an array (R, 3) is three columns of a height map, not R points. Raises
+    InvalidValueError.
     """
     path = mesh_path(folder, name, SUFFIXES)
     content = read_regular_file(path, BYTES_MAX)
     suffix = path.suffix.lower()
     if suffix == ".npy":
-        return _from_array(content)
+        return _from_array(content, heights=heights)
     if suffix == ".pcd":
         points, notes = _from_pcd(content)
     else:
@@ -282,7 +283,7 @@ def _of_points(points: FloatArray, notes: tuple[str, ...] = ()) -> Measured:
     return Measured(points[finite], None, notes)
 
 
-def _from_array(content: bytes) -> Measured:
+def _from_array(content: bytes, *, heights: bool) -> Measured:
     """Points (N, 3), an organised cloud (R, C, 3), or heights (R, C)."""
     try:
         array: Any = np.load(io.BytesIO(content), allow_pickle=False)
@@ -291,7 +292,8 @@ def _from_array(content: bytes) -> Measured:
     if not (isinstance(array, np.ndarray) and array.dtype.kind in "fiu"):
         raise InvalidValueError("must be one NumPy array of numbers")
     values = array.astype(np.float64)
-    if values.ndim in (2, 3) and values.shape[-1] == 3 and values.size:
+    columns = heights and values.ndim == 2
+    if values.ndim in (2, 3) and values.shape[-1] == 3 and values.size and not columns:
         return _of_points(values.reshape(-1, 3))
     if values.ndim != 2 or min(values.shape) < 2:
         raise InvalidValueError(
