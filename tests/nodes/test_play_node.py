@@ -9,19 +9,24 @@ from typing import Any
 import pytest
 from mcap.writer import Writer
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64, String
 
 from ir_msgs_py import names
+from ir_msgs_py.ros.messages import interface_type
+from ir_planner.node.node import PlannerNode
+from ir_program_runner.node import ProgramRunnerNode
 from ir_recorder.errors import RecorderError
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.play.node import PlayNode
-from ir_recorder.play.playback import PlaySettings
+from ir_recorder.play.playback import PlaySettings, is_command
 from ir_recorder.reading.mcap_file import read_raw
 from ir_recorder.recording.session import RecordingSession
 from ir_recorder.recording.writer import RecordingWriter
+from ir_sim_driver.node import SimDriver
 
 START = 1_700_000_000_000_000_000
 
@@ -173,6 +178,59 @@ def test_a_driver_that_comes_later_ends_playback(
     ros_node.create_subscription(Float64, topic, lambda m: None, 100)
     wait_for(lambda: not player.playing)
     assert "would command" in player.failure
+
+
+FREE = "/seen_by_nobody"
+
+
+def of_every_topic(node: Node, others: list[Node], path: Path) -> tuple[Any, set[str]]:
+    """A recording of every topic that the nodes take in or publish, as the graph has them, and
+    of one more.
+    """
+    topics: dict[str, str] = {}
+    for other in others:
+        where = other.get_name(), other.get_namespace()
+        for ask in (
+            node.get_subscriber_names_and_types_by_node,
+            node.get_publisher_names_and_types_by_node,
+        ):
+            topics.update({topic: types[0] for topic, types in ask(*where) if "/msg/" in types[0]})
+    session = RecordingSession(RecordingWriter(path), {}, START)
+    for topic, type_name in {**topics, FREE: "std_msgs/msg/String"}.items():
+        session.open_topic(topic, type_name, [QosOffer(transient_local=True)])
+        session.message(topic, serialize_message(interface_type(type_name, "msg")()), START)
+    return read_raw(session.finish().path), set(topics)
+
+
+def test_no_topic_that_a_running_node_takes_in_or_publishes_is_played_beside_it(
+    ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any, tmp_path: Path
+) -> None:
+    driver = SimDriver(
+        context=ros_context,
+        parameter_overrides=[
+            Parameter("cell", value="open"),
+            Parameter("backend", value="ideal"),
+            Parameter("wake_port", value=0),
+        ],
+    )
+    planner = PlannerNode(
+        context=ros_context, parameter_overrides=[Parameter("cell", value="open")]
+    )
+    runner = ProgramRunnerNode(context=ros_context)
+    others: list[Node] = [driver, planner, runner]
+    for other in others:
+        ros_executor.add_node(other)
+    wait_for(lambda: {other.get_name() for other in others} <= set(ros_node.get_node_names()))
+    recording, topics = of_every_topic(ros_node, others, tmp_path / "a.mcap")
+    assert {"/ir_planner/cell", "/joint_states", "/ir_sim_driver/stop_number"} <= topics
+    reported = tuple(topic for topic in topics if not is_command(topic))
+    for chosen, count in (((), 1), ((*topics, FREE), 0), (reported, 0), ((*reported, FREE), 1)):
+        player = PlayNode(recording, PlaySettings(topics=chosen), delay=0.0, context=ros_context)
+        player.start()
+        wait_for(lambda player=player: not player.playing)
+        assert player.published == count
+        assert bool(player.failure) == (count == 0)
+        player.destroy_node()
 
 
 def test_a_type_name_from_a_file_imports_nothing(

@@ -122,6 +122,8 @@ END_REST: Final = "end_rest"
 
 NODES = (PLANNER, SIM_DRIVER, PROGRAM_RUNNER, RECORDER)
 """The nodes of a cell."""
+ACTING = (PLANNER, SIM_DRIVER, PROGRAM_RUNNER, MOVEIT, STUDIES)
+"""Nodes that act on what they hear; the others record or show it."""
 
 
 def diagnostic_name(namespace: str, name: str) -> str:
@@ -140,6 +142,11 @@ def hidden_node(name: str, what: str) -> str:
     Tools hide names that begin with an underscore.
     """
     return f"_{name}_{what}"
+
+
+def acts(node: str) -> bool:
+    """Whether a node of this name, or that it is a hidden part of, acts on what it hears."""
+    return node in ACTING or node.startswith(tuple(hidden_node(name, "") for name in ACTING))
 
 
 def owns_node(namespace: str, fully_qualified: str) -> bool:

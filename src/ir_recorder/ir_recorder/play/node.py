@@ -2,7 +2,8 @@
 
 The qualities of service are those that were offered; what was latched is latched again. Topics that
 command a robot or a machine are left out unless asked for by their full name, and then not beside a
-driver.
+driver. A topic that a running node of a cell takes in or publishes is left out while it is there:
+which ones these are, the graph says.
 """
 
 from __future__ import annotations
@@ -100,6 +101,8 @@ def keys_of_terminal(pressed: Callable[[bytes], None]) -> Iterator[bool]:
 
 
 LOOK_PERIOD = 0.1  # s between two looks for a driver: less than discovery takes
+LEAST_DELAY = 0.5  # s from the publishers to the first message, in which running nodes are found
+_CLOCK = "/clock"
 _CLOCK_NS = 2**31 * 1_000_000_000  # seconds of a message have 32 bits
 DEPTH = 1000  # messages per topic: 2 s of joint states while a subscriber is busy
 
@@ -121,11 +124,12 @@ class PlayNode(Node):
         self._wake = threading.Event()
         self._latched: set[str] = set()
         self._feeds: dict[str, Publisher] = {}
-        self._ticks = self.create_publisher(Clock, "/clock", 10) if clock else None
+        self._ticks = self.create_publisher(Clock, _CLOCK, 10) if clock else None
         self._delay = delay
         self.published = 0
         self._schemas = SchemaLibrary()
         self._commands: list[str] = []
+        self._left_out: set[str] = set()
         self._next_look = 0.0
         self.failure = ""
         self._messages: list[tuple[int, str, bytes]] = []
@@ -146,7 +150,9 @@ class PlayNode(Node):
             )
 
     def start(self) -> None:
-        """Begins to play, after `delay` seconds in which subscribers find the publishers."""
+        """Begins to play, after `delay` seconds in which subscribers find the publishers; at least
+        LEAST_DELAY.
+        """
         self._thread.start()
 
     def stop(self) -> None:
@@ -239,49 +245,85 @@ class PlayNode(Node):
             self._commands.append(topic)
 
     def _play(self) -> None:
-        if self._stop.wait(self._delay) or self._refused():
+        if self._stop.wait(max(self._delay, LEAST_DELAY)) or self._refused():
             return
         tick = self._tick if self._ticks is not None else None
         player = Player(
             time.monotonic, self._wait, self._publish, tick, head=self.head, latched=self._latched
         )
         try:
-            self.published = player.play(self._messages, self._settings)
+            player.play(self._messages, self._settings)
         except Exception as error:  # whatever it was, not all was played
             self.get_logger().error(traceback.format_exc())
             self.failure = f"playback failed: {error!r}"
 
     def _refused(self) -> bool:
-        """Whether playback ends because a driver would follow its commands; looks every
-        LOOK_PERIOD.
+        """Whether playback ends, because a driver would follow its commands or nothing is left to
+        play; looks at the graph every LOOK_PERIOD.
         """
         now = time.monotonic()
-        if not self._commands or now < self._next_look:
-            return bool(self.failure)
-        self._next_look = now + LOOK_PERIOD
+        if now >= self._next_look:
+            self._next_look = now + LOOK_PERIOD
+            self._look(self.get_node_names())
+        return bool(self.failure)
+
+    def _look(self, nodes: Sequence[str]) -> None:
         followers = {
             end.node_name
             for topic in self._commands
             for end in self.get_subscriptions_info_by_topic(topic)
         }
-        followers |= {name for name in self.get_node_names() if name == names.SIM_DRIVER}
+        if self._commands:
+            followers |= {name for name in nodes if name == names.SIM_DRIVER}
         if followers:
             who = ", ".join(sorted(followers))
             what = ", ".join(self._commands)
-            self.failure = f"{what} would command {who}: a recording is not played to a live robot"
-            self._stop.set()
-        return bool(self.failure)
+            self._end(f"{what} would command {who}: a recording is not played to a live robot")
+            return
+        if any(map(names.acts, nodes)):
+            self._leave_out()
+
+    def _leave_out(self) -> None:
+        """Play no topic any more that a running node of a cell takes in or publishes."""
+        clock = [_CLOCK] if self._ticks is not None else []
+        topics = [*self._feeds, *clock]
+        live = {topic: self._live(topic) for topic in topics if topic not in self._left_out}
+        found = {topic: who for topic, who in live.items() if who}
+        if not found:
+            return
+        who = ", ".join(sorted(set().union(*found.values())))
+        self.get_logger().warning(
+            f"{', '.join(sorted(found))[:2000]}: not played beside {who}, which takes it in or "
+            "publishes it; end that node, or play in another ROS_DOMAIN_ID"
+        )
+        self._left_out |= found.keys()
+        if self._left_out.issuperset(topics):
+            self._end(f"nothing is left to play beside {who}")
+
+    def _live(self, topic: str) -> set[str]:
+        """Running nodes of a cell that take the topic in or publish it."""
+        ends = [
+            *self.get_subscriptions_info_by_topic(topic),
+            *self.get_publishers_info_by_topic(topic),
+        ]
+        return {end.node_name for end in ends if names.acts(end.node_name)}
+
+    def _end(self, failure: str) -> None:
+        self.failure = failure
+        self._stop.set()
 
     def _publish(self, message: DueMessage) -> None:
-        if message.topic in self._commands and self._refused():
+        if self._refused() or message.topic in self._left_out:
             return
         self._feeds[message.topic].publish(message.data)
+        self.published += 1
 
     def _tick(self, recorded_ns: int) -> None:
-        if self._ticks is not None:
-            clock = Clock()
-            clock.clock.sec, clock.clock.nanosec = divmod(recorded_ns, 1_000_000_000)
-            self._ticks.publish(clock)
+        if self._ticks is None or self._refused() or _CLOCK in self._left_out:
+            return
+        clock = Clock()
+        clock.clock.sec, clock.clock.nanosec = divmod(recorded_ns, 1_000_000_000)
+        self._ticks.publish(clock)
 
 
 def _known(error: Exception) -> Status | None:
