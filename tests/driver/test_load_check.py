@@ -11,7 +11,9 @@ from ir_description import data_sheet, load_cell, robot_marks
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver import (
+    ErrorCode,
     LoadCheckSettings,
+    LoadFinding,
     Outcome,
     SimulationSettings,
     TrajectoryGoal,
@@ -21,6 +23,7 @@ from ir_sim_driver.controller.outputs import report
 from ir_sim_driver.load_check import Declared, Motion, Uncertainty, weighed
 from ir_sim_driver.notices import Level
 from ir_sim_driver.plant import carried
+from ir_values.arrays import FloatArray
 
 CELL = load_cell("demo")
 
@@ -68,6 +71,56 @@ def test_a_declared_load_is_weighed_and_not_noticed() -> None:
     assert outcome.load_check is not None
     assert not outcome.load_check.noticed
     assert (outcome.sentence, level) == ("", Level.OK)
+
+
+def after_a_stop(mass_error: float, seed: int) -> LoadFinding | None:
+    """What a movement says that follows an emergency stop somewhere in another one: of A1, or of
+    drawn axes, from where the arm sank to, while the other axes creep back to where they were.
+    """
+    generator = np.random.default_rng(seed)
+    settings = SimulationSettings(load_check=LoadCheckSettings(mass_error=mass_error))
+    simulation = make_simulation(CELL, "cell", "pybullet", settings)
+    home = simulation.executor.command
+
+    def drive(there: FloatArray, seconds: float) -> None:
+        rest = np.zeros((2, 6))
+        way = [simulation.executor.command, there]
+        goal = JointTrajectory.from_seconds(
+            simulation.robot.joint_names, [0.0, seconds], way, rest, rest
+        )
+        simulation.execute(simulation.vet(TrajectoryGoal(goal), 0), 0)
+
+    def turned() -> FloatArray:
+        moves = generator.random(6) < 0.3
+        moves[0] = True
+        return home + moves * generator.uniform(-0.4, 0.4, 6)
+
+    drive(turned(), generator.uniform(1.5, 3.0))
+    simulation.run(generator.uniform(0.2, 1.2))
+    simulation.plc.set_bit("emergency_stop", True)
+    simulation.run(generator.uniform(0.6, 1.5))
+    simulation.plc.set_bit("emergency_stop", False)
+    simulation.run(0.2)
+    simulation.recover()
+    simulation.run(0.5)
+    simulation.take_outcomes()
+    drive(turned(), generator.uniform(1.5, 3.0))
+    simulation.run(4.0)
+    (outcome,) = simulation.take_outcomes()
+    assert outcome.code is ErrorCode.SUCCESSFUL
+    return outcome.load_check
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_declared_load_is_not_noticed_after_a_stop_and_another_one_is(seed: int) -> None:
+    as_declared = after_a_stop(0.0, seed)
+    assert as_declared is not None
+    assert not as_declared.noticed, as_declared.sentence
+    for error in (0.3, -0.3):
+        other = after_a_stop(error, seed)
+        assert other is not None
+        assert other.noticed
+        assert np.sign(other.mass) == np.sign(error)
 
 
 def test_no_load_is_not_weighed() -> None:

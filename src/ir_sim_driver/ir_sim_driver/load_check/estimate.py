@@ -19,7 +19,9 @@ from ir_values.arrays import FloatArray
 # power parameters (the data's marks of confidence, or a fit). Each link's own mass, centre and
 # inertia, and the friction at low speed, have the deviations of the table below, whatever was
 # fitted: an energy fit does not separate them. An axis that stands has whatever friction holds
-# it: its motor's torque says how the gravity on it changes, hardly how large that is.
+# it: its motor's torque says how the gravity on it changes, hardly how large that is. One that
+# creeps, as back to its place after a stop, has a friction that grows with its speed nobody knows
+# how soon: any mixture of the growths below.
 
 LINK_SIZE = 0.2
 """m: a link's centre of mass is off by its mark's share of this, in each direction."""
@@ -34,6 +36,7 @@ movement.
 """
 _SIGN = 0.01  # rad/s over which the sign of a friction turns
 _STANDS = 0.003  # rad/s below which friction is whatever holds the axis
+_CREEPS = (0.0003, 0.001, 0.003)  # rad/s within which the friction of a creeping axis may grow
 _AXIS_TERMS = ("viscous", "coulomb", "gear")
 _SCALES = ("rotor_inertia", "link_mass", "counterbalance")
 
@@ -95,14 +98,20 @@ class Uncertainty:
         )
         axes = (qd, sign, np.abs(torque) * sign)
         known = [_on_axis(values, j) for values in axes for j in range(n)]
-        standing = STANDING_SHARE * self.model.friction_coulomb * self.standing(qd)
+        either_way = STANDING_SHARE * self.model.friction_coulomb
+        standing = self.standing(qd)
+        moving = np.sign(qd) * (1.0 - standing)
+        creeping = [np.tanh(qd / speed) - moving for speed in _CREEPS]
+        unknown = [standing, *(each / np.sqrt(len(_CREEPS)) for each in creeping)]
         known += [rotors, scaled, -balance]
         return np.concatenate(
             (
                 np.stack(known, axis=2) @ self._root,
                 np.stack(links, axis=2),
+                np.stack([_on_axis(rest, j) for j in range(n)], axis=2),
                 np.stack(
-                    [_on_axis(values, j) for values in (rest, standing) for j in range(n)], axis=2
+                    [_on_axis(either_way * values, j) for values in unknown for j in range(n)],
+                    axis=2,
                 ),
             ),
             axis=2,
