@@ -198,7 +198,8 @@ class PlannerAnswers:
 
     def _contact_of(self, pair: Any, robot: set[str], held: set[str]) -> Any:
         msg = self._contact()
-        a, b = point_from_msg(pair.point_a), point_from_msg(pair.point_b)
+        a = point_from_msg(pair.point_a)
+        b = point_from_msg(pair.point_b)
         msg.header.frame_id = names.WORLD_FRAME
         middle = 0.5 * (a + b)
         msg.position.x, msg.position.y, msg.position.z = middle.tolist()
@@ -207,12 +208,10 @@ class PlannerAnswers:
         if length > 0.0:
             msg.normal.x, msg.normal.y, msg.normal.z = (away / length).tolist()
         msg.depth = -float(pair.distance)  # below 0: still so far apart
-        msg.contact_body_1, msg.contact_body_2 = pair.body_a, pair.body_b
-        kinds = [
-            _ROBOT_LINK if name in robot else _ATTACHED if name in held else _WORLD_OBJECT
-            for name in (pair.body_a, pair.body_b)
-        ]
-        msg.body_type_1, msg.body_type_2 = kinds
+        msg.contact_body_1 = pair.body_a
+        msg.contact_body_2 = pair.body_b
+        msg.body_type_1 = _body_type(pair.body_a, robot, held)
+        msg.body_type_2 = _body_type(pair.body_b, robot, held)
         return msg
 
     def cartesian_path(self, request: Any, response: Any) -> Status:
@@ -277,6 +276,13 @@ def _first(trajectory: Any) -> Any:
     return JointState(name=trajectory.joint_names, position=trajectory.points[0].positions)
 
 
+def _body_type(name: str, robot: set[str], held: set[str]) -> int:
+    """What moveit_msgs/ContactInformation calls a body."""
+    if name in robot:
+        return _ROBOT_LINK
+    return _ATTACHED if name in held else _WORLD_OBJECT
+
+
 def _check(answer: Any) -> None:
     status = status_from_msg(answer.status)
     if not status.ok:
@@ -304,15 +310,14 @@ def status_of(error: BaseException) -> Status:
     return known or unexpected(error)
 
 
-SERVICES = (
-    ("GetMotionPlan", "plan_kinematic_path", "plan"),
-    ("GetCartesianPath", "compute_cartesian_path", "cartesian_path"),
-    ("GetPositionIK", "compute_ik", "position_ik"),
-    ("GetStateValidity", "check_state_validity", "state_validity"),
-    ("ApplyPlanningScene", "apply_planning_scene", "apply_scene"),
-)
-"""Type of moveit_msgs, name as MoveIt's move_group has it, and what answers it."""
-_LONG = 2  # of them plan
+SERVICES = {
+    "GetMotionPlan": "plan_kinematic_path",
+    "GetCartesianPath": "compute_cartesian_path",
+    "GetPositionIK": "compute_ik",
+    "GetStateValidity": "check_state_validity",
+    "ApplyPlanningScene": "apply_planning_scene",
+}
+"""Name of each type of moveit_msgs, as MoveIt's move_group serves it."""
 
 
 class MoveItNode(Node):
@@ -341,16 +346,18 @@ class MoveItNode(Node):
             import_module("moveit_msgs.msg").ContactInformation,
             lambda: parameters.value,
         )
-        groups = [MutuallyExclusiveCallbackGroup() for _ in range(2)]
-        for k, (kind, name, handler) in enumerate(SERVICES):
-            BoundedService(
-                self,
-                types[kind],
-                name,
-                self._guarded(name, getattr(answers, handler)),
-                groups[0 if k < _LONG else 1],
-                put=put_error_code,
-            )
+        plans = MutuallyExclusiveCallbackGroup()
+        questions = MutuallyExclusiveCallbackGroup()
+        for kind, handler, group in (
+            ("GetMotionPlan", answers.plan, plans),
+            ("GetCartesianPath", answers.cartesian_path, plans),
+            ("GetPositionIK", answers.position_ik, questions),
+            ("GetStateValidity", answers.state_validity, questions),
+            ("ApplyPlanningScene", answers.apply_scene, questions),
+        ):
+            name = SERVICES[kind]
+            guarded = self._guarded(name, handler)
+            BoundedService(self, types[kind], name, guarded, group, put=put_error_code)
 
     def destroy_node(self) -> None:
         """Let go of the planner, then of the rest."""
@@ -410,7 +417,7 @@ def moveit_types() -> dict[str, Any]:
         raise IrError(
             "moveit_msgs is not installed: docs/ros_interfaces.md says how it is built"
         ) from error
-    return {kind: getattr(services, kind) for kind, _, _ in SERVICES}
+    return {kind: getattr(services, kind) for kind in SERVICES}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

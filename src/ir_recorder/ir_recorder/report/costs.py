@@ -155,7 +155,12 @@ class Costs:
     @property
     def line(self) -> dict[str, float]:
         """Shares [%] of the energy of a line with its hall, by consumer."""
-        return {name: float(getattr(self, f"line_{name}")) for name in _TABLE_1}
+        return {
+            "robots": self.line_robots,
+            "stand_by": self.line_stand_by,
+            "technology": self.line_technology,
+            "infrastructure": self.line_infrastructure,
+        }
 
     @property
     def production_hours(self) -> float:
