@@ -5,6 +5,7 @@ written.
 from __future__ import annotations
 
 import csv
+import os
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -106,6 +107,20 @@ def test_the_command_sums_folders_up_and_names_what_it_leaves_out(
     with table.open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["what"] == "cycle"]
     assert [row["robot"] for row in rows] == ["left", "right"]
+
+
+def test_what_is_no_regular_file_is_left_out_of_a_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A FIFO held the command up for ever."""
+    os.mkfifo(tmp_path / "a.mcap")
+    (tmp_path / "b.mcap").mkdir()
+    arguments = ["fleet", str(tmp_path), "-o", str(tmp_path / "fleet.html")]
+    assert main(arguments) == 1
+    said = capsys.readouterr().err
+    for name in ("a.mcap", "b.mcap"):
+        assert f"{tmp_path / name}: left out" in said
+        assert "is not a regular file" in said
 
 
 def fleet(tmp_path: Path, *paths: Path) -> tuple[dict[str, int], list[str]]:

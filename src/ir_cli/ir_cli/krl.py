@@ -180,7 +180,7 @@ def data_beside(source: Path) -> Path | None:
         return None
     stem = source.stem.upper()  # as on the controller, whose names have no case
     found = (one for one in source.parent.iterdir() if one.stem.upper() == stem)
-    return next((one for one in found if one.suffix.lower() == ".dat"), None)
+    return next((one for one in found if one.suffix.lower() == ".dat" and one.is_file()), None)
 
 
 def _setting(text: str) -> Source:

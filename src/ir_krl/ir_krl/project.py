@@ -15,6 +15,7 @@ from ir_krl.errors import KrlError, KrlSyntaxError, Place
 from ir_krl.language import Routine, Source, Tree, parse
 from ir_krl.run.library import CONTROLLERS
 from ir_krl.run.notes import Effect, Note
+from ir_values.files import ANYWHERE
 
 BYTES_MAX = 4_000_000  # of a file
 FILES_MAX = 20_000
@@ -172,12 +173,13 @@ def _of_folder(path: Path) -> Iterator[File]:
     for one in found[:FILES_MAX]:
         inside = PurePosixPath(one.relative_to(path).as_posix())
         if one.is_file() and _is_program_file(inside):
-            yield File(inside, one.read_bytes()[: BYTES_MAX + 1])
+            with ANYWHERE.open_to_read(one) as stream:
+                yield File(inside, stream.read(BYTES_MAX + 1))
 
 
 def _of_archive(path: Path) -> Iterator[File]:
     try:
-        with zipfile.ZipFile(path) as archive:
+        with ANYWHERE.open_to_read(path) as stream, zipfile.ZipFile(stream) as archive:
             for one in sorted(archive.infolist(), key=lambda one: one.filename)[:FILES_MAX]:
                 inside = PurePosixPath(one.filename.replace("\\", "/"))
                 if _is_program_file(inside) and not one.is_dir():

@@ -74,10 +74,9 @@ def executed_steps(recording: Recording) -> tuple[ExecutedStep, ...]:
     steps: list[ExecutedStep] = []
     runs = _Runs(recording.controller)
     late = 0.0
-    for position, event in enumerate(recording.events):
+    for event, end in zip(recording.events, _ends(recording.events), strict=True):
         if event.event != STARTED:
             continue
-        end = _end_of(event, recording.events[position + 1 :])
         last = end.time if end else max(recording.duration, event.time)
         ran = runs.next_of(event.movement)
         if ran is not None:
@@ -126,11 +125,16 @@ def _begin_of(event: ProgramEvent, before: Sequence[ExecutedStep]) -> float:
     return max(event.time, before[-1].end) if moving else event.time
 
 
-def _end_of(start: ProgramEvent, later: tuple[ProgramEvent, ...]) -> ProgramEvent | None:
-    for event in later:
-        if (event.program_id, event.index) == (start.program_id, start.index):
-            return event if event.event != STARTED else None
-    return None
+def _ends(events: Sequence[ProgramEvent]) -> list[ProgramEvent | None]:
+    """For each event the next one of its step, where that is its end."""
+    following: dict[tuple[str, int], ProgramEvent] = {}
+    ends: list[ProgramEvent | None] = []
+    for event in reversed(events):
+        step = event.program_id, event.index
+        later = following.get(step)
+        ends.append(later if later is not None and later.event != STARTED else None)
+        following[step] = event
+    return ends[::-1]
 
 
 class _Runs:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -46,7 +47,7 @@ from ir_recorder.report.page import PAGE_START, asset, folded
 from ir_recorder.report.step_table import TableValue, write_columns
 from ir_recorder.report.tables import table
 from ir_recorder.report.whole_line import WholeLine, line_section, of_whole_line
-from ir_values.errors import IrError
+from ir_values.errors import FileRefusedError, IrError
 from ir_values.files import ANYWHERE, FileRoots
 
 # Which files a fleet is made of: recordings of folders, whose robot each one is of, none of them
@@ -118,13 +119,13 @@ def _without_copies(files: Sequence[RecordedFile], said: Said) -> list[RecordedF
 
 
 def _content(path: Path) -> tuple[int, str] | None:
-    """Size and end of a file; None where it can't be read, or holds nothing."""
+    """Size and end of a regular file; None where it can't be read, or holds nothing."""
     try:
-        size = path.stat().st_size
-        with path.open("rb") as file:
+        with ANYWHERE.open_to_read(path) as file:
+            size = file.seek(0, os.SEEK_END)
             file.seek(max(size - _BLOCK, 0))
             return (size, sha256(file.read(_BLOCK)).hexdigest()) if size else None
-    except OSError:
+    except (FileRefusedError, OSError):
         return None
 
 
