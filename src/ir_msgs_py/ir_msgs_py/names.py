@@ -1,8 +1,9 @@
 """Names of nodes, topics, services, actions, joints and frames: a contract, spelled once.
 
 All names are relative, so a namespace moves a whole cell; a script outside puts a "/" before them.
-Topics and services of a node carry its name: `ir_planner/set_cell`. On the topics that all cells
-share (/diagnostics, /rosout, /parameter_events) the sender's name says whose a message is.
+Topics and services of a node carry its name: `ir_planner/set_cell`; the node itself offers them in
+its private namespace (`own`), so that they move with its name. On the topics that all cells share
+(/diagnostics, /rosout, /parameter_events) the sender's name says whose a message is.
 """
 
 from __future__ import annotations
@@ -119,6 +120,12 @@ END_REST: Final = "end_rest"
 
 # Senders on the topics that all cells share: the namespace is a part of the name, so that two cells
 # in one graph are kept apart. Namespaces are absolute: "/" or "/cell_1".
+
+
+def own(name: str) -> str:
+    """A name of a node ("ir_planner/set_cell") as this node itself has it: "~/set_cell"."""
+    return f"~/{name.rpartition('/')[2]}"
+
 
 NODES = (PLANNER, SIM_DRIVER, PROGRAM_RUNNER, RECORDER)
 """The nodes of a cell."""

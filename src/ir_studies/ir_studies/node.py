@@ -22,6 +22,7 @@ from rclpy.node import Node
 from ir_description import DescriptionError, is_path
 from ir_msgs.action import RunStudy
 from ir_msgs_py import names
+from ir_msgs_py.names import own
 from ir_msgs_py.ros.diagnostics import OK, Condition, Diagnostics
 from ir_msgs_py.ros.node_process import run_node
 from ir_msgs_py.ros.parameters import Parameters
@@ -72,7 +73,7 @@ class StudiesNode(Node):
         self._server = RecordedActionServer(
             self,
             RunStudy,
-            names.RUN_STUDY,
+            own(names.RUN_STUDY),
             self._run,
             cancel_callback=lambda goal: CancelResponse.ACCEPT,
             callback_group=ReentrantCallbackGroup(),

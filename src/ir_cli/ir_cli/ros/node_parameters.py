@@ -14,6 +14,7 @@ import yaml
 from ir_cli.errors import CommandError, unknown_name
 from ir_msgs_py.modes import PREFIX, TransitionTimes
 from ir_msgs_py.names import NODES
+from ir_msgs_py.ros.parameters import IntrospectionSettings
 from ir_planner import PlannerSettings
 from ir_planner.node.moveit_requests import MoveItSettings
 from ir_program_runner import LinkSettings, ProgramSettings
@@ -53,6 +54,8 @@ NODE_SETTINGS: dict[str, tuple[tuple[str, Callable[[], Any]], ...]] = {
     "ir_studies": (("", StudiesSettings),),
     "ir_moveit": (("", MoveItSettings),),
 }
+for _node in NODE_SETTINGS:
+    NODE_SETTINGS[_node] += (("", IntrospectionSettings),)
 
 
 def parameters_of(node: str) -> dict[str, Setting]:

@@ -27,7 +27,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from ir_msgs_py.ros.network import apply_network
-from ir_msgs_py.ros.parameters import check_names
+from ir_msgs_py.ros.parameters import check_names, introspect_services
 from ir_msgs_py.ros.rclpy_inside import UNREADABLE_ARGUMENTS, heed_times_only, survive_clients
 from ir_msgs_py.ros.spinning import LOOK, Spinning
 from ir_values.errors import ParameterError, one_line
@@ -124,6 +124,7 @@ def run_node(
         init_ros(arguments)
         node = make()
         try:
+            introspect_services(node)
             check_names(node, words)
             spins = executor()
             spins.add_node(node)

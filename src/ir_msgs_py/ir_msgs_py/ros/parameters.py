@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from itertools import pairwise
 from typing import Any, Generic, TypeVar
@@ -24,11 +24,13 @@ from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+from rclpy.service_introspection import ServiceIntrospectionState
 
 from ir_msgs_py.ros.rclpy_inside import given_names
-from ir_msgs_py.ros.serving import ANY
+from ir_msgs_py.ros.serving import ANY, Calls
 from ir_values.errors import IrError, ParameterError, one_line
-from ir_values.settings import Setting, changed, tree
+from ir_values.settings import Setting, changed, check_settings, setting, tree
 
 PACKAGE = "rcl_interfaces"
 Callback = Callable[[Any, Any], Any]
@@ -83,6 +85,7 @@ def _results(response: Any) -> Sequence[Any]:
 
 T = TypeVar("T")
 _INT64 = 2**63
+_EVENTS = 100  # of a service that wait for a slow listener
 
 
 class Parameters(Generic[T]):
@@ -228,6 +231,46 @@ def _real(name: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise ParameterError(f"{name} is {one_line(str(value), 80)}: it must be a number")
     return float(value)
+
+
+# What ros2cli's `ros2 service echo` shows.
+
+_INTROSPECTION = {
+    "off": ServiceIntrospectionState.OFF,
+    "metadata": ServiceIntrospectionState.METADATA,
+    "contents": ServiceIntrospectionState.CONTENTS,
+}
+
+
+@dataclass(frozen=True)
+class IntrospectionSettings:
+    """What every node publishes of its services."""
+
+    service_introspection: str = setting(
+        "off",
+        "Events of each service on <service>/_service_event, for ros2 service echo: off, metadata "
+        "(who asked, and when), or contents (requests and answers too).",
+        choices=tuple(_INTROSPECTION),
+        read_only=True,
+    )
+
+    def __post_init__(self) -> None:
+        check_settings(self)
+
+
+def introspect_services(node: Node) -> None:
+    """Declare the parameter of IntrospectionSettings, and let the services of the node that answer
+    for this project publish their events as it says. Actions publish none in Jazzy.
+
+    Call it once, when all services are there. Raises ParameterError.
+    """
+    chosen = Parameters(node, IntrospectionSettings).value.service_introspection
+    if chosen == "off":
+        return
+    for service in Calls.of(node).services:
+        service.configure_introspection(
+            node.get_clock(), QoSProfile(depth=_EVENTS), _INTROSPECTION[chosen]
+        )
 
 
 # Names that no parameter has.

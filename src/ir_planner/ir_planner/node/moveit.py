@@ -28,6 +28,7 @@ from ir_msgs.msg import Status as StatusMsg
 from ir_msgs.msg import TrajectoryReport
 from ir_msgs.srv import CheckState, GetCell, SetCell
 from ir_msgs_py import names
+from ir_msgs_py.names import own
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import (
     configuration_from_msg,
@@ -334,9 +335,9 @@ class MoveItNode(Node):
             node_name=names.hidden_node(self.get_name(), "client"),
             timeout=_PATIENCE,
         )
-        self._statuses = self.create_publisher(StatusMsg, names.MOVEIT_STATUS, LATCHED)
-        self._reports = self.create_publisher(TrajectoryReport, names.MOVEIT_REPORT, LATCHED)
-        self._energies = self.create_publisher(Float64, names.MOVEIT_ENERGY, LATCHED)
+        self._statuses = self.create_publisher(StatusMsg, own(names.MOVEIT_STATUS), LATCHED)
+        self._reports = self.create_publisher(TrajectoryReport, own(names.MOVEIT_REPORT), LATCHED)
+        self._energies = self.create_publisher(Float64, own(names.MOVEIT_ENERGY), LATCHED)
         self._states = LatestMessage(self, JointState, names.JOINT_STATES, 16)
         self._last = LastState(offered=lambda: self.count_publishers(names.JOINT_STATES) > 0)
         answers = PlannerAnswers(

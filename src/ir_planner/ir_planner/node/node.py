@@ -45,6 +45,7 @@ from ir_msgs.srv import (
     SetEquipment,
 )
 from ir_msgs_py import names
+from ir_msgs_py.names import own
 from ir_msgs_py.ros.conversions import configuration_from_msg, trajectory_to_msg
 from ir_msgs_py.ros.diagnostics import OK, WARN, Condition, Diagnostics
 from ir_msgs_py.ros.node_process import run_node
@@ -108,10 +109,12 @@ class PlannerNode(Node):
             self._show_savings,
         )
         self._trajectories = self.create_publisher(
-            JointTrajectoryMsg, names.PLANNED_TRAJECTORY, LATCHED
+            JointTrajectoryMsg, own(names.PLANNED_TRAJECTORY), LATCHED
         )
-        self._savings = self.create_publisher(ProgramSavingsMsg, names.PROGRAM_SAVINGS, LATCHED)
-        self._markers = self.create_publisher(MarkerArray, names.PLANNER_MARKERS, LATCHED)
+        self._savings = self.create_publisher(
+            ProgramSavingsMsg, own(names.PROGRAM_SAVINGS), LATCHED
+        )
+        self._markers = self.create_publisher(MarkerArray, own(names.PLANNER_MARKERS), LATCHED)
         self._diagnostics = Diagnostics(self)
         self._shown = ShownMarkers()
         self._quick = MutuallyExclusiveCallbackGroup()
@@ -152,11 +155,11 @@ class PlannerNode(Node):
             (OptimizeTrajectory, names.OPTIMIZE_TRAJECTORY, ask.optimize_trajectory, long),
             (PlanProgram, names.PLAN_PROGRAM, ask.plan_program, long),
         ):
-            BoundedService(self, kind, name, ask.guarded(handler), group)
+            BoundedService(self, kind, own(name), ask.guarded(handler), group)
         self._action = RecordedActionServer(
             self,
             Plan,
-            names.PLAN,
+            own(names.PLAN),
             self._goals.execute,
             handle_accepted_callback=self._goals.accepted,
             cancel_callback=self._goals.cancel,

@@ -15,6 +15,7 @@ from ir_msgs.msg import ControllerTimers as ControllerTimersMsg
 from ir_msgs.msg import MachineStates as MachineStatesMsg
 from ir_msgs_py import names
 from ir_msgs_py.announcements import CellState
+from ir_msgs_py.names import own
 from ir_msgs_py.ros.conversions import pose_to_msg
 from ir_msgs_py.ros.plan_conversions import machine_states_from_msg
 from ir_msgs_py.ros.power_conversions import (
@@ -41,7 +42,7 @@ class Announcements:
     def __init__(self, node: Node, planner: Planner, group: CallbackGroup) -> None:
         self._node = node
         self._planner = planner
-        self._cells = node.create_publisher(CellStateMsg, names.CELL, LATCHED)
+        self._cells = node.create_publisher(CellStateMsg, own(names.CELL), LATCHED)
         for kind, topic, hear in (
             (ControllerTimersMsg, names.CONTROLLER_TIMERS, self._hear_timers),
             (CarriedLoadMsg, names.CARRIED_LOAD, self._hear_load),

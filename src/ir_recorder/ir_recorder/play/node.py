@@ -28,6 +28,7 @@ from rosgraph_msgs.msg import Clock
 
 from ir_msgs.srv import ControlPlayback
 from ir_msgs_py import names
+from ir_msgs_py.names import own
 from ir_msgs_py.ros.messages import interface_type
 from ir_msgs_py.ros.node_process import CommandLineError, own_words, run_node
 from ir_msgs_py.ros.serving import BoundedService, answered
@@ -140,7 +141,7 @@ class PlayNode(Node):
         self.head = Playhead(time.monotonic, duration, settings.rate)
         self._check_clock(max(times, default=0))
         self._thread = threading.Thread(target=self._play, name="ir_play", daemon=True)
-        BoundedService(self, ControlPlayback, names.CONTROL_PLAYBACK, self._on_control)
+        BoundedService(self, ControlPlayback, own(names.CONTROL_PLAYBACK), self._on_control)
 
     def _check_clock(self, last_ns: int) -> None:
         if self._ticks is not None and last_ns >= _CLOCK_NS:

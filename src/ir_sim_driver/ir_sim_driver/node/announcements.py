@@ -24,6 +24,7 @@ from ir_msgs.msg import ControllerTimers as ControllerTimersMsg
 from ir_msgs.msg import MachineStates as MachineStatesMsg
 from ir_msgs_py import names
 from ir_msgs_py.announcements import CarriedLoad
+from ir_msgs_py.names import own
 from ir_msgs_py.ros.plan_conversions import contact_to_msg, machine_states_to_msg
 from ir_msgs_py.ros.power_conversions import carried_load_to_msg, controller_timers_to_msg
 from ir_msgs_py.ros.serving import ANY, unexpected
@@ -55,16 +56,18 @@ class Announcements:
         self._load: Carried | None = None
         self._cells = ThreadPoolExecutor(max_workers=1, thread_name_prefix="cells")
         self._offered: deque[CellState] = deque(maxlen=1)  # a flood of large cells waits nowhere
-        self._loads = node.create_publisher(CarriedLoadMsg, names.CARRIED_LOAD, LATCHED)
+        self._loads = node.create_publisher(CarriedLoadMsg, own(names.CARRIED_LOAD), LATCHED)
         self._description = node.create_publisher(String, names.ROBOT_DESCRIPTION, LATCHED)
-        self._timers = node.create_publisher(ControllerTimersMsg, names.CONTROLLER_TIMERS, LATCHED)
-        self._machines = node.create_publisher(MachineStatesMsg, names.MACHINE_STATES, LATCHED)
-        self._contacts = node.create_publisher(ContactMsg, names.CONTACTS, _CONTACTS)
+        self._timers = node.create_publisher(
+            ControllerTimersMsg, own(names.CONTROLLER_TIMERS), LATCHED
+        )
+        self._machines = node.create_publisher(MachineStatesMsg, own(names.MACHINE_STATES), LATCHED)
+        self._contacts = node.create_publisher(ContactMsg, own(names.CONTACTS), _CONTACTS)
         self._version = -1
         timers = controller_timers_to_msg(driver.timers)
         timers.header.stamp = self._now()
         self._timers.publish(timers)
-        self._plant = node.create_publisher(String, names.PLANT, LATCHED)
+        self._plant = node.create_publisher(String, own(names.PLANT), LATCHED)
         self._plant.publish(String(data=plant_to_yaml(driver.plant)))
         self.look()
         self._changed = node.create_guard_condition(self.look)

@@ -8,6 +8,7 @@ from rclpy.node import Node
 from trajectory_msgs.msg import JointTrajectory
 
 from ir_msgs_py import names
+from ir_msgs_py.names import own
 from ir_msgs_py.ros.rclpy_inside import can_take_messages, take_bytes
 from ir_sim_driver.controller import Driver, refused
 from ir_sim_driver.motion import ErrorCode, Outcome, TrajectoryGoal
@@ -31,7 +32,7 @@ class TrajectoryTopic:
         self._driver = driver
         self._admit = admit
         self._reader = TrajectoryReader()
-        topic = names.COMMANDED_TRAJECTORY
+        topic = own(names.COMMANDED_TRAJECTORY)
         self._subscription = node.create_subscription(
             JointTrajectory, topic, self._take, 10, raw=True
         )

@@ -12,6 +12,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from ir_msgs_py import names
+from ir_msgs_py.names import own
 from ir_msgs_py.ros.conversions import float_array, time_from_msg, time_to_msg
 from ir_msgs_py.ros.serving import BoundedService
 from ir_msgs_py.status import Status
@@ -44,7 +45,7 @@ class StateQueries:
         """Serve it on a node, where its type is installed."""
         kind = control_type("srv", "QueryTrajectoryState")
         if kind is not None:
-            BoundedService(node, kind, names.QUERY_STATE, self.answer, put=put_refusal)
+            BoundedService(node, kind, own(names.QUERY_STATE), self.answer, put=put_refusal)
 
     def answer(self, request: Any, response: Any) -> Any:
         """What the controller commands at the time of the request."""
@@ -79,7 +80,7 @@ class ControllerStates:
         self._publisher = None
         if self._type is not None:
             self._publisher = node.create_publisher(
-                self._type, names.TRAJECTORY_CONTROLLER_STATE, quality
+                self._type, own(names.TRAJECTORY_CONTROLLER_STATE), quality
             )
 
     def publish(self, stamp_ns: int, following: Following) -> None:
@@ -99,7 +100,7 @@ def hear_speed_factor(node: Node, driver: Driver) -> None:
     if kind is not None:
         node.create_subscription(
             kind,
-            names.SPEED_SCALING_INPUT,
+            own(names.SPEED_SCALING_INPUT),
             lambda msg: driver.set_speed_scaling(float(msg.factor)),
             10,
         )

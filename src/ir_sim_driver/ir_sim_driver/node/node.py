@@ -23,6 +23,7 @@ from ir_description import DescriptionError
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, StartPause
 from ir_msgs_py import names
+from ir_msgs_py.names import own
 from ir_msgs_py.ros.conversions import time_to_msg
 from ir_msgs_py.ros.diagnostics import Diagnostics
 from ir_msgs_py.ros.node_process import run_node
@@ -144,14 +145,14 @@ class SimDriver(Node):
 
     def _open_topics(self) -> None:
         self._streams = Streams(self, self._driver.joint_names)
-        self._markers = self.create_publisher(MarkerArray, names.ROBOT_MARKERS, 1)
+        self._markers = self.create_publisher(MarkerArray, own(names.ROBOT_MARKERS), 1)
         self._robot = RobotMarkers((), ())
         self._diagnostics = Diagnostics(self)
         self._drained = 0  # the last stop of before which no goal waits any more
         self._trajectory_topic = TrajectoryTopic(self, self._driver, self._admit)
         self.create_subscription(
             Float64,
-            names.SPEED_SCALING,
+            own(names.SPEED_SCALING),
             lambda msg: self._driver.set_speed_scaling(float(msg.data)),
             10,
         )
@@ -164,10 +165,10 @@ class SimDriver(Node):
         self._announcements = Announcements(self, self._driver, self.now_msg, self._load_changed)
 
     def _open_requests(self) -> None:
-        self._actions = [self._serve_action(ExecuteTrajectory, names.EXECUTE_TRAJECTORY)]
+        self._actions = [self._serve_action(ExecuteTrajectory, own(names.EXECUTE_TRAJECTORY))]
         follow = control_type("action", "FollowJointTrajectory")
         if follow is not None:
-            self._actions.append(self._serve_action(follow, names.FOLLOW_JOINT_TRAJECTORY))
+            self._actions.append(self._serve_action(follow, own(names.FOLLOW_JOINT_TRAJECTORY)))
         StateQueries(self._driver).offer(self)
         self._answers = answers = Services(self._driver, self.get_name(), self._announcements.look)
         self._presses = OwnParticipant(self, "presses")
@@ -175,12 +176,12 @@ class SimDriver(Node):
         self._inputs = PolledService(
             self._requests.node,
             SetPlcInput,
-            names.SET_PLC_INPUT,
+            own(names.SET_PLC_INPUT),
             answers.set_plc_input,
             self,
             urgent=presses_the_stop,
         )
-        self._recoveries = PolledService(self, Recover, names.RECOVER, self._recover, self)
+        self._recoveries = PolledService(self, Recover, own(names.RECOVER), self._recover, self)
         self._threads = (
             CommandThread("presses", PlcTopic(self, self._driver, self._presses).poll),
             CommandThread(
@@ -191,10 +192,10 @@ class SimDriver(Node):
         )
         for thread in self._threads:
             thread.start()
-        BoundedService(self, StartPause, names.START_PAUSE, answers.start_pause)
-        BoundedService(self, EndPause, names.END_PAUSE, answers.end_pause)
-        BoundedService(self, QueryModes, names.QUERY_MODES, answers.query_modes)
-        BoundedService(self, SetLoad, names.SET_LOAD, answers.set_load)
+        BoundedService(self, StartPause, own(names.START_PAUSE), answers.start_pause)
+        BoundedService(self, EndPause, own(names.END_PAUSE), answers.end_pause)
+        BoundedService(self, QueryModes, own(names.QUERY_MODES), answers.query_modes)
+        BoundedService(self, SetLoad, own(names.SET_LOAD), answers.set_load)
 
     def _serve_action(self, action_type: Any, name: str) -> BoundedActionServer:
         executions = Executions(

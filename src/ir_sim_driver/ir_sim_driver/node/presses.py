@@ -26,6 +26,7 @@ from rclpy.serialization import deserialize_message
 
 from ir_msgs.msg import PlcInputs
 from ir_msgs_py import names
+from ir_msgs_py.names import own
 from ir_msgs_py.plc import PlcInputs as Levels
 from ir_msgs_py.ros.conversions import status_to_msg
 from ir_msgs_py.ros.messages import type_name
@@ -251,6 +252,7 @@ class PlcTopic:
         self._order = LevelOrder(time.time_ns())
         self._read_before: dict[bytes, Levels] = {}
         self._pressed = False  # by the last message in its turn
+        self._name = node.resolve_topic_name(own(names.PLC_INPUTS))
         self._all = self._listen(node, QoSProfile(depth=BURST))
         self._presses: list[tuple[Any, bool]] = []
         if presses.apart:
@@ -265,7 +267,6 @@ class PlcTopic:
         """Subscriptions that `poll` takes from, and whether they hear those who latch; where rclpy
         can't poll, the executor calls back.
         """
-        topic = names.PLC_INPUTS
         found = []
         for durability in _BOTH:
             quality.durability = durability
@@ -277,11 +278,11 @@ class PlcTopic:
 
             if can_poll():
                 polled = node.create_subscription(
-                    PlcInputs, topic, called, quality, callback_group=PolledGroup(), raw=True
+                    PlcInputs, self._name, called, quality, callback_group=PolledGroup(), raw=True
                 )
                 found.append((polled, latching))
             else:
-                node.create_subscription(PlcInputs, topic, called, quality, raw=True)
+                node.create_subscription(PlcInputs, self._name, called, quality, raw=True)
         return found
 
     def poll(self) -> int:
@@ -423,6 +424,7 @@ class PolledService:
         self._source = owner.get_name()
         self._log = node.get_logger().error
         self._polled = can_poll()
+        name = owner.resolve_service_name(name)  # `node` may have another private namespace
         if self._polled:
             self._service = node.create_service(
                 service_type, name, _nothing, qos_profile=SERVICE, callback_group=PolledGroup()
@@ -432,6 +434,7 @@ class PolledService:
                 service_type, name, lambda request, response: handler(request, response, 0)
             )
         self._calls = Calls.of(owner)
+        self._calls.services.append(self._service)
         self._sender = patient_sender(self._service, _SENDS)
         self._waiting: deque[tuple[Any, Any, int]] = deque()
         self._answers = _Answers()

@@ -15,6 +15,7 @@ from std_msgs.msg import UInt64
 
 from ir_msgs.msg import ControllerState, LoadCheck, PlcInputs, PlcOutputs, PowerState
 from ir_msgs_py import names
+from ir_msgs_py.names import own
 from ir_msgs_py.ros.conversions import time_to_msg
 from ir_msgs_py.ros.power_conversions import (
     plc_inputs_to_msg,
@@ -41,16 +42,16 @@ class Streams:
         self._node = node
         self._names = joint_names
         self._joint_states = node.create_publisher(JointState, names.JOINT_STATES, _STREAM)
-        self._power_states = node.create_publisher(PowerState, names.POWER_STATE, _STREAM)
+        self._power_states = node.create_publisher(PowerState, own(names.POWER_STATE), _STREAM)
         self._controller_states = node.create_publisher(
-            ControllerState, names.CONTROLLER_STATE, _STREAM
+            ControllerState, own(names.CONTROLLER_STATE), _STREAM
         )
         self._states_of_controllers = ControllerStates(node, joint_names, _STREAM)
-        self._load_checks = node.create_publisher(LoadCheck, names.LOAD_CHECK, LATCHED)
-        self._stop_numbers = node.create_publisher(UInt64, names.STOP_NUMBER, LATCHED)
+        self._load_checks = node.create_publisher(LoadCheck, own(names.LOAD_CHECK), LATCHED)
+        self._stop_numbers = node.create_publisher(UInt64, own(names.STOP_NUMBER), LATCHED)
         self._stop_number = -1
-        self._outputs = node.create_publisher(PlcOutputs, names.PLC_OUTPUTS, LATCHED)
-        self._in_force = node.create_publisher(PlcInputs, names.PLC_INPUTS_IN_FORCE, LATCHED)
+        self._outputs = node.create_publisher(PlcOutputs, own(names.PLC_OUTPUTS), LATCHED)
+        self._in_force = node.create_publisher(PlcInputs, own(names.PLC_INPUTS_IN_FORCE), LATCHED)
         self._joint_state = JointState(name=list(joint_names))
         self._joint_state.header.frame_id = names.BASE_FRAME
         self._clock = None
