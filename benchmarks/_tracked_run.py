@@ -157,7 +157,11 @@ class TrackedRun:
             sum(load.watts_drive_bus for load in loads),
             sum(load.mass for load in loads),
         )
-        return self._base.of(stretch.mode, stretch.q[-1]), self._base.tool(stretch.mode)
+        rest = None
+        if stretch.mode is not Mode.STAND_ON_MOTORS:
+            rest = self._base.whole(stretch.mode, stretch.q[-1])
+        watts = self._base.of(stretch.mode) if rest is None else rest
+        return watts, self._base.tool(stretch.mode)
 
     def _torques(self, stretch: _Stretch) -> FloatArray:
         """Motor torque (N, n) [Nm] at the joints; warms the gears."""

@@ -224,7 +224,7 @@ def model_energy(simulation: Simulation, trajectory: JointTrajectory) -> float:
     s = trajectory.sample(t)
     power = simulation.dynamics.drive_power(s.q, s.qd, s.qdd)
     bus = dc_bus(power, DT, DcBusParameters(106.0))
-    base = simulation.mains.base.of(simulation.modes.level, simulation.backend.q)
+    base = simulation.mains.base.of(simulation.modes.level)
     return float(DT * bus.mains.sum() + base * trajectory.duration)
 
 

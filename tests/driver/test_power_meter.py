@@ -66,15 +66,15 @@ def test_braking_lifts_the_bus_voltage_up_to_the_chopper(meter):
 
 def test_watts_of_the_tool_don_t_grow_with_a_part(make):
     simulation = make()
-    assert simulation.mains.base.of(Mode.HIBERNATION, HOME) == pytest.approx(105.0)
-    assert simulation.mains.base.of(Mode.STAND_ON_BRAKES, HOME) == pytest.approx(325.0)
+    assert simulation.mains.base.of(Mode.HIBERNATION) == pytest.approx(105.0)
+    assert simulation.mains.base.of(Mode.STAND_ON_BRAKES) == pytest.approx(325.0)
 
 
 def test_base_power_follows_the_level(cell):
     base = BasePower(nominal_plant(cell.robot, load_power_data()).watts)
     base.set_load(90.0, 100.0, 155.0)
     watts = [
-        base.of(Mode[mode], HOME)
+        base.of(Mode[mode])
         for mode in ("HIBERNATION", "BUS_POWER_OFF", "STAND_ON_BRAKES", "STAND_ON_MOTORS")
     ]
     assert watts == pytest.approx([105.0, 205.0, 325.0, 602.16])

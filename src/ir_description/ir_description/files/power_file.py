@@ -140,12 +140,11 @@ def power_of(root: Item) -> PowerData:
 
 
 def _rest_table(item: Item, modes: tuple[str, ...]) -> RestTable:
-    """Measured rests: every row has the same modes, all of them with the brakes closed."""
+    """Measured rests: every row has the same modes."""
     rows = [entry.table(("posture_deg", "load_kg", "watts")) for entry in item.list(1, _RESTS_MAX)]
-    resting = modes[1:]
-    known = [name for name in resting if name in rows[0]["watts"].table((), modes)]
+    known = [name for name in modes if name in rows[0]["watts"].table((), modes)]
     if not known:
-        rows[0]["watts"].fail(f"names no saving mode: known are {', '.join(resting)}")
+        rows[0]["watts"].fail(f"names no mode: known are {', '.join(modes)}")
     return RestTable(tuple(known), tuple(_rest_row(row, known) for row in rows))
 
 

@@ -99,8 +99,9 @@ class PowerData:
     """All of a controller's power figures; tool watts belong to the tool (Load).
 
     table_2_robot: the robot that Table II was measured with, "" where there is no such table.
-    rest_table: power of the saving modes by posture and load, as it was measured; None: each draws
-    the same at every posture, and what is attached adds its own watts.
+    rest_table: power at rest by posture and load, as it was measured; None, or of a mode that it
+    does not know: motors hold by the model's torques, a saving mode draws the same at every
+    posture, and what is attached adds its own watts.
     marks: how sure each figure is, by its place in the file.
     """
 
@@ -166,12 +167,11 @@ class PowerData:
                 "no table by posture and load was measured"
             )
         beyond = self.rest_table.outside(posture, load)
-        rows = f"{len(self.rest_table.rows)} measured rests"
-        return (
-            f"saving modes draw by {rows}, outside of them: {beyond}, their nearest values count"
-            if beyond
-            else f"saving modes draw by {rows}"
-        )
+        what = "saving modes draw"
+        if self.modes[0].name in self.rest_table.modes:
+            what = "motors that hold and saving modes draw"
+        said = f"{what} by {len(self.rest_table.rows)} measured rests"
+        return f"{said}, outside of them: {beyond}, their nearest values count" if beyond else said
 
     def measured(self, payload: float, mode: str) -> float:
         """Return Table II's watts for a payload of 0 or 155 kg in a mode."""

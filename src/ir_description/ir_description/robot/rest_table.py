@@ -1,4 +1,4 @@
-"""Power of the saving modes by posture and load, as a meter showed it."""
+"""Power at rest by posture and load, as a meter showed it: of saving modes, and on motors."""
 
 from __future__ import annotations
 

@@ -174,14 +174,13 @@ def at_once(rests: Sequence[Rest]) -> Steps:
 
 def mode_watts(name: str, q: FloatArray, scene: PlanningScene) -> float:
     """Mains power [W] in a mode at q (n,): controller, tool (its bus share while the drive bus is
-    up), holding torque; of a saving mode that was measured by posture and load, what its table
-    says.
+    up), holding torque; of a mode that was measured by posture and load, what its table says.
     """
-    if name == MOTORS:
-        return holding_watts(q, scene)
     table = scene.power.measured_rest(name)
     if table is not None:
         return table.watts(name, q.tolist(), scene.load_mass)
+    if name == MOTORS:
+        return holding_watts(q, scene)
     return scene.power.mode(name).controller_watts + scene.tool_watts(drive_bus=name == BRAKES)
 
 
@@ -240,10 +239,10 @@ def _one_watt(rests: Rests, mode: str) -> Rests:
 
 
 def _mode_slope(mode: str, q: FloatArray, scene: PlanningScene) -> FloatArray:
-    if mode == MOTORS:
-        return holding_slope(q, scene)
     if scene.power.measured_rest(mode) is not None:  # a measured power depends on no parameter
         return np.zeros(len(scene.parameters.names))
+    if mode == MOTORS:
+        return holding_slope(q, scene)
     return standing_slope(1.0, scene, mode, drive_bus=mode == BRAKES)
 
 

@@ -81,7 +81,7 @@ def resting_watts(
     mode: str, q: FloatArray, cell: Cell, loads: tuple[Load, ...], data: PowerData
 ) -> float:
     """W at the mains in a mode at q (n,): controller, tool, and with motors on drives and holding
-    torque; of a saving mode that was measured by posture and load, what its table says.
+    torque; of a mode that was measured by posture and load, what its table says.
     """
     table = data.measured_rest(mode)
     if table is not None:

@@ -93,7 +93,8 @@ def _plateau(
         known and cell.robot.name == data.table_2_robot and _of_the_paper(loads, payload, data)
     )
     table_2 = data.measured(round(payload), mode) if of_the_paper else NAN
-    low, high = _interval(expected, cell, loads, data) if known and mode == MOTORS else (NAN, NAN)
+    modelled = known and mode == MOTORS and data.measured_rest(mode) is None
+    low, high = _interval(expected, cell, loads, data) if modelled else (NAN, NAN)
     return Plateau(mode, load, payload, power, expected, table_2, seconds, low, high)
 
 

@@ -29,6 +29,7 @@ class Mains:
         self._unsettled = 0
         # steps at this level that the meter has not counted
         self._level = Mode.STAND_ON_MOTORS
+        self._standing = True
         self._steps = 0
 
     def set_load(self, load: Carried) -> None:
@@ -37,11 +38,12 @@ class Mains:
         for base in (self.base, self._known):
             base.set_load(load.watts_always, load.watts_drive_bus, load.mass)
 
-    def step(self, level: Mode) -> None:
-        """Count one step at this level: STAND_ON_MOTORS or a rest."""
-        if level is not self._level:
+    def step(self, level: Mode, *, standing: bool) -> None:
+        """Count one step at this level: STAND_ON_MOTORS or a rest, and whether the robot stands."""
+        if level is not self._level or standing is not self._standing:
             self._count()
             self._level = level
+            self._standing = standing
         self._steps += 1
         self._unsettled += 1
         if self._unsettled >= _SETTLE_STEPS:
@@ -57,12 +59,14 @@ class Mains:
         """Let the meter count the steps at the present level."""
         if self._steps:
             level = self._level
-            base = self.base.of(level, self._backend.q)
+            whole = self.base.whole(level, self._backend.q) if self._standing else None
+            base = self.base.of(level) if whole is None else whole
             self.meter.add(
                 base,
                 min(self.base.tool(level), base),
                 level is Mode.STAND_ON_MOTORS,
                 self._steps,
+                whole=whole is not None,
             )
             self._steps = 0
 
@@ -74,7 +78,10 @@ class Mains:
     def standing_power(self, level: Mode, dynamics: DynamicsModel) -> float:
         """Watts at the mains that the controller expects of a mode at the present posture."""
         q = self._backend.q[None]
-        watts = self._known.of(level, q[0])
+        whole = self._known.whole(level, q[0])
+        if whole is not None:
+            return whole
+        watts = self._known.of(level)
         if level is Mode.STAND_ON_MOTORS:
             still = np.zeros_like(q)
             hold = dynamics.inverse_dynamics(q, still, still)

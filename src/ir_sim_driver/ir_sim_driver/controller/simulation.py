@@ -360,7 +360,7 @@ class Simulation:
                 self._supervise()
         except BackendError as error:
             self.safety.failed(error)
-        self.mains.step(self.modes.level)
+        self.mains.step(self.modes.level, standing=self.modes.mode is not Mode.MOVING)
         self._outcomes.collect()
         self.steps += 1
 

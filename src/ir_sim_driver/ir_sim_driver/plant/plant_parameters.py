@@ -130,8 +130,8 @@ class LinkFigures:
 @dataclass(frozen=True)
 class StandingWatts:
     """Watts [W] of the controller by mode and of the drives while motors are on; tool: factor on
-    the data's watts of the tool; rest_table: what the cabinet draws in saving modes by posture and
-    load, where that was measured.
+    the data's watts of the tool; rest_table: what the mains give at rest by posture and load,
+    where that was measured.
     """
 
     controller: Mapping[Mode, float]

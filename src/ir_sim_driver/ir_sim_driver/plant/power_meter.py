@@ -42,12 +42,20 @@ class BasePower:
             level: watts + self._tool[level] for level, watts in self._controller.items()
         }
 
-    def of(self, level: Mode, q: FloatArray) -> float:
-        """Watts in STAND_ON_MOTORS or a rest at q (n,), without holding torque."""
-        table = self._figures.rest_table
-        if table is not None and level.name in table.modes:
-            return table.watts(level.name, q.tolist(), self._mass)
+    def of(self, level: Mode) -> float:
+        """Watts in STAND_ON_MOTORS or a rest by the figures of controller, drives and tool, without
+        holding torque.
+        """
         return self._watts[level]
+
+    def whole(self, level: Mode, q: FloatArray) -> float | None:
+        """Watts at the mains of a robot that stands at q (n,), holding torque included, where that
+        was measured by posture and load; None: it was not.
+        """
+        table = self._figures.rest_table
+        if table is None or level.name not in table.modes:
+            return None
+        return table.watts(level.name, q.tolist(), self._mass)
 
     def tool(self, level: Mode) -> float:
         """Watts of the tool, a part of `of`."""
@@ -135,6 +143,16 @@ class DcCircuit:
                 flows[j] += flow
             k += 1
         return Flows(*flows)
+
+    def drawn(self, powers: FloatArray) -> FloatArray:
+        """Watts (K,) that the mains give for axes that take `powers` (K,) [W] in all, with an empty
+        capacitor.
+        """
+        f = self._figures
+        taken = np.maximum(powers, 0.0)
+        lost = f.rectifier_drop * taken + f.rectifier_resistance / f.mains * taken * taken
+        drawn: FloatArray = taken + lost / f.mains
+        return drawn
 
     def _events(self, power: float) -> tuple[float, float]:
         """Energies supplied and dissipated in a step of this power."""
@@ -258,7 +276,7 @@ class PowerMeter:
         self._dt = dt
         self._losses = DriveLosses(plant.drives, np.array(plant.robot.gear_ratio))
         self._circuit = DcCircuit(plant.link, dt, regeneration)
-        self._loads: list[tuple[int, float, float, bool]] = []  # steps that have the same
+        self._loads: list[tuple[int, float, float, bool, bool]] = []  # steps that have the same
         self._pending = 0
         self._steps = 0
         self._supplied = self._dissipated = self._rectifier = self._base_energy = (
@@ -270,12 +288,18 @@ class PowerMeter:
         self._last_base = self._last_tool = 0.0
 
     def add(
-        self, base_power: float, tool_power: float = 0.0, powered: bool = True, steps: int = 1
+        self,
+        base_power: float,
+        tool_power: float = 0.0,
+        powered: bool = True,
+        steps: int = 1,
+        *,
+        whole: bool = False,
     ) -> None:
         """Count steps with this base load [W], the tool's share of it, and whether motors are
-        on.
+        on; whole: it holds what the axes take at rest, the base load is what remains.
         """
-        self._loads.append((steps, base_power, tool_power, powered))
+        self._loads.append((steps, base_power, tool_power, powered, whole))
         self._pending += steps
 
     def settle(self, work: Work) -> None:
@@ -285,7 +309,7 @@ class PowerMeter:
         if not self._pending:
             return
         dt = self._dt
-        counts, base, tool, powered = zip(*self._loads, strict=True)
+        counts, base, tool, powered, whole = zip(*self._loads, strict=True)
         axes = self._losses.power(work, np.repeat(np.array(powered, dtype=np.float64), counts))
         total = axes.total
         flows = self._circuit.steps(total)
@@ -300,6 +324,11 @@ class PowerMeter:
         self._torque = work.torque[-1]
         self._current = axes.current[-1]
         self._last_base = base[-1]
+        if any(whole):
+            at_rest = np.repeat(np.array(whole, dtype=np.float64), counts)
+            held = at_rest * self._circuit.drawn(total.sum(axis=1))
+            self._base_energy -= dt * float(held.sum())
+            self._last_base -= float(held[-1])
         self._last_tool = tool[-1]
         self._loads.clear()
         self._pending = 0
