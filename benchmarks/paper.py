@@ -24,7 +24,7 @@ import re
 import resource
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -381,6 +381,13 @@ def is_asked(name: str, given: argparse.Namespace) -> bool:
     return given.again or stored(EXPERIMENTS[name], given) is None
 
 
+def origin(experiment: Experiment, given: argparse.Namespace, kept: Container[str]) -> str:
+    """Where the chapter of a claim that is not measured comes from."""
+    if stored(experiment, given) is not None:
+        return "as it is stored"
+    return "as the page has it" if experiment.title in kept else "not run"
+
+
 def chapter(experiment: Experiment, found: dict[str, Any], images: Path, folder: Path) -> Chapter:
     """Judge what was stored, and draw it."""
     rows: list[Row] = found["rows"]
@@ -405,12 +412,12 @@ def main() -> None:
     """Measure what is missing, write the page, print the claims."""
     given = arguments()
     asked = [] if given.write else [name for name in EXPERIMENTS if is_asked(name, given)]
-    for name in EXPERIMENTS:
+    kept = kept_chapters(given.page, seeds_of(given))
+    for name, one in EXPERIMENTS.items():
         if name not in asked:
-            print(f"{name}: as it is stored", flush=True)
+            print(f"{name}: {origin(one, given, kept)}", flush=True)
     run_all(asked, given)
     folder = given.page.parent
-    kept = kept_chapters(given.page, seeds_of(given))
     there = {}
     shown: list[Chapter | Kept] = []
     left = []
