@@ -1,5 +1,6 @@
 """Law: with a measured table by posture and load, planner, simulated plant and report draw the same
-on motors and in every saving mode, at every posture and load, by the stated rule; without one nothing changes.
+on motors and in every saving mode, at every posture and load, by the stated rule; without one
+nothing changes.
 """
 
 from __future__ import annotations
