@@ -32,8 +32,31 @@ def long_movement() -> JointTrajectory:
     return JointTrajectory.from_seconds(names.JOINT_NAMES, [200.0], there[None], np.zeros((1, 6)))
 
 
+def whole_client(node: Any, goal: Any) -> tuple[Any, Any]:
+    """A client of the action, as most are: what ends it, and the future of its goal."""
+    client = ActionClient(node, ExecuteTrajectory, names.EXECUTE_TRAJECTORY)
+    client.wait_for_server()
+    return client.destroy, client.send_goal_async(goal)
+
+
+def bare_client(node: Any, goal: Any) -> tuple[Any, Any]:
+    """A client of the action's service for goals alone, that hears no feedback."""
+    service = f"{names.EXECUTE_TRAJECTORY}/_action/send_goal"
+    client = node.create_client(ExecuteTrajectory.Impl.SendGoalService, service)
+    assert client.wait_for_service(10.0)
+    request = ExecuteTrajectory.Impl.SendGoalService.Request(goal=goal)
+    request.goal_id.uuid = list(range(16))
+    return lambda: node.destroy_client(client), client.call_async(request)
+
+
+@pytest.mark.parametrize("sends", [whole_client, bare_client])
 def test_a_movement_whose_client_has_gone_is_stopped_though_others_are_there(
-    ros_context: Any, ros_executor: Any, ros_node: Any, ros_domain_id: int, wait_for: Any
+    ros_context: Any,
+    ros_executor: Any,
+    ros_node: Any,
+    ros_domain_id: int,
+    wait_for: Any,
+    sends: Any,
 ) -> None:
     """As the program runner's, which is always there. A context is a participant, as a process
     is.
@@ -45,26 +68,26 @@ def test_a_movement_whose_client_has_gone_is_stopped_though_others_are_there(
         lambda: ActionClient(ros_node, ExecuteTrajectory, names.EXECUTE_TRAJECTORY)
     )
     wait_for(another.server_is_ready)
+
+    def processes() -> int:
+        return len({each[:12] for each in driver.clients_of(names.EXECUTE_TRAJECTORY)})
+
     context = Context()
     rclpy.init(context=context, domain_id=ros_domain_id)
     guest = BackgroundExecutor(context)
     try:
         node = guest.add_node(rclpy.create_node("guest", context=context))
-        client = guest.run(lambda: ActionClient(node, ExecuteTrajectory, names.EXECUTE_TRAJECTORY))
-        wait_for(client.server_is_ready)
         goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(long_movement()))
-        heard: list[Any] = []
-        accepted = guest.run(lambda: client.send_goal_async(goal, feedback_callback=heard.append))
+        leave, accepted = guest.run(lambda: sends(node, goal))
         wait_for(accepted.done)
-        feedback = f"{names.EXECUTE_TRAJECTORY}/_action/feedback"
-        wait_for(lambda: len(heard) > 2, what="the driver knows its client")
-        wait_for(lambda: len(driver.subscribers(feedback)) == 2, what="both clients are known")
-        guest.run(client.destroy)
+        wait_for(lambda: driver._driver.moving, what="the movement runs")
+        wait_for(lambda: processes() == 2, what="both clients are known")
+        guest.run(leave)
     finally:
         guest.close()
         context.try_shutdown()
     wait_for(lambda: not driver._driver.moving, what="the movement stops")
-    wait_for(lambda: len(driver.subscribers(feedback)) == 1, what="the other one is left")
+    wait_for(lambda: processes() == 1, what="the other one is left")
 
 
 def test_a_client_counts_by_its_process_once_that_is_known() -> None:
@@ -77,3 +100,9 @@ def test_a_client_counts_by_its_process_once_that_is_known() -> None:
     assert not ClientWatch(1e-9).gone([other + b"feed"])  # a middleware that names nobody
     assert ClientWatch(1e-9, own).gone([])
     assert not ClientWatch(0.0, own).gone([])
+
+
+def test_a_client_that_never_shows_in_the_graph_counts_as_gone_whoever_else_is_there() -> None:
+    other = [b"q" * 12 + b"feed"]
+    assert ClientWatch(1e-9, b"p" * 12, discovery=0.0).gone(other)
+    assert not ClientWatch(1e-9, b"", discovery=0.0).gone(other)

@@ -114,7 +114,7 @@ class SimDriver(Node):
         self._hardware = hardware_id(simulation.robot)
         self._joints: Joints | None = None
         self._last_words = 0.0
-        self._subscribers: dict[str, tuple[float, tuple[bytes, ...]]] = {}
+        self._action_clients: dict[str, tuple[float, tuple[bytes, ...]]] = {}
         self._open_topics()
         self._open_requests()
         self._links = open_links(self._configuration.links, self._driver)
@@ -264,14 +264,20 @@ class SimDriver(Node):
         if self.executor is not None:
             self.executor.wake()
 
-    def subscribers(self, topic: str) -> Sequence[bytes]:
-        """Identities of the subscriptions to a topic in the graph, of the last _GRAPH_PERIOD."""
+    def clients_of(self, action: str) -> Sequence[bytes]:
+        """Identities of the clients of an action in the graph, of the last _GRAPH_PERIOD: who
+        hears the answers to goals, as whoever sends one does, or the feedback.
+        """
         now = time.monotonic()
-        seen, there = self._subscribers.get(topic, (-_GRAPH_PERIOD, ()))
+        seen, there = self._action_clients.get(action, (-_GRAPH_PERIOD, ()))
         if now - seen >= _GRAPH_PERIOD:
-            found = self.get_subscriptions_info_by_topic(topic)
+            service = self.resolve_service_name(f"{action}/_action/send_goal")
+            found = [
+                *self.get_subscriptions_info_by_topic(f"rr{service}Reply", no_mangle=True),
+                *self.get_subscriptions_info_by_topic(f"{action}/_action/feedback"),
+            ]
             there = tuple(bytes(each.endpoint_gid) for each in found)
-            self._subscribers[topic] = now, there
+            self._action_clients[action] = now, there
         return there
 
     def every(self, seconds: float, callback: Callable[[], None]) -> Callable[[], None]:

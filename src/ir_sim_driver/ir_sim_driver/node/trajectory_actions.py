@@ -23,27 +23,33 @@ from ir_sim_driver.node.messages import fill_load_check, fill_points, goal_from_
 from ir_values.errors import one_line
 
 
+_DISCOVERY = 10.0  # s in which the client of a goal shows in the graph, on a busy machine too
+
+
 class ClientWatch:
     """Whether the client of a goal has been gone for `timeout` [s]; 0: never.
 
-    participant: of who sent it, b"" where nobody knows: any subscriber to the feedback counts then,
-    and also before the participant's own has been discovered.
+    participant: of who sent it. b"" where nobody knows: any client of the action counts then. One
+    that does not show in the graph within `discovery` [s] can't be watched and counts as gone;
+    until then any client counts.
     """
 
-    def __init__(self, timeout: float, participant: bytes = b"") -> None:
+    def __init__(
+        self, timeout: float, participant: bytes = b"", discovery: float = _DISCOVERY
+    ) -> None:
         self._timeout = timeout
         self._participant = participant
         self._known = False
         self._seen = time.monotonic()
+        self._until = self._seen + discovery
 
-    def gone(self, subscribers: Sequence[bytes]) -> bool:
-        """Look at the identities of those who subscribe to the feedback now."""
+    def gone(self, clients: Sequence[bytes]) -> bool:
+        """Look at the identities of those who are clients of the action now."""
         now = time.monotonic()
-        own = bool(self._participant) and any(
-            each.startswith(self._participant) for each in subscribers
-        )
-        self._known = self._known or own
-        if own or (subscribers and not self._known):
+        own = any(each.startswith(self._participant) for each in clients)
+        self._known = self._known or (own and bool(self._participant))
+        discovering = bool(clients) and not self._known and now < self._until
+        if own or discovering:
             self._seen = now
         return 0.0 < self._timeout < now - self._seen
 
@@ -319,8 +325,8 @@ class Executing(Protocol):
     def every(self, seconds: float, callback: Callable[[], None]) -> Callable[[], None]:
         """Call back again and again until the returned function is called."""
 
-    def subscribers(self, topic: str) -> Sequence[bytes]:
-        """Identities of the subscriptions to a topic in the graph."""
+    def clients_of(self, action: str) -> Sequence[bytes]:
+        """Identities of the clients of an action in the graph."""
 
     def now_msg(self) -> Any:
         """Time of the plant, as a message."""
@@ -342,7 +348,7 @@ class Executions:
         self._driver = driver
         self._node = node
         self._type = action_type
-        self._feedback_topic = f"{name}/_action/feedback"  # every client subscribes to it
+        self._name = name
         self._client_timeout = client_timeout
         self._tickets: dict[bytes, int] = {}
         self._canceled: set[bytes] = set()
@@ -378,7 +384,7 @@ class Executions:
 
         def report() -> None:
             self._publish_feedback(handle, ticket)
-            if watch.gone(self._node.subscribers(self._feedback_topic)):
+            if watch.gone(self._node.clients_of(self._name)):
                 seconds = self._client_timeout
                 self._driver.abandon(ticket, f"the goal has had no client for {seconds:g} s")
 
