@@ -46,7 +46,7 @@ def bare_client(node: Any, goal: Any) -> tuple[Any, Any]:
     assert client.wait_for_service(10.0)
     request = ExecuteTrajectory.Impl.SendGoalService.Request(goal=goal)
     request.goal_id.uuid = list(range(16))
-    return lambda: node.destroy_client(client), client.call_async(request)
+    return node.destroy_node, client.call_async(request)
 
 
 @pytest.mark.parametrize("sends", [whole_client, bare_client])

@@ -102,6 +102,9 @@ class World:
                 if not all((signal.name in self.levels) == signal.value for signal in signals):
                     self.pass_time(self.now + timeout)
                     return Status(StatusCode.TIMED_OUT, "not in time"), ()
+            case ask.TakeBack(name):
+                self.log.append(f"end_{name}")
+                self.set_bit(name, False)
             case ask.SetPlcInput(name, value):
                 if self.mode in (Mode.HIBERNATION, Mode.FROM_HIBERNATION):
                     return Status(StatusCode.TIMED_OUT, "hibernates"), ()
@@ -239,9 +242,9 @@ def test_a_signal_that_does_not_come_ends_the_program():
 @pytest.mark.parametrize(
     ("mode", "sleep", "wake"),
     [
-        ("BUS_POWER_OFF", ["ab=1"], ["ab=0"]),
-        ("HIBERNATION", ["hib=1"], ["packet", "hib=0"]),
-        ("STAND_ON_BRAKES", ["drives_off=1"], ["drives_off=0", "end_rest=1"]),
+        ("BUS_POWER_OFF", ["ab=1"], ["end_ab"]),
+        ("HIBERNATION", ["hib=1"], ["packet", "end_hib"]),
+        ("STAND_ON_BRAKES", ["drives_off=1"], ["end_drives_off", "end_rest=1"]),
     ],
 )
 def test_a_pause_rests_in_its_mode_and_is_ready_when_it_ends(mode, sleep, wake):
@@ -284,7 +287,7 @@ def test_a_pause_of_several_modes_goes_deeper_as_soon_as_it_can():
     world = World()
     result = world.run([pause(60.0, "STAND_ON_BRAKES>BUS_POWER_OFF"), move()])
     assert result.status.ok
-    deeper = ["drives_off=1", "ab=1", "drives_off=0", "end_rest=1", "ab=0"]
+    deeper = ["drives_off=1", "ab=1", "end_drives_off", "end_rest=1", "end_ab"]
     assert world.log[2:-4] == ["0 started", *deeper, "0 ended"]
     assert world.now == pytest.approx(100.0 + 60.0 + 2.0)
     assert not any(world.bits.values())

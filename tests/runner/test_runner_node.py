@@ -90,11 +90,10 @@ class FakeDriver(Node):
     def set_plc_input(self, request, response):
         self.log.append(f"{request.name}={int(request.value)}")
         if request.name in REST:
-            if request.value:
-                self.mode = REST[request.name]
-            elif request.name == "ab":
-                self.mode = Mode.STAND_ON_MOTORS
-        elif request.name == "end_rest" and request.value:
+            self.mode = REST[request.name]
+        elif request.name == "end_rest" or (
+            request.name == "end_ab" and self.mode is Mode.BUS_POWER_OFF
+        ):
             self.mode = Mode.STAND_ON_MOTORS
         response.status = OK
         return response

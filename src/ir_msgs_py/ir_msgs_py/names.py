@@ -117,6 +117,8 @@ STOPS_STATE: Final = "driver.stops"
 """Of a goal's `states`: "driver.stops=2" relies on no stop after the second."""
 END_REST: Final = "end_rest"
 """Name in SetPlcInput of a program's request to leave the rest that drives_off began."""
+TAKE_BACK: Final = "end_"
+"""Before "ab", "hib" or "drives_off" in SetPlcInput: a client takes its own 1 back."""
 
 # Senders on the topics that all cells share: the namespace is a part of the name, so that two cells
 # in one graph are kept apart. Namespaces are absolute: "/" or "/cell_1".

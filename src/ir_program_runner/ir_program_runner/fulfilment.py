@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ir_msgs_py.modes import Mode, PowerMode
+from ir_msgs_py.names import TAKE_BACK
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -172,6 +173,8 @@ class Fulfilment:
                 status = await ports.driver.set_plc_input(name, value)
                 # what counts is the mode that follows, which is waited for
                 return Status.success() if status.code == StatusCode.INPUT_IGNORED else status
+            case ask.TakeBack(name):
+                return await ports.driver.set_plc_input(TAKE_BACK + name, True)
             case ask.Drive(trajectory, cell_hash, load, station, states):
                 return await ports.driver.drive(
                     trajectory, self._stop, cell_hash, load, station, states, self._after_stop

@@ -30,6 +30,7 @@ from ir_program_runner.requests import (
     SetLoad,
     SetPlcInput,
     SetSignal,
+    TakeBack,
     WaitForMode,
     WaitForSignals,
     WaitUntil,
@@ -245,7 +246,7 @@ class Pause:
         self._mode = mode
         outcome = need((yield SetPlcInput(_BIT[mode], True)))
         if before in _BIT:
-            outcome = need((yield SetPlcInput(_BIT[before], False)))
+            outcome = need((yield TakeBack(_BIT[before])))
         if before is Mode.STAND_ON_BRAKES:  # takes the latched drives_off back
             outcome = need((yield SetPlcInput(END_REST, True)))
         return outcome
@@ -258,7 +259,7 @@ class Pause:
         if self._mode is Mode.HIBERNATION:
             outcome = yield from self._wake_by_packets(outcome, limit)
         else:
-            outcome = need((yield SetPlcInput(_BIT[self._mode], False)))
+            outcome = need((yield TakeBack(_BIT[self._mode])))
         if self._mode is Mode.STAND_ON_BRAKES:
             outcome = need((yield SetPlcInput(END_REST, True)))
         outcome = yield WaitForMode(READY, max(0.0, limit - outcome.now))
@@ -271,7 +272,7 @@ class Pause:
             raise StepFailedError(Status(StatusCode.TIMED_OUT, sentence))
         ready = need(outcome)
         if self._mode is Mode.HIBERNATION:
-            need((yield SetPlcInput(_BIT[self._mode], False)))
+            need((yield TakeBack(_BIT[self._mode])))
         return ready
 
     def _wake_by_packets(self, outcome: Outcome, limit: float) -> Requests:
@@ -294,12 +295,15 @@ class Pause:
 
     def _stay_awake(self) -> Requests:
         """Take the HIB bit back; whoever doesn't answer hibernates, and who has begun to shows it
-        soon.
+        soon. Raises StepFailedError where somebody else wants it to hibernate.
         """
-        outcome = yield SetPlcInput(_BIT[self._mode], False)
-        if outcome.status.ok:
+        outcome = yield TakeBack(_BIT[self._mode])
+        status = outcome.status
+        if status.ok or status.code == StatusCode.INVALID_ROBOT_STATE:
             seen = yield WaitForMode(_ASLEEP, self._settings.wake_repeat)
-            outcome = replace(seen, status=outcome.status)
+            outcome = replace(seen, status=status)
+        if status.code == StatusCode.INVALID_ROBOT_STATE and outcome.mode not in _ASLEEP:
+            raise StepFailedError(status)
         return outcome
 
     def _clear(self) -> Generator[Request, Outcome, None]:
@@ -313,7 +317,7 @@ class Pause:
             yield SendWakePacket()
             return
         for mode in reversed(self._modes[: self._modes.index(self._mode) + 1]):
-            yield SetPlcInput(_BIT[mode], False)
+            yield TakeBack(_BIT[mode])
         if self._modes[0] is Mode.STAND_ON_BRAKES:
             outcome = yield SetPlcInput(END_REST, True)
             if outcome.status.ok:  # not while a stop is latched
@@ -389,7 +393,7 @@ class Program:
             raise StepFailedError(Status(StatusCode.INVALID_ROBOT_STATE, sentence))
         need(outcome)
         for bit in ("ab", "hib"):
-            need((yield SetPlcInput(bit, False)))
+            need((yield TakeBack(bit)))
 
     def _step(self, index: int, movement: PlannedMovement) -> Generator[Request, Outcome, str]:
         """Do one step; it counts as started when its signals are there and as ended before its load

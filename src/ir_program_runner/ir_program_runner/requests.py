@@ -90,6 +90,13 @@ class SetPlcInput:
 
 
 @dataclass(frozen=True)
+class TakeBack:
+    """Take the program's own 1 of a bit back; refused where somebody else has given it too."""
+
+    name: str
+
+
+@dataclass(frozen=True)
 class AskModes:
     """Ask the driver for its power modes."""
 
@@ -124,6 +131,7 @@ Request = (
     | SetLoad
     | Drive
     | SetPlcInput
+    | TakeBack
     | AskModes
     | WaitForMode
     | WaitUntil

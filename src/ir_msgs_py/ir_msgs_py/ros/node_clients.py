@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from action_msgs.msg import GoalStatus
 from rclpy.action import ActionClient
 from rclpy.node import Node
 from rclpy.task import Future
@@ -237,14 +238,40 @@ class DriverClient:
         handle = sent.result()
         if not handle.accepted:
             return Status(StatusCode.FAILURE, f"{self.name} rejected the trajectory")
-        result: Future = handle.get_result_async()
-        result.add_done_callback(lambda done: self._waiting.look())
-        await self._waiting.until(
-            lambda: result.done() or stop() or self.silent or self.off_the_network
-        )
+        result = await self._result(handle, stop)
         if result.done():
-            return _status_of_result(result.result().result)
+            return self._status_of_goal(result.result())
         return await self._give_up(handle, result, stop())
+
+    async def _result(self, handle: Any, stop: Callable[[], bool]) -> Future:
+        """Wait for the result of a goal, or for what ends the wait before.
+
+        The answer may be lost, as where this process was held up for longer than the middleware
+        believes in it: the result is asked for again, every silence_timeout while the robot stands
+        and more and more seldom while it moves.
+        """
+        patience = self._silence_timeout
+        while True:
+            result: Future = handle.get_result_async()
+            result.add_done_callback(lambda done: self._waiting.look())
+            ended = await self._waiting.until(
+                lambda result=result: (
+                    result.done() or stop() or self.silent or self.off_the_network
+                ),
+                patience,
+            )
+            if ended:
+                return result
+            moves = self._mode is Mode.MOVING
+            patience = 2.0 * patience if moves else self._silence_timeout
+
+    def _status_of_goal(self, response: Any) -> Status:
+        if response.status == GoalStatus.STATUS_UNKNOWN:
+            sentence = (
+                f"{self.name} does not know this movement any more: how it ended is not known"
+            )
+            return Status(StatusCode.FAILURE, sentence)
+        return _status_of_result(response.result)
 
     async def ask(self, client: Any, request: Any) -> Any:
         """Call a service: its response, or a Status that says why there is none."""

@@ -206,6 +206,20 @@ def participant_of(request_id: Any) -> bytes:
     return bytes(found.writer)[:_PARTICIPANT] if same else b""
 
 
+def client_of(header: Any) -> str:
+    """Client that sent a service's request, by the identity of its endpoint; "" where it is not
+    known, and all clients are one.
+    """
+    if part(_rclpy, "rmw_service_info_t") is not type(header):
+        return ""
+    value = ctypes.c_void_p.from_address(id(header) + _VALUE).value
+    if not value:
+        return ""
+    found = _RequestId.from_address(value + _INFO)
+    same = found.sequence_number == header.request_id.sequence_number
+    return bytes(found.writer).hex() if same else ""
+
+
 def forget_request(goal: Any) -> None:
     """Drop what a goal asked for: rclpy keeps it as long as the result, a quarter of an hour.
 

@@ -16,7 +16,7 @@ from ir_kernels.chain import Chain
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.announcements import ControllerTimers
 from ir_msgs_py.modes import Mode, PowerMode
-from ir_msgs_py.names import END_REST
+from ir_msgs_py.names import END_REST, TAKE_BACK
 from ir_msgs_py.plc import OperatingMode, PlcInputs
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.access import Access, CellSide, PlcSide
@@ -30,9 +30,11 @@ from ir_sim_driver.errors import BackendError, RequestRefusedError, TrajectoryRe
 from ir_sim_driver.motion import ExecutionSettings, Following, Motion, Outcome, TrajectoryGoal
 from ir_sim_driver.notices import Level, Notice
 from ir_sim_driver.plant import Carried, Plant
-from ir_sim_driver.plc import STOP_BIT
+from ir_sim_driver.plc import OWN_BITS, STOP_BIT, giver_of
 from ir_values.arrays import FloatArray
 from ir_values.errors import IrError
+
+_TAKEN_BACK = {TAKE_BACK + bit: bit for bit in OWN_BITS}
 
 
 def try_cell(simulation: Simulation, cell: Cell) -> str:
@@ -303,22 +305,28 @@ class Driver:
     # -- requests; each raises RequestRefusedError, also while the controller is off the network
     # -------------
 
-    def press(self, writer: str, name: str, level: bool, came_ns: int = 0) -> tuple[PlcInputs, str]:
-        """Set one bit, or the mode switch by the name of its position.
+    def press(
+        self, writer: str, name: str, level: bool, came_ns: int = 0, client: str = ""
+    ) -> tuple[PlcInputs, str]:
+        """Set one bit, or the mode switch by the name of its position, or take one's own bit back.
 
         Returns the levels and a remark: why the bit will not count. A pressed emergency stop is
         latched in every mode, asleep too, and has been acted upon when this returns. came_ns: as of
-        `recover`; only a press may come before the last stop.
+        `recover`; only a press may come before the last stop. client: who it is among a writer's.
         """
         pressed = name == STOP_BIT and level
         with self._access.online(asleep_too=pressed) as simulation:
             plc = simulation.plc
             if not pressed:
                 plc.stop.refuse_earlier(came_ns, name)
-            if name == END_REST:
+            if name == END_REST or name in _TAKEN_BACK:
                 if level:
                     plc.check_owner(writer)
-                    simulation.control.end_rest()
+                    giver = giver_of(writer, client)
+                    if name == END_REST:
+                        simulation.control.end_rest(giver)
+                    else:
+                        plc.take_back(_TAKEN_BACK[name], giver)
                 return plc.raw, ""
             try:
                 plc.raw.with_bit(name, level)
@@ -327,7 +335,7 @@ class Driver:
             if name in OperatingMode.__members__:
                 plc.turn_switch(writer, OperatingMode[name])
             else:
-                plc.write(writer, {name: level})
+                plc.write(writer, {name: level}, client)
                 simulation.heed_stop()
             return plc.raw, plc.remark(name, simulation.pauses.rest is not None)
 

@@ -9,7 +9,7 @@ from ir_msgs_py.plc import OperatingMode, PlcOutputs
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.errors import RequestRefusedError
-from ir_sim_driver.plc import Plc
+from ir_sim_driver.plc import OFF_BIT, Plc
 from ir_sim_driver.power import PAUSE_MAX, Demand, PowerModes, best_route, mode_table
 
 # Latched requests: drives off, recovery, cold start, waking.
@@ -18,12 +18,13 @@ from ir_sim_driver.power import PAUSE_MAX, Demand, PowerModes, best_route, mode_
 class Latches:
     """drives_off: it came and no drives_on since. recover, restart, wake: waiting to be acted upon.
     end_rest: number of the stop after which a program asked to open the brakes again, None: no
-    program has.
+    program has. end_rest_by: that program.
     """
 
     def __init__(self) -> None:
         self.drives_off = self.recover = self.restart = self.wake = False
         self.end_rest: int | None = None
+        self.end_rest_by = ""
 
     def react(self, plc: Plc, mode: Mode) -> bool:
         """Take the edges of this step in `mode`; whether motors are asked for."""
@@ -35,18 +36,23 @@ class Latches:
         if not plc.drives_on or plc.levels.drives_off:
             return False
         self.drives_off = False
+        plc.off_by.clear()
         if awake and plc.stop.switch_on(plc.rose("drives_on")):
             self.recover = mode is Mode.EMERGENCY_STOP
         return True
 
     def rest_ended(self, plc: Plc) -> bool:
-        """Whether the program's wish to leave its rest counts now; a stop makes it void."""
+        """Whether the program's wish to leave its rest counts now; a stop makes it void, and so
+        does a drives_off of anybody else.
+        """
         if self.end_rest is None or plc.levels.drives_off or plc.raw.drives_off:
             return False
         counts = self.end_rest == plc.stop.number and not plc.stop.stopped
+        counts = counts and not plc.keeps_off(self.end_rest_by)
         self.end_rest = None
         if counts:
             self.drives_off = False
+            plc.off_by.clear()
         return counts
 
     def mode_changed(self, plc: Plc, before: Mode, now: Mode) -> None:
@@ -57,6 +63,7 @@ class Latches:
             self.restart = False
         if now in OFF_THE_NETWORK:
             self.restart = self.drives_off = False
+            plc.off_by.clear()
             plc.stop.leave_network()
 
 
@@ -265,16 +272,25 @@ class ModeControl:
         self._mode_changed(before, now)
         return before, now
 
-    def end_rest(self) -> None:
-        """A program leaves the rest that drives_off began; void while a stop is latched, and never
-        a part of a recovery. Raises RequestRefusedError.
+    def end_rest(self, giver: str = "") -> None:
+        """A program leaves the rest that its drives_off began; void while a stop is latched, and
+        never a part of a recovery. Raises RequestRefusedError, also where anybody but the giver
+        has given drives_off.
         """
         if self._plc.stop.stopped:
             raise RequestRefusedError(
                 StatusCode.INVALID_ROBOT_STATE,
                 f"stop {self._plc.stop.number} is latched: a person has to recover first",
             )
+        other = self._plc.keeps_off(giver)
+        if other:
+            raise RequestRefusedError(
+                StatusCode.INVALID_ROBOT_STATE,
+                f"drives_off was given by {other}: drives_on is needed",
+            )
+        self._plc.take_back(OFF_BIT, giver)
         self.latches.end_rest = self._plc.stop.number
+        self.latches.end_rest_by = giver
 
     def end_pause(self) -> float:
         """PROFIenergy End_Pause: back to motors; the seconds until they are on.

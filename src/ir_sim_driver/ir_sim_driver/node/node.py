@@ -237,7 +237,7 @@ class SimDriver(Node):
             self._drained = number
         return none_waits
 
-    def _recover(self, request: Any, response: Any, came_ns: int) -> Any:
+    def _recover(self, request: Any, response: Any, came_ns: int, client: str) -> Any:
         """Recover, and take no goal that came before that."""
         response = self._answers.recover(request, response, came_ns)
         self._refuse_waiting()

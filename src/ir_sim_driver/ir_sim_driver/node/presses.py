@@ -34,6 +34,7 @@ from ir_msgs_py.ros.network import RANGE
 from ir_msgs_py.ros.power_conversions import plc_inputs_from_msg
 from ir_msgs_py.ros.rclpy_inside import (
     can_poll,
+    client_of,
     keep_only,
     patient_sender,
     take_bytes,
@@ -404,8 +405,8 @@ class PolledService:
     """A service of `node` that a CommandThread answers: requests are acted upon at once, and their
     answers are sent by another thread.
 
-    owner: in whose name. handler: from request, response and the time at which the request came [ns
-    of the monotonic clock]. urgent: whether a request goes before all that wait. At most
+    owner: in whose name. handler: from request, response, the time at which the request came [ns
+    of the monotonic clock] and its client. urgent: whether a request goes before all that wait. At most
     REQUESTS_WAITING wait; what comes beyond is refused.
     """
 
@@ -414,7 +415,7 @@ class PolledService:
         node: Node,
         service_type: Any,
         name: str,
-        handler: Callable[[Any, Any, int], Any],
+        handler: Callable[[Any, Any, int, str], Any],
         owner: Node,
         urgent: Callable[[Any], bool] = lambda request: False,
     ) -> None:
@@ -431,7 +432,7 @@ class PolledService:
             )
         else:  # then the executor calls the handler
             self._service = node.create_service(
-                service_type, name, lambda request, response: handler(request, response, 0)
+                service_type, name, lambda request, response: handler(request, response, 0, "")
             )
         self._calls = Calls.of(owner)
         self._calls.services.append(self._service)
@@ -471,7 +472,7 @@ class PolledService:
         response = self._type.Response()
         answered = self._calls.taken(self._service.service_name, type_name(self._type), request)
         try:
-            response = self._handler(request, response, came)
+            response = self._handler(request, response, came, client_of(header))
         except ANY as error:
             self._log(traceback.format_exc())
             response.status = self._status(unexpected(error))

@@ -31,14 +31,14 @@ class Services:
         self._source = source
         self._load_changed = load_changed
 
-    def set_plc_input(self, request: Any, response: Any, came_ns: int = 0) -> Any:
+    def set_plc_input(self, request: Any, response: Any, came_ns: int = 0, client: str = "") -> Any:
         """Set one bit, or the mode switch by the name of its position; INPUT_IGNORED where it won't
-        count. came_ns: when the request came [ns of the monotonic clock].
+        count. came_ns: when the request came [ns of the monotonic clock]; client: who sent it.
         """
 
         def work() -> str:
             value = bool(request.value)
-            levels, remark = self._driver.press(SERVICE, request.name, value, came_ns)
+            levels, remark = self._driver.press(SERVICE, request.name, value, came_ns, client)
             response.inputs = plc_inputs_to_msg(levels)
             if remark:
                 raise RequestRefusedError(StatusCode.INPUT_IGNORED, remark)

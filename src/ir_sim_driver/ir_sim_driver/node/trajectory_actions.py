@@ -22,7 +22,6 @@ from ir_sim_driver.motion import ErrorCode, Outcome, TrajectoryGoal
 from ir_sim_driver.node.messages import fill_load_check, fill_points, goal_from_action
 from ir_values.errors import one_line
 
-
 _DISCOVERY = 10.0  # s in which the client of a goal shows in the graph, on a busy machine too
 
 

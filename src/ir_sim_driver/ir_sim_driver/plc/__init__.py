@@ -5,6 +5,8 @@ by.
 from ir_sim_driver.plc.inputs import (
     BITS,
     LINKS,
+    OFF_BIT,
+    OWN_BITS,
     POWER_BITS,
     SERVICE,
     TOPIC,
@@ -13,6 +15,7 @@ from ir_sim_driver.plc.inputs import (
     PlcSettings,
     Watchdog,
     Written,
+    giver_of,
     usable_links,
 )
 from ir_sim_driver.plc.port import STOP_BIT, Controller, Link, OpenLink, Readout
@@ -22,6 +25,8 @@ from ir_sim_driver.plc.wake_listener import WakeOnLan
 __all__ = [
     "BITS",
     "LINKS",
+    "OFF_BIT",
+    "OWN_BITS",
     "POWER_BITS",
     "SERVICE",
     "STOP_BIT",
@@ -38,5 +43,6 @@ __all__ = [
     "WakeOnLan",
     "Watchdog",
     "Written",
+    "giver_of",
     "usable_links",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, is_dataclass, replace
 from math import inf
 from typing import Any, NamedTuple, cast
@@ -105,6 +105,9 @@ _HANDOVER = 0.5  # s in which a program may set the bit of a deeper rest and cle
 HIBERNATION_BIT = ROW[Mode.HIBERNATION].bit
 POWER_BITS = (*REST_OF_BIT, RESTART_BIT)
 BITS = tuple(name for name in PLC_INPUT_NAMES if name not in OperatingMode.__members__)
+OFF_BIT = "drives_off"
+OWN_BITS = ("ab", "hib", OFF_BIT)
+"""Those that a program gives in a pause, and takes back."""
 
 
 @dataclass(frozen=True)
@@ -162,6 +165,18 @@ def _stop_first(bit: str) -> bool:
 _WRITTEN = tuple(sorted(BITS, key=_stop_first))
 
 
+def giver_of(writer: str, client: str) -> str:
+    """Who gives a level: a writer, of the service each client by itself."""
+    return f"{writer} {client}".strip()
+
+
+def _named(givers: Collection[str]) -> str:
+    """Writers in a sentence; clients of the service have no names that people know."""
+    names = {giver.partition(" ")[0] or "somebody" for giver in givers}
+    others = {"another client of the service" if name == SERVICE else name for name in names}
+    return " and ".join(sorted(others))
+
+
 class Plc:
     """Levels in, requests out; `step` lets time pass.
 
@@ -190,6 +205,8 @@ class Plc:
         self._up = 0.0  # s since then
         self.no_hibernation = ""
         self.drives_on = self.confirm = self.restart = False
+        self._gave: dict[str, set[str]] = {bit: set() for bit in OWN_BITS}  # since it was 0
+        self.off_by: set[str] = set()
         self._ages: dict[str, float] = {}
         self._stuck: frozenset[str] = frozenset()
         self._uptime = 0.0
@@ -198,10 +215,10 @@ class Plc:
         self._greeted = False
         self._judged: tuple[object, bool] = (None, False)
 
-    def write(self, writer: str, levels: Mapping[str, bool]) -> None:
+    def write(self, writer: str, levels: Mapping[str, bool], client: str = "") -> None:
         """Set these levels in the name of a writer (one of WRITERS), the others stay.
 
-        Raises RequestRefusedError; a pressed emergency stop counts even then.
+        client: which of its writers. Raises RequestRefusedError; a pressed emergency stop counts even then.
         """
         pressed = levels.get(STOP_BIT, False)
         number = self.stop.number
@@ -210,7 +227,7 @@ class Plc:
             self._greeted = True
             self.order += 1
             for bit in sorted(levels, key=_stop_first):
-                self._set(bit, levels[bit])
+                self._set(bit, levels[bit], giver=giver_of(writer, client))
         finally:
             self._note_stop(writer, number)
 
@@ -231,7 +248,7 @@ class Plc:
             inputs = inputs.with_bit(STOP_BIT, False)
         try:
             self._guard(writer, inputs.emergency_stop)
-            self._set_all(inputs, late)
+            self._set_all(inputs, late, writer)
         finally:
             self._note_stop(writer, number)
 
@@ -266,14 +283,14 @@ class Plc:
         """Take all levels at once, as the topic and the field bus do."""
         self._set_all(inputs, late=False)
 
-    def _set_all(self, inputs: PlcInputs, late: bool) -> None:
+    def _set_all(self, inputs: PlcInputs, late: bool, giver: str = "") -> None:
         if not self._greeted and self._uptime < self._settings.startup_window:
             stuck = frozenset(bit for bit in POWER_BITS if getattr(inputs, bit))
             self._stick(stuck, Level.WARN, "at the start")
         self._greeted = True
         self.order += 1
         for bit in _WRITTEN[1:] if late and not inputs.emergency_stop else _WRITTEN:
-            self._set(bit, getattr(inputs, bit), late=late)
+            self._set(bit, getattr(inputs, bit), late=late, giver=giver)
         if inputs.operating_mode is not OperatingMode.UNCHANGED:
             self.set_operating_mode(inputs.operating_mode)
 
@@ -318,6 +335,8 @@ class Plc:
         self._stick(still, Level.OK, "when the controller wakes")
         self._ages.clear()
         self.levels = replace(self.raw, ab=False, hib=False, ks=False)
+        if self.levels.drives_off:
+            self.off_by |= self._gave[OFF_BIT]
         self.rest = None
 
     def step(self, dt: float, pause_active: bool = False) -> bool:
@@ -351,7 +370,39 @@ class Plc:
         if self._up >= self._settings.debounce - 1e-9:
             self.stop.release(self._fell)
 
-    def _set(self, bit: str, level: bool, *, late: bool = False) -> None:
+    def take_back(self, bit: str, giver: str) -> None:
+        """A giver takes its own 1 of one of OWN_BITS back: it falls where nobody else has given it.
+
+        A 1 that counts no more, since the controller woke, is nobody's. Raises RequestRefusedError.
+        """
+        others = self._gave[bit] - {giver}
+        if bit in self._stuck:
+            others = set()
+        self._gave[bit].discard(giver)
+        if getattr(self.raw, bit) and others:
+            raise RequestRefusedError(
+                StatusCode.INVALID_ROBOT_STATE,
+                f"{bit} stays 1: {_named(others)} has given it too, and has to take it back",
+            )
+        if getattr(self.raw, bit):
+            self.set_bit(bit, False)
+
+    def keeps_off(self, giver: str) -> str:
+        """Who else has given the drives_off that counts or is 1, "" for nobody."""
+        held = self._gave[OFF_BIT] if self.raw.drives_off else set()
+        return _named((self.off_by | held) - {giver})
+
+    def _note_giver(self, bit: str, giver: str) -> None:
+        """Remember who gives a 1, also one that is there already."""
+        if not getattr(self.raw, bit):
+            self._gave[bit].clear()
+        self._gave[bit].add(giver)
+        if bit == OFF_BIT and self.levels.drives_off:
+            self.off_by.add(giver)
+
+    def _set(self, bit: str, level: bool, *, late: bool = False, giver: str = "") -> None:
+        if level and bit in self._gave:
+            self._note_giver(bit, giver)
         if level == getattr(self.raw, bit):
             return
         self.raw = self.raw.with_bit(bit, level)
@@ -387,6 +438,7 @@ class Plc:
                 del self._ages[bit]
                 self.levels = self.levels.with_bit(bit, level)
                 if level:
+                    self.off_by |= self._gave[bit] if bit == OFF_BIT else set()
                     self.drives_on |= bit == "drives_on"
                     self.confirm |= bit == "conf_mess"
                     self.restart |= bit == RESTART_BIT
