@@ -48,6 +48,8 @@ class Core:
         plc.stop = copy.copy(plc.stop)
         plc._ages = dict(plc._ages)
         plc._rose = dict(plc._rose)
+        plc._gave = {bit: set(givers) for bit, givers in plc._gave.items()}
+        plc.off_by = set(plc.off_by)
         new.control = control = copy.copy(self.control)
         control._plc = plc
         control.modes = copy.copy(control.modes)
@@ -137,7 +139,7 @@ class Core:
         """The program runner leaves a rest on brakes."""
         if self.on_the_network:
             with suppress(RequestRefusedError):
-                self.control.end_rest()
+                self.control.end_rest(TOPIC)
 
     def key(self) -> tuple[Any, ...]:
         """All that decides what may happen next, without what only counts."""

@@ -61,7 +61,7 @@ class Plant:
         except StopIteration as ended:
             return ended.value
 
-    def fulfil(self, request: ask.Request) -> tuple[Status, tuple[Any, ...]]:  # noqa: C901
+    def fulfil(self, request: ask.Request) -> tuple[Status, tuple[Any, ...]]:  # noqa: C901, PLR0912
         plant = self.plant
         match request:
             case ask.Announce(index, event, note):

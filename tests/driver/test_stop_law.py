@@ -391,7 +391,7 @@ def test_a_wish_to_leave_a_rest_is_void_after_a_stop() -> None:
     pair = Pair()
     pair.write({"drives_off": True})
     pair.wait(25)
-    pair.core.end_rest()  # waits for drives_off to be 0
+    pair.core.end_rest()  # counts when drives_off has been 0 for the debounce
     for levels in ({"emergency_stop": True}, {"emergency_stop": False}, {"drives_off": False}):
         pair.write(levels)
         pair.wait(25)

@@ -32,15 +32,10 @@ def long_movement() -> JointTrajectory:
     return JointTrajectory.from_seconds(names.JOINT_NAMES, [200.0], there[None], np.zeros((1, 6)))
 
 
-def whole_client(node: Any, goal: Any) -> tuple[Any, Any]:
-    """A client of the action, as most are: what ends it, and the future of its goal."""
-    client = ActionClient(node, ExecuteTrajectory, names.EXECUTE_TRAJECTORY)
-    client.wait_for_server()
-    return client.destroy, client.send_goal_async(goal)
-
-
 def bare_client(node: Any, goal: Any) -> tuple[Any, Any]:
-    """A client of the action's service for goals alone, that hears no feedback."""
+    """A client of the service for goals alone, that hears no feedback: what ends it, and the
+    future of its goal.
+    """
     service = f"{names.EXECUTE_TRAJECTORY}/_action/send_goal"
     client = node.create_client(ExecuteTrajectory.Impl.SendGoalService, service)
     assert client.wait_for_service(10.0)
@@ -49,14 +44,12 @@ def bare_client(node: Any, goal: Any) -> tuple[Any, Any]:
     return node.destroy_node, client.call_async(request)
 
 
-@pytest.mark.parametrize("sends", [whole_client, bare_client])
 def test_a_movement_whose_client_has_gone_is_stopped_though_others_are_there(
     ros_context: Any,
     ros_executor: Any,
     ros_node: Any,
     ros_domain_id: int,
     wait_for: Any,
-    sends: Any,
 ) -> None:
     """As the program runner's, which is always there. A context is a participant, as a process
     is.
@@ -78,7 +71,7 @@ def test_a_movement_whose_client_has_gone_is_stopped_though_others_are_there(
     try:
         node = guest.add_node(rclpy.create_node("guest", context=context))
         goal = ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(long_movement()))
-        leave, accepted = guest.run(lambda: sends(node, goal))
+        leave, accepted = guest.run(lambda: bare_client(node, goal))
         wait_for(accepted.done)
         wait_for(lambda: driver._driver.moving, what="the movement runs")
         wait_for(lambda: processes() == 2, what="both clients are known")

@@ -278,7 +278,7 @@ def test_a_program_is_fetched_by_its_id_and_run(cell, wait_for):
     assert result.executed == 2
     assert result.energy > 0.0
     assert result.duration > 0.02
-    assert cell.driver.log == ["ab=0", "hib=0", "load gripper", "drive", "drive"]
+    assert cell.driver.log == ["end_ab=1", "end_hib=1", "load gripper", "drive", "drive"]
     wait_for(lambda: cell.events() == ["0 started", "0 ended", "1 started", "1 ended"])
     assert cell.states[0].program_id == "known"
     wait_for(lambda: (1, 2, "moving") in phases)
@@ -318,13 +318,13 @@ def test_pauses_switch_the_bits_and_wake_by_a_packet(cell):
     result = cell.run([pause(1.0, "BUS_POWER_OFF"), pause(1.0, "HIBERNATION"), move()])
     assert result.status.code == StatusCode.SUCCESS, result.status.message
     assert cell.driver.log == [
-        "ab=0",
-        "hib=0",
+        "end_ab=1",
+        "end_hib=1",
         "ab=1",
-        "ab=0",
+        "end_ab=1",
         "hib=1",
         "packet 127.0.0.1:9009",
-        "hib=0",
+        "end_hib=1",
         "load gripper",
         "drive",
     ]
@@ -377,7 +377,7 @@ def test_a_stop_in_a_pause_on_brakes_ends_the_program_and_asks_for_no_motors(cel
         wait_for(lambda: "drives_off=1" in cell.driver.log)
         cell.driver.stops.publish(UInt64(data=1))
         wait_for(lambda: "0 failed" in cell.events())
-    assert "drives_off=0" in cell.driver.log
+    assert "end_drives_off=1" in cell.driver.log
     assert not {"drives_on=1", "end_rest=1", "drive"} & set(cell.driver.log)
     assert "stop 1" in ended[0].status.message
 
@@ -407,7 +407,7 @@ def test_a_cancel_in_a_pause_takes_the_bit_back(cell, wait_for):
         wait_for(lambda: cell.driver.log[-1:] == ["ab=1"])
     assert ended[0].status.code == StatusCode.PREEMPTED
     wait_for(lambda: cell.events() == ["0 started", "0 canceled"])
-    assert cell.driver.log[-2:] == ["ab=1", "ab=0"]
+    assert cell.driver.log[-2:] == ["ab=1", "end_ab=1"]
 
 
 def test_the_drivers_abort_ends_the_program_with_its_sentence(cell, wait_for):
@@ -446,7 +446,7 @@ def test_a_driver_that_falls_silent_in_a_pause_ends_the_program_and_the_bit_is_t
 
     result = cell.run([pause(60.0, "BUS_POWER_OFF")], feedback=fall_silent)
     assert result.status.code == StatusCode.ROBOT_STATE_STALE
-    assert cell.driver.log[-2:] == ["ab=1", "ab=0"]
+    assert cell.driver.log[-2:] == ["ab=1", "end_ab=1"]
 
 
 def test_a_driver_that_hibernates_during_a_movement_ends_the_program(cell):
@@ -606,7 +606,7 @@ def test_a_clock_that_jumps_back_ends_the_program(simulated):
     result = cell.run([pause(600.0, "BUS_POWER_OFF")], feedback=jump)
     assert "step 1 of 1 (pause BUS_POWER_OFF): the clock jumped back by" in result.status.message
     assert float(result.status.message.split()[-2]) > 500.0
-    assert cell.driver.log[-2:] == ["ab=1", "ab=0"]
+    assert cell.driver.log[-2:] == ["ab=1", "end_ab=1"]
 
 
 def test_a_goal_that_has_ended_is_not_kept_with_its_result(cell):

@@ -152,7 +152,7 @@ class Fulfilment:
             ports.driver.plant_time, ports.driver.mode, status, modes, ports.driver.energy
         )
 
-    async def _fulfil(self, request: ask.Request) -> Status:  # noqa: C901, PLR0911
+    async def _fulfil(self, request: ask.Request) -> Status:  # noqa: C901, PLR0911, PLR0912
         ports = self._ports
         match request:
             case ask.Begin(index):

@@ -253,23 +253,17 @@ class DriverClient:
         patience = self._silence_timeout
         while True:
             result: Future = handle.get_result_async()
-            result.add_done_callback(lambda done: self._waiting.look())
-            ended = await self._waiting.until(
-                lambda result=result: (
-                    result.done() or stop() or self.silent or self.off_the_network
-                ),
-                patience,
+            answered = self._waiting.answer(
+                result, patience, lambda: stop() or self.silent or self.off_the_network
             )
-            if ended:
+            if await answered:
                 return result
             moves = self._mode is Mode.MOVING
             patience = 2.0 * patience if moves else self._silence_timeout
 
     def _status_of_goal(self, response: Any) -> Status:
         if response.status == GoalStatus.STATUS_UNKNOWN:
-            sentence = (
-                f"{self.name} does not know this movement any more: how it ended is not known"
-            )
+            sentence = f"{self.name} knows this movement no more: how it ended is not known"
             return Status(StatusCode.FAILURE, sentence)
         return _status_of_result(response.result)
 

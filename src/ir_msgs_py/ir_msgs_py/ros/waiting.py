@@ -52,12 +52,14 @@ class Waiting:
         self._timer.reset()
         return bool(await wait.future)
 
-    async def answer(self, future: Future, timeout: float) -> bool:
-        """Wait for a service's or action's future; False when it is not done within `timeout`
-        [s].
+    async def answer(
+        self, future: Future, timeout: float, over: Callable[[], bool] = lambda: False
+    ) -> bool:
+        """Wait for a service's or action's future, or until it is `over`; False when neither is so
+        within `timeout` [s].
         """
         future.add_done_callback(lambda done: self.look())
-        return await self.until(future.done, timeout)
+        return await self.until(lambda: future.done() or over(), timeout)
 
     async def ask(self, client: Any, request: Any, timeout: float) -> Any:
         """Call a service: its response, or a TIMED_OUT Status when there is none in `timeout`

@@ -406,8 +406,8 @@ class PolledService:
     answers are sent by another thread.
 
     owner: in whose name. handler: from request, response, the time at which the request came [ns
-    of the monotonic clock] and its client. urgent: whether a request goes before all that wait. At most
-    REQUESTS_WAITING wait; what comes beyond is refused.
+    of the monotonic clock] and its client. urgent: whether a request goes before all that wait. At
+    most REQUESTS_WAITING wait; what comes beyond is refused.
     """
 
     def __init__(

@@ -218,7 +218,8 @@ class Plc:
     def write(self, writer: str, levels: Mapping[str, bool], client: str = "") -> None:
         """Set these levels in the name of a writer (one of WRITERS), the others stay.
 
-        client: which of its writers. Raises RequestRefusedError; a pressed emergency stop counts even then.
+        client: of the service. Raises RequestRefusedError; a pressed emergency stop counts even
+        then.
         """
         pressed = levels.get(STOP_BIT, False)
         number = self.stop.number
