@@ -13,7 +13,7 @@ from _regional_ours import planner_of
 
 from ir_planner.scene import LinkVoltage, PlanningScene
 
-PAIRS = 80  # per seed
+PAIRS = 400  # per seed
 QUICK_PAIRS = 8
 NOMINAL = "at the nominal voltage"
 LOW = "at 5 % less voltage"

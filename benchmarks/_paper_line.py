@@ -11,6 +11,9 @@ from _regional_ours import planner_of
 
 from ir_description import load_power_data
 from ir_msgs_py.options import PlanOptions
+from ir_recorder.analysis.production import Amount
+from ir_recorder.report.costs import Costs
+from ir_recorder.report.whole_line import WholeLine, of_whole_line
 
 TOURS = {
     "open": 2,
@@ -64,12 +67,19 @@ def _shares() -> dict[str, float]:
     return {row.consumer: row.percent for row in load_power_data().table_1}
 
 
+def of_line(saved: float) -> WholeLine:
+    """What robots that take `saved` (0 to 1) less save of Table I's whole."""
+    found = of_whole_line(Amount(saved, saved, saved), 1.0, Costs())
+    assert found is not None  # robots take something
+    return found
+
+
 def after(saved: float) -> float:
     """The robots' share of the line [%] where they take `saved` (0 to 1) less and nothing else
     changes.
     """
-    robot = _shares()[ROBOT]
-    return 100.0 * robot * (1.0 - saved) / (100.0 - robot * saved)
+    left = of_line(saved).after
+    return 100.0 * left["robots"] / sum(left.values())
 
 
 def judge(rows: Sequence[Row]) -> list[Statement]:
@@ -85,7 +95,7 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
         programs = [(row["cell"], row["stops"]) for row in rows]
         count = len(set(programs)), "programs"
         share = interval(lambda x: 100.0 * float(np.mean(x)), saved, groups=programs)
-        line = interval(lambda x: robot * float(np.mean(x)), saved, groups=programs)
+        line = interval(lambda x: of_line(float(np.mean(x))).factory.value, saved, groups=programs)
         left = interval(lambda x: after(float(np.mean(x))), saved, groups=programs)
         found += [
             Statement(f"energy {what}: saved at equal cycle time", "mean", *share, *count, "%"),

@@ -32,7 +32,7 @@ from ir_planner.timing.straight_steps import straight_steps
 from ir_values.arrays import FloatArray
 
 STATIONS = ("cnc_door", "deep_box", "demo")
-VARIANTS = 20  # of each and seed
+VARIANTS = 200  # of each and seed
 EDGES = 8_000  # certified edges of a search, as for the modified one
 SECONDS = 20.0
 HALF = 50.0  # % of the searches

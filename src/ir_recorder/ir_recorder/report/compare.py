@@ -40,6 +40,7 @@ from ir_recorder.report.number_text import (
 from ir_recorder.report.page import PAGE_START, asset
 from ir_recorder.report.series import Curves, Json, packed
 from ir_recorder.report.tables import table
+from ir_recorder.report.whole_line import of_recording, with_ends
 from ir_values.files import ANYWHERE, FileRoots
 
 MOST = 12  # recordings on one page: more columns than that are not read
@@ -113,6 +114,7 @@ def _paid(compared: Sequence[Compared], names: Sequence[str], costs: Costs) -> s
         ("checks", *(text(summary(tuple(checks))[1]) for _, checks in compared)),
         ("a year of such cycles", *(_year(cycle, cycles[0], costs) for cycle in cycles)),
         ("saved by its plan, a year", *(_year_saved(cycle, costs) for cycle in cycles)),
+        ("that is, of the whole line", *(_of_line(analysis, costs) for analysis, _ in compared)),
         ("a cycle", *(_cycle(cycle) for cycle in cycles)),
     ]
     hint = (
@@ -151,6 +153,17 @@ def _year_saved(cycle: Production | None, costs: Costs) -> str:
         lines.insert(0, f"{money(price.low, '').strip()} to {money(price.high, costs.currency)}")
     small = "".join(f"<small>{text(line)}</small>" for line in lines)
     return f"<b>{text(money(price.value, costs.currency))}</b>{small}"
+
+
+def _of_line(analysis: Analysis, costs: Costs) -> str:
+    found = of_recording(analysis, costs)
+    if found is None:
+        return DASH
+    word = found.line.gain()[0]
+    return (
+        f"<b>{with_ends(found.line)} {word}</b>"
+        f"<small>{with_ends(found.factory)} of the factory's</small>"
+    )
 
 
 def _cycle(cycle: Production | None) -> str:

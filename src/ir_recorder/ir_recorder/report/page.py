@@ -32,7 +32,7 @@ from ir_recorder.report.tables import (
     step_table,
     warning_table,
 )
-from ir_recorder.report.whole_line import recorded_line_section
+from ir_recorder.report.whole_line import line_section, of_recording
 from ir_values.files import ANYWHERE, FileRoots
 
 # Charts and tables that the page shows of an analysis: a new one is a function, and a line here.
@@ -92,6 +92,7 @@ def report_html(
 
     The chart of clearances shows the recorded safety distance, else that of the tolerances.
     """
+    prices = costs or Costs()
     known = not math.isnan(analysis.safety_distance)
     drawn = analysis.safety_distance if known else (tolerances or Tolerances()).safety_distance
     name = analysis.cell.name if analysis.cell is not None else analysis.recording.path.stem
@@ -103,14 +104,14 @@ def report_html(
         "source": source(analysis),
         "verdict": verdict(checks),
         "notes": notes(analysis),
-        "tiles": tiles(analysis, costs or Costs()),
+        "tiles": tiles(analysis, prices),
         "run": run_tiles(analysis),
         "capacity": text(joules(controller.dc_link_capacity_energy)),
-        "costs": costs_section(analysis, costs or Costs()),
+        "costs": costs_section(analysis, prices),
         "front": folded(front_section(analysis, front)),
-        "levers": lever_section(analysis, costs or Costs()),
-        "around": clock_section(analysis, costs or Costs()),
-        "line": recorded_line_section(analysis, costs or Costs()),
+        "levers": lever_section(analysis, prices),
+        "around": clock_section(analysis, prices),
+        "line": line_section(of_recording(analysis, prices), prices),
         "checks": check_table(checks),
         "style": asset("page.css"),
         "data": page_data(analysis, drawn),

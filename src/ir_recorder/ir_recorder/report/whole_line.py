@@ -45,15 +45,15 @@ class WholeLine:
         word = self.line.gain()[0]
         robots = f"{self.shares['robots']:g} %"
         return (
-            f"of the whole line: {_with_ends(self.robots)} {word} of the robots' energy is "
-            f"{_with_ends(self.line)} of the line's and {_with_ends(self.factory)} of the "
+            f"of the whole line: {with_ends(self.robots)} {word} of the robots' energy is "
+            f"{with_ends(self.line)} of the line's and {with_ends(self.factory)} of the "
             f"factory's, where robots take {robots} and the hall "
             f"{self.shares['infrastructure']:g} %: no plan of robots saves more than their "
             f"{robots}, and none of the hall's"
         )
 
 
-def _with_ends(share: Amount) -> str:
+def with_ends(share: Amount) -> str:
     """A saved share as people say it, with its 90 % interval where there is one."""
     _, amount = share.gain()
     shown = f"{amount.value:.1f} %"
@@ -80,12 +80,12 @@ def of_saving(saving: Saving, costs: Costs) -> WholeLine | None:
     return of_whole_line(saved_amount(saving), saving.common, costs)
 
 
-def recorded_line_section(analysis: Analysis, costs: Costs) -> str:
-    """The section of a recording's plan; "" where it says nothing of a saving."""
+def of_recording(analysis: Analysis, costs: Costs) -> WholeLine | None:
+    """The same of a recording's plan; None where it says nothing of a saving."""
     cycle = production_of(analysis)
     if cycle is None or cycle.savings is None:
-        return ""
-    return line_section(of_saving(cycle.savings.total, costs), costs)
+        return None
+    return of_saving(cycle.savings.total, costs)
 
 
 def line_section(found: WholeLine | None, costs: Costs) -> str:
