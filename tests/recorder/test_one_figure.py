@@ -90,7 +90,7 @@ def test_full_pauses_save_within_the_interval_of_drawn_robots(found: Analysis) -
     if full is None or not full.added or found.cell is None:
         pytest.skip("no pause is shortened")
     cell = found.cell
-    data, _ = recorded_power_data(found.recording)
+    data, _ = recorded_power_data(found.recording, found.cell)
     parameters = data_sheet_of(cell.robot, data)
     timer = data.motors_to_brakes_in_program
     joints = found.recording.joints

@@ -226,11 +226,13 @@ class _Analyser:
     recording: Recording
     parameters: PowerParameters | None = None
     problems: list[str] = field(default_factory=list)
+    cell: Cell | None = field(init=False)
     data: PowerData = field(init=False)
     link: DcLink = field(init=False)
 
     def __post_init__(self) -> None:
-        self.data, problem = recorded_power_data(self.recording)
+        self.cell = self._cell()
+        self.data, problem = recorded_power_data(self.recording, self.cell)
         self.problems += [problem] if problem else []
         self.link = recorded_link(self.recording, self.data)
 
@@ -242,10 +244,7 @@ class _Analyser:
             else None
         )
         meter = Meter(power) if power is not None else None
-        cell = self._cell()
-        if cell is not None and not recording.power_yaml:  # the controller of its robot
-            self.data = cell.robot.controller
-            self.link = recorded_link(recording, self.data)
+        cell = self.cell
         loads = load_timeline(recording)
         steps = self._predicted(executed_steps(recording), cell)
         results = self._results(steps, meter, cell)

@@ -42,16 +42,17 @@ _PLANT = {  # of a plant file's dc_link
 }
 
 
-def recorded_power_data(recording: Recording) -> tuple[PowerData, str]:
-    """The attached data of the controller, and a sentence where they can't be read; else the
-    bundled ones.
+def recorded_power_data(recording: Recording, cell: Cell | None) -> tuple[PowerData, str]:
+    """The attached data of the controller, else those of the robot of the recording's `cell`, else
+    the bundled ones; and a sentence where the attached ones can't be read.
     """
+    own = load_power_data() if cell is None else cell.robot.controller
     if not recording.power_yaml:
-        return load_power_data(), ""
+        return own, ""
     try:
         return power_from_yaml(recording.power_yaml, contents.POWER), ""
     except (DescriptionError, InvalidValueError) as error:
-        return load_power_data(), f"the attached {contents.POWER} can't be read: {error}"
+        return own, f"the attached {contents.POWER} can't be read: {error}"
 
 
 def recorded_link(recording: Recording, data: PowerData) -> DcLink:

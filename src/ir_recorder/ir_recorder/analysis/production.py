@@ -325,7 +325,7 @@ def idle_watts(analysis: Analysis) -> dict[str, float]:
     cell = analysis.cell
     if cell is None:
         return {}
-    data, _ = recorded_power_data(analysis.recording)
+    data, _ = recorded_power_data(analysis.recording, cell)
     ends = [step.load for step in analysis.recording.planned[-1:]]
     ends += [result.step.movement.load for result in analysis.steps[-1:]]
     loads = carried(cell, ends[-1] if ends else NO_LOAD)

@@ -192,7 +192,7 @@ def resting_table(analysis: Analysis) -> str:
         ">Table II",
         ">over",
     )
-    data, _ = recorded_power_data(analysis.recording)
+    data, _ = recorded_power_data(analysis.recording, analysis.cell)
     remark = ""
     if analysis.plateaus and analysis.cell is not None and data.has_table:
         home = analysis.cell.machine_home.tolist()
