@@ -11,14 +11,15 @@ from __future__ import annotations
 import errno
 import os
 import struct
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from io import BufferedWriter, FileIO
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from mcap.exceptions import McapError
-from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
@@ -31,7 +32,7 @@ from ir_values.output_files import FileLock, beside, sync_folder
 
 CHUNK_SIZE = 256 * 1024  # bytes: about 1.5 s of a cell; what a power cut may cost
 REORDERED = 1_000_000_000  # ns: topics are polled every 20 ms; more is a clock that was set back
-_RECORD_HEAD = struct.Struct("<BQ")  # of MCAP: kind and length
+_READ = 1 << 20  # bytes that are read back at a time
 _PATH_MAX = 4000  # bytes; systems end at 4096
 _NAME_MAX = 200  # bytes of a file's name; file systems end at 255
 
@@ -154,14 +155,16 @@ class RecordingWriter:
     def finish(self) -> RecordingSummary:
         """Writes indexes and statistics, puts all on the disk, and closes the file.
 
-        The summary counts what the file says that it holds; WriteError where that is not what was
-        written. A second call changes nothing.
+        Every byte is read back, about a second per GB, and the summary counts what the file says
+        that it holds; WriteError where either is not what was written. A second call changes
+        nothing.
         """
         if not self._finished:
             with self._storage():
                 self._writer.finish()  # type: ignore[no-untyped-call]
                 self._file.settle()
                 self._check_there()
+                self._file.check_bytes()
                 held = self._file.messages_on_disk()
                 if held != self._messages:
                     raise OSError(errno.EIO, f"it holds {held} messages of {self._messages}")
@@ -230,6 +233,17 @@ def checked_path(path: str | Path) -> Path:
         raise PathError(f"path {text[:80]!r}: {error}") from error
 
 
+class _SummedWriter(BufferedWriter):
+    """A stream that is appended to; sum: the check sum (CRC-32) of all its bytes."""
+
+    sum = 0
+
+    def write(self, data: Any) -> int:
+        """Append bytes."""
+        self.sum = zlib.crc32(data, self.sum)
+        return super().write(data)
+
+
 class RecordingFile:
     """The file of a recording below `roots`, locked while it grows.
 
@@ -238,7 +252,7 @@ class RecordingFile:
     """
 
     def __init__(self, path: Path, overwrite: bool, roots: FileRoots) -> None:
-        self._beside = ""
+        self._new: Path | None = None  # the file until it has settled
         self._replaced: BinaryIO | None = None
         self._locks: list[FileLock] = []
         try:
@@ -247,7 +261,7 @@ class RecordingFile:
                 raise PathError(
                     f"{path} can't be written: there is no directory {path.parent}; make it first"
                 )
-            self.stream = os.fdopen(self._opened(path, overwrite), "wb")
+            self.stream = _SummedWriter(FileIO(self._opened(path, overwrite), "wb"))
         except FileRefusedError as error:
             raise PathError(str(error)) from error
         except FileExistsError as error:
@@ -267,10 +281,13 @@ class RecordingFile:
         while True:
             try:
                 flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC | os.O_NOFOLLOW
-                return self._locked(os.open(self._place, flags, 0o666))
+                descriptor = self._locked(os.open(self._place, flags, 0o666))
             except FileExistsError:
                 if not overwrite:
                     raise
+            else:
+                self._new = self._place
+                return descriptor
             try:
                 older = os.fdopen(opened(self._place, os.O_RDWR, path), "r+b")
             except FileNotFoundError:
@@ -279,7 +296,8 @@ class RecordingFile:
                 break
             older.close()
         self._replaced = older
-        descriptor, self._beside = beside(self._place)
+        descriptor, name = beside(self._place)
+        self._new = Path(name)
         return self._locked(descriptor)
 
     def _may_replace(self, older: BinaryIO, path: Path) -> bool:
@@ -301,9 +319,12 @@ class RecordingFile:
 
     def is_there(self, descriptor: int | None = None) -> bool:
         """Whether the place leads to the file (to that descriptor's) still."""
-        number = self.stream.fileno() if descriptor is None else descriptor
+        return self._leads(self._place, self.stream.fileno() if descriptor is None else descriptor)
+
+    @staticmethod
+    def _leads(path: Path, descriptor: int) -> bool:
         try:
-            return os.path.samestat(os.stat(self._place), os.fstat(number))
+            return os.path.samestat(os.stat(path), os.fstat(descriptor))
         except (FileNotFoundError, NotADirectoryError):
             return False
 
@@ -311,29 +332,40 @@ class RecordingFile:
         """Puts what was written so far on the disk, and in place of the older recording."""
         self.stream.flush()
         os.fsync(self.stream.fileno())
-        if self._beside:
-            os.replace(self._beside, self._place)
-            self._beside = ""
+        if self._new is not None and self._new != self._place:
+            os.replace(self._new, self._place)
+        self._new = None
         sync_folder(self._place.parent)
         if self._replaced is not None:
             self._replaced.close()
             self._replaced = None
 
+    def check_bytes(self) -> None:
+        """OSError where the bytes of the file aren't those that were written: somebody else wrote
+        into it, or the storage lost them.
+        """
+        found = 0
+        with ANYWHERE.open_to_read(self._place) as stream:
+            while block := stream.read(_READ):
+                found = zlib.crc32(block, found)
+        if found != self.stream.sum:
+            raise OSError(errno.EIO, "its bytes are not those that were written")
+
     def messages_on_disk(self) -> int:
-        """The number of messages that the file's statistics and its chunks' headers agree on;
-        OSError where it can't be read back.
+        """The number of messages that the file says it holds; OSError where it can't be read
+        back.
         """
         return messages_on_disk(self._place)
 
     def close(self) -> None:
         """Closes it and gives up its lock; one that never settled is deleted."""
         try:
+            if self._new is not None and self._leads(self._new, self.stream.fileno()):
+                with suppress(OSError):
+                    os.unlink(self._new)
+            self._new = None
             self.stream.close()
         finally:
-            if self._beside:
-                with suppress(OSError):
-                    os.unlink(self._beside)
-                self._beside = ""
             if self._replaced is not None:
                 self._replaced.close()
                 self._replaced = None
@@ -342,19 +374,10 @@ class RecordingFile:
 
 
 def messages_on_disk(path: Path) -> int:
-    """The number of messages of a finished recording; OSError where its chunks aren't those that
-    its indexes name.
-    """
+    """The number of messages of a finished recording; OSError where it can't be read."""
     try:
         with path.open("rb") as stream:
             summary = make_reader(stream).get_summary()
-            for chunk in summary.chunk_indexes if summary else ():
-                stream.seek(chunk.chunk_start_offset)
-                kind, length = _RECORD_HEAD.unpack(stream.read(_RECORD_HEAD.size))
-                if kind != Opcode.CHUNK or length + _RECORD_HEAD.size != chunk.chunk_length:
-                    raise OSError(
-                        errno.EIO, f"no chunk stands at byte {chunk.chunk_start_offset} of it"
-                    )
     except (McapError, ValueError, struct.error) as error:
         raise OSError(errno.EIO, f"it can't be read back: {error}") from error
     if summary is None or summary.statistics is None:
