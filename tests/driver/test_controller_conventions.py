@@ -153,3 +153,47 @@ def test_a_stamp_in_the_past_starts_late_or_joins_in_the_middle(
     taken = simulation.time - begun
     assert taken == pytest.approx(3.0 if join else 4.0, abs=0.2)
     assert np.abs(simulation.backend.q - there).max() < 1e-3
+
+
+def test_a_plan_from_the_present_state_at_time_0_is_joined_in_motion(
+    make, start, run_out, plan, cell, home
+):
+    """Replanned in motion: the first point is where the robot is now, with its velocity."""
+    simulation = make()
+    there = home + np.array([0.5, 0.2, -0.2, 0.3, -0.2, 0.4])
+    sent = plan(2.0, home, there)
+    start(simulation, sent)
+    simulation.run(0.7)
+    left = np.linspace(0.7, 2.0, 14)
+    state = sent.sample(left)
+    replanned = JointTrajectory.from_seconds(
+        cell.robot.joint_names, left - left[0], state.q, state.qd, state.qdd
+    )
+    q = [simulation.backend.q.copy()]
+    start(simulation, replanned)
+    for _ in range(1500):
+        simulation.step()
+        q.append(simulation.backend.q.copy())
+    outcomes = simulation.take_outcomes()
+    assert [outcome.code for outcome in outcomes] == [
+        ErrorCode.INVALID_GOAL,  # preempted
+        ErrorCode.SUCCESSFUL,
+    ]
+    acceleration = np.abs(np.diff(q, 2, axis=0)) / simulation.settings.dt**2
+    assert (acceleration < 1.05 * cell.robot.acceleration_max + 0.05).all()
+    assert np.abs(q[-1] - there).max() < 1e-3
+
+
+@pytest.mark.parametrize("off", [0.05, -0.3])
+def test_a_first_point_elsewhere_at_time_0_in_motion_changes_nothing(
+    make, start, run_out, plan, home, off
+):
+    simulation = make()
+    there = home + np.array([0.5, 0.2, -0.2, 0.3, -0.2, 0.4])
+    start(simulation, plan(2.0, home, there))
+    simulation.run(0.7)
+    with pytest.raises(TrajectoryRefusedError):
+        start(simulation, plan(2.0, simulation.backend.q + off, home))
+    outcome = run_out(simulation)
+    assert outcome.code == ErrorCode.SUCCESSFUL
+    assert np.abs(simulation.backend.q - there).max() < 1e-3
