@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 import re
 import runpy
+import shlex
+import subprocess
 import sys
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -206,3 +209,34 @@ def test_commands_that_docker_s_files_show_begin_with_a_command_of_the_image() -
     scripts = set(re.findall(r"[\"'](\w+) ?= ?[\w.]+:\w+", setups))
     assert len(shown) > 5
     assert set(shown) - {"bash"} <= scripts
+
+
+def test_every_command_in_a_comment_of_docker_s_files_names_what_there_is() -> None:
+    compose = yaml.safe_load((ROOT / "docker" / "compose.yaml").read_text())
+    dockerfile = (ROOT / "docker" / "Dockerfile").read_text()
+    targets = set(re.findall(r"^FROM \S+ AS (\w+)", dockerfile, re.MULTILINE))
+    shown = [
+        re.split(r"\s{3,}", line.lstrip("# "))[0]
+        for path in sorted((ROOT / "docker").iterdir())
+        for line in path.read_text().splitlines()
+        if re.match(r"#\s+docker ", line)
+    ]
+    assert len(shown) == 5
+    for command in shown:
+        subprocess.run(["bash", "-n", "-c", command], check=True)
+        words = shlex.split(command)
+        assert words[1] in {"build", "run", "compose"}, command
+        files = [after for word, after in pairwise(words) if word in ("-f", "--file")]
+        assert all((ROOT / file).is_file() for file in files), command
+        if words[1] == "build":
+            assert words[-1] == "."
+            assert words[words.index("-t") + 1] == compose["x-node"]["image"]
+        elif words[1] == "run":
+            assert words[-3] == compose["x-node"]["image"], command
+        elif "run" in words:
+            assert words[-1] in compose["services"], command
+        else:
+            assert {"up", "--build"} <= set(words), command
+    assert compose["x-node"]["build"]["target"] in targets
+    listed = re.findall(r"^# Targets: .*", dockerfile, re.MULTILINE)
+    assert set(re.findall(r"(\w+) \(", "".join(listed))) == targets - {"base"}
