@@ -1,5 +1,5 @@
 """What somebody has given stays until he, or drives_on, takes it away: a law of AB, HIB and
-drives_off.
+drives_off. A stop ends a pause of PROFIenergy.
 """
 
 from __future__ import annotations
@@ -8,9 +8,10 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ir_msgs_py.modes import Mode
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.plc import OWN_BITS, SERVICE, TOPIC, giver_of
 
@@ -80,3 +81,21 @@ def test_what_a_program_alone_has_given_goes(bit: str, steps: int) -> None:
     wait(core, 30)
     assert not getattr(core.plc.levels, bit)
     assert not core.control.latches.drives_off
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 5000), st.booleans())
+def test_a_stop_ends_a_pause_of_profienergy_for_good(after: int, recovers: bool) -> None:
+    core = Core()
+    core.control.pauses._route = (Mode.STAND_ON_BRAKES, Mode.BUS_POWER_OFF, Mode.HIBERNATION)
+    wait(core, after)
+    core.write({"emergency_stop": True})
+    wait(core, 1)
+    core.write({"emergency_stop": False})
+    wait(core, 30)
+    if recovers:
+        core.recover()
+    wait(core, 5000)
+    assert core.control.pauses.rest is None
+    assert not core.control.pauses.active
+    assert core.mode not in (Mode.TO_HIBERNATION, Mode.HIBERNATION)

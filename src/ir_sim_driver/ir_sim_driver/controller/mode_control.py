@@ -324,6 +324,7 @@ class ModeControl:
     def _forget_requests(self) -> None:
         """A stop has a new number: nothing of before it is asked for any more."""
         self.pauses.wants_motors = False
+        self.pauses.forget()
         self.latches.end_rest = None
         self.latches.recover = False
 
