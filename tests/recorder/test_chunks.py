@@ -148,3 +148,17 @@ def test_a_chunk_of_very_many_records_is_not_opened() -> None:
     data = bytes(9 * (MOST_RECORDS + 1))
     with pytest.raises(ReadError, match="more than 500,000 records"):
         ChunkReader(ReadLimits()).records(Chunk("", data, 0, 0, 0, len(data)))
+
+
+def test_records_that_cost_nothing_in_the_file_end_at_a_bound(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("ir_recorder.reading.limits.MOST_CHEAP", 10_000)
+    data = (b"\x05" + (22).to_bytes(8, "little") + bytes(22)) * 6_000
+    small = zstandard.compress(data)
+    assert len(small) < 1_000
+    chunk = Chunk("zstd", small, 0, 0, 0, len(data))
+    reader = ChunkReader(ReadLimits())
+    assert len(reader.records(chunk)) == 6_000
+    with pytest.raises(ReadError, match="more than its compressed chunks have bytes"):
+        reader.records(chunk)

@@ -17,6 +17,7 @@ from ir_recorder.errors import ReadError
 _STEP = 1 << 20  # bytes that are decompressed at a time
 _HEAD = 9  # bytes of a record's kind and length
 MOST_RECORDS = 500_000  # in one chunk; one of 4 MB of the smallest messages has 100,000
+MOST_CHEAP = 1_000_000  # records of a recording beyond one for each byte of its compressed chunks
 MOST_CHANNELS = 10_000  # of a recording, and as many schemas; a cell has 50
 MOST_RECORD = 1 << 20  # bytes of a record but chunks, messages and attachments; a schema has 20 kB
 MOST_CHANNEL = 1 << 16  # bytes of a channel; one of this project has 500
@@ -45,7 +46,7 @@ class ChunkReader:
 
     def __init__(self, limits: ReadLimits) -> None:
         self._limits = limits
-        self._used = self._given = self._claimed = self._channels = 0
+        self._used = self._given = self._claimed = self._channels = self._cheap = 0
 
     def records(self, chunk: Chunk) -> list[McapRecord]:
         """What is in the chunk; its check sum is compared."""
@@ -65,7 +66,12 @@ class ChunkReader:
             )
         data = _decompressed(chunk)
         self.count(len(data))
-        _check_number(data)
+        self._cheap += max(0, _number_of_records(data) - len(chunk.data))
+        if self._cheap > MOST_CHEAP:
+            raise TooLargeError(
+                f"{MOST_CHEAP:,} records more than its compressed chunks have bytes: the rest is "
+                "left out"
+            )
         records = breakup_chunk(replace(chunk, compression="", data=data), validate_crc=True)
         self.count(_OVERHEAD * len(records))
         for record in records:
@@ -107,14 +113,14 @@ def most_of(kind: int) -> int:
     return MOST_CHANNEL if kind == Opcode.CHANNEL else MOST_RECORD
 
 
-def _check_number(data: bytes) -> None:
-    """ReadError for a chunk of so many records that making them takes minutes and gigabytes, or
-    with a record of maps and texts that is too long.
+def _number_of_records(data: bytes) -> int:
+    """How many there are; ReadError for a chunk of so many that making them takes minutes and
+    gigabytes, or with a record of maps and texts that is too long.
     """
     at = 0
-    for _ in range(MOST_RECORDS):
+    for number in range(MOST_RECORDS):
         if at + _HEAD > len(data):
-            return
+            return number
         length = int.from_bytes(data[at + 1 : at + _HEAD], "little")
         if data[at] != Opcode.MESSAGE and length > most_of(data[at]):
             raise ReadError(f"it has a record of {length:,} bytes that is no message")
