@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from rclpy.node import Node
 
-from ir_msgs_py.ros.parameters import Parameters
+from ir_msgs_py.ros.parameters import Parameters, introspect_services
 from ir_planner import PlannerSettings
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
@@ -36,6 +36,7 @@ DECLARE: dict[str, Callable[[Node], object]] = {
 def test_the_page_lists_what_the_node_declares(name: str, ros_node: Node) -> None:
     before = set(ros_node._parameters)
     DECLARE[name](ros_node)
+    introspect_services(ros_node)
     declared = {
         each: ros_node.describe_parameter(each) for each in set(ros_node._parameters) - before
     }
