@@ -1,10 +1,12 @@
-"""Writes the table of figures in README.md: what `ir compare demo` says, rounded.
+"""Writes the figures in README.md: what `ir compare demo` says, rounded, and the span of the table
+beside OMPL in docs/planning.md.
 
 A test compares. The planner's clock stands, so that no busy machine cuts a plan.
 """
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -17,6 +19,7 @@ from ir_recorder.report.number_text import millimetres, seconds, significant
 from ir_recorder.report.program_comparison import Year, year_of
 
 PAGE = Path(__file__).resolve().parents[1] / "README.md"
+PEERS = PAGE.parent / "docs" / "planning.md"
 START = "| | point to point at 100 % | planned | |\n"
 END = "\n\n"
 
@@ -78,10 +81,22 @@ def _co2(year: Year, costs: Costs) -> str:
     return f"{significant(costs.co2(year.saved.value), 3)} kg"
 
 
+def beside_peers(table: str) -> str:
+    """What a movement takes and saves, smallest to largest cell of the table beside OMPL."""
+    row = r"^\| `\w+` \| [^|]+ \| [\d.]+, (\d+) ms \|.*\| ([\d.]+), [\d.]+ to [\d.]+ \|$"
+    found = re.findall(row, table, re.MULTILINE)
+    final = sorted(int(ms) for ms, _ in found)
+    saved = sorted(round(100.0 * (1.0 - float(ratio))) for _, ratio in found)
+    return f"{final[0]} to {final[-1]} ms and costs {saved[0]} to {saved[-1]} %"
+
+
 def page() -> str:
     """README.md with the figures of this build."""
     before, _, after = PAGE.read_text(encoding="utf-8").partition(START)
-    return before + figures(compared(), Costs()) + END + after.partition(END)[2]
+    after = after.partition(END)[2]
+    peers = beside_peers(PEERS.read_text(encoding="utf-8"))
+    after = re.sub(r"\d+ to \d+ ms and costs \d+ to \d+ %", peers, after)
+    return before + figures(compared(), Costs()) + END + after
 
 
 def main() -> int:
