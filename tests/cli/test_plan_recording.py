@@ -121,3 +121,8 @@ def test_a_plan_is_a_page_and_a_failed_one_says_which_pair_is_in_the_path(
     assert drawn["blamed"] == ["base", "l2"]
     assert {body["name"] for body in drawn["scene"]["bodies"]} >= {"tray_in_top", "divider"}
     assert {"base", "l2"} <= {shape["name"] for shape in drawn["scene"]["shapes"]}
+
+
+def test_recordings_are_no_programs_to_compare(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", "a.mcap", "b.mcap"]) == 2
+    assert "a.mcap: a recording, not a cell: use ir report a.mcap b.mcap" in capsys.readouterr().err

@@ -8,9 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ir_description import load_cell
 from ir_recorder import Analysis, analyse
-from ir_recorder.analysis.production import demand_watts, idle_watts, production_of
+from ir_recorder.analysis.production import (
+    DRIVES_ONLY,
+    OPEN,
+    Amount,
+    demand_watts,
+    idle_watts,
+    production_of,
+)
 from ir_recorder.errors import RecorderError
+from ir_recorder.report import report_html
+from ir_recorder.report.compare import comparison_html
 from ir_recorder.report.costs import (
     NAMES,
     Costs,
@@ -19,8 +29,11 @@ from ir_recorder.report.costs import (
     given_and_assumed,
     lever_section,
     money,
+    payback,
     read_costs,
+    yearly_money,
 )
+from ir_recorder.report.fleet import fleet_html, fleet_of_line, member_of
 from ir_values.settings import settings_table
 
 GIVEN = """format: ir_costs/1
@@ -178,3 +191,57 @@ def test_without_a_program_there_is_nothing_to_pay(analysis: Analysis) -> None:
     assert costs_section(bare, Costs()) == ""
     assert lever_section(bare, Costs()) == ""
     assert clock_section(bare, Costs()) == ""
+
+
+@pytest.mark.parametrize(
+    ("saved", "words"),
+    [(30.0, "2 years"), (60.0, "12 months"), (1000.0, "22 days"), (12.0, "5 years"), (1.0, "")],
+)
+def test_an_hour_of_an_engineer_is_paid_back_by_the_saving(saved: float, words: str) -> None:
+    costs = Costs(price=0.25, engineer_hour=60.0)
+    year = Amount(1.0, 0.5, 1.5).times(saved / 0.25 * 3.6e6)
+    expected = f"is paid back in {words}" if words else "is not paid back within 20 years"
+    assert payback(year, costs) == f"one hour of an engineer (60 EUR) {expected}"
+    assert payback(replace(year, low=-year.low), costs) == ""
+
+
+def test_amounts_that_nobody_counts_are_said_in_words() -> None:
+    assert yearly_money(4.3e-8, "EUR") == "practically nothing"
+    assert yearly_money(0.02, "EUR") == money(0.02, "EUR")
+    assert payback(Amount(1.0, 1.0, 1.0), Costs()) == ""
+
+
+def test_zero_inside_an_interval_is_said_on_every_page(analysis: Analysis) -> None:
+    (event,) = analysis.recording.savings[-1:]
+    savings = replace(event.savings, total_low=-1e6, total_high=1e6)
+    events = (replace(event, savings=savings, time=0.0),)
+    found = analyse(replace(analysis.recording, savings=events))
+    member = member_of(found, "robot")
+    assert member is not None
+    pages = (
+        report_html(found, ()),
+        comparison_html([(found, ()), (found, ())]),
+        fleet_html([member]),
+    )
+    assert all(OPEN in page for page in pages)
+    assert not any("Of the whole line" in page for page in pages)
+
+
+def test_a_robot_without_figures_of_its_controller_is_in_no_sum_at_the_mains(
+    analysis: Analysis,
+) -> None:
+    assert analysis.cell is not None
+    robot = replace(analysis.cell.robot, controller=load_cell("kr6_bench").robot.controller)
+    found = replace(analysis, cell=replace(analysis.cell, robot=robot))
+    assert idle_watts(found) == {}
+    members = [member_of(analysis, "counted"), member_of(found, "bare")]
+    known = [member for member in members if member is not None]
+    fleet = fleet_html(known)
+    alone = fleet_html(known[:1])
+    pages = (report_html(found, ()), comparison_html([(found, ()), (analysis, ())]), fleet)
+    assert all(DRIVES_ONLY in page for page in pages)
+    assert "In no sum" in fleet
+    assert "Of the whole line" not in pages[0]
+    whole = fleet_of_line(known, Costs())
+    assert whole == fleet_of_line(known[:1], Costs())
+    assert fleet.partition("</section>")[0].split("<main>")[1] in alone

@@ -31,6 +31,7 @@ from ir_cli.planning import (
     options_of,
     planner_of,
     sentences,
+    supply,
 )
 from ir_cli.trace_programs import today_of_trace
 from ir_cli.traces import add_measured
@@ -41,6 +42,7 @@ from ir_planner.krl import evaluate_krl
 
 KRL = (".src", ".dat", ".sub", UR)
 TRACES = (".csv", ".txt", ".parquet", ".mcap", ".db3", ".xml")
+RECORDINGS = (".mcap", ".db3")
 COLUMNS: Columns = {
     "program": ("program", text),
     "seconds": ("s", number(2)),
@@ -114,6 +116,10 @@ def run_compare(arguments: argparse.Namespace) -> int:
     from ir_recorder.report.program_comparison import write_before_after, write_before_after_table
     from ir_recorder.report.whole_line import of_saving
 
+    files = [Path(arguments.cell), *arguments.today]
+    if files[0].suffix.lower() in RECORDINGS:
+        names = " ".join(map(str, files))
+        raise InputError(f"{files[0]}: a recording, not a cell: use ir report {names}")
     costs = read_costs(arguments.costs) if arguments.costs else Costs()
     with sentences(), ProgressLine() as line:
         planner = planner_of(arguments.cell, arguments.power_parameters)
@@ -123,7 +129,8 @@ def run_compare(arguments: argparse.Namespace) -> int:
     if arguments.table:
         locale = arguments.locale
         table = write_before_after_table(found, arguments.table, costs, locale=locale)
-    whole = of_saving(found.planned.saving, costs)
+    counted = planner.cell.robot.controller.counted
+    whole = of_saving(found.planned.saving, costs) if counted else None
     rows = [row_of(side) for side in (found.today, *found.sides)]
     if arguments.json:
         shares = {"whole_line": asdict(whole) if whole is not None else None}
@@ -134,7 +141,8 @@ def run_compare(arguments: argparse.Namespace) -> int:
         print_csv(rows)
     else:
         print_table(rows, COLUMNS)
-        said = [*_sentences(found), *([whole.sentence] if whole is not None else [])]
+        apart = [] if counted else [f"all energies: {supply(planner.cell)}"]
+        said = [*_sentences(found), *apart, *([whole.sentence] if whole is not None else [])]
         sys.stdout.write("\n".join(said) + "\n")
         sys.stdout.write("".join(f"{path}\n" for path in (page, table) if path is not None))
     return 0

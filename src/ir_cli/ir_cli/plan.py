@@ -275,6 +275,8 @@ def sentences_of(plan: ProgramPlan, cell: Cell) -> list[str]:
     standing = totals["seconds"] - totals["moving_seconds"]
     waiting = totals["joules"] - totals["moving_joules"]
     energy = kilowatt_hours(totals["joules"] / J_PER_KWH)
+    if totals["joules"] < 1e-2 * J_PER_KWH:
+        energy = f"{energy} ({totals['joules']:.0f} J)"
     proof = "free of collision and within all limits at every instant, proved"
     if all(step.is_pause for step in plan.movements):
         proof = "nothing moves"

@@ -190,8 +190,7 @@ def predicted(report: TrajectoryReport) -> str:
 
 def supply(cell: Cell) -> str:
     """Where joules are counted: without watts of a controller they are those of drives and tool."""
-    power = cell.robot.controller
-    counted = power.has_table or power.modes[0].controller_watts > 0.0
+    counted = cell.robot.controller.counted
     return "from the mains" if counted else "at the drives, no controller counted"
 
 

@@ -224,8 +224,8 @@ class PlanWorker:
         start = cell.posture("park")
         found = before_after_common(planner, asked.stations, start, 0.0, options, progress)
         costs = Costs()
-        tables = (figure_table(found, costs), change_table(found, costs), assumptions(found, costs))
-        return Planned(None, compared="".join(tables))
+        figures = figure_table(found, costs) + change_table(found, costs)
+        return Planned(None, compared=figures + assumptions(found, cell, costs))
 
     def _stop_if_old(self, asked: ViewRequest) -> None:
         if self._latest != asked.number:

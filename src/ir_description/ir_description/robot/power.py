@@ -141,6 +141,11 @@ class PowerData:
         """Whether there are modes to rest in; without, a robot that waits stands on its motors."""
         return len(self.modes) > 1
 
+    @property
+    def counted(self) -> bool:
+        """Whether joules hold what the controller draws; else they are those of drives and tool."""
+        return self.has_table or self.modes[0].controller_watts > 0.0
+
     def mode(self, name: str) -> ControllerMode:
         """Return the mode of that name."""
         for mode in self.modes:

@@ -208,12 +208,16 @@ def sentence_of(savings: ProgramSavings) -> str:
 
 
 def _percent(saving: Saving) -> str:
-    within = f"{saving.saved_low / 1e3:.2f} to {saving.saved_high / 1e3:.2f} kJ"
+    small = max(saving.common, saving.planned) < 1e3  # J
+    unit, scale, digits = ("J", 1.0, 1) if small else ("kJ", 1e-3, 2)
+    low, high = (f"{scale * end:.{digits}f}" for end in (saving.saved_low, saving.saved_high))
+    within = f"{low} to {high} {unit}"
     sure = saving.certain or saving.common == saving.planned
     doubt = "" if sure else "; zero lies in it: it is open whether anything is saved"
     return (
-        f"{saving.change} ({saving.planned / 1e3:.2f} kJ instead of "
-        f"{saving.common / 1e3:.2f} kJ, predicted; 90 % interval of what is saved {within}{doubt})"
+        f"{saving.change} ({scale * saving.planned:.{digits}f} {unit} instead of "
+        f"{scale * saving.common:.{digits}f} {unit}, predicted; "
+        f"90 % interval of what is saved {within}{doubt})"
     )
 
 

@@ -36,6 +36,8 @@ ENDED = "ended"  # outcome of a step
 PREDICTED = "predicted"
 PLANNED_MOVING = "MOVING"
 NO_MODE = "STAND_ON_MOTORS"
+OPEN = "zero lies in it: it is open whether anything is saved"
+DRIVES_ONLY = "drives only, controller not counted"
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,13 @@ class Amount:
     def times(self, count: float) -> Amount:
         """So many of it."""
         return self.of(lambda value: value * count)
+
+    @property
+    def doubt(self) -> str:
+        """OPEN where zero lies inside the interval of a saving; "" where it does not, or there is
+        no interval.
+        """
+        return OPEN if self.low < self.high and self.low <= 0.0 <= self.high else ""
 
     def gain(self) -> tuple[str, Amount]:
         """A saving as people say it: "saved", or "more" where it is negative, and how much."""
@@ -90,7 +99,8 @@ class Production:
     [J]: 90 % interval of the energy, alike where there is none. cycles: how many the recording
     holds. modes, steps: shares by power mode and by movement or pause; the modes' sum is the
     cycle's energy. savings: what the plan saves of the common program, pauses at full length; None
-    where it is not known. notes: sentences that limit the figures.
+    where it is not known. notes: sentences that limit the figures. drives_only: joules are those of
+    drives and tool, as nobody knows what the controller draws.
     """
 
     name: str
@@ -104,12 +114,38 @@ class Production:
     steps: Mapping[str, Share] = field(default_factory=dict)
     savings: ProgramSavings | None = None
     notes: tuple[str, ...] = ()
+    drives_only: bool = False
+
+    @property
+    def supply(self) -> str:
+        """DRIVES_ONLY, or "" where the energy is that of the mains."""
+        return DRIVES_ONLY if self.drives_only else ""
 
 
 def production_of(analysis: Analysis) -> Production | None:
     """The cycle of what was driven, else of what was planned; None without a whole cycle of known
     energy (`without_production` says why).
     """
+    cycle = _cycle_of(analysis)
+    if cycle is None or not drives_only(analysis):
+        return cycle
+    note = f"{DRIVES_ONLY}: the mains give more, and what the controller draws at rest isn't known"
+    return replace(
+        cycle,
+        name=f"{cycle.name}, {DRIVES_ONLY}",
+        notes=(*cycle.notes, note),
+        drives_only=True,
+    )
+
+
+def drives_only(analysis: Analysis) -> bool:
+    """Whether the joules are computed for a robot whose controller has no figures."""
+    cell = analysis.cell
+    computed = analysis.program is None or analysis.recording.origin == "simulated"
+    return cell is not None and not cell.robot.controller.counted and computed
+
+
+def _cycle_of(analysis: Analysis) -> Production | None:
     if analysis.program is not None:
         return _driven(analysis, analysis.program)
     planned = analysis.recording.planned
@@ -320,10 +356,11 @@ def _in_order(analysis: Analysis) -> list[tuple[float, float]]:
 
 def idle_watts(analysis: Analysis) -> dict[str, float]:
     """W at rest at machine home in each power mode that the controller has, with what the program
-    holds at its end, by the data; empty where the recording has no cell.
+    holds at its end, by the data; empty where the recording has no cell, or its controller has no
+    figures.
     """
     cell = analysis.cell
-    if cell is None:
+    if cell is None or not cell.robot.controller.counted:
         return {}
     data, _ = recorded_power_data(analysis.recording, cell)
     ends = [step.load for step in analysis.recording.planned[-1:]]

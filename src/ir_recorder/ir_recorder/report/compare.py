@@ -17,6 +17,7 @@ from ir_recorder.analysis import Analysis, Finding, summary
 from ir_recorder.analysis.flows import energy_flows
 from ir_recorder.analysis.production import (
     Production,
+    drives_only,
     planned_clearance,
     planned_share,
     production_of,
@@ -24,7 +25,13 @@ from ir_recorder.analysis.production import (
 from ir_recorder.analysis.results import ProgramTotals, Share
 from ir_recorder.analysis.steps import step_label
 from ir_recorder.report.charts import Point, front_chart
-from ir_recorder.report.costs import Costs, given_and_assumed, money
+from ir_recorder.report.costs import (
+    Costs,
+    given_and_assumed,
+    payback,
+    yearly_end,
+    yearly_money,
+)
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import plant_of
 from ir_recorder.report.number_text import (
@@ -72,6 +79,7 @@ def comparison_html(compared: Sequence[Compared], costs: Costs | None = None) ->
         "subtitle": text(f"{names[0]} is what the others are held against"),
         "problems": _problems(analyses, names),
         "paid": _paid(compared, names, costs or Costs()),
+        "supply": "" if any(map(drives_only, analyses)) else " at the mains",
         "figures": _figures(compared, names),
         "front": front_chart(_points(analyses, names)),
         "steps": _steps(analyses, names),
@@ -103,7 +111,9 @@ def _problems(analyses: Sequence[Analysis], names: Sequence[str]) -> str:
         items.append(
             "<li>These recordings are of different plants: not only the programs differ.</li>"
         )
-    return f'<div class="problems"><b>Notes</b><ul>{"".join(items)}</ul></div>' if items else ""
+    return (
+        f'<div class="problems calm"><b>Notes</b><ul>{"".join(items)}</ul></div>' if items else ""
+    )
 
 
 def _paid(compared: Sequence[Compared], names: Sequence[str], costs: Costs) -> str:
@@ -131,10 +141,11 @@ def _year(cycle: Production | None, first: Production | None, costs: Costs) -> s
         return DASH
     year = costs.energy_of_year(cycle).value
     shown = (
-        f"<b>{text(money(costs.money(year), costs.currency))}</b>"
+        f"<b>{text(yearly_money(costs.money(year), costs.currency))}</b>"
         f"<small>{kilowatt_hours(year)}</small>"
+        + (f"<small>{cycle.supply}</small>" if cycle.supply else "")
     )
-    if first is None or first is cycle:
+    if first is None or first is cycle or first.drives_only != cycle.drives_only:
         return shown
     return f"{shown}<small>{percent(year / costs.energy_of_year(first).value - 1.0)}</small>"
 
@@ -148,11 +159,14 @@ def _year_saved(cycle: Production | None, costs: Costs) -> str:
     lines = [
         f"{kilowatt_hours(gain.value)}{' more' if word == 'more' else ''}",
         cycle.savings.total.change,
+        gain.doubt,
+        cycle.supply,
+        payback(amount, costs),
     ]
     if price.high > price.low:
-        lines.insert(0, f"{money(price.low, '').strip()} to {money(price.high, costs.currency)}")
-    small = "".join(f"<small>{text(line)}</small>" for line in lines)
-    return f"<b>{text(money(price.value, costs.currency))}</b>{small}"
+        lines.insert(0, f"{yearly_end(price.low)} to {yearly_end(price.high)} {costs.currency}")
+    small = "".join(f"<small>{text(line)}</small>" for line in lines if line)
+    return f"<b>{text(yearly_money(price.value, costs.currency))}</b>{small}"
 
 
 def _of_line(analysis: Analysis, costs: Costs) -> str:

@@ -23,6 +23,7 @@ from ir_recorder.analysis.production import (
     saved_amount,
 )
 from ir_recorder.errors import RecorderError
+from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import (
     DASH,
     kilowatt_hours,
@@ -315,14 +316,29 @@ def _row(
     name: str, energy: float, length: float, counts: tuple[float, ...], costs: Costs
 ) -> tuple[str, ...]:
     cycle = f"<b>{kilowatt_hours(energy)}</b><small>{seconds(length)}</small>"
-    return (text(name), cycle, *(_priced(energy * count, costs) for count in counts))
-
-
-def _priced(energy: float, costs: Costs) -> str:
     return (
-        f"<b>{text(money(costs.money(energy), costs.currency))}</b><small>{kilowatt_hours(energy)}</small><small>{number(costs.co2(energy), 'kg')} "  # noqa: E501
-        "CO2</small>"
+        text(name),
+        cycle,
+        *(_priced(energy * count, energy * counts[-1], costs) for count in counts),
     )
+
+
+def _priced(energy: float, year: float, costs: Costs) -> str:
+    """Energy of a part, a shift or a year, which takes `year` [J] in all."""
+    shown = _shown(costs.money(energy), costs.money(year), costs.currency)
+    return (
+        f"<b>{text(shown)}</b><small>{kilowatt_hours(energy)}</small>"
+        f"<small>{number(costs.co2(energy), 'kg')} CO2</small>"
+    )
+
+
+def _shown(value: float, year: float, currency: str) -> str:
+    """An amount of a part, a shift or a year; in words where it, or the whole year, is too little
+    to count.
+    """
+    if 0.0 < abs(value) < _UNSEEN or 0.0 < abs(year) < _NOTHING:
+        return "practically nothing"
+    return money(value, currency)
 
 
 def money(value: float, currency: str) -> str:
@@ -338,6 +354,54 @@ def money(value: float, currency: str) -> str:
     else:
         shown = significant(value, 3 if abs(value) >= 0.001 else 2)
     return f"{shown} {currency}"
+
+
+_NOTHING = 0.01  # of a currency, a year: nobody counts less
+_UNSEEN = 1e-4  # of a currency, a part or a shift
+
+
+def yearly_money(value: float, currency: str) -> str:
+    """An amount of a year; in words where it is below a hundredth of the currency."""
+    if 0.0 < abs(value) < _NOTHING:
+        return "practically nothing"
+    return money(value, currency)
+
+
+def yearly_end(value: float) -> str:
+    """An end of the interval of an amount of a year, without its currency."""
+    return money(value if abs(value) >= _NOTHING else 0.0, "").strip()
+
+
+def _end(value: float) -> str:
+    return money(value if abs(value) >= _UNSEEN else 0.0, "").strip()
+
+
+def payback(year: Amount, costs: Costs) -> str:
+    """When the saving of a year [J] has paid an hour of an engineer; "" where it is open whether
+    anything is saved, or next to nothing is.
+    """
+    saved = costs.money(year.value)
+    if year.doubt or saved < _NOTHING or costs.engineer_hour <= 0.0:
+        return ""
+    years = costs.engineer_hour / saved
+    hour = f"one hour of an engineer ({costs.engineer_hour:g} {costs.currency})"
+    if years > _LONG:
+        return f"{hour} is not paid back within {_LONG:.0f} years"
+    return f"{hour} is paid back in {_span(years)}"
+
+
+_LONG = 20.0  # years: a robot is older by then
+_MONTHS = 12.0
+_SOON = 2.0  # months: shorter spans are said in days
+_LATER = 2.0  # years: longer ones in years
+
+
+def _span(years: float) -> str:
+    if years * _MONTHS < _SOON:
+        return counted(max(round(years * _YEAR), 1), "day")
+    if years < _LATER:
+        return counted(round(years * _MONTHS), "month")
+    return counted(round(years), "year")
 
 
 def share_between(amount: Amount, whole: float) -> str:
@@ -363,11 +427,14 @@ def _saved(
 
 def _saving(where: str, saving: Saving, counts: tuple[float, ...], costs: Costs) -> tuple[str, ...]:
     word, amount = saved_amount(saving).gain()
-    cells = [f"<b>{kilowatt_hours(amount.value)}</b>{_between(amount, kilowatt_hours)}"]
+    doubt = f"<small>{amount.doubt}</small>" if amount.doubt else ""
+    cells = [f"<b>{kilowatt_hours(amount.value)}</b>{_between(amount, kilowatt_hours)}{doubt}"]
+    year = costs.money(amount.value * counts[-1])
     for count in counts:
         price = amount.times(count).of(costs.money)
-        shown = text(money(price.value, costs.currency))
-        cells.append(f"<b>{shown}</b>{_between(price, lambda value: money(value, '').strip())}")
+        shown = _shown(price.value, year, costs.currency)
+        between = _between(price, _end) if abs(year) >= _NOTHING else ""
+        cells.append(f"<b>{text(shown)}</b>{between}")
     return (f"{word} {where}", *cells)
 
 
@@ -411,7 +478,7 @@ def lever_section(analysis: Analysis, costs: Costs) -> str:
             text(lever.name),
             f"<b>{kilowatt_hours(lever.joules)}</b>",
             share(lever.joules, cycle.energy),
-            text(money(costs.money(lever.joules * yearly), costs.currency)),
+            text(yearly_money(costs.money(lever.joules * yearly), costs.currency)),
             f"{text(lever.means)}<small>counted: {text(lever.basis)}</small>",
         )
         for lever in found
@@ -433,22 +500,15 @@ def clock_section(analysis: Analysis, costs: Costs) -> str:
     cycle = production_of(analysis)
     if cycle is None:
         return ""
-    found = [_demand(analysis, cycle, costs), _payback(cycle, costs)]
+    saved = costs.saving_of_year(cycle)
+    paid = payback(saved, costs) if saved is not None else ""
+    found = [
+        _demand(analysis, cycle, costs),
+        text(f"By what the plan saves, {paid}.") if paid else "",
+    ]
     return (
         f'<section id="around"><h2>Around the clock</h2><p class="hint">{" ".join(found).strip()}'
         f"</p>{_idle(analysis, costs)}</section>"
-    )
-
-
-def _payback(cycle: Production, costs: Costs) -> str:
-    """How much work the saving of a year pays."""
-    year = costs.saving_of_year(cycle)
-    if year is None or year.value <= 0.0 or costs.engineer_hour <= 0.0:
-        return ""
-    hours = costs.money(year.value) / costs.engineer_hour
-    return (
-        f"What the plan saves in a year pays {hours:.2g} h of an engineer at "
-        f"{text(money(costs.engineer_hour, costs.currency))} an hour."
     )
 
 
@@ -458,12 +518,18 @@ def _demand(analysis: Analysis, cycle: Production, costs: Costs) -> str:
     price = ""
     if costs.demand_price > 0.0:
         price = f", {money(peak / 1000.0 * costs.demand_price, costs.currency)} a year"
-    return f"The largest quarter of an hour takes {watts(peak)} on average{text(price)}."
+    limit = f" ({cycle.supply})" if cycle.supply else ""
+    return f"The largest quarter of an hour takes {watts(peak)} on average{limit}{text(price)}."
 
 
 def _idle(analysis: Analysis, costs: Costs) -> str:
     """What the robot draws while nobody works, by power mode."""
     found = idle_watts(analysis)
+    if analysis.cell is not None and not analysis.cell.robot.controller.counted:
+        return (
+            '<p class="hint">What the robot takes when nobody works isn\'t known: its controller '
+            "has no figures.</p>"
+        )
     if not found or costs.idle_hours <= 0.0:
         return ""
     seconds_idle = costs.idle_hours * 3600.0

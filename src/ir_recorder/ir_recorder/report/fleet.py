@@ -13,6 +13,7 @@ from pathlib import Path
 
 from ir_recorder.analysis import Analysis, analyse
 from ir_recorder.analysis.production import (
+    DRIVES_ONLY,
     Amount,
     Production,
     demand_watts,
@@ -28,7 +29,14 @@ from ir_recorder.errors import ReadError, RecorderError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import is_further_part
 from ir_recorder.reading.reader import read_recording
-from ir_recorder.report.costs import Costs, given_and_assumed, idle_money, money
+from ir_recorder.report.costs import (
+    Costs,
+    given_and_assumed,
+    idle_money,
+    payback,
+    yearly_end,
+    yearly_money,
+)
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import Tile, started
 from ir_recorder.report.methods import counted
@@ -236,6 +244,7 @@ def member_of(analysis: Analysis, robot: str, said: Said = lambda _: None) -> Me
 class Robot:
     """All members of one robot: recordings, mean seconds and joules of a cycle; joules of a year,
     and those that its plans save of the common program's, each with its 90 % interval.
+    drives_only: they are those of drives and tool, and no part of a sum at the mains.
     """
 
     name: str
@@ -246,6 +255,7 @@ class Robot:
     joules: float
     yearly: Amount
     saved: Amount | None
+    drives_only: bool = False
 
 
 def robots_of(members: Sequence[Member], costs: Costs) -> list[Robot]:
@@ -267,16 +277,24 @@ def robots_of(members: Sequence[Member], costs: Costs) -> list[Robot]:
                 sum(member.cycle.energy for member in own) / len(own),
                 mean_of([costs.energy_of_year(member.cycle) for member in own]),
                 mean_of(saved) if saved else None,
+                any(member.cycle.drives_only for member in own),
             )
         )
     return sorted(found, key=lambda robot: -robot.yearly.value)
 
 
+def at_mains(members: Sequence[Member]) -> list[Member]:
+    """Those of robots whose energy at the mains is known."""
+    apart = {member.robot for member in members if member.cycle.drives_only}
+    return [member for member in members if member.robot not in apart]
+
+
 def fleet_of_line(members: Sequence[Member], costs: Costs) -> WholeLine | None:
     """What all plans together save in a year, as a share of the line and of the factory; None where
-    no recording says it. Several recordings of a robot are averaged.
+    no recording says it, or it is open whether anything is saved. Several
+    recordings of a robot are averaged.
     """
-    known = [(m.robot, m.cycle) for m in members if m.cycle.savings is not None]
+    known = [(m.robot, m.cycle) for m in at_mains(members) if m.cycle.savings is not None]
     count = Counter(robot for robot, _ in known)
     saved = []
     common = 0.0
@@ -286,7 +304,8 @@ def fleet_of_line(members: Sequence[Member], costs: Costs) -> WholeLine | None:
             saved.append(amount.times(1.0 / count[robot]))
             cycles = costs.cycles_per_year(cycle.seconds) / count[robot]
             common += cycle.savings.total.common * cycles
-    return of_whole_line(sum_of(saved), common, costs)
+    total = sum_of(saved)
+    return None if total.doubt else of_whole_line(total, common, costs)
 
 
 def by_mode(members: Sequence[Member], costs: Costs) -> dict[str, dict[str, float]]:
@@ -349,16 +368,18 @@ def fleet_html(
     """The page as text; left_out: a sentence for each file that could not be used."""
     prices = costs or Costs()
     robots = robots_of(members, prices)
+    known = at_mains(members)
+    summed = [robot for robot in robots if not robot.drives_only]
     sections = [
         _section("Robots", _robots(robots, prices)),
-        line_section(fleet_of_line(members, prices), prices),
         _section("Peak, and when nobody works", _around_the_clock(members, robots, prices)),
         _section("Month by month: driven and predicted", _months(members)),
-        folded(_section("By power mode", _matrix("mode", by_mode(members, prices), robots))),
-        _section("What could be saved, by measure", _potential(members, robots, prices)),
+        folded(_section("By power mode", _matrix("mode", by_mode(known, prices), summed))),
+        _section("What could be saved, by measure", _potential(known, summed, prices)),
+        line_section(fleet_of_line(members, prices), prices),
         folded(
             _section(
-                "By movement and pause", _matrix("movement", by_movement(members, prices), robots)
+                "By movement and pause", _matrix("movement", by_movement(known, prices), summed)
             )
         ),
     ]
@@ -371,7 +392,7 @@ def fleet_html(
         f"<style>{asset('page.css')}</style></head><body><header><div><h1>{text(title)}</h1>"
         f'<p class="subtitle">{text(_origins(members))}; a year of each robot, one cycle after '
         "the other</p>"
-        f"</div></header><main>{_problems(left_out)}{_tiles(robots, prices)}{''.join(sections)}"
+        f"</div></header><main>{_tiles(robots, prices)}{_problems(left_out)}{''.join(sections)}"
         f"{_assumptions(prices)}</main>"
         f"<script>{asset('export.js')}\nexportButtons();</script></body></html>"
     )
@@ -379,30 +400,45 @@ def fleet_html(
 
 def _tiles(robots: Sequence[Robot], costs: Costs) -> str:
     """The fleet in three figures."""
-    yearly = sum_of([robot.yearly for robot in robots])
-    saved = [robot.saved for robot in robots if robot.saved is not None]
+    summed = [robot for robot in robots if not robot.drives_only]
+    if not summed:
+        return f'<p class="hint">{_apart(robots)}</p>'
+    yearly = sum_of([robot.yearly for robot in summed])
+    saved = [robot.saved for robot in summed if robot.saved is not None]
     word, of_it = sum_of(saved).gain()
-    price = money(costs.money(yearly.value), costs.currency)
+    price = yearly_money(costs.money(yearly.value), costs.currency)
     found = [
-        Tile("energy a year", kilowatt_hours(yearly.value), (f"{counted(len(robots), 'robot')}",)),
+        Tile("energy a year", kilowatt_hours(yearly.value), (counted(len(summed), "robot"),)),
         Tile("costs a year", price, (f"{number(costs.co2(yearly.value), 'kg')} of CO2",)),
     ]
     if saved:
-        ends = [money(costs.money(end), costs.currency) for end in (of_it.low, of_it.high)]
+        ends = [yearly_end(costs.money(end)) for end in (of_it.low, of_it.high)]
         found.append(
             Tile(
                 f"{word} a year by plans, predicted",
-                money(costs.money(of_it.value), costs.currency),
-                (kilowatt_hours(of_it.value), f"90 % interval {ends[0]} to {ends[1]}"),
+                yearly_money(costs.money(of_it.value), costs.currency),
+                (
+                    kilowatt_hours(of_it.value),
+                    f"90 % interval {ends[0]} to {ends[1]} {costs.currency}",
+                    of_it.doubt,
+                    _paid(saved, costs),
+                ),
             )
         )
     return f'<section class="tiles">{"".join(tile.html() for tile in found)}</section>'
 
 
+def _paid(saved: Sequence[Amount], costs: Costs) -> str:
+    """When an hour for each robot is paid back."""
+    found = payback(mean_of(saved), costs)
+    return f"{found}, for each robot in the mean" if found and len(saved) > 1 else found
+
+
 def _robots(robots: Sequence[Robot], costs: Costs) -> str:
     rows = [
         (
-            f"{text(robot.name)}<small>{text(robot.cell)}</small>",
+            f"{text(robot.name)}<small>{text(robot.cell)}</small>"
+            + (f"<small>{DRIVES_ONLY}</small>" if robot.drives_only else ""),
             text(", ".join(robot.origins)),
             str(robot.recordings),
             *_yearly(robot.yearly, costs),
@@ -412,18 +448,20 @@ def _robots(robots: Sequence[Robot], costs: Costs) -> str:
         )
         for robot in robots
     ]
-    saved = [robot.saved for robot in robots if robot.saved is not None]
-    rows.append(
-        (
-            "<b>all</b>",
-            "",
-            str(sum(robot.recordings for robot in robots)),
-            *_yearly(sum_of([robot.yearly for robot in robots]), costs),
-            _saved(sum_of(saved) if saved else None, costs),
-            "",
-            "",
+    summed = [robot for robot in robots if not robot.drives_only]
+    saved = [robot.saved for robot in summed if robot.saved is not None]
+    if summed:
+        rows.append(
+            (
+                "<b>all</b>",
+                "",
+                str(sum(robot.recordings for robot in summed)),
+                *_yearly(sum_of([robot.yearly for robot in summed]), costs),
+                _saved(sum_of(saved) if saved else None, costs),
+                "",
+                "",
+            )
         )
-    )
     heads = (
         "robot",
         "origin",
@@ -441,7 +479,18 @@ def _robots(robots: Sequence[Robot], costs: Costs) -> str:
         "timers; intervals hold 90 %, and those of several robots add up as if all were wrong "
         "alike."
     )
-    return f'<p class="hint">{hint}</p>{table(heads, rows, "Robots")}'
+    return f'<p class="hint">{hint} {_apart(robots)}</p>{table(heads, rows, "Robots")}'
+
+
+def _apart(robots: Sequence[Robot]) -> str:
+    """Which robots are in no sum, and why; "" where all are."""
+    names = ", ".join(robot.name for robot in robots if robot.drives_only)
+    if not names:
+        return ""
+    return text(
+        f"In no sum, as their energy at the mains isn't known ({DRIVES_ONLY}), nor what they take "
+        f"at rest: {names}."
+    )
 
 
 def _around_the_clock(members: Sequence[Member], robots: Sequence[Robot], costs: Costs) -> str:
@@ -453,16 +502,19 @@ def _around_the_clock(members: Sequence[Member], robots: Sequence[Robot], costs:
     for robot in robots:
         own = [member for member in members if member.robot == robot.name]
         demand = max(member.demand for member in own)
-        demands.append(demand)
+        if not robot.drives_only:
+            demands.append(demand)
         energies = []
         for mode in modes:
             known = [member.idle[mode] for member in own if mode in member.idle]
             energy = max(known) * costs.idle_hours * 3600.0 if known else float("nan")
             energies.append(energy)
-            idle[mode].append(energy)
-        rows.append(_clock_row(text(robot.name), demand, energies, costs))
+            if not robot.drives_only:
+                idle[mode].append(energy)
+        rows.append(_clock_row(_named(robot), demand, energies, costs))
     sums = [sum(idle[mode]) for mode in modes]
-    rows.append(_clock_row("<b>all</b>", sum(demands), sums, costs))
+    if demands:
+        rows.append(_clock_row("<b>all</b>", sum(demands), sums, costs))
     heads = ("robot", ">largest quarter of an hour", *(f">{_shown(mode)}" for mode in modes))
     hint = (
         f"{significant(costs.idle_hours, 6)} hours a year lie outside of the shifts; the columns "
@@ -470,6 +522,11 @@ def _around_the_clock(members: Sequence[Member], robots: Sequence[Robot], costs:
         "theirs: as if all came at once."
     )
     return f'<p class="hint">{text(hint)}</p>{table(heads, rows, "Peak and rest")}'
+
+
+def _named(robot: Robot) -> str:
+    limit = f"<small>{DRIVES_ONLY}</small>" if robot.drives_only else ""
+    return f"{text(robot.name)}{limit}"
 
 
 def _months(members: Sequence[Member]) -> str:
@@ -512,7 +569,9 @@ def _clock_row(
     name: str, demand: float, energies: Sequence[float], costs: Costs
 ) -> tuple[str, ...]:
     price = demand / 1000.0 * costs.demand_price
-    small = f"<small>{text(money(price, costs.currency))} a year</small>" if price > 0.0 else ""
+    small = (
+        f"<small>{text(yearly_money(price, costs.currency))} a year</small>" if price > 0.0 else ""
+    )
     cells = (
         f"{text(idle_money(energy, costs))}<small>{text(kilowatt_hours(energy))}</small>"
         for energy in energies
@@ -529,7 +588,7 @@ def _yearly(amount: Amount, costs: Costs) -> tuple[str, str, str]:
     """Energy, price and CO2 of a year, with their intervals."""
     return (
         f"<b>{text(kilowatt_hours(amount.value))}</b>{_between(amount, kilowatt_hours)}",
-        text(money(costs.money(amount.value), costs.currency)),
+        text(yearly_money(costs.money(amount.value), costs.currency)),
         text(number(costs.co2(amount.value), "kg")),
     )
 
@@ -538,11 +597,12 @@ def _saved(amount: Amount | None, costs: Costs) -> str:
     if amount is None:
         return DASH
     word, amount = amount.gain()
-    price = money(costs.money(amount.value), costs.currency)
+    price = yearly_money(costs.money(amount.value), costs.currency)
+    doubt = f"<small>{amount.doubt}</small>" if amount.doubt else ""
     energy = f"{kilowatt_hours(amount.value)}{' more' if word == 'more' else ''}"
     return (
         f"<b>{text(price)}</b><small>{text(energy)}</small>"
-        f"{_between(amount, lambda value: money(costs.money(value), costs.currency))}"
+        f"{_between(amount, lambda value: yearly_end(costs.money(value)))}{doubt}"
     )
 
 
@@ -582,7 +642,10 @@ def _potential(members: Sequence[Member], robots: Sequence[Robot], costs: Costs)
     if not found:
         return '<p class="empty">No recording says it.</p>'
     rows = [
-        (*_row(name, own, robots), text(money(costs.money(sum(own.values())), costs.currency)))
+        (
+            *_row(name, own, robots),
+            text(yearly_money(costs.money(sum(own.values())), costs.currency)),
+        )
         for name, own in found.items()
     ]
     heads = ("measure", *_robot_heads(robots), ">all", ">a year, at most")
@@ -606,7 +669,7 @@ def _problems(left_out: Sequence[str]) -> str:
     if not left_out:
         return ""
     items = "".join(f"<li>{text(sentence)}</li>" for sentence in left_out)
-    return f'<div class="problems"><b>Notes</b><ul>{items}</ul></div>'
+    return f'<div class="problems calm"><b>Notes</b><ul>{items}</ul></div>'
 
 
 def _assumptions(costs: Costs) -> str:

@@ -10,7 +10,9 @@ from datetime import UTC, datetime, timedelta
 from ir_msgs_py.savings import one_sided
 from ir_recorder.analysis import Analysis, Finding, ProgramTotals, Share, Verdict, summary
 from ir_recorder.analysis.production import (
+    DRIVES_ONLY,
     driven_and_predicted,
+    drives_only,
     planned_clearance,
     planned_interval,
     planned_share,
@@ -19,7 +21,7 @@ from ir_recorder.analysis.production import (
 )
 from ir_recorder.format.contents import OWN_FACTS, VERSION
 from ir_recorder.reading.recording import Recording
-from ir_recorder.report.costs import NAMES, Costs, money, share_between
+from ir_recorder.report.costs import NAMES, Costs, share_between, yearly_money
 from ir_recorder.report.number_text import (
     DASH,
     joules,
@@ -58,9 +60,10 @@ def subtitle(analysis: Analysis) -> str:
     recording = analysis.recording
     start = started(recording)
     version = recording.fact(VERSION)
+    supply = f"({DRIVES_ONLY})" if drives_only(analysis) else "at the mains"
     return text(
         f"{recording.path.name}, {start:%Y-%m-%d %H:%M:%S} UTC, recorded "
-        f"{seconds(recording.duration)}, {joules(analysis.energy)} at the mains"
+        f"{seconds(recording.duration)}, {joules(analysis.energy)} {supply}"
         + (f", recorder {version}" if version else "")
     )
 
@@ -174,6 +177,8 @@ def _planned(analysis: Analysis) -> list[Tile]:
 
 def _recorded(analysis: Analysis) -> Tile:
     note = f"mean {watts(analysis.mean_power)} over {seconds(analysis.seconds)}"
+    if drives_only(analysis):
+        return Tile("energy", joules(analysis.energy), (note, DRIVES_ONLY))
     return Tile("energy at the mains", joules(analysis.energy), (note,))
 
 
@@ -250,8 +255,13 @@ def _saved(analysis: Analysis) -> Tile | None:
     beside = "of" if word == "saved" else "than"
     energy = kilowatt_hours(amount.value)
     before = f"{energy} {beside} the common program's {kilowatt_hours(total.common)}"
+    limit = cycle.supply if cycle is not None else ""
     name = "saved by its plan" if word == "saved" else "more by its plan"
-    return Tile(name, f"{100.0 * abs(total.share):.1f} %", (f"{before}, predicted", within))
+    return Tile(
+        name,
+        f"{100.0 * abs(total.share):.1f} %",
+        (f"{before}, predicted", within, amount.doubt, limit),
+    )
 
 
 def _yearly(analysis: Analysis, costs: Costs) -> Tile | None:
@@ -265,7 +275,8 @@ def _yearly(analysis: Analysis, costs: Costs) -> Tile | None:
         if set(costs.given) != set(NAMES)
         else "prices and shifts as given"
     )
-    return Tile("a year of such cycles", money(costs.money(energy), costs.currency), (co2, assumed))
+    price = yearly_money(costs.money(energy), costs.currency)
+    return Tile("a year of such cycles", price, (co2, assumed, cycle.supply))
 
 
 def _parts(program: ProgramTotals, origin: str) -> list[Tile]:

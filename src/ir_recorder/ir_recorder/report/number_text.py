@@ -47,9 +47,13 @@ def watts(value: float) -> str:
 
 
 def kilowatt_hours(value: float) -> str:
-    """Joules as kWh with three significant digits, whole ones from 100 on, Wh below 0.01."""
+    """Joules as kWh with three significant digits, whole ones from 100 on, Wh below 0.01 kWh, and
+    joules below 0.01 Wh.
+    """
     if not math.isfinite(value):
         return DASH
+    if 0.0 < abs(value) < 36.0:
+        return f"{significant(value, 3)} J"
     kwh = value / 3.6e6
     if abs(kwh) < 0.01:
         return f"{significant(1e3 * kwh, 3)} Wh"

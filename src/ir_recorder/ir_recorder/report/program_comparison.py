@@ -11,10 +11,18 @@ from pathlib import Path
 
 from ir_description import Cell
 from ir_msgs_py.savings import BeforeAfter, Change, Side
-from ir_recorder.analysis.production import Amount, saved_amount
+from ir_recorder.analysis.production import DRIVES_ONLY, OPEN, Amount, saved_amount
 from ir_recorder.report.cell_scene import cell_scene
 from ir_recorder.report.charts import Point, front_chart
-from ir_recorder.report.costs import J_PER_KWH, Costs, given_and_assumed, money, share_between
+from ir_recorder.report.costs import (
+    J_PER_KWH,
+    Costs,
+    given_and_assumed,
+    payback,
+    share_between,
+    yearly_end,
+    yearly_money,
+)
 from ir_recorder.report.files import write_output
 from ir_recorder.report.motion_scene import motion_of, power_curves, rests_of
 from ir_recorder.report.number_text import (
@@ -72,7 +80,6 @@ def year_of(found: BeforeAfter, side: Side, costs: Costs) -> Year:
 WORK = {1: "a power mode", 2: "other times on the same path", 3: "another path"}
 Show = Callable[[float], str]
 _FIT = 0.999  # of the cycles: fewer are said
-OPEN = "zero lies in it: it is open whether anything is saved"
 
 
 def tiles(found: BeforeAfter, costs: Costs) -> str:
@@ -87,7 +94,12 @@ def tiles(found: BeforeAfter, costs: Costs) -> str:
     between = share_between(cycle, saving.common)
     shown = (
         (f"{word} a cycle", f"{100.0 * abs(saving.share):.1f} %", between, sure),
-        (f"{word} a year", money(costs.money(year.value), costs.currency), _money(year, costs)),
+        (
+            f"{word} a year",
+            yearly_money(costs.money(year.value), costs.currency),
+            _money(year, costs),
+            payback(year_of(found, side, costs).saved, costs),
+        ),
         (
             f"CO2 {word} a year",
             number(costs.co2(year.value), "kg"),
@@ -163,7 +175,7 @@ def _change(k: int, change: Change, cycles: float, costs: Costs) -> tuple[str, .
         text(WORK[change.work]),
         text(change.words),
         _cell(kilowatt_hours(saving.saved), between, "" if saving.certain else OPEN),
-        text(money(costs.money(saving.saved * cycles), costs.currency)),
+        text(yearly_money(costs.money(saving.saved * cycles), costs.currency)),
     )
 
 
@@ -190,14 +202,15 @@ def _keyed(side: Side) -> Sequence[tuple[tuple[str, int], str]]:
     return found
 
 
-def assumptions(found: BeforeAfter, costs: Costs) -> str:
+def assumptions(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     """What the amounts rest on; what no file gave is named an assumption."""
     parameters = found.today.report.power_parameters or "the data sheet"
+    supply = " at the mains" if cell.robot.controller.counted else f" ({DRIVES_ONLY})"
     said = (
         "Same cycle time: the planner's program in the time of today's. Free: as fast as pays, "
         "where a second is worth some watts (--time-value). For the line: in the time that the "
         "line asks for. A 90 % interval holds the true figure in nine of ten cases. "
-        "All energies are predicted at the mains by the same model, with 90 % intervals from "
+        f"All energies are predicted{supply} by the same model, with 90 % intervals from "
         f"the uncertainty of the power parameters ({parameters}). What is saved has an interval "
         "of its own: the same drawn robots drive both programs. Intervals by the data sheet lie "
         "mostly above their values: losses that it puts at zero can only add. A year has as "
@@ -272,7 +285,7 @@ def _amount(amount: Amount | None, show: Show) -> str:
 def _cost(energy: Amount | None, costs: Costs) -> str:
     if energy is None:
         return DASH
-    return _cell(money(costs.money(energy.value), costs.currency), _money(energy, costs))
+    return _cell(yearly_money(costs.money(energy.value), costs.currency), _money(energy, costs))
 
 
 def _co2(year: Year | None, costs: Costs) -> str:
@@ -281,7 +294,7 @@ def _co2(year: Year | None, costs: Costs) -> str:
 
 def _money(energy: Amount, costs: Costs) -> str:
     amount = energy.of(costs.money)
-    return f"{money(amount.low, '').strip()} to {money(amount.high, '').strip()}"
+    return f"{yearly_end(amount.low)} to {yearly_end(amount.high)}"
 
 
 def _proof(side: Side) -> str:
@@ -336,11 +349,11 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
         "subtitle": text(
             f"{found.name} ({found.kind}) against what the planner makes of the same stops"
         ),
-        "problems": _problems(found),
+        "problems": _problems(found, cell),
         "tiles": tiles(found, prices),
         "figures": figure_table(found, prices),
-        "assumptions": assumptions(found, prices),
-        "line": line_section(of_saving(found.planned.saving, prices), prices),
+        "assumptions": assumptions(found, cell, prices),
+        "line": _line(found, cell, prices),
         "changes": change_table(found, prices),
         "hops": hop_table(found),
         "front": front_chart([_point(side) for side in there]),
@@ -352,15 +365,22 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("before_after.html"))
 
 
-def _problems(found: BeforeAfter) -> str:
+def _line(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
+    if not cell.robot.controller.counted:
+        return ""
+    return line_section(of_saving(found.planned.saving, costs), costs)
+
+
+def _problems(found: BeforeAfter, cell: Cell) -> str:
     items = [
+        *([] if cell.robot.controller.counted else [f"all energies and costs: {DRIVES_ONLY}"]),
         *found.notes,
         *(f"{side.name}: {side.problem}" for side in found.sides if not side.found),
     ]
     if not items:
         return ""
     listed = "".join(f"<li>{text(item)}</li>" for item in items)
-    return f'<div class="problems"><b>Notes</b><ul>{listed}</ul></div>'
+    return f'<div class="problems calm"><b>Notes</b><ul>{listed}</ul></div>'
 
 
 def _point(side: Side) -> Point:

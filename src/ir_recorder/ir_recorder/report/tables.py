@@ -12,7 +12,7 @@ from ir_recorder.analysis import Analysis, Finding, Verdict
 from ir_recorder.analysis.checks import row_name
 from ir_recorder.analysis.indirect import Agreement
 from ir_recorder.analysis.predicted_power import recorded_power_data
-from ir_recorder.analysis.production import production_of, saved_amount
+from ir_recorder.analysis.production import OPEN, production_of, saved_amount
 from ir_recorder.analysis.results import Share, StepResult
 from ir_recorder.format import contents
 from ir_recorder.report.number_text import (
@@ -453,7 +453,7 @@ def _within(saving: Saving) -> str:
         low, high = (100.0 * end / saving.common for end in (amount.low, amount.high))
         lines.append(f"90 % interval {low:.1f} to {high:.1f} %")
         if not saving.certain:
-            lines.append("zero lies in it, so it is open whether anything is saved")
+            lines.append(OPEN)
     return "".join(f"<small>{text(line)}</small>" for line in lines)
 
 
@@ -462,8 +462,4 @@ def _sure(saving: Saving) -> str:
     if saving.saved_low == saving.saved_high:
         return ""
     within = f", 90 % interval {joules(saving.saved_low)} to {joules(saving.saved_high)}"
-    return (
-        within
-        if saving.certain
-        else f"{within}: zero lies in it, so it is open whether anything is saved"
-    )
+    return within if saving.certain else f"{within}: {OPEN}"

@@ -45,10 +45,10 @@ class WholeLine:
         word = self.line.gain()[0]
         robots = f"{self.shares['robots']:g} %"
         return (
-            f"of the whole line: {with_ends(self.robots)} {word} of the robots' energy is "
-            f"{with_ends(self.line)} of the line's and {with_ends(self.factory)} of the "
-            f"factory's, where robots take {robots} and the hall "
-            f"{self.shares['infrastructure']:g} %: no plan of robots saves more than their "
+            f"of the whole line, if every robot saved this: {with_ends(self.robots)} {word} "
+            f"of the robots' energy is {with_ends(self.line)} of the line's and "
+            f"{with_ends(self.factory)} of the factory's, where robots take {robots} and the "
+            f"hall {self.shares['infrastructure']:g} %: no plan of robots saves more than their "
             f"{robots}, and none of the hall's"
         )
 
@@ -76,14 +76,15 @@ def of_whole_line(saved: Amount, robots: float, costs: Costs) -> WholeLine | Non
 
 
 def of_saving(saving: Saving, costs: Costs) -> WholeLine | None:
-    """The same of a program's saving."""
-    return of_whole_line(saved_amount(saving), saving.common, costs)
+    """The same of a program's saving; None as well where it is open whether anything is saved."""
+    saved = saved_amount(saving)
+    return None if saved.doubt else of_whole_line(saved, saving.common, costs)
 
 
 def of_recording(analysis: Analysis, costs: Costs) -> WholeLine | None:
     """The same of a recording's plan; None where it says nothing of a saving."""
     cycle = production_of(analysis)
-    if cycle is None or cycle.savings is None:
+    if cycle is None or cycle.savings is None or cycle.drives_only:
         return None
     return of_saving(cycle.savings.total, costs)
 
