@@ -159,7 +159,7 @@ ASSUMED = {
     ),
     "a palletising robot": ("$PAL_MODE=TRUE", "$PAL_MODE isn't modelled", Effect.PLACES),
     "a flag that follows an expression": (
-        "$CYCFLAG[2]=$IN[1] AND $IN[2]\nIF $CYCFLAG[2] THEN\nENDIF",
+        "DECL BOOL B\nB=TRUE\n$CYCFLAG[2]=$IN[1] AND B\nIF $CYCFLAG[2] THEN\nENDIF",
         "$CYCFLAG[2] is taken as it was when it was set, not evaluated anew",
         Effect.MOTIONS,
     ),
@@ -184,6 +184,54 @@ def test_an_assumption_is_said_with_what_it_could_change(name: str, followed: Fo
     assert [note.effect for note in found] == [effect]
     assert found[0].place.line >= 2
     assert "could change" in str(found[0])
+
+
+LEADS_TO_TEN = {
+    "a pulse lasts": "PULSE($OUT[1],TRUE,2.0)\nIF $OUT[1] THEN\nPTP {A1 10}\nENDIF",
+    "a pulse is over": (
+        "PULSE($OUT[1],TRUE,2.0)\nWAIT SEC 1.5\nWAIT SEC 1\nIF NOT $OUT[1] THEN\nPTP {A1 10}\nENDIF"
+    ),
+    "a pulse to FALSE goes back": (
+        "$OUT[1]=TRUE\nPULSE($OUT[1],FALSE,1.0)\nWAIT SEC 2\nIF $OUT[1] THEN\nPTP {A1 10}\nENDIF"
+    ),
+    "a group has the number that was waited for": (
+        "SIGNAL NR $IN[3] TO $IN[6]\nWAIT FOR NR==5\nSWITCH NR\nCASE 5\nPTP {A1 10}\nENDSWITCH"
+    ),
+    "a cyclical flag follows its inputs": (
+        "$CYCFLAG[1]=$IN[1] AND NOT $IN[2]\nWAIT FOR $CYCFLAG[1]\nIF $CYCFLAG[1] THEN\n"
+        "PTP {A1 10}\nENDIF"
+    ),
+    "a letter of a text": (
+        'DECL CHAR S[10]\nS[]="AB"\nS[2]="Z"\nIF S[2]=="Z" THEN\nPTP {A1 10}\nENDIF'
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LEADS_TO_TEN)
+def test_what_follows_from_the_program_is_no_assumption(name: str, followed: Follow) -> None:
+    program = followed(LEADS_TO_TEN[name])
+    assert angles(program) == [10.0]
+    assert texts(program) == []
+
+
+@pytest.mark.parametrize("begun", [-300, 0, 200])
+def test_a_timer_that_was_started_just_before_is_waited_for(begun: int, followed: Follow) -> None:
+    started = f"$TIMER[1]={begun}\n$TIMER_STOP[1]=FALSE\nWAIT SEC 0.1\nWAIT FOR $TIMER[1]>500"
+    waits = [one.seconds for one in followed(started).commands if isinstance(one, Wait)]
+    assert sum(waits) == pytest.approx((500 - begun) / 1e3)
+    unknown = followed("$TIMER_STOP[1]=FALSE\nWAIT FOR $TIMER[1]>500")
+    assert any("nobody knows how long" in text for text in texts(unknown))
+
+
+@pytest.mark.parametrize("name", ["$FILTER", "$SINGUL_POS[1]", "$NEVER_HEARD_OF"])
+def test_a_system_variable_that_is_not_modelled_is_listed(name: str, followed: Follow) -> None:
+    assert any("isn't modelled" in text for text in texts(followed(f"{name}=1")))
+
+
+def test_what_a_controller_computes_needs_no_file(followed: Follow) -> None:
+    program = followed("DECL INT E\nDECL E6AXIS X\nX=INVERSE($POS_ACT,$AXIS_ACT,E)")
+    assert any("INVERSE is built in" in text for text in texts(program))
+    assert not any("--stub" in text for text in texts(program))
 
 
 def test_the_worst_assumption_comes_first_and_is_said_once(followed: Follow) -> None:

@@ -306,3 +306,91 @@ def test_a_tool_that_stands_in_the_cell(
     speed = np.linalg.norm(np.gradient(places, times, axis=0), axis=1)
     assert speed[100:300].max() == pytest.approx(0.2, rel=5e-3)
     assert np.abs(again.positions[-1] - line.positions[-1]).max() < 1e-6
+
+
+SPLINE_LAWS = {
+    "$JERK.CP=1": "SLIN_REL {Y 100}",
+    "$JERK={CP 1.0,ORI 500.0}": "SPLINE\nSLIN_REL {Y 100}\nENDSPLINE",
+    "$GEAR_JERK[1]=5": "SPTP {A1 20}",
+}
+
+
+@pytest.mark.parametrize("setting", SPLINE_LAWS)
+def test_jerk_that_a_program_sets_slows_motions_of_the_spline_kind_alone(
+    setting: str, followed: Follow, planner: Planner
+) -> None:
+    """Law: a bound of the jerk makes a spline motion longer, and leaves PTP and LIN as they are."""
+    motion = SPLINE_LAWS[setting]
+    old = {"SLIN_REL {Y 100}": "LIN_REL {Y 100}", "SPTP {A1 20}": "PTP {A1 20}"}
+
+    def lasts(lines: str) -> float:
+        return float(steps_of(followed(START + lines), planner)[-1].duration)
+
+    assert lasts(f"{setting}\n{motion}") > 1.2 * lasts(motion)
+    plain = old.get(motion, "LIN_REL {Y 100}")
+    assert lasts(f"{setting}\n{plain}") == lasts(plain)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "moves"),
+    [
+        ("LIN_REL {Y 100} C_DIS", "SLIN_REL {Z 100}", 2),
+        ("SLIN_REL {Y 100} C_SPL", "LIN_REL {Z 100}", 2),
+        ("SPTP {A1 20} C_SPL", "PTP {A1 0}", 2),
+        ("PTP {A1 20} C_PTP", "SPTP {A2 -80}", 2),
+        ("LIN_REL {Y 100} C_DIS", "LIN_REL {Z 100}", 1),
+        ("SLIN_REL {Y 100} C_SPL", "SLIN_REL {Z 100}", 1),
+    ],
+)
+def test_a_corner_between_the_two_kinds_of_motions_is_an_exact_stop(
+    first: str, second: str, moves: int, followed: Follow, planner: Planner
+) -> None:
+    program = followed(f"{START}$APO={{CPTP 50,CDIS 30.0}}\n{first}\n{second}")
+    steps, notes = drive(program, planner.scene("none"), planner.cell.machine_home)
+    assert sum(step.moves for step in steps) == moves
+    assert any("stops exactly" in note.text for note in notes) == (moves == 2)
+
+
+@given(st.floats(0.2, 5.0))
+@settings(max_examples=10, deadline=None)
+def test_a_time_block_over_some_parts_leaves_the_others_their_own_time(
+    planner: Planner, seconds: float
+) -> None:
+    """Law: a spline whose parts take `own` s lasts `own`, and what the block is longer than its
+    part.
+    """
+
+    def lasts(begin: str, end: str) -> float:
+        lines = f"PTP_SPLINE\nSPTP {{A1 15}}\n{begin}\nSPTP {{A1 30}}\n{end}\nENDSPLINE"
+        text = f"DEF T( )\n{START}{lines}\nEND\n"
+        cell = planner.cell
+        program = follow([parse(text, "t.src")], cell.machine_home, tool_in_flange(cell.tcp))
+        return float(steps_of(program, planner)[-1].duration)
+
+    own = lasts("", "")
+    most = max(own, own / 2.0 + seconds)
+    timed = lasts("TIME_BLOCK START", f"TIME_BLOCK END={seconds:.4f}")
+    assert timed == pytest.approx(most, abs=0.02 + 2e-3 * most)
+
+
+def test_a_tool_faster_than_the_machine_data_is_said(followed: Follow) -> None:
+    notes = followed(f"{START}$VEL.CP=5\n$ACC.CP=50\nLIN_REL {{Y 100}}").notes
+    assert sum("value invalid" in note.text for note in notes) == 2
+
+
+def test_a_turn_that_was_rounded_to_the_other_sign_is_taken_and_said(
+    followed: Follow, planner: Planner
+) -> None:
+    q = np.radians([10.0, -80.0, 90.0, 20.0, 50.0, 0.01])
+    text = frame_text(Arm(planner.scene("none")), q)
+    place, turn = text.rstrip("}").split(",T ")
+    program = followed(f"{START}PTP {place},T {int(turn) ^ 32}}}")
+    steps, notes = drive(program, planner.scene("none"), planner.cell.machine_home)
+    assert np.allclose(steps[-1].trajectory.positions[-1], q, atol=1e-6)
+    assert any("other sign of an axis" in note.text for note in notes)
+
+
+def test_ptp_rel_leads_in_the_tool_where_asked(followed: Follow, planner: Planner) -> None:
+    axis = steps_of(followed(f"{START}PTP_REL {{Z 100}} #TOOL"), planner)[-1]
+    path = steps_of(followed(f"{START}LIN_REL {{Z 100}} #TOOL"), planner)[-1]
+    assert np.allclose(axis.positions[-1], path.positions[-1], atol=1e-6)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from ir_kernels import portable
 from ir_krl.errors import Place
+from ir_krl.run.system import AXES
 from ir_values.arrays import FloatArray
 
 Kind = Literal["ptp", "lin", "circ", "spl"]
@@ -69,7 +71,8 @@ class Target:
 class Speeds:
     """How fast: shares (6,) of the axes' speeds and accelerations; velocity [m/s] and acceleration
     [m/s^2] of the tool, turning [rad/s] and turning_acceleration [rad/s^2] of its orientation;
-    override: share of all speeds.
+    override: share of all speeds. jerk [m/s^3], turning_jerk [rad/s^3] of the tool and axis_jerk,
+    shares (6,) of the axes' jerk, bound motions of the spline kind alone.
     """
 
     axis_velocity: tuple[float, ...]
@@ -79,6 +82,9 @@ class Speeds:
     turning: float
     turning_acceleration: float
     override: float
+    jerk: float = math.inf
+    turning_jerk: float = math.inf
+    axis_jerk: tuple[float, ...] = (1.0,) * AXES
 
 
 @dataclass(frozen=True)
@@ -111,7 +117,8 @@ class Payload:
 class Motion:
     """One motion to `target`; circles pass `via` and end after `angle` [rad] where one is given.
     keeps_orientation: the tool doesn't turn, whatever the target says ($ORI_TYPE #CONSTANT).
-    payload: None where the program never says what is carried.
+    payload: None where the program never says what is carried. spline: of the spline kind (SPTP,
+    SLIN, SCIRC, SPL), which a controller never rounds a corner to from PTP, LIN and CIRC.
     """
 
     kind: Kind
@@ -123,6 +130,7 @@ class Motion:
     angle: float | None = None
     keeps_orientation: bool = False
     payload: Payload | None = None
+    spline: bool = False
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,16 @@ from ir_krl.errors import KrlRunError, Place
 from ir_krl.language import Tree, Word, place_of
 from ir_krl.run.commands import Command, Motion, SplineBlock, Stop, Switch, Wait, WaitFor
 from ir_krl.run.expressions import Expressions
-from ir_krl.run.memory import INPUT, Memory, Signals, Step, Watched
+from ir_krl.run.memory import (
+    CYCLIC,
+    INPUT,
+    TIMER,
+    TIMER_FLAG,
+    Memory,
+    Signals,
+    Step,
+    Watched,
+)
 from ir_krl.run.notes import Effect, Note
 from ir_krl.run.values import Value, integer
 
@@ -19,6 +28,7 @@ STATEMENTS_MAX = 200_000
 ever.
 """
 WAIT_MAX = 604_800.0  # s
+_TICK = 1e-3  # s, of a timer
 _ENDLESS = "give what ends it by --set or --input"
 Again = Callable[[], tuple[bool, bool | None]]
 """Whether a loop goes on, and whether that hangs on nothing that is known; None: on its exits."""
@@ -57,6 +67,17 @@ class _Turn:
     exits: int
 
 
+@dataclass(frozen=True)
+class Clock:
+    """A timer: `value` [ms] that it was set to, and after how many commands that was and it began
+    to run; None: never, it stands.
+    """
+
+    value: float = 0.0
+    set_at: int | None = None
+    runs_at: int | None = None
+
+
 @dataclass
 class Control:
     """Runs bodies of statements: each kind has a method of its name, `_if_` of the rule `if_`."""
@@ -72,6 +93,8 @@ class Control:
     _signals: Signals = field(init=False)
     _guessed_exits: int = 0  # times that an assumed value decided about leaving a loop
     _known_exits: int = 0  # and a known one
+    _timers: dict[int, Clock] = field(default_factory=dict)
+    _flags: dict[int, Tree] = field(default_factory=dict)  # what cyclical flags are set to
     _said: dict[tuple[str, Effect], int] = field(default_factory=dict)  # where among the notes
     _places: dict[int, set[Place]] = field(default_factory=dict)  # of a note that is said again
 
@@ -350,9 +373,13 @@ class Control:
             waited = self.triggered.waited + max(seconds, 0.0)
             self.triggered = replace(self.triggered, waited=waited)
         elif seconds > 0.0:
-            self.commands.append(Wait(seconds, self.place(tree)))
+            self._wait(seconds, self.place(tree))
         else:  # passed at once, as on the controller; yet the advance run stops
             self.stop(self.place(tree), f"WAIT SEC {seconds:g}")
+
+    def _wait(self, seconds: float, place: Place) -> None:
+        self.commands.append(Wait(seconds, place))
+        self._signals.stood(seconds, place)
 
     def _wait_for(self, tree: Tree) -> None:
         condition = tree.children[0]
@@ -367,7 +394,43 @@ class Control:
         if _constant(condition) and not self.expressions.truth(condition, "the condition"):
             text = "this wait never ends by itself: taken as ended"
             self.note_at(place, text, Effect.MOTIONS)
+        if _names(condition) & {TIMER, TIMER_FLAG}:
+            seconds = self._timed(condition)
+            if seconds is not None and seconds > 0.0:
+                text = f"{_written(condition)}: taken as a wait of {seconds:g} s from standstill"
+                self.note_at(place, text, Effect.TIMES)
+                self._wait(seconds, place)
+                return
+            if seconds is None:
+                text = f"{_written(condition)}: nobody knows how long until then, taken as 0 s"
+                self.note_at(place, text, Effect.TIMES)
         self.commands.append(WaitFor(_written(condition), place))
+        self._signals.moved()
+
+    def _timed(self, condition: Tree) -> float | None:
+        """Seconds until a timer that was set and started just before has passed a bound; None where
+        the condition is another one, or time has passed since.
+        """
+        bound = 0.0
+        if condition.data == "compared" and str(condition.children[1]) in (">", ">="):
+            given = condition.children[2]
+            if not _constant(given):
+                return None
+            bound = self.expressions.number(given, "the bound of a timer")
+            condition = condition.children[0]
+        if condition.data != "access":
+            return None
+        (name, index), *_ = self.expressions.path(condition)
+        clock = self._timers.get(index[0]) if index is not None else None
+        if name not in (TIMER, TIMER_FLAG) or clock is None or clock.set_at is None:
+            return None
+        if clock.runs_at is None:
+            return None
+        since = self.commands[max(clock.set_at, clock.runs_at) :]
+        if any(isinstance(one, Motion | SplineBlock | WaitFor) for one in since):
+            return None
+        waited = sum(one.seconds for one in since if isinstance(one, Wait))
+        return (bound - clock.value) * _TICK - waited
 
     def _waited(self, tree: Tree, *, wanted: bool) -> list[tuple[int, bool]]:
         """Inputs that a condition which holds leaves no choice."""
@@ -379,14 +442,37 @@ class Control:
                 return self._waited(left, wanted=wanted) + self._waited(right, wanted=wanted)
             case "joined" if str(tree.children[1]) == ("OR" if wanted else "AND"):
                 return self._waited_one(tree.children[::2], wanted=wanted)
-            case "compared" if tree.children[2].data in ("true", "false"):
-                same = (str(tree.children[1]) == "==") is (tree.children[2].data == "true")
-                return self._waited(tree.children[0], wanted=wanted is same)
+            case "compared":
+                return self._waited_compared(tree, wanted=wanted)
             case "access":
-                (name, index), *rest = self.expressions.path(tree)
-                if name == INPUT and index is not None and not rest:
-                    return [(index[0], wanted)]
+                return self._waited_signal(tree, wanted=wanted)
         return []
+
+    def _waited_signal(self, tree: Tree, *, wanted: bool) -> list[tuple[int, bool]]:
+        """The same of an input, or of those that a cyclical flag follows."""
+        (name, index), *rest = self.expressions.path(tree)
+        if name == INPUT and index is not None and not rest:
+            return [(index[0], wanted)]
+        if name == CYCLIC and index is not None and index[0] in self._flags:
+            return self._waited(self._flags[index[0]], wanted=wanted)
+        return []
+
+    def _waited_compared(self, tree: Tree, *, wanted: bool) -> list[tuple[int, bool]]:
+        """The same of a comparison with TRUE or FALSE, or of a group of inputs with a number."""
+        left, sign, right = tree.children
+        if right.data in ("true", "false"):
+            same = (str(sign) == "==") is (right.data == "true")
+            return self._waited(left, wanted=wanted is same)
+        if right.data != "number":
+            return []
+        group = self._signals.groups.get(str(left.children[0]) if left.data == "access" else "")
+        equal = (str(sign) == "==") is wanted and str(sign) in ("==", "<>")
+        number = self.expressions.number(right, "what a group is compared with")
+        if group is None or group.kind != INPUT or not equal:
+            return []
+        if number != int(number) or not 0 <= number < 1 << len(group.numbers):
+            return []
+        return [(n, bool(int(number) >> k & 1)) for k, n in enumerate(group.numbers)]
 
     def _waited_one(self, sides: Sequence[Tree], *, wanted: bool) -> list[tuple[int, bool]]:
         """Inputs of that one of two conditions which ends a wait: of one that holds as they are
@@ -410,6 +496,12 @@ class Control:
                 self.note(tree, text, Effect.TIMES)
         for child in tree.children if isinstance(tree, Tree) else ():
             self._check_names(child)
+
+
+def _names(tree: Tree) -> set[str]:
+    """Names of what an expression reads."""
+    own = {str(tree.children[0])} if tree.data == "access" else set()
+    return own.union(*(_names(one) for one in tree.children if isinstance(one, Tree)))
 
 
 def _written(tree: Any) -> str:

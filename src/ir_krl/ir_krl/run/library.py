@@ -15,6 +15,7 @@ from ir_krl.run.values import (
     Array,
     Structure,
     Symbol,
+    Unknown,
     Value,
     copied,
     frame,
@@ -35,8 +36,6 @@ WITHOUT_EFFECT = frozenset(
         "MSGQUIT",
         "MSGSTATE",
         "SET_CD_PARAMS",
-        "SGEAR_JERK",
-        "SJERK",
         "USE_CM_PRO_VALUES",
         "ERR_CLEAR",
         "RESET_CD_PARAMS",
@@ -53,6 +52,8 @@ STOPPING = frozenset({"CWRITE", "CREAD", "COPEN", "CCLOSE", "CIOCTL"})
 """What speaks with other programs: the advance run stops, nothing moves."""
 FILLING = frozenset({"CREAD", "SREAD", "SWRITE", "STRADD", "STRCLEAR", "STRCOPY"})
 """What gives its arguments values that nobody knows here: texts, what a channel sent."""
+COMPUTED = frozenset({"INVERSE", "FORWARD"})
+"""Of the controller's kinematics: functions whose values nobody computes here."""
 CONTROLLERS = frozenset(
     ("BAS", "BAS_EX", "IR_STOPM", "MSGLIB", "COLLMONLIB", "TM_BIB", "KRLMSG", "SPS", "CELL_TEACH")
 )
@@ -81,6 +82,8 @@ class Library:
             "SACC_JOINT": self._joint_acceleration,
             "SVEL_CP": self._tool_velocity,
             "SACC_CP": self._path_acceleration,
+            "SGEAR_JERK": lambda given, place: _field(given, "GEAR_JERK", Unknown("$GEAR_JERK")),
+            "SJERK": lambda given, place: Unknown("$JERK"),  # the controller's own
             "SAPO_PTP": self._axis_approximation,
             "SAPO": lambda given, place: Structure({"CDIS": _component(given, "APO_DIST", place)}),
             "SORI_TYP": lambda given, place: _field(given, "ORI_TYP", Symbol("VAR")),

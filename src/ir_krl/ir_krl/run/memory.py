@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ir_krl.errors import KrlRunError, Place
@@ -212,6 +212,10 @@ class Memory:
             key: Any = part
             kind = parts.get(part, "")
             if part_index is not None:
+                held_text = holder.get(part)
+                if isinstance(held_text, str) and following is None:
+                    holder[part] = _with_letter(held_text, part, part_index, value, place)
+                    return
                 array = _array_at(holder, part, kind, place)
                 elements = array.elements
                 key = part_index
@@ -291,6 +295,17 @@ def _structure_at(
     return held
 
 
+def _with_letter(text: str, name: str, index: tuple[int, ...], letter: Value, place: Place) -> str:
+    """A text with another letter at an index from 1; blanks fill what lacks before. Raises
+    KrlRunError.
+    """
+    if not isinstance(letter, str) or len(letter) != 1 or len(index) != 1 or index[0] < 1:
+        raise KrlRunError(f"{name} is a text: one letter is set at an index from 1", place)
+    at = index[0] - 1
+    padded = text.ljust(at)
+    return padded[:at] + letter + padded[at + 1 :]
+
+
 def _element(value: Value, name: str, index: tuple[int, ...] | None, place: Place) -> Value:
     if index is None:
         return value
@@ -333,11 +348,23 @@ class SignalRange:
         return range(self.first, self.last + 1)
 
 
+@dataclass(frozen=True)
+class Pulse:
+    """A pulse of an output to `level` that lasts `left` s from here; moved: motions have passed
+    meanwhile, nobody knows how long.
+    """
+
+    level: bool
+    left: float
+    moved: bool = False
+
+
 @dataclass
 class Signals:
     """What is known of signals. inputs: what $IN[n] reads; noted: hears what is assumed; stops:
     hears what stops the advance run; expected: inputs that a WAIT FOR has waited for; aliases and
-    groups: what SIGNAL declares, by name.
+    groups: what SIGNAL declares, by name; pulses: of outputs, that may still last; cyclic: what
+    gives cyclical flags their values anew.
     """
 
     memory: Memory
@@ -347,6 +374,25 @@ class Signals:
     expected: dict[int, bool] = field(default_factory=dict)
     aliases: dict[str, tuple[Step, ...]] = field(default_factory=dict)
     groups: dict[str, SignalRange] = field(default_factory=dict)
+    pulses: dict[int, Pulse] = field(default_factory=dict)
+    cyclic: dict[int, Callable[[], bool]] = field(default_factory=dict)
+
+    def pulse(self, index: int, pulse: Pulse, place: Place) -> None:
+        """PULSE has set an output: it goes back as time passes."""
+        self.memory.set(((OUTPUT, (index,)),), pulse.level, place)
+        self.pulses[index] = pulse
+
+    def moved(self) -> None:
+        """A motion, or a wait of unknown length, has passed."""
+        self.pulses = {n: replace(one, moved=True) for n, one in self.pulses.items()}
+
+    def stood(self, seconds: float, place: Place) -> None:
+        """A wait of known length has passed: pulses that it outlasts are over."""
+        for index, one in list(self.pulses.items()):
+            self.pulses[index] = replace(one, left=one.left - seconds)
+            if one.left <= seconds:
+                del self.pulses[index]
+                self.memory.set(((OUTPUT, (index,)),), not one.level, place)
 
     def read(self, name: str, index: int, place: Place) -> bool:
         """One signal or flag; what isn't known is FALSE. Raises KrlRunError."""
@@ -357,7 +403,13 @@ class Signals:
         if name == TIMER_FLAG:
             self.stands_still(index, place)
             return number(self._held(TIMER, index) or 0, f"$TIMER[{index}]", place) > 0.0
+        if name == CYCLIC and index in self.cyclic:
+            return self.cyclic[index]()
         held = self._held(name, index)
+        if name == OUTPUT and index in self.pulses and self.pulses[index].moved:
+            self.memory.guesses += 1
+            text = f"the PULSE of $OUT[{index}] may be over after motions: taken as lasting"
+            self.noted(place, text, Effect.MOTIONS)
         if held is None:
             self.memory.guesses += 1
             self.noted(place, f"{name}[{index}] was never set: taken as FALSE", Effect.MOTIONS)

@@ -22,11 +22,20 @@ from ir_krl.run.commands import (
     Target,
     TimeBlock,
 )
-from ir_krl.run.control import Control
+from ir_krl.run.control import Clock, Control
 from ir_krl.run.expressions import Expressions
-from ir_krl.run.memory import INPUT, OUTPUT, SIGNALS, Memory, Noted
+from ir_krl.run.memory import CYCLIC, INPUT, OUTPUT, SIGNALS, TIMER, Memory, Noted, Pulse
 from ir_krl.run.notes import Effect
-from ir_krl.run.system import AXES, FULL, HARMLESS, MODELLED, SITUATION, STANDING, mode_variables
+from ir_krl.run.system import (
+    AXES,
+    DEFAULTS,
+    FULL,
+    HARMLESS,
+    MODELLED,
+    SITUATION,
+    STANDING,
+    mode_variables,
+)
 from ir_krl.run.values import (
     AXIS_NAMES,
     EXTERNAL_NAMES,
@@ -56,9 +65,11 @@ class Assigning(Control):
     def _assignment(self, tree: Tree) -> None:
         access, expression = tree.children
         path = self.expressions.path(access)
+        (name, index), where = path[0], self.place(tree)
+        if name == CYCLIC and index is not None and self._follows(index[0], expression):
+            return
         self.memory.chosen.clear()
         value = self.expressions.value(expression)
-        (name, index), where = path[0], self.place(tree)
         if name in self._signals.groups and index is None:
             value = self.memory.guess(value, 0, where)
             for number, level in self._signals.group_bits(name, value, where):
@@ -75,11 +86,50 @@ class Assigning(Control):
             return
         self._check_effect(name, value, where)
         self.memory.set(path, value, where)
+        if index is not None:
+            self._follow_clock(name, index[0], value)
         assumed = self.memory.chosen.pop(name, None)
         if assumed is not None:  # of STOOL2, SBASE
             self.memory.assumed[name] = assumed
         for other, follows in mode_variables(name, value).items():
             self.memory.set(((other, None),), follows, where)
+
+    def _follow_clock(self, name: str, index: int, value: Value) -> None:
+        """What a timer does from its assignment on."""
+        at = len(self.commands)
+        if name == TIMER and isinstance(value, int | float):
+            self._timers[index] = replace(self._timers.get(index, Clock()), value=value, set_at=at)
+        elif name == "$TIMER_STOP" and isinstance(value, bool):
+            clock = self._timers.get(index, Clock())
+            begun = at if clock.runs_at is None else clock.runs_at
+            self._timers[index] = replace(clock, runs_at=None if value else begun)
+
+    def _follows(self, index: int, expression: Tree) -> bool:
+        """Whether a cyclical flag is evaluated anew from its assignment on: of signals alone."""
+        self._flags.pop(index, None)
+        self._signals.cyclic.pop(index, None)
+        if not self._of_signals(expression):
+            return False
+        self._flags[index] = expression
+        anew = partial(self.expressions.truth, expression, f"{CYCLIC}[{index}]")
+        self._signals.cyclic[index] = anew
+        return True
+
+    def _of_signals(self, tree: Tree) -> bool:
+        """Whether an expression hangs on inputs and outputs, and on nothing else."""
+        if tree.data == "access":
+            name = str(tree.children[0])
+            indexed = name in (INPUT, OUTPUT) and tree.children[1] is not None
+            return name in self._signals.groups or (
+                all(one.data == "number" for one in tree.children[1].children)
+                if indexed
+                else self._signals.aliases.get(name, ((name, None),))[0][0] in (INPUT, OUTPUT)
+            )
+        if tree.data == "call":
+            return False
+        return tree.data not in ("true", "false") and all(
+            self._of_signals(one) for one in tree.children if isinstance(one, Tree)
+        )
 
     def _check_effect(self, name: str, value: Value, where: Place) -> None:
         """Note what isn't modelled of a system variable. Raises KrlRunError for an interpolation
@@ -100,7 +150,10 @@ class Assigning(Control):
         output = SetOutput(int(number), level, place, pulse, self.continuing, self.triggered)
         self.commands.append(output)
         if pulse == 0.0:
+            self._signals.pulses.pop(int(number), None)
             self.memory.set(((OUTPUT, (int(number),)),), level, place)
+        else:
+            self._signals.pulse(int(number), Pulse(level, pulse), place)
 
 
 _MOVING = (
@@ -153,7 +206,7 @@ class Motions:
             for child in tree.children
             if isinstance(child, Tree) and child.data not in _OTHERS
         ]
-        in_tool = str(tree.children[-1]) == "#TOOL" if word in ("LIN_REL", "SLIN_REL") else False
+        in_tool = relative and kind != "circ" and str(tree.children[-1]) == "#TOOL"
         if kind == "circ":
             via = self.target(frames[0], relative, in_tool)
             end = self.target(frames[1], relative, in_tool)
@@ -179,16 +232,18 @@ class Motions:
             None,
         )
         payload = payload_of(self._memory.shared.get("$LOAD"), place)
+        spline = word.startswith("S")
         return Motion(
             kind,
             end,
-            self.speeds(place),
+            self.speeds(place, spline=spline),
             place,
             blend,
             via,
             angle,
             self._keeps_orientation(),
             payload,
+            spline,
         )
 
     def target(self, tree: Tree, relative: bool, in_tool: bool) -> Target:
@@ -263,8 +318,10 @@ class Motions:
         base, tool = (pose(Structure({}) if one is None else one, n, place) for n, one in found)
         return base, tool
 
-    def speeds(self, place: Place) -> Speeds:
-        """How fast the system variables say; each bounded by what a controller takes."""
+    def speeds(self, place: Place, *, spline: bool = False) -> Speeds:
+        """How fast the system variables say, of a motion of the `spline` kind or of the other;
+        each bounded by what a controller takes.
+        """
         velocity, acceleration = (
             tuple(self._share(name, (j,), place) for j in range(1, AXES + 1))
             for name in ("$VEL_AXIS", "$ACC_AXIS")
@@ -277,7 +334,34 @@ class Motions:
             math.radians(self._positive("$VEL", "ORI1", place)),
             math.radians(self._positive("$ACC", "ORI1", place)),
             self._share("$OV_PRO", None, place),
+            *(self._jerks(place) if spline else ()),
         )
+
+    def _jerks(self, place: Place) -> tuple[float, float, tuple[float, ...]]:
+        """$JERK.CP [m/s^3], $JERK.ORI [rad/s^3], inf where none is set, and what $GEAR_JERK leaves
+        of the axes' jerk: all of it from the percentage that controllers are delivered with.
+        """
+        given = self._memory.peek("$JERK")
+        fields = given.fields if isinstance(given, Structure) else {}
+        path, turning = (
+            math.inf
+            if isinstance(fields.get(name, Unknown(name)), Unknown)
+            else self._positive("$JERK", name, place)
+            for name in ("CP", "ORI")
+        )
+        if isinstance(fields.get("AX"), Structure):
+            text = "$JERK.AX isn't modelled: the axes' jerk is that of the robot data"
+            self._noted(place, text, Effect.SPEEDS)
+        full = number(DEFAULTS["DEF_GEAR_JERK"], "DEF_GEAR_JERK", place) / FULL
+        axis = tuple(self._gear_jerk(j, full, place) for j in range(1, AXES + 1))
+        return path, math.radians(turning), axis
+
+    def _gear_jerk(self, axis: int, full: float, place: Place) -> float:
+        """Of an axis' jerk, the share that $GEAR_JERK leaves; all where nobody says it."""
+        value = self._memory.peek("$GEAR_JERK", axis)
+        if value is None or isinstance(value, Unknown):
+            return 1.0
+        return min(self._share("$GEAR_JERK", (axis,), place) / full, 1.0)
 
     def blend(self, tree: Tree, *, axis: bool) -> Blend | None:
         """Approximate positioning as the words of `tree` ask for it, of an axis motion or of one of
@@ -328,6 +412,16 @@ class Motions:
         value = self._number(variable, component, place)
         if value <= 0.0:
             raise KrlRunError(f"{variable}.{component} is {value:g}; it must be above 0", place)
+        most = self._memory.peek(f"{variable}_MA")
+        bound = most.fields.get(component) if isinstance(most, Structure) else None
+        if isinstance(bound, int | float) and value > bound:
+            text = (
+                f"{variable}.{component} is {value:g}, above {variable}_MA.{component} {bound:g}: "
+                f"a controller stops there (value invalid), driven as {bound:g}; "
+                f"--set '{variable}_MA.{component}=…'"
+            )
+            self._noted(place, text, Effect.MOTIONS)
+            return float(bound)
         return value
 
     def _share(self, name: str, index: tuple[int, ...] | None, place: Place) -> float:
@@ -436,6 +530,7 @@ class Moving(Assigning):
         self._act(one for one in due if one.switch.ahead)
         built = self._with_settings(tree, lambda: self._motions.motion(tree))
         self.commands.append(self._in_advance(built))
+        self._signals.moved()
         self._act(one for one in due if not one.switch.ahead)
 
     def _not_beside(self, tree: Tree) -> bool:
@@ -490,6 +585,7 @@ class Moving(Assigning):
         late = [one for one in made if one not in early]
         self.commands += [_ahead(one) for one in reversed(early)]
         self.commands += [block, *late]
+        self._signals.moved()
         self._act(one for one in due if not one.switch.ahead)
 
     def _with_settings(self, tree: Tree, build: Callable[[], _Built]) -> _Built:

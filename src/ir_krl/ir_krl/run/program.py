@@ -12,7 +12,7 @@ from ir_krl.language import Parameter, Routine, Source, Tree, place_of
 from ir_krl.run.commands import Command
 from ir_krl.run.control import Endless, Jump, LoopExit, Returned
 from ir_krl.run.expressions import Expressions
-from ir_krl.run.library import CONTROLLERS, STOPPING, Library
+from ir_krl.run.library import COMPUTED, CONTROLLERS, STOPPING, Library
 from ir_krl.run.memory import Memory, SignalRange, Signals
 from ir_krl.run.motions import Motions, Moving
 from ir_krl.run.notes import Effect, Note, worst_first
@@ -390,6 +390,10 @@ class _Run(Moving):
         """A routine that nobody gave: it moves nothing, and the advance run stops at it. Its value
         must be set where one is used.
         """
+        if name in COMPUTED:
+            text = f"{name} is built in, but isn't computed here: what it gives is unknown"
+            self.note_at(place, text, Effect.MOTIONS)
+            return Unknown(name)
         held = self.unknown.get(name)
         most = max(arguments, held.arguments if held else 0)
         used = function or (held is not None and held.function)

@@ -28,6 +28,8 @@ MODELLED = frozenset(
         "$ORI_TYPE",
         "$ADVANCE",
         "$LOAD",
+        "$JERK",
+        "$GEAR_JERK",
     )
 )
 """System variables that motions follow from."""
@@ -35,10 +37,8 @@ HARMLESS = frozenset(
     (
         "$BWDSTART",
         "$H_POS",
-        "$GEAR_JERK",
         "$COLLMON_TOL_PRO",
         "$CIRC_TYPE",
-        "$JERK",
         "$IPO_MODE",
         "$ACT_TOOL",
         "$ACT_BASE",
@@ -56,12 +56,13 @@ HARMLESS = frozenset(
         "$VEL_EXTAX",
         "$ACC_EXTAX",
         "$ERR",
-        "$SINGUL_POS",
         "$ANOUT",
         "$FCT_CALL",
     )
 )
-"""Set by nearly every program; nothing here follows from them."""
+"""Known where they are read, or without any effect on motions: what is neither here nor modelled
+is noted where it is assigned.
+"""
 STANDING = frozenset(
     (
         "$POS_ACT",
@@ -206,6 +207,7 @@ FACTS: dict[str, Value] = {
     "$NUM_AX": AXES,
     "$TCP_IPO": True,
     "$VEL_MA": Structure({"CP": 3.0, "ORI1": 400.0, "ORI2": 400.0}),
+    "$ACC_MA": Structure({"CP": 10.0, "ORI1": 1000.0, "ORI2": 1000.0}),
     "$ERR": Structure({"NUMBER": 0}),
     "$BWDSTART": False,
     "$NULLFRAME": Structure(dict(NULL)),

@@ -204,10 +204,12 @@ class _Drive:
     def _among(self, scene: PlanningScene) -> None:
         """Drive in this scene from here on."""
         self.scene = scene
-        self.arm = Arm(scene)
+        self.arm = Arm(scene, self.notes.append)
 
     def take(self, command: Command, triggered: Sequence[SetOutput] = ()) -> None:
         """Drive one command; what triggers set in it, where it is a motion."""
+        if isinstance(command, Motion | SplineBlock):
+            self._part_kinds(command)
         match command:
             case Motion():
                 self._motion(command, triggered)
@@ -236,6 +238,16 @@ class _Drive:
                 self._stand(0.0, command.place, command.condition)
                 signals = self.around.awaited(command.condition)
                 self.steps[-1] = replace(self.steps[-1], awaited=signals)
+
+    def _part_kinds(self, command: Motion | SplineBlock) -> None:
+        """Stop between a motion of the spline kind and one of the other, as controllers do."""
+        if self._through and _is_spline(self._through[-1].command) != _is_spline(command):
+            text = (
+                "between PTP, LIN, CIRC and motions of a spline no corner is rounded: the motion "
+                "before stops exactly"
+            )
+            self.notes.append(Note(self._through[-1].command.place, text, Effect.TIMES))
+            self.finish()
 
     def finish(self) -> None:
         """Come to rest: what is being driven through becomes a step."""
@@ -389,9 +401,32 @@ class _Drive:
             self.notes.append(
                 Note(block.place, "parts have speeds of their own: driven as its first part")
             )
-        least = sum(one.seconds for one in block.times) / block.parts[0].speeds.override
+        least = self._least(block, curve)
         drawn = None if block.axis else tool_spline(block, self.here, self.arm)
         self._drive(curve, block, block.parts[0].speeds, drawn, triggered, least)
+
+    def _least(self, block: SplineBlock, curve: Curve) -> float:
+        """Seconds that a block lasts at least: its TIME_BLOCK, and the parts outside as long as
+        they take by themselves.
+        """
+        speeds = block.parts[0].speeds
+        if not block.times:
+            return 0.0
+        if block.times[0].first > 0 or block.times[-1].last < len(block.parts):
+            text = (
+                "TIME_BLOCK over some parts of a spline: the whole lasts as long as they and the "
+                "parts outside by themselves, but one law drives all of it, so that the parts "
+                "aren't passed when they should be"
+            )
+            self.notes.append(Note(block.times[0].place, text, Effect.MOTIONS))
+        by_itself = move(curve, speeds, self.scene, _target_of(block), block.place)
+        passed = np.concatenate([[0], by_itself.passing()]) * GRID_S
+        own = [float(passed[one.last] - passed[one.first]) for one in block.times]
+        longer = (
+            max(one.seconds / speeds.override - seconds, 0.0)
+            for one, seconds in zip(block.times, own, strict=True)
+        )
+        return float(passed[-1]) + sum(longer)
 
     def _drive(
         self,
@@ -558,6 +593,10 @@ def _payload_of(command: Motion | SplineBlock) -> Payload | None:
 
 def _first_part(command: Motion | SplineBlock) -> Motion:
     return command if isinstance(command, Motion) else command.parts[0]
+
+
+def _is_spline(command: Motion | SplineBlock) -> bool:
+    return isinstance(command, SplineBlock) or command.spline
 
 
 def _is_axis(command: Motion | SplineBlock) -> bool:

@@ -1,12 +1,13 @@
 """Frames of KRL and of the cell: flange, tool, base; targets as poses; status and turn."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ir_description.poses import abc_from_rotation, inverse, rotation_from_abc
 from ir_kernels import Chain, portable
-from ir_krl import FRAME_NAMES, KrlMotionError, Place, Target
+from ir_krl import FRAME_NAMES, Effect, KrlMotionError, Note, Place, Target
 from ir_planner.scene import PlanningScene
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
@@ -17,6 +18,7 @@ from ir_values.arrays import BoolArray, FloatArray, IntArray
 # angle that is 0 mean nothing: a position that was taught there may carry either.
 
 _UNDECIDED = 1e-4  # rad or m: nearer to 0 than this, either bit is taken
+_TAUGHT = np.radians(0.05)  # rad: a bit of the turn may be wrong by rounding up to this angle
 
 
 def _signs(chain: Chain, q: FloatArray) -> FloatArray:
@@ -42,12 +44,22 @@ def status_turn(chain: Chain, q: FloatArray) -> tuple[int, int]:
     return int(status.sum()), int(turn.sum())
 
 
-def meeting(chain: Chain, q: FloatArray, status: int | None, turn: int | None) -> BoolArray:
-    """Which configurations q (N, n) [rad] have this status and turn; None: any."""
+def meeting(
+    chain: Chain,
+    q: FloatArray,
+    status: int | None,
+    turn: int | None,
+    *,
+    near: float = _UNDECIDED,
+) -> BoolArray:
+    """Which configurations q (N, n) [rad] have this status and turn; None: any. near: up to which
+    angle [rad] of an axis either bit of the turn is taken.
+    """
     signs = _signs(chain, q)
+    undecided = np.array([_UNDECIDED] * 3 + [near] * q.shape[1])
     wanted = np.concatenate([_bits(status, 3), _bits(turn, q.shape[1])])
     agrees = (signs < 0.0) == (wanted == 1)
-    return np.asarray((agrees | (np.abs(signs) < _UNDECIDED) | (wanted < 0)).all(axis=1))
+    return np.asarray((agrees | (np.abs(signs) < undecided) | (wanted < 0)).all(axis=1))
 
 
 def _bits(value: int | None, count: int) -> IntArray:
@@ -75,9 +87,10 @@ def tool_in_flange(tcp: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """The robot in its cell, as motions need it."""
+    """The robot in its cell, as motions need it; noted: hears what is assumed of a target."""
 
     scene: PlanningScene
+    noted: Callable[[Note], None] = lambda note: None
 
     def flange(self, q: FloatArray) -> FloatArray:
         """KUKA's flange (N, 4, 4) in the robot's foot, of q (N, n)."""
@@ -156,6 +169,17 @@ class Arm:
                 place,
             )
         fits = found[meeting(self.scene.chain, found, target.status, target.turn)]
+        if len(fits) == 0:
+            rounded = meeting(
+                self.scene.chain, found, target.status, target.turn, near=float(_TAUGHT)
+            )
+            fits = found[rounded]
+            if len(fits):
+                text = (
+                    f"{_called(target)}T {target.turn} asks for the other sign of an axis within "
+                    f"{np.degrees(_TAUGHT):g} deg of 0: taken as this side"
+                )
+                self.noted(Note(place, text, Effect.PLACES))
         if len(fits) == 0:
             alike = found[meeting(self.scene.chain, found, target.status, None)]
             alike = alike if len(alike) else found

@@ -245,7 +245,7 @@ def _axis_limits(speeds: Speeds, limits: MotionLimits) -> MotionLimits:
         limits,
         velocity=limits.velocity * np.asarray(speeds.axis_velocity),
         acceleration=limits.acceleration * share,
-        jerk=limits.jerk * share,
+        jerk=limits.jerk * np.minimum(share, speeds.axis_jerk),
     )
     return kept.for_speed(speeds.override)
 
@@ -257,19 +257,19 @@ def _law_bounds(curve: Curve, speeds: Speeds, limits: MotionLimits) -> tuple[flo
     v, a, j = (
         float(np.min(bound / rate)) for bound in (limits.velocity, limits.acceleration, limits.jerk)
     )
-    for size, speed, acceleration in (
-        (curve.length, speeds.velocity, speeds.acceleration),
-        (curve.turning, speeds.turning, speeds.turning_acceleration),
+    for size, speed, acceleration, jerk in (
+        (curve.length, speeds.velocity, speeds.acceleration, speeds.jerk),
+        (curve.turning, speeds.turning, speeds.turning_acceleration, speeds.turning_jerk),
     ):
         if size > STILL:
             v = min(v, speed * speeds.override / size)
             a = min(a, acceleration * (speeds.override * speeds.override) / size)
             j = min(
                 j,
-                acceleration
+                min(acceleration / RAMP, jerk)
                 * (speeds.override * speeds.override)
                 * speeds.override
-                / (size * RAMP),
+                / size,
             )
     return min(v, _HUGE), min(a, _HUGE), min(j, _HUGE)
 
