@@ -204,3 +204,14 @@ def test_no_two_ticks_of_an_axis_read_alike(
         ticks = re.findall(rf'text-anchor="{anchor}">(-?[\d .]+ (?:s|min|J|kJ))</text>', drawn)
         assert len(ticks) >= 2
         assert len(set(ticks)) == len(ticks)
+
+
+def test_recordings_of_different_cells_have_no_shares_of_each_other(
+    analysis: Analysis, other: Analysis
+) -> None:
+    assert other.cell is not None
+    moved = replace(other, cell=replace(other.cell, name="another_cell"))
+    page = comparison_html([(analysis, ()), (moved, ())])
+    assert "(another_cell)" in page
+    assert "+10.00 %" not in page
+    assert "are of different cells" in page

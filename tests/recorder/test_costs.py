@@ -27,6 +27,7 @@ from ir_recorder.report.costs import (
     clock_section,
     costs_section,
     given_and_assumed,
+    idle_saving,
     lever_section,
     money,
     payback,
@@ -245,3 +246,19 @@ def test_a_robot_without_figures_of_its_controller_is_in_no_sum_at_the_mains(
     whole = fleet_of_line(known, Costs())
     assert whole == fleet_of_line(known[:1], Costs())
     assert fleet.partition("</section>")[0].split("<main>")[1] in alone
+
+
+def test_hibernation_outside_of_the_shifts_is_a_headline(analysis: Analysis) -> None:
+    costs = Costs(price=0.2)
+    found = idle_saving(idle_watts(analysis), costs)
+    assert found is not None
+    rest = idle_watts(analysis)
+    power = rest["STAND_ON_BRAKES"] - rest["HIBERNATION"]
+    assert found.saved == pytest.approx(power / 1000.0 * costs.idle_hours * 0.2)
+    words = f"saves {money(found.saved, 'EUR')} a year"
+    member = member_of(analysis, "robot")
+    assert member is not None
+    assert words in clock_section(analysis, costs)
+    assert words in fleet_html([member], costs=costs)
+    assert "outside of shifts, saved a year" in report_html(analysis, (), costs=costs)
+    assert idle_saving({}, costs) is None

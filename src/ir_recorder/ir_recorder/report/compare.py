@@ -76,7 +76,11 @@ def comparison_html(compared: Sequence[Compared], costs: Costs | None = None) ->
     }
     parts = {
         "title": text(f"{len(analyses)} recordings compared"),
-        "subtitle": text(f"{names[0]} is what the others are held against"),
+        "subtitle": text(
+            "of different cells, each by itself"
+            if _apart(analyses)
+            else f"{names[0]} is what the others are held against"
+        ),
         "problems": _problems(analyses, names),
         "paid": _paid(compared, names, costs or Costs()),
         "supply": "" if any(map(drives_only, analyses)) else " at the mains",
@@ -91,12 +95,21 @@ def comparison_html(compared: Sequence[Compared], costs: Costs | None = None) ->
 
 
 def _names(analyses: Sequence[Analysis]) -> list[str]:
-    """File names; with their folders where two are alike."""
+    """File names; with their folders where two are alike, with their cells where those differ."""
     short = [analysis.recording.path.stem for analysis in analyses]
     long = [f"{a.recording.path.parent.name}/{a.recording.path.stem}" for a in analyses]
-    return [
+    names = [
         name if short.count(name) == 1 else other for name, other in zip(short, long, strict=True)
     ]
+    if not _apart(analyses):
+        return names
+    cells = [a.cell.name if a.cell is not None else "no cell" for a in analyses]
+    return [f"{name} ({cell})" for name, cell in zip(names, cells, strict=True)]
+
+
+def _apart(analyses: Sequence[Analysis]) -> bool:
+    """Whether the recordings are of different cells: no share of one is one of another."""
+    return len({a.cell.name for a in analyses if a.cell is not None}) > 1
 
 
 def _problems(analyses: Sequence[Analysis], names: Sequence[str]) -> str:
@@ -105,7 +118,7 @@ def _problems(analyses: Sequence[Analysis], names: Sequence[str]) -> str:
         for analysis, name in zip(analyses, names, strict=True)
         for problem in analysis.problems
     ]
-    if len({a.cell.name for a in analyses if a.cell is not None}) > 1:
+    if _apart(analyses):
         items.append("<li>These recordings are of different cells.</li>")
     if len({(a.recording.origin, a.recording.plant) for a in analyses}) > 1:
         items.append(
@@ -119,16 +132,18 @@ def _problems(analyses: Sequence[Analysis], names: Sequence[str]) -> str:
 def _paid(compared: Sequence[Compared], names: Sequence[str], costs: Costs) -> str:
     """The figures for those who pay, as the report of each recording has them."""
     cycles = [production_of(analysis) for analysis, _ in compared]
+    first = None if _apart([analysis for analysis, _ in compared]) else cycles[0]
     rows = [
         ("plant", *(text(plant_of(a)) for a, _ in compared)),
         ("checks", *(text(summary(tuple(checks))[1]) for _, checks in compared)),
-        ("a year of such cycles", *(_year(cycle, cycles[0], costs) for cycle in cycles)),
+        ("a year of such cycles", *(_year(cycle, first, costs) for cycle in cycles)),
         ("saved by its plan, a year", *(_year_saved(cycle, costs) for cycle in cycles)),
         ("that is, of the whole line", *(_of_line(analysis, costs) for analysis, _ in compared)),
         ("a cycle", *(_cycle(cycle) for cycle in cycles)),
     ]
     hint = (
-        "A year is one cycle after the other, pauses at full length. What a plan saves is "
+        "A year is one cycle after the other in shifts, pauses at full length, without nights and "
+        "weekends. What a plan saves is "
         "predicted, against the same stations by PTP at full speed and the controller's own "
         f"timers; intervals hold 90 %. {given_and_assumed(costs)}"
     )
@@ -190,7 +205,11 @@ def _cycle(cycle: Production | None) -> str:
 
 
 def _figures(compared: Sequence[Compared], names: Sequence[str]) -> str:
-    rows = [_measured_row(name, unit, value, compared) for name, unit, value in _VALUES]
+    rows = [
+        _measured_row(name, unit, value, compared)
+        for name, unit, value in _VALUES
+        if any(math.isfinite(value(analysis)) for analysis, _ in compared)
+    ]
     return table(("", *(f">{name}" for name in names)), rows, "Runs in figures")
 
 
@@ -201,7 +220,9 @@ def _measured_row(
     compared: Sequence[Compared],
 ) -> tuple[str, ...]:
     values = [value(analysis) for analysis, _ in compared]
-    return (name, *(_against(each, values[0], unit, k == 0) for k, each in enumerate(values)))
+    apart = _apart([analysis for analysis, _ in compared])
+    cells = (_against(each, values[0], unit, k == 0 or apart) for k, each in enumerate(values))
+    return (name, *cells)
 
 
 def _against(value: float, first: float, unit: Callable[[float], str], own: bool) -> str:
@@ -289,13 +310,14 @@ def _points(analyses: Sequence[Analysis], names: Sequence[str]) -> list[Point]:
 
 def _steps(analyses: Sequence[Analysis], names: Sequence[str]) -> str:
     """Energy of every step; steps are matched by their label and its number of times before."""
+    apart = _apart(analyses)
     held = [dict(_keyed(analysis)) for analysis in analyses]
     keys = list(dict.fromkeys(key for own in held for key in own))
     rows = []
     for key in keys:
         found = [own.get(key) for own in held]
         first = found[0].energy if found[0] is not None else math.nan
-        cells = (_step(result, first, k == 0) for k, result in enumerate(found))
+        cells = (_step(result, first, k == 0 or apart) for k, result in enumerate(found))
         rows.append((text(key[0]), *cells))
     return table(("step", *(f">{name}" for name in names)), rows, "Steps")
 

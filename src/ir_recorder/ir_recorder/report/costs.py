@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeGuard
@@ -522,6 +522,50 @@ def _demand(analysis: Analysis, cycle: Production, costs: Costs) -> str:
     return f"The largest quarter of an hour takes {watts(peak)} on average{limit}{text(price)}."
 
 
+LEFT_ALONE = "STAND_ON_BRAKES"
+"""The mode that a controller goes into by itself while nobody works."""
+_DEEPEST = "HIBERNATION"
+_TODAY = "<small>today: what the controller does if left alone</small>"
+
+
+@dataclass(frozen=True)
+class IdleSaving:
+    """Money of a year outside of the shifts: the controller left alone, and in its deepest mode."""
+
+    mode: str
+    left_alone: float
+    deepest: float
+
+    @property
+    def saved(self) -> float:
+        """What the deepest mode saves."""
+        return self.left_alone - self.deepest
+
+
+def idle_saving(watts_at_rest: Mapping[str, float], costs: Costs) -> IdleSaving | None:
+    """What hibernation saves outside of the shifts; None where a power of rest [W] is not known, or
+    it saves nothing.
+    """
+    if not {LEFT_ALONE, _DEEPEST} <= set(watts_at_rest) or costs.idle_hours <= 0.0:
+        return None
+    left, deepest = (
+        watts_at_rest[mode] * costs.idle_hours / 1000.0 * costs.idle_price
+        for mode in (LEFT_ALONE, _DEEPEST)
+    )
+    found = IdleSaving(_DEEPEST.lower(), left, deepest)
+    return found if found.saved >= _NOTHING else None
+
+
+def idle_sentence(found: IdleSaving | None, costs: Costs) -> str:
+    """The same in words; "" without it."""
+    if found is None:
+        return ""
+    return (
+        f"Outside of shifts: {found.mode} instead of closing the brakes saves "
+        f"{yearly_money(found.saved, costs.currency)} a year."
+    )
+
+
 def _idle(analysis: Analysis, costs: Costs) -> str:
     """What the robot draws while nobody works, by power mode."""
     found = idle_watts(analysis)
@@ -535,7 +579,7 @@ def _idle(analysis: Analysis, costs: Costs) -> str:
     seconds_idle = costs.idle_hours * 3600.0
     rows = [
         (
-            text(mode.replace("_", " ").lower()),
+            text(mode.replace("_", " ").lower()) + (_TODAY if mode == LEFT_ALONE else ""),
             watts(power),
             f"<b>{text(idle_money(power * seconds_idle, costs))}</b>"
             f"<small>{kilowatt_hours(power * seconds_idle)}</small>",
@@ -546,6 +590,7 @@ def _idle(analysis: Analysis, costs: Costs) -> str:
     return (
         f'<p class="hint">{significant(costs.idle_hours, 6)} hours a year lie outside of the '
         "shifts (nights, weekends, holidays): at machine home, by the data of controller and "
-        "tool. Left alone, the controller only closes the brakes.</p>"
+        "tool. Left alone, the controller only closes the brakes. "
+        f"{text(idle_sentence(idle_saving(found, costs), costs))}</p>"
         f"{table(heads, rows, 'When nobody works')}"
     )

@@ -30,9 +30,12 @@ from ir_recorder.format import contents
 from ir_recorder.format.contents import is_further_part
 from ir_recorder.reading.reader import read_recording
 from ir_recorder.report.costs import (
+    LEFT_ALONE,
     Costs,
     given_and_assumed,
     idle_money,
+    idle_saving,
+    idle_sentence,
     payback,
     yearly_end,
     yearly_money,
@@ -474,10 +477,10 @@ def _robots(robots: Sequence[Robot], costs: Costs) -> str:
         ">energy a part",
     )
     hint = (
-        "A year is one cycle after the other, pauses at full length. What plans save is "
-        "predicted, against the same stations by PTP at full speed and the controller's own "
-        "timers; intervals hold 90 %, and those of several robots add up as if all were wrong "
-        "alike."
+        "A year is one cycle after the other in shifts, pauses at full length, without nights and "
+        "weekends. What plans save is predicted, against the same stations by PTP at full speed "
+        "and the controller's own timers; intervals hold 90 %, and those of several robots add up "
+        "as if all were wrong alike."
     )
     return f'<p class="hint">{hint} {_apart(robots)}</p>{table(heads, rows, "Robots")}'
 
@@ -515,13 +518,28 @@ def _around_the_clock(members: Sequence[Member], robots: Sequence[Robot], costs:
     sums = [sum(idle[mode]) for mode in modes]
     if demands:
         rows.append(_clock_row("<b>all</b>", sum(demands), sums, costs))
-    heads = ("robot", ">largest quarter of an hour", *(f">{_shown(mode)}" for mode in modes))
+    heads = ("robot", ">largest quarter of an hour", *(f">{_rest_head(mode)}" for mode in modes))
     hint = (
         f"{significant(costs.idle_hours, 6)} hours a year lie outside of the shifts; the columns "
         "of modes say what rest takes in them, by the data. The peak of all robots is the sum of "
-        "theirs: as if all came at once."
+        f"theirs: as if all came at once. {_idle_saved(members, costs)}"
     )
     return f'<p class="hint">{text(hint)}</p>{table(heads, rows, "Peak and rest")}'
+
+
+def _idle_saved(members: Sequence[Member], costs: Costs) -> str:
+    """What hibernation saves outside of the shifts, of all robots whose rest is known."""
+    rests: dict[str, dict[str, float]] = {}
+    for member in members:
+        own = rests.setdefault(member.robot, {}) if member.idle else {}
+        own.update({mode: max(power, own.get(mode, 0.0)) for mode, power in member.idle.items()})
+    modes = set.intersection(*(set(rest) for rest in rests.values())) if rests else set()
+    watts_of_all = {mode: sum(rest[mode] for rest in rests.values()) for mode in modes}
+    return idle_sentence(idle_saving(watts_of_all, costs), costs)
+
+
+def _rest_head(mode: str) -> str:
+    return f"{_shown(mode)} (today, if left alone)" if mode == LEFT_ALONE else _shown(mode)
 
 
 def _named(robot: Robot) -> str:

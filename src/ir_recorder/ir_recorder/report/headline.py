@@ -13,6 +13,7 @@ from ir_recorder.analysis.production import (
     DRIVES_ONLY,
     driven_and_predicted,
     drives_only,
+    idle_watts,
     planned_clearance,
     planned_interval,
     planned_share,
@@ -21,7 +22,7 @@ from ir_recorder.analysis.production import (
 )
 from ir_recorder.format.contents import OWN_FACTS, VERSION
 from ir_recorder.reading.recording import Recording
-from ir_recorder.report.costs import NAMES, Costs, share_between, yearly_money
+from ir_recorder.report.costs import NAMES, Costs, idle_saving, share_between, yearly_money
 from ir_recorder.report.number_text import (
     DASH,
     joules,
@@ -61,9 +62,11 @@ def subtitle(analysis: Analysis) -> str:
     start = started(recording)
     version = recording.fact(VERSION)
     supply = f"({DRIVES_ONLY})" if drives_only(analysis) else "at the mains"
+    length = f", recorded {seconds(recording.duration)}, {joules(analysis.energy)} {supply}"
+    if recording.never_driven:
+        length = ""
     return text(
-        f"{recording.path.name}, {start:%Y-%m-%d %H:%M:%S} UTC, recorded "
-        f"{seconds(recording.duration)}, {joules(analysis.energy)} {supply}"
+        f"{recording.path.name}, {start:%Y-%m-%d %H:%M:%S} UTC{length}"
         + (f", recorder {version}" if version else "")
     )
 
@@ -120,7 +123,8 @@ def notes(analysis: Analysis) -> str:
 def tiles(analysis: Analysis, costs: Costs | None = None) -> str:
     """The figures for who pays; those of the program where one was executed."""
     program = analysis.program
-    paid = (_yearly(analysis, costs or Costs()), _saved(analysis))
+    prices = costs or Costs()
+    paid = (_yearly(analysis, prices), _saved(analysis), _idle_saved(analysis, prices))
     if analysis.recording.only_planned and program is None:
         return _html([*paid, *_planned(analysis)])
     peak = Tile("peak power", watts(analysis.peak_power), ("of a 10 ms reading",))
@@ -172,7 +176,10 @@ def _planned(analysis: Analysis) -> list[Tile]:
             )
         )
     near = millimetres(planned_clearance(steps))
-    return [*tiles, Tile("least clearance", near, ("planned, without pairs that may touch",))]
+    moved = [step.report.certified for step in steps if not step.is_pause]
+    proof = "proved: free of collision and within all limits" if moved and all(moved) else ""
+    lines = ("planned, without pairs that may touch", proof)
+    return [*tiles, Tile("least clearance", near, lines)]
 
 
 def _recorded(analysis: Analysis) -> Tile:
@@ -276,7 +283,30 @@ def _yearly(analysis: Analysis, costs: Costs) -> Tile | None:
         else "prices and shifts as given"
     )
     price = yearly_money(costs.money(energy), costs.currency)
-    return Tile("a year of such cycles", price, (co2, assumed, cycle.supply))
+    lines = ("in shifts, without nights and weekends", co2, assumed, cycle.supply)
+    return Tile("a year of such cycles", price, lines)
+
+
+def _idle_saved(analysis: Analysis, costs: Costs) -> Tile | None:
+    """What the deepest mode saves outside of the shifts, and what shifts and nights take with and
+    without it.
+    """
+    found = idle_saving(idle_watts(analysis), costs)
+    cycle = production_of(analysis)
+    if found is None or cycle is None:
+        return None
+    worked = costs.money(costs.energy_of_year(cycle).value)
+    sums = [
+        yearly_money(worked + cost, costs.currency) for cost in (found.left_alone, found.deepest)
+    ]
+    return Tile(
+        "outside of shifts, saved a year",
+        yearly_money(found.saved, costs.currency),
+        (
+            f"{found.mode} instead of only closing the brakes",
+            f"shifts and nights together {sums[0]}, then {sums[1]}",
+        ),
+    )
 
 
 def _parts(program: ProgramTotals, origin: str) -> list[Tile]:

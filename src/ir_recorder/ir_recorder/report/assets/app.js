@@ -18,6 +18,9 @@
     find("no-motion").hidden = false;
     find("trail-legend").hidden = true;
   }
+  if (!data.scene && !data.power && !data.clearance.length) {
+    for (const id of ["motion", "over-time"]) find(id).hidden = true; /* a plan without its trajectories */
+  }
 
   const player = new Player(timeline);
   for (const button of document.querySelectorAll("button.go")) {
