@@ -40,7 +40,10 @@ def assert_planned_figures_are_those_of_the_answer(analysis: Analysis, raw: RawR
     assert [step.from_station for step in planned] == [step.from_station for step in steps]
     assert analysis.problems == ()  # nothing is missing: nothing was driven
     energy = joules(sum(step.report.energy for step in steps))
-    assert f"<b>{energy}</b>" in report_html(analysis, ())
+    drawn = report_html(analysis, ())
+    assert f"<b>{energy}</b>" in drawn
+    assert analysis.recording.planned_certified == report.certified
+    assert ("proved: free of collision" in drawn) == report.certified
     page = comparison_html([(analysis, ()), (analysis, ())])
     assert page.count(f"<b>{energy}</b>") >= 2
     assert page.count("predicted, not driven") == 2

@@ -164,13 +164,14 @@ Interval = tuple[float, float]
 
 def planned_program(
     channel: RawChannel | None,
-) -> tuple[tuple[PlannedMovement, ...], Interval | None]:
-    """Steps of the last answer on a planner's calls that has some, without points, and the 90 %
-    interval of their energy [J], which is not that of the steps' sum; empty where none has.
+) -> tuple[tuple[PlannedMovement, ...], Interval | None, bool]:
+    """Steps of the last answer on a planner's calls that has some, without points, the 90 %
+    interval of their energy [J], which is not that of the steps' sum, and whether the answer is
+    certified; empty where none has.
     """
     definition = result_definition()
     if channel is None or channel.message_encoding != "cdr" or not definition:
-        return (), None
+        return (), None, False
     for answer in answers(channel, (ACTION, SERVICE)):
         try:
             name = f"{ACTION.replace('/action/', '/msg/')}_Result"
@@ -181,8 +182,9 @@ def planned_program(
             low, high = (
                 float(columns.numbers(f"report.energy_{end}")[0]) for end in ("low", "high")
             )
-            return steps, (low, high) if high > low else None
-    return (), None
+            certified = float(columns.numbers("report.certified")[0]) == 1.0
+            return steps, (low, high) if high > low else None, certified
+    return (), None, False
 
 
 def _steps_of(columns: Columns) -> tuple[PlannedMovement, ...]:

@@ -186,12 +186,18 @@ class _Reader:
         found = with_plans(found, self._channel(_CALLS))
         if found.joints is not None or found.power is not None or found.events:
             return found
-        planned, interval = planned_program(self._channel(_CALLS))
+        planned, interval, certified = planned_program(self._channel(_CALLS))
         missing = {f"{self._prefix}{name} isn't in the recording" for name in _OF_A_RUN}
         kept = tuple(problem for problem in found.problems if problem not in missing)
         if not planned:
             return found
-        return replace(found, planned=planned, planned_interval=interval, problems=kept)
+        return replace(
+            found,
+            planned=planned,
+            planned_interval=interval,
+            planned_certified=certified,
+            problems=kept,
+        )
 
     def _channel(self, name: str) -> RawChannel | None:
         """The channel of a topic, where its messages are of the type that the topic has."""

@@ -176,8 +176,8 @@ def _planned(analysis: Analysis) -> list[Tile]:
             )
         )
     near = millimetres(planned_clearance(steps))
-    moved = [step.report.certified for step in steps if not step.is_pause]
-    proof = "proved: free of collision and within all limits" if moved and all(moved) else ""
+    proved = analysis.recording.planned_certified
+    proof = "proved: free of collision and within all limits" if proved else ""
     lines = ("planned, without pairs that may touch", proof)
     return [*tiles, Tile("least clearance", near, lines)]
 
