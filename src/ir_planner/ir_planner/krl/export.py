@@ -371,8 +371,28 @@ class _Job:
         if texts.bases:
             bases = ", ".join(f"{number} ({name})" for name, number in texts.bases.items())
             lines.append(f"sets BASE_DATA of the numbers {bases}, for inline forms")
+        if texts.tools or texts.bases:
+            lines += [
+                "WARNING: the plant's own values of these numbers in $config.dat are replaced when",
+                "this program starts, for all programs, until somebody restores them: back them up",
+            ]
+        if self._style == "kss8":
+            lines.append("needs KSS 8.5 or later, for its lines of collision monitoring")
+        lines += self._output_lines()
         lines += self._pause_lines()
         return lines
+
+    def _output_lines(self) -> list[str]:
+        """Which outputs the program sets, that nobody sets at its start."""
+        named = [name for step in self._steps for name, _ in _signals(step.set_signals)]
+        if any(step.attach or step.detach for step in self._steps):
+            named.insert(0, "GRIP, with the gripper empty (else $LOAD is wrong)")
+        if not named:
+            return []
+        listed = [
+            "outputs that must stand as at the start of the plan, for nothing sets them before:"
+        ]
+        return listed + [f"  {one}" for one in dict.fromkeys(named)]
 
     def _pause_lines(self) -> list[str]:
         if not self._pauses:
