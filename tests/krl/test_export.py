@@ -283,6 +283,22 @@ def test_points_are_written_in_the_bases_of_their_machines(style: Style) -> None
     assert shifted == [False, True, False]
 
 
+@pytest.mark.parametrize("style", ["kss8", "krc2"])
+def test_a_stretched_wrist_is_written_by_its_axes(style: Style) -> None:
+    """Law: where A5 is 0 the axes are read back as they were, none of them from rounding."""
+    joints = np.radians([10.0, -90.0, 90.0, -0.3, 0.0, 0.3])
+    move = WrittenMove("", np.eye(4), 2, 2, straight=False, velocity=100, joints=joints)
+    none = Payload(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    texts = written("P", np.zeros(6), [move], Attached(np.eye(4), (none,)), [], style=style)
+    files = [parse(texts.source, "p.src"), parse(texts.data, "p.dat")]
+    last = [
+        one for one in follow(files, np.zeros(6), np.eye(4)).commands if isinstance(one, Motion)
+    ]
+    assert last[-1].target.axes is not None
+    back = [last[-1].target.axes[f"A{k}"] for k in range(1, 7)]
+    assert back == pytest.approx(joints, abs=1e-8)
+
+
 def rounded(frame: dict[str, float]) -> np.ndarray:
     pose = np.eye(4)
     pose[:3, 3] = [1e-3 * frame[name] for name in "XYZ"]

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from ir_krl.errors import Place
-from ir_krl.run.values import FRAME_NAMES, components, frame
+from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES, components, frame
 from ir_krl.write.parts import Style, WrittenMove
 from ir_values.arrays import FloatArray
 
@@ -13,6 +17,8 @@ from ir_values.arrays import FloatArray
 _SPLINE_FORMS = "kukaroboter.basistech.inlineforms.movement.spline"
 _CHECK = "$COLLMON_TOL_PRO[1] = USE_CM_PRO_VALUES(0)"
 _TOP = 2.0  # m/s, of an LDAT
+_WRIST = 4  # A5
+_STRETCHED = math.radians(0.05)  # of A5: nearer to 0 the wrist is written by its axes
 
 
 class Forms:
@@ -56,12 +62,25 @@ def _declared(part: WrittenMove, n: int, numbers: _Numbers, style: Style) -> lis
             f"DECL PDAT PPDAT{n}={{VEL 100.0,ACC {part.acceleration}.0,"
             f"APO_DIST {part.rounded:.1f}{mode}}}"
         )
-    fields = frame_text(part.pose, 6)
     external = ",".join(f"E{k} 0.0" for k in range(1, 7))
-    position = f"{{{fields},S {part.status},T {part.turn},{external}}}"
+    if _is_posture(part):
+        angles = zip(AXIS_NAMES, np.degrees(part.joints), strict=True)
+        fields = ",".join(f"{name} {decimal(angle, 7)}" for name, angle in angles)
+        point = f"DECL E6AXIS XP{n}={{{fields},{external}}}"
+    else:
+        marks = f"S {part.status},T {part.turn}"
+        point = f"DECL E6POS XP{n}={{{frame_text(part.pose, 6)},{marks},{external}}}"
     tool, base = numbers
     form = f'{{TOOL_NO {tool},BASE_NO {base},IPO_FRAME #BASE,POINT2[] " "}}'
-    return [f"DECL E6POS XP{n}={position}", f"DECL FDAT FP{n}={form}", motion]
+    return [point, f"DECL FDAT FP{n}={form}", motion]
+
+
+def _is_posture(part: WrittenMove) -> bool:
+    """Whether the axes say where a PTP in the robot's foot leads: near A5 = 0 a pose leaves A4 and
+    A6 to rounding.
+    """
+    singular = len(part.joints) > _WRIST and abs(part.joints[_WRIST]) < _STRETCHED
+    return bool(singular) and not part.straight and part.base == 0
 
 
 def _title(word: str, part: WrittenMove, n: int, numbers: _Numbers, unit: str, data: str) -> str:

@@ -386,7 +386,7 @@ class _Job:
         """Which outputs the program sets, that nobody sets at its start."""
         named = [name for step in self._steps for name, _ in _signals(step.set_signals)]
         if any(step.attach or step.detach for step in self._steps):
-            named.insert(0, "GRIP, with the gripper empty (else $LOAD is wrong)")
+            named.insert(0, "GRIP, with the gripper empty (else the load is wrong)")
         if not named:
             return []
         listed = [
