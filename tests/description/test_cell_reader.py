@@ -345,7 +345,9 @@ def test_a_broken_mesh_is_answered_by_a_sentence(
 def test_a_huge_mesh_is_refused_unread(tmp_path: Path) -> None:
     with (tmp_path / "mesh.stl").open("wb") as file:
         file.truncate(2_000_000_000)
-    with pytest.raises(CellFileError, match="has 2000000000 bytes, must be at most 20000000 bytes"):
+    with pytest.raises(
+        CellFileError, match="has 2000000000 bytes, must be at most 120000000 bytes"
+    ):
         load_cell(cell_with(tmp_path, "mesh.stl"))
 
 

@@ -223,7 +223,7 @@ def test_a_mesh_is_taken_from_its_own_package_only(tmp_path: Path) -> None:
             else "broken"
         )
     meshes = Meshes(tmp_path / "one", None)
-    assert len(meshes.triangles("package://two/meshes/a.obj")) == 4
+    assert len(meshes.triangles("package://two/meshes/a.obj")[0]) == 4
     with pytest.raises(InvalidValueError, match="package 'three' is not found; --packages"):
         meshes.triangles("package://three/meshes/a.obj")
 

@@ -57,7 +57,7 @@ class Bench:
                 handles.append(handle)
             return SimpleNamespace(handle=handle, msg_type=PlcInputs)
 
-        node = SimpleNamespace(create_subscription=subscribe)
+        node = SimpleNamespace(create_subscription=subscribe, resolve_topic_name=str)
         apart = SimpleNamespace(node=node, apart=True)
         self.topic = presses.PlcTopic(node, self, apart)  # type: ignore[arg-type]
         self.turn, self.ahead = (handle.queue for handle in handles)

@@ -74,7 +74,7 @@ def test_a_press_does_not_come_behind_old_levels_nor_with_a_mode_that_is_none(
     driver = Heard()
     server = BackgroundExecutor(ros_context)
     try:
-        node = server.add_node(rclpy.create_node("busy", context=ros_context))
+        node = server.add_node(rclpy.create_node("ir_sim_driver", context=ros_context))
         alone = SimpleNamespace(apart=False)
         topic = server.run(lambda: PlcTopic(node, driver, alone))  # type: ignore[arg-type]
         publisher = ros_executor.run(
