@@ -86,7 +86,8 @@ def _built(payload: float, rng: np.random.Generator) -> RobotModel:
     reach = 0.75 * payload**0.25 * rng.uniform(0.85, 1.15)
     total = 13.0 * payload**0.85
     upper, fore = rng.uniform(0.4, 0.5, 2) * reach
-    elbow, wrist = 0.1 * reach, 0.09 * reach
+    elbow = 0.1 * reach
+    wrist = 0.09 * reach
     places = np.array(
         [
             (0.0, 0.0, 0.3 * reach),
@@ -151,7 +152,8 @@ def _motion(
     time = np.arange(0.0, seconds, DT)
     here = np.array(robot.machine_home)
     q = np.tile(here, (len(time), 1))
-    qd, qdd = np.zeros_like(q), np.zeros_like(q)
+    qd = np.zeros_like(q)
+    qdd = np.zeros_like(q)
     now = _REST
     number = 0
     while True:

@@ -344,7 +344,8 @@ def test_triggers_change_no_motion(seed: int) -> None:
     assert other.report.energy == pytest.approx(one.report.energy, rel=5e-3)
     steps = [step.step for step in other.steps]
     for before, after in pairwise(steps):
-        last, first = before.trajectory.sample([before.trajectory.duration]), after.trajectory
+        last = before.trajectory.sample([before.trajectory.duration])
+        first = after.trajectory
         assert np.abs(last.q[0] - first.positions[0]).max() < 1e-9
         if not before.at_rest[1]:
             assert not after.at_rest[0]

@@ -379,7 +379,8 @@ def test_any_sequence_of_operations_leaves_what_a_plain_table_has(steps: Any, x:
                 applied(asked_for, cell, ours)
             continue
         done = applied(asked_for, cell, ours)
-        cell, ours = done.cell, done.objects
+        cell = done.cell
+        ours = done.objects
         there, count = table.get(name, (x + k, 0))
         if operation == REMOVE:
             del table[name]

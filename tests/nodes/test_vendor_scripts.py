@@ -112,7 +112,8 @@ def several_points_with_positions_only(robot):
 def a_plan_with_times_and_velocities(robot):
     """What MoveIt's time parametrization hands over, from the present state at time 0."""
     times = np.linspace(0.0, 1.5, 16)
-    s, w = times / 1.5, 2.0 * pi / 1.5
+    s = times / 1.5
+    w = 2.0 * pi / 1.5
     points = [
         at(
             t,

@@ -30,7 +30,8 @@ def moved(robot: RobotModel, seed: int) -> Samples:
     rng = np.random.default_rng(seed)
     time = (np.arange(int(SECONDS / STEP)) + 0.5) * STEP
     q = np.tile(robot.machine_home, (len(time), 1))
-    qd, qdd = np.zeros_like(q), np.zeros_like(q)
+    qd = np.zeros_like(q)
+    qdd = np.zeros_like(q)
     for begin in np.arange(0.5, SECONDS - 1.5, 1.5):
         rows = (time >= begin) & (time < begin + 1.2)
         rate = 2.0 * np.pi / 1.2

@@ -289,9 +289,10 @@ def _apart(first: FloatArray, second: FloatArray) -> float:
 
 def _fine(triangles: FloatArray, step: float) -> FloatArray:
     """The same surface in triangles (T, 3, 3) without an edge longer than step [m]."""
-    while len(long := np.flatnonzero(_longest(triangles) > step)):
-        kept = np.delete(triangles, long, axis=0)
-        triangles = np.concatenate([kept, halved(triangles[long])])
+    long = _longest(triangles) > step
+    while long.any():
+        triangles = np.concatenate([triangles[~long], halved(triangles[long])])
+        long = _longest(triangles) > step
     return triangles
 
 

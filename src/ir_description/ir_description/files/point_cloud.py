@@ -267,7 +267,8 @@ def read_cloud(folder: Path, name: str, *, heights: bool = False) -> Measured:
     if suffix == ".pcd":
         points, notes = _from_pcd(content)
     else:
-        points, notes = _from_ply(content), ()
+        points = _from_ply(content)
+        notes = ()
     return _of_points(points, notes)
 
 

@@ -258,7 +258,8 @@ class _TendingModel:
 
     def _keys(self, activity: int) -> list[Key]:
         """The movements of an activity in order."""
-        start, end = self.visits[activity], self.visits[activity + 1]
+        start = self.visits[activity]
+        end = self.visits[activity + 1]
         return [
             (ENTER, start, start, False),
             (LEAVE, start, start, True),

@@ -106,7 +106,8 @@ class PlannerAnswers:
 
     def plan(self, request: Any, response: Any) -> Status:
         """GetMotionPlan."""
-        given, answer = request.motion_plan_request, response.motion_plan_response
+        given = request.motion_plan_request
+        answer = response.motion_plan_response
         settings = self._settings()
         cell = self.cell()
         asked = movement(given, cell, settings.group, settings.safety_distance)

@@ -129,7 +129,8 @@ def goals_of(given: Sequence[Any], cell: Cell) -> list[Any]:
 
 
 def _goal(given: Any, cell: Cell, what: str) -> Any:
-    joints, places = len(given.joint_constraints), len(given.position_constraints)
+    joints = len(given.joint_constraints)
+    places = len(given.position_constraints)
     turns = len(given.orientation_constraints)
     if given.visibility_constraints:
         raise refusal(what, "visibility constraints can't be heeded")
@@ -141,7 +142,8 @@ def _goal(given: Any, cell: Cell, what: str) -> Any:
             f"it has {joints} joint, {places} position and {turns} orientation constraints: all "
             f"{cell.robot.n} joints, or one position and one orientation, make a goal",
         )
-    place, turn = given.position_constraints[0], given.orientation_constraints[0]
+    place = given.position_constraints[0]
+    turn = given.orientation_constraints[0]
     if place.link_name != turn.link_name:
         links = f"{shown(place.link_name)} and {shown(turn.link_name)}"
         raise refusal(what, f"its position and orientation are of two links, {links}")
@@ -185,7 +187,8 @@ def _tolerance(value: float, what: str) -> None:
 
 def _region_centre(given: Any, cell: Cell, what: str) -> FloatArray:
     region = given.constraint_region
-    shapes, places = len(region.primitives), len(region.primitive_poses)
+    shapes = len(region.primitives)
+    places = len(region.primitive_poses)
     if region.meshes or (shapes, places) != (1, 1):
         raise refusal(
             what,
@@ -246,7 +249,8 @@ def ik_pose(given: Any, cell: Cell, group: str) -> FloatArray:
     """Pose (4, 4) of the tcp that a PositionIKRequest asks for."""
     check_group(given.group_name, group)
     check_free(given.constraints, "constraints")
-    links, poses = list(given.ik_link_names), list(given.pose_stamped_vector)
+    links = list(given.ik_link_names)
+    poses = list(given.pose_stamped_vector)
     if len(links) > 1 or len(poses) > 1 or len(links) != len(poses):
         raise refusal(f"{len(links)} ik_link_names and {len(poses)} poses", "the robot has one tip")
     link, pose = (links[0], poses[0]) if links else (given.ik_link_name, given.pose_stamped)

@@ -25,7 +25,9 @@ OBJECTS_MAX = 1000
 TRIANGLES_MAX = 200_000
 """Of one mesh."""
 _ADD, _REMOVE, _APPEND, _MOVE = range(4)
-_BOX, _SPHERE, _CYLINDER = 1, 2, 3
+_BOX = 1
+_SPHERE = 2
+_CYLINDER = 3
 _PRIMITIVES = {_BOX: ("box", 3), _SPHERE: ("sphere", 1), _CYLINDER: ("cylinder", 2)}
 _OTHERS = {4: "a cone", 5: "a prism"}
 _CODE = StatusCode.INVALID_OBJECT_NAME
@@ -182,7 +184,8 @@ def _bodies(msg: Any, name: str, taken: int, notes: list[str]) -> list[Body]:
     if msg.planes:
         raise refusal(what, "planes can't be taken; the floor is the cell's, a wall is a box")
     for shapes, poses in (("primitives", "primitive_poses"), ("meshes", "mesh_poses")):
-        count, places = len(getattr(msg, shapes)), len(getattr(msg, poses))
+        count = len(getattr(msg, shapes))
+        places = len(getattr(msg, poses))
         if count != places:
             raise refusal(what, f"it has {count} {shapes} and {places} {poses}")
     total = taken + len(msg.primitives) + len(msg.meshes)

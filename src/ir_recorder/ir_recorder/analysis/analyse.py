@@ -163,7 +163,8 @@ def _full_pause(
         full = pause_joules(watts(mode, result), motors, length, change(mode))
         own = pause_joules(added_watts(mode, result), motors_added, length, change(mode))
         saved_added = common_added - own
-    energy, predicted = full - result.energy, full - planned
+    energy = full - result.energy
+    predicted = full - planned
     if deepest(sequence) != sequence and longer >= 0.0:
         # one mode after the other: the last one lasts longer
         energy = predicted = longer * watts(mode, result)

@@ -84,7 +84,8 @@ def centre_torques(
     for i in range(n):
         frame, axes[i] = _next(frame, robot, i, q[:, i], qd[:, i], qdd[:, i])
         places[i] = frame.place
-        mass, inertia = float(robot.link_mass[i + 1]), robot.link_inertia[i + 1]
+        mass = float(robot.link_mass[i + 1])
+        inertia = robot.link_inertia[i + 1]
         for own, direction in zip(found, directions[:, i], strict=True):
             for side in (-0.5, 0.5):
                 part = np.zeros((N, n))

@@ -20,10 +20,18 @@ from ir_recorder.errors import RecorderError
 from ir_recorder.traces.table_files import VALUES_MAX, opened
 from ir_recorder.traces.trace import Trace
 
-_VARINT, _EIGHT, _BYTES, _FOUR = 0, 1, 2, 5
-_HEADER, _FEEDBACK = 1, 2  # of EgmRobot; a sensor's message has what it plans in place of 2
-_SEQUENCE, _TIME, _TYPE = 1, 2, 3  # of EgmHeader
-_JOINTS, _EXTERNAL, _CLOCK = 1, 3, 4  # of EgmFeedBack
+_VARINT = 0
+_EIGHT = 1
+_BYTES = 2
+_FOUR = 5
+_HEADER = 1  # of EgmRobot; a sensor's message has what it plans in place of 2
+_FEEDBACK = 2
+_SEQUENCE = 1  # of EgmHeader
+_TIME = 2
+_TYPE = 3
+_JOINTS = 1  # of EgmFeedBack
+_EXTERNAL = 3
+_CLOCK = 4
 _DATA = 2  # type of the robot's messages
 _MS = 1e-3
 _LENGTH_MAX = 65_535  # bytes of a datagram
@@ -216,7 +224,8 @@ def _field(content: bytes, at: int) -> tuple[int, int, int | bytes, int]:
     where it is cut. Raises _NoMessageError.
     """
     tag, at = _varint(content, at)
-    number, wire = tag >> 3, tag & 7
+    number = tag >> 3
+    wire = tag & 7
     if number == 0 or wire not in (_VARINT, _EIGHT, _BYTES, _FOUR):
         raise _NoMessageError
     if wire == _VARINT:

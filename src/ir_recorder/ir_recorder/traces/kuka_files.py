@@ -140,7 +140,8 @@ def _files_of_axes(path: Path, count: int) -> Sequence[Path]:
     """The files of all axes where `path` is that of one, else none."""
     beside = {each.name.lower(): each for each in path.parent.iterdir()}
     for found in reversed(list(_NUMBERED.finditer(path.stem))):
-        before, after = path.stem[: found.start()], path.stem[found.end() :]
+        before = path.stem[: found.start()]
+        after = path.stem[found.end() :]
         numbers = [f"{k:0{len(found[0])}d}" for k in range(1, count + 1)]
         names = [f"{before}{number}{after}.dat".lower() for number in numbers]
         if path.name.lower() in names and all(name in beside for name in names):
