@@ -13,7 +13,7 @@ import traceback
 from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Any, ClassVar
-from weakref import WeakKeyDictionary
+from weakref import WeakKeyDictionary, WeakSet
 
 from rclpy.callback_groups import CallbackGroup
 from rclpy.executors import await_or_execute
@@ -50,15 +50,16 @@ class Calls:
     """Publishes the calls of a node on its topic `~/calls`; `of` gives the one that all its
     services share.
 
-    services: those that answer. Where nobody subscribes, nothing is done. A message that is longer
-    than MOST_BYTES is left out (its field is empty), and it is measured before it is copied: a
-    recorder must not cost a node the memory of its answers.
+    services: those that answer; weakly, since their handlers hold the node. Where nobody
+    subscribes, nothing is done. A message that is longer than MOST_BYTES is left out (its field is
+    empty), and it is measured before it is copied: a recorder must not cost a node the memory of
+    its answers.
     """
 
     _known: ClassVar[WeakKeyDictionary[Node, Calls]] = WeakKeyDictionary()
 
     def __init__(self, node: Node) -> None:
-        self.services: list[Service] = []
+        self.services: WeakSet[Service] = WeakSet()
         self._clock = node.get_clock()
         self._name = node.get_fully_qualified_name()
         self._publisher = node.create_publisher(
@@ -200,9 +201,9 @@ class BoundedService(Waitable):
             self._service = node.create_service(
                 service_type, name, self._answer, qos_profile=SERVICE, callback_group=group
             )
-            self._calls.services.append(self._service)
+            self._calls.services.add(self._service)
             return
-        self._calls.services.append(self._service)
+        self._calls.services.add(self._service)
         self._more = node.create_guard_condition(_nothing, callback_group=untouched)
         self._waiting: deque[tuple[Any, Any]] = deque()
         self._index = 0

@@ -46,9 +46,13 @@ class WaitFor(Protocol):
         """Wait."""
 
 
-def _reserved() -> tuple[int, socket.socket]:
-    """A domain, 1 to 101, that no other test process of this host has, and its reservation: a name
-    among the host's abstract sockets. Raises RuntimeError when none is left.
+@cache
+def own_domain() -> int:
+    """ROS domain, 1 to 101, that no other test process of this host has: reserved until this
+    process ends.
+
+    The reservation is a name among the host's abstract sockets. Raises RuntimeError when none is
+    left.
     """
     for k in range(_DOMAINS):
         domain = 1 + (os.getpid() + k) % _DOMAINS
@@ -58,38 +62,15 @@ def _reserved() -> tuple[int, socket.socket]:
         except OSError:  # somebody has it
             name.close()
             continue
-        return domain, name
+        atexit.register(name.close)
+        return domain
     raise RuntimeError(f"each of the {_DOMAINS} domains for tests is in use")
 
 
-@cache
-def own_domain() -> int:
-    """ROS domain of this test process alone, reserved until it ends. RuntimeError as _reserved."""
-    domain, name = _reserved()
-    atexit.register(name.close)
-    return domain
-
-
-_HELD: list[socket.socket] = []
-_MOST_HELD = 30
-
-
-@pytest.fixture(scope="module")
-def ros_domain_id() -> Iterator[int]:
-    """Domain of this module of tests alone, so that parallel sessions don't meet, and participants
-    that are let go late don't fill it: those of one domain find some thirty of each other.
-    """
-    domain, name = _reserved()
-    _HELD.append(name)
-    if len(_HELD) > _MOST_HELD:
-        _HELD.pop(0).close()
-    before = os.environ.get("ROS_DOMAIN_ID")
-    os.environ["ROS_DOMAIN_ID"] = str(domain)
-    yield domain
-    if before is None:
-        del os.environ["ROS_DOMAIN_ID"]
-    else:
-        os.environ["ROS_DOMAIN_ID"] = before
+@pytest.fixture(scope="session")
+def ros_domain_id() -> int:
+    """Domain of this test process alone, so that parallel sessions don't meet."""
+    return own_domain()
 
 
 @pytest.fixture

@@ -435,7 +435,7 @@ class PolledService:
                 service_type, name, lambda request, response: handler(request, response, 0, "")
             )
         self._calls = Calls.of(owner)
-        self._calls.services.append(self._service)
+        self._calls.services.add(self._service)
         self._sender = patient_sender(self._service, _SENDS)
         self._waiting: deque[tuple[Any, Any, int]] = deque()
         self._answers = _Answers()
