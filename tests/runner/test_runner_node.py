@@ -277,7 +277,7 @@ def test_a_program_is_fetched_by_its_id_and_run(cell, wait_for):
     assert result.status.source == "ir_program_runner"
     assert result.executed == 2
     assert result.energy > 0.0
-    assert result.duration > 0.02
+    assert result.duration >= 0.02 - 1e-9  # of the plant: two movements of 10 ms
     assert cell.driver.log == ["end_ab=1", "end_hib=1", "load gripper", "drive", "drive"]
     wait_for(lambda: cell.events() == ["0 started", "0 ended", "1 started", "1 ended"])
     assert cell.states[0].program_id == "known"
