@@ -286,7 +286,8 @@ class Pause:
         waking = False
         while not waking and outcome.now < limit:
             need((yield SendWakePacket()))
-            outcome = yield WaitForMode((Mode.FROM_HIBERNATION,), self._settings.wake_repeat)
+            woken = _AWAKE if asleep else (Mode.FROM_HIBERNATION,)
+            outcome = yield WaitForMode(woken, self._settings.wake_repeat)
             if outcome.status.code == StatusCode.ROBOT_STATE_STALE:
                 raise StepFailedError(outcome.status)
             asleep = asleep or outcome.mode in _ASLEEP
