@@ -15,6 +15,7 @@ import sys
 import pytest
 from hypothesis import HealthCheck, settings
 
+import ir_cli  # noqa: F401 - one thread of linear algebra; before anything loads NumPy
 from ir_msgs_py.ros.network import apply_network
 from ir_msgs_py.ros.testing import own_domain
 

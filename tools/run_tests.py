@@ -45,15 +45,17 @@ class Part:
         return [sys.executable, "-m", "pytest", f"--junitxml={self.results}", *self.words]
 
 
-def parts(words: list[str], cores: int) -> list[Part]:
-    """The parts that these words of pytest ask for."""
+def parts(words: list[str], workers: int) -> list[Part]:
+    """The parts that these words of pytest ask for. One worker more than there are cores keeps them
+    busy: tests of nodes wait for each other's answers and for the robot's real time.
+    """
     paths = paths_of(words)
     options = [word for word in words if word not in paths]
     system = [path for path in paths if SYSTEM in path]
     others = [path for path in paths if SYSTEM not in path]
     found = []
     if others or not paths:
-        shared = ("-n", str(cores), "--dist", "worksteal", "--ignore", SYSTEM)
+        shared = ("-n", str(workers), "--dist", "worksteal", "--ignore", SYSTEM)
         found.append(Part("others", (*shared, *options, *others)))
     if system or not paths:
         found.append(Part("system", (*without_workers(options), *(system or [SYSTEM]))))
@@ -121,7 +123,7 @@ def main() -> int:
     words = sys.argv[1:]
     OUTPUT.mkdir(parents=True, exist_ok=True)
     cores = os.cpu_count() or 2
-    chosen = parts(words, cores)
+    chosen = parts(words, cores + 1)
     for part in chosen:
         part.results.unlink(missing_ok=True)
     if not paths_of(words) and "-k" not in words:
