@@ -80,7 +80,7 @@ class Polynomials:
     def spread(self, rows: IntArray, middle: FloatArray, half: FloatArray) -> FloatArray:
         """Sum of the absolute terms of the polynomial about the middle, at the interval's end."""
         shifted = np.abs(self._shifted(rows, middle))
-        powers = half[:, None] ** np.arange(1, shifted.shape[-1])
+        powers = np.cumprod(np.repeat(half[:, None], shifted.shape[-1] - 1, axis=1), axis=1)
         result: FloatArray = np.einsum("ijk,ik->ij", shifted[..., 1:], powers)
         return result
 
@@ -115,11 +115,24 @@ def motion_bounds(
     """(I, Z): how much each pair's distance can change while joint j moves by at most spread_j (I,
     n) [m].
     """
-    origin, direction = chain.axes(model.chain.joint_axis, link_poses)
+    axes = chain.axes(model.chain.joint_axis, link_poses)
+    bound = capsule_bounds(model.capsules.link, axes, segments, spread)
+    outside = bound[:, model.environment[:, 0], 0]
     links = model.capsules.link
-    n = model.chain.n
-    # bound[:, c, k]: movement of capsule c, seen from link k <= its own
-    bound = np.zeros((len(segments), len(links), n + 1))
+    a, b = model.self_pairs.T
+    outer = np.where(links[a] >= links[b], a, b)
+    inner = np.where(links[a] >= links[b], b, a)
+    return np.concatenate([outside, bound[:, outer, links[inner]]], axis=1)
+
+
+def capsule_bounds(
+    links: IntArray, axes: tuple[FloatArray, FloatArray], segments: FloatArray, spread: FloatArray
+) -> FloatArray:
+    """(I, C, n + 1): how far capsule c of `links` (C,) can move, seen from link k <= its own, while
+    joint j moves by at most spread_j (I, n) [m]; axes: origins and directions (I, n, 3).
+    """
+    origin, direction = axes
+    bound = np.zeros((len(segments), len(links), spread.shape[1] + 1))
     for c, link in enumerate(links):
         moved = np.zeros(len(segments))
         for j in range(link - 1, -1, -1):
@@ -127,11 +140,7 @@ def motion_bounds(
             reach = np.linalg.norm(np.cross(arm, direction[:, None, j]), axis=-1).max(axis=1)
             moved = moved + spread[:, j] * (reach + moved)
             bound[:, c, j] = moved
-    outside = bound[:, model.environment[:, 0], 0]
-    a, b = model.self_pairs.T
-    outer = np.where(links[a] >= links[b], a, b)
-    inner = np.where(links[a] >= links[b], b, a)
-    return np.concatenate([outside, bound[:, outer, links[inner]]], axis=1)
+    return bound
 
 
 def certify(model: Geometry, motion: Motion, threshold: FloatArray) -> Outcome:  # noqa: PLR0915
