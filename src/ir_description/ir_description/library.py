@@ -25,8 +25,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ir_description.cell import Cell
+from ir_description.cell import Cell, RobotCells
 from ir_description.files import (
+    ROBOT_MARK,
     bundled_controller,
     bundled_controllers,
     cell_errors,
@@ -36,6 +37,7 @@ from ir_description.files import (
     read_cell,
     read_regular_file,
     read_robot,
+    read_robot_cells,
     robot_from_yaml,
     subject_line,
     text_of,
@@ -170,12 +172,18 @@ def data_sheet_of(robot: RobotModel, power: PowerData) -> PowerParameters:
 
 
 def bundled_cells() -> tuple[str, ...]:
-    """Return the names of cells that load_cell knows."""
+    """Return the names of cells with one robot that load_cell knows."""
     return _bundled("cells")
 
 
+def bundled_robot_cells() -> tuple[str, ...]:
+    """Return the names of cells with several robots that load_robot_cells knows."""
+    return _bundled("robot_cells")
+
+
 def load_cell(name_or_path: str | Path) -> Cell:
-    """Return a bundled cell by its name, or the cell of a file by its path.
+    """Return a bundled cell by its name, or the cell of a file by its path; of a cell with several
+    robots that of one of them, with its name behind: "two_robots@left".
 
     A text with a folder or with the ending .yaml or .yml is a path. Only regular files of at most
     CELL_BYTES_MAX are read; their meshes come from their own folder.
@@ -183,14 +191,42 @@ def load_cell(name_or_path: str | Path) -> Cell:
     name = os.fspath(name_or_path)
     if isinstance(name_or_path, str) and name in bundled_cells():
         return _bundled_cell(name)
+    cell, robot = robot_in(name)
+    if robot:
+        several = load_robot_cells(cell)
+        if several is None:
+            raise UnknownNameError(f"robot (the cell {cell} has one)", robot, ())
+        return several.of_robot(robot)
+    return read_cell(*_cell_text(name_or_path))
+
+
+def load_robot_cells(name_or_path: str | Path) -> RobotCells | None:
+    """Return the cells of all robots of a bundled cell or a file; None: it has one robot."""
+    return read_robot_cells(*_cell_text(name_or_path))
+
+
+def robot_in(name: str) -> tuple[str, str]:
+    """Return the cell and the robot that "two_robots@left" names; "" where no robot is named."""
+    cell, mark, robot = name.rpartition(ROBOT_MARK)
+    named = bool(mark) and os.sep not in robot and not is_path(robot)
+    return (cell, robot) if named else (name, "")
+
+
+def _cell_text(name_or_path: str | Path) -> tuple[str, str, Callable[[str], RobotModel], Path]:
+    """The text of a cell, its source, the bundled robots, and the folder of its meshes."""
+    name = os.fspath(name_or_path)
+    for folder in ("cells", "robot_cells"):
+        if isinstance(name_or_path, str) and name in _bundled(folder):
+            path = Path(str(_DATA / folder / f"{name}.yaml"))
+            return path.read_text(encoding="utf-8"), path.name, load_robot, path.parent
     if isinstance(name_or_path, str) and not is_path(name):
-        raise UnknownNameError("cell", name, bundled_cells())
+        raise UnknownNameError("cell", name, (*bundled_cells(), *bundled_robot_cells()))
     path = Path(name)
     try:
         content = read_regular_file(path, CELL_BYTES_MAX)
     except InvalidValueError as error:
         raise CellFileError(shown(name, 200)[1:-1], 0, str(error)) from error
-    return read_cell(text_of(content, str(path), CellFileError), str(path), load_robot, path.parent)
+    return text_of(content, str(path), CellFileError), str(path), load_robot, path.parent
 
 
 def load_path(name: str) -> CartesianPath:
@@ -236,10 +272,7 @@ def cell_from_yaml(text: str, source: str = "<text>") -> Cell:
 
 @cache
 def _bundled_cell(name: str) -> Cell:
-    path = _DATA / "cells" / f"{name}.yaml"
-    return read_cell(
-        path.read_text(encoding="utf-8"), path.name, load_robot, Path(str(path)).parent
-    )
+    return read_cell(*_cell_text(name))
 
 
 # Reading in a process of its own. Its answer is the cell, or the error that reading here raises.

@@ -139,6 +139,19 @@ class Capsule:
         return replace(self, p0=transformed(pose, self.p0), p1=transformed(pose, self.p1))
 
 
+def standing_capsule(name: str, capsule: Capsule) -> Body:
+    """Return the capsule as a body of that name in the frame of its link."""
+    middle = (capsule.p0 + capsule.p1) / 2.0
+    along = capsule.p1 - capsule.p0
+    length = float(np.sqrt((along * along).sum()))
+    z = along / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
+    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
+    x = x / np.sqrt((x * x).sum())
+    turned = np.stack([x, np.cross(z, x), z], axis=1)
+    size = np.array([capsule.radius, length, 0.0])
+    return Body(name, "capsule", pose_of(middle, turned), size)
+
+
 # Signed distance of a point and of a capsule to one body, plain and exact: to check a cell, not to
 # plan.
 

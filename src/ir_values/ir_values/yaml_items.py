@@ -261,6 +261,12 @@ class Table:
     def __contains__(self, key: str) -> bool:
         return key in self._items
 
+    def joined(self, other: Table) -> Table:
+        """Return a table of both, in the place of the other, whose items count where both have
+        one.
+        """
+        return Table(other.item, {**self._items, **other._items})
+
     def get(self, key: str) -> Item | None:
         """Return the item, or None where the key is not given."""
         return self._items.get(key)

@@ -51,6 +51,7 @@ from ir_description.cell.program import (
     ProgramStep,
     StepKind,
 )
+from ir_description.cell.robot_cells import ROBOT_COUNT, RobotCells
 
 __all__ = [
     "APPROACH_MAX",
@@ -62,6 +63,7 @@ __all__ = [
     "PAUSE_POWER_MODES",
     "POSTURES",
     "PROCESS_MAX",
+    "ROBOT_COUNT",
     "STARTS_MAX",
     "SWITCH_MAX",
     "VISITS",
@@ -78,6 +80,7 @@ __all__ = [
     "PartPlaces",
     "PartRoute",
     "ProgramStep",
+    "RobotCells",
     "StateSwitch",
     "Station",
     "StationSearch",

@@ -1,6 +1,6 @@
 """Files and texts: cells, robots, power figures and meshes in, cells and URDF out."""
 
-from ir_description.files.cell_reader import cell_errors, read_cell
+from ir_description.files.cell_reader import ROBOT_MARK, cell_errors, read_cell, read_robot_cells
 from ir_description.files.cell_writer import cell_hash, cell_to_yaml
 from ir_description.files.power_file import (
     bundled_controller,
@@ -23,6 +23,7 @@ from ir_values.files import is_path, is_utf16, read_regular_file, text_of
 from ir_values.yaml_tree import plain_yaml
 
 __all__ = [
+    "ROBOT_MARK",
     "bundled_controller",
     "bundled_controllers",
     "cell_errors",
@@ -39,6 +40,7 @@ __all__ = [
     "read_cell",
     "read_regular_file",
     "read_robot",
+    "read_robot_cells",
     "robot_errors",
     "robot_file_errors",
     "robot_from_yaml",

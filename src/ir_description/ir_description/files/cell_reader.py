@@ -6,14 +6,15 @@ line is at hand.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 
 from ir_description.cell import (
+    ROBOT_COUNT,
     Cell,
     CellPath,
     CellSignal,
@@ -23,6 +24,7 @@ from ir_description.cell import (
     PartPlaces,
     PartRoute,
     ProgramStep,
+    RobotCells,
     Station,
     check_base_contact,
     check_contact,
@@ -60,20 +62,18 @@ from ir_values.yaml_errors import document_errors
 from ir_values.yaml_items import Item, Table, read_items
 
 FORMAT = "ir_cell/1"
+ROBOT_MARK = "@"
+"""Between the name of a cell with several robots and that of one of them."""
 RobotSource = Callable[[str], RobotModel]
 _T = TypeVar("_T")
 
 _REQUIRED = ("format", "name", "robot")
-_OPTIONAL = (
-    "description",
+_SHARED = ("description", "floor", "parts", "equipment", "signals")
+_OF_ROBOT = (
     "base",
     "base_contacts",
-    "floor",
     "tool",
     "tcp",
-    "parts",
-    "equipment",
-    "signals",
     "home",
     "home_deg",
     "park",
@@ -81,8 +81,8 @@ _OPTIONAL = (
     "program",
     "tasks",
     "paths",
-    "route",
 )
+_OPTIONAL = (*_SHARED, *_OF_ROBOT, "route")
 
 
 def read_cell(text: str, source: str, robots: RobotSource, folder: Path | None) -> Cell:
@@ -90,18 +90,64 @@ def read_cell(text: str, source: str, robots: RobotSource, folder: Path | None) 
     return cell_of(read_items(text, source, CellFileError), robots, folder)
 
 
+def read_robot_cells(
+    text: str, source: str, robots: RobotSource, folder: Path | None
+) -> RobotCells | None:
+    """Return the cells of a text with several robots; None: it has one."""
+    root = read_items(text, source, CellFileError)
+    return robot_cells_of(root, robots, folder) if root.holds("robots") else None
+
+
 def cell_of(root: Item, robots: RobotSource, folder: Path | None) -> Cell:
-    """Return the cell of a document."""
+    """Return the cell of a document with one robot."""
+    if root.holds("robots"):
+        names = robot_cells_of(root, robots, folder).robots
+        root.fail(
+            f"the file has the robots {', '.join(names)}, here one is needed: write its name "
+            f"behind that of the cell or the file, as CELL{ROBOT_MARK}{names[0]}"
+        )
     table = root.table(_REQUIRED, _OPTIONAL)
     table["format"].choice((FORMAT,))
     return _CellReader(root, table, _robot(table["robot"], robots, folder), folder).cell()
+
+
+def robot_cells_of(root: Item, robots: RobotSource, folder: Path | None) -> RobotCells:
+    """Return the cells of a document with several robots."""
+    shared = root.table(("format", "name", "robots"), _SHARED)
+    shared["format"].choice((FORMAT,))
+    entries = shared["robots"].list(*ROBOT_COUNT)
+    tables = [entry.table(("name", "robot"), (*_OF_ROBOT, "starts")) for entry in entries]
+    models = [_robot(table["robot"], robots, folder) for table in tables]
+    tools = [_tool_capsules(table, model) for table, model in zip(tables, models, strict=True)]
+    cells = []
+    for k, (table, model) in enumerate(zip(tables, models, strict=True)):
+        others = {name for tool in tools for name in tool} - set(tools[k])
+        reader = _CellReader(entries[k], shared.joined(table), model, folder, others)
+        cells.append((table["name"].name(), reader.cell()))
+    with shared["robots"].blamed():
+        return RobotCells.of(shared["name"].name(), cells, cells[0][1].description)
+
+
+def _tool_capsules(table: Table, robot: RobotModel) -> list[str]:
+    """Names of the capsules of a robot's tool."""
+    item = table.get("tool")
+    if item is None:
+        return []
+    with item.blamed():
+        tool = read_tool(item, robot.n, shape_register(robot))
+    return [capsule.name for capsule in tool.capsules]
 
 
 def cell_errors(
     text: str, source: str, robots: RobotSource, folder: Path | None
 ) -> tuple[CellFileError, ...]:
     """All errors of the text of a cell, by line; none: it can be read."""
-    return document_errors(text, source, CellFileError, lambda root: cell_of(root, robots, folder))
+
+    def read(root: Item) -> object:
+        several = root.holds("robots")
+        return (robot_cells_of if several else cell_of)(root, robots, folder)
+
+    return document_errors(text, source, CellFileError, read)
 
 
 def _robot(item: Item, robots: RobotSource, folder: Path | None) -> RobotModel:
@@ -130,15 +176,24 @@ class _Placed:
 
 
 class _CellReader:
-    """One reading: what has been named so far."""
+    """One reading: what has been named so far. foreign: capsules of other robots' tools."""
 
-    def __init__(self, root: Item, table: Table, robot: RobotModel, folder: Path | None) -> None:
+    def __init__(
+        self,
+        root: Item,
+        table: Table,
+        robot: RobotModel,
+        folder: Path | None,
+        foreign: Collection[str] = (),
+    ) -> None:
         self._root = root
         self._table = table
+        self._foreign = foreign
         self._robot = robot
         self._shapes = shape_register(robot)
         self._bodies = BodyReader(self._shapes, folder)
         self._capsules = [capsule.name for capsule in robot.capsules]
+        self._tool_names: list[str] = []
 
     def cell(self) -> Cell:
         table = self._table
@@ -189,7 +244,8 @@ class _CellReader:
         with item.blamed():
             tool = read_tool(item, self._robot.n, self._shapes)
             check_part_mass(self._robot, tool)
-        self._capsules += [capsule.name for capsule in tool.capsules]
+        self._tool_names = [capsule.name for capsule in tool.capsules]
+        self._capsules += self._tool_names
         return tool
 
     def _parts(self, tool: Load | None) -> tuple[Part, ...]:
@@ -202,7 +258,21 @@ class _CellReader:
                 check_part_mass(self._robot, tool, part.load)
             self._capsules += [capsule.name for capsule in part.load.capsules]
             parts.append(part)
-        return tuple(parts)
+        return tuple(self._at_start(parts))
+
+    def _at_start(self, parts: list[Part]) -> list[Part]:
+        """The parts where they lie when the program of this robot begins."""
+        item = self._table.get("starts")
+        if item is None:
+            return parts
+        known = [part.name for part in parts]
+        starts = {}
+        for name, place in item.pairs():
+            with place.blamed():
+                if name not in known:
+                    raise UnknownNameError("part", name, known)
+            starts[name] = place.name()
+        return [replace(part, station=starts.get(part.name, part.station)) for part in parts]
 
     def _equipment(self) -> tuple[tuple[Equipment, ...], list[_Placed]]:
         names = NameRegister("equipment")
@@ -218,7 +288,22 @@ class _CellReader:
                 with station_item.blamed():
                     station_names.add(station.name)
                 placed.append(_Placed(station_item, station))
-        return tuple(machines), [_Placed(e.item, self._bodies.at_pieces(e.station)) for e in placed]
+        return tuple(machines), [self._own_contacts(each) for each in placed]
+
+    def _own_contacts(self, placed: _Placed) -> _Placed:
+        """A station with the contacts that this robot can make."""
+        station = self._bodies.at_pieces(placed.station)
+        own = []
+        for contact in station.allowed_contacts:
+            pair = (contact.body_a, contact.body_b)
+            others = [name for name in pair if name in self._foreign]
+            if len(others) == 2 or (others and set(pair) & set(self._tool_names)):
+                placed.item.fail(
+                    f"allows {pair[0]} and {pair[1]} to touch: robots keep apart everywhere"
+                )
+            if not others:
+                own.append(contact)
+        return _Placed(placed.item, replace(station, allowed_contacts=tuple(own)))
 
     def _check_part_stations(self, parts: tuple[Part, ...], stations: tuple[Station, ...]) -> None:
         known = dict.fromkeys(station.name for station in stations)

@@ -1,0 +1,64 @@
+"""Several robots in one cell: a cell for each of them, with what the others' feet take away."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ir_description.cell.cell import Cell, NameRegister
+from ir_description.cell.equipment import Equipment, zone_around
+from ir_description.shapes import standing_capsule
+from ir_values.errors import UnknownNameError
+
+ROBOT_COUNT = (2, 6)
+"""Fewest and most robots of a cell."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotCells:
+    """The cell of each of `robots`, in their order: machines, parts and signals are shared, the
+    feet of the other robots are among the machines.
+    """
+
+    name: str
+    robots: tuple[str, ...]
+    cells: tuple[Cell, ...]
+    description: str = ""
+
+    @staticmethod
+    def of(name: str, cells: Sequence[tuple[str, Cell]], description: str = "") -> RobotCells:
+        """The cells of robots by name, each of which knows no other yet."""
+        register = NameRegister("robot")
+        for robot, _ in cells:
+            register.add(robot)
+        feet = [_foot(robot, cell) for robot, cell in cells]
+        own = [
+            replace(
+                cell,
+                name=f"{name}.{robot}",
+                equipment=(*cell.equipment, *(foot for foot in feet if foot.name != robot)),
+            )
+            for robot, cell in cells
+        ]
+        return RobotCells(name, tuple(robot for robot, _ in cells), tuple(own), description)
+
+    def of_robot(self, name: str) -> Cell:
+        """The cell as one of the robots sees it."""
+        if name not in self.robots:
+            raise UnknownNameError("robot", name, self.robots)
+        return self.cells[self.robots.index(name)]
+
+
+def _foot(name: str, cell: Cell) -> Equipment:
+    """What never moves of a robot, as equipment of its name."""
+    bodies = tuple(
+        standing_capsule(f"{name}.{capsule.name}", capsule)
+        for capsule in cell.robot.capsules
+        if capsule.link == 0
+    )
+    return Equipment(
+        name=name,
+        pose=cell.base_pose,
+        zone_in_equipment=zone_around("OPEN", bodies),
+        bodies=bodies,
+    )
