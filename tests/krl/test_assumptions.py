@@ -144,12 +144,12 @@ ASSUMED = {
     ),
     "what a channel sends": (
         'CREAD(H,S,M,1,0.0,O,"%d",N)',
-        "CREAD isn't followed: what it would fill in stays as it is",
+        "CREAD isn't followed: what it would fill in is taken as it stands",
         Effect.MOTIONS,
     ),
     "a text that is put together": (
-        "STRCOPY(A[],B[])",
-        "STRCOPY isn't followed: what it would fill in stays as it is",
+        'SWRITE(A[],S,O,"%d",N)',
+        "SWRITE isn't followed: what it would fill in is taken as it stands",
         Effect.MOTIONS,
     ),
     "a base that moves": (
@@ -230,7 +230,7 @@ def test_a_system_variable_that_is_not_modelled_is_listed(name: str, followed: F
 
 def test_what_a_controller_computes_needs_no_file(followed: Follow) -> None:
     program = followed("DECL INT E\nDECL E6AXIS X\nX=INVERSE($POS_ACT,$AXIS_ACT,E)")
-    assert any("INVERSE is built in" in text for text in texts(program))
+    assert any("INVERSE needs a robot" in text for text in texts(program))
     assert not any("--stub" in text for text in texts(program))
 
 
@@ -238,7 +238,7 @@ def test_the_worst_assumption_comes_first_and_is_said_once(followed: Follow) -> 
     lines = "PTP XHOME\nHALT\nDECL INT I\nFOR I=1 TO 3\nH50(I)\nENDFOR\nH50(9)\nHALT\n$SINT_X=1"
     notes = followed(lines).notes
     assert [note.effect for note in notes] == sorted((n.effect for n in notes), reverse=True)
-    assert [note.places for note in notes if "H50" in note.text] == [2]
+    assert [note.places for note in notes if note.text.startswith("H50")] == [2]
     assert "at 2 places" in str(notes[0])
 
 
@@ -282,6 +282,25 @@ def test_the_value_of_an_unknown_routine_can_be_set(followed: Follow) -> None:
     assert followed(lines).commands == ()
     (wait,) = followed(lines, settings=[settings_of(["KIND=3"])]).commands
     assert isinstance(wait, Wait)
+
+
+def test_what_an_unknown_routine_was_given_may_have_changed(followed: Follow) -> None:
+    """Law: a variable that a routine without a file got is assumed where it is used, until the
+    program sets it again.
+    """
+    lines = "DECL INT n,m\nn=2\nm=3\nASK_PLC(n,m)\nm=4\nWAIT SEC n\nWAIT SEC m"
+    program = followed(lines)
+    said = [one for one in program.notes if "may get another value" in one.text]
+    assert [(one.place.line, one.effect) for one in said] == [(7, Effect.MOTIONS)]
+    assert "N may get another value from ASK_PLC: taken as it stands" in said[0].text
+
+
+@pytest.mark.parametrize("name", ["x", "s.q", "a[2]"])
+def test_a_setting_reaches_variables_of_a_routine(name: str, followed: Follow) -> None:
+    lines = f"STRUC t INT p,q\nDECL t s\nDECL INT x,a[3]\nWAIT SEC {name}"
+    (wait,) = followed(lines, settings=[settings_of([f"{name}=5"])]).commands
+    assert isinstance(wait, Wait)
+    assert wait.seconds == 5
 
 
 def test_stubs_are_written_for_what_nobody_gave(followed: Follow) -> None:
@@ -387,6 +406,28 @@ def test_arrays_arrive_as_parameters(followed: Follow) -> None:
         "DEF DRIVE(P[]:OUT,N:IN)\nE6AXIS P[]\nINT N,I\nFOR I=1 TO N\nPTP P[I]\nENDFOR\nEND\n"
     )
     assert angles(follow([parse(text, "t.src")], np.zeros(6), np.eye(4))) == [10.0, 20.0]
+
+
+def test_kinematics_are_computed_both_ways(planner: Planner) -> None:
+    """Law: INVERSE of FORWARD is where it began, and the error is 0; what is out of reach is 1."""
+    rng = np.random.default_rng(3)
+    for _ in range(5):
+        taught = np.array([10, -80, 80, 30, 40, 50])
+        wanted = np.round(taught + rng.uniform(-15, 15, 6), 2)
+        written = ",".join(f"A{k + 1} {one}" for k, one in enumerate(wanted))
+        lines = (
+            f"DECL E6AXIS q,back\nDECL INT e,far\nDECL E6POS p\n$TOOL=$NULLFRAME\n"
+            f"$TOOL.Z=120\n$BASE.X=300\nq={{{written}}}\np=FORWARD(q,e)\n"
+            "back=INVERSE(p,q,e)\nPTP back\nWAIT SEC 1+e\np.X=99000\nback=INVERSE(p,q,far)\n"
+            "WAIT SEC far"
+        )
+        program = follow_krl(planner, [parse(f"DEF P( )\n{lines}\nEND\n", "p.src")])
+        motion, *waits = program.commands
+        assert isinstance(motion, Motion)
+        assert motion.target.axes is not None
+        found = np.degrees([motion.target.axes[f"A{k}"] for k in range(1, 7)])
+        assert found == pytest.approx(wanted, abs=1e-3)
+        assert [one.seconds for one in waits if isinstance(one, Wait)] == [1, 1]
 
 
 def test_where_the_robot_stands_is_known(planner: Planner) -> None:

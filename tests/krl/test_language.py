@@ -112,7 +112,7 @@ REFUSED = {
     "a text as a number": ('WAIT SEC "A"', "1:10", "the text 'A', not a number"),
     "a number as a condition": ("IF 1 THEN\nENDIF", "1:4", "the number 1, not TRUE or FALSE"),
     "numbers with AND": ("IF 1==1 AND 2==2 THEN\nENDIF", "1:7", "a comparison is weaker"),
-    "an index that isn't there": ("DECL INT A[2]\nWAIT SEC A[3]", "2:10", "A[3] has no value"),
+    "an index that isn't there": ("DECL INT A[2]\nWAIT SEC A[3]", "2:10", "A[3] isn't in A[2]"),
     "GOTO nowhere": ("GOTO X", "1:1", "there is no label X"),
     "GOTO into a branch": ("GOTO X\nIF TRUE THEN\nX:\nENDIF", "1:1", "there is no label X"),
     "a point that nobody gives": (
@@ -140,7 +140,7 @@ REFUSED = {
     "an interpolation of nothing": ("$IPO_MODE=#NOBODY", "1:1", "it is #BASE or #TCP"),
     "EXIT outside of a loop": ("EXIT", None, "EXIT stands outside of a loop"),
     "a REAL beyond its range": ("WAIT SEC 1E400", "1:10", "a REAL is at most"),
-    "an INT beyond its range": ("WAIT SEC 99999*99999", "1:10", "an INT is at most 2147483647"),
+    "an INT beyond its range": ("WAIT SEC 99999*99999", "1:10", "from -2147483648 to 2147483647"),
     "an INT of many digits": ("WAIT SEC " + "9" * 6000, "1:10", "6000 digits"),
     "a component that no position has": (
         "PTP {A1 0,A7 5}",

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from ir_krl import Effect, Followed, Motion, Wait, follow, parse
+from ir_krl import Effect, Followed, KrlRunError, Motion, Wait, follow, parse
 
 Follow = Callable[..., Followed]
 ROBOT = (np.zeros(6), np.eye(4))  # home and tool
@@ -96,6 +97,74 @@ def test_an_axis_is_a_real(followed: Follow) -> None:
     assert isinstance(motion, Motion)
     assert motion.target.axes is not None
     assert motion.target.axes["A1"] == pytest.approx(0.043633, abs=1e-6)
+
+
+OPERATIONS = {"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide}
+
+
+@pytest.mark.parametrize("sign", OPERATIONS)
+def test_reals_are_of_single_precision(sign: str, followed: Follow) -> None:
+    """Law: a sum, a product, a comparison of REALs is that of IEEE 754 single precision."""
+    rng = np.random.default_rng(29)
+    for _ in range(12):
+        a, b = np.round(rng.uniform(0.1, 9.0, 2), 2)
+        wanted = OPERATIONS[sign](np.float32(a), np.float32(b))
+        lines = f"x={a}{sign}{b}\ny={abs(wanted):.9g}\nIF ABS(x)==y THEN\nWAIT SEC 1\nENDIF"
+        program = followed(f"DECL REAL x,y\n{lines}")
+        assert [type(one) for one in program.commands] == [Wait]
+
+
+KEPT = {  # lines that end in WAIT SEC of one second where they compute as a controller does
+    "a tenth, added": "x=0.1\ny=x+0.2\nIF y==0.3 THEN\nWAIT SEC 1\nENDIF",
+    "a large INT as a REAL": "n=16777217\nx=16777216\nIF n==x THEN\nWAIT SEC 1\nENDIF",
+    "the least INT": "n='H80000000'\nIF n==-2147483647-1 THEN\nWAIT SEC 1\nENDIF",
+    "a letter's number": 'c=65\nIF c=="A" THEN\nWAIT SEC 1\nENDIF',
+    "a letter as a number": 'c="A"\nIF c==65 THEN\nWAIT SEC 1\nENDIF',
+    "a text of letters": 's[1]="O"\ns[2]="K"\nIF s[]=="OK" THEN\nWAIT SEC 1\nENDIF',
+    "a text that was never set": 'IF s[]=="" THEN\nWAIT SEC 1\nENDIF',
+    "the length of a text": 's[]="four"\nWAIT SEC StrLen(s[])/4',
+    "a text in a text": 's[]="kilogram"\nWAIT SEC StrFind(1,s[],"GRAM",#NOT_CASE_SENS)/5',
+    "a text behind a place": 's[]="aba"\nWAIT SEC StrFind(2,s[],"a",#CASE_SENS)/3',
+    "texts that differ by case": (
+        's[]="ok"\nIF StrComp(s[],"OK",#NOT_CASE_SENS) EXOR StrComp(s[],"OK",#CASE_SENS) THEN\n'
+        "WAIT SEC 1\nENDIF"
+    ),
+    "a text copied and added to": (
+        'n=StrAdd(s[],"ab")\nb=StrCopy(s[],"xy")\nn=StrAdd(s[],"z")\n'
+        'IF s[]=="xyz" THEN\nWAIT SEC n/3\nENDIF'
+    ),
+    "a text cleared": 's[]="a"\nb=StrClear(s[])\nWAIT SEC 1+StrLen(s[])',
+}
+
+
+@pytest.mark.parametrize("name", KEPT)
+def test_numbers_and_texts_decide_as_on_a_controller(name: str, followed: Follow) -> None:
+    head = "DECL REAL x,y\nDECL INT n\nDECL BOOL b\nDECL CHAR c,s[20]\n"
+    (wait,) = followed(head + KEPT[name]).commands
+    assert isinstance(wait, Wait)
+    assert wait.seconds == 1
+
+
+STOPPED = {  # what a controller stops at, and what is said
+    "n=2147483647+1": "an INT is from -2147483648 to 2147483647",
+    "n=-n-2": "an INT is from",
+    "n=3.0E9": "an INT is from",
+    "x=1.0E38*1.0E3": "a REAL is at most",
+    "a[3]=1": "A[3] isn't in A[2]",
+    "n=a[0]": "the first element is [1]",
+    "m[2,4]=1": "M[2, 4] isn't in M[2, 3]",
+    "n=m[2]": "M[2] isn't in M[2, 3]",
+    "FILL(a[])": "W[3] isn't in W[2]",
+}
+
+
+@pytest.mark.parametrize("line", STOPPED)
+def test_what_a_variable_cannot_hold_is_refused_at_its_place(line: str) -> None:
+    head = "DEF P( )\nDECL INT n,a[2],m[2,3]\nDECL REAL x\nn=2147483647\n"
+    fill = "DEF FILL(w[]:OUT)\nINT w[]\nINT k\nFOR k=1 TO 3\nw[k]=k\nENDFOR\nEND\n"
+    with pytest.raises(KrlRunError, match=re.escape(STOPPED[line])) as caught:
+        follow([parse(f"{head}{line}\nEND\n{fill}", "p.src")], *ROBOT)
+    assert caught.value.place.line == (11 if "FILL" in line else 5)
 
 
 COUNTED = {  # lines of a loop over I: what it waits for, and what I holds behind it

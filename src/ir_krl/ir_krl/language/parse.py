@@ -8,6 +8,7 @@ stay as they were.
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -43,12 +44,24 @@ _SPELLED = {  # what a user calls the parser's terminals
     "COLON": ":",
     "DOT": ".",
 }
+_UNITS = frozenset(("DEF", "DEFFCT", "DEFDAT", "GLOBAL", "_NL"))
+_CLOSING = ("ENDIF", "ENDFOR", "ENDWHILE", "ENDLOOP", "UNTIL", "ENDSWITCH", "ENDSPLINE")
+_PLAIN_REMEDY = "mend the line, or put ; before it to leave it out"
+_SPEED = "a motion takes no speed: set $VEL.CP [m/s] or $VEL_AXIS[1] to [6] [%] before it"
+_REMEDIES = {  # by the word that stands where none is expected
+    "VEL": _SPEED,
+    "ACC": _SPEED,
+    "DO": "WHILE and FOR have no DO: leave it out",
+    ",": "one line is one statement: begin a new line",
+    ":": "a parameter is NAME:IN or NAME:OUT; its type is declared in the routine, that of a "
+    "function stands before its name",
+}
 _EXPECTED_MAX = 6  # alternatives that a sentence names
 # constructs of KRL that aren't read: named, so that nobody looks for a typing error
 _KNOWN_ELSEWHERE = {
-    "STOP": "stops of a spline by a condition, outside of a SPLINE",
-    "ELSEIF": "KRL has none: ELSE with an IF of its own inside",
-    "ELSIF": "KRL has none: ELSE with an IF of its own inside",
+    "STOP": "a condition stops motions of a spline only, put it into SPLINE … ENDSPLINE",
+    "ELSEIF": "KRL has none, write ELSE with an IF of its own inside",
+    "ELSIF": "KRL has none, write ELSE with an IF of its own inside",
 }
 
 
@@ -191,21 +204,32 @@ def _complaint(error: Any, text: str) -> tuple[str, int]:
     line = lines[error.line - 1] if 0 < error.line <= len(lines) else ""
     if isinstance(error, UnexpectedCharacters):
         character = line[error.column - 1 : error.column] or "?"
-        return f"{character!r} is no part of KRL here", error.column
+        return f"{character!r} is no part of KRL here: {_PLAIN_REMEDY}", error.column
     first = line.split()[0].upper() if line.split() else ""
     if first in _KNOWN_ELSEWHERE:
-        return f"{first} ({_KNOWN_ELSEWHERE[first]}) isn't read", line.upper().index(first) + 1
+        sentence = f"{first} isn't read here: {_KNOWN_ELSEWHERE[first]}"
+        return sentence, line.upper().index(first) + 1
     if {"LPAR", "EQUAL"} <= set(error.expected) and not line[: error.column - 1].split()[1:]:
         name = first[:40]
         return (
-            f"{name} is no statement of KRL: a call has brackets, an assignment =",
+            f"{name} is no statement of KRL: a call has brackets, an assignment =; {_PLAIN_REMEDY}",
             line.upper().index(name) + 1,
         )
     word = str(error.token).strip()
     found = f"{word[:40]!r}" if word else "the line ends, or the file"
     expected = sorted(_spelled(name) for name in error.expected)
     wanted = " or ".join(expected) if len(expected) <= _EXPECTED_MAX else "something else"
-    return f"{found} where {wanted} is expected", error.column
+    return f"{found} where {wanted} is expected: {_remedy(word, error.expected)}", error.column
+
+
+def _remedy(word: str, expected: Collection[str]) -> str:
+    """What helps where `word` stands and one of `expected` should."""
+    closing = next((one for one in _CLOSING if one in expected), "")
+    if closing and word in ("END", "ENDFCT", "ENDDAT", *_CLOSING):
+        return f"a block isn't closed before, {closing} ends it"
+    if _UNITS.issuperset(expected):
+        return "lines stand between DEF and END, or DEFDAT and ENDDAT: put them there"
+    return _REMEDIES.get(word, _PLAIN_REMEDY)
 
 
 def _spelled(terminal: str) -> str:

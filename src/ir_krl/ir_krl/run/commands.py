@@ -204,8 +204,8 @@ class Switch:
 @dataclass(frozen=True)
 class SetOutput:
     """A digital output is set; `pulse` [s] later it goes back, 0 = it stays. on_path: while the
-    robot moves (by a TRIGGER, or after CONTINUE), so that it needn't stop. switch: when a TRIGGER
-    sets it.
+    robot moves (by a TRIGGER, after CONTINUE, or as $OUT_C), so that it needn't stop. switch: when
+    a TRIGGER sets it; in_time: just when the motion before ends ($OUT_C).
     """
 
     number: int
@@ -214,6 +214,7 @@ class SetOutput:
     pulse: float = 0.0
     on_path: bool = False
     switch: Switch | None = None
+    in_time: bool = False
 
 
 Command: TypeAlias = Motion | SplineBlock | Wait | WaitFor | SetOutput | Stop

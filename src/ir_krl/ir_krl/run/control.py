@@ -124,7 +124,12 @@ class Control:
     def _statement(self, statement: Tree) -> None:
         self.statements += 1
         self._check_budget(statement)
-        getattr(self, f"_{statement.data}")(statement)
+        try:
+            getattr(self, f"_{statement.data}")(statement)
+        except KrlRunError as error:  # of a value that doesn't know where it stands
+            if error.place.line:
+                raise
+            raise KrlRunError(error.reason, self.place(statement)) from None
         self.continuing = self._beside or statement.data == "continue_"
 
     def _turns_back(self, between: Sequence[Tree], jump: Jump, turns: dict[str, _Turn]) -> bool:

@@ -14,6 +14,7 @@ from ir_krl.run.system import STOPS_ADVANCE
 from ir_krl.run.values import (
     FRAME_NAMES,
     INT_MAX,
+    Array,
     Structure,
     Symbol,
     Value,
@@ -24,6 +25,8 @@ from ir_krl.run.values import (
     kind_of,
     number,
     pose,
+    real,
+    text_of,
     truth,
 )
 
@@ -154,7 +157,7 @@ class Expressions:
         sign, operand = tree.children
         value = self.memory.guess(self.value(operand), 0, place)
         number(value, "what follows the sign", place)
-        return -value if sign == "-" else value  # type: ignore[operator]
+        return in_range(-value, place) if sign == "-" else value  # type: ignore[operator]
 
     def _negated(self, tree: Tree, place: Place) -> Value:
         word, operand = tree.children
@@ -177,7 +180,8 @@ class Expressions:
         if b == 0:
             raise KrlRunError("division by 0", place)
         if isinstance(a, int) and isinstance(b, int):
-            return abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)  # towards zero
+            whole = abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)  # towards zero
+            return in_range(whole, place)
         return in_range(a / b, place)
 
     def _numbers(self, left: Tree, right: Tree, sign: str) -> tuple[int | float, int | float]:
@@ -186,7 +190,7 @@ class Expressions:
             value = self.memory.guess(self.value(side), 0, place_of(side, self.file))
             number(value, f"an operand of {sign}", place_of(side, self.file))
             values.append(value)
-        return values[0], values[1]  # type: ignore[return-value]
+        return _alike(*values)
 
     def _joined(self, tree: Tree, place: Place) -> Value:
         """AND, OR, EXOR of truth values; B_AND, B_OR, B_EXOR of the bits of whole numbers."""
@@ -209,6 +213,7 @@ class Expressions:
         a = self.value(left)
         b = self.value(right)
         a, b = (self.memory.guess(one, _like(other), place) for one, other in ((a, b), (b, a)))
+        a, b = _alike(a, b)
         if sign in ("==", "<>"):
             return (a == b) is (sign == "==")
         return _COMPARED[str(sign)](
@@ -226,6 +231,25 @@ class Expressions:
         return result
 
 
+def _alike(a: Any, b: Any) -> tuple[Any, Any]:
+    """Two operands: of an INT and a REAL both as REAL, of a letter and an INT both as numbers, of
+    texts both whole.
+    """
+    if isinstance(a, float) and type(b) is int:
+        return a, real(b)
+    if isinstance(b, float) and type(a) is int:
+        return real(a), b
+    if isinstance(a, Array | str) and isinstance(b, Array | str):
+        return text_of(a), text_of(b)
+    if isinstance(a, str) and type(b) is int and len(a) == 1:
+        return ord(a), b
+    if isinstance(b, str) and type(a) is int and len(b) == 1:
+        return a, ord(b)
+    return a, b
+
+
 def _like(value: Value) -> Value:
     """What an unknown value that is compared with this one is taken as."""
+    if isinstance(value, str | Array):
+        return ""
     return False if isinstance(value, bool) else 0

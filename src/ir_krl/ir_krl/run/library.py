@@ -23,6 +23,7 @@ from ir_krl.run.values import (
     kind_of,
     number,
     pose,
+    real,
 )
 
 Arguments = list[Value | None]
@@ -50,10 +51,10 @@ WITHOUT_EFFECT = frozenset(
 """Called in many programs; neither the path nor the speeds of a motion follows from them here."""
 STOPPING = frozenset({"CWRITE", "CREAD", "COPEN", "CCLOSE", "CIOCTL"})
 """What speaks with other programs: the advance run stops, nothing moves."""
-FILLING = frozenset({"CREAD", "SREAD", "SWRITE", "STRADD", "STRCLEAR", "STRCOPY"})
+FILLING = frozenset({"CREAD", "SREAD", "SWRITE", "CAST_FROM", "CAST_TO"})
 """What gives its arguments values that nobody knows here: texts, what a channel sent."""
-COMPUTED = frozenset({"INVERSE", "FORWARD"})
-"""Of the controller's kinematics: functions whose values nobody computes here."""
+COMPUTED = {"INVERSE": 3, "FORWARD": 2}
+"""Functions of the controller's kinematics, and how many arguments they take."""
 CONTROLLERS = frozenset(
     ("BAS", "BAS_EX", "IR_STOPM", "MSGLIB", "COLLMONLIB", "TM_BIB", "KRLMSG", "SPS", "CELL_TEACH")
 )
@@ -106,7 +107,7 @@ class Library:
     def call(self, name: str, arguments: Arguments, place: Place) -> Value:
         """Its value; 0 where it has none. Raises KrlRunError."""
         if name in FILLING:
-            text = f"{name} isn't followed: what it would fill in stays as it is"
+            text = f"{name} isn't followed: what it would fill in is taken as it stands"
             self._memory.noted(place, text, Effect.MOTIONS)
         if name in WITHOUT_EFFECT | STOPPING | FILLING:
             return 0
@@ -116,7 +117,7 @@ class Library:
             number(_given(one, name, place), f"an argument of {name}", place) for one in arguments
         ]
         try:
-            return _MATHEMATICS[name](*numbers)
+            return real(_MATHEMATICS[name](*numbers))
         except (TypeError, ValueError):
             raise KrlRunError(
                 f"{name} can't be computed of {', '.join(f'{one:g}' for one in numbers)}", place

@@ -17,8 +17,10 @@ from ir_krl.run.values import (
     Unknown,
     Value,
     copied,
+    in_range,
     integer,
     number,
+    real,
     rounded,
     typed,
 )
@@ -53,7 +55,8 @@ class Memory:
     modules, `scopes` the calls that run. module: whose statements run; listed: all names that data
     lists declare; types: components of structures; assumed: values that the program didn't bring,
     by name or name[index]; chosen: the same of $TOOL and $BASE that a function has just found;
-    noted: hears of those that are used; guesses: how many were; watched: see `watch`.
+    noted: hears of those that are used; guesses: how many were; watched: see `watch`. settings:
+    what a user has set, which variables of a call begin with too.
     """
 
     shared: dict[str, Value]
@@ -66,6 +69,7 @@ class Memory:
     modules: dict[str, dict[str, Value]] = field(default_factory=dict)
     module: str = ""
     listed: set[str] = field(default_factory=set)
+    settings: dict[str, Value] = field(default_factory=dict)
     types: dict[str, Mapping[str, str]] = field(default_factory=lambda: dict(TYPES))
 
     def enter(self, values: dict[str, Value], names: Iterable[str]) -> None:
@@ -89,6 +93,8 @@ class Memory:
         if isinstance(value, Array) and not value.elements:
             held = home.get(name, self.shared.get(name))
             value = held if isinstance(held, Array) else value  # a parameter, or the controller's
+        if self.scopes and name in self.settings and name not in home:
+            value = _begun(value, self.settings[name])
         if value is None:
             home[name] = typed(kind, home.get(name, Unknown(name, kind)), self.types)
             return
@@ -151,7 +157,11 @@ class Memory:
         if not isinstance(value, Unknown):
             return value
         self.guesses += 1
-        taken = "FALSE" if otherwise is False else otherwise
+        taken = otherwise
+        if otherwise is False:
+            taken = "FALSE"
+        elif otherwise == "":
+            taken = "an empty text"
         text = f"{value.name} has no value: taken as {taken}; --set '{value.name}=…'"
         self.noted(place, text, Effect.MOTIONS)
         return otherwise
@@ -162,6 +172,13 @@ class Memory:
         if index is None:
             return value
         return value.elements.get((index,)) if isinstance(value, Array) else None
+
+    def may_change(self, name: str, routine: str) -> None:
+        """A routine that nobody gave, or that isn't followed, was given a variable: it may have got
+        another value.
+        """
+        text = f"{name} may get another value from {routine}: taken as it stands; --set '{name}=…'"
+        self.assumed[name] = Assumption(text, Effect.MOTIONS)
 
     def _guessed(self, name: str, index: tuple[int, ...] | None, place: Place) -> None:
         """Say that a value which isn't the program's is used."""
@@ -217,6 +234,7 @@ class Memory:
                     holder[part] = _with_letter(held_text, part, part_index, value, place)
                     return
                 array = _array_at(holder, part, kind, place)
+                array.check(part_index, part, place)
                 elements = array.elements
                 key = part_index
                 kind = array.kind
@@ -253,6 +271,16 @@ class Memory:
         return self.modules.setdefault(self.module, {})
 
 
+def _begun(value: Value | None, setting: Value) -> Value:
+    """What a declared variable begins with where a setting gives it; what it is declared with
+    counts more.
+    """
+    given = copied(setting)
+    if isinstance(value, Array) and isinstance(given, Array):
+        given.sizes = value.sizes
+    return given if value is None or isinstance(value, Array) else value
+
+
 def _merged(before: Value | None, value: Value, kind: str, types: Types) -> Value:
     """The new value of a variable of the type `kind`: components that an aggregate leaves out stay,
     and so does INT or REAL.
@@ -267,9 +295,9 @@ def _merged(before: Value | None, value: Value, kind: str, types: Types) -> Valu
             new.kind or before.kind,
         )
     if isinstance(before, float) and isinstance(new, int) and not isinstance(new, bool):
-        return float(new)
+        return real(new)
     if isinstance(before, int) and not isinstance(before, bool) and isinstance(new, float):
-        return rounded(new)
+        return in_range(rounded(new), Place())
     return new
 
 
@@ -317,6 +345,7 @@ def _element(value: Value, name: str, index: tuple[int, ...] | None, place: Plac
         return value[index[0] - 1] if within else Unknown(written)
     if not isinstance(value, Array):
         raise KrlRunError(f"{name} is no array: leave out the index", place)
+    value.check(index, name, place)
     return value.elements.get(index, Unknown(written))
 
 
@@ -324,6 +353,7 @@ def _element(value: Value, name: str, index: tuple[int, ...] | None, place: Plac
 
 INPUT = "$IN"
 OUTPUT = "$OUT"
+OUTPUT_IN_TIME = "$OUT_C"  # the same, set when the motion before ends: no stop of the advance run
 TIMER = "$TIMER"
 TIMER_FLAG = "$TIMER_FLAG"
 CYCLIC = "$CYCFLAG"

@@ -24,7 +24,17 @@ from ir_krl.run.commands import (
 )
 from ir_krl.run.control import Clock, Control
 from ir_krl.run.expressions import Expressions
-from ir_krl.run.memory import CYCLIC, INPUT, OUTPUT, SIGNALS, TIMER, Memory, Noted, Pulse
+from ir_krl.run.memory import (
+    CYCLIC,
+    INPUT,
+    OUTPUT,
+    OUTPUT_IN_TIME,
+    SIGNALS,
+    TIMER,
+    Memory,
+    Noted,
+    Pulse,
+)
 from ir_krl.run.notes import Effect
 from ir_krl.run.system import (
     AXES,
@@ -75,11 +85,8 @@ class Assigning(Control):
             for number, level in self._signals.group_bits(name, value, where):
                 self._set_output(number, level, where)
             return
-        if name == OUTPUT and index is not None:
-            value = self.memory.guess(value, False, where)
-            if not isinstance(value, bool):
-                raise KrlRunError(f"$OUT[{index[0]}] is set to {kind_of(value)}", where)
-            self._set_output(index[0], value, where)
+        if name in (OUTPUT, OUTPUT_IN_TIME) and index is not None:
+            self._output_assigned(name, index[0], value, where)
             return
         if name == INPUT and index is not None:  # of --set, and of a simulation
             self._signals.expected[index[0]] = value is True
@@ -93,6 +100,12 @@ class Assigning(Control):
             self.memory.assumed[name] = assumed
         for other, follows in mode_variables(name, value).items():
             self.memory.set(((other, None),), follows, where)
+
+    def _output_assigned(self, name: str, number: int, value: Value, where: Place) -> None:
+        level = self.memory.guess(value, False, where)
+        if not isinstance(level, bool):
+            raise KrlRunError(f"{name}[{number}] is set to {kind_of(level)}", where)
+        self._set_output(number, level, where, in_time=name == OUTPUT_IN_TIME)
 
     def _follow_clock(self, name: str, index: int, value: Value) -> None:
         """What a timer does from its assignment on."""
@@ -132,22 +145,35 @@ class Assigning(Control):
         )
 
     def _check_effect(self, name: str, value: Value, where: Place) -> None:
-        """Note what isn't modelled of a system variable. Raises KrlRunError for an interpolation
-        that no controller has.
+        """Note what isn't modelled of a system variable, stop at an analog output. Raises
+        KrlRunError for an interpolation that no controller has.
         """
+        if name == ANALOG_OUTPUT:
+            self.stop(where, ANALOG_OUTPUT)
         if name == "$IPO_MODE" and value not in (Symbol("BASE"), Symbol("TCP")):
             raise KrlRunError(f"$IPO_MODE is {kind_of(value)}: it is #BASE or #TCP", where)
         known = MODELLED | HARMLESS | SITUATION.keys()
         if name.startswith("$") and name not in known:
             self.note_at(where, f"{name} isn't modelled", _effect_of(name))
 
-    def _set_output(self, number: float, level: bool, place: Place, pulse: float = 0.0) -> None:
-        """Set a digital output. Raises KrlRunError for one that no controller has."""
+    def _set_output(
+        self,
+        number: float,
+        level: bool,
+        place: Place,
+        pulse: float = 0.0,
+        *,
+        in_time: bool = False,
+    ) -> None:
+        """Set a digital output; in_time: as the motion before ends, without a stop. Raises
+        KrlRunError for one that no controller has.
+        """
         if number != int(number) or not 1 <= number <= SIGNALS:
             raise KrlRunError(
                 f"$OUT[{number:g}]: outputs have whole numbers from 1 to {SIGNALS}", place
             )
-        output = SetOutput(int(number), level, place, pulse, self.continuing, self.triggered)
+        on_path = self.continuing or in_time
+        output = SetOutput(int(number), level, place, pulse, on_path, self.triggered, in_time)
         self.commands.append(output)
         if pulse == 0.0:
             self._signals.pulses.pop(int(number), None)
@@ -156,6 +182,7 @@ class Assigning(Control):
             self._signals.pulse(int(number), Pulse(level, pulse), place)
 
 
+ANALOG_OUTPUT = "$ANOUT"
 _MOVING = (
     "$CORR",
     "$SEN",
@@ -266,7 +293,12 @@ class Motions:
             )
         frame = components(value, FRAME_NAMES, place)
         if not frame:
-            raise KrlRunError(f"a motion can't go to {kind_of(value)}", place)
+            point = name or "POINT"
+            raise KrlRunError(
+                f"a motion can't go to {kind_of(value)}: it has neither X, Y, Z nor A1 to A6; "
+                f"--set '{point}={{X …,Y …,Z …,A …,B …,C …}}' gives them",
+                place,
+            )
         for variable in () if relative else ("$TOOL", "$BASE"):
             self._memory.get(((variable, None),), place)  # says what is assumed of it
         status, turn = (

@@ -7,17 +7,18 @@ from dataclasses import dataclass, field
 from pathlib import PurePath
 from typing import Any
 
-from ir_krl.errors import KrlRunError, Place
+from ir_krl.errors import KrlMotionError, KrlRunError, Place
 from ir_krl.language import Parameter, Routine, Source, Tree, place_of
 from ir_krl.run.commands import Command
 from ir_krl.run.control import Endless, Jump, LoopExit, Returned
 from ir_krl.run.expressions import Expressions
-from ir_krl.run.library import COMPUTED, CONTROLLERS, STOPPING, Library
+from ir_krl.run.library import COMPUTED, CONTROLLERS, FILLING, STOPPING, Library
 from ir_krl.run.memory import Memory, SignalRange, Signals
 from ir_krl.run.motions import Motions, Moving
 from ir_krl.run.notes import Effect, Note, worst_first
 from ir_krl.run.standing import AXES_NOW, PLACE_NOW, Kinematics, Standing
 from ir_krl.run.system import Assumption, assumed_variables, system_variables
+from ir_krl.run.texts import TEXT_FUNCTIONS, text_value
 from ir_krl.run.values import Array, Unknown, Value, copied, typed
 from ir_values.arrays import FloatArray
 
@@ -230,6 +231,8 @@ class _Run(Moving):
                 self._statement(statement)
             self._at(file)
             self._statement(statement)
+            whole = self.memory.get(((name, None),), self.place(statement))
+            self.memory.settings[name] = copied(whole)
 
     def background(self, sources: Sequence[Source]) -> None:
         """What programs beside this one set is known as it stands at the start, and assumed."""
@@ -310,10 +313,18 @@ class _Run(Moving):
         kind, *declarators = (one for one in tree.children if one != GLOBAL)
         for declarator in declarators:
             name, index, expression = declarator.children
-            value: Value | None = None if index is None else Array(kind=str(kind))
+            value: Value | None = None
+            if index is not None:
+                value = Array(kind=str(kind), sizes=self._sizes(index))
             if expression is not None:
                 value = copied(self.expressions.value(expression))
             self.memory.declare(str(name), value, str(kind), everywhere)
+
+    def _sizes(self, index: Tree) -> tuple[int, ...]:
+        """How many elements an array has in each direction; () where that isn't known."""
+        values = [self.expressions.value(one) for one in index.children if one is not None]
+        known = tuple(one for one in values if isinstance(one, int))
+        return known if len(known) == len(values) else ()
 
     def _structure(self, tree: Tree) -> None:
         """Types are known before the program runs."""
@@ -325,7 +336,12 @@ class _Run(Moving):
         what = _UNMODELLED[tree.data]
         self.note(tree, f"{what} isn't modelled: no motion assumed", Effect.NONE)
 
-    _analog = _confirm = _error_proceed = _channel = _import = _unmodelled
+    def _analog(self, tree: Tree) -> None:
+        """ANIN and ANOUT stop the advance run."""
+        self._unmodelled(tree)
+        self.stop(self.place(tree), "ANIN or ANOUT")
+
+    _confirm = _error_proceed = _channel = _import = _unmodelled
 
     def _asynchronous(self, tree: Tree) -> None:
         self.note(tree, "ASYPTP moves external axes alone: not driven", Effect.PLACES)
@@ -348,22 +364,42 @@ class _Run(Moving):
         trees = [one.children[0] for one in arguments if one is not None]
         if trees == [None]:  # ROUTINE()
             trees = []
-        if name == "PULSE":
-            return self._pulse(trees, place)
         try:
             routine = self._routines.named(name, self.expressions.file)
         except KrlRunError as error:
             raise KrlRunError(error.reason, place) from None
         controllers = routine is not None and module_of(routine.file) in CONTROLLERS
-        if self._library.has(name) and (routine is None or controllers):
-            if name in STOPPING:
-                self.stop(place, name)
-            values = [None if one is None else self.expressions.value(one) for one in trees]
-            return self._library.call(name, values, place)
+        if (routine is None or controllers) and self._is_built_in(name):
+            return self._built_in(name, trees, place)
         if controllers:
             return self.memory.shared.get(name, Unknown(name))  # of messages and the like
         if routine is None:
-            return self._unknown(name, len(trees), place, function=not statement)
+            value = self._unknown(name, len(trees), place, function=not statement)
+            self._may_change(name, trees)
+            return value
+        return self._run_routine(routine, trees, place)
+
+    def _is_built_in(self, name: str) -> bool:
+        own = TEXT_FUNCTIONS | COMPUTED.keys() | {"PULSE"}
+        return name in own or self._library.has(name)
+
+    def _built_in(self, name: str, trees: list[Any], place: Place) -> Value:
+        """What a routine of every controller does."""
+        if name == "PULSE":
+            return self._pulse(trees, place)
+        if name in TEXT_FUNCTIONS:
+            return text_value(name, trees, self.expressions, place)
+        if name in COMPUTED:
+            return self._computed(name, trees, place)
+        if name in STOPPING:
+            self.stop(place, name)
+        if name in FILLING:
+            self._may_change(name, trees)
+        values = [None if one is None else self.expressions.value(one) for one in trees]
+        return self._library.call(name, values, place)
+
+    def _run_routine(self, routine: Routine, trees: list[Any], place: Place) -> Value:
+        """A routine of the files with its arguments; those that come back are set."""
         values = [
             None if one is None else self._argument(one, k, routine) for k, one in enumerate(trees)
         ]
@@ -390,10 +426,6 @@ class _Run(Moving):
         """A routine that nobody gave: it moves nothing, and the advance run stops at it. Its value
         must be set where one is used.
         """
-        if name in COMPUTED:
-            text = f"{name} is built in, but isn't computed here: what it gives is unknown"
-            self.note_at(place, text, Effect.MOTIONS)
-            return Unknown(name)
         held = self.unknown.get(name)
         most = max(arguments, held.arguments if held else 0)
         used = function or (held is not None and held.function)
@@ -404,6 +436,40 @@ class _Run(Moving):
         self.note_at(place, text, Effect.MOTIONS)
         self.stop(place, name, assumed=True)
         return self.memory.shared.get(name, Unknown(name))
+
+    def _may_change(self, name: str, trees: Sequence[Any]) -> None:
+        """Variables that a routine which isn't followed is given."""
+        for tree in trees:
+            variable = str(tree.children[0]) if tree is not None and tree.data == "access" else "$"
+            if not variable.startswith("$") and self.memory.has(variable):
+                self.memory.may_change(variable, name)
+
+    def _computed(self, name: str, trees: list[Any], place: Place) -> Value:
+        """FORWARD and INVERSE, of the kinematics of the robot: 0 in their last argument, or 1 and
+        no value.
+        """
+        if len(trees) != COMPUTED[name] or any(one is None for one in trees):
+            raise KrlRunError(
+                f"{name} takes {COMPUTED[name]} arguments, {len(trees)} are given", place
+            )
+        try:
+            if name == "FORWARD":
+                frames = self._motions.here(PLACE_NOW[0], place)
+                value = self.standing.forward(self.expressions.value(trees[0]), frames, place)
+            else:
+                target = self._motions.target(trees[0], False, False)
+                start = self.expressions.value(trees[1])
+                value = self.standing.inverse(target, start, place)
+            failed = 0
+            if value is None:
+                text = f"{name} needs a robot: what it gives is unknown"
+                self.note_at(place, text, Effect.MOTIONS)
+        except KrlMotionError as error:
+            self.note_at(place, f"{name}: {error.reason}: 1 as an error", Effect.MOTIONS)
+            value, failed = None, 1
+        if trees[-1].data == "access":
+            self.memory.set(self.expressions.path(trees[-1]), failed, place)
+        return Unknown(name) if value is None else value
 
     def _argument(self, tree: Tree, k: int, routine: Routine) -> Value | None:
         """The value of an argument; one that only comes back needs none."""

@@ -9,9 +9,19 @@ from typing import Protocol
 import numpy as np
 
 from ir_description.poses import pose_of, rotation_from_abc
-from ir_krl.errors import Place
+from ir_krl.errors import KrlRunError, Place
 from ir_krl.run.commands import Command, Motion, SplineBlock, Target
-from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES, Structure, Value, frame
+from ir_krl.run.values import (
+    AXIS_NAMES,
+    FRAME_NAMES,
+    Structure,
+    Unknown,
+    Value,
+    axes,
+    frame,
+    kind_of,
+    real,
+)
 from ir_values.arrays import FloatArray
 
 _MM = 1e-3  # m
@@ -55,8 +65,7 @@ class Standing:
         q = self._configuration()
         if q is None:
             return None
-        angles = dict(zip(AXIS_NAMES, map(float, np.degrees(q)), strict=True))
-        return Structure({**angles}, "E6AXIS")
+        return _angles(q)
 
     def place(self, frames: Target) -> Value | None:
         """$POS_ACT with the base and the tool of `frames`; None where it isn't known."""
@@ -69,11 +78,33 @@ class Standing:
             q = self._configuration()
             if q is None or self.kinematics is None:
                 return None
-            flange = self.kinematics.flange(q[None])[0]
-            status, turn = self.kinematics.status_turn(q)
-            state = {"S": status, "T": turn}
+            return self._position(frames, self.kinematics.flange(q[None])[0], q)
         found = frame(frames.pose(flange))
         return Structure({**found.fields, **state}, "E6POS")
+
+    def forward(self, value: Value, frames: Target, place: Place) -> Value | None:
+        """FORWARD: the E6POS of axis angles with the base and the tool of `frames`; None without a
+        robot. Raises KrlRunError.
+        """
+        q = _whole_axes(value, place)
+        if self.kinematics is None:
+            return None
+        return self._position(frames, self.kinematics.flange(q[None])[0], q)
+
+    def inverse(self, target: Target, start: Value, place: Place) -> Value | None:
+        """INVERSE: the axis angles at a target, from where they start; None without a robot. Raises
+        KrlRunError, and KrlMotionError where no angles lead there.
+        """
+        q = _whole_axes(start, place)
+        if self.kinematics is None:
+            return None
+        return _angles(self.kinematics.reached(target, q, place))
+
+    def _position(self, frames: Target, flange: FloatArray, q: FloatArray) -> Value:
+        """The E6POS of the configuration q (n,) whose flange is known."""
+        assert self.kinematics is not None
+        status, turn = self.kinematics.status_turn(q)
+        return Structure({**frame(frames.pose(flange)).fields, "S": status, "T": turn}, "E6POS")
 
     def _last(self) -> Target | None:
         """Where the last motion leads; None before the first one, and where a circle ends by its
@@ -103,6 +134,23 @@ class Standing:
         self._replayed = len(self.commands)
         self._q = q
         return q
+
+
+def _angles(q: FloatArray) -> Structure:
+    """The E6AXIS of a configuration q (n,) [rad]."""
+    angles = (real(one) for one in np.degrees(q))
+    return Structure(dict(zip(AXIS_NAMES, angles, strict=True)), "E6AXIS")
+
+
+def _whole_axes(value: Value, place: Place) -> FloatArray:
+    """The configuration (n,) [rad] of axis angles. Raises KrlRunError where one lacks."""
+    if isinstance(value, Unknown):
+        raise KrlRunError(value.refusal("a computed position"), place)
+    given = axes(value, place) if isinstance(value, Structure) else {}
+    missing = ", ".join(name for name in AXIS_NAMES if name not in given)
+    if missing:
+        raise KrlRunError(f"{kind_of(value)} has no {missing}: give all axis angles", place)
+    return np.array([given[name] for name in AXIS_NAMES])
 
 
 def _motions_of(command: Command) -> Sequence[Motion]:

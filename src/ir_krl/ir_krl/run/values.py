@@ -45,14 +45,35 @@ class Structure:
 
 @dataclass(eq=True)
 class Array:
-    """Elements by their indices, which begin with 1; what was never set is not there."""
+    """Elements by their indices, which begin with 1; what was never set is not there. sizes: how
+    many there are in each direction, as declared; () where nobody says it.
+    """
 
     elements: dict[tuple[int, ...], Value] = field(default_factory=dict)
     kind: str = ""
+    sizes: tuple[int, ...] = ()
 
     def copied(self) -> Array:
         """A value of its own."""
-        return Array({index: copied(value) for index, value in self.elements.items()}, self.kind)
+        elements = {index: copied(value) for index, value in self.elements.items()}
+        return Array(elements, self.kind, self.sizes)
+
+    def check(self, index: tuple[int, ...], name: str, place: Place) -> None:
+        """Raise KrlRunError for an index that isn't within the declared sizes."""
+        written = ", ".join(map(str, index))
+        if any(one < 1 for one in index):
+            raise KrlRunError(f"{name}[{written}]: the first element is [1]", place)
+        if not self.sizes:
+            return
+        declared = ", ".join(map(str, self.sizes))
+        if len(index) != len(self.sizes) or any(
+            one > size for one, size in zip(index, self.sizes, strict=True)
+        ):
+            raise KrlRunError(
+                f"{name}[{written}] isn't in {name}[{declared}] as it is declared: a controller "
+                "stops there; declare more elements or mend the index",
+                place,
+            )
 
 
 @dataclass(frozen=True)
@@ -87,22 +108,37 @@ def copied(value: Value) -> Value:
     return value.copied() if isinstance(value, Structure | Array) else value
 
 
+_NO_LETTER = chr(0)
+_LETTERS = 256  # that a CHAR may be
 INT_MAX = 2**31 - 1
+INT_MIN = -(2**31)
 REAL_MAX = 3.4e38
 
 
+def real(value: float) -> float:
+    """The REAL of single precision that is nearest to a number: what a controller computes with."""
+    with np.errstate(over="ignore"):
+        return float(np.float32(value))
+
+
 def in_range(value: int | float, place: Place) -> int | float:
-    """An INT of 32 bits or a REAL of single range, as the controller has them. Raises
-    KrlRunError.
+    """An INT of 32 bits or a REAL of single precision, as the controller has them. Raises
+    KrlRunError beyond their range, where a controller stops.
     """
-    if isinstance(value, int) and abs(value) > INT_MAX:
+    if isinstance(value, int):
+        if not INT_MIN <= value <= INT_MAX:
+            raise KrlRunError(
+                f"an INT is from {INT_MIN} to {INT_MAX}; this one has {value.bit_length()} bits: a "
+                "controller stops there, make it a REAL",
+                place,
+            )
+        return value
+    if not abs(value) <= REAL_MAX:
         raise KrlRunError(
-            f"an INT is at most {INT_MAX}; this one has {value.bit_length()} bits: make it a REAL",
+            f"a REAL is at most {REAL_MAX:g}; this one is {value:g}: a controller stops there",
             place,
         )
-    if isinstance(value, float) and not abs(value) <= REAL_MAX:
-        raise KrlRunError(f"a REAL is at most {REAL_MAX:g}; this one is {value:g}", place)
-    return value
+    return real(value)
 
 
 def number(value: Value, what: str, place: Place) -> float:
@@ -116,12 +152,29 @@ def number(value: Value, what: str, place: Place) -> float:
 
 def integer(value: Value, what: str, place: Place) -> int:
     """An INT, or a REAL rounded as KRL does. Raises KrlRunError."""
+    if isinstance(value, int) and not isinstance(value, bool):
+        return value
     return rounded(number(value, what, place))
 
 
 def rounded(value: float) -> int:
     """A REAL as an INT: to the nearest, halves away from 0, as the controller assigns it."""
     return int(math.copysign(math.floor(abs(value) + 0.5), value))
+
+
+def text_of(value: Value) -> str:
+    """The text of a CHAR array, set whole or letter by letter, as far as its first letter that
+    isn't set.
+    """
+    if isinstance(value, str):
+        return value.partition(_NO_LETTER)[0]
+    letters: list[str] = []
+    while isinstance(value, Array) and (len(letters) + 1,) in value.elements:
+        letter = value.elements[(len(letters) + 1,)]
+        if not isinstance(letter, str) or letter == _NO_LETTER:
+            break
+        letters.append(letter)
+    return "".join(letters)
 
 
 def truth(value: Value, what: str, place: Place) -> bool:
@@ -171,11 +224,20 @@ def typed(kind: str, value: Value, types: Types) -> Value:
             )
         case Array():
             held_at = {index: typed(kind, one, types) for index, one in value.elements.items()}
-            return Array(held_at, kind or value.kind)
-        case int() if kind == "REAL" and not isinstance(value, bool):
-            return float(value)
-        case float() if kind == "INT":
-            return rounded(value)
+            return Array(held_at, kind or value.kind, value.sizes)
+        case int() | float() if not isinstance(value, bool):
+            return _number_as(kind, value)
+    return value
+
+
+def _number_as(kind: str, value: int | float) -> Value:
+    """A number as a variable of the type `kind` holds it."""
+    if kind == "REAL":
+        return real(value)
+    if kind == "INT":
+        return in_range(rounded(value), Place()) if isinstance(value, float) else value
+    if kind == "CHAR" and isinstance(value, int) and 0 <= value < _LETTERS:
+        return chr(value)
     return value
 
 
@@ -237,7 +299,7 @@ def frame(transform: FloatArray, kind: str = "FRAME") -> Structure:
     """The FRAME [mm, deg] of a pose (4, 4) [m]."""
     values = [*(transform[:3, 3] / _MM), *abc_from_rotation(transform[:3, :3])]
     return Structure(
-        {name: float(value) for name, value in zip(FRAME_NAMES, values, strict=True)}, kind
+        {name: real(value) for name, value in zip(FRAME_NAMES, values, strict=True)}, kind
     )
 
 
