@@ -56,7 +56,7 @@ PLANNER = Rights(
         *(names.COMPUTE_IK, names.PLAN_SERVICE_MOVEMENT, names.PLAN_REGIONAL_MOVEMENT),
         *(names.PLAN_TRAJECTORY, names.PLAN_PROGRAM, names.OPTIMIZE_TRAJECTORY),
         *(names.EVALUATE_TRAJECTORY, names.GET_TRAJECTORY, names.GET_PROGRAM, names.PLAN_STANDBY),
-        *(names.EXPORT_PROGRAM, names.PLAN_CARTESIAN_MOVEMENT),
+        *(names.EXPORT_PROGRAM, names.PLAN_CARTESIAN_MOVEMENT, names.PLAN_ESCAPE),
     ),
     execute=(names.PLAN,),
 )

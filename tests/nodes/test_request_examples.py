@@ -47,6 +47,7 @@ EXPECTED: dict[str, tuple[int, str]] = {
     "StartRecording": (Status.SUCCESS, "shift.mcap"),
     "ComputeIk": (Status.SUCCESS, ""),
     "PlanRegionalMovement": (Status.SUCCESS, ""),
+    "PlanEscape": (Status.SUCCESS, ""),
     "PlanServiceMovement": (Status.SUCCESS, ""),
     "PlanTrajectory": (Status.SUCCESS, ""),
     "PlanCartesianMovement": (Status.SUCCESS, ""),

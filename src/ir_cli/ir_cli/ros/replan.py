@@ -282,6 +282,7 @@ def _nanoseconds(stamp: Any) -> int:
 HANDLERS = {
     "ir_msgs/srv/PlanServiceMovement": "plan_service",
     "ir_msgs/srv/PlanRegionalMovement": "plan_regional",
+    "ir_msgs/srv/PlanEscape": "plan_escape",
     "ir_msgs/srv/PlanTrajectory": "plan_trajectory",
     "ir_msgs/srv/OptimizeTrajectory": "optimize_trajectory",
     "ir_msgs/srv/PlanProgram": "plan_program",

@@ -24,7 +24,13 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
 
 from ir_msgs.action import ExecuteTrajectory, Plan, RunProgram
-from ir_msgs.srv import GetTrajectory, OptimizeTrajectory, PlanRegionalMovement, SetCell
+from ir_msgs.srv import (
+    GetTrajectory,
+    OptimizeTrajectory,
+    PlanEscape,
+    PlanRegionalMovement,
+    SetCell,
+)
 from ir_msgs_py import names
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement, PlanningInfo, TrajectoryReport
@@ -235,7 +241,7 @@ class MovementPlan:
 
     @classmethod
     def from_msg(cls, response: Any) -> MovementPlan:
-        """From the response of plan_regional_movement or plan_trajectory."""
+        """From the response of plan_regional_movement, plan_trajectory or plan_escape."""
         points = response.trajectory
         return cls(
             response.trajectory_id,
@@ -481,6 +487,15 @@ class Client:
         response = self.ask(
             names.PLAN_REGIONAL_MOVEMENT, request, self.timeout + chosen.planning_time
         )
+        return MovementPlan.from_msg(response)
+
+    def plan_escape(self, *, station: str = "", options: PlanOptions | None = None) -> MovementPlan:
+        """Plan a slow way from where the robot stands too near to something, in it or beyond a
+        limit; no trajectory_id where it stands free. station: its allowed contacts hold.
+        """
+        chosen = options or PlanOptions()
+        request = PlanEscape.Request(station=station, options=plan_options_to_msg(chosen))
+        response = self.ask(names.PLAN_ESCAPE, request, self.timeout + chosen.planning_time)
         return MovementPlan.from_msg(response)
 
     def optimize(

@@ -32,7 +32,7 @@ from ir_planner.checks import Evaluation, StateCheck
 from ir_planner.configurations import IkAnswer
 from ir_planner.krl import KrlExport
 from ir_planner.program import ProgramPlan, Standby
-from ir_planner.regional import MovementPlan
+from ir_planner.regional import EscapePlan, MovementPlan
 from ir_planner.service import ServicePlan
 from ir_planner.state_queries import StatesCheck
 from ir_planner.store import StoredProgram
@@ -84,7 +84,9 @@ def fill_ik(response: Any, answer: IkAnswer) -> None:
     response.info = planning_info_to_msg(answer.info)
 
 
-def fill_movement(response: Any, plan: MovementPlan | CartesianPlan, include_points: bool) -> None:
+def fill_movement(
+    response: Any, plan: MovementPlan | CartesianPlan | EscapePlan, include_points: bool
+) -> None:
     """plan_regional_movement and plan_trajectory; points only where they were asked for."""
     response.report = report_to_msg(plan.report)
     response.info = planning_info_to_msg(plan.info)
@@ -92,6 +94,13 @@ def fill_movement(response: Any, plan: MovementPlan | CartesianPlan, include_poi
         response.trajectory_id = plan.trajectory.trajectory_id
         if include_points:
             response.trajectory = trajectory_to_msg(plan.trajectory)
+
+
+def fill_escape(response: Any, plan: EscapePlan, include_points: bool) -> None:
+    """plan_escape."""
+    fill_movement(response, plan, include_points)
+    response.pairs = [distance_pair_to_msg(pair) for pair in plan.pairs]
+    response.left = list(plan.left)
 
 
 def fill_cartesian(response: Any, plan: CartesianPlan, include_points: bool) -> None:

@@ -247,6 +247,16 @@ def goal_of(request: Any, cell: Cell) -> Goal:
     return one_goal(request.goal, configuration, pose_of(request.goal_pose, cell), cell, forms)
 
 
+def refuse_motion(request: Any) -> None:
+    """Raise RequestError where a regional movement is to start or end in motion."""
+    for name in ("start_acceleration", "goal_acceleration", "joins"):
+        if len(getattr(request, name)):
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"{name} is given: movements start and end at rest",
+            )
+
+
 def options_of(msg: Any, draw_seed: Any) -> PlanOptions:
     """Options of a request; a random seed is drawn here, once, and echoed in the answer."""
     options = plan_options_from_msg(msg)

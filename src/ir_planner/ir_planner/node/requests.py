@@ -21,6 +21,7 @@ from ir_planner.errors import CancelledError, PlannerError, RequestError
 from ir_planner.krl import export_krl, one_movement
 from ir_planner.node.answers import (
     fill_cartesian,
+    fill_escape,
     fill_evaluation,
     fill_export,
     fill_ik,
@@ -41,6 +42,7 @@ from ir_planner.node.inputs import (
     path_of,
     pose_of,
     reference_of,
+    refuse_motion,
     state_of,
     states_of,
     trajectory_of,
@@ -195,10 +197,19 @@ class Requests:
         cell = self.planner.cell
         options = options_of(request.options, self.draw_seed)
         goal = goal_of(request, cell)
+        refuse_motion(request)
         start = self._state(request.start, StatusCode.START_STATE_INVALID, at_rest="start")
         plan = self.planner.plan_regional(start=start, goal=goal, options=options)
         response.searches = searches_to_msg(plan.info.searches)
         return self._movement(plan, response, options.include_points)
+
+    def plan_escape(self, request: Any, response: Any) -> Status:
+        """Away from what is too near, and back within the limits."""
+        options = options_of(request.options, self.draw_seed)
+        start = self._state(request.start, StatusCode.START_STATE_INVALID, at_rest="start")
+        plan = self.planner.plan_escape(start, station=request.station, options=options)
+        fill_escape(response, plan, options.include_points)
+        return self._shown(plan)
 
     def plan_service(self, request: Any, response: Any) -> Status:
         """Out of a machine's work area, or into it."""
