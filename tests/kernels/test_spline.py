@@ -284,6 +284,49 @@ def test_compiled_cores_agree_with_the_reference(
     )
 
 
+def tilted(seed: int, most: float) -> dict[str, Any]:
+    """Terms of a drawn axis and direction that may be `most` rad apart."""
+    drawn = np.random.default_rng(seed).normal(0.0, 1.0, (2, 3))
+    axis, direction = drawn / np.linalg.norm(drawn, axis=1)[:, None]
+    return {"tilt_axis": axis, "tilt_direction": direction, "tilt_max": most}
+
+
+@pytest.mark.parametrize(("seed", "most"), [(0, 0.0), (1, 0.2), (2, 1.5), (3, 3.0)])
+def test_a_tilt_costs_the_square_of_its_excess_over_time(core: Any, seed: int, most: float) -> None:
+    control = motion(seed, 9, around=WORKING)
+    asked = tilted(seed, most)
+    with_tilt, without = (
+        kr210_cost(core, few=True, **given).value(control, 0.2).value for given in (asked, {})
+    )
+    chain = kr210_models(few=True)[0].chain
+    q = np.ascontiguousarray(along(control, 0.2, sample_times(9, 0.2)))
+    axis = chain.link_poses(q)[:, -1, :3, :3] @ asked["tilt_axis"]
+    tilt = np.arccos(np.clip(axis @ asked["tilt_direction"], -1.0, 1.0))
+    excess = np.maximum(tilt - most, 0.0) / SplineTerms.tilt_scale
+    expected = 1e4 * float(np.square(excess).sum()) * 0.1
+    assert with_tilt - without == pytest.approx(expected, rel=1e-7, abs=1e-6 * abs(without))
+
+
+@pytest.mark.parametrize(("seed", "most"), [(4, 0.0), (5, 0.3), (6, 1.0)])
+def test_derivatives_of_a_tilt_are_those_of_differences(core: Any, seed: int, most: float) -> None:
+    cost = kr210_cost(core, OPEN, few=True, **tilted(seed, most))
+    control = motion(seed, 10, around=WORKING)
+    check_derivatives(cost, control, 0.2, np.zeros(7, int), seed, directions(core))
+
+
+def test_compiled_cores_agree_with_the_reference_on_a_tilt(compiled_core: Any) -> None:
+    control = motion(9, 13, around=WORKING)
+    found, expected = (
+        kr210_cost(one, OPEN, **tilted(9, 0.4)).value(control, 0.15)
+        for one in (compiled_core, None)
+    )
+    assert found.value == pytest.approx(expected.value, rel=1e-11)
+    assert found.of_interval == pytest.approx(expected.of_interval, rel=1e-9)
+    np.testing.assert_allclose(
+        found.gradient, expected.gradient, atol=1e-9 * np.abs(expected.gradient).max()
+    )
+
+
 def test_native_agrees_with_baseline(baseline: Any) -> None:
     control = motion(8, 40, around=WORKING)
     native, portable = (

@@ -42,6 +42,10 @@ ir::SplineTerms terms_of(const py::object& data) {
   t.clearance_scale = data.attr("clearance_scale").cast<double>();
   t.penalty = data.attr("penalty").cast<double>();
   t.clearance_penalty = data.attr("clearance_penalty").cast<double>();
+  t.tilt_axis = flat(data, "tilt_axis");
+  t.tilt_direction = flat(data, "tilt_direction");
+  t.tilt_max = data.attr("tilt_max").cast<double>();
+  t.tilt_scale = data.attr("tilt_scale").cast<double>();
   return t;
 }
 
@@ -51,6 +55,8 @@ class SplineCost {
       : pairs_(geometry.pairs()), n_(drives.model.n), terms_(terms_of(data)), geometry_(geometry), drives_(drives) {
     for (const auto* of : {&terms_.velocity, &terms_.acceleration, &terms_.jerk, &terms_.low, &terms_.high, &terms_.travel})
       if (of->size() != static_cast<std::size_t>(n_)) throw std::invalid_argument("terms have to be (n,)");
+    for (const auto* of : {&terms_.tilt_axis, &terms_.tilt_direction})
+      if (of->size() != 3) throw std::invalid_argument("directions of the tilt have to be (3,)");
     const std::size_t given = terms_.threshold.size();
     if (geometry.chain.n != n_ || (pairs_ > 0 ? given == 0 || given % pairs_ != 0 : given != 0))
       throw std::invalid_argument("chain, drives and thresholds don't fit together");

@@ -81,12 +81,23 @@ std::vector<double> levers(const Model& model) {
   return longest;
 }
 
+// A direction of the last link's own frame in its internal frame.
+Local turned(const Chain& chain, const double direction[3]) {
+  const double none[3] = {};
+  double from[3], to[3], result[3];
+  chain.to_internal(chain.n, none, from);
+  chain.to_internal(chain.n, direction, to);
+  for (int i = 0; i < 3; ++i) result[i] = to[i] - from[i];
+  return Local(result);
+}
+
 }  // namespace
 
 SplineCost::SplineCost(const Model& geometry, const dynamics::Core& drives, const SplineTerms& terms)
     : model_(geometry), core_(drives), terms_(terms), n_(drives.model.n), widest_(widest(terms, geometry.pairs())),
       shift_float_(geometry, widest_.data()), shift_double_(geometry, widest_.data()), placement_float_(geometry),
-      placement_double_(geometry), lever_(levers(geometry)), slope_(n_) {
+      placement_double_(geometry), lever_(levers(geometry)), slope_(n_),
+      tilt_axis_(turned(geometry.chain, terms.tilt_axis.data())), frames_(n_ + 1) {
   smooth_envelope();
 }
 
@@ -123,6 +134,7 @@ double SplineCost::operator()(const double* control, int K, const std::int32_t* 
   double value = drives(step);
   value += bus(step);
   value += clearance(row, step);
+  value += tilt(step);
   of_interval = -slower() / interval + of_step_ / P + terms_.time_value * intervals;
   value += terms_.time_value * intervals * interval;
   value += knots(intervals, interval, gradient, of_interval);

@@ -17,6 +17,8 @@ struct SplineTerms {
   dynamics::Regeneration regeneration;
   std::vector<double> threshold;  // (rows, pairs) [m]
   double clearance_margin, clearance_scale, penalty, clearance_penalty;
+  std::vector<double> tilt_axis, tilt_direction;  // (3) each, of length 1: in the last link, in the world
+  double tilt_max, tilt_scale;                    // [rad] between the two; pi: whatever it is
 };
 
 // Workspace of one thread: evaluates one motion after the other without allocating again.
@@ -56,6 +58,7 @@ class SplineCost {
   void exact_bus(double step);
   double smooth_bus(double step);
   double clearance(const std::int32_t* row, double step);
+  double tilt(double step);
   double slower();
   template <int kJoints> double slower_of();
   double knots(int intervals, double interval, double* gradient, double& of_interval) const;
@@ -90,6 +93,8 @@ class SplineCost {
   std::vector<double> lever_;  // (n) [m] of each joint: no point of a capsule's axis is farther from it
   double moved(const std::vector<double>& from, const double* q, int used) const;
   std::vector<Lane> slope_;
+  Local tilt_axis_;                // in the last link's internal frame
+  std::vector<Frame<Lane>> frames_;  // (n + 1)
   template <class V> double clearance_in(Placement<V>& placement, const Shifts<Scalar<V>>& shift,
                                          const std::int32_t* row, double step);
 };

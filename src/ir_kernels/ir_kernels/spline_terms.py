@@ -1,11 +1,12 @@
 """Terms of the cost of a motion along a spline: bounds, weights and thresholds, checked once."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ir_kernels import arguments, data
+from ir_kernels import arguments, data, portable
 from ir_kernels.errors import InputError
 from ir_kernels.power import REGENERATIONS, Regeneration
 from ir_values.arrays import FloatArray
@@ -19,6 +20,7 @@ NOT_NEGATIVE = (
     "penalty",
     "clearance_penalty",
 )
+_UNIT = 1e-6  # by which the length of a direction may differ from 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +34,9 @@ class SplineTerms:
     much the bus' switch between mains,
     capacitor and resistor is rounded, 0: not at all. clearance_margin, clearance_scale [m].
     penalty,
-    clearance_penalty: cost per second of a relative excess of 1.
+    clearance_penalty: cost per second of a relative excess of 1. tilt_axis (3,) in the last link
+    may lean by tilt_max [rad] from tilt_direction (3,) in the world, pi: as it likes; an excess of
+    tilt_scale [rad] counts like one of 1, with clearance_penalty.
     """
 
     velocity: FloatArray
@@ -52,6 +56,10 @@ class SplineTerms:
     clearance_scale: float = 0.01
     penalty: float = 1e4
     clearance_penalty: float = 1e4
+    tilt_axis: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    tilt_direction: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    tilt_max: float = math.pi
+    tilt_scale: float = 0.02
 
 
 def _copy(value: ArrayLike) -> ArrayLike:
@@ -115,7 +123,20 @@ def checked_terms(terms: SplineTerms, n: int, pairs: int) -> SplineTerms:
             "terms.clearance_scale", terms.clearance_scale, 0.0, above=True
         ),
         regeneration=terms.regeneration,
+        tilt_axis=_unit(terms.tilt_axis, "terms.tilt_axis"),
+        tilt_direction=_unit(terms.tilt_direction, "terms.tilt_direction"),
+        tilt_max=arguments.number("terms.tilt_max", terms.tilt_max, 0.0, math.pi),
+        tilt_scale=arguments.number("terms.tilt_scale", terms.tilt_scale, 0.0, above=True),
     )
+
+
+def _unit(value: ArrayLike, name: str) -> FloatArray:
+    """A direction (3,) of length 1. Raises InputError."""
+    direction = data.array(_copy(value), name, (3,))
+    length = float(portable.norm(direction))
+    if abs(length - 1.0) > _UNIT:
+        raise InputError(f"{name} has length {length}: expected 1")
+    return direction
 
 
 def _thresholds(value: ArrayLike, pairs: int) -> FloatArray:

@@ -24,6 +24,7 @@ RAMP = 0.05  # share of the speed over which the step of the torque limit is smo
 ABOUT = 100.0  # 1 / rad: a position limit overrun by 0.01 rad counts like a limit used twice
 INTERVAL_WEIGHT = 4.0  # of the logarithm of the interval in the metric, against (rad/s)^2
 HOLDING = 0.02  # against bending
+STRAIGHT = 1e-12  # sine of a tilt at which no way back is nearer than another
 
 
 @dataclass
@@ -179,6 +180,7 @@ class SplineCost:
         ):  # as in the compiled core: inf and nan say it
             value, energy = self._drives(s, step)
             value += self._clearance(s, np.repeat(row, SAMPLES), step)
+            value += self._tilt(s, step)
             gradient = weights[0].T @ s.of_q + weights[1].T @ s.of_qd + weights[2].T @ s.of_qdd
             of_interval = s.of_step / SAMPLES + t.time_value * count
             of_interval -= float(np.sum(s.of_qd * s.qd + 2.0 * s.of_qdd * s.qdd)) / interval
@@ -279,6 +281,25 @@ class SplineCost:
         slopes = collision.gradient(model, poses[sample], found, pair)
         weight = 2.0 * t.clearance_penalty * step * lacks / t.clearance_scale
         np.subtract.at(s.of_q, sample, weight[:, None] * slopes)
+        rate = t.clearance_penalty * float(np.sum(lacks**2))
+        s.of_step += rate
+        return rate * step
+
+    def _tilt(self, s: Samples, step: float) -> float:
+        """Cost of an axis of the last link that leans too far from a direction of the world."""
+        t = self.terms
+        if t.tilt_max >= np.pi or not np.isfinite(s.q).all():
+            return 0.0
+        poses = collision.poses(self.geometry, s.q)
+        axis = poses[:, -1, :3, :3] @ t.tilt_axis
+        around = np.cross(axis, t.tilt_direction)
+        sine = np.linalg.norm(around, axis=1)
+        lacks = np.maximum(np.arctan2(sine, axis @ t.tilt_direction) - t.tilt_max, 0.0)
+        lacks /= t.tilt_scale
+        turning = np.einsum("kjab,jb->kja", poses[:, 1:, :3, :3], self.geometry.chain.joint_axis)
+        slopes = -np.einsum("kja,ka->kj", turning, around) / np.maximum(sine, STRAIGHT)[:, None]
+        slopes[sine <= STRAIGHT] = 0.0
+        s.of_q += (2.0 * t.clearance_penalty * step / t.tilt_scale) * lacks[:, None] * slopes
         rate = t.clearance_penalty * float(np.sum(lacks**2))
         s.of_step += rate
         return rate * step
