@@ -12,7 +12,7 @@ from ir_planner.checks.free_space import FreeSpace
 from ir_planner.errors import CancelledError
 from ir_planner.request.context import Work
 from ir_planner.scene.planning_scene import PlanningScene
-from ir_planner.search.tree import connect, joint_scale
+from ir_planner.search.tree import connect
 
 SceneOf = Callable[[str], PlanningScene]
 TASK = "tun->bin"  # of deep_box: some hundred edges at the least
@@ -70,7 +70,7 @@ def test_a_deadline_is_heard_between_slices(scene_of: SceneOf) -> None:
 
 
 def test_heavy_joints_count_more_and_none_counts_nothing(scene_of: SceneOf) -> None:
-    scale = joint_scale(space_of(scene_of("open"), endless(1)))
+    scale = space_of(scene_of("open"), endless(1)).scale
     assert scale[0] == 1.0
     assert (np.diff(scale) <= 0.0).all()
     assert (scale >= 0.1).all()

@@ -6,17 +6,19 @@ Exit codes: 0 an answer was found, 1 none was found, 2 the input makes no sense.
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypedDict
 
 from ir_cli.errors import CommandError, InputError, nearest, unknown_name
 from ir_cli.output import Row
 from ir_description import Cell, DescriptionError, UnknownNameError, load_cell
 from ir_krl import KrlError
-from ir_msgs_py.options import OBJECTIVES, ROBOTS_TIME_VALUE, PlanOptions
+from ir_msgs_py.options import NO_TILT, OBJECTIVES, ROBOTS_TIME_VALUE, PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.savings import one_sided
 from ir_planner import Goal, Planner, PlannerSettings, RequestError, parse_goal
@@ -24,6 +26,16 @@ from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError
 
 FAILED = 1
+
+
+class TiltFields(TypedDict):
+    """Fields of PlanOptions."""
+
+    tilt_max: float
+    tilt_axis: tuple[float, ...]
+    tilt_direction: tuple[float, ...]
+
+
 CEILING = 600.0  # s: what is asked at a terminal ends with its work, or with Ctrl-C
 
 
@@ -132,6 +144,31 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--planning-time", type=float, default=CEILING, metavar="S", help="ceiling in s"
     )
+    add_tilt(parser)
+
+
+def add_tilt(parser: argparse.ArgumentParser) -> None:
+    """How far the tool may lean."""
+    parser.add_argument(
+        "--tilt-max", type=float, metavar="DEG", help="deg that the tool may lean on the way"
+    )
+    for name, words in (
+        ("axis", "the tool's axis that counts, in the tcp (that which points up at the start)"),
+        ("direction", "what it may lean from, in the cell (up: 0 0 1)"),
+    ):
+        parser.add_argument(
+            f"--tilt-{name}", type=float, nargs=3, metavar=("X", "Y", "Z"), default=(), help=words
+        )
+
+
+def tilt_of(arguments: argparse.Namespace) -> TiltFields:
+    """The fields of options that say how far the tool may lean."""
+    degrees = arguments.tilt_max
+    return {
+        "tilt_max": NO_TILT if degrees is None else math.radians(degrees),
+        "tilt_axis": tuple(arguments.tilt_axis),
+        "tilt_direction": tuple(arguments.tilt_direction),
+    }
 
 
 def options_of(arguments: argparse.Namespace, duration: float = 0.0) -> PlanOptions:
@@ -144,6 +181,7 @@ def options_of(arguments: argparse.Namespace, duration: float = 0.0) -> PlanOpti
         time_value=arguments.time_value,
         duration=duration,
         load=arguments.load,
+        **tilt_of(arguments),
     )
 
 
@@ -168,6 +206,7 @@ def figures_of(report: TrajectoryReport) -> Row:
         "joint_joules": report.joint_energy,
         "peak_watts": report.peak_power,
         "clearance": report.min_clearance,
+        "largest_tilt": None if report.largest_tilt == NO_TILT else report.largest_tilt,
         "closest": None if closest is None else [closest.body_a, closest.body_b],
         "certified": report.certified,
         "velocity_share": report.velocity_ratio,
@@ -211,11 +250,13 @@ def sentence_of(report: TrajectoryReport, cell: Cell) -> str:
             report.torque_ratio,
         )
     )
+    tilt = f"leans at most {math.degrees(report.largest_tilt):.2f} deg; "
+    leans = "" if report.largest_tilt == NO_TILT else tilt
     return (
         f"{report.duration:.3f} s, {report.energy:.0f} J {supply(cell)}, predicted "
         f"({predicted(report)}), "
         f"at most {report.peak_power / 1e3:.1f} kW\n"
         f"clearance {report.min_clearance * 1e3:.1f} mm{pair}; uses {100.0 * used:.0f} % of a "
-        "limit; "
+        f"limit; {leans}"
         f"{'certified' if report.certified else 'NOT certified'}"
     )

@@ -13,12 +13,14 @@ from ir_cli.planning import (
     add_margin,
     add_options,
     add_parameters,
+    add_tilt,
     failed,
     figures_of,
     options_of,
     planner_of,
     sentence_of,
     sentences,
+    tilt_of,
 )
 from ir_cli.trace_programs import stretches_of
 from ir_cli.traces import add_measured, measured_figures, motion_of, write_trace
@@ -36,6 +38,7 @@ def add_evaluate(evaluate: argparse.ArgumentParser) -> None:
     add_measured(evaluate)
     evaluate.add_argument("--station", default="", help="whose allowed contacts hold in its zone")
     add_margin(evaluate)
+    add_tilt(evaluate)
     add_parameters(evaluate)
     add_formats(evaluate, comma=False)
     evaluate.set_defaults(run=run_evaluate)
@@ -50,7 +53,10 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
         station = arguments.station
         known, trajectory = motion_of(arguments, planner, line.show)
         line.show("evaluate", 0, 1, 0.0)
-        found = planner.evaluate(trajectory, safety_distance=margin, load=load, station=station)
+        tilt = tilt_of(arguments)
+        found = planner.evaluate(
+            trajectory, safety_distance=margin, load=load, station=station, **tilt
+        )
     verification = found.verification
     if arguments.json:
         violations = [v for v in (verification.violation, *verification.others) if v is not None]

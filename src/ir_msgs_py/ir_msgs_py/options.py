@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from ir_values.arrays import at_least, finite, in_fraction, one_of, set_field
+from ir_values.arrays import at_least, direction, finite, in_fraction, one_of, set_field
 from ir_values.errors import InvalidValueError
 
 OBJECTIVES = ("movement_cost", "time", "energy", "time_and_energy")
 TIMINGS = ("synchronous", "asynchronous")
 ROBOTS_TIME_VALUE = -1.0
 """The time_value of who leaves it to the robot: its price of a second follows from its drives."""
+NO_TILT = -1.0
+"""The tilt_max of who asks for none."""
+TILT_MAX = math.pi
+UP = (0.0, 0.0, 1.0)
+"""The tilt_direction of who names none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,6 +28,10 @@ class PlanOptions:
     time_value [W] in J = energy of the drives + time_value x T, without the base load; -1: the
     robot's own. duration: wanted [s], 0 = free. velocity_scaling, acceleration_scaling in (0, 1].
     load: load text, "" = what is attached. include_points: put the points into the answer.
+    tilt_max [rad]: by how much tilt_axis, (3,) in the frame of the tcp, may lean from
+    tilt_direction, (3,) in the cell, at every instant of a regional movement; -1: as it likes. ()
+    is the axis that points in the direction at the start, and the direction up. Both are brought
+    to length 1.
     """
 
     planner_id: str = ""
@@ -38,6 +48,9 @@ class PlanOptions:
     acceleration_scaling: float = 1.0
     load: str = ""
     include_points: bool = False
+    tilt_max: float = NO_TILT
+    tilt_axis: tuple[float, ...] = ()
+    tilt_direction: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         for name, bound in (("seed", 2**64), ("max_iterations", 2**32)):
@@ -59,3 +72,21 @@ class PlanOptions:
         one_of(self.timing, TIMINGS, "timing")
         for name in ("velocity_scaling", "acceleration_scaling"):
             set_field(self, name, in_fraction(getattr(self, name), name))
+        set_field(self, "tilt_max", tilt_value(self.tilt_max, "tilt_max"))
+        for name in ("tilt_axis", "tilt_direction"):
+            given = tuple(getattr(self, name))
+            if given and self.tilt_max == NO_TILT:
+                raise InvalidValueError(
+                    f"{name} is {list(given)} without a tilt_max: give one in [0, {TILT_MAX:g}] rad"
+                )
+            set_field(self, name, direction(given, name) if given else ())
+
+
+def tilt_value(value: float, name: str) -> float:
+    """The largest tilt [rad], or NO_TILT. Raises InvalidValueError."""
+    tilt = finite(value, name, "rad")
+    if tilt != NO_TILT and not 0.0 <= tilt <= TILT_MAX + 1e-6:
+        raise InvalidValueError(
+            f"{name} is {tilt:g} rad: it must be in [0, {TILT_MAX:g}] rad, or {NO_TILT:g} for none"
+        )
+    return tilt

@@ -12,6 +12,7 @@ from enum import StrEnum
 import numpy as np
 
 from ir_msgs_py.modes import modes_of
+from ir_msgs_py.options import NO_TILT
 from ir_msgs_py.search_log import SearchLog
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_values.arrays import FloatArray, at_least, finite, not_nan, one_of, read_only, set_field
@@ -82,6 +83,8 @@ class TrajectoryReport:
     path_length of the tcp [m]; certified: clearance and limits proved for every instant, in the
     cell of cell_hash and with this load; contacts: pairs that were allowed their own safety
     distance. torque_reserve: share of the torque envelope that was left to the feedback.
+    largest_tilt [rad]: a proved bound of how far the tool leans, -1 where nobody asked; inf where
+    none is proved.
     """
 
     duration: float = 0.0
@@ -108,6 +111,7 @@ class TrajectoryReport:
     contacts: tuple[DistancePair, ...] = ()
     power_parameters: str = ""
     torque_reserve: float = 0.0
+    largest_tilt: float = NO_TILT
 
     def __post_init__(self) -> None:
         for name in ("duration", "burnt_energy", "path_length", "torque_reserve"):
@@ -117,6 +121,7 @@ class TrajectoryReport:
         for name in ("safety_distance", *_INTERVAL):
             set_field(self, name, finite(getattr(self, name), name))
         set_field(self, "min_clearance", not_nan(self.min_clearance, "min_clearance", "m"))
+        set_field(self, "largest_tilt", not_nan(self.largest_tilt, "largest_tilt", "rad"))
         joints = np.shape(self.joint_energy)[:1] or (0,)
         for name in (
             "joint_energy",

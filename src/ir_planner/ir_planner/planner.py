@@ -19,7 +19,7 @@ import numpy as np
 
 from ir_description import Cell, CellPath, PowerData, cell_hash, is_path
 from ir_msgs_py.cartesian import CartesianPath
-from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.options import NO_TILT, PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.cartesian import CartesianPlan, checked_path_options, plan_path
@@ -61,10 +61,13 @@ from ir_planner.request import (
     bounded,
     checked_options,
     chosen,
+    cone_of,
     examinable,
     joints_of,
+    leaning_freely_only,
     noted,
     parse_goal,
+    upright_options,
     within_limits,
 )
 from ir_planner.request import (
@@ -114,6 +117,9 @@ class OptionFields(TypedDict, total=False):
     acceleration_scaling: float
     load: str
     include_points: bool
+    tilt_max: float
+    tilt_axis: tuple[float, ...]
+    tilt_direction: tuple[float, ...]
 
 
 def options_with(options: PlanOptions | None, changes: OptionFields) -> PlanOptions:
@@ -270,14 +276,26 @@ class Planner:
         safety_distance: float = MARGIN,
         load: str = "",
         station: str = "",
+        tilt_max: float = NO_TILT,
+        tilt_axis: tuple[float, ...] = (),
+        tilt_direction: tuple[float, ...] = (),
     ) -> Evaluation:
         """Everything that is known about a trajectory, with the first violation. station: its
-        allowed contacts hold.
+        allowed contacts hold. tilt_max and the others: as in PlanOptions.
         """
         checked_margin(safety_distance)
         scene = self.scene(load)
         scene.allowed(station)  # an unknown one is refused here
-        found = evaluate_trajectory(examinable(trajectory), scene, safety_distance, station)
+        asked: OptionFields = {
+            "tilt_max": tilt_max,
+            "tilt_axis": tilt_axis,
+            "tilt_direction": tilt_direction,
+        }
+        trajectory = examinable(trajectory)
+        start = trajectory.reordered(scene.cell.robot.joint_names).positions[0]
+        options = upright_options(options_with(None, asked), scene, start)
+        cone = cone_of(options, scene)
+        found = evaluate_trajectory(trajectory, scene, safety_distance, station, cone=cone)
         return evaluation_in(found, trajectory, scene)
 
     def standby(
@@ -331,6 +349,7 @@ class Planner:
         which nothing gets worse. station: its allowed contacts hold.
         """
         options, note = checked_options(options_with(options, changes))
+        leaning_freely_only(options, "a way out")
         scene = self.scene(options.load)
         scene.allowed(station)  # an unknown one is refused here
         if isinstance(start, str):
@@ -360,6 +379,7 @@ class Planner:
         options = options_with(options, changes)
         method = known_method(options.planner_id)
         options, note = checked_options(replace(options, planner_id=""))
+        leaning_freely_only(options, "a service movement")
         checked_request(direction, max_candidates)
         scene = self.scene(options.load)
         here = self._configuration(near, "near", StatusCode.INVALID_ROBOT_STATE)
@@ -388,6 +408,7 @@ class Planner:
     ) -> MovementPlan:
         """Trajectory through points."""
         options, note = self._checked(options_with(options, changes))
+        leaning_freely_only(options, "a trajectory through points")
         scene = self.scene(options.load)
         plan = plan_through(reference, scene, options, self._work(options, cancelled))
         return self._kept(plan, scene, note)

@@ -21,8 +21,13 @@ _SAMPLES = 400  # of a plotted trajectory: finer than a screen shows
 
 def in_mm(distance: float, bound: float) -> tuple[str, str]:
     """Two distances [m] in mm, with as many digits as it takes to tell them apart."""
+    return told_apart(1e3 * distance, 1e3 * bound)
+
+
+def told_apart(value: float, bound: float) -> tuple[str, str]:
+    """Two numbers with as many digits as it takes to tell them apart."""
     for digits in range(1, _DIGITS):
-        texts = f"{1e3 * distance:.{digits}f}", f"{1e3 * bound:.{digits}f}"
+        texts = f"{value:.{digits}f}", f"{bound:.{digits}f}"
         if texts[0] != texts[1]:
             break
     return texts

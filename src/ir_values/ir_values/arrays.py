@@ -7,7 +7,7 @@ Shapes stand in docstrings: the array types say float64, int64 or bool.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -80,6 +80,21 @@ def read_only(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> Flo
         array = array.copy()
         array.flags.writeable = False
     return array
+
+
+def direction(value: Sequence[float], name: str) -> tuple[float, float, float]:
+    """Return a direction in space at length 1; refuse what has no three finite numbers, or no
+    length.
+    """
+    if len(value) != 3:
+        raise InvalidValueError(f"{name} has {len(value)} numbers: it must have 3, x, y and z")
+    x, y, z = (finite(number, name) for number in value)
+    largest = max(abs(x), abs(y), abs(z))
+    if largest == 0.0:
+        raise InvalidValueError(f"{name} is [0, 0, 0]: it must have a length")
+    x, y, z = x / largest, y / largest, z / largest
+    length = math.sqrt(x * x + y * y + z * z)
+    return x / length, y / length, z / length
 
 
 def set_field(value: object, name: str, content: object) -> None:

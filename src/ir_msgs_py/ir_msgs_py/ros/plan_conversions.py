@@ -64,6 +64,7 @@ _REPORT_NUMBERS = (
     "safety_distance",
     "path_length",
     "torque_reserve",
+    "largest_tilt",
 )
 _PER_JOINT = ("joint_energy", "velocity_ratio", "acceleration_ratio", "jerk_ratio", "torque_ratio")
 _TEXTS = (

@@ -37,7 +37,7 @@ from ir_planner.checks import FreeSpace
 from ir_planner.curves import extremes
 from ir_planner.errors import RequestError
 from ir_planner.presentation import plot_trajectory, result_text
-from ir_planner.request import Context, checked_options, chosen, within_limits
+from ir_planner.request import Context, checked_options, chosen, leaning_freely_only, within_limits
 from ir_planner.timing import Movement
 from ir_values.arrays import BoolArray, FloatArray
 
@@ -392,4 +392,5 @@ def checked_path_options(options: PlanOptions) -> tuple[PlanOptions, str]:
             f"timing is {options.timing}: along a path all axes move together, it must be "
             "synchronous",
         )
+    leaning_freely_only(options, "a path of the tool, whose poses say how it leans,")
     return checked_options(options)

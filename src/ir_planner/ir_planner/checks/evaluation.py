@@ -8,14 +8,15 @@ from typing import Any
 import numpy as np
 
 from ir_kernels import portable
+from ir_msgs_py.options import NO_TILT
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.clearance import ClearanceProfile, clearance_profile
 from ir_planner.checks.energy import MovementEnergy, movement_energy, peak_power
-from ir_planner.checks.verification import AtRest, Verification, verify
+from ir_planner.checks.verification import TILT, AtRest, Verification, verify
 from ir_planner.presentation import plot_profiles, report_text, status_text
-from ir_planner.scene import PROOF_TOLERANCE, PlanningScene, Stops
+from ir_planner.scene import PROOF_TOLERANCE, TILT_TOLERANCE, PlanningScene, Stops, ToolCone
 from ir_values.arrays import FloatArray
 
 
@@ -69,13 +70,15 @@ def evaluate_trajectory(
     safety_distance: float,
     station: Stops = "",
     at_rest: AtRest = (True, True),
+    cone: ToolCone | None = None,
 ) -> Evaluation:
     """Verify and measure a trajectory with the loads of the scene. station: whose contacts are
-    allowed; of a hop between two stations both, each in its own zone.
+    allowed; of a hop between two stations both, each in its own zone. cone: in which the tool has
+    to stay.
     """
-    verification = verify(trajectory, scene, safety_distance, station, at_rest)
+    verification = verify(trajectory, scene, safety_distance, station, at_rest, cone)
     energy = movement_energy(trajectory, scene)
-    return measured(trajectory, scene, safety_distance, station, verification, energy)
+    return measured(trajectory, scene, safety_distance, station, verification, energy, cone)
 
 
 def measured(
@@ -85,6 +88,7 @@ def measured(
     station: Stops,
     verification: Verification,
     energy: MovementEnergy,
+    cone: ToolCone | None = None,
 ) -> Evaluation:
     """The evaluation of a trajectory that has been verified, and whose energy is known."""
     clearance = clearance_profile(trajectory, scene, station)
@@ -108,6 +112,7 @@ def measured(
         certified=verification.certified,
         contacts=clearance.contacts,
         torque_reserve=_reserve(verification.torque, scene),
+        largest_tilt=_largest_tilt(trajectory, cone, verification),
     )
     return Evaluation(report, verification, clearance, energy)
 
@@ -117,6 +122,19 @@ def _reserve(torque: FloatArray, scene: PlanningScene) -> float:
     keep.
     """
     return min(scene.drives.torque_reserve, max(1.0 - float(torque.max(initial=0.0)), 0.0))
+
+
+def _largest_tilt(
+    trajectory: JointTrajectory, cone: ToolCone | None, verification: Verification
+) -> float:
+    """What is proved of the largest tilt [rad]; where the cone's is, that too. NO_TILT: no cone."""
+    if cone is None:
+        return NO_TILT
+    coefficients, durations = trajectory.coefficients()
+    if len(durations) == 0:
+        return float(cone.tilts(trajectory.positions).max())
+    proved = np.inf if verification.breaks(TILT) else cone.most + TILT_TOLERANCE
+    return min(cone.largest(coefficients, durations), proved)
 
 
 def _least_clearance(
@@ -169,6 +187,7 @@ def total_report(
         certified=all(report.certified for report in moving),
         contacts=tuple(pair for report in reports for pair in report.contacts),
         torque_reserve=min(report.torque_reserve for report in moving),
+        largest_tilt=max(report.largest_tilt for report in moving),
         velocity_ratio=ratios["velocity_ratio"],
         acceleration_ratio=ratios["acceleration_ratio"],
         jerk_ratio=ratios["jerk_ratio"],

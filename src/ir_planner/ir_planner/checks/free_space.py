@@ -10,32 +10,41 @@ from ir_kernels.collision import FREE, Certificates
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks.clearance import nearest_pairs, pair_value
+from ir_planner.checks.verification import leans
+from ir_planner.curves import in_short_steps
 from ir_planner.presentation import in_mm, status_text
 from ir_planner.request import Work
-from ir_planner.scene import END_TOLERANCE, PROOF_TOLERANCE, PlanningScene
+from ir_planner.scene import END_TOLERANCE, PROOF_TOLERANCE, PlanningScene, ToolCone
 from ir_values.arrays import BoolArray, FloatArray
+
+_LEAST_SCALE = 0.1  # of the first joint: the wrist still counts where it carries nothing
+_SHORT = 0.2  # rad of the joint that turns most, between the points of a path that is kept upright
 
 
 @dataclass(frozen=True, eq=False)
 class FreeSpace:
     """Scene, thresholds (Z,) m of its pairs, and the budget that every certified edge is charged
-    to.
+    to. cone: in which the tool has to stay, None: there is none.
     """
 
     scene: PlanningScene
     threshold: FloatArray
     work: Work
+    cone: ToolCone | None = None
 
     @staticmethod
     def of(
-        scene: PlanningScene, safety_distance: float, work: Work, station: str = ""
+        scene: PlanningScene,
+        safety_distance: float,
+        work: Work,
+        station: str = "",
+        cone: ToolCone | None = None,
     ) -> "FreeSpace":
         """Free space for S_m, or what `station` allows its pairs; half of the proof's tolerance is
         kept in hand.
         """
-        return FreeSpace(
-            scene, scene.thresholds(safety_distance, station) - PROOF_TOLERANCE / 2, work
-        )
+        threshold = scene.thresholds(safety_distance, station) - PROOF_TOLERANCE / 2
+        return FreeSpace(scene, threshold, work, cone)
 
     @property
     def low(self) -> FloatArray:
@@ -47,11 +56,34 @@ class FreeSpace:
         """Upper position limits (n,) rad."""
         return self.scene.cell.robot.position_max
 
+    @property
+    def scale(self) -> FloatArray:
+        """How much each joint (n,) counts in the distance of configurations: the root of its weight
+        in eq. (9), the first one's being 1.
+        """
+        weights = self.scene.weights
+        return np.asarray(np.maximum(np.sqrt(weights / weights[0]), _LEAST_SCALE))
+
+    def kept_upright(self, paths: list[FloatArray]) -> list[FloatArray]:
+        """Paths (M, n) as they are, or in a cone as many with more points, all but the ends brought
+        into it.
+        """
+        if self.cone is None:
+            return paths
+        dense = [in_short_steps(path, _SHORT) for path in paths]
+        within = self.cone.brought_in(np.concatenate(dense), self.low, self.high, self.scale)
+        upright = np.split(within, np.cumsum([len(path) for path in dense])[:-1])
+        for path, given in zip(upright, paths, strict=True):
+            path[0] = given[0]
+            path[-1] = given[-1]
+        return upright
+
     def states_free(self, q: FloatArray) -> BoolArray:
         """Which configurations (N, n) are free."""
         if len(q) == 0:
             return np.zeros(0, dtype=bool)
-        return np.asarray(self.scene.collision.is_free(q, self.threshold), dtype=bool)
+        free = np.asarray(self.scene.collision.is_free(q, self.threshold), dtype=bool)
+        return free if self.cone is None else free & self.cone.holds(q)
 
     def ends_free(self, q: FloatArray) -> BoolArray:
         """Which configurations (N, n) may begin or end a movement: so free that a proof can begin
@@ -70,9 +102,15 @@ class FreeSpace:
         left: they take what there is of it.
         """
         self.work.spend(min(len(q0), self.work.left))
-        return np.asarray(
+        return self._proved(q0, q1)
+
+    def _proved(self, q0: FloatArray, q1: FloatArray) -> BoolArray:
+        free = np.asarray(
             self.scene.collision.certify_edges(q0, q1, self.threshold).verdict == FREE
         )
+        if self.cone is not None and free.any():
+            free[free] = self.cone.edges_held(q0[free], q1[free])
+        return free
 
     def edges_free(self, q0: FloatArray, q1: FloatArray) -> BoolArray:
         """Which of the straight movements (N, n) to (N, n) are proved free; those are not for which
@@ -81,7 +119,8 @@ class FreeSpace:
         result = np.zeros(len(q0), dtype=bool)
         count = min(len(q0), self.work.left)
         if count:
-            result[:count] = self.certificates(q0[:count], q1[:count]).verdict == FREE
+            self.work.spend(count)
+            result[:count] = self._proved(q0[:count], q1[:count])
         return result
 
     def paths_free(self, paths: list[FloatArray]) -> BoolArray:
@@ -143,6 +182,21 @@ def end_in_collision(
         if not space.ends_free(q[None])[0]:
             hint = "; plan_escape (ir ask escape) leads out" if what == "start" else ""
             return Status(code, too_near(q, space, what, safety_distance) + hint)
+    return None
+
+
+def end_outside_cone(start: FloatArray, goal: FloatArray, cone: ToolCone | None) -> Status | None:
+    """The status for a start or goal (n,) at which the tool leans too far; None where it does at
+    neither, or nothing is asked.
+    """
+    if cone is None:
+        return None
+    for q, what, code in (
+        (start, "start", StatusCode.START_STATE_VIOLATES_PATH_CONSTRAINTS),
+        (goal, "goal", StatusCode.GOAL_VIOLATES_PATH_CONSTRAINTS),
+    ):
+        if not cone.holds(q[None])[0]:
+            return Status(code, leans(float(cone.tilts(q[None])[0]), cone, f"at the {what}"))
     return None
 
 

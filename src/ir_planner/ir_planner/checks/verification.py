@@ -16,11 +16,12 @@ from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.clearance import pair_value
 from ir_planner.curves import Extremes, extremes
-from ir_planner.presentation import in_mm
+from ir_planner.presentation import in_mm, told_apart
 from ir_planner.scene import (
     PROOF_TOLERANCE,
     PlanningScene,
     Stops,
+    ToolCone,
     polynomials_between,
     spans_outside,
     tcp_inside,
@@ -32,6 +33,7 @@ SLACK = 1e-6  # relative: what rounding of a limit that is reached exactly may c
 POSITION_SLACK = 1e-9  # rad
 JUMP = 1e-4  # rad/s, rad/s^2: rounding of times and points
 AT_REST = 1e-6  # rad/s and rad/s^2 that count as rest
+TILT = "tilt"  # what a violation of the tool's cone is called
 
 
 @dataclass(frozen=True)
@@ -288,6 +290,39 @@ def _violation(
     return Violation(interval[0], k, "clearance", excess, sentence, pair)
 
 
+def tilt_violation(trajectory: JointTrajectory, cone: ToolCone | None) -> Violation | None:
+    """The first part of a trajectory on which the tool leans too far, or isn't proved not to; None:
+    proved, or nothing is asked.
+    """
+    if cone is None:
+        return None
+    coefficients, durations = polynomials_between(
+        trajectory, float(trajectory.times[0]), float(trajectory.times[-1])
+    )
+    if len(durations) == 0:
+        coefficients = trajectory.positions[:, :, None]
+        durations = np.zeros(1)
+    found = cone.proof(coefficients, durations)
+    if found.ok.all():
+        return None
+    k = int(np.argmin(found.ok))
+    time = float(trajectory.times[0] + durations[:k].sum() + found.time[k])
+    tilt = float(cone.tilts(trajectory.sample([time]).q)[0])
+    sentence = leans(tilt, cone, f"at {time:.3f} s")
+    return Violation(time, segment_at(trajectory, time), TILT, tilt - cone.most, sentence)
+
+
+def leans(tilt: float, cone: ToolCone, where: str) -> str:
+    """The sentence for a tilt [rad] that is too large, or isn't proved not to be."""
+    value, bound = told_apart(np.degrees(tilt), np.degrees(cone.most))
+    axis, direction = (", ".join(f"{x:.4g}" for x in of) for of in (cone.axis, cone.direction))
+    what = "leans" if tilt > cone.most else "can't be proved to lean less than it may, it leans"
+    return (
+        f"the tool's axis ({axis}) {what} {value} deg from ({direction}) {where}: it must be at "
+        f"most {bound} deg"
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Verification:
     """violation: the first one, None: everything is proved; others: the first of every other kind,
@@ -310,8 +345,12 @@ class Verification:
     @property
     def keeps_clear(self) -> bool:
         """Every pair proved to keep its distance at every instant, whatever the limits."""
+        return not self.breaks("clearance")
+
+    def breaks(self, what: str) -> bool:
+        """Whether one of the violations is of this kind."""
         found = (self.violation, *self.others)
-        return all(violation is None or violation.what != "clearance" for violation in found)
+        return any(violation is not None and violation.what == what for violation in found)
 
     @property
     def status(self) -> Status:
@@ -341,12 +380,15 @@ def verify(
     safety_distance: float,
     station: Stops = "",
     at_rest: AtRest = (True, True),
+    cone: ToolCone | None = None,
 ) -> Verification:
-    """Check a trajectory against the robot's limits and S_m (or what `station` allows its
-    pairs).
+    """Check a trajectory against the robot's limits, S_m (or what `station` allows its pairs), and
+    the cone in which the tool has to stay.
     """
     clearance = clearance_violation(trajectory, scene, safety_distance, station)
-    return verified(trajectory, scene, clearance, torque_proof(trajectory, scene), at_rest)
+    torque = torque_proof(trajectory, scene)
+    tilt = tilt_violation(trajectory, cone)
+    return verified(trajectory, scene, clearance, torque, at_rest, tilt)
 
 
 def verified(
@@ -355,8 +397,9 @@ def verified(
     clearance: Violation | None,
     torque: TorqueProof,
     at_rest: AtRest = (True, True),
+    tilt: Violation | None = None,
 ) -> Verification:
-    """The verification of a trajectory whose clearance and torque have been examined."""
+    """The verification of a trajectory whose clearance, torque and tilt have been examined."""
     largest = extremes(*trajectory.coefficients())
     robot = scene.cell.robot
     limits = scene.limits
@@ -375,6 +418,7 @@ def verified(
             for name, values in share.items()
         ),
         clearance,
+        tilt,
     ]
     violations = sorted((v for v in found if v is not None), key=lambda violation: violation.time)
     top = {name: values.max(axis=0, initial=0.0) for name, values in share.items()}

@@ -21,6 +21,7 @@ from ir_planner.curves.uniform_spline import (
     at_shares,
     evenly_spaced,
     fewest_seconds,
+    in_short_steps,
 )
 
 __all__ = [
@@ -33,6 +34,7 @@ __all__ = [
     "evenly_spaced",
     "extremes",
     "fewest_seconds",
+    "in_short_steps",
     "motion_at",
     "natural_durations",
     "rotation_of",

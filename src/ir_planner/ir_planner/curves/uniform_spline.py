@@ -22,6 +22,18 @@ def at_shares(path: FloatArray, shares: FloatArray) -> FloatArray:
     return _at(path, passed, shares * passed[-1])
 
 
+def in_short_steps(path: FloatArray, longest: float) -> FloatArray:
+    """The path (M, n) with points added in its steps, so that no joint turns by more than `longest`
+    rad in one.
+    """
+    parts = np.maximum(np.ceil(np.abs(np.diff(path, axis=0)).max(axis=1) / longest), 1.0)
+    steps = [
+        first + (last - first) * (np.arange(count) / count)[:, None]
+        for first, last, count in zip(path[:-1], path[1:], parts, strict=True)
+    ]
+    return np.concatenate([*steps, path[-1:]])
+
+
 def evenly_spaced(path: FloatArray, count: int) -> FloatArray:
     """`count` configurations (count, n) at even distances along `path` (M, n), its ends exactly
     included.

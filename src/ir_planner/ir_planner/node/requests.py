@@ -329,6 +329,9 @@ class Requests:
             safety_distance=request.safety_distance,
             load=request.load,
             station=request.station,
+            tilt_max=request.tilt_max,
+            tilt_axis=tuple(request.tilt_axis),
+            tilt_direction=tuple(request.tilt_direction),
         )
         fill_evaluation(response, evaluation)
         return evaluation.status

@@ -18,7 +18,7 @@ import numpy as np
 from ir_kernels import SplineCost
 from ir_kernels.spline import RowArray
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks import Violation
+from ir_planner.checks import TILT, Violation
 from ir_planner.curves import UniformSpline, along_motion, along_path, fewest_seconds
 from ir_planner.optimize.spline_cost import beyond_limits, slowed_to_limits, spline_cost
 from ir_planner.request import Context
@@ -172,6 +172,7 @@ SLOWER = 1.3  # than the path at full speed: where the descent starts
 _STIFFNESS = 4.0  # of penalties, against the power that the objective is about: at least
 _REPAIRS = 5
 _MARGIN_STEP = 1e-3  # m of clearance margin beyond what lacked
+_UPRIGHT_STEP = 1e-3  # rad that the tool is to lean less, beyond what it leaned too far
 _REPAIR_EVALUATIONS = 40
 _TIGHTENINGS = 4  # of the limits, where a motion of requested duration exceeds them
 _TIGHTENED = 100  # evaluations after each
@@ -198,7 +199,7 @@ EDGES_PER_INTERVAL = (
 class Solution:
     """A spline under optimisation: the stage it went through, its cost, the distances (R, Z) m that
     its pairs are to keep, and the shares of the limits' speed and of the torque that it is
-    optimised for.
+    optimised for. upright [rad]: by how much less than it may the tool is to lean.
     """
 
     spline: UniformSpline
@@ -207,10 +208,11 @@ class Solution:
     kept: FloatArray
     speed: float = 1.0
     torque: float = TORQUE_SHARES[0]
+    upright: float = 0.0
 
     def ended(self, spline: UniformSpline, cost: float) -> "Solution":
         """Where its descent came to."""
-        return Solution(spline, self.stage, cost, self.kept, self.speed, self.torque)
+        return replace(self, spline=spline, cost=cost)
 
     @cached_property
     def places(self) -> FloatArray:
@@ -304,7 +306,7 @@ class Refinement:
                 movement = replace(found, context=self.context).stretched_by(
                     max(requested / duration, 1.0)
                 )
-                if movement.clearance is None:
+                if movement.astray is None:
                     cheaper = within_duration(
                         found, self.context, lambda one, asked: Refinement(asked).near([one])
                     )
@@ -337,11 +339,15 @@ class Refinement:
             found = self._proved(solution, path)
             if not isinstance(found, Violation):
                 return found
-            if found.pair is None:
+            if found.what == TILT:
+                wider = replace(
+                    solution, upright=solution.upright + max(found.excess, 0.0) + _UPRIGHT_STEP
+                )
+            elif found.pair is None:
                 return None
-            solution = self._repaired(
-                self._with_larger_margin(solution, found), path, _REPAIR_EVALUATIONS
-            )
+            else:
+                wider = self._with_larger_margin(solution, found)
+            solution = self._repaired(wider, path, _REPAIR_EVALUATIONS)
         return None
 
     def staged(self, solution: Solution, stage: Stage, path: FloatArray) -> Solution:
@@ -408,12 +414,14 @@ class Refinement:
         stiffer = _STIFFER if self.context.options.duration > 0.0 else 1.0
         penalty = weights.power * max(stiffer * stage.stiffness, _STIFFNESS)
         key = (penalty, stage.smoothing, solution.speed, solution.torque, weights.travel.tobytes())
-        known = self._costs.get(key) if solution.kept is self._kept else None
+        usual = solution.kept is self._kept and solution.upright == 0.0
+        known = self._costs.get(key) if usual else None
         if known is not None:
             return known
         limits = self.limits.with_torque_share(solution.torque).for_speed(solution.speed)
-        cost = spline_cost(self.context, limits, weights, penalty, solution.kept, stage.smoothing)
-        if solution.kept is self._kept:
+        bounds = (solution.kept, stage.smoothing, solution.upright)
+        cost = spline_cost(self.context, limits, weights, penalty, *bounds)
+        if usual:
             self._costs[key] = cost
         return cost
 
@@ -442,15 +450,15 @@ class Refinement:
         return replace(solution, kept=kept)
 
     def _proved(self, solution: Solution, path: FloatArray) -> Movement | Violation | None:
-        """The movement, or where a pair is too near; None where its limits can't be kept."""
+        """The movement, or where it goes astray; None where its limits can't be kept."""
 
         def slowed(limits: MotionLimits) -> Movement | None:
             trajectory = self._slowed(solution.spline, limits)
             return None if trajectory is None else Movement(path, trajectory, self.context)
 
         movement = within_torque(slowed, self.context)
-        if movement is None or movement.clearance is not None:
-            return None if movement is None else movement.clearance
+        if movement is None or movement.astray is not None:
+            return None if movement is None else movement.astray
         return movement if movement.torque.violation is None else None
 
     def _slowed(self, spline: UniformSpline, limits: MotionLimits) -> JointTrajectory | None:

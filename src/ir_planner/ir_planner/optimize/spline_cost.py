@@ -3,6 +3,8 @@
 While a spline is optimised, a limit is a penalty; what is sent is slowed until every limit holds.
 """
 
+from typing import Any
+
 import numpy as np
 
 from ir_kernels import SplineCost, SplineTerms
@@ -14,6 +16,9 @@ from ir_values.arrays import FloatArray
 
 _MARGIN = 1e-3  # m of clearance beyond S_m that the descent asks for
 _SCALE = 1e-2  # m that lack count like a limit used twice
+_TILT_MARGIN = 2e-3  # rad below the largest tilt that the descent asks for, at most
+_TILT_SHARE = 0.05  # of that tilt
+_TILT_SCALE = 0.02  # rad of excess that count like a limit used twice
 _FAR = -1e3  # m: no pair is ever that near, so clearance costs nothing
 
 
@@ -24,12 +29,14 @@ def spline_cost(
     penalty: float,
     threshold: FloatArray | None = None,
     smoothing: float = 0.0,
+    upright: float = 0.0,
 ) -> SplineCost:
     """Cost of splines by the objective; what exceeds the limits costs `penalty` W for a relative
     excess of 1.
 
     threshold (R, Z) m: what the pairs must keep; None: path and clearance are given and cost
-    nothing. smoothing [W]: of the bus' switch.
+    nothing. smoothing [W]: of the bus' switch. upright [rad]: by how much less than it may the
+    tool is to lean.
     """
     scene = context.scene
     robot = context.scene.cell.robot
@@ -52,8 +59,23 @@ def spline_cost(
         clearance_scale=_SCALE,
         penalty=penalty,
         clearance_penalty=0.0 if given else penalty,
+        **_tilt_terms(context, upright),
     )
     return SplineCost(scene.collision, scene.dynamics, terms)
+
+
+def _tilt_terms(context: Context, upright: float) -> dict[str, Any]:
+    """Terms of the cone that the tool has to stay in, a little narrower."""
+    cone = context.cone
+    if cone is None:
+        return {}
+    margin = min(_TILT_MARGIN, _TILT_SHARE * cone.most) + upright
+    return {
+        "tilt_axis": cone.axis_of_link,
+        "tilt_direction": cone.direction,
+        "tilt_max": max(cone.most - margin, 0.0),
+        "tilt_scale": _TILT_SCALE,
+    }
 
 
 _TORQUE_SAMPLES = 6  # per interval; the proof comes after

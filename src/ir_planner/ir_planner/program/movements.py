@@ -268,6 +268,7 @@ class Movements:
 
     def _planned(self, part: Part, context: Context) -> Movement | Failure:
         inside = context.inside(self.route.arriving(part.hop))
+        inside = inside.upright_from(self.ends(part)[0])
         return self._across(part, inside) if part.kind == ACROSS else self._along_line(part, inside)
 
     def _across(self, part: Part, context: Context) -> Movement | Failure:
@@ -288,7 +289,7 @@ class Movements:
         station = self.route.name(part.hop if entry else part.hop - 1)
         driven = self.nodes(part)[0].driven
         if entry and driven is not None:
-            return driven.asked_by(context)
+            return driven.asked_by(context.leaning_freely())
         what = f"{'entering' if entry else 'leaving'} {station}"
         at = context.at(station)
         slower = slowed_near(_known(self._near.lines, part), at)

@@ -14,7 +14,15 @@ import numpy as np
 from ir_planner.checks import FreeSpace
 from ir_planner.optimize import QUICK, THOROUGH, Portfolio, Refinement
 from ir_planner.request import Context
-from ir_planner.search import SEARCHES, Ends, Search, correction_log, guesses, quick
+from ir_planner.search import (
+    SEARCHES,
+    Ends,
+    Search,
+    correction_log,
+    guesses,
+    keeps_upright,
+    quick,
+)
 from ir_values.arrays import FloatArray
 
 Searches = Mapping[str, Search]
@@ -100,7 +108,12 @@ def improve(
                 ends, paths, portfolio, guided=context.options.planner_id == "", more=more
             )
         )
-    explorers = [name for name in EXPLORERS if context.options.planner_id in ("", name)]
+    explorers = [
+        name
+        for name in EXPLORERS
+        if context.options.planner_id in ("", name)
+        and (context.cone is None or keeps_upright(searches[name]))
+    ]
     turn = 0
     with journal.stage("improve") as notes:
         new = Counter[str]()
@@ -160,7 +173,10 @@ def _guessed(ends: Ends, portfolio: Portfolio, straight: bool) -> int:
     space = portfolio.space
     park = np.array(space.scene.cell.park)
     nearest = ends.goals[:_GOALS]
-    paths = [guesses(ends.start, goal, park, space.low, space.high) for goal in nearest]
+    paths = [
+        space.kept_upright(guesses(ends.start, goal, park, space.low, space.high))
+        for goal in nearest
+    ]
     if straight:
         share = max(_FEW_GUESSES // len(nearest), 1)
         few = [path for of_goal in paths for path in of_goal[:share]]

@@ -16,8 +16,9 @@ from ir_kernels.collision import FREE
 from ir_msgs_py.report import PlanningInfo, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks import FreeSpace, end_in_collision, pair_value
+from ir_planner.checks import FreeSpace, end_in_collision, end_outside_cone, leans, pair_value
 from ir_planner.configurations import free_configurations, no_configuration
+from ir_planner.errors import RequestError
 from ir_planner.optimize import Portfolio, Refinement
 from ir_planner.presentation import in_mm, plot_trajectory, result_text
 from ir_planner.regional.exploration import Path, Searches, first_paths
@@ -32,7 +33,7 @@ from ir_planner.regional.safeguards import (
 )
 from ir_planner.request import Context, Goal, Journal, within_limits
 from ir_planner.scene import STILL, path_cost
-from ir_planner.search import Ends, fewest_corners, pulled
+from ir_planner.search import Ends, fewest_corners, keeps_upright, pulled
 from ir_planner.timing import (
     TOO_HEAVY,
     Movement,
@@ -65,6 +66,9 @@ class MovementPlan:
         return plot_trajectory(self.trajectory, repr(self))
 
 
+_SHARES = 101  # of a straight movement, at which a refusal looks for the largest tilt
+
+
 def refusal(
     start: FloatArray, goal: FloatArray, space: FreeSpace, journal: Journal, *, path: bool
 ) -> Status:
@@ -74,6 +78,18 @@ def refusal(
     found = space.scene.collision.certify_edges(start[None], goal[None], space.threshold)
     tried = ", ".join(f"{stage.name} ({stage.note})" for stage in journal.stages) or "nothing"
     cut = " within planning_time" if journal.work.truncated else ""
+    cone = space.cone
+    if cone is not None and not path and found.verdict[0] == FREE:
+        shares = np.linspace(0.0, 1.0, _SHARES)
+        tilts = cone.tilts(start + shares[:, None] * (goal - start))
+        worst = int(np.argmax(tilts))
+        where = f"at {100 * shares[worst]:.0f} % of the straight movement"
+        sentence = leans(float(tilts[worst]), cone, where)
+        return Status(
+            StatusCode.PLANNING_FAILED,
+            f"no path found{cut}: {sentence}; tried: {tried}; a larger tilt_max, or another start "
+            "or goal configuration, may help",
+        )
     if found.verdict[0] == FREE:
         rejected = (f"{reason} ({count})" for reason, count in journal.rejected.items())
         reasons = (
@@ -137,6 +153,8 @@ def search_regional(
     """The best movement found, with the status that says so or says why not; start (n,), goals (n,)
     or (G, n).
     """
+    context = context.upright_from(np.asarray(start))
+    _check_search(context, searches)
     status, found = _search_timed(start, goals, context, searches)
     if found is None and TOO_HEAVY in status.message:
         lines = [(np.asarray(start), goal) for goal in np.atleast_2d(goals)]
@@ -145,6 +163,19 @@ def search_regional(
             if found is not None:
                 break
     return status, found
+
+
+def _check_search(context: Context, searches: Searches) -> None:
+    """Raise RequestError for a search that is asked for by name and heeds no bound of the tilt."""
+    name = context.options.planner_id
+    if context.cone is None or not name or keeps_upright(searches[name]):
+        return
+    able = ", ".join(name for name, search in searches.items() if keeps_upright(search))
+    raise RequestError(
+        StatusCode.INVALID_GOAL_CONSTRAINTS,
+        f"planner_id is {name} with a tilt_max of {context.options.tilt_max:g} rad: searches that "
+        f"keep it are {able}, and all together without a planner_id",
+    )
 
 
 def _search_timed(
@@ -162,8 +193,10 @@ def _search(  # noqa: C901
 ) -> tuple[Status, Movement | None]:
     """The best synchronous movement found."""
     ends = Ends(start, np.atleast_2d(goals))
-    space = FreeSpace.of(context.scene, context.safety_distance, context.work)
+    cone = context.cone
+    space = FreeSpace.of(context.scene, context.safety_distance, context.work, cone=cone)
     blocked = end_in_collision(start, ends.goals[0], space, context.safety_distance)
+    blocked = blocked or end_outside_cone(start, ends.goals[0], cone)
     if blocked is not None:
         return blocked, None
     paths = first_paths(ends, space, context, searches, briefly=True)

@@ -286,7 +286,9 @@ def _own(common: Movement, context: Context) -> Movement | None:
     law of its own, or it isn't certified.
     """
     try:
-        space = FreeSpace.of(context.scene, context.safety_distance, context.work)
+        space = FreeSpace.of(
+            context.scene, context.safety_distance, context.work, cone=context.cone
+        )
         movement = straight_steps(over_free_steps(common, space).path, context)
     except (TimingError, RequestError) as error:
         context.journal.reject(f"own laws: {error}")

@@ -7,9 +7,18 @@ from ir_planner.request.bounds import (
     checked_options,
     chosen,
     examinable,
+    leaning_freely_only,
     safety_distance,
 )
-from ir_planner.request.context import Clock, Context, Journal, Work, noted
+from ir_planner.request.context import (
+    Clock,
+    Context,
+    Journal,
+    Work,
+    cone_of,
+    noted,
+    upright_options,
+)
 from ir_planner.request.goals import (
     POSTURES,
     Goal,
@@ -32,12 +41,15 @@ __all__ = [
     "bounded",
     "checked_options",
     "chosen",
+    "cone_of",
     "examinable",
     "joint_values",
     "joints_of",
+    "leaning_freely_only",
     "noted",
     "one_goal",
     "parse_goal",
     "safety_distance",
+    "upright_options",
     "within_limits",
 ]

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ir_msgs_py.options import ROBOTS_TIME_VALUE, PlanOptions
+from ir_msgs_py.options import NO_TILT, ROBOTS_TIME_VALUE, PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import extremes
@@ -50,6 +50,15 @@ def chosen(value: str, known: tuple[str, ...], name: str) -> str:
 def safety_distance(value: float) -> float:
     """S_m [m]: 0 is taken literally."""
     return bounded(value, 0.0, SAFETY_DISTANCE_MAX, "safety_distance", "m")
+
+
+def leaning_freely_only(options: PlanOptions, what: str) -> None:
+    """Raise RequestError where a bound of the tool's tilt is asked for that `what` doesn't keep."""
+    if options.tilt_max != NO_TILT:
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"tilt_max is {options.tilt_max:g} rad: {what} doesn't keep it, leave it {NO_TILT:g}",
+        )
 
 
 def checked_options(options: PlanOptions) -> tuple[PlanOptions, str]:

@@ -4,14 +4,15 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
-from ir_msgs_py.options import ROBOTS_TIME_VALUE, PlanOptions
+from ir_msgs_py.options import NO_TILT, ROBOTS_TIME_VALUE, TILT_MAX, UP, PlanOptions
 from ir_msgs_py.report import PlanningInfo, PlanningStage, Rejection
 from ir_msgs_py.search_log import ConfigurationLog, SearchLog
 from ir_planner.errors import CancelledError
-from ir_planner.scene import MotionLimits, PlanningScene
+from ir_planner.scene import MotionLimits, PlanningScene, ToolCone
 from ir_values.arrays import FloatArray
 
 # How much work a request may cost: counted in certified edges, with time only as a ceiling, and
@@ -131,6 +132,34 @@ def noted(info: PlanningInfo, note: str, about: str = "options") -> PlanningInfo
     return replace(info, stages=(*info.stages, PlanningStage(about, 0.0, note))) if note else info
 
 
+def upright_options(options: PlanOptions, scene: PlanningScene, start: FloatArray) -> PlanOptions:
+    """The options with tilt_direction, and tilt_axis where none is given: that which points in the
+    direction at the start (n,). A tilt of pi bounds nothing.
+    """
+    if options.tilt_max == NO_TILT or options.tilt_max >= TILT_MAX:
+        return _leaning_freely(options)
+    direction = options.tilt_direction or UP
+    axis = options.tilt_axis
+    if not axis:
+        turned = scene.chain.tcp_poses(np.asarray(start)[None])[0, :3, :3]
+        axis = tuple((turned * np.array(direction)[:, None]).sum(axis=0).tolist())
+    return replace(options, tilt_axis=axis, tilt_direction=direction)
+
+
+def _leaning_freely(options: PlanOptions) -> PlanOptions:
+    if options.tilt_max == NO_TILT:
+        return options
+    return replace(options, tilt_max=NO_TILT, tilt_axis=(), tilt_direction=())
+
+
+def cone_of(options: PlanOptions, scene: PlanningScene) -> ToolCone | None:
+    """The cone that options with an axis ask for; None: none."""
+    if options.tilt_max == NO_TILT or not options.tilt_axis:
+        return None
+    axis, direction = (np.array(of) for of in (options.tilt_axis, options.tilt_direction or UP))
+    return ToolCone(scene.chain, axis, direction, options.tilt_max)
+
+
 @dataclass(frozen=True, eq=False)
 class Context:
     """scene: where the robot moves. options: as they were checked, with the robot's own price of a
@@ -174,6 +203,23 @@ class Context:
         return self.scene.limits.scaled(
             self.options.velocity_scaling, self.options.acceleration_scaling
         )
+
+    @cached_property
+    def cone(self) -> ToolCone | None:
+        """In which the tool has to stay; None: nothing is asked, or its axis is that of a start
+        which nobody has named yet.
+        """
+        return cone_of(self.options, self.scene)
+
+    def upright_from(self, start: FloatArray) -> "Context":
+        """The same with the axis named whose tilt counts on a movement from start (n,)."""
+        if self.options.tilt_max == NO_TILT:
+            return self
+        return replace(self, options=upright_options(self.options, self.scene, start))
+
+    def leaning_freely(self) -> "Context":
+        """The same without a bound of the tool's tilt."""
+        return replace(self, options=_leaning_freely(self.options))
 
     def thresholds(self) -> FloatArray:
         """Distance (Z,) m that each pair must exceed."""

@@ -18,6 +18,7 @@ from ir_planner.scene.planning_scene import (
     scene_with,
     with_parts,
 )
+from ir_planner.scene.tool_cone import TILT_TOLERANCE, ToolCone
 from ir_planner.scene.zones import polynomials_between, spans_outside, tcp_inside
 
 __all__ = [
@@ -26,12 +27,14 @@ __all__ = [
     "PROOF_TOLERANCE",
     "RUNNING",
     "STILL",
+    "TILT_TOLERANCE",
     "Drives",
     "Dynamics",
     "LinkVoltage",
     "MotionLimits",
     "PlanningScene",
     "Stops",
+    "ToolCone",
     "lasting_longer",
     "load_text",
     "movement_cost",

@@ -2,10 +2,10 @@
 
 from ir_planner.search.correction import correction_log
 from ir_planner.search.guesses import guesses
-from ir_planner.search.port import Ends, Found, Search, quick, repeatable
+from ir_planner.search.port import Ends, Found, Search, keeps_upright, quick, repeatable
 from ir_planner.search.registry import SEARCHES, not_installed, registered
 from ir_planner.search.shortcuts import fewest_corners, pulled, straight_along
-from ir_planner.search.tree import connect, joint_scale
+from ir_planner.search.tree import connect
 from ir_planner.search.variety import COARSE, EXIT, apart, at_nine_shares, first_different
 
 __all__ = [
@@ -22,7 +22,7 @@ __all__ = [
     "fewest_corners",
     "first_different",
     "guesses",
-    "joint_scale",
+    "keeps_upright",
     "not_installed",
     "pulled",
     "quick",

@@ -8,6 +8,7 @@ this is the cheap attempt before the trees.)
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -81,6 +82,7 @@ def scattered(
 class Detours:
     """Simple detours over one or two via configurations, all certified in one batch."""
 
+    keeps_upright: ClassVar[bool] = True
     vias: int = setting(160, "Scattered via configurations per goal.", minimum=1, maximum=100_000)
 
     def __post_init__(self) -> None:
@@ -97,6 +99,7 @@ class Detours:
             candidates += over_retracted_arm(ends.start, goal, postures)
             candidates += scattered(ends.start, goal, space.low, space.high, self.vias, rng)
         candidates = [np.clip(path, space.low, space.high) for path in candidates]
+        candidates = space.kept_upright(candidates)
         free = space.paths_free(candidates)
         paths = [path for path, is_free in zip(candidates, free, strict=True) if is_free]
         return Found(different_paths(paths, space.scene.weights))
@@ -110,6 +113,7 @@ _PARTS = (1.0, 0.6, 0.3)  # of the free retraction from which detours are tried
 class Retract:
     """The tool is retracted along its axis at one end or both, then simple detours."""
 
+    keeps_upright: ClassVar[bool] = True
     length: float = setting(1.0, "Longest retraction.", unit="m", minimum=0.05, maximum=5.0)
     spacing: float = setting(
         0.05, "Distance of the configurations along it.", unit="m", minimum=0.005, maximum=0.5
@@ -152,6 +156,7 @@ class Retract:
                 ]
                 inner.extend(np.clip(inner_path, space.low, space.high) for inner_path in between)
                 lines.extend([(first, last)] * len(between))
+        inner = space.kept_upright(inner)
         free = space.paths_free(inner)
         return [
             np.concatenate([outward[:first], inner_path, inward[:last][::-1]])
@@ -194,8 +199,11 @@ def _ends(line: FloatArray) -> list[int]:
 
 @dataclass(frozen=True)
 class Direct:
-    """The straight movements to the goals that are free."""
+    """The straight movements to the goals that are free; where the tool has to stay upright, along
+    configurations near them.
+    """
 
+    keeps_upright: ClassVar[bool] = True
     paths: int = setting(
         3, "Straight movements that are taken, to as many goals.", minimum=1, maximum=64
     )
@@ -209,4 +217,10 @@ class Direct:
         """
         starts = np.repeat(ends.start[None], len(ends.goals), axis=0)
         free = np.flatnonzero(space.straight_free(starts, ends.goals))[: self.paths]
-        return Found([np.stack([ends.start, goal]) for goal in ends.goals[free]])
+        straight = [np.stack([ends.start, goal]) for goal in ends.goals[free]]
+        if straight or space.cone is None:
+            return Found(straight)
+        upright = space.kept_upright([np.stack([ends.start, goal]) for goal in ends.goals])
+        held = space.paths_free(upright)
+        paths = [path for path, is_free in zip(upright, held, strict=True) if is_free]
+        return Found(paths[: self.paths])

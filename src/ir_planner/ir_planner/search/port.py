@@ -42,7 +42,8 @@ class Search(Protocol):
         `work`).
 
         The same ends, space and seed give the same paths; a search that can't promise that has a
-        class attribute `repeatable = False`. Ends early when `work.exhausted`; what a search does
+        class attribute `repeatable = False`, and one that heeds the cone of the space
+        `keeps_upright = True`. Ends early when `work.exhausted`; what a search does
         beside certifying steps it charges itself. Raises CancelledError when asked to stop.
         """
 
@@ -58,6 +59,11 @@ class HasQuickVariant(Protocol):
 def quick(search: Search) -> Search:
     """The search with little work, where it has such a variant; else itself."""
     return search.quick() if isinstance(search, HasQuickVariant) else search
+
+
+def keeps_upright(search: Search) -> bool:
+    """Whether the paths of a search keep the tool in the cone of its space."""
+    return bool(getattr(search, "keeps_upright", False))
 
 
 def repeatable(search: Search) -> bool:

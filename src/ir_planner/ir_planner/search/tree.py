@@ -5,6 +5,7 @@ the budget, so that a request can be stopped between them.
 """
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,35 +13,18 @@ from ir_kernels.search import BidirectionalTree
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.search.port import Ends, Found
+from ir_planner.search.upright_tree import Meeting, connect_upright
 from ir_values.arrays import FloatArray
 from ir_values.settings import check_settings, setting
 
 _SLICE = 256  # edges between two looks at the clock, about 2 ms
-_LEAST_SCALE = 0.1  # of the first joint: the wrist still counts where it carries nothing
-
-
-def joint_scale(space: FreeSpace) -> FloatArray:
-    """How much each joint (n,) counts in the distance of configurations: the root of its weight in
-    eq. (9), the first one's being 1.
-    """
-    weights = space.scene.weights
-    return np.asarray(np.maximum(np.sqrt(weights / weights[0]), _LEAST_SCALE))
-
-
-@dataclass(frozen=True, eq=False)
-class Meeting:
-    """A free path (M, n), or None; then gap [rad]: how near the trees came, each joint by its
-    scale.
-    """
-
-    path: FloatArray | None
-    gap: float
 
 
 @dataclass(frozen=True)
 class Tree:
     """Bidirectional trees over certified edges: finds narrow passages, given work."""
 
+    keeps_upright: ClassVar[bool] = True
     edges: int = setting(
         100_000_000,
         "Certified edges before the trees are given up.",
@@ -79,6 +63,8 @@ def connect(
     isn't free.
     """
     work = space.work
+    if space.cone is not None:
+        return connect_upright(start, goals, space, space.cone, seed, most)
     search = BidirectionalTree(
         space.scene.collision,
         start,
@@ -86,7 +72,7 @@ def connect(
         space.threshold,
         space.low,
         space.high,
-        joint_scale(space),
+        space.scale,
         seed,
     )
     while not work.exhausted and search.edges < most:

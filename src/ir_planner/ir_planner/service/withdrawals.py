@@ -16,7 +16,7 @@ from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.request import Journal, Work
 from ir_planner.scene import path_cost
-from ir_planner.search import EXIT, connect, fewest_corners, first_different, joint_scale
+from ir_planner.search import EXIT, connect, fewest_corners, first_different
 from ir_planner.service.exit import Exit, ExitSearch, ExitsFound
 from ir_planner.service.modified_ga import ModifiedGa
 from ir_values.arrays import FloatArray
@@ -69,7 +69,7 @@ class ExitTree:
         postures = np.array([cell.park, cell.machine_home])
         drawn = rng.uniform(space.low, space.high, (self.drawn, len(postures[0])))
         drawn = drawn[problem.is_out(drawn)]
-        away = np.linalg.norm((drawn - problem.interaction) * joint_scale(space), axis=1)
+        away = np.linalg.norm((drawn - problem.interaction) * space.scale, axis=1)
         nearest = drawn[np.argsort(away, kind="stable")[: self.goals]]
         return np.concatenate([postures[problem.is_out(postures)], nearest])
 

@@ -21,6 +21,7 @@ from ir_planner.checks import (
     clearance_violation,
     measured,
     movement_energy,
+    tilt_violation,
     torque_proof,
     verified,
 )
@@ -55,6 +56,16 @@ class Movement:
         )
 
     @cached_property
+    def tilt(self) -> Violation | None:
+        """Where the tool leans too far; None: proved, or nothing is asked."""
+        return tilt_violation(self.trajectory, self.context.cone)
+
+    @property
+    def astray(self) -> Violation | None:
+        """Where its path can't be driven, however slowly: too near to something, or leaning."""
+        return self.clearance or self.tilt
+
+    @cached_property
     def torque(self) -> TorqueProof:
         """Bounds of the torque that it needs, which has to leave the reserve."""
         scene = self.context.scene
@@ -63,7 +74,8 @@ class Movement:
     @cached_property
     def verification(self) -> Verification:
         """What holds at every instant of it, as it is sent."""
-        return verified(self.trajectory, self.context.scene, self.clearance, self.torque)
+        found = (self.clearance, self.torque)
+        return verified(self.trajectory, self.context.scene, *found, tilt=self.tilt)
 
     @property
     def violation(self) -> Violation | None:
@@ -92,7 +104,12 @@ class Movement:
         context = self.context
         known = (self.verification, self.energy)
         return measured(
-            self.trajectory, context.scene, context.safety_distance, context.station, *known
+            self.trajectory,
+            context.scene,
+            context.safety_distance,
+            context.station,
+            *known,
+            context.cone,
         )
 
     @property
@@ -128,7 +145,7 @@ class Movement:
         known.
         """
         other = replace(self, context=context.at(self.context.station))
-        known = ("clearance", "torque", "verification", "energy", "evaluation")
+        known = ("clearance", "tilt", "torque", "verification", "energy", "evaluation")
         other.__dict__.update(
             {name: self.__dict__[name] for name in known if name in self.__dict__}
         )
@@ -151,12 +168,12 @@ def within_torque(
 ) -> Movement | None:
     """The movement made for the largest share of the torque with which its guaranteed bounds hold.
 
-    Ends with what `make` returns where that is None, is too near to something, or uses the smallest
-    share. Raises CancelledError when asked to stop.
+    Ends with what `make` returns where that is None, goes astray, or uses the smallest share.
+    Raises CancelledError when asked to stop.
     """
     for share in TORQUE_SHARES:
         context.work.check()
         movement = make(context.limits.with_torque_share(share))
-        if movement is None or movement.clearance is not None or movement.torque.violation is None:
+        if movement is None or movement.astray is not None or movement.torque.violation is None:
             break
     return movement

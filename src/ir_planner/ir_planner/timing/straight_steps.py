@@ -13,7 +13,7 @@ import numpy as np
 
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks import SLACK, Violation, clearance_violation
+from ir_planner.checks import SLACK, Violation, clearance_violation, tilt_violation
 from ir_planner.curves import extremes
 from ir_planner.request import Context
 from ir_planner.scene import STILL, Dynamics, MotionLimits, lasting_longer, torque_use
@@ -225,7 +225,8 @@ def _each_joint_alone(
 
 
 def _blocked(trajectory: JointTrajectory, context: Context) -> Violation | None:
-    return clearance_violation(trajectory, context.scene, context.safety_distance, context.station)
+    found = clearance_violation(trajectory, context.scene, context.safety_distance, context.station)
+    return found or tilt_violation(trajectory, context.cone)
 
 
 def _cut_corners(

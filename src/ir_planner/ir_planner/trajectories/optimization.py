@@ -17,7 +17,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlanningInfo, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks import AT_REST, SLACK, FreeSpace, end_in_collision
+from ir_planner.checks import AT_REST, SLACK, FreeSpace, end_in_collision, end_outside_cone
 from ir_planner.curves import UniformSpline, evenly_spaced
 from ir_planner.errors import RequestError
 from ir_planner.optimize import Descents, path_of
@@ -186,9 +186,15 @@ class _Optimization:
         self.searches = searches
         self.path = path_of(original, scene)
         self.journal = Journal(work, options.seed, planner_id="descent")
-        self.context = Context(scene, options, self.journal, _station_at(self.path[[0, -1]], scene))
+        context = Context(scene, options, self.journal, _station_at(self.path[[0, -1]], scene))
+        self.context = context.upright_from(self.path[0])
         self.options = self.context.options
-        self.space = FreeSpace.of(scene, options.safety_distance, work, self.context.station)
+        cone = self.context.cone
+        outside = end_outside_cone(self.path[0], self.path[-1], cone)
+        if outside is not None:
+            raise RequestError(StatusCode(outside.code), outside.message)
+        margin = options.safety_distance
+        self.space = FreeSpace.of(scene, margin, work, self.context.station, cone)
         self.descents = Descents(self.context)
         self.rerouting = False
         if self.context.station:

@@ -1,0 +1,212 @@
+"""A tool that is kept upright: what is certified, seen by Pinocchio; what is refused, and why."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pinocchio
+import pytest
+
+from ir_description import robot_urdf
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.status import StatusCode
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner import Planner, RequestError
+from ir_planner.regional import MovementPlan
+from ir_planner.request import cone_of, upright_options
+from ir_values.arrays import FloatArray
+
+CELLS = ("table_columns", "kr6_bench", "ur10e_bench")  # a KR 210, a KR 6, a UR10e
+UP = np.array([0.0, 0.0, 1.0])
+STEP_S = 2e-3
+TOLERANCE = 1.1e-6  # rad: of the proof, and of the judge
+GAP = 0.02  # of J, by which a wider cone may be worse: two descents end in different minima
+NARROW = np.radians(5.0)
+
+
+def planner_in(cell: str) -> Planner:
+    return Planner(cell, clock=itertools.repeat(0.0).__next__)
+
+
+class Judge:
+    """Tilts by Pinocchio, from the robot's URDF."""
+
+    def __init__(self, planner: Planner) -> None:
+        cell = planner.cell
+        self._model = pinocchio.buildModelFromXML(robot_urdf(cell.robot, (), cell.tcp))
+        self._data = self._model.createData()
+        self._hand = self._model.getFrameId("tcp")
+        self._turned = np.asarray(cell.base_pose)[:3, :3]
+
+    def rotation(self, q: FloatArray) -> FloatArray:
+        """(3, 3) of the tcp in the cell at q (n,)."""
+        pinocchio.framesForwardKinematics(self._model, self._data, q)
+        return np.asarray(self._turned @ self._data.oMf[self._hand].rotation)
+
+    def largest(
+        self, trajectory: JointTrajectory, axis: FloatArray, direction: FloatArray
+    ) -> float:
+        """The largest tilt [rad] at samples of a trajectory."""
+        count = int(trajectory.duration / STEP_S) + 2
+        q = trajectory.sample(np.linspace(0.0, trajectory.duration, count)).q
+        tilts = []
+        for row in q:
+            leaning = self.rotation(row) @ axis
+            sine = np.linalg.norm(np.cross(leaning, direction))
+            tilts.append(np.arctan2(sine, leaning @ direction))
+        return float(np.max(tilts))
+
+
+def upright_poses(planner: Planner, count: int, seed: int) -> list[FloatArray]:
+    """Free poses (4, 4) of the tool, whose x axis points down."""
+    rng = np.random.default_rng(seed)
+    robot = planner.cell.robot
+    reach = float(np.abs(robot.joint_origin[1:, :3, 3]).sum())
+    base = np.asarray(planner.cell.base_pose)[:3, 3]
+    down = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    found: list[FloatArray] = []
+    while len(found) < count:
+        around, yaw = rng.uniform(-np.pi, np.pi, 2)
+        radius, height = rng.uniform(0.35, 0.6) * reach, rng.uniform(0.15, 0.5) * reach
+        c, s = np.cos(yaw), np.sin(yaw)
+        pose = np.eye(4)
+        pose[:3, :3] = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ down
+        pose[:3, 3] = base + np.array([radius * np.cos(around), radius * np.sin(around), height])
+        if planner.compute_ik(pose).solutions:
+            found.append(pose)
+    return found
+
+
+def upright_ends(planner: Planner, seed: int) -> tuple[FloatArray, FloatArray]:
+    """A free configuration (n,) and a free pose (4, 4)."""
+    first, second = upright_poses(planner, 2, seed)
+    return np.array(planner.compute_ik(first).solutions[0].q), second
+
+
+def cost(plan: MovementPlan, planner: Planner) -> float:
+    report = plan.report
+    return report.energy - report.base_energy + planner.cell.robot.time_value * report.duration
+
+
+@pytest.mark.parametrize("cell", CELLS)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_tool_leans_no_farther_than_asked(cell: str, seed: int) -> None:
+    planner = planner_in(cell)
+    judge = Judge(planner)
+    start, goal = upright_ends(planner, seed)
+    free = planner.plan_regional(start=start, goal=goal)
+    assert free.status.ok, free.status.message
+    axis = judge.rotation(start).T @ UP
+    before = np.inf
+    for most in (NARROW, np.radians(20.0), np.radians(60.0), np.pi):
+        plan = planner.plan_regional(start=start, goal=goal, tilt_max=most)
+        assert plan.status.ok, plan.status.message
+        assert plan.trajectory is not None
+        assert plan.report.certified
+        if most == np.pi:
+            assert free.trajectory is not None
+            assert plan.trajectory.trajectory_id == free.trajectory.trajectory_id
+            continue
+        seen = judge.largest(plan.trajectory, axis, UP)
+        assert seen <= most + TOLERANCE
+        assert seen <= plan.report.largest_tilt + TOLERANCE
+        assert plan.report.largest_tilt <= seen + 1e-3
+        assert cost(plan, planner) <= (1.0 + GAP) * before
+        before = min(before, cost(plan, planner))
+
+
+@pytest.mark.parametrize("objective", ["time", "energy", "movement_cost", "time_and_energy"])
+@pytest.mark.parametrize("timing", ["synchronous", "asynchronous"])
+def test_every_objective_and_timing_keeps_it(objective: str, timing: str) -> None:
+    planner = planner_in("kr6_bench")
+    judge = Judge(planner)
+    start, goal = upright_ends(planner, 5)
+    axis = judge.rotation(start).T @ UP
+    plan = planner.plan_regional(
+        start=start, goal=goal, tilt_max=NARROW, objective=objective, timing=timing
+    )
+    assert plan.status.ok, plan.status.message
+    assert plan.trajectory is not None
+    assert judge.largest(plan.trajectory, axis, UP) <= NARROW + TOLERANCE
+
+
+@pytest.mark.parametrize("planner_id", ["direct", "tree", "detours", "retract"])
+def test_a_named_search_keeps_it_or_finds_nothing(planner_id: str) -> None:
+    planner = planner_in("table_columns")
+    judge = Judge(planner)
+    start, goal = upright_ends(planner, 7)
+    axis = judge.rotation(start).T @ UP
+    plan = planner.plan_regional(start=start, goal=goal, tilt_max=NARROW, planner_id=planner_id)
+    if plan.trajectory is None:
+        assert planner_id != "tree"
+        assert plan.status.code == StatusCode.PLANNING_FAILED
+    else:
+        assert judge.largest(plan.trajectory, axis, UP) <= NARROW + TOLERANCE
+
+
+def test_half_a_turn_of_the_first_axis_with_a_given_axis_and_direction() -> None:
+    planner = planner_in("open")
+    start = np.radians([-90.0, -80.0, 100.0, 0.0, 70.0, 0.0])
+    goal = np.radians([90.0, -70.0, 80.0, 0.0, 80.0, 0.0])
+    plan = planner.plan_regional(
+        start=start,
+        goal=goal,
+        tilt_max=np.radians(12.0),
+        tilt_axis=(-1.0, 0.0, 0.0),
+        tilt_direction=(0.0, 0.0, 2.0),
+    )
+    assert plan.status.ok, plan.status.message
+    assert plan.trajectory is not None
+    seen = Judge(planner).largest(plan.trajectory, np.array([-1.0, 0.0, 0.0]), UP)
+    assert seen <= np.radians(12.0) + TOLERANCE
+
+
+def test_ends_outside_are_refused_with_value_bound_and_unit() -> None:
+    planner = planner_in("open")
+    upright, _ = upright_ends(planner, 3)
+    leaning = upright + np.radians([0.0, 0.0, 0.0, 0.0, 15.0, 0.0])
+    plan = planner.plan_regional(start=upright, goal=leaning, tilt_max=NARROW)
+    assert plan.status.code == StatusCode.GOAL_VIOLATES_PATH_CONSTRAINTS
+    assert "15.0 deg" in plan.status.message
+    assert "at the goal: it must be at most 5.0 deg" in plan.status.message
+    axis = tuple(Judge(planner).rotation(upright).T @ UP)
+    plan = planner.plan_regional(start=leaning, goal=upright, tilt_max=NARROW, tilt_axis=axis)
+    assert plan.status.code == StatusCode.START_STATE_VIOLATES_PATH_CONSTRAINTS
+    for wrong, said in (
+        ({"tilt_max": 4.0}, r"tilt_max is 4 rad: it must be in \[0, 3.14159\] rad"),
+        ({"tilt_axis": (0.0, 0.0, 1.0)}, "without a tilt_max"),
+        ({"tilt_max": 0.1, "tilt_axis": (0.0, 0.0)}, "2 numbers"),
+        ({"tilt_max": 0.1, "tilt_direction": (0.0, 0.0, 0.0)}, "must have a length"),
+        ({"tilt_max": 0.1, "planner_id": "genetic"}, "searches that keep it are direct, tree"),
+    ):
+        with pytest.raises(RequestError, match=said):
+            planner.plan_regional(start=upright, goal=leaning, **wrong)
+
+
+def test_a_tilt_between_the_points_of_a_trajectory_is_found() -> None:
+    """Its points stand upright; between two of them the hand swings out and back."""
+    planner = planner_in("open")
+    q, _ = upright_ends(planner, 4)
+    names = planner.cell.robot.joint_names
+    away = np.zeros(6)
+    away[4] = 0.8
+    nanoseconds = np.arange(0, 5) * 1_000_000_000
+    upright = np.tile(q, (5, 1))
+    swing = np.zeros((5, 6))
+    swing[2] = away
+    still = np.zeros((5, 6))
+    given = JointTrajectory(names, nanoseconds, upright, swing, still)
+    asked = upright_options(PlanOptions(tilt_max=NARROW), planner.scene(), q)
+    cone = cone_of(asked, planner.scene())
+    assert cone is not None
+    assert cone.holds(given.positions).all()
+    proof = cone.proof(*given.coefficients())
+    assert not proof.ok.all()
+    found = planner.evaluate(given, tilt_max=NARROW)
+    assert not found.report.certified
+    assert "it must be at most 5.0 deg" in found.status.message
+    wide = planner.evaluate(given, tilt_max=1.0)
+    assert "leans" not in wide.status.message
+    axis = Judge(planner).rotation(q).T @ UP
+    assert Judge(planner).largest(given, axis, UP) <= wide.report.largest_tilt <= 0.8
