@@ -8,7 +8,7 @@ import pytest
 
 from ir_cli.main import main
 from ir_cli.output import kilowatt_hours
-from ir_description import bundled_cells, cell_to_yaml, load_cell
+from ir_description import bundled_cells, bundled_robot_cells, cell_to_yaml, load_cell
 
 
 @pytest.mark.parametrize("name", bundled_cells())
@@ -58,7 +58,10 @@ def test_the_energy_of_a_small_robot_is_more_than_zeros(joules: float, shown: st
 
 def test_list_prints_every_bundled_cell(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["cell", "list"]) == 0
-    assert set(capsys.readouterr().out.split()) == set(bundled_cells())
+    assert set(capsys.readouterr().out.split()) == {
+        *bundled_cells(),
+        *bundled_robot_cells(),
+    }
 
 
 def test_searches_that_nobody_has_are_errors_with_their_line(

@@ -19,7 +19,7 @@ ROOMS = {
         "errors", "presentation", "cycle", "curves", "scene", "request", "checks", "configurations", "timing", "search", "optimize",  # noqa: E501
         "cartesian", "regional", "trajectories", "service", "settings", "program", "store",
         "current_cell", "certificates", "state_queries", "waiting_postures", "flexible", "planner",
-        "krl", "before_after", "what_if", "node", "contract",
+        "krl", "robots", "before_after", "what_if", "node", "contract",
     ),
     "ir_description": (
         "poses", "shapes", "robot", "cell", "files", "library",

@@ -29,6 +29,7 @@ from ir_description import (
     Finding,
     UnknownNameError,
     bundled_cells,
+    bundled_robot_cells,
     cell_file_errors,
     cell_file_line,
     check_cell,
@@ -124,7 +125,7 @@ def run_new(arguments: argparse.Namespace) -> int:
 def run_list(arguments: argparse.Namespace) -> int:
     """Print the bundled cells."""
     if not (arguments.json or arguments.csv):
-        sys.stdout.write("\n".join(bundled_cells()) + "\n")
+        sys.stdout.write("\n".join((*bundled_cells(), *bundled_robot_cells())) + "\n")
         return 0
     rows: list[Row] = [
         {

@@ -37,6 +37,7 @@ from ir_cli.planning import (
     sentences,
     supply,
 )
+from ir_cli.robots_plan import robots_of, run_robots
 from ir_cli.steady import OUTPUTS, add_steady, run_steady
 from ir_description import Cell
 from ir_msgs_py.options import PlanOptions
@@ -107,6 +108,9 @@ def _output(text: str) -> Path:
 
 def run_plan(arguments: argparse.Namespace) -> int:
     """Plan and print; exit code 1 where nothing is found."""
+    several = robots_of(arguments.cell or "")
+    if several is not None:
+        return run_robots(arguments, several)
     if arguments.parts_per_hour is not None:
         return run_steady(arguments, lambda *what: _report(arguments, *what))
     _check_steady_options(arguments)

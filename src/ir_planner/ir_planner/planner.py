@@ -514,6 +514,30 @@ class Planner:
         from the fastest to the cheapest.
         """
         options, note = self._checked(options_with(options, changes))
+        request, work = self._cycle_request(options, cancelled)
+        plan = plan_steady_cycle(
+            request, parts_per_hour, work, saving=saving, front_points=front_points
+        )
+        if plan.program is not None and plan.request is not None:
+            plan = replace(plan, program=self.kept_program(plan.program, plan.request))
+        return replace(plan, info=noted(plan.info, note))
+
+    def cycle_request(
+        self, options: PlanOptions | None = None, cancelled: Cancelled = _NEVER
+    ) -> tuple[ProgramRequest, Work]:
+        """What is asked for a cycle of the cell's program or route, from its park posture on."""
+        return self._cycle_request(self._checked(options or PlanOptions())[0], cancelled)
+
+    def kept_program(self, program: ProgramPlan, request: ProgramRequest) -> ProgramPlan:
+        """A program in the cell of its request with what it is certified by; it is stored."""
+        spreads = Spreads(request)
+        program = program_in(program, cell_hash(request.cell), self.heard.source, spreads)
+        self._remember(program)
+        return program
+
+    def _cycle_request(
+        self, options: PlanOptions, cancelled: Cancelled
+    ) -> tuple[ProgramRequest, Work]:
         cell = self.cell
         request = ProgramRequest(
             cell,
@@ -524,18 +548,8 @@ class Planner:
             settings=replace(self.settings, transitions=self.heard.transitions),
             doors=self.heard.doors(cell),
         )
-        stops = 3 * len(cell.route.visits) if cell.route is not None else 1
-        work = self._work(options, cancelled, stops)
-        plan = plan_steady_cycle(
-            request, parts_per_hour, work, saving=saving, front_points=front_points
-        )
-        if plan.program is not None and plan.request is not None and plan.cell is not None:
-            spreads = Spreads(plan.request)
-            source = self.heard.source
-            program = program_in(plan.program, cell_hash(plan.cell), source, spreads)
-            self._remember(program)
-            plan = replace(plan, program=program)
-        return replace(plan, info=noted(plan.info, note))
+        stops = 3 * len(cell.route.visits) if cell.route is not None else len(cell.program)
+        return request, self._work(options, cancelled, max(stops, 1))
 
     def _goal(self, goal: Place) -> Goal:
         """The goal as a value, joint values within their limits. Raises RequestError."""

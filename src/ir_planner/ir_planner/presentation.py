@@ -172,6 +172,51 @@ def plot_cycle(
     return figure
 
 
+def plot_robots(
+    robots: Sequence[tuple[str, float, Sequence[PlannedMovement]]],
+    zones: Sequence[tuple[str, str, float, float]],
+    period: float,
+    title: str,
+) -> Any:
+    """Gantt chart of robots over a cycle. robots: name, begin of the steps [s], and the steps;
+    zones: name, robot, begin and length [s] of its turn.
+    """
+    figure, (chart,) = _figure(1)
+    figure.suptitle(title, wrap=True, fontsize="medium")
+    figure.set_size_inches(11, 5)
+    rows = [name for name, _, _ in robots]
+    rows += list(dict.fromkeys(name for name, _, _, _ in zones))
+    for row, (_, begin, steps) in enumerate(robots):
+        for step in steps:
+            colour = _KINDS["wait" if step.is_pause else "transport"]
+            _bar(chart, (begin, step.duration), row, period, colour)
+            if step.is_pause and step.power_mode:
+                at = begin % period
+                mode = step.power_mode.lower()
+                chart.text(at, row + 0.45, mode, fontsize="x-small", va="bottom", clip_on=True)
+            begin += step.duration
+    colours = {name: f"C{row + 1}" for row, (name, _, _) in enumerate(robots)}
+    for name, robot, begin, length in zones:
+        _bar(chart, (begin, length), rows.index(name), period, colours[robot])
+        chart.text(begin % period, rows.index(name), robot, fontsize="small", clip_on=True)
+    chart.set_yticks(range(len(rows)), rows)
+    chart.set_xlim(0.0, period)
+    chart.set_xlabel("time [s]")
+    chart.invert_yaxis()
+    return figure
+
+
+def _bar(chart: Any, span: tuple[float, float], row: int, period: float, colour: str) -> None:
+    """A bar from begin to end of a span (begin, length); over the end of the cycle it goes on at
+    its begin.
+    """
+    begin = span[0] % period
+    before = min(span[1], period - begin)
+    bars = [(begin, before), (0.0, span[1] - before)]
+    shown = [bar for bar in bars if bar[1] > 0.0]
+    chart.broken_barh(shown, (row - 0.4, 0.8), color=colour, edgecolor="white")
+
+
 def plot_throughputs(points: Sequence[tuple[float, float]], title: str) -> Any:
     """Joules a part over parts an hour, as a matplotlib figure."""
     figure, (axes,) = _figure(1)

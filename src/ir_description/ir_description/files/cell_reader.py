@@ -94,6 +94,8 @@ def read_robot_cells(
     text: str, source: str, robots: RobotSource, folder: Path | None
 ) -> RobotCells | None:
     """Return the cells of a text with several robots; None: it has one."""
+    if "robots" not in text:
+        return None
     root = read_items(text, source, CellFileError)
     return robot_cells_of(root, robots, folder) if root.holds("robots") else None
 

@@ -1,5 +1,15 @@
 """The cheapest steady cycle: mixed-integer linear programs, and what is made of them."""
 
+from ir_planner.cycle.joint import (
+    ArmSchedule,
+    ArmWork,
+    JointCycle,
+    Stretch,
+    Zone,
+    cheapest_joint,
+    shortest_joint,
+    zones_of,
+)
 from ir_planner.cycle.linear import LinearAnswer, LinearProgram
 from ir_planner.cycle.steady import (
     UNITS_MAX,
@@ -17,16 +27,24 @@ from ir_planner.cycle.steady import (
 
 __all__ = [
     "UNITS_MAX",
+    "ArmSchedule",
+    "ArmWork",
     "Curve",
+    "JointCycle",
     "LinearAnswer",
     "LinearProgram",
     "SteadyCycle",
     "SteadyProblem",
+    "Stretch",
     "Visit",
     "Wait",
     "WaitMode",
+    "Zone",
     "cheapest_cycle",
+    "cheapest_joint",
     "fastest_cycle",
     "in_turn",
     "shared_among",
+    "shortest_joint",
+    "zones_of",
 ]

@@ -38,7 +38,7 @@ from ir_planner.timing import Movement
 Key = tuple[str, str, str, bool]
 """A kind of movement, from which station, to which, and whether a part is held."""
 
-_RUNGS = (20, 17, 14, 11, 8, 5, 2, 0)  # of the ladder of time values: from time alone to least
+RUNGS = (20, 17, 14, 11, 8, 5, 2, 0)  # of the ladder of time values: from time alone to least
 _SLOWER = (1.15, 1.3, 1.5, 1.75, 2.0, 2.5, 3.0)  # times the slowest, where a wait costs more
 
 
@@ -110,18 +110,18 @@ def planned_columns(request: ProgramRequest, route: PartRoute, context: Context)
     movements = Movements(over, layers, context, settings.searches)
     with context.journal.stage("curves") as notes:
         values = TimeValues(Ladder(movements, improvement), list(parts))
-        for rung in _RUNGS:
+        for rung in RUNGS:
             values.seconds(rung)
         fronts = values.fronts()
-        notes.append(f"{len(parts)} movements at {len(_RUNGS)} values of a second")
+        notes.append(f"{len(parts)} movements at {len(RUNGS)} values of a second")
     columns = {
-        key: Column.of(_slower([point.movement for point in fronts[part]]))
+        key: Column.of(slowed_down([point.movement for point in fronts[part]]))
         for part, key in parts.items()
     }
     return Tending(request.cell, route, scenes, nodes, choices, columns)
 
 
-def _slower(front: list[Movement]) -> list[Movement]:
+def slowed_down(front: list[Movement]) -> list[Movement]:
     """The movements, and the slowest slowed down as long as its drives save by that."""
     slowest = front[-1]
     drives = slowest.energy.total - slowest.energy.base

@@ -4,6 +4,7 @@ modes.
 
 from ir_planner.program.chain import cheapest_chain
 from ir_planner.program.choice import Choice
+from ir_planner.program.more_work import chosen
 from ir_planner.program.movements import Movements
 from ir_planner.program.pauses import (
     AUTO,
@@ -17,7 +18,7 @@ from ir_planner.program.pauses import (
     spent,
     switch_times,
 )
-from ir_planner.program.program import Outlook, outlook, plan_program, program_of
+from ir_planner.program.program import Outlook, outlook, plan_program, prepared, program_of
 from ir_planner.program.request import (
     ProgramPlan,
     ProgramRequest,
@@ -77,6 +78,7 @@ __all__ = [
     "at_once",
     "best_posture",
     "cheapest_chain",
+    "chosen",
     "common_program",
     "doors_advice",
     "doors_along",
@@ -87,6 +89,7 @@ __all__ = [
     "pause_by_itself",
     "placed_steps",
     "plan_program",
+    "prepared",
     "program_of",
     "rests_at",
     "spent",

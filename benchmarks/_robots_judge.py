@@ -1,0 +1,210 @@
+"""Cells of two robots drawn at random, and a judge of their joint cycles that knows the programs
+with their signals alone: it drives them with delays of its own, and measures distances with Coal.
+"""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass
+from typing import Any
+
+import coal
+import numpy as np
+from _coal_shapes import along_z
+
+from ir_description import Cell
+from ir_kernels import Chain
+from ir_msgs_py.report import PlannedMovement
+from ir_planner.robots import RobotsPlan
+from ir_values.arrays import FloatArray
+
+RESOLUTION = 0.5e-3  # s: no two looks are nearer to each other
+_TOOL = (
+    "{{name: {0}_tool, mass: 1.5, com: [0.06, 0, 0], inertia_box: [0.12, 0.1, 0.06], "
+    "capsules: [{{name: {0}_body, p0: [0.03, 0, 0], p1: [0.1, 0, 0], radius: 0.04}}]}}"
+)
+_ROBOT = """\
+  - name: {0}
+    robot: kr6_r900_2
+    base: {{xyz: [{1}, 0, 0], abc_deg: [{2}, 0, 0]}}
+    park_deg: [{3}, -110, 120, 0, 60, 0]
+    tool: {4}
+    tcp: {{xyz: [0.16, 0, 0]}}
+    program: [{5}, {{posture: park}}]
+"""
+
+
+def drawn_cell(seed: int, distance: tuple[float, float] = (0.8, 1.3)) -> str:
+    """The text of a cell: two KR 6 face each other, `distance` [m] apart, and visit stations
+    between them, from above.
+    """
+    rng = np.random.default_rng(seed)
+    apart = float(rng.uniform(*distance))
+    stations = []
+    robots = []
+    for name, x, turn in (("left", 0.0, 0.0), ("right", apart, 180.0)):
+        visits = []
+        for k in range(int(rng.integers(2, 4))):
+            angle = np.radians(turn + rng.uniform(-60.0, 60.0))
+            reach = rng.uniform(0.4, 0.6)
+            place = [x + reach * np.cos(angle), reach * np.sin(angle), rng.uniform(0.25, 0.5)]
+            pose = f"{{xyz: {np.round(place, 4).tolist()}, abc_deg: [0, 90, 0]}}"
+            stations.append(f"      - {{name: {name}_{k}, pose: {pose}, approach_distance: 0.08}}")
+            visits.append(f"{{station: {name}_{k}, dwell: {rng.uniform(0.1, 0.6):.3f}}}")
+        park = round(float(rng.uniform(-150.0, 150.0)), 2)
+        tool = _TOOL.format(name)
+        robots.append(_ROBOT.format(name, round(x, 4), turn, park, tool, ", ".join(visits)))
+    return "\n".join(
+        [
+            "format: ir_cell/1",
+            f"name: drawn_{seed}",
+            "equipment:",
+            "  - name: places",
+            "    bodies: []",
+            "    zone: {kind: OPEN, size: [0.1, 0.1, 0.1], xyz: [0, 0, 5]}",
+            "    stations:",
+            *stations,
+            "robots:",
+            *robots,
+        ]
+    )
+
+
+@dataclass(frozen=True)
+class Piece:
+    """What a robot does from a time on [s]: a step, or standing before it (moving: False)."""
+
+    begin: float
+    step: PlannedMovement
+    moving: bool
+
+
+def driven(
+    plan: RobotsPlan, rng: np.random.Generator, cycles: int, *, delay: float = 1.0
+) -> list[list[Piece]]:
+    """The steps of every robot over some cycles, each begun up to `delay` s late, and never before
+    its signals are there. Raises RuntimeError where all wait for each other.
+    """
+    signals = {zone.signal: zone.initial for zone in plan.zones}
+    todo = [list(program.movements) * cycles for program in plan.programs]
+    pieces: list[list[Piece]] = [[] for _ in todo]
+    done = [0] * len(todo)
+    waiting: set[int] = set()
+    events: list[tuple[float, int, bool]] = []
+    for robot in range(len(todo)):
+        heapq.heappush(events, (0.0, robot, False))
+    now = 0.0
+    while events:
+        now, robot, ended = heapq.heappop(events)
+        if ended:
+            for text in todo[robot][done[robot]].set_signals:
+                signals[text.removesuffix("=0")] = not text.endswith("=0")
+            done[robot] += 1
+            if done[robot] < len(todo[robot]):
+                heapq.heappush(events, (now + rng.uniform(0.0, delay), robot, False))
+                pieces[robot].append(Piece(now, todo[robot][done[robot]], moving=False))
+        elif not pieces[robot]:
+            pieces[robot].append(Piece(0.0, todo[robot][0], moving=False))
+            waiting.add(robot)
+        else:
+            waiting.add(robot)
+        for each in sorted(waiting):
+            step = todo[each][done[each]]
+            if all(signals[w.removesuffix("=0")] != w.endswith("=0") for w in step.wait_for):
+                waiting.discard(each)
+                pieces[each].append(Piece(now, step, moving=True))
+                heapq.heappush(events, (now + step.duration, each, True))
+    if waiting:
+        raise RuntimeError(f"robots {sorted(waiting)} wait for ever, from {now:.2f} s on")
+    return pieces
+
+
+class Judge:
+    """Distances between two robots by Coal."""
+
+    def __init__(self, cells: tuple[Cell, Cell]) -> None:
+        self._cells = cells
+        self._chains = [Chain(cell.robot, cell.base_pose, cell.tcp) for cell in cells]
+        self._shapes: list[dict[str, list[tuple[int, Any, FloatArray]]]] = [{}, {}]
+        self._request = coal.DistanceRequest()
+        self._request.gjk_tolerance = 1e-9
+        # no point of an arm is faster than all joints at full speed with the whole arm as lever
+        self.speed = sum(_reach(cell) * float(cell.robot.velocity_max.sum()) for cell in cells)
+
+    def least(self, pieces: list[list[Piece]], margin: float) -> tuple[float, float]:
+        """The least distance [m] and when it is [s]; between two looks nothing nearer than the
+        margin is missed unless it is over within the resolution.
+        """
+        end = max(own[-1].begin + own[-1].step.duration for own in pieces)
+        stands = [_begin(own) for own in pieces]
+        best = (np.inf, 0.0)
+        at = [0, 0]
+        q = [stands[0], stands[1]]
+        time = 0.0
+        while time <= end:
+            for robot, own in enumerate(pieces):
+                while at[robot] + 1 < len(own) and own[at[robot] + 1].begin <= time:
+                    q[robot] = _posture(own[at[robot]], np.inf, q[robot])
+                    at[robot] += 1
+            now = [_posture(own[at[k]], time, q[k]) for k, own in enumerate(pieces)]
+            loads = [own[at[k]].step.load for k, own in enumerate(pieces)]
+            distance = self.distance((now[0], now[1]), (loads[0], loads[1]))
+            best = min(best, (distance, time))
+            time += max((distance - margin) / self.speed, RESOLUTION)
+        return best
+
+    def distance(self, q: tuple[FloatArray, FloatArray], loads: tuple[str, str]) -> float:
+        """Of two arms at q with what they carry [m]."""
+        placed = []
+        for k in (0, 1):
+            links = self._chains[k].link_poses(np.ascontiguousarray(q[k][None]))[0]
+            own = [(s, links[link] @ local) for link, s, local in self._capsules(k, loads[k])]
+            placed.append(
+                [(s, coal.Transform3s(p[:3, :3].copy(), p[:3, 3].copy())) for s, p in own]
+            )
+        return min(
+            coal.distance(one, here, other, there, self._request, coal.DistanceResult())
+            for one, here in placed[0]
+            for other, there in placed[1]
+        )
+
+    def _capsules(self, robot: int, load: str) -> list[tuple[int, Any, FloatArray]]:
+        known = self._shapes[robot]
+        if load not in known:
+            cell = self._cells[robot]
+            held = [part.name for part in cell.parts if part.name in load.split("+")]
+            known[load] = [
+                (
+                    c.link,
+                    coal.Capsule(c.radius, float(np.linalg.norm(c.p1 - c.p0))),
+                    along_z(c.p0, c.p1) if (c.p0 != c.p1).any() else _at(c.p0),
+                )
+                for c in cell.capsules(held[0] if held else "")
+                if c.link > 0
+            ]
+        return known[load]
+
+
+def _at(point: FloatArray) -> FloatArray:
+    pose = np.eye(4)
+    pose[:3, 3] = point
+    return pose
+
+
+def _reach(cell: Cell) -> float:
+    lengths = [float(np.linalg.norm(origin[:3, 3])) for origin in cell.robot.joint_origin]
+    return sum(lengths) + float(np.linalg.norm(cell.tcp[:3, 3])) + 0.5
+
+
+def _begin(pieces: list[Piece]) -> FloatArray:
+    """Where a robot stands before its first movement (n,)."""
+    return next(p.step.trajectory.positions[0] for p in pieces if p.step.trajectory is not None)
+
+
+def _posture(piece: Piece, time: float, before: FloatArray) -> FloatArray:
+    """Where a robot is at a time [s] in a piece (n,)."""
+    trajectory = piece.step.trajectory
+    if trajectory is None or not piece.moving:
+        return before
+    local = min(time - piece.begin, trajectory.duration)
+    return np.asarray(trajectory.sample([max(local, 0.0)]).q[0])

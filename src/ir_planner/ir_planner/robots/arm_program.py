@@ -1,0 +1,244 @@
+"""The program of one robot among several: its movements with their curves, and its stops."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ir_description import Capsule, Cell, Equipment
+from ir_kernels.swept import SweptArm
+from ir_msgs_py.report import PlannedMovement
+from ir_msgs_py.status import Status, StatusCode
+from ir_planner.checks import clearance_violation
+from ir_planner.cycle import ArmSchedule, ArmWork, Wait
+from ir_planner.errors import RequestError
+from ir_planner.flexible import RUNGS, Column, slowed_down, wait_modes
+from ir_planner.program import (
+    Charge,
+    Pause,
+    ProgramRequest,
+    StageError,
+    TimeValues,
+    chosen,
+    nobody,
+    prepared,
+    rests_at,
+    spent,
+)
+from ir_planner.request import Journal
+from ir_planner.scene import PlanningScene
+from ir_planner.timing import Movement
+from ir_values.arrays import FloatArray
+
+_SAME = 1e-9  # rad
+_TAU = 2.0 * np.pi
+
+
+@dataclass(frozen=True, eq=False)
+class Stop:
+    """Where a robot stands before a movement: q (n,), what it carries from then on (scene), and the
+    pauses of the program there.
+    """
+
+    name: str
+    q: FloatArray
+    scene: PlanningScene
+    pauses: tuple[PlannedMovement, ...]
+
+    @property
+    def seconds(self) -> float:
+        """How long the pauses take."""
+        return sum(pause.duration for pause in self.pauses)
+
+
+@dataclass(frozen=True, eq=False)
+class ArmProgram:
+    """steps: the movements as they are sent, without reports; columns: certified movements of each,
+    fastest first; stops: before each of them, the first one also after the last.
+    """
+
+    robot: str
+    request: ProgramRequest
+    steps: tuple[PlannedMovement, ...]
+    columns: tuple[Column, ...]
+    stops: tuple[Stop, ...]
+
+    @property
+    def cell(self) -> Cell:
+        """The cell of the robot."""
+        return self.request.cell
+
+    def label(self, k: int) -> str:
+        """A movement in words."""
+        step = self.steps[k % len(self.steps)]
+        if step.from_station == step.to_station:
+            return f"{step.kind} {step.to_station}"
+        return f"{step.kind} {step.from_station or 'start'} to {step.to_station}"
+
+    def work(self, movements: Sequence[Movement] | None = None) -> ArmWork:
+        """What the schedule decides about; movements: these alone instead of the columns."""
+        times = self.request.settings.transitions
+        curves = [column.curve for column in self.columns]
+        if movements is not None:
+            curves = [Column.of([movement]).curve for movement in movements]
+        return ArmWork(
+            tuple(curves),
+            tuple((stop.seconds, _joules(stop.pauses)) for stop in self.stops),
+            tuple(wait_modes(rests_at(stop.q, stop.scene, times)) for stop in self.stops),
+        )
+
+    def taking(self, schedule: ArmSchedule) -> list[Movement]:
+        """Certified movements of the seconds of a schedule."""
+        return [
+            column.taking(seconds)
+            for column, seconds in zip(self.columns, schedule.seconds, strict=True)
+        ]
+
+    def swept(self, movement: Movement) -> SweptArm:
+        """A movement as it is proved against other robots, whatever it carries."""
+        scene = movement.context.scene
+        return SweptArm(scene.chain, capsules_in(scene), *movement.trajectory.coefficients())
+
+    def standing(self, k: int) -> SweptArm:
+        """The stop before a movement."""
+        stop = self.stops[k]
+        return SweptArm.standing(stop.scene.chain, capsules_in(stop.scene), stop.q)
+
+    def driven(
+        self,
+        movements: Sequence[Movement],
+        waits: Sequence[Sequence[Wait]],
+        signals: Sequence[tuple[tuple[str, ...], tuple[str, ...]]],
+    ) -> tuple[PlannedMovement, ...]:
+        """The steps of a cycle from the stop before the first movement on; signals: which each
+        movement waits for, and which it sets. The capacitor is empty at its begin.
+        """
+        times = self.request.settings.transitions
+        charge = Charge(times)
+        steps: list[PlannedMovement] = []
+        for k, (step, movement) in enumerate(zip(self.steps, movements, strict=True)):
+            stop = self.stops[k]
+            for pause in stop.pauses:
+                asked = Pause(stop.name, pause.duration, pause.power_mode, stop.q, stop.scene)
+                steps.append(charge.stood(spent(asked, times), asked))
+            for wait in waits[k]:
+                asked = Pause(stop.name, wait.seconds, wait.mode, stop.q, stop.scene)
+                steps.append(charge.stood(spent(asked, times), asked))
+            trajectory = movement.trajectory
+            moving = replace(
+                step,
+                trajectory=trajectory,
+                trajectory_id=trajectory.trajectory_id,
+                duration=trajectory.duration,
+                report=movement.report,
+                wait_for=signals[k][0],
+                set_signals=(*step.set_signals, *signals[k][1]),
+            )
+            steps.append(charge.moved(moving, movement.energy, movement.context.scene))
+        return tuple(steps)
+
+    def too_near(self, movement: Movement, equipment: Equipment) -> bool:
+        """Whether a movement comes too near to bodies that its scene doesn't have."""
+        context = movement.context
+        cell = context.scene.cell
+        more = replace(cell, equipment=(*cell.equipment, equipment), program=(), route=None)
+        scene = replace(context.scene, cell=more)
+        found = clearance_violation(
+            movement.trajectory, scene, context.safety_distance, context.station
+        )
+        return found is not None
+
+
+def _joules(steps: Sequence[PlannedMovement]) -> float:
+    return sum(step.report.energy for step in steps)
+
+
+def capsules_in(scene: PlanningScene) -> tuple[Capsule, ...]:
+    """Capsules of the robot and of what it carries in a scene."""
+    return (*scene.cell.robot.capsules, *(c for load in scene.loads for c in load.capsules))
+
+
+def planned_arm(robot: str, request: ProgramRequest, journal: Journal) -> ArmProgram:
+    """The program of a robot by itself, certified in its cell at many durations. Raises
+    RequestError for one that doesn't end where it begins or waits for signals, StageError for what
+    isn't found.
+    """
+    cell = request.cell
+    for k, step in enumerate(cell.program, start=1):
+        if step.wait_for:
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"step {k} of the program of {robot} waits for {step.wait_for[0].name}: signals of "
+                "machines aren't planned with several robots yet, and those between robots follow "
+                "from the movements; leave it out",
+            )
+    try:
+        return _planned(robot, request, journal)
+    except StageError as failed:
+        status = failed.status
+        sentence = f"the program of {robot}: {status.message}"
+        raise StageError(Status(status.code, sentence)) from failed
+
+
+def _planned(robot: str, request: ProgramRequest, journal: Journal) -> ArmProgram:
+    route, context = prepared(request, journal)
+    choice = chosen(request, route, context, nobody)
+    values = TimeValues(choice.ladder, choice.parts)
+    with journal.stage(f"curves of {robot}") as notes:
+        for rung in RUNGS:
+            values.seconds(rung)
+        fronts = values.fronts()
+        notes.append(f"{len(choice.parts)} movements at {len(RUNGS)} values of a second")
+    columns = [
+        Column.of(slowed_down([point.movement for point in fronts[part]])) for part in choice.parts
+    ]
+    if not columns:
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS, f"the program of {robot} has no movement"
+        )
+    steps = choice.energies({p: c.movements[0] for p, c in zip(choice.parts, columns, strict=True)})
+    return _arm(robot, request, steps, columns)
+
+
+def _arm(
+    robot: str,
+    request: ProgramRequest,
+    steps: Sequence[PlannedMovement],
+    columns: Sequence[Column],
+) -> ArmProgram:
+    first = columns[0].movements[0]
+    end = columns[-1].movements[0].trajectory.positions[-1]
+    begin = first.trajectory.positions[0]
+    if np.abs(end - begin).max() > _SAME:
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"the program of {robot} ends elsewhere than it begins, so it can't be repeated: let "
+            "its last step be {posture: park}",
+        )
+    before: list[list[PlannedMovement]] = [[]]
+    moving: list[PlannedMovement] = []
+    for step in steps:
+        if step.is_pause:
+            if step.attach or step.detach or step.set_signals:
+                raise RequestError(
+                    StatusCode.INVALID_GOAL_CONSTRAINTS,
+                    f"the program of {robot} handles something where it already stands "
+                    f"({step.to_station}): with several robots a step that does has to move",
+                )
+            before[-1].append(step)
+        else:
+            moving.append(step)
+            before.append([])
+    pauses = [[*before[-1], *before[0]], *before[1:-1]]
+    names = [moving[-1].to_station, *(step.to_station for step in moving[:-1])]
+    stops = tuple(
+        Stop(name, column.movements[0].trajectory.positions[0], _scene(column), tuple(own))
+        for name, column, own in zip(names, columns, pauses, strict=True)
+    )
+    return ArmProgram(robot, request, tuple(moving), tuple(columns), stops)
+
+
+def _scene(column: Column) -> PlanningScene:
+    return column.movements[0].context.scene

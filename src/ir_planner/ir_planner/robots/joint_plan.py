@@ -1,0 +1,350 @@
+"""The cheapest joint cycle of several robots: programs, zones, order, speeds, waits and modes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from ir_description import RobotCells
+from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.status import Status, StatusCode
+from ir_planner.cycle import (
+    ArmSchedule,
+    ArmWork,
+    JointCycle,
+    Stretch,
+    WaitMode,
+    Zone,
+    cheapest_joint,
+    shortest_joint,
+    zones_of,
+)
+from ir_planner.errors import RequestError
+from ir_planner.planner import Planner
+from ir_planner.presentation import plot_robots
+from ir_planner.program import MOTORS, ProgramPlan, StageError, program_of
+from ir_planner.request import Journal, bounded
+from ir_planner.robots.arm_program import ArmProgram, planned_arm
+from ir_planner.robots.meetings import (
+    Cells,
+    Meetings,
+    check_lying_parts,
+    hand_over_cells,
+    ordered,
+)
+from ir_planner.settings import PlannerSettings
+from ir_planner.timing import Movement
+
+PERIOD_MAX = 86_400.0  # s
+_ROUNDING = 1e-6  # s: of the linear program
+_SLACK = 1.0005  # of the shortest period, where none is asked for
+_ROUNDS = 20  # until no chosen movements meet outside the zones
+_FOREVER = 1e6  # s
+
+Arms = tuple[ArmProgram, ...]
+Chosen = list[list[Movement]]
+
+
+@dataclass(frozen=True)
+class SharedZone:
+    """A zone that two robots pass in turns. signal: true while it is `robots[1]`'s turn, and
+    whether it is when the programs begin. movements: of each, from its first to its last one there.
+    enter, leave [s]: of both, in the cycle of the first robot.
+    """
+
+    robots: tuple[str, str]
+    movements: tuple[tuple[str, str], tuple[str, str]]
+    signal: str
+    initial: bool
+    first: str
+    enter: tuple[float, float]
+    leave: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class RobotsPlan:
+    """programs: one cycle of each of `robots`, from the stop before its first movement on; begins
+    [s]: when that is, in the cycle of the first robot; period [s]; fastest [s]: the shortest that
+    is possible. joules of all in a cycle; full_speed [J]: of the same zones with all movements as
+    fast as they can and motors on in every wait. gap [%]: how far joules can be above the least for
+    these configurations, zones and curves. peak_power [W]: no shift of the robots needs more.
+    proved: pairs of movements and stops that are free of each other at every relative timing.
+    """
+
+    status: Status
+    name: str
+    robots: tuple[str, ...] = ()
+    programs: tuple[ProgramPlan, ...] = ()
+    planners: tuple[Planner, ...] = ()
+    zones: tuple[SharedZone, ...] = ()
+    begins: tuple[float, ...] = ()
+    period: float = 0.0
+    fastest: float = 0.0
+    full_speed: float = 0.0
+    gap: float = 0.0
+    proved: int = 0
+
+    @property
+    def joules(self) -> float:
+        """Of all robots in a cycle."""
+        return sum(program.report.energy for program in self.programs)
+
+    @property
+    def peak_power(self) -> float:
+        """The sum of the peaks [W], which is enough for every shift."""
+        return sum(program.report.peak_power for program in self.programs)
+
+    @property
+    def certified(self) -> bool:
+        """Whether every robot keeps clear of the cell and of the others, whenever each moves."""
+        return bool(self.programs) and all(each.report.certified for each in self.programs)
+
+    def __repr__(self) -> str:
+        if not self.programs:
+            return f"RobotsPlan({self.status.message})"
+        names = ", ".join(self.robots)
+        return f"RobotsPlan({names}: {self.period:.2f} s, {self.joules:.0f} J a cycle)"
+
+    def plot(self) -> Any:
+        """What each robot does over a cycle, and the zones; a matplotlib figure."""
+        rows = [
+            (robot, begin, program.movements)
+            for robot, begin, program in zip(self.robots, self.begins, self.programs, strict=True)
+        ]
+        zones = [
+            (zone.signal, robot, zone.enter[side], zone.leave[side] - zone.enter[side])
+            for zone in self.zones
+            for side, robot in enumerate(zone.robots)
+        ]
+        return plot_robots(rows, zones, self.period, repr(self))
+
+
+def plan_robots(
+    cells: RobotCells,
+    *,
+    cycle_time: float = 0.0,
+    options: PlanOptions | None = None,
+    settings: PlannerSettings | None = None,
+) -> RobotsPlan:
+    """The cheapest joint cycle of the programs of all robots of a cell that takes `cycle_time` s,
+    0: as short as possible. Raises RequestError for what makes no sense.
+    """
+    bounded(cycle_time, 0.0, PERIOD_MAX, "cycle_time", "s")
+    planners = tuple(Planner(cell, settings=settings) for cell in cells.cells)
+    arms: list[ArmProgram] = []
+    try:
+        for robot, planner in zip(cells.robots, planners, strict=True):
+            request, work = planner.cycle_request(options)
+            arms.append(planned_arm(robot, request, Journal(work, request.options.seed)))
+        check_lying_parts(arms)
+        return _Joint(cells.name, tuple(arms), planners).plan(cycle_time)
+    except StageError as failed:
+        return RobotsPlan(failed.status, cells.name, cells.robots)
+
+
+class _Joint:
+    """The joint cycle of programs that are known."""
+
+    def __init__(self, name: str, arms: Arms, planners: tuple[Planner, ...]) -> None:
+        self.name = name
+        self.arms = arms
+        self.planners = planners
+        self._meetings = Meetings(max(arm.request.options.safety_distance for arm in arms))
+        self._pairs = list(combinations(range(len(arms)), 2))
+        self._cells: dict[tuple[int, int], Cells] = {
+            pair: hand_over_cells(self._both(pair), pair) for pair in self._pairs
+        }
+        for end in (0, -1):
+            self._take([[column.movements[end] for column in arm.columns] for arm in arms], ())
+
+    def _both(self, pair: tuple[int, int]) -> tuple[ArmProgram, ArmProgram]:
+        return self.arms[pair[0]], self.arms[pair[1]]
+
+    def _take(self, chosen: Chosen, zones: Sequence[Zone]) -> bool:
+        """Add what could meet with these movements and isn't ordered by a zone; whether anything
+        was.
+        """
+        new = False
+        for pair in self._pairs:
+            arms = self._both(pair)
+            between = [zone for zone in zones if (zone.one.robot, zone.other.robot) == pair]
+            found = self._meetings.cells(arms, [chosen[k] for k in pair])
+            for cell in found:
+                if not ordered(cell, between, arms):
+                    new = self._cells[pair].setdefault(cell, set()) is not None or new
+        return new
+
+    def _zones(self) -> tuple[Zone, ...]:
+        """The zones of all pairs. Raises RequestError for one that no cycle passes."""
+        zones = []
+        for pair in self._pairs:
+            counts = tuple(len(self.arms[k].steps) for k in pair)
+            found = zones_of(pair, (counts[0], counts[1]), self._cells[pair])
+            zones += [self._passable(zone) for zone in found]
+        return tuple(zones)
+
+    def _passable(self, zone: Zone) -> Zone:
+        """The zone; where a program begins within its stretch, the other robot passes first."""
+        first = set(zone.first)
+        for own, other in ((zone.one, zone.other), (zone.other, zone.one)):
+            count = len(self.arms[own.robot].steps)
+            if own.count >= count:
+                raise self._blocked(own, other)
+            if own.first + own.count > count:
+                first.add(other.robot)
+        if len(first) > 1:
+            raise self._blocked(zone.one, zone.other)
+        return replace(zone, first=tuple(first))
+
+    def _blocked(self, own: Stretch, other: Stretch) -> RequestError:
+        arms = self.arms[own.robot], self.arms[other.robot]
+        there = self._span(other)
+        return RequestError(
+            StatusCode.PLANNING_FAILED,
+            f"{arms[0].robot} is in the way of {arms[1].robot} ({there[0]} .. {there[1]}) wherever "
+            f"its program lets it wait, or the programs begin where both are in each other's way: "
+            f"give {arms[0].robot} a waiting place out of reach, as a step {{posture: park}} with "
+            "a park posture that faces away, between the others",
+        )
+
+    def _span(self, stretch: Stretch) -> tuple[str, str]:
+        arm = self.arms[stretch.robot]
+        return arm.label(stretch.first), arm.label(stretch.first + stretch.count - 1)
+
+    def plan(self, cycle_time: float) -> RobotsPlan:
+        """The joint cycle, certified for every timing that its signals admit."""
+        works = [arm.work() for arm in self.arms]
+        for _ in range(_ROUNDS):
+            zones = self._zones()
+            fastest = shortest_joint(works, zones)
+            if fastest is None:
+                break
+            period = cycle_time or fastest.period * _SLACK
+            self._check_period(period, fastest.period)
+            first = cheapest_joint(works, zones, period)
+            if first is None:
+                break
+            chosen = [
+                arm.taking(schedule) for arm, schedule in zip(self.arms, first.arms, strict=True)
+            ]
+            if self._take(chosen, zones):
+                continue
+            return self._answer(zones, chosen, first, fastest.period)
+        sentence = "no order of the zones lets every robot pass: give the programs waiting places"
+        return RobotsPlan(Status(StatusCode.PLANNING_FAILED, sentence), self.name)
+
+    @staticmethod
+    def _check_period(period: float, fastest: float) -> None:
+        if period < fastest - _ROUNDING:
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"cycle_time is {period:g} s: the shortest of all robots together is "
+                f"{fastest:.3f} s",
+            )
+
+    def _answer(
+        self, zones: tuple[Zone, ...], chosen: Chosen, first: JointCycle, fastest: float
+    ) -> RobotsPlan:
+        fixed = [arm.work(own) for arm, own in zip(self.arms, chosen, strict=True)]
+        cycle = cheapest_joint(fixed, zones, first.period + _ROUNDING)
+        assert cycle is not None  # no movement takes longer than was chosen
+        signals = self._signals(zones)
+        programs = []
+        for k, (arm, planner) in enumerate(zip(self.arms, self.planners, strict=True)):
+            steps = arm.driven(chosen[k], cycle.arms[k].waits, signals[k])
+            programs.append(planner.kept_program(program_of(steps), arm.request))
+        return RobotsPlan(
+            Status.success(),
+            self.name,
+            tuple(arm.robot for arm in self.arms),
+            tuple(programs),
+            self.planners,
+            tuple(self._shared(n, zone, cycle) for n, zone in enumerate(zones)),
+            tuple(self._begin(k, schedule) for k, schedule in enumerate(cycle.arms)),
+            cycle.period,
+            fastest,
+            self._full_speed(zones, cycle.period),
+            100.0 * max(cycle.joules - first.bound, 0.0) / cycle.joules,
+            self._meetings.proved,
+        )
+
+    def _begin(self, robot: int, schedule: ArmSchedule) -> float:
+        """When the stop before the first movement begins [s]."""
+        waited = sum(wait.seconds for wait in schedule.waits[0])
+        return schedule.begin[0] - waited - self.arms[robot].stops[0].seconds + 0.0
+
+    def _full_speed(self, zones: tuple[Zone, ...], period: float) -> float:
+        """Joules with all movements as fast as they can, and motors on in every wait."""
+        works = [
+            _on_motors(arm.work([column.movements[0] for column in arm.columns]))
+            for arm in self.arms
+        ]
+        cycle = cheapest_joint(works, zones, period)
+        return np.inf if cycle is None else cycle.joules
+
+    def _signals(
+        self, zones: Sequence[Zone]
+    ) -> list[list[tuple[tuple[str, ...], tuple[str, ...]]]]:
+        """Of each movement of each robot, the signals that it waits for and that it sets."""
+        waits: list[list[list[str]]] = [[[] for _ in arm.steps] for arm in self.arms]
+        sets: list[list[list[str]]] = [[[] for _ in arm.steps] for arm in self.arms]
+        for n, zone in enumerate(zones):
+            name = _signal(n)
+            for stretch, turn, done in (
+                (zone.one, f"{name}=0", name),
+                (zone.other, name, f"{name}=0"),
+            ):
+                count = len(self.arms[stretch.robot].steps)
+                last = (stretch.first + stretch.count - 1) % count
+                waits[stretch.robot][stretch.first].append(turn)
+                sets[stretch.robot][last].append(done)
+        return [
+            [(tuple(w), tuple(s)) for w, s in zip(own_waits, own_sets, strict=True)]
+            for own_waits, own_sets in zip(waits, sets, strict=True)
+        ]
+
+    def _shared(self, n: int, zone: Zone, cycle: JointCycle) -> SharedZone:
+        spans = [
+            _passed(stretch, cycle, len(self.arms[stretch.robot].steps))
+            for stretch in (zone.one, zone.other)
+        ]
+        robots = [self.arms[stretch.robot].robot for stretch in (zone.one, zone.other)]
+        first = robots[int(cycle.later[n])]
+        begun = [
+            stretch.first + stretch.count > len(self.arms[stretch.robot].steps)
+            for stretch in (zone.one, zone.other)
+        ]
+        return SharedZone(
+            (robots[0], robots[1]),
+            (self._span(zone.one), self._span(zone.other)),
+            _signal(n),
+            begun[1] or (cycle.later[n] and not begun[0]),
+            first,
+            (spans[0][0], spans[1][0]),
+            (spans[0][1], spans[1][1]),
+        )
+
+
+def _signal(n: int) -> str:
+    return f"zone_{n + 1}"
+
+
+def _passed(stretch: Stretch, cycle: JointCycle, count: int) -> tuple[float, float]:
+    """When a robot enters and leaves a zone [s]."""
+    schedule = cycle.arms[stretch.robot]
+    last = stretch.first + stretch.count - 1
+    left = schedule.begin[last % count] + schedule.seconds[last % count]
+    return schedule.begin[stretch.first], left + (cycle.period if last >= count else 0.0)
+
+
+def _on_motors(work: ArmWork) -> ArmWork:
+    """The same with motors on in every wait, however long."""
+    modes = tuple(
+        tuple(WaitMode(MOTORS, 0.0, _FOREVER, 0.0, mode.watts) for mode in own[:1])
+        for own in work.modes
+    )
+    return replace(work, modes=modes)

@@ -1,0 +1,209 @@
+"""What of two robots' programs could meet: the cells from which their zones follow.
+
+Activities of a robot in turn are the stop before its first movement (0), that movement (1), the
+next stop (2) and so on. Two of them are free of each other where that is proved for every pair of
+instants (`ir_kernels.swept`); all others have to be ordered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ir_description import Equipment
+from ir_kernels import FREE
+from ir_kernels.swept import SweptArm, meeting
+from ir_msgs_py.status import StatusCode
+from ir_planner.cycle import Stretch, Zone
+from ir_planner.errors import RequestError
+from ir_planner.robots.arm_program import ArmProgram
+from ir_planner.scene import PROOF_TOLERANCE
+from ir_planner.timing import Movement
+
+Cell = tuple[int, int]  # an activity of either robot
+Cells = dict[Cell, set[int]]  # with the robots that have to be first
+
+
+@dataclass
+class Meetings:
+    """Proofs between movements and stops of robots; each is made once. margin [m]: what robots
+    keep.
+    """
+
+    margin: float
+    _swept: dict[int, tuple[object, SweptArm]] = field(default_factory=dict)
+    _free: dict[tuple[int, int], bool] = field(default_factory=dict)
+
+    @property
+    def proved(self) -> int:
+        """How many pairs were proved free."""
+        return sum(self._free.values())
+
+    def cells(
+        self, arms: tuple[ArmProgram, ArmProgram], movements: Sequence[Sequence[Movement]]
+    ) -> Cells:
+        """Activities of two robots that could meet with these movements; where a stop could, so
+        could the movements beside it.
+        """
+        found: Cells = {}
+        for a, one in enumerate(movements[0]):
+            for b, other in enumerate(movements[1]):
+                for cell in self._of_pair(arms, (a, b), (one, other)):
+                    found.update((each, set()) for each in _with_neighbours(cell, arms))
+        return found
+
+    def _of_pair(
+        self, arms: tuple[ArmProgram, ArmProgram], at: Cell, pair: tuple[Movement, Movement]
+    ) -> Iterator[Cell]:
+        """Which of two movements and the stops before them could meet. A stop is the begin of its
+        movement, with what is carried then: what is free of the movement is free of the stop.
+        """
+        moving = tuple(self._moving(arm, one) for arm, one in zip(arms, pair, strict=True))
+        if self._apart(moving[0], moving[1]):
+            return
+        a, b = at
+        yield 2 * a + 1, 2 * b + 1
+        standing = tuple(self._standing(arm, k) for arm, k in zip(arms, at, strict=True))
+        first = self._apart(standing[0], moving[1])
+        second = self._apart(moving[0], standing[1])
+        if not first:
+            yield 2 * a, 2 * b + 1
+        if not second:
+            yield 2 * a + 1, 2 * b
+        if not (first or second or self._apart(standing[0], standing[1])):
+            yield 2 * a, 2 * b
+
+    def _moving(self, arm: ArmProgram, movement: Movement) -> SweptArm:
+        key = id(movement)
+        if key not in self._swept:
+            self._swept[key] = movement, arm.swept(movement)
+        return self._swept[key][1]
+
+    def _standing(self, arm: ArmProgram, k: int) -> SweptArm:
+        key = id(arm.stops[k])
+        if key not in self._swept:
+            self._swept[key] = arm.stops[k], arm.standing(k)
+        return self._swept[key][1]
+
+    def _apart(self, one: SweptArm, other: SweptArm) -> bool:
+        key = id(one), id(other)
+        if key not in self._free:
+            found = meeting(one, other, self.margin - PROOF_TOLERANCE)
+            self._free[key] = found.verdict == FREE
+        return self._free[key]
+
+
+def _with_neighbours(cell: Cell, arms: tuple[ArmProgram, ArmProgram]) -> Iterator[Cell]:
+    """A cell, and where it is that of a stop the movements beside it: a robot can't be held between
+    a movement and the stop that it ends in.
+    """
+    spans = []
+    for activity, arm in zip(cell, arms, strict=True):
+        around = 2 * len(arm.steps)
+        stop = activity % 2 == 0
+        near = (activity - 1, activity, activity + 1) if stop else (activity,)
+        spans.append([each % around for each in near])
+    for a in spans[0]:
+        for b in spans[1]:
+            yield a, b
+
+
+def ordered(cell: Cell, zones: Sequence[Zone], arms: tuple[ArmProgram, ArmProgram]) -> bool:
+    """Whether a zone keeps two activities apart."""
+    return any(
+        all(
+            _holds(stretch, activity, len(arm.steps))
+            for stretch, activity, arm in zip((zone.one, zone.other), cell, arms, strict=True)
+        )
+        for zone in zones
+    )
+
+
+def _holds(stretch: Stretch, activity: int, count: int) -> bool:
+    return (activity - (2 * stretch.first + 1)) % (2 * count) < 2 * stretch.count - 1
+
+
+# Parts that one robot leaves and another one takes: the place holds one part. The taker's program
+# begins with a part there, so it is first; the giver brings the next one when that is gone.
+
+
+def hand_over_cells(arms: tuple[ArmProgram, ArmProgram], robots: tuple[int, int]) -> Cells:
+    """Movements of two robots that parts between them order, by the places where one of them puts
+    a part down and the other one takes it up.
+    """
+    found: Cells = {}
+    for giver, taker in ((0, 1), (1, 0)):
+        for part, station, left, taken in _hand_overs(arms[giver], arms[taker]):
+            lying = _lying(arms[giver], part, station)
+            before = [k for k in range(left + 1) if k == left or _near(arms[giver], k, lying)]
+            after = [
+                k
+                for k in range(taken, len(arms[taker].steps))
+                if k == taken or _near(arms[taker], k, lying)
+            ]
+            pairs = [(k, taken) for k in before] + [(left, k) for k in after]
+            for gives, takes in pairs:
+                cell = (2 * gives + 1, 2 * takes + 1)
+                key = cell if giver == 0 else cell[::-1]
+                found.setdefault(key, set()).add(robots[taker])
+    return found
+
+
+def _hand_overs(giver: ArmProgram, taker: ArmProgram) -> Iterator[tuple[str, str, int, int]]:
+    """Part, station, the movement that ends with leaving it, and the one that ends with taking
+    it.
+    """
+    starts = {part.name: part.station for part in taker.cell.parts}
+    for left, step in enumerate(giver.steps):
+        for taken, other in enumerate(taker.steps):
+            station = step.to_station
+            if (
+                step.detach != ""
+                and step.detach == other.attach
+                and station == other.to_station == starts[other.attach]
+            ):
+                yield step.detach, station, left, taken
+
+
+def _lying(arm: ArmProgram, part: str, station: str) -> Equipment:
+    """A part at a station, as what another robot may meet there."""
+    cell = arm.cell
+    own = cell.part(part).lying(cell.station(station).pose)
+    name = f"{part}.at.{station}"
+    machine = cell.machine(cell.station(station).equipment)
+    bodies = tuple(replace(body, name=f"{name}.{k}") for k, body in enumerate(own))
+    return Equipment(name, np.eye(4), bodies, machine.zone)
+
+
+def check_lying_parts(arms: Sequence[ArmProgram]) -> None:
+    """Refuse a movement that comes too near to where another robot leaves or finds a part, at a
+    station that its own robot doesn't visit.
+    """
+    for owner in arms:
+        for part, station in _places(owner):
+            for other in arms:
+                visited = {step.to_station for step in other.steps}
+                if other is owner or station in visited or not owner.cell.part(part).bodies:
+                    continue
+                lying = _lying(owner, part, station)
+                for k in range(len(other.steps)):
+                    if _near(other, k, lying):
+                        raise RequestError(
+                            StatusCode.INVALID_GOAL_CONSTRAINTS,
+                            f"{other.robot} comes too near to {part}, which {owner.robot} has at "
+                            f"{station}, in {other.label(k)}: let its program take another way, "
+                            "by a station or a posture between",
+                        )
+
+
+def _places(arm: ArmProgram) -> list[tuple[str, str]]:
+    """Parts of a robot's program with the stations where they lie before or after it."""
+    handled = [(step.attach or step.detach, step.to_station) for step in arm.steps]
+    return sorted({each for each in handled if each[0]})
+
+
+def _near(arm: ArmProgram, k: int, equipment: Equipment) -> bool:
+    """Whether any of the movements of a column comes too near."""
+    return any(arm.too_near(one, equipment) for one in arm.columns[k].movements)

@@ -1,0 +1,166 @@
+"""Several robots planned together: certified for every timing that their signals admit, by a judge
+that drives the programs with delays of its own and measures with Coal.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # the judge of the benchmark
+
+from _robots_judge import Judge, drawn_cell, driven
+
+from ir_description import RobotCells, load_robot_cells
+from ir_planner import RequestError
+from ir_planner.robots import RobotsPlan, plan_robots
+
+MARGIN = 0.02  # m: S_m
+TWO = Path(__file__).parents[2] / "src/ir_description/ir_description/data/robot_cells"
+TEXT = (TWO / "two_robots.yaml").read_text("utf-8")
+
+
+def cells_of(folder: Path, text: str) -> RobotCells:
+    path = folder / "cell.yaml"
+    path.write_text(text)
+    found = load_robot_cells(path)
+    assert found is not None
+    return found
+
+
+@pytest.fixture(scope="module")
+def two() -> RobotCells:
+    found = load_robot_cells("two_robots")
+    assert found is not None
+    return found
+
+
+@pytest.fixture(scope="module")
+def plan(two: RobotCells) -> RobotsPlan:
+    return plan_robots(two)
+
+
+def nearest(plan: RobotsPlan, cells: RobotCells, seed: int, delay: float) -> float:
+    judge = Judge((cells.cells[0], cells.cells[1]))
+    return judge.least(driven(plan, np.random.default_rng(seed), 2, delay=delay), MARGIN)[0]
+
+
+def test_two_robots_share_a_table_in_turns(plan: RobotsPlan) -> None:
+    assert plan.certified
+    (zone,) = plan.zones
+    assert zone.first == "right"  # the table holds a blank when the programs begin
+    assert zone.initial
+    assert plan.joules < plan.full_speed
+    assert 0.0 <= plan.gap < 5.0
+    for program, begin in zip(plan.programs, plan.begins, strict=True):
+        assert sum(step.duration for step in program.movements) == pytest.approx(
+            plan.period, abs=1e-3
+        )
+        assert -plan.period < begin < plan.period
+
+
+@pytest.mark.parametrize("delay", [0.0, 2.0])
+def test_no_delay_of_a_signal_lets_them_meet(
+    plan: RobotsPlan, two: RobotCells, delay: float
+) -> None:
+    assert nearest(plan, two, 5, delay) >= MARGIN - 1e-5
+
+
+def test_without_the_signals_they_meet(plan: RobotsPlan, two: RobotCells) -> None:
+    free = [
+        replace(
+            program,
+            movements=tuple(
+                replace(step, wait_for=(), set_signals=()) for step in program.movements
+            ),
+        )
+        for program in plan.programs
+    ]
+    planted = replace(plan, programs=tuple(free))
+    assert any(nearest(planted, two, seed, 4.0) < MARGIN for seed in range(12))
+
+
+def test_a_part_is_put_down_where_none_lies_and_taken_where_one_does(plan: RobotsPlan) -> None:
+    for seed in range(20):
+        pieces = driven(plan, np.random.default_rng(seed), 4, delay=3.0)
+        handled = []
+        for own in pieces:
+            for piece in own:
+                if piece.moving and piece.step.to_station == "table_seat":
+                    at = piece.begin + piece.step.duration
+                    handled += [(at, +1)] * (piece.step.detach != "")
+                    handled += [(at, -1)] * (piece.step.attach != "")
+        lying = 1 + np.cumsum([change for _, change in sorted(handled)])
+        assert set(lying.tolist()) <= {0, 1}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 3])
+def test_drawn_robots_keep_apart(seed: int, tmp_path: Path) -> None:
+    cells = cells_of(tmp_path, drawn_cell(seed))
+    plan = plan_robots(cells)
+    assert plan.certified
+    assert plan.zones
+    assert nearest(plan, cells, seed, 0.7) >= MARGIN - 1e-5
+
+
+@pytest.mark.long
+def test_a_longer_cycle_costs_less_until_waiting_does_and_the_order_says_nothing(
+    plan: RobotsPlan, two: RobotCells
+) -> None:
+    longer = plan_robots(two, cycle_time=1.3 * plan.period)
+    assert longer.period == pytest.approx(1.3 * plan.period, abs=1e-3)
+    assert longer.joules < plan.joules
+    turned = RobotCells(two.name, two.robots[::-1], two.cells[::-1])
+    again = plan_robots(turned, cycle_time=1.3 * plan.period)
+    assert again.joules == pytest.approx(longer.joules, rel=1e-3)
+    assert again.fastest == pytest.approx(longer.fastest, rel=1e-6)
+
+
+@pytest.mark.long
+def test_robots_out_of_reach_cost_the_sum_of_both(tmp_path: Path) -> None:
+    far = cells_of(tmp_path, drawn_cell(3, (4.0, 5.0)))
+    period = 6.0
+    both = plan_robots(far, cycle_time=period)
+    assert both.zones == ()
+    alone = [
+        plan_robots(RobotCells(far.name, (robot,), (cell,)), cycle_time=period).joules
+        for robot, cell in zip(far.robots, far.cells, strict=True)
+    ]
+    assert both.joules == pytest.approx(sum(alone), rel=1e-4)
+
+
+REFUSED = {
+    "too short": ("", "", 3.0, "cycle_time is 3 s: the shortest of all robots together is"),
+    "ends elsewhere": (
+        "      - {station: outfeed_place, detach: gear, dwell: 0.5}\n      - {posture: park}\n",
+        "      - {station: outfeed_place, detach: gear, dwell: 0.5}\n",
+        0.0,
+        "the program of right ends elsewhere than it begins",
+    ),
+    "waits for a machine": (
+        "      - {station: table_seat, attach: gear, dwell: 0.5}\n",
+        "      - {station: table_seat, attach: gear, wait_for: [ready]}\n",
+        0.0,
+        "step 1 of the program of right waits for ready",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_makes_no_sense_is_refused_by_a_sentence(case: str, tmp_path: Path) -> None:
+    before, after, period, sentence = REFUSED[case]
+    text = TEXT.replace("floor: true\n", "floor: true\nsignals: [{name: ready}]\n")
+    text = text.replace(before, after, 1) if before else text
+    with pytest.raises(RequestError, match=sentence):
+        plan_robots(cells_of(tmp_path, text), cycle_time=period)
+
+
+def test_a_robot_in_the_way_wherever_it_waits_is_said(tmp_path: Path) -> None:
+    near = TEXT.replace("park_deg: [45, -125, 120, 0, 80, 0]", "park_deg: [0, -60, 60, 0, 60, 0]")
+    with pytest.raises(RequestError, match="waiting place"):
+        plan_robots(cells_of(tmp_path, near))
