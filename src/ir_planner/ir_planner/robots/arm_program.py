@@ -162,11 +162,27 @@ def capsules_in(scene: PlanningScene) -> tuple[Capsule, ...]:
 
 def planned_arm(robot: str, request: ProgramRequest, journal: Journal) -> ArmProgram:
     """The program of a robot by itself, certified in its cell at many durations. Raises
-    RequestError for one that doesn't end where it begins or waits for signals, StageError for what
-    isn't found.
+    RequestError for one that doesn't end where it begins, waits for signals or switches machines,
+    StageError for what isn't found.
     """
     cell = request.cell
+    switches = {m.switch.signal: m.name for m in cell.equipment if m.switch is not None}
+    for machine in cell.equipment:
+        if machine.process > 0.0:
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"{machine.name} has a process of {machine.process:g} s: processes aren't planned "
+                "with several robots yet; leave it out, and let a program dwell instead",
+            )
     for k, step in enumerate(cell.program, start=1):
+        for signal in step.set_signals:
+            if signal.name in switches:
+                raise RequestError(
+                    StatusCode.INVALID_GOAL_CONSTRAINTS,
+                    f"step {k} of the program of {robot} switches {switches[signal.name]} by "
+                    f"{signal.name}: machines that change aren't planned with several robots yet, "
+                    "since the others would have to know; leave it in one state",
+                )
         if step.wait_for:
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
@@ -200,6 +216,15 @@ def _planned(robot: str, request: ProgramRequest, journal: Journal) -> ArmProgra
         )
     steps = choice.energies({p: c.movements[0] for p, c in zip(choice.parts, columns, strict=True)})
     return _arm(robot, request, steps, columns)
+
+
+def _column(front: list[Movement]) -> Column:
+    """Movements of a front, slowed down as far as that saves; one that keeps a tool's speed is as
+    it is.
+    """
+    if front[0].fixed_time:
+        return Column.of(front[:1])
+    return Column.of(slowed_down(front))
 
 
 def _arm(
