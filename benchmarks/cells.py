@@ -1,6 +1,6 @@
 """Is the cheapest cycle of a robotic cell found and proved, and how soon?
 
-    python benchmarks/cells.py [--only drawn|flexible] [--file FILE.xml]... [--seeds N]
+    python benchmarks/cells.py [--only drawn|flexible|robots] [--file FILE.xml]... [--seeds N]
                                [--seconds S] [--quick] [--json FILE]
 
 Cells drawn at random that have a schedule by construction, and instances of the public benchmark
@@ -11,6 +11,10 @@ proved; the published model, with its ten segments per curve, never proves a bou
 
 flexible: the bundled cell of that name at 30 parts an hour, with what is saved against the common
 cycle of the same order, which moves at 100 % and leaves waits to the controller's own timers.
+
+robots: drawn cells of two robots, each joint cycle driven with drawn delays of every step, and the
+bundled cell. A judge that knows the programs with their signals alone measures with Coal, at every
+0.5 ms where the robots are near; a planted collision, the same without signals, is found.
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ import argparse
 import time
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +31,11 @@ from _cells_drawn import drawn
 from _cells_judge import energy, faults
 from _cells_published import PublishedModel
 from _results import Claim, at_least, at_most, command_line, finish, line_of
+from _robots_judge import Judge, drawn_cell, driven
 
-from ir_planner import Planner
+from ir_description import RobotCells, load_robot_cells
+from ir_planner import Planner, ProgramPlan, RequestError
+from ir_planner.robots import RobotsPlan, plan_robots
 from ir_studies.cells import CellAnswer, read_instances, solve_cell, written
 
 SIZES = ((2, 6), (3, 6), (3, 9))  # robots and stops of each
@@ -71,27 +78,132 @@ class FlexibleRow:
     seconds: float
 
 
+MARGIN = 0.02  # m that robots keep
+SCHEDULES = 5  # of each drawn cell
+
+
+@dataclass(frozen=True)
+class RobotsRow:
+    """Joint cycles: zones; period [s]; joules, and those at full speed on motors; gap [%]; the
+    least distance [m] over all driven schedules, and without signals; processor seconds of
+    planning. refused: why there is none.
+    """
+
+    name: str
+    schedules: int = 0
+    zones: int = 0
+    period: float = np.nan
+    joules: float = np.nan
+    full_speed: float = np.nan
+    gap: float = np.nan
+    nearest: float = np.inf
+    without_signals: float = np.inf
+    seconds: float = np.nan
+    refused: str = ""
+
+
 def main() -> None:
     """Solve, judge, compare."""
     parser = command_line(__doc__, ["drawn"], 5, "two seeds, no large cells")
-    parser.add_argument("--only", choices=("drawn", "flexible"), help="one part of it")
+    parser.add_argument("--only", choices=("drawn", "flexible", "robots"), help="one part of it")
     parser.add_argument("--file", action="append", default=[], help="instances of the benchmark")
     parser.add_argument("--seconds", type=float, default=120.0, help="of processor time")
     arguments = parser.parse_args()
     seeds = 2 if arguments.quick else arguments.seeds
     seconds = min(arguments.seconds, 20.0) if arguments.quick else arguments.seconds
-    rows: list[Row | FlexibleRow] = []
+    rows: list[Row | FlexibleRow | RobotsRow] = []
     claims: list[Claim] = []
-    if arguments.only != "drawn":
+    if arguments.only in (None, "robots"):
+        robots = list(robots_rows(4 if arguments.quick else 30))
+        claims += robots_claims(robots, 6 if arguments.quick else 100)
+        rows += robots
+    if arguments.only in (None, "flexible"):
         flexible = flexible_row()
         print(line_of(asdict(flexible)), flush=True)
         claims += flexible_claims(flexible)
         rows.append(flexible)
-    if arguments.only != "flexible":
+    if arguments.only in (None, "drawn"):
         solved = drawn_rows(arguments, seeds, seconds)
         claims += drawn_claims(solved)
         rows += solved
     finish(arguments.json, [asdict(row) for row in rows], claims)
+
+
+def robots_rows(count: int) -> Iterator[RobotsRow]:
+    """The bundled cell, and drawn ones."""
+    for seed in range(-1, count):
+        name = "two_robots" if seed < 0 else f"drawn {seed}"
+        row = robots_row(name, robot_cells(seed))
+        print(line_of(asdict(row)), flush=True)
+        yield row
+
+
+def robot_cells(seed: int) -> RobotCells:
+    """The bundled cell, or the one drawn from a seed of 0 or more."""
+    if seed < 0:
+        cells = load_robot_cells("two_robots")
+    else:
+        path = Path("out/robots.yaml")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(drawn_cell(seed), encoding="utf-8")
+        cells = load_robot_cells(path)
+    assert cells is not None
+    return cells
+
+
+def robots_row(name: str, cells: RobotCells) -> RobotsRow:
+    """Plan, and drive with delays."""
+    begin = time.process_time()
+    try:
+        plan = plan_robots(cells)
+    except RequestError as error:
+        return RobotsRow(name, refused=str(error))
+    seconds = time.process_time() - begin
+    if not plan.programs:
+        return RobotsRow(name, refused=plan.status.message)
+    planted = replace(plan, programs=tuple(map(unsignalled, plan.programs)))
+    return RobotsRow(
+        name,
+        SCHEDULES,
+        len(plan.zones),
+        plan.period,
+        plan.joules,
+        plan.full_speed,
+        plan.gap,
+        nearest(plan, cells),
+        nearest(planted, cells) if plan.zones else np.inf,
+        seconds,
+    )
+
+
+def unsignalled(program: ProgramPlan) -> ProgramPlan:
+    """The program whose steps wait for nobody."""
+    steps = (replace(step, wait_for=(), set_signals=()) for step in program.movements)
+    return replace(program, movements=tuple(steps))
+
+
+def nearest(plan: RobotsPlan, cells: RobotCells) -> float:
+    """The least distance [m] over schedules with drawn delays."""
+    judge = Judge((cells.cells[0], cells.cells[1]))
+    found = []
+    for seed in range(SCHEDULES):
+        pieces = driven(plan, np.random.default_rng(seed), 2, delay=0.4 * seed)
+        found.append(judge.least(pieces, MARGIN)[0])
+    return min(found)
+
+
+def robots_claims(rows: list[RobotsRow], schedules: int) -> list[Claim]:
+    """None comes too near, and where signals are taken away some do."""
+    planned = [row for row in rows if not row.refused]
+    zoned = [row for row in planned if row.zones]
+    near = sum(row.nearest < MARGIN - 1e-5 for row in planned)
+    planted = sum(row.without_signals < MARGIN for row in zoned)
+    return [
+        at_least("robots: schedules driven", sum(row.schedules for row in planned), "", schedules),
+        at_most("robots: cells with a pair nearer than S_m", near, "", 0),
+        at_least("robots: cells in which planted collisions are found", planted, "", 1),
+        at_most("robots: largest gap", max(row.gap for row in planned), "%", 5.0),
+    ]
 
 
 def flexible_row() -> FlexibleRow:

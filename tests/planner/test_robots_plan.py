@@ -148,6 +148,19 @@ REFUSED = {
         0.0,
         "step 1 of the program of right waits for ready",
     ),
+    "a machine that works": (
+        "    pose: {xyz: [1.9, 0, 0]}\n",
+        "    pose: {xyz: [1.9, 0, 0]}\n    process: {seconds: 20}\n",
+        0.0,
+        "table has a process of 20 s: processes aren't planned with several robots",
+    ),
+    "a machine that changes": (
+        "    pose: {xyz: [1.9, 0, 0]}\n",
+        "    pose: {xyz: [1.9, 0, 0]}\n    states: {up: [], down: []}\n    state: up\n"
+        "    switch: {signal: ready, on: up, off: down}\n",
+        0.0,
+        "step 1 of the program of left switches table by ready",
+    ),
 }
 
 
@@ -156,6 +169,8 @@ def test_what_makes_no_sense_is_refused_by_a_sentence(case: str, tmp_path: Path)
     before, after, period, sentence = REFUSED[case]
     text = TEXT.replace("floor: true\n", "floor: true\nsignals: [{name: ready}]\n")
     text = text.replace(before, after, 1) if before else text
+    if "switch:" in after:
+        text = text.replace("attach: gear, dwell: 0.5}", "attach: gear, set_signals: [ready]}", 1)
     with pytest.raises(RequestError, match=sentence):
         plan_robots(cells_of(tmp_path, text), cycle_time=period)
 

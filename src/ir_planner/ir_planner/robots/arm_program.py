@@ -33,7 +33,6 @@ from ir_planner.timing import Movement
 from ir_values.arrays import FloatArray
 
 _SAME = 1e-9  # rad
-_TAU = 2.0 * np.pi
 
 
 @dataclass(frozen=True, eq=False)
