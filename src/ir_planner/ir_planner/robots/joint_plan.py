@@ -175,7 +175,8 @@ class _Joint:
             found = self._meetings.cells(arms, [chosen[k] for k in pair])
             for cell in found:
                 if not ordered(cell, between, arms):
-                    new = self._cells[pair].setdefault(cell, set()) is not None or new
+                    self._cells[pair].setdefault(cell, set())
+                    new = True
         return new
 
     def _zones(self) -> tuple[Zone, ...]:

@@ -22,8 +22,8 @@ from ir_planner.robots.arm_program import ArmProgram
 from ir_planner.scene import PROOF_TOLERANCE
 from ir_planner.timing import Movement
 
-Cell = tuple[int, int]  # an activity of either robot
-Cells = dict[Cell, set[int]]  # with the robots that have to be first
+Pair = tuple[int, int]  # an activity of either robot
+Cells = dict[Pair, set[int]]  # with the robots that have to be first
 
 
 @dataclass
@@ -55,8 +55,8 @@ class Meetings:
         return found
 
     def _of_pair(
-        self, arms: tuple[ArmProgram, ArmProgram], at: Cell, pair: tuple[Movement, Movement]
-    ) -> Iterator[Cell]:
+        self, arms: tuple[ArmProgram, ArmProgram], at: Pair, pair: tuple[Movement, Movement]
+    ) -> Iterator[Pair]:
         """Which of two movements and the stops before them could meet. A stop is the begin of its
         movement, with what is carried then: what is free of the movement is free of the stop.
         """
@@ -95,7 +95,7 @@ class Meetings:
         return self._free[key]
 
 
-def _with_neighbours(cell: Cell, arms: tuple[ArmProgram, ArmProgram]) -> Iterator[Cell]:
+def _with_neighbours(cell: Pair, arms: tuple[ArmProgram, ArmProgram]) -> Iterator[Pair]:
     """A cell, and where it is that of a stop the movements beside it: a robot can't be held between
     a movement and the stop that it ends in.
     """
@@ -110,7 +110,7 @@ def _with_neighbours(cell: Cell, arms: tuple[ArmProgram, ArmProgram]) -> Iterato
             yield a, b
 
 
-def ordered(cell: Cell, zones: Sequence[Zone], arms: tuple[ArmProgram, ArmProgram]) -> bool:
+def ordered(cell: Pair, zones: Sequence[Zone], arms: tuple[ArmProgram, ArmProgram]) -> bool:
     """Whether a zone keeps two activities apart."""
     return any(
         all(
