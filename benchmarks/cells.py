@@ -170,8 +170,8 @@ def robots_row(name: str, cells: RobotCells) -> RobotsRow:
         plan.joules,
         plan.full_speed,
         plan.gap,
-        nearest(plan, cells),
-        nearest(planted, cells) if plan.zones else np.inf,
+        nearest(plan, cells, 0.4),
+        nearest(planted, cells, 1.5) if plan.zones else np.inf,
         seconds,
     )
 
@@ -182,12 +182,12 @@ def unsignalled(program: ProgramPlan) -> ProgramPlan:
     return replace(program, movements=tuple(steps))
 
 
-def nearest(plan: RobotsPlan, cells: RobotCells) -> float:
-    """The least distance [m] over schedules with drawn delays."""
+def nearest(plan: RobotsPlan, cells: RobotCells, delay: float) -> float:
+    """The least distance [m] over schedules with drawn delays, in each up to `delay` s longer."""
     judge = Judge((cells.cells[0], cells.cells[1]))
     found = []
     for seed in range(SCHEDULES):
-        pieces = driven(plan, np.random.default_rng(seed), 2, delay=0.4 * seed)
+        pieces = driven(plan, np.random.default_rng(seed), 2, delay=delay * seed)
         found.append(judge.least(pieces, MARGIN)[0])
     return min(found)
 
