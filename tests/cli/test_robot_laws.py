@@ -11,8 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ir_cli.home_posture import ROOMS
 from ir_cli.main import main
 from ir_cli.robot_from_urdf import RobotSource, made_robot
+from ir_cli.robot_shapes import SAFETY
 from ir_kernels import Chain, CollisionModel
 
 pinocchio = pytest.importorskip("pinocchio")
@@ -121,6 +123,20 @@ def test_a_drawn_urdf_is_where_pinocchio_has_it_and_never_farther_apart(
             if least > 0.0:
                 assert below <= least + TOUCH
                 assert least - max(below, 0.0) <= slack + TOUCH
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_home_leaves_room_to_every_pair_also_to_those_near_by_construction(
+    seed: int, tmp_path: Path
+) -> None:
+    path = tmp_path / "drawn.urdf"
+    path.write_text(urdf(seed))
+    robot = made_robot(RobotSource(path, payload=5.0, mass=60.0)).robot
+    model = CollisionModel(Chain(robot), robot.capsules, (), robot.self_pairs)
+    own = {frozenset(each[:2]): each.distance for each in robot.reduced_distances}
+    kept = [min(SAFETY, own.get(frozenset((a, b)), SAFETY)) for _, a, b in model.pairs]
+    room = model.distances(robot.machine_home[None])[0] - np.array(kept)
+    assert room.min() > 0.9 * min(min(each) for each in ROOMS)
 
 
 def coal_distance(shapes: object, placed: object, a: object, b: object) -> float:

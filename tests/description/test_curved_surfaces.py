@@ -120,6 +120,27 @@ def test_triangles_are_in_metres_closed_and_as_near_as_stated(unit: str) -> None
     assert volume == pytest.approx(np.pi * RADIUS**2 * HEIGHT, rel=0.01)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_triangle_without_area_is_as_far_as_its_longest_edge() -> None:
+    """Also where its sides are so short that their squares vanish."""
+    rng = np.random.default_rng(2)
+    corner = rng.normal(size=3)
+    far = rng.normal(size=3)
+    points = rng.normal(size=(50, 3))
+    line = np.array([corner, 0.5 * (corner + far), far])
+    tiny = np.array([[0.0, 0.0, 0.0], [1e-170, 0.0, 0.0], [0.0, 1e-170, 0.0]])
+    share = np.clip((points - corner) @ (far - corner) / ((far - corner) @ (far - corner)), 0, 1)
+    to_line = np.linalg.norm(points - corner - share[:, None] * (far - corner), axis=1)
+    expected = (
+        (np.array([corner, corner, corner]), np.linalg.norm(points - corner, axis=1)),
+        (line, to_line),
+        (tiny, np.linalg.norm(points, axis=1)),
+    )
+    for triangle, distance in expected:
+        found = point_triangle(points, np.tile(triangle, (len(points), 1, 1)))
+        np.testing.assert_allclose(found, distance, rtol=1e-9)
+
+
 def test_the_pieces_of_a_cell_contain_the_curved_solid(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -81,6 +81,17 @@ def test_what_makes_no_sense_is_one_sentence_with_its_line(
         urdf_arm(text, "arm.urdf")
 
 
+def test_what_does_not_matter_is_no_reason_to_refuse_a_file() -> None:
+    """A joint that does not turn needs no axis, and a macro in a comment needs no xacro."""
+    still = '<joint name="jt" type="fixed"><axis xyz="0 0 0"/>'
+    text = arm_text().replace('<joint name="jt" type="fixed">', still)
+    assert still in text
+    urdf_arm(text.replace("</robot>", "<!-- <xacro:macro/> --></robot>"), "arm.urdf")
+    macro = text.replace("</robot>", '<xacro:macro name="m"/></robot>')
+    with pytest.raises(RobotFileError, match=r":1[0-9]: this is a xacro file"):
+        urdf_arm(macro, "arm.urdf")
+
+
 SHAPES = {
     "box": '<box size="0.2 0.1 0.3"/>',
     "cylinder": '<cylinder radius="0.1" length="0.3"/>',

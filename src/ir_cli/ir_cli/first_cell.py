@@ -11,7 +11,7 @@ from ir_cli.robot_shapes import SAFETY, floor_below, lowest_points
 from ir_description import Cell, RobotModel, UnknownNameError, is_path, robot_named
 from ir_description.files import read_cell
 from ir_kernels import Chain, CollisionModel
-from ir_values.arrays import FloatArray
+from ir_values.arrays import BoolArray, FloatArray
 
 TEXT = """\
 format: ir_cell/1
@@ -27,6 +27,9 @@ _SHARES = (1.0, 0.7, 0.5, 0.35, 0.25)
 _SIGNS = ((1, 1, 1, 1, 1, 1), (1, -1, 1, 1, 1, 1), (1, 1, -1, 1, -1, 1), (-1, -1, -1, 1, -1, 1))
 _INSIDE = 1e-3  # rad from both ends of an axis
 _ROOM = 1e-3  # m above what is kept
+_NARROW = 1e-4  # m above what pairs keep that are near by construction
+_WAY = 24  # postures of a straight line between two in joint space
+_LINES = 400  # that are looked at
 _DRAWN = 2000  # postures within 1 rad of machine home
 
 
@@ -51,24 +54,36 @@ def first_cell(robot: str) -> Cell:
 
 
 def second_posture(robot: RobotModel) -> FloatArray:
-    """A free posture (6,) [rad] some way from machine home."""
+    """A free posture (6,) [rad] some way from machine home; where there is one, one to which every
+    axis can turn straight from there.
+    """
     chain = Chain(robot)
     model = CollisionModel(chain, robot.capsules, (), robot.self_pairs)
     own = {frozenset(each[:2]): each.distance for each in robot.reduced_distances}
     kept = np.array([min(SAFETY, own.get(frozenset((a, b)), SAFETY)) for _, a, b in model.pairs])
     reduced = np.array([frozenset((a, b)) in own for _, a, b in model.pairs], dtype=bool)
-    kept += np.where(reduced, 0.0, _ROOM)
+    kept += np.where(reduced, _NARROW, _ROOM)
     steps = np.array([share * _STEP * sign for share in _SHARES for sign in _SIGNS])
     drawn = np.random.default_rng(0).uniform(-1.0, 1.0, (_DRAWN, robot.n))
     low = robot.position_min + _INSIDE
     high = robot.position_max - _INSIDE
     q = np.clip(robot.machine_home + np.concatenate([steps, drawn]), low, high)
     others = [each for each in robot.capsules if each.link > 1]
-    above = lowest_points(chain, q, others) > floor_below(chain, robot.capsules) + SAFETY + _ROOM
-    good = (model.distances(q) > kept).all(axis=1) & above
+    floor = floor_below(chain, robot.capsules) + SAFETY + _ROOM
+
+    def free(postures: FloatArray) -> BoolArray:
+        apart = (model.distances(postures) > kept).all(axis=1)
+        return np.asarray(apart & (lowest_points(chain, postures, others) > floor))
+
+    good = free(q)
     if not good.any():
         raise CommandError(
             f"robot {robot.name} has no free posture near its machine home to move to: choose "
             "another machine_home_deg"
         )
-    return np.asarray(q[int(np.argmax(good))])
+    found = q[good]
+    share = np.linspace(0.0, 1.0, _WAY)[1:, None]
+    for end in found[:_LINES]:
+        if free(robot.machine_home + share * (end - robot.machine_home)).all():
+            return np.asarray(end)
+    return np.asarray(found[0])

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ir_cli.robot_shapes import FLOOR_ROOM, SAFETY, Pairs, floor_below, lowest_points
+from ir_cli.robot_shapes import FLOOR_ROOM, ROOM, SAFETY, Pairs, floor_below, lowest_points
 from ir_description import Capsule, InvalidValueError
 from ir_description.files.making import UrdfArm, holding_torques
 from ir_kernels import Chain, CollisionModel
@@ -24,8 +24,11 @@ USUAL = (
     (0, 30, -60, 0, -30, 0),
 )
 """deg: postures in which arms are usually drawn or parked."""
-CLEAR = 0.01  # m more than the safety distance, where there is such a posture
-LEAST = 1e-4  # m
+ROOMS = ((0.01, 0.01), (0.01, 0.9 * ROOM), (0.01, 0.3 * ROOM), (1e-4, 1e-4))
+"""m more than pairs must keep, the first that some posture has: of pairs with the safety distance,
+and of pairs that are near by construction.
+"""
+LEAST = ROOMS[-1][0]
 HELD = 0.7  # of the peak torque
 _INSIDE = np.radians(2.0)  # from both ends of an axis
 _TRIED = 4000
@@ -61,9 +64,9 @@ class Postures:
 
     def home(self) -> FloatArray:
         """The first (6,) [rad] that is free and held. Raises InvalidValueError where none is."""
-        for room in (CLEAR, LEAST):
+        for room in ROOMS:
             for q in self._candidates():
-                good = self._free(q, room) & self._above_floor(q) & self._held(q)
+                good = self._free(q, *room) & self._above_floor(q) & self._held(q)
                 if good.any():
                     return np.asarray(q[int(np.argmax(good))])
         raise InvalidValueError(self._reason())
@@ -78,8 +81,8 @@ class Postures:
         drawn = np.random.default_rng(0).uniform(low, high, (_TRIED, len(low)))
         yield drawn[np.argsort(np.abs(drawn - middle).max(axis=1), kind="stable")]
 
-    def _free(self, q: FloatArray, room: float) -> BoolArray:
-        wanted = self._kept + np.where(self._reduced, 0.0, room)
+    def _free(self, q: FloatArray, room: float, reduced: float) -> BoolArray:
+        wanted = self._kept + np.where(self._reduced, reduced, room)
         return np.asarray((self._model.distances(q) > wanted).all(axis=1))
 
     def _above_floor(self, q: FloatArray) -> BoolArray:
@@ -97,7 +100,7 @@ class Postures:
         distance = self._model.distances(drawn) - self._kept
         far = (distance > 0.0).mean(axis=0)
         counts = {
-            "free of itself": self._free(drawn, LEAST),
+            "free of itself": self._free(drawn, *ROOMS[-1]),
             "above the floor": self._above_floor(drawn),
             "held by its drives": self._held(drawn),
         }

@@ -32,6 +32,9 @@ from ir_description.files.making import (
     with_home,
     with_masses,
 )
+from ir_kernels import Chain
+from ir_kernels import InputError as KernelInputError
+from ir_kernels.wrist_geometry import arm_lines
 from ir_values.arrays import FloatArray
 from ir_values.output_files import write_file
 
@@ -82,6 +85,7 @@ def made_robot(source: RobotSource) -> MadeRobot:
 def _made(source: RobotSource) -> MadeRobot:
     urdf = source.urdf
     arm = urdf_arm(_urdf_text(source), str(urdf), source.tip, source.without)
+    _check_axes(arm)
     meshes = Meshes(urdf.parent, source.packages)
     bodies = tuple(tuple(link_bodies(link.shapes, meshes)) for link in arm.links)
     if not any(bodies):
@@ -101,6 +105,15 @@ def _made(source: RobotSource) -> MadeRobot:
     )
     robot = robot_from_yaml(text, f"the robot made from {urdf}", _folder(source))
     return MadeRobot(text, robot, arm, bodies, shapes, pairs, tuple(notes))
+
+
+def _check_axes(arm: UrdfArm) -> None:
+    """Raise InvalidValueError for an arm whose axes no inverse kinematics here solves."""
+    try:
+        arm_lines(Chain(arm))
+    except KernelInputError as error:
+        names = ", ".join(joint.name for joint in arm.joints)
+        raise InvalidValueError(f"{error}; its axes are {names}, see --tip") from error
 
 
 def _check_leaders(arm: UrdfArm, low: FloatArray, high: FloatArray) -> None:

@@ -133,7 +133,7 @@ def _longest(triangles: FloatArray) -> FloatArray:
 
 
 def point_triangle(points: FloatArray, triangles: FloatArray) -> FloatArray:
-    """Distance (N,) of each point (N, 3) from its triangle (N, 3, 3)."""
+    """Distance (N,) of each point (N, 3) from its triangle (N, 3, 3), also of one without area."""
     a = triangles[:, 0]
     b = triangles[:, 1]
     c = triangles[:, 2]
@@ -141,18 +141,22 @@ def point_triangle(points: FloatArray, triangles: FloatArray) -> FloatArray:
     normal = np.cross(b - a, c - a)
     height = np.einsum("ni,ni->n", points - a, normal)
     square = np.einsum("ni,ni->n", normal, normal)
+    flat = square == 0.0
+    square = np.where(flat, 1.0, square)
     foot = points - (height / square)[:, None] * normal
     sides = [
         np.einsum("ni,ni->n", np.cross(q - p, foot - p), normal) >= 0.0
         for p, q in ((a, b), (b, c), (c, a))
     ]
-    nearest: FloatArray = np.where(np.all(sides, axis=0), np.abs(height) / np.sqrt(square), found)
+    above = np.all(sides, axis=0) & ~flat
+    nearest: FloatArray = np.where(above, np.abs(height) / np.sqrt(square), found)
     return nearest
 
 
 def _point_segment(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
     along = end - start
-    share = np.einsum("ni,ni->n", points - start, along) / np.einsum("ni,ni->n", along, along)
+    square = np.einsum("ni,ni->n", along, along)
+    share = np.einsum("ni,ni->n", points - start, along) / np.where(square == 0.0, 1.0, square)
     distance: FloatArray = np.linalg.norm(
         points - (start + np.clip(share, 0.0, 1.0)[:, None] * along), axis=1
     )

@@ -39,6 +39,7 @@ without a counterbalance.
 """
 _FIRST = 0.8  # peak torque of axis 1 over that of axis 2: bundled robots 0.76 to 1.3
 _LAST = 0.6  # of axis 6 over that of axis 5: 0.5 to 1.0
+_WEAKEST = 0.01  # of the strongest: an axis that holds nothing has a drive as well
 WORTH = (0.7, 20.0)
 """A stated torque is believed where it is between these shares of what holds the payload."""
 POSTURES = 2000
@@ -178,4 +179,4 @@ def peak_torques(
     peak[0] = max(peak[0], _FIRST * peak[1])
     peak[3] = max(peak[3], peak[4])
     peak[5] = max(peak[5], _LAST * peak[4])
-    return peak, held
+    return np.maximum(peak, _WEAKEST * float(peak.max())), held

@@ -21,6 +21,7 @@ from ir_values.arrays import FloatArray, number_of
 from ir_values.errors import RobotFileError, listed, shown
 
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+_WITHOUT_AXIS = ("fixed", "floating")
 LENGTH_MAX = 100.0
 """Largest length [m] of a robot: beyond, the unit is hardly meant."""
 _LINKS_MAX = 1000
@@ -117,14 +118,16 @@ def urdf_tree(text: str, source: str) -> UrdfTree:
     """Read a URDF. Raises RobotFileError with the line of what is wrong."""
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise RobotFileError(source, 0, "the URDF defines entities: they are not read")
-    if "<xacro:" in text:
-        raise RobotFileError(
-            source, 0, "this is a xacro file: expand it first (xacro FILE > robot.urdf)"
-        )
     try:
         root = _parsed(text)
     except expat.ExpatError as error:
         raise RobotFileError(source, error.lineno, f"this is not XML: {error}") from error
+    macro = next((each for each in root.iter() if each.tag.startswith("xacro:")), None)
+    if macro is not None:
+        line = getattr(macro, "line", 0)
+        raise RobotFileError(
+            source, line, "this is a xacro file: expand it first (xacro FILE > robot.urdf)"
+        )
     if root.tag != "robot":
         raise RobotFileError(source, 0, f"the document is {shown(root.tag)}, must be 'robot'")
     try:
@@ -255,7 +258,7 @@ class _Reader:
             ends[0],
             ends[1],
             _origin(element, f"joint {name}"),
-            _axis(element, name),
+            _axis(element, name) if kind not in _WITHOUT_AXIS else np.array([1.0, 0.0, 0.0]),
             lower,
             upper,
             velocity,
