@@ -1,4 +1,4 @@
-"""Are files of strangers read right, or refused with a sentence: URDFs, meshes, bags, tables, EGM?
+"""Are URDFs, meshes, worlds and recordings of strangers read right, or refused with a sentence?
 
     python benchmarks/strangers.py [--seeds N] [--quick] [--json FILE]
 
@@ -21,6 +21,7 @@ import numpy as np
 from _results import Claim, add_ending, at_least, at_most, finish, line_of
 from _strangers_logs import bags, messages, misread_log, tables
 from _strangers_robots import meshes, misread_mesh, misread_robot, urdfs
+from _strangers_worlds import misread_world, worlds
 
 from ir_cli.errors import CommandError
 from ir_recorder.errors import RecorderError
@@ -36,6 +37,8 @@ def cases(rng: np.random.Generator, folder: Path) -> Iterator[Case]:
         yield "urdf", name, readable, lambda p=path, a=arm, m=more: misread_robot(p, a, m, rng)
     for name, path, triangles, readable in meshes(rng, folder):
         yield "mesh", name, readable, lambda p=path, t=triangles: misread_mesh(p, t)
+    for case in worlds(rng, folder):
+        yield "world", case.name, case.readable, lambda c=case: misread_world(c)
     for name, path, q, readable in bags(rng, folder):
         yield "bag", name, readable, lambda p=path, q=q: misread_log(p, q)
     for name, path, q, readable in tables(rng, folder):

@@ -67,7 +67,7 @@ def test_what_is_written_is_read_back_the_same(
         (f"<sdf><model><link>{BOX.replace('1 2 3', '1 nan 3')}</link></model></sdf>", "must be 3 numbers"),  # noqa: E501
         (f"<sdf><model><link>{BOX.replace('1 2 3', '1 -2 3')}</link></model></sdf>", "size of c"),
         ("<sdf><model><link><pose "
-f"relative_to='x'>1</pose>{BOX}</link></model></sdf>", "write them"),
+f"relative_to='x'>0 0 0 0 0 0</pose>{BOX}</link></model></sdf>", "relative to 'x'"),
         (MESH.format("../a.obj"), "without '..'"),
         (MESH.format("package://b/a.obj"), "folder"),
     ],

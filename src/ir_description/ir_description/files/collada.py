@@ -11,9 +11,9 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from ir_description.files.stl_mesh import TRIANGLES_MAX
+from ir_description.files.stl_mesh import READ_MAX, TRIANGLES_MAX
 from ir_values.arrays import FloatArray, IntArray
-from ir_values.errors import InvalidValueError, shown
+from ir_values.errors import InvalidValueError, listed, shown
 
 _FACES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
 _DEPTH = 50  # of nodes in nodes
@@ -53,6 +53,7 @@ class _Document:
         self._by_id = {e.get("id"): e for e in root.iter() if e.get("id")}
         self._meshes: dict[str, FloatArray] = {}
         self._placed = 0
+        self._total = 0  # triangles
         unit = root.find("asset/unit")
         self._metre = float(unit.get("meter", "1")) if unit is not None else 1.0
         if not 0.0 < self._metre < 1e6:
@@ -84,17 +85,27 @@ class _Document:
         if depth > _DEPTH or self._placed > _COUNT:
             raise InvalidValueError("the Collada file has too many nodes in nodes")
         for element in node:
-            if step := _STEPS.get(element.tag):
-                pose = pose @ step(_numbers(element))
+            if element.tag in _STEPS:
+                pose = pose @ _STEPS[element.tag](_numbers(element))
+                if not np.isfinite(pose).all():
+                    raise InvalidValueError(
+                        f"a <{element.tag}> of the Collada file leads to poses that are not finite"
+                    )
+            elif element.tag in _REFUSED:
+                raise InvalidValueError(f"the Collada file has {_REFUSED[element.tag]}")
             elif element.tag == "instance_geometry":
-                points = self._mesh(self._named(element))
-                yield points @ pose[:3, :3].T + pose[:3, 3]
-            elif element.tag == "instance_controller":
-                raise InvalidValueError("the Collada file has a skin (instance_controller)")
-            elif element.tag == "node":
-                yield from self._node(element, pose, depth + 1)
-            elif element.tag == "instance_node":
-                yield from self._node(self._named(element), pose, depth + 1)
+                yield self._instance(element, pose)
+            elif element.tag in ("node", "instance_node"):
+                inner = element if element.tag == "node" else self._named(element)
+                yield from self._node(inner, pose, depth + 1)
+
+    def _instance(self, element: Xml.Element, pose: FloatArray) -> FloatArray:
+        """Triangles (T, 3, 3) of a geometry at a pose (4, 4)."""
+        points = self._mesh(self._named(element))
+        self._total += len(points)
+        if self._total > READ_MAX:
+            raise InvalidValueError(f"its instances have more than {READ_MAX} triangles")
+        return np.asarray(points @ pose[:3, :3].T + pose[:3, 3])
 
     def _mesh(self, geometry: Xml.Element) -> FloatArray:
         name = geometry.get("id", "")
@@ -143,7 +154,10 @@ class _Document:
         stride = int(accessor.get("stride", "1"))
         count = int(accessor.get("count", "0"))
         first = int(accessor.get("offset", "0"))
-        values = np.array((array.text or "").split(), dtype=np.float64)
+        names = [each.get("name") or "" for each in accessor.findall("param")]
+        if any(names) and names[:3] != ["X", "Y", "Z"]:
+            raise InvalidValueError(f"the corners of a mesh are {listed(names)}, must be X, Y, Z")
+        values = _numbers(array)
         if stride < 3 or len(values) < first + count * stride:
             raise InvalidValueError("the corners of a mesh are fewer than its accessor says")
         return np.asarray(values[first : first + count * stride].reshape(count, stride)[:, :3])
@@ -171,7 +185,10 @@ def _numbers(element: Xml.Element) -> FloatArray:
 
 
 def _matrix(values: FloatArray) -> FloatArray:
-    return values.reshape(4, 4)
+    matrix = values.reshape(4, 4)
+    if (matrix[3] != [0.0, 0.0, 0.0, 1.0]).any():
+        raise InvalidValueError(f"a <matrix> of the Collada file ends with {matrix[3].tolist()}")
+    return matrix
 
 
 def _translation(values: FloatArray) -> FloatArray:
@@ -185,7 +202,10 @@ def _scaling(values: FloatArray) -> FloatArray:
 
 
 def _rotation(values: FloatArray) -> FloatArray:
-    x, y, z = values[:3] / np.linalg.norm(values[:3])
+    length = float(np.linalg.norm(values[:3]))
+    if not length > 0.0:
+        raise InvalidValueError("a <rotate> of the Collada file has an axis without length")
+    x, y, z = values[:3] / length
     angle = np.radians(values[3])
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     pose = np.eye(4)
@@ -194,3 +214,8 @@ def _rotation(values: FloatArray) -> FloatArray:
 
 
 _STEPS = {"matrix": _matrix, "translate": _translation, "scale": _scaling, "rotate": _rotation}
+_REFUSED = {
+    "skew": "a <skew>: write it as a <matrix>",
+    "lookat": "a <lookat>: write it as a <matrix>",
+    "instance_controller": "a skin (instance_controller)",
+}

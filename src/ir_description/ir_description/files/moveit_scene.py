@@ -42,12 +42,14 @@ class SceneObject:
 def scene_objects(text: str) -> tuple[str, tuple[SceneObject, ...]]:
     """Name and objects of a scene. Raises InvalidValueError with the line of what is wrong."""
     lines = _Lines(text)
-    name = lines.take("the name of the scene")
+    first = text.partition("\n")[0].strip()  # the name may be empty
+    name = lines.take("the name of the scene") if first else ""
     objects = []
     while (start := lines.take("'* NAME' or '.'")) != ".":
         if not start.startswith("*"):
             lines.fail(f"is {shown(start)}, must be '* NAME' of an object or '.'")
         objects.append(_object(lines, start[1:].strip() or "object"))
+    lines.end()
     return name, tuple(objects)
 
 
@@ -83,6 +85,13 @@ class _Lines:
         if not (0.0 <= value <= _COUNT and value == int(value)):
             self.fail(f"is {value:g}, must be a whole number up to {_COUNT}: {what}")
         return int(value)
+
+    def end(self) -> None:
+        """Raise InvalidValueError where more follows."""
+        left = next(self._left, None)
+        if left is not None:
+            self._number, text = left
+            self.fail(f"is {shown(text)}, after the '.' that ends the scene")
 
     def fail(self, sentence: str) -> None:
         raise InvalidValueError(f"line {self._number} of the scene {sentence}")

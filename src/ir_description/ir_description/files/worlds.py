@@ -19,9 +19,10 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ir_description.cell import Cell, Equipment, NameRegister
 from ir_description.files.moveit_scene import SceneObject, scene_objects
+from ir_description.files.sdf_frames import Frames
 from ir_description.files.solid_mesh import PIECES, SUFFIXES, piece_names, pieces_of, read_solid
 from ir_description.files.stl_mesh import is_closed
-from ir_description.poses import abc_from_rotation, composed, pose_of, rotation_from_abc
+from ir_description.poses import abc_from_rotation, composed, inverse, pose_of, rotation_from_abc
 from ir_description.shapes import Body
 from ir_values.arrays import FloatArray, number_of
 from ir_values.errors import DescriptionError, InvalidValueError, shown
@@ -30,8 +31,11 @@ from ir_values.files import read_regular_file
 
 BYTES_MAX = 8_000_000
 BODIES_MAX = 10_000
+FARTHEST = 1e4
+"""m from the world's origin that a body may stand."""
 _NO_NAME = re.compile(r"[^A-Za-z0-9_.-]+")
 _DEPTH = 20  # of models in models
+_MOVING = ("actor", "population", "road")  # what has bodies, and is not read
 _CONVEX = 1e-6  # share of the volume by which a hull may be larger
 
 
@@ -81,7 +85,20 @@ def read_world(path: Path, taken: NameRegister, *, visuals: bool = False) -> Wor
     if not machines:
         said = "; ".join(reader.left_out) or "it has none"
         raise InvalidValueError(f"no body of the world can be read: {said}")
+    _check_places(machines)
     return World(_plain(name), machines, tuple(reader.left_out))
+
+
+def _check_places(machines: Iterable[WorldMachine]) -> None:
+    """Raise InvalidValueError where a body stands so far away that its unit is hardly meant."""
+    for machine in machines:
+        for body in machine.bodies:
+            far = float(np.abs(machine.pose[:3] @ body.pose[:, 3]).max())
+            if not far <= FARTHEST:
+                raise InvalidValueError(
+                    f"{body.name} of {machine.name} stands {far:g} m away, must be within "
+                    f"{FARTHEST:g} m: metres are meant"
+                )
 
 
 def _made_importer(name: str, value: Any) -> Callable[[Path], World]:
@@ -131,41 +148,64 @@ class _Reader:
         self._visuals = visuals
         self._taken = taken
         self._names: set[str] = set()
+        self._count = 0  # of models
+        self._within: tuple[Path, ...] = ()  # the included files in which the reader is
         self.left_out: list[str] = []
 
     def sdf(self, root: Xml.Element) -> Iterator[WorldMachine]:
-        world = root.find("world")
-        yield from self._sdf_models(root if world is None else world, np.eye(4), 0)
+        worlds = root.findall("world")
+        scope = worlds[0] if worlds else root
+        for other in worlds[1:]:
+            self._leave_out(f"world {other.get('name') or ''}", other, "a file's first is read")
+        for model in root.findall("model") if worlds else ():
+            self._leave_out(f"model {model.get('name') or ''}", model, "it is beside the world")
+        yield from self._sdf_models(scope, np.eye(4), 0)
+
+    def _leave_out(self, what: str, element: Xml.Element, why: str) -> None:
+        """Name an element that is not read, and how many bodies it has."""
+        count = sum(1 for _ in element.iter("collision"))
+        shapes = f", and {count} collision shapes with it" if count else ""
+        self.left_out.append(f"{what.strip()}: {why}{shapes}")
 
     def _sdf_models(
         self, parent: Xml.Element, pose: FloatArray, depth: int
     ) -> Iterator[WorldMachine]:
         """Models in a world or a model at a pose (4, 4), included ones among them."""
+        frames = Frames(parent)
+        for tag in _MOVING:
+            for each in parent.findall(tag):
+                self._leave_out(f"{tag} {each.get('name') or ''}", each, "its kind is not read")
         for include in parent.findall("include"):
-            yield from self._included(include, pose, depth)
+            yield from self._included(include, frames, pose, depth)
         for model in parent.findall("model"):
-            yield from self._sdf_model(model, composed(pose, _sdf_pose(model)), depth)
+            yield from self._sdf_model(model, composed(pose, frames.placed(model)), depth)
 
     def _sdf_model(
         self, model: Xml.Element, pose: FloatArray, depth: int
     ) -> Iterator[WorldMachine]:
         name = _plain(model.get("name") or "model")
+        self._count += 1
+        if self._count > BODIES_MAX:
+            raise InvalidValueError(f"there are more than {BODIES_MAX} models, included ones too")
         if any(joint.get("type") != "fixed" for joint in model.findall("joint")):
-            self.left_out.append(f"model {name}: it has joints that move")
+            self._leave_out(f"model {name}", model, "it has joints that move")
             return
         bodies = list[Body]()
+        frames = Frames(model)
         for link in model.findall("link"):
+            stands = frames.placed(link)
             for place in self._places(link, f"link {link.get('name') or ''} of model {name}"):
-                at = composed(_sdf_pose(link), _sdf_pose(place))
-                bodies += self._bodies(name, place, at)
+                bodies += self._bodies(name, place, frames.placed(place, stands))
         if bodies:
             yield WorldMachine(name, pose, tuple(bodies))
         yield from self._sdf_models(model, pose, depth + 1)
 
     def _included(
-        self, include: Xml.Element, pose: FloatArray, depth: int
+        self, include: Xml.Element, frames: Frames, pose: FloatArray, depth: int
     ) -> Iterator[WorldMachine]:
-        """The model of a folder below the world's own: model://NAME, or its path."""
+        """The model of a folder below the world's own: model://NAME, or its path; frames: of what
+        includes it.
+        """
         uri = (include.findtext("uri") or "").strip()
         named = uri.partition("://")[2] if "://" in uri else uri
         folders = [self._folder / named, self._folder / "models" / named]
@@ -175,22 +215,35 @@ class _Reader:
             for file in (folder / "model.sdf", folder)
             if file.is_file() and file.resolve().is_relative_to(self._folder.resolve())
         ]
-        if not found or depth > _DEPTH:
+        if not found:
             self.left_out.append(
                 f"include {shown(uri)}: there is no {named or 'model'}/model.sdf in the world's "
                 "folder or its models/: put it there, or merge it"
             )
             return
-        text = read_regular_file(found[0], BYTES_MAX).decode("utf-8", errors="replace")
-        outer = self._models
-        self._models = found[0].parent
+        file = found[0].resolve()
+        if file in self._within or depth > _DEPTH:
+            self.left_out.append(f"include {shown(uri)}: it includes itself")
+            return
+        text = read_regular_file(file, BYTES_MAX).decode("utf-8", errors="replace")
+        outer = self._models, self._within
+        self._models, self._within = file.parent, (*self._within, file)
         for model in _document(text).findall("model"):
             given = include.findtext("name")
             if given:
                 model.set("name", given.strip())
-            own = include if include.find("pose") is not None else model
-            yield from self._sdf_model(model, composed(pose, _sdf_pose(own)), depth + 1)
-        self._models = outer
+            placement = include.findtext("placement_frame")
+            if placement:
+                model.set("placement_frame", placement.strip())
+            if include.find("pose") is None:
+                at = Frames(Xml.Element("sdf")).placed(model)
+            else:
+                at = frames.placed(include)
+                if model.get("placement_frame"):
+                    own = Frames(model).frame(model.get("placement_frame", ""))
+                    at = composed(at, inverse(own))
+            yield from self._sdf_model(model, composed(pose, at), depth + 1)
+        self._models, self._within = outer
 
     def _places(self, link: Xml.Element, what: str) -> list[Xml.Element]:
         """The collision shapes of a link; of one that has none, its visual ones where asked."""
@@ -232,7 +285,10 @@ class _Reader:
                 raise ValueError(
                     f"joint {shown(joint.get('name') or '')} has no parent or no child"
                 )
-            above[child.get("link") or ""] = (parent.get("link") or "", joint)
+            carried = child.get("link") or ""
+            if carried in above:
+                raise ValueError(f"link {shown(carried)} is carried by two joints")
+            above[carried] = (parent.get("link") or "", joint)
         for link in root.findall("link"):
             name = link.get("name") or "link"
             pose = np.eye(4)
@@ -256,10 +312,17 @@ class _Reader:
 
     def _bodies(self, machine: str, place: Xml.Element, pose: FloatArray) -> list[Body]:
         geometry = place.find("geometry")
-        shape = None if geometry is None else next(iter(geometry), None)
+        shapes = [] if geometry is None else list(geometry)
+        shape = shapes[0] if shapes else None
         name = self._name(machine, place.get("name") or "body")
         if len(self._names) > BODIES_MAX:
             raise InvalidValueError(f"there are more than {BODIES_MAX} bodies")
+        if len(shapes) > 1:
+            kinds = ", ".join(shown(each.tag) for each in shapes)
+            self.left_out.append(
+                f"{name}: its geometry has {len(shapes)} shapes ({kinds}), not one"
+            )
+            return []
         if shape is None or shape.tag not in ("box", "cylinder", "sphere", "capsule", "mesh"):
             self.left_out.append(
                 f"{name}: its shape is {'none' if shape is None else shown(shape.tag)}"
@@ -280,11 +343,18 @@ class _Reader:
         file = _value(shape, "uri" if shape.find("uri") is not None else "filename")
         given = shape.get("scale") or shape.findtext("scale") or "1 1 1"
         scale = _row(given, 3)
+        if shape.find("submesh") is not None:
+            self.left_out.append(
+                f"{name}: it is a <submesh> of {shown(file)}: write a file of its own"
+            )
+            return []
         try:
             triangles = read_solid(*self._place_of(file), (*SUFFIXES, ".dae")).triangles
         except InvalidValueError as error:
             self.left_out.append(f"{name}: {error}")
             return []
+        if np.prod(scale) < 0.0:  # a mirrored solid is seen from inside
+            triangles = triangles[:, ::-1]
         return self._pieces(name, triangles * scale, pose)
 
     def _place_of(self, file: str) -> tuple[Path, str]:
@@ -375,20 +445,6 @@ def _row(text: str, count: int) -> FloatArray:
     if values.shape != (count,) or not np.isfinite(values).all():
         raise ValueError(f"{shown(text)} must be {count} numbers")
     return values
-
-
-def _sdf_pose(element: Xml.Element) -> FloatArray:
-    """The pose (4, 4) of an element in its parent."""
-    pose = element.find("pose")
-    if pose is None or not (pose.text or "").strip():
-        return np.eye(4)
-    if pose.get("relative_to") or pose.get("rotation_format", "euler_rpy") != "euler_rpy":
-        raise ValueError(
-            "poses relative to other frames, or as quaternions, are not read: write them out"
-        )
-    values = _row(pose.text or "", 6)
-    angles = values[3:] if pose.get("degrees") == "true" else np.degrees(values[3:])
-    return pose_of(values[:3], rotation_from_abc(angles[::-1]))
 
 
 def _urdf_pose(element: Xml.Element) -> FloatArray:
