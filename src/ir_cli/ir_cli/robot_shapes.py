@@ -39,30 +39,34 @@ def capsules_of(
     sentences: list[str] = []
     for k, own in enumerate(bodies):
         to = arm.origin[k] if k < len(arm.origin) else np.zeros(3)
-        beside = max((body.beside for body in own), default=0.0)
+        wider = arm.rounding + max((body.beside for body in own), default=0.0) + WRITTEN
         if own:
-            fits, said = _fits(own, to)
+            fits, said = _fits(own, to, wider)
         else:
             fits, said = _without_body(to, k, capsules, radii)
             if not fits:
                 sentences.append(f"{names[k]}: no body; nothing of it is checked")
         for n, (fit, how) in enumerate(zip(fits, said, strict=True)):
             name = f"{names[k]}_{n}"
-            radius = fit.radius + arm.rounding + beside + WRITTEN
+            radius = fit.radius + wider
             capsules.append(Capsule(name=name, link=k, p0=fit.p0, p1=fit.p1, radius=radius))
             sentences.append(f"{name}: radius {1e3 * radius:.0f} mm, {how}")
     return Shapes(tuple(capsules), tuple(sentences))
 
 
-def _fits(bodies: Sequence[LinkBody], to: FloatArray) -> tuple[list[CapsuleFit], list[str]]:
-    """Capsules of a link's bodies, with words on each; to (3,): the next joint."""
+def _fits(
+    bodies: Sequence[LinkBody], to: FloatArray, wider: float
+) -> tuple[list[CapsuleFit], list[str]]:
+    """Capsules of a link's bodies, with words on each; to (3,): the next joint; wider [m]: by what
+    their radii will be larger.
+    """
     fits: list[CapsuleFit] = []
     said: list[str] = []
     around = [body for body in bodies if body.exact is None]
     if around:
-        slack = max(body.slack for body in around)
+        slack = max(body.slack for body in around) + wider
         fits += fitted(np.concatenate([body.triangles for body in around]), to)
-        stands = [f"stands out {1e3 * (fit.overhang + slack):.0f} mm at most" for fit in fits]
+        stands = [f"stands out {_millimetres(fit.overhang + slack)} mm at most" for fit in fits]
         holds = f"{around[0].place}" if len(around) == 1 else f"{len(around)} bodies"
         said += [f"{words} from what it encloses: {holds}" for words in stands]
     for body in bodies:
@@ -75,6 +79,11 @@ def _fits(bodies: Sequence[LinkBody], to: FloatArray) -> tuple[list[CapsuleFit],
         else:
             said[home] += f", {body.place}"
     return fits, said
+
+
+def _millimetres(length: float) -> int:
+    """Whole ones that a length [m] is at most."""
+    return int(np.ceil(1e3 * length))
 
 
 def _without_body(

@@ -152,8 +152,9 @@ def urdf_arm(text: str, source: str, tip: str = "", without: Collection[str] = (
         frame[:3, :3].T @ placed[joint.child][:3, :3] @ joint.axis
         for joint, frame in zip(moving, frames[1:], strict=True)
     ]
-    axis = _snapped(np.array(turned))
-    rounding += _BODY * float(np.abs(axis - np.array(turned)).sum())
+    axis = np.array([_squared(each, EXACT) for each in turned])
+    beyond = np.cumsum(np.linalg.norm(origin[::-1], axis=1))[::-1]  # from each joint on
+    rounding += float((beyond + _BODY) @ np.linalg.norm(axis - np.array(turned), axis=1))
     couplings = coupling_notes(read.transmissions, [joint.name for joint in moving])
     notes = [*read.notes, *_below_base(tree.path(base)), *gathering.notes, *couplings]
     if rounding > SAID:
@@ -306,20 +307,23 @@ def _frames(
     last = placed[moving[-1].child]
     z = last[:3, :3] @ moving[-1].axis
     frames[-1][:3, 3] = last[:3, 3] + ((tip[:3, 3] - last[:3, 3]) @ z) * z
-    R = _snapped(tip[:3, :3] @ TOOL0[:3, :3].T if path[-1].child.endswith("tool0") else tip[:3, :3])
+    R = tip[:3, :3] @ TOOL0[:3, :3].T if path[-1].child.endswith("tool0") else tip[:3, :3]
     if abs(abs(R[:, 0] @ z) - 1.0) > EXACT:  # not a flange by its x: build one
         out = z if (tip[:3, 3] - last[:3, 3]) @ z >= 0.0 else -z
         helper = np.eye(3)[2] if abs(out[2]) < 0.9 else np.eye(3)[1]
         y = np.cross(helper, out) / np.linalg.norm(np.cross(helper, out))
-        R = _snapped(np.stack([out, y, np.cross(out, y)], axis=1))
-    frames[-1][:3, :3] = R
+        R = np.stack([out, y, np.cross(out, y)], axis=1)
+    frames[-1][:3, :3] = _squared(R, SAID)
     return frames
 
 
-def _snapped(values: FloatArray) -> FloatArray:
-    """Entries that miss -1, 0 or 1 by rounding are these."""
+def _squared(values: FloatArray, within: float) -> FloatArray:
+    """A direction along an axis, or a rotation by right angles, where all values miss that by less:
+    as a whole, so that it stays a direction or a rotation.
+    """
     near = np.round(values)
-    return np.asarray(np.where(np.abs(values - near) < EXACT, near, values))
+    close = float(np.abs(values - near).max()) < within
+    return np.asarray(near if close else values)
 
 
 _Part = tuple[UrdfLink, tuple[PlacedShape, ...]]

@@ -190,7 +190,9 @@ class _Reader:
                 if name not in links:
                     known = listed(links)
                     raise _UrdfError(
-                        element, f"joint {joint.name} names the link {shown(name)}: {known}"
+                        element,
+                        f"joint {joint.name} names the link {shown(name)}, which the file does "
+                        f"not have; it has {known}: add it, or take the joint out",
                     )
             if joint.name in joints:
                 raise _UrdfError(element, f"joint {joint.name} is there twice")
@@ -323,7 +325,8 @@ class _Reader:
                 raise _UrdfError(
                     one,
                     f"{what} is a {one.tag} of {', '.join(f'{s:g}' for s in size[:used])} m: "
-                    f"lengths must be above 0 and at most {LENGTH_MAX:g} m",
+                    f"lengths must be above 0 and at most {LENGTH_MAX:g} m; a body without a size "
+                    "is none: take it out",
                 )
         visual = element.tag == "visual"
         return UrdfShape(one.tag, _origin(element, what), size, file, link, line, visual)
