@@ -15,15 +15,21 @@ from ir_description import CellPath
 from ir_description.poses import rotation_from_abc
 from ir_krl import (
     Attached,
+    FrameNumbers,
+    KrlError,
     Motion,
     Payload,
     SetOutput,
     Style,
+    WrittenHandling,
     WrittenMove,
     WrittenSignals,
+    base_numbers,
     check_name,
     follow,
     parse,
+    settings_of,
+    tool_numbers,
     written,
 )
 from ir_krl.write import SignalNames
@@ -297,6 +303,93 @@ def test_a_stretched_wrist_is_written_by_its_axes(style: Style) -> None:
     assert last[-1].target.axes is not None
     back = [last[-1].target.axes[f"A{k}"] for k in range(1, 7)]
     assert back == pytest.approx(joints, abs=1e-8)
+
+
+EMPTY = Payload(12.0, (0.0, 0.0, 0.1), (0.0, 0.0, 0.0), (0.1, 0.2, 0.3))
+GEAR = replace(EMPTY, mass=30.0)
+TOOL = np.diag([-1.0, -1.0, 1.0, 1.0])
+TOOL[:3, 3] = [0.1, 0.2, 0.3]
+LATHE = np.eye(4)
+LATHE[:3, 3] = [1.5, -0.5, 0.25]
+FRAMES = {  # as the plant writes them
+    "tool": "{X 100.0,Y 200.0,Z 300.0,A 180.0,B 0.0,C 0.0}",
+    "lathe": "{X 1500.0,Y -500.0,Z 250.0,A 0.0,B 0.0,C 0.0}",
+    "other": "{X 7.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0}",
+    "none": "{X 0.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0}",
+}
+LOADS = {
+    "empty": "{M 12.0,CM {X 0.0,Y 0.0,Z 100.0,A 0.0,B 0.0,C 0.0},J {X 0.1,Y 0.2,Z 0.3}}",
+    "gear": "{M 30.0,CM {X 0.0,Y 0.0,Z 100.0,A 0.0,B 0.0,C 0.0},J {X 0.1,Y 0.2,Z 0.3}}",
+    "none": "{M -1.0,CM {X 0.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0},J {X 0.0,Y 0.0,Z 0.0}}",
+}
+
+
+def plant(tools: list[tuple[str, str]], bases: list[str]) -> FrameNumbers:
+    """A plant whose $config.dat has these tools with their loads, and these bases, from 1 on."""
+    lines = [f"TOOL_DATA[{n}]={FRAMES[tool]}" for n, (tool, _) in enumerate(tools, 1)]
+    lines += [f"LOAD_DATA[{n}]={LOADS[load]}" for n, (_, load) in enumerate(tools, 1)]
+    lines += [f"BASE_DATA[{n}]={FRAMES[base]}" for n, base in enumerate(bases, 1)]
+    text = "\n".join(["DEFDAT $CONFIG PUBLIC", *lines, "ENDDAT", ""])
+    return FrameNumbers(plant=parse(text, "$config.dat"))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_numbers_are_the_plants_own_or_free(seed: int) -> None:
+    """Law: a number that is taken holds the same in the plant, or nothing; no two are the same."""
+    rng = np.random.default_rng(seed)
+    names, held, places = (list(one) for one in (FRAMES, LOADS, FRAMES))
+    tools = [(str(rng.choice(names)), str(rng.choice(held))) for _ in range(6)]
+    bases = [str(rng.choice(places)) for _ in range(6)]
+    asked = plant(tools, bases)
+    loads = {"": EMPTY, "gear": GEAR}
+    found = tool_numbers(asked, TOOL, loads)
+    assert len({one.number for one in found}) == 2
+    for one, load in zip(found, ("empty", "gear"), strict=True):
+        there = tools[one.number - 1] if one.number <= len(tools) else ("none", "none")
+        assert there == (("tool", load) if one.origin == "plant" else ("none", "none"))
+        assert (one.origin == "plant") is (("tool", load) in tools)
+    (base,) = base_numbers(asked, {"lathe": LATHE})
+    there_too = bases[base.number - 1] if base.number <= len(bases) else "none"
+    assert there_too == ("lathe" if "lathe" in bases else "none")
+
+
+def test_numbers_that_are_asked_for_are_in_the_forms() -> None:
+    attached_to = Attached(TOOL, (EMPTY, GEAR), (("lathe", LATHE),), (3, 7), (9,))
+    move = WrittenMove("", LATHE, 2, 10, straight=True, velocity=1, base=1)
+    parts = [move, WrittenHandling("takes gear", True, 1), move]
+    texts = written("P", np.zeros(6), parts, attached_to, [], style="kss8")
+    assert (texts.tools, texts.bases) == ((3, 7), {"lathe": 9})
+    assert re.findall(r"Tool\[(\d+)\] Base\[(\d+)\]", texts.source) == [("3", "9"), ("7", "9")]
+    assert "TOOL_DATA[7]=IR_TOOL" in texts.source
+    assert "LOAD_DATA[7]=IR_LOAD_1" in texts.source
+    assert "BASE_DATA[9]=IR_BASE_1" in texts.source
+
+
+ASKED_WRONGLY = {
+    "a part that isn't carried": ({"bolt": 2}, "--tool 2=bolt: the program has nothing, gear"),
+    "one number twice": ({"": 2, "gear": 2}, "two have one number"),
+    "a number that no controller has": ({"": 200}, "--tool 200: numbers are from 1 to 128"),
+}
+
+
+@pytest.mark.parametrize("name", ASKED_WRONGLY)
+def test_numbers_are_refused_with_what_there_is(name: str) -> None:
+    tools, sentence = ASKED_WRONGLY[name]
+    with pytest.raises(KrlError, match=re.escape(sentence)):
+        tool_numbers(FrameNumbers(tools=tools), TOOL, {"": EMPTY, "gear": GEAR})
+
+
+def test_a_program_with_a_gripper_halts_until_it_is_open() -> None:
+    parts = [WrittenHandling("takes gear", True, 1)]
+    texts = written("P", np.zeros(6), parts, Attached(TOOL, (EMPTY, GEAR)), [])
+    files = [parse(texts.source, "p.src"), parse(texts.data, "p.dat")]
+    closed = [settings_of(["$OUT[1]=TRUE"])]
+    halted = [
+        "HALT" in str(follow(files, np.zeros(6), np.eye(4), settings=one).notes)
+        for one in ([], closed)
+    ]
+    assert halted == [False, True]
+    assert texts.source.index("ENDWHILE") < texts.source.index("PTP XSTART")
 
 
 def rounded(frame: dict[str, float]) -> np.ndarray:

@@ -40,6 +40,7 @@ from ir_krl import (
     STYLES,
     URSCRIPT,
     Followed,
+    FrameNumbers,
     Note,
     PlcPause,
     Source,
@@ -223,6 +224,27 @@ def add_export(write: argparse.ArgumentParser) -> None:
         default="spline",
         help="spline keeps the plan; kss8, krc2: inline forms to touch up (spline)",
     )
+    write.add_argument(
+        "--tool",
+        action="append",
+        default=[],
+        metavar="N[=PART]",
+        help="of inline forms: number of TOOL_DATA of the tool, or of it with a part; repeatable",
+    )
+    write.add_argument(
+        "--base",
+        action="append",
+        default=[],
+        metavar="N=MACHINE",
+        help="of inline forms: number of BASE_DATA of a machine; repeatable",
+    )
+    write.add_argument(
+        "--numbers-from",
+        type=Path,
+        metavar="FILE.dat",
+        help="the plant's $config.dat: take its own numbers of the same tools and bases, or free "
+        "ones",
+    )
     write.add_argument("--start", default="park", help="posture or joint values (park)")
     add_options(write)
     add_parameters(write)
@@ -284,7 +306,8 @@ def run_export(arguments: argparse.Namespace) -> int:
         )
         if not plan.status.ok:
             return failed(plan.status.message)
-        written = export_krl(planner, plan.movements, source.stem, options, style)
+        asked = _frame_numbers(arguments)
+        written = export_krl(planner, plan.movements, source.stem, options, style, asked)
     if written.data:
         write_file(data, written.data, new=True)
     if written.plc_table:
@@ -309,6 +332,26 @@ def run_export(arguments: argparse.Namespace) -> int:
             f"EXT; read back with --plc {table}\n"
         )
     return 0
+
+
+def _frame_numbers(arguments: argparse.Namespace) -> FrameNumbers:
+    """What the options say of numbers of tools and bases. Raises InputError."""
+    plant = arguments.numbers_from
+    return FrameNumbers(
+        _by_name("--tool", arguments.tool, "N or N=PART"),
+        _by_name("--base", arguments.base, "N=MACHINE"),
+        None if plant is None else parse(_text(plant), plant.name),
+    )
+
+
+def _by_name(option: str, texts: Sequence[str], form: str) -> dict[str, int]:
+    found: dict[str, int] = {}
+    for given in texts:
+        number, _, name = given.partition("=")
+        if not number.isdigit() or (form == "N=MACHINE" and not name) or name in found:
+            raise InputError(f"{option} {given[:40]}: it is {form}, each once")
+        found[name] = int(number)
+    return found
 
 
 def rows_of(found: EvaluatedProgram) -> list[Row]:

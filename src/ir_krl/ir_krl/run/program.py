@@ -19,7 +19,7 @@ from ir_krl.run.notes import Effect, Note, worst_first
 from ir_krl.run.standing import AXES_NOW, PLACE_NOW, Kinematics, Standing
 from ir_krl.run.system import Assumption, assumed_variables, system_variables
 from ir_krl.run.texts import TEXT_FUNCTIONS, text_value
-from ir_krl.run.values import Array, Unknown, Value, copied, typed
+from ir_krl.run.values import TYPES, Array, Unknown, Value, copied, typed
 from ir_values.arrays import FloatArray
 
 # Routines of several files: those of the same file come first, as on the controller.
@@ -156,6 +156,23 @@ def follow(
         raise KrlRunError(NESTED, Place(run.expressions.file)) from None
     notes = worst_first(run.notes)
     return Followed(name, tuple(run.commands), notes, run.signals, tuple(run.unknown.values()))
+
+
+def data_of(source: Source) -> dict[str, Value]:
+    """What the data lists of a file give values to, as those of $config.dat; what can't be read of
+    them is left out.
+    """
+    memory = Memory({}, types=dict(TYPES))
+    for body in source.data:
+        memory.types |= _structures(body)
+    run = _Run(Routines([source]), memory, {}, 1)
+    for body in source.data:
+        run.data(body, source.file, lenient=True)
+    return {
+        name: value
+        for one in (*memory.modules.values(), memory.shared)
+        for name, value in one.items()
+    }
 
 
 def _structures(body: Tree) -> dict[str, dict[str, str]]:

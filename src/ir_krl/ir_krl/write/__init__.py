@@ -1,6 +1,7 @@
 """Texts of a program: .src and .dat, and the PLC's part of its pauses."""
 
 from ir_krl.write.names import NAME_MAX, Numbers, SignalNames, Wiring, check_name
+from ir_krl.write.numbering import BASES_MAX, Chosen, FrameNumbers, base_numbers, tool_numbers
 from ir_krl.write.parts import (
     STYLES,
     URSCRIPT,
@@ -17,7 +18,6 @@ from ir_krl.write.parts import (
 )
 from ir_krl.write.plc import PlcPause, plc_input, plc_table, read_plc_table, structured_text
 from ir_krl.write.program import (
-    BASES_MAX,
     GRIP,
     PLC_DONE,
     PLC_PAUSE,
@@ -37,6 +37,8 @@ __all__ = [
     "STYLES",
     "URSCRIPT",
     "Attached",
+    "Chosen",
+    "FrameNumbers",
     "Numbers",
     "Part",
     "PlcPause",
@@ -50,6 +52,7 @@ __all__ = [
     "WrittenPause",
     "WrittenSignals",
     "WrittenSpline",
+    "base_numbers",
     "check_name",
     "check_signal",
     "check_style",
@@ -57,5 +60,6 @@ __all__ = [
     "plc_table",
     "read_plc_table",
     "structured_text",
+    "tool_numbers",
     "written",
 ]

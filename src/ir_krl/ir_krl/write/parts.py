@@ -111,9 +111,13 @@ Part: TypeAlias = (
 @dataclass(frozen=True, eq=False)
 class Attached:
     """The tool: its frame (4, 4) in the flange [m]; loads: what is carried, first at the start;
-    bases: machines with their poses (4, 4) [m] in the robot's foot, for inline forms.
+    bases: machines with their poses (4, 4) [m] in the robot's foot, for inline forms; tool_numbers,
+    base_numbers: of TOOL_DATA for each load and of BASE_DATA for each base, () where the program
+    chooses.
     """
 
     tool: FloatArray
     loads: tuple[Payload, ...]
     bases: tuple[tuple[str, FloatArray], ...] = ()
+    tool_numbers: tuple[int, ...] = ()
+    base_numbers: tuple[int, ...] = ()

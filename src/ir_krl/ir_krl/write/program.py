@@ -14,6 +14,7 @@ from ir_krl.run.commands import Payload
 from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES
 from ir_krl.write.forms import Forms, decimal, frame_text
 from ir_krl.write.names import INPUT, OUTPUT, WIDTHS, Numbers, Wiring, check_name
+from ir_krl.write.numbering import BASES_MAX, TOOL_HIGHEST
 from ir_krl.write.parts import (
     Attached,
     Part,
@@ -43,9 +44,6 @@ _OWN_SIGNALS = {
 }
 START_SPEED = 10
 """% of the axes' speed, on the way from wherever the robot stands."""
-_HIGHEST_TOOL = 16  # of TOOL_DATA: inline forms name tools by number, from here downwards
-BASES_MAX = 15
-"""Bases of a program: numbers of BASE_DATA that every controller has."""
 
 
 def check_signal(name: str) -> None:
@@ -163,6 +161,7 @@ class _Body:
         self._carried = 0
         self._movements = 0
         self._rests = False
+        self._grips = False
 
     def add(self, part: Part) -> None:
         """Append the lines of a part."""
@@ -174,11 +173,14 @@ class _Body:
             case WrittenMove():
                 assert self._forms is not None  # of another style
                 self._forms.move(
-                    self._in_base(part), _HIGHEST_TOOL - self._carried, self._base_number(part.base)
+                    self._in_base(part),
+                    self._tool_number(self._carried),
+                    self._base_number(part.base),
                 )
             case WrittenPause():
                 self._pause(part)
             case WrittenHandling():
+                self._grips = True
                 self.lines += [f"; {part.comment}", f"{self._grip()}={_truth(part.closes)}"]
                 self._carried = part.carried
                 self.lines.append(f"$LOAD={_load_name(part.carried)}")
@@ -208,6 +210,16 @@ class _Body:
                 for k in range(1, len(self._attached.bases) + 1)
             ),
             *([f"{PLC_PAUSE}=0"] if self._rests else []),
+            *(self._waits_for_open_gripper() if self._grips else []),
+        ]
+
+    def _waits_for_open_gripper(self) -> list[str]:
+        """The program halts as long as its gripper is closed where it begins."""
+        return [
+            f"WHILE {self._grip()}",
+            f'MsgNotify("{self._grip()} is on: open the gripper, empty, then go on")',
+            "HALT",
+            "ENDWHILE",
         ]
 
     def bases(self) -> dict[str, int]:
@@ -215,10 +227,17 @@ class _Body:
         names = (name for name, _ in self._attached.bases)
         return {name: self._base_number(k) for k, name in enumerate(names, start=1)}
 
-    @staticmethod
-    def _base_number(k: int) -> int:
+    def _base_number(self, k: int) -> int:
         """Of BASE_DATA, for the k-th base; 0 for the robot's foot."""
-        return BASES_MAX + 1 - k if k else 0
+        if not k:
+            return 0
+        asked = self._attached.base_numbers
+        return asked[k - 1] if asked else BASES_MAX + 1 - k
+
+    def _tool_number(self, k: int) -> int:
+        """Of TOOL_DATA and LOAD_DATA, for the tool with the k-th load."""
+        asked = self._attached.tool_numbers
+        return asked[k] if asked else TOOL_HIGHEST - k
 
     def _in_base(self, part: WrittenMove) -> WrittenMove:
         if not part.base:
@@ -229,7 +248,7 @@ class _Body:
     def tools(self) -> list[int]:
         """Numbers of TOOL_DATA that inline forms name, one for each load."""
         count = 0 if self._forms is None else len(self._attached.loads)
-        return [_HIGHEST_TOOL - k for k in range(count)]
+        return [self._tool_number(k) for k in range(count)]
 
     def data(self) -> list[str]:
         """Declarations: tool, loads, signals."""

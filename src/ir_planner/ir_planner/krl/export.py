@@ -13,7 +13,10 @@ from ir_kernels import portable
 from ir_krl import (
     BASES_MAX,
     Attached,
+    Chosen,
     Followed,
+    FrameNumbers,
+    KrlError,
     Numbers,
     Part,
     Payload,
@@ -26,11 +29,13 @@ from ir_krl import (
     WrittenPause,
     WrittenSignals,
     WrittenSpline,
+    base_numbers,
     check_name,
     check_signal,
     check_style,
     plc_table,
     structured_text,
+    tool_numbers,
 )
 from ir_msgs_py.modes import TransitionTimes
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
@@ -94,9 +99,10 @@ def export(
     times: TransitionTimes,
     style: str,
     around: Callable[[Followed], Surroundings],
+    numbers: FrameNumbers | None = None,
 ) -> KrlExport:
     """Write steps (movements with their points, and pauses) as program `name`. around: what a
-    program that is read back moves among.
+    program that is read back moves among; numbers: of tools and bases that inline forms name.
 
     Raises RequestError where a movement can't be written so that it stays certified, KrlError for
     the name and the style.
@@ -105,7 +111,8 @@ def export(
     if not moving:
         raise RequestError(StatusCode.INVALID_MOTION_PLAN, "the program has no movement to export")
     check_name(name)
-    return _Job(steps, name, scene, judge, times, check_style(style), around).done()
+    asked = numbers or FrameNumbers()
+    return _Job(steps, name, scene, judge, times, check_style(style), around, asked).done()
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +135,7 @@ class _Job:
         times: TransitionTimes,
         style: Style,
         around: Callable[[Followed], Surroundings],
+        asked: FrameNumbers,
     ) -> None:
         self._around = around
         self._steps = steps
@@ -140,6 +148,7 @@ class _Job:
         self._pauses = _plc_pauses(steps, times)
         self._loads = _loads(steps, judge)
         self._bases = self._machines() if style in _WITH_BASES else {}
+        self._tools_chosen, self._bases_chosen = self._chosen(asked)
         self._start = points_of(next(step for step in steps if not step.is_pause)).positions[0]
         fitted = {id(one): self._fitted(one) for one in steps if not one.is_pause}
         self._motions = {key: parts for key, (parts, _) in fitted.items()}
@@ -205,6 +214,8 @@ class _Job:
                 tool_in_flange(self._scene.cell.tcp),
                 tuple(self._loads.values()),
                 tuple(self._bases.items()),
+                tuple(one.number for one in self._tools_chosen),
+                tuple(one.number for one in self._bases_chosen),
             ),
             header,
             from_home=from_home,
@@ -231,6 +242,18 @@ class _Job:
         if step.set_signals:
             parts.append(WrittenSignals(set_signals=_signals(step.set_signals)))
         return parts
+
+    def _chosen(self, asked: FrameNumbers) -> tuple[tuple[Chosen, ...], tuple[Chosen, ...]]:
+        """Numbers of the tools and of the bases, where the style has any. Raises KrlError."""
+        if self._style not in _WITH_BASES:
+            if asked != FrameNumbers():
+                raise KrlError(
+                    f"style {self._style} names no tools and bases by number: leave --tool, --base "
+                    f"and --numbers-from out, or take style {' or '.join(_WITH_BASES)}"
+                )
+            return (), ()
+        tool = tool_in_flange(self._scene.cell.tcp)
+        return tool_numbers(asked, tool, self._loads), base_numbers(asked, self._bases)
 
     def _machines(self) -> dict[str, FloatArray]:
         """Machines that the movements lead to, with their poses (4, 4) in the robot's foot: bases
@@ -366,12 +389,13 @@ class _Job:
             lines.append("numbered here, for the cell file says none; adapt them in the data list:")
             lines += [f"  {one}" for one in texts.assumed]
         if texts.tools:
-            tools = ", ".join(map(str, texts.tools))
+            held = [name or "empty" for name in self._loads]
+            tools = _numbered(self._tools_chosen, held)
             lines.append(f"sets TOOL_DATA and LOAD_DATA of the numbers {tools}, for inline forms")
         if texts.bases:
-            bases = ", ".join(f"{number} ({name})" for name, number in texts.bases.items())
+            bases = _numbered(self._bases_chosen, list(texts.bases))
             lines.append(f"sets BASE_DATA of the numbers {bases}, for inline forms")
-        if texts.tools or texts.bases:
+        if any(one.origin in ("own", "asked") for one in self._tools_chosen + self._bases_chosen):
             lines += [
                 "WARNING: the plant's own values of these numbers in $config.dat are replaced when",
                 "this program starts, for all programs, until somebody restores them: back them up",
@@ -386,7 +410,9 @@ class _Job:
         """Which outputs the program sets, that nobody sets at its start."""
         named = [name for step in self._steps for name, _ in _signals(step.set_signals)]
         if any(step.attach or step.detach for step in self._steps):
-            named.insert(0, "GRIP, with the gripper empty (else the load is wrong)")
+            named.insert(
+                0, "GRIP off, with the gripper empty (else it halts, or the load is wrong)"
+            )
         if not named:
             return []
         listed = [
@@ -489,6 +515,17 @@ def _deviation_of(step: PlannedMovement, parts: Sequence[_Motion], again: JointT
     if isinstance(parts[0], WrittenSpline):
         return deviation_in_time(parts[0], again, planned)
     return deviation_along(again, planned)
+
+
+_ORIGINS = {"plant": ", the plant's own", "free": ", free in the plant"}
+
+
+def _numbered(chosen: Sequence[Chosen], names: Sequence[str]) -> str:
+    """Numbers with what they stand for, and whose they were."""
+    return "; ".join(
+        f"{one.number} ({name}{_ORIGINS.get(one.origin, '')})"
+        for one, name in zip(chosen, names, strict=True)
+    )
 
 
 def _load_words(load: Payload) -> str:

@@ -10,6 +10,7 @@ from ir_krl import (
     PLC_DONE,
     PLC_PAUSE,
     Followed,
+    FrameNumbers,
     KrlError,
     KrlMotionError,
     Note,
@@ -263,12 +264,14 @@ def export_krl(
     name: str,
     options: PlanOptions | None = None,
     style: str = "spline",
+    numbers: FrameNumbers | None = None,
 ) -> KrlExport:
     """Planned movements as a KRL program, read back, driven by the controller's model and certified
     again.
 
     options: those that were planned with; style: "spline", which keeps the plan, or inline forms of
-    "kss8" or "krc2", or "urscript". Raises RequestError where that can't be.
+    "kss8" or "krc2", or "urscript"; numbers: of tools and bases in inline forms. Raises
+    RequestError where that can't be.
     """
     chosen = options or PlanOptions()
     if chosen.timing == ASYNCHRONOUS:
@@ -288,6 +291,7 @@ def export_krl(
             planner.heard.transitions,
             style,
             lambda program: surroundings(planner, program),
+            numbers,
         )
     except KrlError as error:
         raise RequestError(StatusCode.INVALID_MOTION_PLAN, str(error)) from error
