@@ -351,26 +351,50 @@ def test_a_corner_between_the_two_kinds_of_motions_is_an_exact_stop(
     assert any("stops exactly" in note.text for note in notes) == (moves == 2)
 
 
-@given(st.floats(0.2, 5.0))
-@settings(max_examples=10, deadline=None)
-def test_a_time_block_over_some_parts_leaves_the_others_their_own_time(
-    planner: Planner, seconds: float
+@given(st.floats(0.1, 4.0), st.floats(0.1, 4.0), st.sampled_from([100.0, 7.0]))
+@settings(max_examples=12, deadline=None)
+def test_parts_of_a_spline_last_as_long_as_their_time_block_asks(
+    planner: Planner, first: float, second: float, whole: float
 ) -> None:
-    """Law: a spline whose parts take `own` s lasts `own`, and what the block is longer than its
-    part.
+    """Law: between its marks a spline takes the asked shares of the block's time, or its own time
+    where that is longer; outside it takes its own.
     """
 
-    def lasts(begin: str, end: str) -> float:
-        lines = f"PTP_SPLINE\nSPTP {{A1 15}}\n{begin}\nSPTP {{A1 30}}\n{end}\nENDSPLINE"
-        text = f"DEF T( )\n{START}{lines}\nEND\n"
+    def passed(*block: str) -> np.ndarray:
+        begin, part, last, end = block or ("",) * 4
+        lines = ["SPTP {A1 10}", begin, "SPTP {A1 20}", part, "SPTP {A1 35}", last, end]
+        body = "\n".join(["PTP_SPLINE", *lines, "SPTP {A1 45}", "ENDSPLINE"])
         cell = planner.cell
+        text = f"DEF T( )\n{START}{body}\nEND\n"
         program = follow([parse(text, "t.src")], cell.machine_home, tool_in_flange(cell.tcp))
-        return float(steps_of(program, planner)[-1].duration)
+        driven = steps_of(program, planner)[-1]
+        fine = np.linspace(0.0, driven.duration, 20_001)
+        turned = np.degrees(driven.sample(fine).q[:, 0] - driven.positions[0, 0])
+        return np.diff(np.interp([0, 10, 20, 35, 45], turned, fine))
 
-    own = lasts("", "")
-    most = max(own, own / 2.0 + seconds)
-    timed = lasts("TIME_BLOCK START", f"TIME_BLOCK END={seconds:.4f}")
-    assert timed == pytest.approx(most, abs=0.02 + 2e-3 * most)
+    own = passed()
+    share = whole * first / (first + second)
+    timed = passed(
+        "TIME_BLOCK START",
+        f"TIME_BLOCK PART={share:.6f}",
+        f"TIME_BLOCK PART={whole - share:.6f}",
+        f"TIME_BLOCK END={first + second:.6f}",
+    )
+    wanted = [own[0], max(first, own[1]), max(second, own[2]), own[3]]
+    assert timed == pytest.approx(wanted, abs=6e-3)
+
+
+def test_a_time_block_that_no_robot_keeps_is_driven_as_fast_as_it_can_and_said(
+    planner: Planner, followed: Follow
+) -> None:
+    lines = "SPTP {A1 10}\nTIME_BLOCK START\nSPTP {A1 40}\nTIME_BLOCK END=0.05"
+    program = followed(f"{START}PTP_SPLINE\n{lines}\nENDSPLINE")
+    steps, notes = drive(program, planner.scene("none"), planner.cell.machine_home)
+    assert any("less than the robot needs" in note.text for note in notes)
+    assert planner.scene("none").limits.velocity[0] >= np.abs(steps[-1].trajectory.velocities).max()
+    whole = "TIME_BLOCK START\nSPTP {A1 40}\nTIME_BLOCK END=0.05"
+    all_of_it = followed(f"{START}PTP_SPLINE\n{whole}\nENDSPLINE")
+    assert not evaluate_krl(planner, all_of_it).certified
 
 
 def test_a_tool_faster_than_the_machine_data_is_said(followed: Follow) -> None:

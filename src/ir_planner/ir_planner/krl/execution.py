@@ -29,7 +29,15 @@ from ir_msgs_py.plc import Signal
 from ir_msgs_py.trajectory import NS_PER_S, JointTrajectory
 from ir_planner.krl.geometry import Arm
 from ir_planner.krl.motions import AxisLine, Curve, Move, move, overlap, tool_curve, trajectory
-from ir_planner.krl.splines import ToolMotion, block_curve, timed_block, tool_motion, tool_spline
+from ir_planner.krl.splines import (
+    ToolMotion,
+    block_curve,
+    stretched,
+    stretches,
+    timed_block,
+    tool_motion,
+    tool_spline,
+)
 from ir_planner.krl.surroundings import Surroundings, nothing_around
 from ir_planner.krl.triggers import Stage, along_path, instant, stages_at, stages_of
 from ir_planner.scene import STILL, PlanningScene
@@ -406,9 +414,37 @@ class _Drive:
             self.notes.append(
                 Note(block.place, "parts have speeds of their own: driven as its first part")
             )
+        if block.times and block.blend is None and self._blend is None:
+            self._timed_parts(block, curve, triggered)
+            return
         least = self._least(block, curve)
-        drawn = None if block.axis else tool_spline(block, self.here, self.arm)
+        drawn = None if block.axis or block.times else tool_spline(block, self.here, self.arm)
         self._drive(curve, block, block.parts[0].speeds, drawn, triggered, least)
+
+    def _timed_parts(
+        self, block: SplineBlock, curve: Curve, triggered: Sequence[SetOutput]
+    ) -> None:
+        """A block that begins and ends at rest and whose TIME_BLOCKs time some of its parts."""
+        self.finish()
+        self._carry(block.parts[0].payload, block.place)
+        speeds = block.parts[0].speeds
+        by_itself = move(curve, speeds, self.scene, _target_of(block), block.place)
+        passed = np.concatenate([[0], by_itself.passing()]) * GRID_S
+        asked = stretches(block, passed, speeds.override)
+        hurried = [one for one in asked if one.longer < -GRID_S]
+        if hurried:
+            text = (
+                f"TIME_BLOCK asks for {sum(-one.longer for one in hurried):.3f} s less than the "
+                "robot needs: driven as fast as it can"
+            )
+            self.notes.append(Note(block.times[0].place, text, Effect.TIMES))
+        slower = [one for one in asked if one.longer > 0.0]
+        names = self.scene.cell.robot.joint_names
+        driven, times = stretched(trajectory([by_itself], [], names), slower, passed)
+        events = self._triggers(driven, block, stages_at(times), triggered)
+        self.here = driven.positions[-1]
+        process = (block.place,) if self.working else ()
+        self._step(driven, (block.place,), events, moves=True, tool=(None,), process=process)
 
     def _least(self, block: SplineBlock, curve: Curve) -> float:
         """Seconds that a block lasts at least: its TIME_BLOCK, and the parts outside as long as
@@ -417,13 +453,12 @@ class _Drive:
         speeds = block.parts[0].speeds
         if not block.times:
             return 0.0
-        if block.times[0].first > 0 or block.times[-1].last < len(block.parts):
-            text = (
-                "TIME_BLOCK over some parts of a spline: the whole lasts as long as they and the "
-                "parts outside by themselves, but one law drives all of it, so that the parts "
-                "aren't passed when they should be"
-            )
-            self.notes.append(Note(block.times[0].place, text, Effect.MOTIONS))
+        text = (
+            "TIME_BLOCK in a spline whose corner is rounded: the whole lasts as long as its times "
+            "and the parts outside by themselves, but one law drives all of it, so that the parts "
+            "aren't passed when they should be"
+        )
+        self.notes.append(Note(block.times[0].place, text, Effect.MOTIONS))
         by_itself = move(curve, speeds, self.scene, _target_of(block), block.place)
         passed = np.concatenate([[0], by_itself.passing()]) * GRID_S
         own = [float(passed[one.last] - passed[one.first]) for one in block.times]

@@ -1,5 +1,7 @@
 """Splines: blocks of several parts driven without a stop, and their motions of the tool."""
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -170,6 +172,8 @@ _STEP_M = 4e-3
 _SAMPLES_MIN = 33
 _SAMPLES_MAX = 20_001
 _KNOTS_PER_S = 125
+_NEWTON = 4  # steps from a first guess between samples
+_ROUNDING = 1e-6  # grid steps
 
 
 def block_curve(block: SplineBlock, start: FloatArray, arm: Arm) -> AxisCurve:
@@ -210,18 +214,111 @@ def timed_block(
     return driven, times
 
 
+# A TIME_BLOCK over some parts, or that leaves times of points open: the spline is driven as
+# without one, and each stretch between two marks is then slowed so that it lasts as long as is
+# asked; at the marks it is as fast as before. Nothing gets faster, so that all limits hold.
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """What lies between two marks of a TIME_BLOCK lasts from `begin` to `end` [s] by itself, and
+    `longer` [s] than that by what is asked.
+    """
+
+    begin: float
+    end: float
+    longer: float
+
+
+def stretches(block: SplineBlock, passed: FloatArray, override: float) -> list[Stretch]:
+    """Of all TIME_BLOCKs, where parts end at `passed` (parts + 1,) [s], 0 first, without them; what
+    would have to be faster has a `longer` below 0. Raises KrlMotionError.
+    """
+    found = []
+    for one in block.times:
+        seconds = one.seconds / override
+        marks = [one.first, *_marks(one)]
+        for (a, b), share in zip(itertools.pairwise(marks), _shares(one), strict=True):
+            own = passed[b] - passed[a]
+            longer = share * seconds - own
+            found.append(Stretch(float(passed[a]), float(passed[b]), float(longer)))
+    return found
+
+
+def stretched(
+    driven: JointTrajectory, slowed: Sequence[Stretch], passed: FloatArray
+) -> tuple[JointTrajectory, FloatArray]:
+    """A movement that lasts longer in each stretch, and when it passes what it passed at `passed`
+    (P,) [s].
+    """
+    own = np.linspace(0.0, driven.duration, max(len(driven.times_ns), 2) * _PER_INTERVAL)
+    total = _slow(own, slowed)[0][-1]
+    steps = int(np.ceil(total / GRID_S - _ROUNDING))
+    scale = steps * GRID_S / total  # less than a step longer: it ends on the grid
+    times = np.arange(steps + 1) * GRID_S
+    count = max(round(times[-1] * _KNOTS_PER_S), 2)
+    times = np.unique(np.rint(np.linspace(0, steps, count + 1)).astype(np.int64)) * GRID_S
+    before = np.interp(times / scale, _slow(own, slowed)[0], own)
+    for _ in range(_NEWTON):
+        at, slope, _ = _slow(before, slowed)
+        before = np.clip(before - (at - times / scale) / slope, 0.0, driven.duration)
+    _, slope, bend = _slow(before, slowed)
+    slope = (slope * scale)[:, None]
+    bend = (bend * scale)[:, None]
+    found = driven.sample(before)
+    qd = found.qd / slope
+    qdd = (found.qdd - qd * bend) / slope**2
+    grid = np.rint(times / GRID_S).astype(np.int64) * GRID_NS
+    again = JointTrajectory(driven.joint_names, grid, found.q, qd, qdd)
+    return again, _slow(passed, slowed)[0] * scale
+
+
+def _slow(
+    times: FloatArray, slowed: Sequence[Stretch]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Instants [s] of the stretched movement for `times` [s] of its own, and their first and second
+    derivatives.
+    """
+    at = np.array(times)
+    slope = np.ones_like(at)
+    bend = np.zeros_like(at)
+    for one in slowed:
+        lasting = one.end - one.begin
+        x = np.clip((times - one.begin) / lasting, 0.0, 1.0)
+        at += one.longer * x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+        slope += one.longer / lasting * 30.0 * x**2 * (1.0 - x) ** 2
+        bend += one.longer / lasting**2 * 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x)
+    return at, slope, bend
+
+
+def _marks(block: TimeBlock) -> list[int]:
+    """Before which parts the stretches of a block end; the last one is its own end."""
+    inner = [part for part, _ in block.marks]
+    return inner if inner and inner[-1] == block.last else [*inner, block.last]
+
+
+def _shares(block: TimeBlock) -> FloatArray:
+    """Of the block's time, the share of each stretch between its marks (M,): as they are to each
+    other where the last one is given too, else what is left of 100 %. Raises KrlMotionError.
+    """
+    marks = _marks(block)
+    shares = np.array([share for _, share in block.marks])
+    if len(shares) < len(marks):
+        shares = np.append(shares, 100.0 - shares.sum())
+    if min(shares) <= 0.0 or min(np.diff([block.first, *marks])) <= 0:
+        raise KrlMotionError(
+            "TIME_BLOCK PART: shares are above 0 %, each behind a part, and less than 100 % "
+            "together before the last one",
+            block.place,
+        )
+    return np.asarray(shares / shares.sum())
+
+
 def _passing_times(block: TimeBlock, parts: int) -> FloatArray | None:
     """Times (parts + 1,) [s] at which the points are passed; None where marks leave some open."""
-    marked = dict(block.marks)
-    if set(marked) != set(range(1, parts)):
+    if _marks(block) != list(range(1, parts + 1)):
         return None
-    shares = np.array([marked[k] for k in range(1, parts)])
-    last = 100.0 - shares.sum()
-    if (shares <= 0.0).any() or last <= 0.0:
-        raise KrlMotionError(
-            "TIME_BLOCK PART: shares are above 0 % and less than 100 % together", block.place
-        )
-    return np.concatenate([[0.0], np.cumsum([*shares, last])]) * (block.seconds / 100.0)
+    return np.concatenate([[0.0], np.cumsum(_shares(block))]) * block.seconds
 
 
 def _axis_points(block: SplineBlock, start: FloatArray, arm: Arm) -> FloatArray:
