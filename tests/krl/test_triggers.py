@@ -10,7 +10,8 @@ import pytest
 
 from ir_description import cell_from_yaml, cell_to_yaml, load_cell
 from ir_krl import Followed, KrlError, follow, parse
-from ir_planner import Planner
+from ir_planner import Planner, RequestError
+from ir_planner.before_after.today import today_of_krl
 from ir_planner.krl import evaluate_krl, tool_in_flange
 from ir_planner.krl.execution import DrivenStep, drive
 
@@ -136,6 +137,23 @@ def test_an_instant_at_a_rounded_corner(
         assert at == pytest.approx(expected, abs=STEP), when
 
 
+@pytest.mark.parametrize("output", ["$OUT_C[4]=TRUE", "CONTINUE\n$OUT[4]=TRUE"])
+@pytest.mark.parametrize("word", ["", " C_DIS"])
+def test_an_output_that_stops_nothing_is_set_where_the_motion_before_ends(
+    output: str, word: str, planner: Planner, followed: Follow
+) -> None:
+    """Law: as a TRIGGER at that end sets it; the robot moves as without it."""
+    head = f"{HEAD}$APO.CDIS=40\n"
+    first = f"LIN_REL {{Y 300}}{word}"
+    rest = "LIN_REL {Z -300} C_DIS\nLIN_REL {Y -300}"
+    own = followed(f"{head}{first}\n{output}\n{rest}")
+    trigger = "TRIGGER WHEN DISTANCE=1 DELAY=0 DO $OUT[4]=TRUE"
+    judged = followed(f"{head}{trigger}\n{first}\n{rest}")
+    assert switched(planner, own) == switched(planner, judged)
+    plain = followed(f"{head}{first}\n{rest}")
+    assert len(moving(planner, own)) == len(moving(planner, plain))
+
+
 def test_a_path_leads_over_a_rounded_corner(planner: Planner, followed: Follow) -> None:
     """PATH=60 after a rounded corner acts on the next motion, measured along the driven path."""
     instants = []
@@ -246,6 +264,23 @@ def test_a_door_moves_from_the_instant_on() -> None:
     doors = [one.step.scene.cell.machine("lathe").state for one in (first, second)]
     assert doors == ["door_open", "door_open>door_closed"]
     assert all(one.found.verification.certified for one in (first, second))
+
+
+def test_a_process_in_whose_course_a_door_moves_names_its_lines_and_what_to_do() -> None:
+    lines = "PTP XHOME\nPTP {A1 20}\n$VEL.CP=0.1\n$OUT[9]=TRUE\n{t}LIN_REL {Z -80}\n$OUT[9]=FALSE"
+    trigger = "TRIGGER WHEN DISTANCE=0 DELAY=300 DO $OUT[17]=FALSE\n"
+    for between, refused in (("", False), (trigger, True)):
+        planner, program = tending(lines.replace("{t}", between))
+        found = evaluate_krl(planner, program)
+        if not refused:
+            assert [one.process is not None for one in today_of_krl(found).stretches].count(
+                True
+            ) == 1
+            continue
+        with pytest.raises(
+            RequestError, match=r"t\.src:7:1 is a process in whose course \$OUT\[17\]"
+        ):
+            today_of_krl(found)
 
 
 @pytest.mark.parametrize("delay", [0, 350])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ir_cli.main import main
-from ir_krl import KrlError, Motion, SetOutput, Wait, WaitFor
+from ir_krl import Effect, KrlError, Motion, SetOutput, Wait, WaitFor
 from ir_krl.urscript import (
     JointLimits,
     follow_urscript,
@@ -140,3 +140,22 @@ def test_the_commands_of_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixt
     assert [one.name for one in tmp_path.iterdir()] == ["visit.script"]
     assert main(["krl", "import", str(script), "--cell", "ur10e_bench"]) == 0
     assert "free of violations" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("radius", "stops"), [(0.0, 1), (0.05, 0)])
+def test_an_output_in_a_blend_stops_nothing(radius: float, stops: int) -> None:
+    """A UR sets it while it drives through; after an exact stop it stands."""
+    moves = f"movej(a, r={radius})\n set_digital_out(2, True)\n movej(b)"
+    text = f"def p():\n a=[0,-1.5,1.5,0,1,0]\n b=[0.4,-1.5,1.5,0,1,0]\n movej(b)\n {moves}\nend\n"
+    program = follow_urscript(text, "p.script", np.eye(4), LIMITS)
+    (output,) = [one for one in program.commands if isinstance(one, SetOutput)]
+    assert (output.number, output.on_path) == (3, not stops)
+    assert (output.switch is None) is bool(stops)
+
+
+@pytest.mark.parametrize("line", ["popup(1)", "set_gravity([0,0,9.8])", "movel(p[1,0,1,0,0,0])"])
+def test_what_a_script_leaves_open_is_said(line: str) -> None:
+    text = f"def p():\n movej([0,-1.5,1.5,0,1,0])\n {line}\nend\n"
+    (note,) = follow_urscript(text, "p.script", np.eye(4), LIMITS).notes
+    assert note.place.line == 3
+    assert note.effect > Effect.NONE

@@ -17,6 +17,7 @@ import numpy as np
 from ir_description.poses import abc_from_rotation, pose_of
 from ir_krl.errors import KrlError, KrlRunError, KrlSyntaxError, Place
 from ir_krl.run.commands import (
+    END_OF_LAST,
     Blend,
     Command,
     Kind,
@@ -28,7 +29,7 @@ from ir_krl.run.commands import (
     Wait,
     WaitFor,
 )
-from ir_krl.run.notes import Effect, Note
+from ir_krl.run.notes import Effect, Note, worst_first
 from ir_krl.run.program import Followed
 from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES
 from ir_krl.write.names import INPUT, OUTPUT, Numbers, Wiring, check_name
@@ -46,8 +47,13 @@ from ir_values.arrays import FloatArray
 # Frames: a UR's flange is KUKA's, turned a quarter about z.
 
 _TURNING = math.pi  # rad/s and rad/s^2 of the tool, that movel doesn't name
+_TURNS = "movel doesn't say how fast the tool turns: at most 180 deg/s and 180 deg/s^2"
 _OUTPUTS = ("set_standard_digital_out", "set_digital_out")
-_SILENT = ("sync", "textmsg", "popup", "set_gravity")
+_SILENT = ("sync", "textmsg")
+_NOTED = {
+    "popup": ("may wait for the operator: taken as no pause", Effect.TIMES),
+    "set_gravity": ("isn't followed: the cell's robot stands upright", Effect.SPEEDS),
+}
 _WAIT = re.compile(
     r"while\s*\(?\s*(not\s+)?get_(?:standard_)?digital_in\((\d+)\)\s*(?:==\s*(True|False))?\s*\)?:"
 )
@@ -163,7 +169,7 @@ class _Script:
                 waiting = False
                 continue
             self._statement(text, place)
-        return Followed(self._name, tuple(self._commands), tuple(self._notes))
+        return Followed(self._name, tuple(self._commands), worst_first(self._notes))
 
     def _statement(self, text: str, place: Place) -> None:
         if match := re.fullmatch(r"def\s+(\w+)\(\):", text):
@@ -186,6 +192,9 @@ class _Script:
             self._calls[name](call, place)
         elif name in _SILENT:
             pass
+        elif name in _NOTED:
+            text, effect = _NOTED[name]
+            self._notes.append(Note(place, f"{name} {text}", effect))
         elif re.match(r"(move|servo|speed|force|path|conveyor)", name):
             raise KrlSyntaxError(f"{name} may move the robot and isn't read", place)
         else:
@@ -285,6 +294,8 @@ class _Script:
 
     def _movel(self, call: ast.Call, place: Place) -> None:
         target, a, v, blend = self._move(call, "lin", (1.2, 0.25), place)
+        if not any(note.text == _TURNS for note in self._notes):
+            self._notes.append(Note(place, _TURNS, Effect.SPEEDS))
         full = (1.0,) * len(AXIS_NAMES)
         speeds = Speeds(full, full, v, a, _TURNING, _TURNING, 1.0)
         self._commands.append(Motion("lin", target, speeds, place, blend, payload=self._payload))
@@ -323,7 +334,13 @@ class _Script:
         if len(values) != 2 or not isinstance(values[1], bool):
             raise KrlRunError("an output takes its number and True or False", place)
         number = self._number(call.args[0], place)
-        self._commands.append(SetOutput(int(number) + 1, values[1], place))
+        last = next(
+            (one for one in reversed(self._commands) if not isinstance(one, SetOutput)), None
+        )
+        rounding = isinstance(last, Motion) and last.blend is not None
+        switch = END_OF_LAST if rounding else None  # a UR sets it in the blend, without a stop
+        output = SetOutput(int(number) + 1, values[1], place, on_path=rounding, switch=switch)
+        self._commands.append(output)
 
 
 _OPERATORS: dict[type, Callable[[float, float], float]] = {

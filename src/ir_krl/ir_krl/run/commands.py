@@ -187,10 +187,10 @@ class Stop:
 
 @dataclass(frozen=True)
 class Switch:
-    """When a TRIGGER acts: at the end of part `part` of its motion (from_start: at its start), or
-    `path` [m] of the tool's path after that place (None: WHEN DISTANCE), `delay` [s] later, and
-    `waited` [s] that the routine which it calls has waited. ahead: its motion is the next one among
-    the commands, else the one before.
+    """When a TRIGGER acts: at the end of part `part` of its motion (-1: of the last one;
+    from_start: at its start), or `path` [m] of the tool's path after that place (None: WHEN
+    DISTANCE), `delay` [s] later, and `waited` [s] that the routine which it calls has waited.
+    ahead: its motion is the next one among the commands, else the one before.
     """
 
     ahead: bool
@@ -201,11 +201,15 @@ class Switch:
     waited: float = 0.0
 
 
+END_OF_LAST = Switch(ahead=False, from_start=False, path=None, delay=0.0, part=-1)
+"""The end of the motion before, in a rounded corner the middle of the rounding."""
+
+
 @dataclass(frozen=True)
 class SetOutput:
     """A digital output is set; `pulse` [s] later it goes back, 0 = it stays. on_path: while the
     robot moves (by a TRIGGER, after CONTINUE, or as $OUT_C), so that it needn't stop. switch: when
-    a TRIGGER sets it; in_time: just when the motion before ends ($OUT_C).
+    a TRIGGER sets it, or just when the motion before ends.
     """
 
     number: int
@@ -214,7 +218,6 @@ class SetOutput:
     pulse: float = 0.0
     on_path: bool = False
     switch: Switch | None = None
-    in_time: bool = False
 
 
 Command: TypeAlias = Motion | SplineBlock | Wait | WaitFor | SetOutput | Stop

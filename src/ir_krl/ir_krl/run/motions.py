@@ -11,6 +11,7 @@ from typing import TypeVar, get_args
 from ir_krl.errors import KrlRunError, Place
 from ir_krl.language import Tree, place_of
 from ir_krl.run.commands import (
+    END_OF_LAST,
     Blend,
     Kind,
     Motion,
@@ -173,7 +174,16 @@ class Assigning(Control):
                 f"$OUT[{number:g}]: outputs have whole numbers from 1 to {SIGNALS}", place
             )
         on_path = self.continuing or in_time
-        output = SetOutput(int(number), level, place, pulse, on_path, self.triggered, in_time)
+        switch = self.triggered
+        if on_path and switch is None and self._rounding:
+            switch = END_OF_LAST
+            if not in_time:
+                text = (
+                    "an output after CONTINUE is set by the advance run: taken as set when the "
+                    "motion before ends"
+                )
+                self.note_at(place, text, Effect.TIMES)
+        output = SetOutput(int(number), level, place, pulse, on_path, switch)
         self.commands.append(output)
         if pulse == 0.0:
             self._signals.pulses.pop(int(number), None)

@@ -159,8 +159,17 @@ def _may_work(step: DrivenStep) -> bool:
 
 def _check_alone(step: DrivenStep, worked: tuple[Place, ...]) -> None:
     """Raise RequestError where a step has motions that no path of the tool describes."""
-    if all(one is not None for one in step.tool) and step.tool:
+    if all(one is not None for one in step.tool) and step.tool and all(step.at_rest):
         return
+    if not all(step.at_rest):
+        switched = ", ".join(f"$OUT[{one.number}]" for one in step.outputs) or "$LOAD"
+        raise RequestError(
+            StatusCode.INVALID_MOTION_PLAN,
+            f"{lines_of(worked)} is a process in whose course {switched} moves a door or changes "
+            "what is carried: no path of the tool is driven on among other bodies or with another "
+            "load; set it where a motion ends exactly (without C_DIS, C_SPL and TRIGGER), or name "
+            "the lines of processes, or none (--process)",
+        )
     raise RequestError(
         StatusCode.INVALID_MOTION_PLAN,
         f"{lines_of(worked)} is a process, but the movement {lines_of(step.places)} that it is "

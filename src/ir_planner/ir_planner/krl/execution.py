@@ -225,8 +225,6 @@ class _Drive:
                 self._block(command, triggered)
             case SetOutput() if command.switch is not None:
                 pass  # belongs to its motion
-            case SetOutput() if command.on_path and self._through:
-                self._set_in_motion(command)
             case SetOutput():
                 self.finish()
                 self._set(command)
@@ -241,16 +239,6 @@ class _Drive:
                 self._stand(0.0, command.place, command.condition)
                 signals = self.around.awaited(command.condition)
                 self.steps[-1] = replace(self.steps[-1], awaited=signals)
-
-    def _set_in_motion(self, output: SetOutput) -> None:
-        """An output that no motion stops for."""
-        self._outputs.append(output)
-        if not output.in_time:
-            text = (
-                "an output after CONTINUE is set by the advance run: taken as set when the motion "
-                "before ends"
-            )
-            self.notes.append(Note(output.place, text, Effect.TIMES))
 
     def _part_kinds(self, command: Motion | SplineBlock) -> None:
         """Stop between a motion of the spline kind and one of the other, as controllers do."""

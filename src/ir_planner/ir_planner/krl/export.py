@@ -400,6 +400,8 @@ class _Job:
                 "WARNING: the plant's own values of these numbers in $config.dat are replaced when",
                 "this program starts, for all programs, until somebody restores them: back them up",
             ]
+        if self._style == "urscript":
+            lines.append("payloads have no moments of inertia here: give the controller its own")
         if self._style == "kss8":
             lines.append("needs KSS 8.5 or later, for its lines of collision monitoring")
         lines += self._output_lines()
