@@ -139,7 +139,7 @@ ASSUMED = {
     ),
     "a wait for nothing": (
         "WAIT FOR FALSE",
-        "this wait never ends by itself: taken as ended",
+        "this wait never ends by what the program itself sets: taken as ended",
         Effect.MOTIONS,
     ),
     "what a channel sends": (
@@ -245,7 +245,8 @@ def test_the_worst_assumption_comes_first_and_is_said_once(followed: Follow) -> 
 def test_nothing_is_assumed_of_what_a_program_brings(followed: Follow) -> None:
     lines = (
         "XHOME={A1 0,A2 -90,A3 90,A4 0,A5 0,A6 0}\nTOOL_DATA[1]={X 0,Y 0,Z 10,A 0,B 0,C 0}\n"
-        "BASE_DATA[2]={X 5,Y 0,Z 0,A 0,B 0,C 0}\n$OUT[3]=FALSE\nREADY=TRUE\n$MODE_OP=#EX\n"
+        "BASE_DATA[2]={X 5,Y 0,Z 0,A 0,B 0,C 0}\nLOAD_DATA[1]={M 9.0}\n$OUT[3]=FALSE\n"
+        "READY=TRUE\n$MODE_OP=#EX\n"
         "BAS(#INITMOV,0)\nPTP XHOME\nFDAT_ACT={TOOL_NO 1,BASE_NO 2}\nBAS(#FRAMES)\n"
         "IF READY AND NOT $OUT[3] AND ($MODE_OP==#EX) AND $EXT THEN\n"
         "PTP {X 1,Y 2,Z 3,A 0,B 90,C 0}\nENDIF"
@@ -333,6 +334,31 @@ def test_a_wait_for_one_of_several_ends_by_one_of_them(condition: str, followed:
     program = followed(f"WAIT FOR {condition}\n{read}", inputs=inputs)
     waited = {one.seconds for one in program.commands if isinstance(one, Wait)}
     assert "".join("1" if n in waited else "0" for n in (1, 2, 3)) == wanted
+
+
+WAITED = {  # a wait, what is set before, and whether the program itself keeps it from ending
+    "$FLAG[1]": ("$FLAG[1]=FALSE", True),
+    "$FLAG[1]==TRUE": ("$FLAG[1]=FALSE", True),
+    "NOT $FLAG[1]": ("$FLAG[1]=TRUE", True),
+    "ready AND NOT busy": ("ready=FALSE\nbusy=TRUE", True),
+    "ready OR busy": ("ready=FALSE\nbusy=TRUE", False),
+    "ready AND NOT $IN[4]": ("ready=FALSE", True),
+    "busy AND NOT $IN[4]": ("busy=TRUE", False),
+}
+
+
+@pytest.mark.parametrize("condition", WAITED)
+def test_a_flag_that_was_waited_for_is_as_it_was_waited_for(
+    condition: str, followed: Follow
+) -> None:
+    """Law: a wait that nothing in the program ends is taken as ended, and said; what follows sees
+    it as it then is.
+    """
+    before, endless = WAITED[condition]
+    lines = f"DECL BOOL ready,busy\n{before}\nWAIT FOR {condition}\nIF {condition} THEN\n"
+    program = followed(f"{lines}PTP {{A1 10}}\nENDIF", inputs={4: False})
+    assert ("this wait never ends" in " ".join(texts(program))) is endless
+    assert angles(program) == [10.0]
 
 
 def test_an_input_that_was_waited_for_is_as_it_was_waited_for(followed: Follow) -> None:

@@ -12,6 +12,7 @@ from ir_krl.run.commands import Command, Motion, SplineBlock, Stop, Switch, Wait
 from ir_krl.run.expressions import Expressions
 from ir_krl.run.memory import (
     CYCLIC,
+    FLAG,
     INPUT,
     TIMER,
     TIMER_FLAG,
@@ -21,7 +22,7 @@ from ir_krl.run.memory import (
     Watched,
 )
 from ir_krl.run.notes import Effect, Note
-from ir_krl.run.values import Value, integer
+from ir_krl.run.values import Unknown, Value, integer
 
 STATEMENTS_MAX = 200_000
 """Statements that one run may take: a loop that never ends is named instead of followed for
@@ -396,9 +397,10 @@ class Control:
             text = "WAIT FOR after CONTINUE: taken as fulfilled when it is reached"
             self.note_at(place, text, Effect.TIMES)
             return
-        if _constant(condition) and not self.expressions.truth(condition, "the condition"):
-            text = "this wait never ends by itself: taken as ended"
+        if self._blocked(condition, wanted=True):
+            text = "this wait never ends by what the program itself sets: taken as ended"
             self.note_at(place, text, Effect.MOTIONS)
+            self._settle(condition, wanted=True)
         if _names(condition) & {TIMER, TIMER_FLAG}:
             seconds = self._timed(condition)
             if seconds is not None and seconds > 0.0:
@@ -411,6 +413,49 @@ class Control:
                 self.note_at(place, text, Effect.TIMES)
         self.commands.append(WaitFor(_written(condition), place))
         self._signals.moved()
+
+    def _blocked(self, tree: Tree, *, wanted: bool) -> bool:
+        """Whether flags and variables, which only the program sets, keep a condition from what a
+        wait wants of it; inputs and the state of the controller may come to it.
+        """
+        match tree.data:
+            case "negated":
+                return self._blocked(tree.children[1], wanted=not wanted)
+            case "joined" if str(tree.children[1]) in ("AND", "OR"):
+                sides = [self._blocked(one, wanted=wanted) for one in tree.children[::2]]
+                every = (str(tree.children[1]) == "AND") is wanted
+                return any(sides) if every else all(sides)
+            case "compared" if (same := _same_as(tree)) is not None:
+                return self._blocked(tree.children[0], wanted=wanted is same)
+        if not self._is_own(tree):
+            return False
+        before = self.memory.guesses
+        values = [self.expressions.value(one) for one in _accesses(tree)]
+        if any(isinstance(one, Unknown) for one in values):
+            return False  # a note says so
+        holds = self.expressions.truth(tree, "the condition of WAIT FOR")
+        return holds is not wanted and self.memory.guesses == before
+
+    def _is_own(self, tree: Tree) -> bool:
+        """Whether an expression reads flags and variables alone."""
+        signals = self.expressions.signals
+        outside = (*signals.groups, *signals.aliases)
+        return not _calls(tree) and all(
+            name == FLAG or not (name.startswith("$") or name in outside) for name in _names(tree)
+        )
+
+    def _settle(self, tree: Tree, *, wanted: bool) -> None:
+        """Flags and variables hold what a wait that was taken as ended leaves no choice."""
+        match tree.data:
+            case "negated":
+                self._settle(tree.children[1], wanted=not wanted)
+            case "joined" if str(tree.children[1]) == ("AND" if wanted else "OR"):
+                self._settle(tree.children[0], wanted=wanted)
+                self._settle(tree.children[2], wanted=wanted)
+            case "compared" if (same := _same_as(tree)) is not None:
+                self._settle(tree.children[0], wanted=wanted is same)
+            case "access" if self._is_own(tree):
+                self.memory.set(self.expressions.path(tree), wanted, self.place(tree))
 
     def _timed(self, condition: Tree) -> float | None:
         """Seconds until a timer that was set and started just before has passed a bound; None where
@@ -501,6 +546,26 @@ class Control:
                 self.note(tree, text, Effect.TIMES)
         for child in tree.children if isinstance(tree, Tree) else ():
             self._check_names(child)
+
+
+def _same_as(compared: Tree) -> bool | None:
+    """Of a comparison with TRUE or FALSE: whether it holds where its left side does; else None."""
+    _, sign, right = compared.children
+    if right.data not in ("true", "false"):
+        return None
+    return (str(sign) == "==") is (right.data == "true")
+
+
+def _accesses(tree: Tree) -> list[Tree]:
+    """What an expression reads."""
+    if tree.data == "access":
+        return [tree]
+    return [found for one in tree.children if isinstance(one, Tree) for found in _accesses(one)]
+
+
+def _calls(tree: Tree) -> bool:
+    """Whether an expression calls a function."""
+    return tree.data == "call" or any(_calls(one) for one in tree.children if isinstance(one, Tree))
 
 
 def _names(tree: Tree) -> set[str]:

@@ -88,7 +88,7 @@ class Library:
             "SAPO_PTP": self._axis_approximation,
             "SAPO": lambda given, place: Structure({"CDIS": _component(given, "APO_DIST", place)}),
             "SORI_TYP": lambda given, place: _field(given, "ORI_TYP", Symbol("VAR")),
-            "SLOAD": lambda given, place: self._load(_whole(given, "SLOAD", place)),
+            "SLOAD": lambda given, place: self._load(_whole(given, "SLOAD", place), place),
             "SIPO_MODE": lambda given, place: _first(given, "SIPO_MODE", place),
             "STOOL2": self._form_tool,
             "STOOL": lambda given, place: self._tool(_whole(given, "STOOL", place)),
@@ -165,7 +165,7 @@ class Library:
             case "FRAMES":
                 self._frames(place)
             case "TOOL":
-                self._take_tool(round(amount()))
+                self._take_tool(round(amount()), place)
             case "BASE":
                 self._take_base(round(amount()))
             case "GROUP":
@@ -254,16 +254,16 @@ class Library:
         noted = self._own("FDAT_ACT", place)
         if not isinstance(noted, Structure):
             return
-        self._take_tool(round(self._noted("FDAT_ACT", "TOOL_NO", 0.0, place)))
+        self._take_tool(round(self._noted("FDAT_ACT", "TOOL_NO", 0.0, place)), place)
         self._take_base(round(self._noted("FDAT_ACT", "BASE_NO", 0.0, place)))
         mode = noted.fields.get("IPO_FRAME", Symbol("BASE"))
         if mode not in (Symbol("BASE"), Symbol("TCP")):
             raise KrlRunError(f"IPO_FRAME is {kind_of(mode)}: it is #BASE or #TCP", place)
         self._set("$IPO_MODE", mode)
 
-    def _take_tool(self, index: int) -> None:
+    def _take_tool(self, index: int, place: Place) -> None:
         self._set("$TOOL", self._tool(index))
-        self._set("$LOAD", self._load(index))
+        self._set("$LOAD", self._load(index, place))
 
     def _take_base(self, index: int) -> None:
         self._set("$BASE", self._base(index))
@@ -357,11 +357,14 @@ class Library:
         share = FULL if mode else self._default("DEF_APO_CPTP")
         return Structure({"CDIS": distance, "CPTP": share})
 
-    def _load(self, index: int) -> Value:
+    def _load(self, index: int, place: Place) -> Value:
         """LOAD_DATA of a tool; a mass of -1, as the machine data have it, where nothing is said."""
         value = self._memory.peek("LOAD_DATA", index)
         if index > 0 and _holds(value, "M"):
             return copied(value)
+        if index > 0:
+            text = f"LOAD_DATA[{index}] isn't in the files: what the cell holds"
+            self._memory.noted(place, text, Effect.TIMES)
         return Structure({"M": -1.0}, "LOAD")
 
 

@@ -357,7 +357,8 @@ OUTPUT_IN_TIME = "$OUT_C"  # the same, set when the motion before ends: no stop 
 TIMER = "$TIMER"
 TIMER_FLAG = "$TIMER_FLAG"
 CYCLIC = "$CYCFLAG"
-SINGLE = frozenset((INPUT, OUTPUT, TIMER_FLAG, "$FLAG", CYCLIC))
+FLAG = "$FLAG"
+SINGLE = frozenset((INPUT, OUTPUT, TIMER_FLAG, FLAG, CYCLIC))
 """What is TRUE or FALSE by its number."""
 SIGNALS = 8192
 """A KR C4 has $OUT[1] to $OUT[8192], and as many inputs."""
