@@ -336,6 +336,23 @@ def test_a_wait_for_one_of_several_ends_by_one_of_them(condition: str, followed:
     assert "".join("1" if n in waited else "0" for n in (1, 2, 3)) == wanted
 
 
+@pytest.mark.parametrize("action", ["n=5", "SETS( )"])
+def test_what_a_trigger_sets_is_read_in_advance_and_said(action: str, followed: Follow) -> None:
+    """On a controller the advance run may read a variable before the TRIGGER acts."""
+    head = (
+        f"PTP {{A1 1}}\nn=0\nTRIGGER WHEN DISTANCE=0 DELAY=0 DO {action} PRIO=-1\nPTP {{A1 10}}\n"
+    )
+    sets = "\nEND\nDEF SETS( )\nn=5"
+    read = followed(f"{head}IF n==5 THEN\nPTP {{A1 20}}\nENDIF{sets}", "DECL INT n")
+    others = [
+        followed(f"{head}{between}\nIF n==5 THEN\nPTP {{A1 20}}\nENDIF{sets}", "DECL INT n")
+        for between in ("n=5", "WAIT SEC 0", "WAIT FOR $IN[1]", "$OUT[1]=TRUE", "HALT")
+    ]
+    said = ["N is set by a TRIGGER" in " ".join(texts(one)) for one in (read, *others)]
+    assert said == [True, *[False] * 5]
+    assert all(angles(one) == [1.0, 10.0, 20.0] for one in others)
+
+
 WAITED = {  # a wait, what is set before, and whether the program itself keeps it from ending
     "$FLAG[1]": ("$FLAG[1]=FALSE", True),
     "$FLAG[1]==TRUE": ("$FLAG[1]=FALSE", True),

@@ -227,7 +227,7 @@ def _remedy(word: str, expected: Collection[str]) -> str:
     closing = next((one for one in _CLOSING if one in expected), "")
     if closing and word in ("END", "ENDFCT", "ENDDAT", *_CLOSING):
         return f"a block isn't closed before, {closing} ends it"
-    if _UNITS.issuperset(expected):
+    if "DEF" in expected and _UNITS.issuperset(expected):
         return "lines stand between DEF and END, or DEFDAT and ENDDAT: put them there"
     return _REMEDIES.get(word, _PLAIN_REMEDY)
 

@@ -173,6 +173,8 @@ class Control:
         """The advance run stops here, unless CONTINUE stands before: no corner is rounded. assumed:
         a note says so already.
         """
+        if not self.continuing:
+            self.memory.arrived()
         if not self.continuing and self._rounding:
             self.commands.append(Stop(why, place))
             if not assumed:
@@ -384,6 +386,7 @@ class Control:
             self.stop(self.place(tree), f"WAIT SEC {seconds:g}")
 
     def _wait(self, seconds: float, place: Place) -> None:
+        self.memory.arrived()
         self.commands.append(Wait(seconds, place))
         self._signals.stood(seconds, place)
 
@@ -411,6 +414,7 @@ class Control:
             if seconds is None:
                 text = f"{_written(condition)}: nobody knows how long until then, taken as 0 s"
                 self.note_at(place, text, Effect.TIMES)
+        self.memory.arrived()
         self.commands.append(WaitFor(_written(condition), place))
         self._signals.moved()
 

@@ -56,7 +56,8 @@ class Memory:
     lists declare; types: components of structures; assumed: values that the program didn't bring,
     by name or name[index]; chosen: the same of $TOOL and $BASE that a function has just found;
     noted: hears of those that are used; guesses: how many were; watched: see `watch`. settings:
-    what a user has set, which variables of a call begin with too.
+    what a user has set, which variables of a call begin with too; beside: what triggers have set
+    since the advance run stopped last.
     """
 
     shared: dict[str, Value]
@@ -70,6 +71,7 @@ class Memory:
     module: str = ""
     listed: set[str] = field(default_factory=set)
     settings: dict[str, Value] = field(default_factory=dict)
+    beside: set[str] = field(default_factory=set)
     types: dict[str, Mapping[str, str]] = field(default_factory=lambda: dict(TYPES))
 
     def enter(self, values: dict[str, Value], names: Iterable[str]) -> None:
@@ -179,6 +181,21 @@ class Memory:
         """
         text = f"{name} may get another value from {routine}: taken as it stands; --set '{name}=…'"
         self.assumed[name] = Assumption(text, Effect.MOTIONS)
+
+    def set_beside(self, name: str) -> None:
+        """A TRIGGER has set a variable, at an instant that the advance run doesn't wait for."""
+        text = (
+            f"{name} is set by a TRIGGER while the robot moves: taken as set before; a "
+            "controller's advance run reads it sooner, put WAIT SEC 0 before"
+        )
+        self.assumed[name] = Assumption(text, Effect.MOTIONS)
+        self.beside.add(name)
+
+    def arrived(self) -> None:
+        """The advance run has stopped: what triggers set is set."""
+        for name in self.beside:
+            self.assumed.pop(name, None)
+        self.beside.clear()
 
     def _guessed(self, name: str, index: tuple[int, ...] | None, place: Place) -> None:
         """Say that a value which isn't the program's is used."""

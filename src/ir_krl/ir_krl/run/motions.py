@@ -94,6 +94,8 @@ class Assigning(Control):
             return
         self._check_effect(name, value, where)
         self.memory.set(path, value, where)
+        if self._beside and not name.startswith("$"):
+            self.memory.set_beside(name)
         if index is not None:
             self._follow_clock(name, index[0], value)
         assumed = self.memory.chosen.pop(name, None)
@@ -175,6 +177,8 @@ class Assigning(Control):
             )
         on_path = self.continuing or in_time
         switch = self.triggered
+        if not on_path and switch is None:
+            self.memory.arrived()
         if on_path and switch is None and self._rounding:
             switch = END_OF_LAST
             if not in_time:

@@ -399,9 +399,8 @@ class _Drive:
             return
         curve = block_curve(block, self.here, self.arm)
         if any(part.speeds != block.parts[0].speeds for part in block.parts):
-            self.notes.append(
-                Note(block.place, "parts have speeds of their own: driven as its first part")
-            )
+            text = "parts have speeds of their own: driven as its first part"
+            self.notes.append(Note(block.place, text, Effect.SPEEDS))
         if block.times and block.blend is None and self._blend is None:
             self._timed_parts(block, curve, triggered)
             return
