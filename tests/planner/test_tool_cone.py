@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio
 import pytest
 
-from ir_description import robot_urdf
+from ir_description import cell_to_yaml, load_cell, robot_urdf
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -210,3 +210,47 @@ def test_a_tilt_between_the_points_of_a_trajectory_is_found() -> None:
     assert "leans" not in wide.status.message
     axis = Judge(planner).rotation(q).T @ UP
     assert Judge(planner).largest(given, axis, UP) <= wide.report.largest_tilt <= 0.8
+
+
+def test_a_program_keeps_the_tilt_that_its_cell_asks_for() -> None:
+    text = cell_to_yaml(load_cell("kr6_bench"))
+    step = "{station: place, dwell: 0.5"
+    assert step in text
+    most = np.radians(2.0)
+    planner = planner_in("kr6_bench")
+    judge = Judge(planner)
+    largest = {}
+    for asked in ("", ", tilt: {max_deg: 2}"):
+        planner.set_cell(text=text.replace(step, step + asked))
+        plan = planner.plan_program(start=planner.cell.posture("park"))
+        assert plan.status.ok, plan.status.message
+        moved = [one for one in plan.movements if one.to_station == "place"]
+        across = [one for one in moved if one.trajectory is not None and one.kind == "regional"]
+        assert len(across) == 1
+        trajectory = across[0].trajectory
+        assert trajectory is not None
+        axis = judge.rotation(trajectory.positions[0]).T @ UP
+        largest[asked] = judge.largest(trajectory, axis, UP)
+        reported = across[0].report.largest_tilt
+        assert reported == -1.0 if not asked else largest[asked] <= reported <= most + TOLERANCE
+    assert largest[""] > most + TOLERANCE  # the law would hold emptily
+
+
+def test_a_station_asks_for_it_wherever_one_plans_to_it_and_all_have_to_agree() -> None:
+    planner = planner_in("kr6_bench")
+    text = cell_to_yaml(planner.cell)
+    lines = []
+    for line in text.splitlines():
+        lines.append(line)
+        if line.endswith("- name: place"):
+            lines.append(" " * line.index("name") + "tilt: {max_deg: 3}")
+    planner.set_cell(text="\n".join(lines))
+    start = np.array(planner.compute_ik("pick").solutions[0].q)
+    plan = planner.plan_regional(start=start, goal="place")
+    assert plan.status.ok, plan.status.message
+    assert 0.0 <= plan.report.largest_tilt <= np.radians(3.0) + TOLERANCE
+    narrower = planner.plan_regional(start=start, goal="place", tilt_max=np.radians(1.0))
+    assert narrower.status.ok, narrower.status.message
+    assert narrower.report.largest_tilt <= np.radians(1.0) + TOLERANCE
+    with pytest.raises(RequestError, match="different axes"):
+        planner.plan_regional(start=start, goal="place", tilt_max=0.1, tilt_axis=(1.0, 0.0, 0.0))

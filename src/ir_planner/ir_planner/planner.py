@@ -17,7 +17,7 @@ from typing import TypedDict, Unpack
 
 import numpy as np
 
-from ir_description import Cell, CellPath, PowerData, cell_hash, is_path
+from ir_description import Cell, CellPath, PowerData, ToolTilt, cell_hash, is_path
 from ir_msgs_py.cartesian import CartesianPath
 from ir_msgs_py.options import NO_TILT, PlanOptions
 from ir_msgs_py.status import StatusCode
@@ -66,6 +66,7 @@ from ir_planner.request import (
     joints_of,
     leaning_freely_only,
     noted,
+    one_tilt,
     parse_goal,
     upright_options,
     within_limits,
@@ -334,6 +335,7 @@ class Planner:
         begin = self._configuration(start, "start", StatusCode.START_STATE_INVALID)
         end = self._goal(goal)
         context = Context.of(scene, options, self._work(options, cancelled))
+        context = context.leaning_by(_tilt_to(end, scene))
         return self._kept(plan_to_goal(begin, end, context, self.settings.searches), scene, note)
 
     def plan_escape(
@@ -600,3 +602,12 @@ class Planner:
         improvement = options.max_iterations or self.settings.improvement_iterations
         deadline = self.clock() + options.planning_time * movements
         return Work(most, deadline, self.clock, cancelled, improvement)
+
+
+def _tilt_to(goal: Goal, scene: PlanningScene) -> ToolTilt | None:
+    """How far the tool may lean on a movement to a goal, by its station and what is held."""
+    held = {load.name for load in scene.loads}
+    asked = {f"part {part.name}": part.tilt for part in scene.cell.parts if part.name in held}
+    if goal.station:
+        asked[f"station {goal.station}"] = scene.station(goal.station).tilt
+    return one_tilt(asked, f"the movement to {goal.station or 'the goal'}")

@@ -523,6 +523,7 @@ class Cell:
             old.allowed_contacts,
             old.approach_distance,
             old.search,
+            old.tilt,
         )
         stations = tuple(moved if station is old else station for station in self.stations)
         mine = [
@@ -559,6 +560,7 @@ def _moved(station: Station, machine: Equipment) -> Station:
         station.allowed_contacts,
         station.approach_distance,
         station.search,
+        station.tilt,
     )
 
 

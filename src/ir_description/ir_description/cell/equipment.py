@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,7 +15,7 @@ from ir_description.robot import Load
 from ir_description.shapes import SIZE_MAX, Body
 from ir_kernels import portable
 from ir_msgs_py.cartesian import CartesianPath
-from ir_values.arrays import FloatArray, frozen, frozen_pose, in_range
+from ir_values.arrays import FloatArray, direction, frozen, frozen_pose, in_range, set_field
 from ir_values.errors import InvalidValueError, UnknownNameError
 
 ZoneKind = Literal["OPEN", "SEMI_CLOSED", "CLOSED"]
@@ -217,13 +218,32 @@ class StationSearch:
             )
 
 
+@dataclass(frozen=True)
+class ToolTilt:
+    """How far the tool may lean: an axis (3,) in the frame of the tcp, (): that which points in the
+    direction where a movement begins, by at most `most` [rad] from a direction (3,) in the cell,
+    (): up.
+    """
+
+    most: float
+    axis: tuple[float, ...] = ()
+    direction: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        in_range(self.most, 0.0, math.pi, "rad", "tilt")
+        for name in ("axis", "direction"):
+            given = getattr(self, name)
+            set_field(self, name, direction(given, f"{name} of a tilt") if given else ())
+
+
 @dataclass(frozen=True, eq=False)
 class Station:
     """Where the tool works: pose (4, 4) of the tcp in the WORLD, and the same in its machine's
     frame.
 
     zone is the kind of its machine's zone. The tool leaves by approach_distance [m] along -x of the
-    tcp. The allowed contacts hold inside the machine's zone only.
+    tcp. The allowed contacts hold inside the machine's zone only. tilt: how far the tool may lean
+    on the movement to it, None: as it likes.
     """
 
     name: str
@@ -234,6 +254,7 @@ class Station:
     allowed_contacts: tuple[AllowedContact, ...] = ()
     approach_distance: float = 0.0
     search: StationSearch = StationSearch()
+    tilt: ToolTilt | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", frozen_pose(self.pose, f"pose of {self.name}"))
@@ -252,6 +273,7 @@ def station_at(
     allowed_contacts: tuple[AllowedContact, ...] = (),
     approach_distance: float = 0.0,
     search: StationSearch = StationSearch(),
+    tilt: ToolTilt | None = None,
 ) -> Station:
     """Return a station of a machine from its pose (4, 4) in the machine's frame."""
     return Station(
@@ -263,6 +285,7 @@ def station_at(
         allowed_contacts=allowed_contacts,
         approach_distance=approach_distance,
         search=search,
+        tilt=tilt,
     )
 
 
@@ -275,13 +298,14 @@ class Part:
     is held.
 
     station: where it lies, "" for nowhere (held, or not there). Lying at a station means lying as
-    it is held when the tcp stands at the station.
+    it is held when the tcp stands at the station. tilt: how far the tool may lean while it is held.
     """
 
     load: Load
     bodies: tuple[Body, ...]
     grasp: FloatArray
     station: str = ""
+    tilt: ToolTilt | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "grasp", frozen_pose(self.grasp, f"grasp of {self.load.name}"))

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
+from ir_description.cell.equipment import ToolTilt
 from ir_msgs_py.modes import REST_MODES
 from ir_msgs_py.plc import Signal
 from ir_values.arrays import in_range
@@ -61,6 +62,7 @@ class ProgramStep:
     power_mode is one of PAUSE_POWER_MODES for a pause and "" otherwise; AUTO leaves the choice to
     whoever plans. planner: which search looks for the regional movement to the target, "": as the
     request says. carries: which of the cell's whole loads is carried from then on, "": as before.
+    tilt: how far the tool may lean on the movement to the target, None: as it likes.
     """
 
     kind: StepKind
@@ -73,6 +75,7 @@ class ProgramStep:
     power_mode: str = ""
     planner: str = ""
     carries: str = ""
+    tilt: ToolTilt | None = None
 
     def __post_init__(self) -> None:
         in_range(self.dwell, 0.0, PAUSE_MAX, "s", "dwell")
@@ -90,6 +93,8 @@ class ProgramStep:
             raise InvalidValueError("only a pause has a power mode")
         if self.kind == "PAUSE" and self.planner:
             raise InvalidValueError("a pause has no planner")
+        if self.kind not in ("STATION", "POSTURE") and self.tilt is not None:
+            raise InvalidValueError("only movements to stations and postures have a tilt")
         if self.kind != "STATION" and (self.attach or self.detach):
             raise InvalidValueError("parts are attached and detached at stations only")
         if self.attach and self.detach:

@@ -21,6 +21,7 @@ from ir_description.cell import (
     ProgramStep,
     StateSwitch,
     Station,
+    ToolTilt,
 )
 from ir_description.files.cell_reader import FORMAT
 from ir_description.files.program_reader import path_lines
@@ -106,6 +107,8 @@ def _part(part: Part) -> Iterator[str]:
         yield f"grasp: {{{_pose(part.grasp)}}}"
     if part.station:
         yield f"station: {part.station}"
+    if part.tilt is not None:
+        yield _tilt(part.tilt)
     yield from _block("bodies", ([_body(body)] for body in part.bodies))
 
 
@@ -158,6 +161,8 @@ def _station(station: Station) -> Iterator[str]:
     yield f"name: {station.name}"
     yield f"pose: {{{_pose(station.pose_in_equipment)}}}"
     yield f"approach_distance: {_number(station.approach_distance)}"
+    if station.tilt is not None:
+        yield _tilt(station.tilt)
     search = station.search
     if search.configurations != CONFIGURATION_SEARCHES[0]:
         yield f"configurations: {search.configurations}"
@@ -174,6 +179,12 @@ def _station(station: Station) -> Iterator[str]:
             for c in station.allowed_contacts
         ),
     )
+
+
+def _tilt(tilt: ToolTilt) -> str:
+    ways = (("axis", tilt.axis), ("direction", tilt.direction))
+    given = "".join(f", {key}: {_row(way)}" for key, way in ways if way)
+    return f"tilt: {{max: {_number(tilt.most)}{given}}}"
 
 
 def _signal(signal: CellSignal) -> str:
@@ -195,6 +206,8 @@ def _step(step: ProgramStep) -> str:
             fields.append(f"dwell: {_number(step.dwell)}")
         if step.planner:
             fields.append(f"planner: {step.planner}")
+        if step.tilt is not None:
+            fields.append(_tilt(step.tilt))
     for key, part in (("attach", step.attach), ("detach", step.detach)):
         if part:
             fields.append(f"{key}: {part}")

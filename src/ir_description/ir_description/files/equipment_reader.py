@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 from itertools import product
@@ -28,6 +29,7 @@ from ir_description.cell import (
     StateSwitch,
     Station,
     StationSearch,
+    ToolTilt,
     Zone,
     station_at,
     zone_around,
@@ -354,7 +356,9 @@ def _process(item: Item) -> float:
 
 
 def _station(item: Item, machine: Equipment) -> Station:
-    table = item.table(("name", "pose"), ("approach_distance", "allowed_contacts", *_SEARCH_KEYS))
+    table = item.table(
+        ("name", "pose"), ("approach_distance", "allowed_contacts", "tilt", *_SEARCH_KEYS)
+    )
     contacts = table["allowed_contacts"].list(0, 1000) if "allowed_contacts" in table else []
     approach = table.get("approach_distance")
     return station_at(
@@ -364,7 +368,26 @@ def _station(item: Item, machine: Equipment) -> Station:
         tuple(read_contact(contact) for contact in contacts),
         0.0 if approach is None else approach.number(0.0, APPROACH_MAX, "m"),
         _search(table),
+        read_tilt(table),
     )
+
+
+def read_tilt(table: Table) -> ToolTilt | None:
+    """Return how far the tool may lean; None where there is no `tilt`."""
+    if "tilt" not in table:
+        return None
+    given = table["tilt"].table((), ("max", "max_deg", "axis", "direction"))
+    if given.one_of("max", "max_deg") == "max":
+        most = given["max"].number(0.0, math.pi, "rad")
+    else:
+        most = math.radians(given["max_deg"].number(0.0, 180.0, "deg"))
+    ways = {
+        key: tuple(given[key].numbers(3, -FAR, FAR).tolist())
+        for key in ("axis", "direction")
+        if key in given
+    }
+    with table["tilt"].blamed():
+        return ToolTilt(most, **ways)
 
 
 def _search(table: Table) -> StationSearch:
@@ -414,7 +437,7 @@ def read_tool(item: Item, link: int, shapes: NameRegister) -> Load:
 
 def read_part(item: Item, link: int, shapes: NameRegister, bodies: BodyReader) -> Part:
     """Return a part: its load in its own frame, its bodies, its grasp and where it lies."""
-    table = item.table(("name", "mass", "com"), (*_MASS_KEYS, "bodies", "grasp", "station"))
+    table = item.table(("name", "mass", "com"), (*_MASS_KEYS, "bodies", "grasp", "station", "tilt"))
     mass = table["mass"].number(0.0, MASS_MAX, "kg", above=True)
     load = Load(
         name=table["name"].name(),
@@ -429,6 +452,7 @@ def read_part(item: Item, link: int, shapes: NameRegister, bodies: BodyReader) -
         bodies=bodies.all(table["bodies"].list(0, 100)) if "bodies" in table else (),
         grasp=read_pose(table["grasp"]) if "grasp" in table else np.eye(4),
         station=table["station"].name() if "station" in table else "",
+        tilt=read_tilt(table),
     )
 
 

@@ -20,7 +20,7 @@ from ir_description.cell import (
     Task,
     check_posture,
 )
-from ir_description.files.equipment_reader import read_contact, read_pose
+from ir_description.files.equipment_reader import read_contact, read_pose, read_tilt
 from ir_description.robot import RobotModel
 from ir_msgs_py.cartesian import (
     KINDS,
@@ -37,12 +37,23 @@ from ir_values.yaml_items import Item, Table, read_items
 
 _COMMON = ("wait_for", "set_signals")
 _STEP_KEYS = (
-    *("station", "posture", "path", "pause", "dwell", "attach", "detach", "power_mode", "planner"),
+    *(
+        "station",
+        "posture",
+        "path",
+        "pause",
+        "dwell",
+        "attach",
+        "detach",
+        "power_mode",
+        "planner",
+        "tilt",
+    ),
     *_COMMON,
 )
 _KEYS = {
-    "station": ("station", "dwell", "attach", "detach", "planner", *_COMMON),
-    "posture": ("posture", "dwell", "planner", *_COMMON),
+    "station": ("station", "dwell", "attach", "detach", "planner", "tilt", *_COMMON),
+    "posture": ("posture", "dwell", "planner", "tilt", *_COMMON),
     "path": ("path", "dwell", "planner", *_COMMON),
     "pause": ("pause", "power_mode", *_COMMON),
 }
@@ -117,8 +128,9 @@ def read_step(item: Item) -> ProgramStep:
         "set_signals": set_signals,
         "planner": table["planner"].name() if "planner" in table else "",
     }
+    tilt = read_tilt(table)
     if kind == "posture":
-        return ProgramStep("POSTURE", table["posture"].choice(POSTURES), **moving)
+        return ProgramStep("POSTURE", table["posture"].choice(POSTURES), tilt=tilt, **moving)
     if kind == "path":
         return ProgramStep("PATH", table["path"].name(), **moving)
     return ProgramStep(
@@ -126,6 +138,7 @@ def read_step(item: Item) -> ProgramStep:
         target=table["station"].name(),
         attach=table["attach"].name() if "attach" in table else "",
         detach=table["detach"].name() if "detach" in table else "",
+        tilt=tilt,
         **moving,
     )
 

@@ -268,7 +268,7 @@ class Movements:
 
     def _planned(self, part: Part, context: Context) -> Movement | Failure:
         inside = context.inside(self.route.arriving(part.hop))
-        inside = inside.upright_from(self.ends(part)[0])
+        inside = inside.leaning_by(self.route.tilt(part.hop)).upright_from(self.ends(part)[0])
         return self._across(part, inside) if part.kind == ACROSS else self._along_line(part, inside)
 
     def _across(self, part: Part, context: Context) -> Movement | Failure:

@@ -298,7 +298,10 @@ def prepared(request: ProgramRequest, journal: Journal) -> tuple[Route, Context]
     context = Context(scenes.of(cell.parts_at_start()), request.options, journal)
     if request.cycle_time > 0.0 and request.options.objective == "energy":
         context = at_the_mains(context)
-    return Route.over(steps, scenes), context
+    route = Route.over(steps, scenes)
+    for place in range(len(route)):
+        context.leaning_by(route.tilt(place))  # one that can't be kept is refused here
+    return route, context
 
 
 def program_hash(movements: tuple[PlannedMovement, ...]) -> str:

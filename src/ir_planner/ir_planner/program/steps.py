@@ -12,12 +12,13 @@ from ir_description import (
     ProgramStep,
     Signal,
     StepKind,
+    ToolTilt,
     cell_in,
 )
 from ir_description import UnknownNameError as DescriptionNameError
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.errors import RequestError, UnknownNameError
-from ir_planner.request import POSTURES
+from ir_planner.request import POSTURES, one_tilt
 from ir_planner.scene import Drives, PlanningScene, with_parts
 
 # Which states the machines with a switch are in along a program, as its own signals move them.
@@ -266,6 +267,20 @@ class Route:
     def name(self, place: int) -> str:
         """Where a stop is; "": before the first."""
         return self.at(place).step.target if place >= 0 else ""
+
+    def tilt(self, place: int) -> ToolTilt | None:
+        """How far the tool may lean on the movement to a stop, by its step, station and the part
+        that is held; None: as it likes. Raises RequestError where they bound different axes.
+        """
+        placed = self.at(place)
+        target = placed.step.target
+        held = placed.before.held
+        asked = {f"step {self.stops[place] + 1}": placed.step.tilt}
+        if placed.step.kind == "STATION":
+            asked[f"station {target}"] = self.scenes.cell.station(target).tilt
+        if held:
+            asked[f"part {held}"] = self.scenes.cell.part(held).tilt
+        return one_tilt(asked, f"the movement to {target}")
 
     def arriving(self, place: int) -> PlanningScene:
         """The scene in which a stop is reached."""

@@ -17,6 +17,7 @@ from ir_planner.request.context import (
     Work,
     cone_of,
     noted,
+    one_tilt,
     upright_options,
 )
 from ir_planner.request.goals import (
@@ -48,6 +49,7 @@ __all__ = [
     "leaning_freely_only",
     "noted",
     "one_goal",
+    "one_tilt",
     "parse_goal",
     "safety_distance",
     "upright_options",

@@ -1,17 +1,19 @@
 """Context of one request: what every stage needs to know, as one value."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
+from ir_description import ToolTilt
 from ir_msgs_py.options import NO_TILT, ROBOTS_TIME_VALUE, TILT_MAX, UP, PlanOptions
 from ir_msgs_py.report import PlanningInfo, PlanningStage, Rejection
 from ir_msgs_py.search_log import ConfigurationLog, SearchLog
-from ir_planner.errors import CancelledError
+from ir_msgs_py.status import StatusCode
+from ir_planner.errors import CancelledError, RequestError
 from ir_planner.scene import MotionLimits, PlanningScene, ToolCone
 from ir_values.arrays import FloatArray
 
@@ -132,6 +134,20 @@ def noted(info: PlanningInfo, note: str, about: str = "options") -> PlanningInfo
     return replace(info, stages=(*info.stages, PlanningStage(about, 0.0, note))) if note else info
 
 
+def one_tilt(asked: Mapping[str, ToolTilt | None], what: str) -> ToolTilt | None:
+    """The smallest tilt of those who ask for one, by their names; None: nobody does. Raises
+    RequestError where they are of different axes or directions.
+    """
+    given = {name: tilt for name, tilt in asked.items() if tilt is not None}
+    if len({(tilt.axis, tilt.direction) for tilt in given.values()}) > 1:
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"{what}: {' and '.join(given)} bound the tilt of different axes of the tool, or from "
+            "different directions: they must be the same",
+        )
+    return min(given.values(), key=lambda tilt: tilt.most, default=None)
+
+
 def upright_options(options: PlanOptions, scene: PlanningScene, start: FloatArray) -> PlanOptions:
     """The options with tilt_direction, and tilt_axis where none is given: that which points in the
     direction at the start (n,). A tilt of pi bounds nothing.
@@ -210,6 +226,22 @@ class Context:
         which nobody has named yet.
         """
         return cone_of(self.options, self.scene)
+
+    def leaning_by(self, tilt: ToolTilt | None) -> "Context":
+        """The same with what the cell asks of the tool's tilt beside the request. Raises
+        RequestError where both bound different axes.
+        """
+        options = self.options
+        own = None
+        if options.tilt_max != NO_TILT:
+            own = ToolTilt(options.tilt_max, options.tilt_axis, options.tilt_direction)
+        both = one_tilt({"the cell": tilt, "the request": own}, "the movement")
+        if both is None or both is own:
+            return self
+        asked = replace(
+            options, tilt_max=both.most, tilt_axis=both.axis, tilt_direction=both.direction
+        )
+        return replace(self, options=asked)
 
     def upright_from(self, start: FloatArray) -> "Context":
         """The same with the axis named whose tilt counts on a movement from start (n,)."""
