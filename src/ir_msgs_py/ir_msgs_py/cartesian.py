@@ -25,6 +25,9 @@ POSES_MAX = 2000  # of a path
 # m/s
 SPEED_MIN = 1e-4
 SPEED_MAX = 10.0
+# rad/s
+ROTATION_SPEED_MIN = 1e-3
+ROTATION_SPEED_MAX = 20.0
 SPEED_TOLERANCE_MIN = 1e-4  # share of the speed
 LENGTH_MAX = 10.0  # m: of an approach, a retract and a blending radius
 _RIGID = 1e-6  # of a rotation
@@ -61,12 +64,14 @@ class CartesianSegment:
     """One part of a path; it begins where the part before it ends.
 
     poses (4, 4) [m] of the tcp in the cell. line: the end; circle: a point between and the end;
-    spline: every point it passes. tool_speed [m/s], 0: that of the path. Raises InvalidValueError.
+    spline: every point it passes. tool_speed [m/s] and rotation_speed [rad/s], 0: that of the path.
+    Raises InvalidValueError.
     """
 
     kind: str
     poses: tuple[FloatArray, ...]
     tool_speed: float = 0.0
+    rotation_speed: float = 0.0
 
     def __post_init__(self) -> None:
         one_of(self.kind, KINDS, "kind")
@@ -85,17 +90,26 @@ class CartesianSegment:
                 "tool_speed",
                 _within(self.tool_speed, SPEED_MIN, SPEED_MAX, "tool_speed", "m/s"),
             )
+        set_field(self, "rotation_speed", _rotation_speed(self.rotation_speed))
+
+
+def _rotation_speed(value: float) -> float:
+    """A speed [rad/s], or 0 where none is asked for."""
+    if value == 0.0:
+        return 0.0
+    return _within(value, ROTATION_SPEED_MIN, ROTATION_SPEED_MAX, "rotation_speed", "rad/s")
 
 
 @dataclass(frozen=True, eq=False)
 class CartesianPath:
     """Where the tool begins, (4, 4) [m] in the cell, its segments, and what is kept along them.
 
-    tool_speed [m/s]; speed_tolerance: share of it that may be lost, 1: as slow as the axes need.
-    blending_radius [m] around the corners between segments. orientation: of the poses (given), of
-    the start (constant), or turning with the path about the tool's axis (tangent). free_angle
-    [rad]: how far the tool may turn about its own axis, either way. approach, retract [m]: straight
-    along the tool's axis. Raises InvalidValueError.
+    tool_speed [m/s]; rotation_speed [rad/s]: a segment on which the tool would turn faster is
+    driven so much slower, 0: none is asked for; speed_tolerance: share of it that may be lost,
+    1: as slow as the axes need. blending_radius [m] around the corners between segments.
+    orientation: of the poses (given), of the start (constant), or turning with the path about
+    the tool's axis (tangent). free_angle [rad]: how far the tool may turn about its own axis,
+    either way. approach, retract [m]: straight along the tool's axis. Raises InvalidValueError.
     """
 
     start: FloatArray
@@ -107,6 +121,7 @@ class CartesianPath:
     free_angle: float = 0.0
     approach: float = 0.0
     retract: float = 0.0
+    rotation_speed: float = 0.0
 
     def __post_init__(self) -> None:
         set_field(self, "start", _rigid(self.start, "start"))
@@ -124,3 +139,10 @@ class CartesianPath:
             ("retract", 0.0, LENGTH_MAX, "m"),
         ):
             set_field(self, name, _within(getattr(self, name), low, high, name, unit))
+        set_field(self, "rotation_speed", _rotation_speed(self.rotation_speed))
+        turns = [self.rotation_speed, *(segment.rotation_speed for segment in self.segments)]
+        if self.orientation == TANGENT and any(turns):
+            raise InvalidValueError(
+                f"rotation_speed is {max(turns):g} rad/s with orientation {TANGENT}: there the "
+                "path says how fast the tool turns, it must be 0 rad/s"
+            )

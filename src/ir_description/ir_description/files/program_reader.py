@@ -235,12 +235,13 @@ def _path(table: Table) -> CartesianPath:
 
 
 def _segment(item: Item) -> CartesianSegment:
-    table = item.table((), (*KINDS, "tool_speed"))
+    table = item.table((), (*KINDS, "tool_speed", "rotation_speed"))
     kind = table.one_of(*KINDS)
     poses = (table[kind],) if kind == LINE else table[kind].list(1, POSES_MAX)
     speed = table["tool_speed"].number(0.0, _FAR, "m/s") if "tool_speed" in table else 0.0
+    turns = table["rotation_speed"].number(0.0, _FAR, "rad/s") if "rotation_speed" in table else 0.0
     with item.blamed():
-        return CartesianSegment(kind, tuple(read_pose(pose) for pose in poses), speed)
+        return CartesianSegment(kind, tuple(read_pose(pose) for pose in poses), speed, turns)
 
 
 def path_lines(
@@ -268,4 +269,6 @@ def path_lines(
         poses = ", ".join(f"{{{pose(one)}}}" for one in segment.poses)
         drawn = poses if segment.kind == LINE else f"[{poses}]"
         speed = f", tool_speed: {number(segment.tool_speed)}" if segment.tool_speed else ""
+        turns = segment.rotation_speed
+        speed += f", rotation_speed: {number(turns)}" if turns else ""
         yield f"  - {{{segment.kind}: {drawn}{speed}}}"

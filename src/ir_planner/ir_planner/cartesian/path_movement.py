@@ -1,6 +1,5 @@
 """The movement along a path: the cheapest chains of configurations with their times, certified."""
 
-import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -252,7 +251,7 @@ def timed(asked: Asked, chain: Chain, share: float = 1.0, *, longer: bool = Fals
     whole = asked.whole
     scene = asked.context.scene
     angle, chain = angle_along(whole, chain, path.free_angle, asked.space, asked.fixed)
-    ends = _strokes(whole)
+    ends = whole.strokes
     curves = [curve_of(whole, chain, angle, (whole.ends[a], whole.ends[b]), scene) for a, b in ends]
     slower = _flange_share(asked, curves) if asked.t1 else 1.0
     along = [_spans(whole, a, b, slower * asked.rate) for a, b in ends]
@@ -313,11 +312,6 @@ def _check_duration(duration: float, asked: Asked) -> None:
         )
 
 
-def _strokes(whole: ToolPath) -> list[tuple[int, int]]:
-    """From which corner to which the tool moves without a stop."""
-    return list(itertools.pairwise(k for k, radius in enumerate(whole.radius) if radius == 0.0))
-
-
 def _spans(whole: ToolPath, first: int, last: int, slower: float) -> tuple[Span, ...]:
     """Parts of a stroke; those that follow each other at one speed are one, so that ramps may reach
     over them.
@@ -335,16 +329,19 @@ def _flange_share(asked: Asked, curves: list[JointCurve]) -> float:
     """What share of the speed keeps the centre of the flange at T1's speed too."""
     path = asked.path
     context = asked.context
+    linear = max([path.tool_speed, *(one.tool_speed for one in path.segments)])
     fastest = 0.0
-    for curve in curves:
+    for curve, (first_part, _) in zip(curves, asked.whole.strokes, strict=True):
+        part = asked.whole.parts[first_part]
+        top = part.speed if part.in_place else linear
         s = np.linspace(curve.begin, curve.end, _FLANGE_SAMPLES)
         q, first, _, _ = curve.at(s)
         here, ahead = (
             context.scene.chain.link_poses(at)[:, -1, :3, 3] for at in (q, q + _STEP * first)
         )
-        fastest = max(fastest, float(np.linalg.norm(ahead - here, axis=1).max()) / _STEP)
-    top = max([path.tool_speed, *(one.tool_speed for one in path.segments)])
-    return min(1.0, _SHRUNK * T1_SPEED / max(fastest * top, 1e-12))
+        rate = float(np.linalg.norm(ahead - here, axis=1).max()) / _STEP
+        fastest = max(fastest, rate * top)
+    return min(1.0, _SHRUNK * T1_SPEED / max(fastest, 1e-12))
 
 
 # of a stroke; m of a difference quotient along the path

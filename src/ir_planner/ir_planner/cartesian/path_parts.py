@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from ir_kernels import portable
-from ir_msgs_py.cartesian import CIRCLE, CONSTANT, LENGTH_MAX, LINE, CartesianPath, CartesianSegment
+from ir_msgs_py.cartesian import (
+    CIRCLE,
+    CONSTANT,
+    LENGTH_MAX,
+    LINE,
+    TANGENT,
+    CartesianPath,
+    CartesianSegment,
+)
 from ir_msgs_py.status import StatusCode
 from ir_planner.curves import RotationSpline, rotation_of, rotation_vector, turn_of
 from ir_planner.errors import RequestError
@@ -84,6 +92,35 @@ class Line:
         if self.length == 0.0:
             return np.zeros(3)
         return np.asarray((self.end - self.start) / self.length)
+
+
+TURN_LENGTH = 0.25  # m that a rad of turning in place counts along a path
+
+
+@dataclass(frozen=True, eq=False)
+class Still:
+    """One place (3,) [m], while the tool turns over `length` m."""
+
+    place: FloatArray
+    length: float
+
+    @property
+    def curvature(self) -> float:
+        """None."""
+        return 0.0
+
+    @property
+    def breaks(self) -> FloatArray:
+        """Both ends."""
+        return np.array([0.0, self.length])
+
+    def at(self, s: FloatArray) -> FloatArray:
+        """Places (M, 3) m at s (M,)."""
+        return np.broadcast_to(self.place, (len(s), 3))
+
+    def tangent(self, s: FloatArray) -> FloatArray:
+        """No direction: zeros (M, 3)."""
+        return np.zeros((len(s), 3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -344,6 +381,8 @@ def about_tool(angle: FloatArray) -> FloatArray:
 # itself.
 
 SHORTEST = 1e-4  # m: of a part, and between the points of a spline
+TURN_SPEED = 0.5  # rad/s of a turn in place for which none is asked
+_LEAST_TURN = 1e-3  # rad of a turn in place
 FARTHEST = 100.0  # m: of any coordinate, and the longest path
 _ROUNDED = 1.0 - 1e-6  # what differences of places round
 _OPPOSITE = np.radians(179.0)  # beyond, the shortest turn isn't known
@@ -367,6 +406,11 @@ class Part:
         """m."""
         return self.places.length
 
+    @property
+    def in_place(self) -> bool:
+        """Whether the tool only turns: its speed is TURN_LENGTH times that of the turn."""
+        return isinstance(self.places, Still)
+
     def ends(self) -> tuple[FloatArray, FloatArray]:
         """Rotations (3, 3) at the beginning and at the end."""
         first, last = self.turning.at(np.array([0.0, self.length]))
@@ -384,6 +428,7 @@ def parts_of(path: CartesianPath) -> tuple[Part, ...]:
         parts.append(part)
         here = np.array(segment.poses[-1])
         here[:3, :3] = part.ends()[1]
+        here[:3, 3] = part.places.at(np.array([part.length]))[0] if part.in_place else here[:3, 3]
     total = sum(part.length for part in parts)
     if total > FARTHEST:
         raise _refused(f"the path is {total:g} m long: it must be at most {FARTHEST:g} m")
@@ -402,8 +447,34 @@ def _segment(segment: CartesianSegment, here: FloatArray, name: str, path: Carte
         for pose in poses[1:]:
             pose[:3, :3] = path.start[:3, :3]
     places = np.array([pose[:3, 3] for pose in poses])
+    turning = segment.rotation_speed or path.rotation_speed
+    if segment.kind == LINE and portable.norm(places[1] - places[0]) <= STRAIGHT:
+        return _in_place(poses, name, turning or TURN_SPEED, path)
     _check_steps(places, name)
-    speed = segment.tool_speed or path.tool_speed
+    part = _moving(segment, poses, name, segment.tool_speed or path.tool_speed)
+    most = part.turning.rates.first
+    return replace(part, speed=min(part.speed, turning / most)) if turning * most > 0.0 else part
+
+
+def _in_place(poses: list[FloatArray], name: str, speed: float, path: CartesianPath) -> Part:
+    """The turn between two poses (4, 4) at one place, at `speed` rad/s."""
+    if path.orientation == TANGENT:
+        raise _refused(f"{name} turns in place: with orientation {TANGENT} the path says how")
+    first, last = (pose[:3, :3] for pose in poses)
+    _check_turns(poses, name)
+    turn = turn_between(first, last)
+    if turn < _LEAST_TURN:
+        raise _refused(
+            f"{name}.poses[0] is where the pose before it is, turned by {turn:.3g} rad: it must be "
+            f"at least {SHORTEST:g} m from it, or turned by {_LEAST_TURN:g} rad"
+        )
+    length = TURN_LENGTH * turn
+    turning = Evenly.between(first, last, length)
+    return Part(name, Still(poses[0][:3, 3], length), turning, TURN_LENGTH * speed)
+
+
+def _moving(segment: CartesianSegment, poses: list[FloatArray], name: str, speed: float) -> Part:
+    places = np.array([pose[:3, 3] for pose in poses])
     curve: PlaceCurve
     if segment.kind == LINE:
         curve = Line(places[0], places[1])

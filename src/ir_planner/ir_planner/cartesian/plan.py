@@ -22,7 +22,7 @@ from ir_planner.cartesian.path_movement import (
     farther_from_limits,
     timed,
 )
-from ir_planner.cartesian.path_parts import parts_of
+from ir_planner.cartesian.path_parts import TURN_LENGTH, TURN_SPEED, parts_of
 from ir_planner.cartesian.tool_error import Kept, kept_of
 from ir_planner.cartesian.tool_path import (
     REVERSAL,
@@ -152,6 +152,8 @@ def _check_corners(path: CartesianPath, whole: ToolPath, joints: tuple[Joint, ..
         after = whole.parts[k]
         if joint.radius > 0.0 or not (before.kept and after.kept):
             continue
+        if before.in_place or after.in_place:  # where the tool has to stop
+            continue
         corner = (
             f"at {whole.ends[k]:.3f} m the path has a corner of {np.degrees(joint.angle):.1f} deg"
         )
@@ -277,19 +279,24 @@ def _turned(driven: DrivenPath) -> Iterator[Choice]:
 _REACHED = 0.999  # of a speed
 
 
-def remarks(path: CartesianPath, found: DrivenPath) -> Iterator[tuple[str, str]]:
+def remarks(drawn: Asked, found: DrivenPath) -> Iterator[tuple[str, str]]:
     """Names and texts of remarks: T1 slows the tool, ramps are long, or the speed isn't reached."""
+    path = drawn.path
+    whole = drawn.whole
+    if any(part.in_place and part.speed == TURN_LENGTH * TURN_SPEED for part in whole.parts):
+        yield "speed", f"turns in place at {found.slower * TURN_SPEED:.4g} rad/s"
+    moving = [stroke for k, stroke in enumerate(found.sent.strokes) if not whole.turns_in_place(k)]
+    if not moving:
+        return
     if found.slower < 1.0:
         yield "t1", f"{found.slower * path.tool_speed:.4g} m/s, so that the flange keeps 250 mm/s"
     if found.longer:
         yield "speed", f"the axes need long ramps: the tool keeps its speed {_kept_between(found)}"
     asked = found.slower * max(part.tool_speed or path.tool_speed for part in path.segments)
-    top = found.top_speed
-    slowed = [stroke for stroke in found.sent.strokes if stroke.slowness is not None]
+    top = found.top_speed if len(moving) == len(found.sent.strokes) else asked
+    slowed = [stroke for stroke in moving if stroke.slowness is not None]
     if path.speed_tolerance >= 1.0 and slowed:
-        mean = sum(s.curve.end - s.curve.begin for s in found.sent.strokes) / sum(
-            s.duration for s in found.sent.strokes
-        )
+        mean = sum(s.curve.end - s.curve.begin for s in moving) / sum(s.duration for s in moving)
         yield (
             "speed",
             f"slower than {asked:.4g} m/s where the axes need it: {mean:.4g} m/s in the mean",
@@ -348,7 +355,7 @@ def _planned(
     found = best_along(whole.asked, whole.layers)
     with context.journal.stage("tool error"):
         kept = whole.kept(found)
-    for name, text in remarks(whole.asked.path, found):
+    for name, text in remarks(whole.asked, found):
         context.journal.note(name, text)
     trajectory = found.movement.trajectory
     info = context.journal.info(trajectory.positions[0], context.joint_names)

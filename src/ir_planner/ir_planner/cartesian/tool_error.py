@@ -7,6 +7,7 @@ import numpy as np
 from ir_kernels import portable
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.cartesian.joint_curve import Angle, tool_poses
+from ir_planner.cartesian.path_parts import TURN_LENGTH
 from ir_planner.cartesian.path_times import SentPath
 from ir_planner.cartesian.tool_path import ToolPath
 from ir_planner.curves import extremes
@@ -24,13 +25,15 @@ from ir_values.arrays import FloatArray
 @dataclass(frozen=True, eq=False)
 class ToolMotion:
     """Bounds (S,) on each segment: of |p''| [m/s^2] and |p'''| [m/s^3] of the tcp's place, and of
-    |R''| [rad/s^2] of its rotation, as 1 / sqrt(2) of the Frobenius norm; times (S + 1,) s.
+    |R''| [rad/s^2] of its rotation, as 1 / sqrt(2) of the Frobenius norm, and of |w''| [rad/s^3] of
+    its turning speed; times (S + 1,) s.
     """
 
     times: FloatArray
     acceleration: FloatArray
     jerk: FloatArray
     turning: FloatArray
+    spinning: FloatArray
 
     def between(self, values: FloatArray, times: FloatArray) -> FloatArray:
         """The largest of values (S,) between times (M,) s and the next (M - 1,), at most a segment
@@ -61,6 +64,7 @@ def tool_motion(trajectory: JointTrajectory, scene: PlanningScene) -> ToolMotion
         outermost(a + v * v),
         outermost(j + 3.0 * a * v + portable.power(v, 3)),
         np.asarray(a[:, -1] + v[:, -1] ** 2),
+        np.asarray(j[:, -1] + 3.0 * a[:, -1] * v[:, -1] + portable.power(v[:, -1], 3)),
     )
 
 
@@ -129,6 +133,16 @@ class _Stroke:
     scene: PlanningScene
     motion: ToolMotion
 
+    @property
+    def in_place(self) -> bool:
+        """Whether the tool only turns."""
+        return self.path.turns_in_place(self.k)
+
+    @property
+    def third(self) -> FloatArray:
+        """A bound (S,) of the second derivative of the velocity whose size is the speed."""
+        return TURN_LENGTH * self.motion.spinning if self.in_place else self.motion.jerk
+
     def times(self, tau: FloatArray) -> FloatArray:
         """Seconds (M,) of the trajectory at instants tau (M,) s of the law."""
         stroke = self.sent.strokes[self.k]
@@ -145,7 +159,7 @@ class _Stroke:
         allowed = (
             (_BETWEEN, motion.acceleration),
             (_BETWEEN_TURN, motion.turning),
-            (_BETWEEN_SPEED * slowest, motion.jerk),
+            (_BETWEEN_SPEED * slowest, self.third),
         )
         steps = [
             8.0 * most / np.maximum(motion.between(value, points), 1e-9) for most, value in allowed
@@ -172,9 +186,10 @@ class _Stroke:
         away = _at_most(np.linalg.norm(difference[:, :3, 3], axis=1), sags / 8.0)
         turns = squared * self.motion.between(self.motion.turning, times) / 8.0 + self._turned(u)
         norm = _at_most(np.linalg.norm(difference[:, :3, :3], axis=(1, 2)), _ROOT * turns)
-        jacobian = self.scene.chain.jacobian(moved.q)[:, :3]
-        velocity = np.einsum("mij,mj->mi", jacobian, moved.qd)
-        sags = squared * self.motion.between(self.motion.jerk, times) / 8.0
+        jacobian = self.scene.chain.jacobian(moved.q)
+        rows = TURN_LENGTH * jacobian[:, 3:] if self.in_place else jacobian[:, :3]
+        velocity = np.einsum("mij,mj->mi", rows, moved.qd)
+        sags = squared * self.motion.between(self.third, times) / 8.0
         turn = 2.0 * portable.arcsin(min(norm / (2.0 * _ROOT), 1.0))
         return Kept(away, float(turn), self._off(tau, velocity, sags))
 

@@ -196,7 +196,20 @@ class ToolPath:
         return result
 
     def _speed(self, u: FloatArray) -> FloatArray:
-        return np.asarray(np.linalg.norm(self.tangents(u), axis=1))
+        speed = np.linalg.norm(self.tangents(u), axis=1)
+        for k, chosen in self._owners(u):
+            if self.parts[k].in_place:
+                speed[chosen] = 1.0
+        return np.asarray(speed)
+
+    @cached_property
+    def strokes(self) -> list[tuple[int, int]]:
+        """From which corner to which the tool moves without a stop."""
+        return list(pairwise(k for k, radius in enumerate(self.radius) if radius == 0.0))
+
+    def turns_in_place(self, stroke: int) -> bool:
+        """Whether the tool only turns between two stops."""
+        return self.parts[self.strokes[stroke][0]].in_place
 
     def _owners(self, u: FloatArray) -> list[tuple[int, IntArray]]:
         """The parts and which of u (M,) lie on each."""
@@ -322,6 +335,8 @@ def joined(path: CartesianPath, parts: tuple[Part, ...]) -> tuple[ToolPath, tupl
 
 def joint_between(before: Part, after: Part, asked: float) -> Joint:
     """How two parts are joined, with the radius [m] that is asked for."""
+    if before.in_place or after.in_place:
+        return Joint(0.0, 0.0)
     half = 0.5 * min(before.length, after.length)
     first = before.places.tangent(np.array([before.length]))[0]
     second = after.places.tangent(np.array([0.0]))[0]

@@ -306,6 +306,7 @@ def reference_of(msg: Any, cell: Cell) -> Reference:
 _CODE = StatusCode.INVALID_GOAL_CONSTRAINTS
 _FIELDS = (
     "tool_speed",
+    "rotation_speed",
     "speed_tolerance",
     "blending_radius",
     "orientation",
@@ -351,6 +352,6 @@ def _segment(msg: Any, frame: FloatArray, k: int) -> CartesianSegment:
         except PoseError as error:
             raise PoseError(f"segments[{k}].poses[{i}]: {error}", error.code) from error
     try:
-        return CartesianSegment(msg.kind, tuple(poses), msg.tool_speed)
+        return CartesianSegment(msg.kind, tuple(poses), msg.tool_speed, msg.rotation_speed)
     except InvalidValueError as error:
         raise RequestError(_CODE, f"segments[{k}]: {error}") from error
