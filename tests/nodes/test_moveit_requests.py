@@ -11,6 +11,7 @@ import pytest
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState, MultiDOFJointState
 from shape_msgs.msg import Mesh, MeshTriangle, SolidPrimitive
 from std_msgs.msg import Header
@@ -104,6 +105,21 @@ def plan_request(*goals: Any, **fields: Any) -> Any:
 def asked(request: Any) -> Any:
     (one,) = movement(request, CELL, "manipulator", MARGIN)
     return one
+
+
+def upright(tolerances: Any, rotation: Any = None, **fields: Any) -> Any:
+    """A constraint along the way on the orientation of a link."""
+    pose = np.eye(4)
+    pose[:3, :3] = np.eye(3) if rotation is None else rotation
+    names = (f"absolute_{axis}_axis_tolerance" for axis in "xyz")
+    own = {
+        "header": Header(frame_id="cell"),
+        "link_name": "tcp",
+        "orientation": pose_to_msg(pose).orientation,
+        "parameterization": 0,
+        **dict(zip(names, tolerances, strict=True)),
+    }
+    return constraints(orientation_constraints=[Of(**{**own, **fields})], name="upright")
 
 
 angles = st.lists(st.floats(-1.5, 1.5), min_size=6, max_size=6).map(np.array)
@@ -449,3 +465,47 @@ def test_a_whole_scene_replaces_earlier_objects_and_leaves_the_cell() -> None:
 def test_a_scene_that_can_t_be_held_is_refused_as_a_whole(given_scene: Any, sentence: str) -> None:
     with pytest.raises(RequestError, match=sentence):
         applied(given_scene, CELL, ())
+
+
+def within(error: Any, tolerances: Any, *, as_vector: bool) -> bool:
+    """Whether MoveIt would take a rotation (3, 3) off the one asked for."""
+    turn = Rotation.from_matrix(error)
+    values = turn.as_rotvec() if as_vector else turn.as_euler("XYZ")
+    return bool((np.abs(values) <= np.array(tolerances) + 1e-9).all())
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    angles,
+    st.sampled_from((0, 1, 2)),
+    st.booleans(),
+    st.floats(0.05, 1.0),
+    st.floats(0.0, 1.0),
+    st.floats(-3.0, 3.0),
+    st.floats(-3.0, 3.0),
+)
+def test_what_leans_less_than_asked_of_the_planner_moveit_takes_too(
+    q: Any, free: int, as_vector: bool, most: float, share: float, around: float, spin: float
+) -> None:
+    if free == 1 and not as_vector:
+        return
+    rotation = CHAIN.tcp_poses(q[None])[0, :3, :3]
+    tolerances = [most, most, most]
+    tolerances[free] = 3.2
+    constraint = upright(tolerances, rotation, parameterization=int(as_vector))
+    options = asked(plan_request(path_constraints=constraint)).options
+    axis = np.array(options.tilt_axis)
+    np.testing.assert_allclose(axis, np.eye(3)[free], atol=1e-9)
+    np.testing.assert_allclose(options.tilt_direction, rotation @ axis, atol=1e-9)
+    across = np.roll(axis, 1) * np.cos(around) + np.roll(axis, 2) * np.sin(around)
+    lean = Rotation.from_rotvec(share * options.tilt_max * across)
+    leaning = (lean * Rotation.from_rotvec(spin * axis)).as_matrix()
+    assert within(leaning, tolerances, as_vector=as_vector)
+
+
+@pytest.mark.parametrize(
+    "tolerances", [(0.1, 0.1, 0.1), (3.2, 3.2, 0.1), (0.1, 3.2, 0.1), (-0.1, 0.1, 3.2)]
+)
+def test_other_tolerances_along_the_way_are_refused(tolerances: Any) -> None:
+    with pytest.raises(RequestError, match="tolerance"):
+        asked(plan_request(path_constraints=upright(tolerances)))

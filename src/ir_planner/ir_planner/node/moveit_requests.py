@@ -31,6 +31,10 @@ from ir_values.settings import check_settings, setting
 TIP = "tcp"
 PIPELINE = "ir_planner"
 WAYPOINTS_MAX = 1000
+_WHOLE_TURN = 3.14  # rad: a tolerance of pi, as people round it
+_ROTATION_VECTOR = (
+    1  # parameterization of moveit_msgs/OrientationConstraint; 0: angles about x, y, z
+)
 _GOALS_MAX = 16  # alternatives of a request
 _CODE = StatusCode.INVALID_GOAL_CONSTRAINTS
 _TURN = StatusCode.FRAME_TRANSFORM_FAILURE
@@ -219,7 +223,6 @@ def movement(given: Any, cell: Cell, group: str, safety_distance: float) -> list
     check_group(given.group_name, group)
     if given.pipeline_id not in ("", PIPELINE):
         raise refusal(f"pipeline {shown(given.pipeline_id)}", f"{PIPELINE} plans here")
-    check_free(given.path_constraints, "path_constraints")
     if given.trajectory_constraints.constraints:
         raise refusal("trajectory_constraints", "they are not kept, so none may be given")
     if given.reference_trajectories:
@@ -234,6 +237,7 @@ def movement(given: Any, cell: Cell, group: str, safety_distance: float) -> list
     start = robot_state(given.start_state, cell, "start_state", StatusCode.START_STATE_INVALID)
     options = options_of_request(given, safety_distance)
     options.planner_id = given.planner_id
+    keep_upright(given.path_constraints, options, cell)
     asked = []
     for goal in goals_of(given.goal_constraints, cell):
         request = PlanRegionalMovement.Request(start=start, options=options)
@@ -243,6 +247,43 @@ def movement(given: Any, cell: Cell, group: str, safety_distance: float) -> list
             request.goal_state = goal
         asked.append(request)
     return asked
+
+
+def keep_upright(constraints: Any, options: PlanOptions, cell: Cell) -> None:
+    """Let options bound the tool's tilt by one orientation constraint along the way, which leaves
+    the rotation about one axis free. Raises RequestError for others.
+    """
+    kinds = {kind: len(getattr(constraints, kind)) for kind in _KINDS}
+    if not any(kinds.values()) and not constraints.name:
+        return
+    what = "path_constraints"
+    if kinds != {**dict.fromkeys(_KINDS, 0), "orientation_constraints": 1}:
+        raise refusal(what, "one orientation constraint is kept along the way, and nothing else")
+    given = constraints.orientation_constraints[0]
+    tolerance = [float(getattr(given, f"absolute_{axis}_axis_tolerance")) for axis in "xyz"]
+    for value in tolerance:
+        _tolerance(value, what)
+    free = [k for k in range(3) if tolerance[k] >= _WHOLE_TURN]
+    by_vector = getattr(given, "parameterization", 0) == _ROTATION_VECTOR
+    if len(free) != 1 or (free == [1] and not by_vector):
+        raise refusal(
+            what,
+            f"its tolerances are {', '.join(f'{value:g}' for value in tolerance)} rad: those kept "
+            "leave the rotation about one axis free, with a tolerance of at least pi (about y as a "
+            "rotation vector only), and bound the others",
+        )
+    least = min(tolerance[k] for k in range(3) if k != free[0])
+    frame = frame_pose(given.header.frame_id, cell, what)
+    q = given.orientation
+    try:
+        asked = rotation_from_quaternion(np.array((q.x, q.y, q.z, q.w)))
+    except InvalidValueError as error:
+        raise RequestError(_TURN, f"{what}: {error}") from error
+    hand = tcp_at(given.link_name, np.eye(4), cell)[:3, :3]
+    # a rotation vector is up to pi / 2 times as long across the axis as the axis leans
+    options.tilt_max = 2.0 * float(portable.arcsin(least / np.pi)) if by_vector else least
+    options.tilt_axis = hand[free[0]].tolist()
+    options.tilt_direction = portable.matmul(frame[:3, :3], asked)[:, free[0]].tolist()
 
 
 def ik_pose(given: Any, cell: Cell, group: str) -> FloatArray:
