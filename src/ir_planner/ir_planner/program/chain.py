@@ -1,6 +1,7 @@
 """Chains: one configuration for every stop of a route, and the cheapest of them."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -105,9 +106,9 @@ class CostEdges:
         for part in parts:
             if part.kind == ACROSS:
                 first, second = self.movements.ends(part)
-                space = FreeSpace.of(
-                    route.arriving(part.hop), context.safety_distance, context.work
-                )
+                cone = self.movements.asking(part, context).cone
+                scene = route.arriving(part.hop)
+                space = FreeSpace.of(scene, context.safety_distance, context.work, cone=cone)
                 blocked += [] if space.straight_free(first[None], second[None])[0] else [part]
         if not blocked:
             return self._planned(parts)
@@ -193,7 +194,9 @@ class TravelEdges:
 
     def _straight(self, part: Part) -> Settled:
         first, second = self.movements.ends(part)
-        free = self._spaces[part.hop].edges_free(first[None], second[None])[0]
+        cone = self.movements.asking(part, self.movements.context).cone
+        space = replace(self._spaces[part.hop], cone=cone)
+        free = space.edges_free(first[None], second[None])[0]
         if not free:
             self._blocked.add(part)
         weights = self.movements.route.arriving(part.hop).weights

@@ -10,7 +10,7 @@ from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.search_log import SearchLog
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner import optimize
-from ir_planner.checks import Consumption
+from ir_planner.checks import Consumption, tilt_violation
 from ir_planner.errors import TimingError
 from ir_planner.program.bounds import Rates
 from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Part
@@ -266,9 +266,15 @@ class Movements:
             return first.interaction, first.departure
         return first.arrival, first.interaction
 
-    def _planned(self, part: Part, context: Context) -> Movement | Failure:
+    def asking(self, part: Part, context: Context) -> Context:
+        """A context with what the movement of a part has to keep: its scene, and how far the tool
+        may lean.
+        """
         inside = context.inside(self.route.arriving(part.hop))
-        inside = inside.leaning_by(self.route.tilt(part.hop)).upright_from(self.ends(part)[0])
+        return inside.leaning_by(self.route.tilt(part.hop)).upright_from(self.ends(part)[0])
+
+    def _planned(self, part: Part, context: Context) -> Movement | Failure:
+        inside = self.asking(part, context)
         return self._across(part, inside) if part.kind == ACROSS else self._along_line(part, inside)
 
     def _across(self, part: Part, context: Context) -> Movement | Failure:
@@ -289,6 +295,11 @@ class Movements:
         station = self.route.name(part.hop if entry else part.hop - 1)
         driven = self.nodes(part)[0].driven
         if entry and driven is not None:
+            held = self.route.tilt(part.hop) is not None
+            leaning = tilt_violation(driven.trajectory, context.cone) if held else None
+            if leaning is not None:
+                what = f"along {station}: {leaning.sentence}"
+                return Failure(Status(StatusCode.PLANNING_FAILED, what))
             return driven.asked_by(context.leaning_freely())
         what = f"{'entering' if entry else 'leaving'} {station}"
         at = context.at(station)

@@ -96,7 +96,7 @@ def nearest_chain(movements: Movements) -> Chain:
 def _plain(part: Part, movements: Movements) -> Movement | None:
     """The baseline movement of a part across, None where it isn't certified."""
     first, second = movements.ends(part)
-    found = baseline(first, second, movements.context.inside(movements.route.arriving(part.hop)))
+    found = baseline(first, second, movements.asking(part, movements.context))
     return found if found is not None and found.certified else None
 
 
