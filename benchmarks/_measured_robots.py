@@ -18,6 +18,15 @@ from ir_description.robot import DcLink, without_table
 from ir_values.arrays import FloatArray
 
 ESTIMATED = 0.08  # share of the peak torque: Coulomb friction, and viscous at full speed
+ESTIMATES = frozenset(
+    f"drives.{each}"
+    for each in (
+        "reflected_inertia_kgm2",
+        "friction_viscous_nms_rad",
+        "friction_coulomb_nm",
+        "copper_loss_w_per_nm2",
+    )
+)
 _COPPER = 0.03  # share of the peak power at peak torque
 _ROTOR = 1.0 / 3.0  # of the peak torque, at full speed in 0.3 s
 # The bus of a light arm: 48 V, with a resistor that takes what comes back at once.
@@ -135,7 +144,12 @@ def ur3e() -> RobotModel:
     peak = np.array([56.0, 56.0, 28.0, 12.0, 12.0, 12.0])
     speed = np.radians([180.0, 180.0, 180.0, 360.0, 360.0, 360.0])
     built = _by_dh(like, rows, bodies, np.eye(4))
-    return estimated(replace(built, name="ur3e"), peak, speed, without_table(link=BUS_48_V))
+    whole = estimated(replace(built, name="ur3e"), peak, speed, without_table(link=BUS_48_V))
+    places = [f"links.{link}" for link in whole.link_names]
+    return replace(
+        whole,
+        marks={f"{place}.{key}": "M" for place in places for key in ("mass_kg", "com_m")},
+    )
 
 
 def tx40(folder: Path) -> RobotModel:
@@ -189,6 +203,7 @@ def estimated(
         envelope_torque=np.column_stack([peak, 0.9 * peak, 0.5 * peak]),
         controller=power,
         marks={},
+        estimated=ESTIMATES,
     )
 
 

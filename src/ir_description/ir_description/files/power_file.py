@@ -45,21 +45,32 @@ def confidence_marks(text: str, source: str = "<text>") -> dict[str, str]:
 
 def marks_of(node: Node) -> dict[str, str]:
     """The same of a tree."""
-    return dict(_marks(node, ""))
+    return {place: _text(figure, "confidence") for place, figure in _figures(node, "")}
 
 
-def _marks(node: Node, place: str) -> Iterator[tuple[str, str]]:
+ESTIMATE = "estimate"
+"""The source of a figure that a rule estimated from others: only its order is known."""
+
+
+def estimates_of(node: Node) -> frozenset[str]:
+    """The places of the figures of a tree whose source is ESTIMATE."""
+    return frozenset(
+        place for place, figure in _figures(node, "") if _text(figure, "source") == ESTIMATE
+    )
+
+
+def _figures(node: Node, place: str) -> Iterator[tuple[str, Node]]:
+    """Every figure of a tree with its place."""
     content = node.content
     if isinstance(content, list):
         for i, element in enumerate(content):
-            yield from _marks(element, f"{place}.{_text(element, 'name') or i}")
+            yield from _figures(element, f"{place}.{_text(element, 'name') or i}")
     elif isinstance(content, dict):
-        mark = _text(node, "confidence")
-        if mark and "value" in content:
-            yield place, mark
+        if _text(node, "confidence") and "value" in content:
+            yield place, node
             return
         for key, entry in content.items():
-            yield from _marks(entry.node, f"{place}.{key}" if place else key)
+            yield from _figures(entry.node, f"{place}.{key}" if place else key)
 
 
 def _text(node: Node, key: str) -> str:

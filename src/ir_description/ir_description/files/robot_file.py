@@ -11,7 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ir_description.files.power_file import controller_document, figure, marks_of, read_controller
+from ir_description.files.power_file import (
+    controller_document,
+    estimates_of,
+    figure,
+    marks_of,
+    read_controller,
+)
 from ir_description.poses import rotation_from_abc
 from ir_description.robot import Counterbalance, ReducedDistance, RobotModel, without_table
 from ir_description.shapes import Capsule
@@ -118,7 +124,13 @@ def robot_of(root: Item, folder: Path | None) -> RobotModel:
         own = controller_document(controller, power, folder)
         content = {**content, "controller": Entry(controller.line, own)}
     document = yaml_text(Node(root.line, content))
-    return replace(robot, controller=power, marks=marks_of(root.node), document=document)
+    return replace(
+        robot,
+        controller=power,
+        marks=marks_of(root.node),
+        estimated=estimates_of(root.node),
+        document=document,
+    )
 
 
 def _robot(root: Item) -> RobotModel:

@@ -399,6 +399,9 @@ DATA_SHEET = "data_sheet"
 RELATIVE_DEVIATION = {"H": 0.02, "M": 0.10, "L": 0.30}
 """Standard deviation as a share of the value, by the mark of confidence in the data."""
 
+ESTIMATED_DEVIATION = 0.5
+"""The same of a drive's figure that a rule estimated, whatever its mark: its order is known."""
+
 _FACTORS = {"viscous": 1.5, "coulomb": 1.5}
 """Friction is this much less certain than its mark says: it changes with temperature, grease and
 wear.
@@ -480,12 +483,8 @@ def prior(robot: RobotModel, power: PowerData, marks: Marks) -> PowerParameters:
     )  # in the order of AXIS_UNITS
     mean = np.concatenate([*means, np.ones(len(SCALARS)), watts])
     known = [_mark(name, robot, marks) for name in names]
-    share = np.array([RELATIVE_DEVIATION.get(mark, 0.0) for mark in known])
-    deviation = (
-        np.abs(mean)
-        * share
-        * np.array([_FACTORS.get(name.partition(".")[0], 1.0) for name in names])
-    )
+    share = np.array([_share(name, mark, robot) for name, mark in zip(names, known, strict=True)])
+    deviation = np.abs(mean) * share
     for name, value in _assumed(robot, power, marks).items():
         deviation[names.index(name)] = value
     return PowerParameters(
@@ -528,6 +527,14 @@ def _assumed(robot: RobotModel, power: PowerData, marks: Marks) -> dict[str, flo
         "rectifier_efficiency": RECTIFIER_LOSS,
         IDLE: min(IDLE_WATTS * robot.n, power.drives_and_brake_release),
     }
+
+
+def _share(name: str, mark: str, robot: RobotModel) -> float:
+    """The standard deviation of a parameter as a share of its value; 0 without a mark."""
+    kind = name.partition(".")[0]
+    if _PLACES.get(kind) in robot.estimated:
+        return ESTIMATED_DEVIATION
+    return RELATIVE_DEVIATION.get(mark, 0.0) * _FACTORS.get(kind, 1.0)
 
 
 def _mark(name: str, robot: RobotModel, marks: Marks) -> str:

@@ -95,7 +95,8 @@ class RobotModel:
     load_self_capsules: robot capsules that every capsule of a load is checked against.
     machine_home (n,) rad: the posture of Table II. rated_payload kg: tool and part together.
     title: maker and model, for people. controller: its power figures. marks: how sure each figure
-    is, H, M or L, by its place in the file. document: the robot file as text; "" for a bundled
+    is, H, M or L, by its place in the file; estimated: the places of those that a rule estimated.
+    document: the robot file as text; "" for a bundled
     robot: its name is enough. motor_turns (n, n): what a radian of each joint turns each motor,
     seen at the motor's own joint; not the identity where the axes of a wrist are coupled.
     """
@@ -133,6 +134,7 @@ class RobotModel:
     title: str = field(default="", repr=False)
     controller: PowerData = field(default_factory=without_table, repr=False)
     marks: Mapping[str, str] = field(default_factory=dict, repr=False)
+    estimated: frozenset[str] = field(default=frozenset(), repr=False)
     document: str = field(default="", repr=False)
     motor_turns: FloatArray = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
     reduced_distances: tuple[ReducedDistance, ...] = field(default=(), repr=False)
