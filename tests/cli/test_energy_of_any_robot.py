@@ -120,10 +120,16 @@ def test_a_log_is_fitted_and_planned_with(
     assert any("plan with the fit" in sentence for sentence in found["sentences"])
     home = " ".join(f"A{k + 1} {v:.1f}" for k, v in enumerate(np.degrees(robot.machine_home)))
     goal = re.sub(r"A1 \S+", "A1 20", home)
-    words = ["ask", "move", cell, "home", goal, "--power-parameters", str(out), "--json"]
+    words = ["ask", "move", cell, "home", goal, "--power-parameters", str(out)]
     assert main(words) == 0
     answer = capsys.readouterr().out
-    assert '"power_parameters": "mine"' in answer
+    assert "by mine" in answer
+    if by == "meter":
+        assert "from the mains" in answer  # whether a table or the fit says so
+        words = [str(log), "--mapping", str(mapping), "--cell", cell, "--load", "none", "--json"]
+        assert main(["energy", "compare", *words, "--power-parameters", str(out)]) == 0
+        both = json.loads(capsys.readouterr().out)
+        assert abs(both["difference"]["mean"]) < 0.05
 
 
 def test_parameters_of_another_robot_are_refused_with_both_names(

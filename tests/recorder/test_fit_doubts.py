@@ -65,14 +65,54 @@ def doubted(samples: Samples) -> str:
     model, prior = model_of(ROBOT)
     estimate = Estimate([samples], ["run"], model, prior)
     try:
-        result(estimate, "x")
+        found = result(estimate, "x")
     except RecorderError as error:
         return str(error)
-    return " ".join(doubts(estimate))
+    return " ".join(doubts(estimate, found))
 
 
 def test_nothing_speaks_against_good_data() -> None:
     assert doubted(metered(1)) == ""
+
+
+def drawn_meter(seed: int) -> Samples:
+    """What a meter shows of a robot that is drawn from what is known of it."""
+    model, prior = model_of(ROBOT)
+    samples = moved(ROBOT, seed)
+    truth = prior.drawn(seed).mean
+    noise = np.random.default_rng(seed).normal(0.0, 2.0, len(samples))
+    return replace(samples, watts=model.watts(truth, model.prepare(samples)) + 90.0 + noise)
+
+
+def with_columns(samples: Samples, order: list[int], factor: np.ndarray) -> Samples:
+    """Columns of joints in another order, times factors; a factor of 0 is a column that stands."""
+    home = np.array(ROBOT.machine_home)
+    q, qd, qdd = (each[:, order] * factor for each in (samples.q, samples.qd, samples.qdd))
+    q = np.where(factor == 0.0, home, q)
+    return replace(samples, q=q, qd=qd, qdd=qdd)
+
+
+STRAIGHT = list(range(6))
+CORRUPTIONS = {
+    "one phase": lambda samples: replace(samples, watts=samples.watts / 3.0),
+    "kW as W": lambda samples: replace(samples, watts=samples.watts / 1e3),
+    "A5 stands": lambda s: with_columns(s, STRAIGHT, np.array([1, 1, 1, 1, 0, 1.0])),
+    "A2 and A3": lambda s: with_columns(s, [0, 2, 1, 3, 4, 5], np.ones(6)),
+    "sign of A2": lambda s: with_columns(s, STRAIGHT, np.array([1, -1, 1, 1, 1, 1.0])),
+    "late": lambda samples: replace(samples, watts=np.roll(samples.watts, 8)),
+}
+SEEDS = [1, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(2, 6))]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_drawn_robot_that_is_recorded_well_is_not_doubted(seed: int) -> None:
+    assert doubted(drawn_meter(seed)) == ""
+
+
+@pytest.mark.parametrize("kind", CORRUPTIONS)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_no_corrupted_recording_is_taken_without_a_word(seed: int, kind: str) -> None:
+    assert doubted(CORRUPTIONS[kind](drawn_meter(seed)))
 
 
 @pytest.mark.parametrize("steps", [-30, 12])

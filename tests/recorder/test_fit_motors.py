@@ -111,6 +111,15 @@ def test_a_fit_that_is_worse_recommends_the_data_sheet() -> None:
 
     rows = [of("fit", 0.05), of("data sheet", -0.02), of("regression", 0.03)]
     assert "plan with the data sheet" in recommendation(rows)
+    assert "plan with mine, this fit is worse" in recommendation(rows, begun="mine")
+
+
+def test_where_a_regression_is_nearer_it_is_said_how_near_the_fit_is() -> None:
+    def of(method: str, error: float) -> LeftOut:
+        return LeftOut("a", method, 1.0, (error,), None)
+
+    rows = [of("fit", 0.03), of("data sheet", 0.08), of("regression", 0.018)]
+    assert "plan with the fit only if 3.0 % is near enough" in recommendation(rows)
 
 
 def test_coupled_motors_give_the_power_that_the_joints_take() -> None:

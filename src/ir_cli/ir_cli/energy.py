@@ -9,6 +9,8 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
+
 from ir_cli.errors import InputError
 from ir_cli.output import (
     Columns,
@@ -23,13 +25,15 @@ from ir_cli.output import (
 )
 from ir_cli.planning import add_cell, planner_of, sentences
 from ir_description import (
+    DATA_SHEET,
+    PowerParameters,
     centre_deviations,
     load_cell,
     load_power_parameters,
     power_parameters_to_yaml,
 )
 from ir_recorder import analyse, read_recording
-from ir_recorder.analysis.indirect import agreement
+from ir_recorder.analysis.indirect import Agreement, Measured, agreement, agreement_of
 from ir_recorder.fit import (
     BY,
     Estimate,
@@ -38,6 +42,7 @@ from ir_recorder.fit import (
     fit_data,
     left_out,
     left_out_rows,
+    open_prior,
     parameter_rows,
     recommendation,
     result,
@@ -45,6 +50,8 @@ from ir_recorder.fit import (
     write_fit_picture,
 )
 from ir_recorder.fit import sentences as fit_sentences
+from ir_recorder.measure import PowerModel, movements
+from ir_recorder.measure.arm import available, pinocchio_torques
 from ir_recorder.report.files import write_output
 from ir_recorder.traces import read_mapping
 from ir_values.files import ANYWHERE
@@ -79,9 +86,39 @@ LEFT_OUT: Columns = {
 PARAMETERS_START = b"format: ir_description/power_parameters/"
 
 
+def _add_sources(parser: argparse.ArgumentParser, what: str) -> None:
+    """Arguments that say what was recorded, by which robot."""
+    parser.add_argument(
+        "motion",
+        type=Path,
+        nargs="+",
+        metavar="RECORDING",
+        help=what,
+    )
+    parser.add_argument(
+        "--meter",
+        type=Path,
+        action="append",
+        metavar="FILE",
+        help="CSV of a power meter beside each of them, in their order",
+    )
+    parser.add_argument(
+        "--mapping", type=Path, metavar="FILE", help="what the columns of the joints mean"
+    )
+    parser.add_argument(
+        "--meter-mapping", type=Path, metavar="FILE", help="what those of the meter mean"
+    )
+    parser.add_argument("--cell", default="", help="of the robot, where the recording carries none")
+    parser.add_argument("--load", default="", help='what is held all the time: "gripper+part"')
+    prior = parser.add_argument(
+        "--power-parameters", default="", metavar="FILE", help="to begin with (the data sheet)"
+    )
+    add_renamed(parser, "--prior", prior)
+
+
 def add_compare(compare: argparse.ArgumentParser) -> None:
     """Arguments of `ir energy compare`."""
-    compare.add_argument("recording", type=Path, metavar="RECORDING", help="a recording (.mcap)")
+    _add_sources(compare, "recordings, or CSV of the joints")
     add_formats(compare)
     compare.set_defaults(run=run_compare)
 
@@ -100,20 +137,7 @@ def add_drive(drive: argparse.ArgumentParser) -> None:
 
 def add_fit(fitted: argparse.ArgumentParser) -> None:
     """Arguments of `ir energy fit`."""
-    fitted.add_argument(
-        "motion",
-        type=Path,
-        nargs="+",
-        metavar="RECORDING",
-        help="recordings, or CSV of the joints; one fit of all",
-    )
-    fitted.add_argument(
-        "--meter",
-        type=Path,
-        action="append",
-        metavar="FILE",
-        help="CSV of a power meter beside each of them, in their order",
-    )
+    _add_sources(fitted, "recordings, or CSV of the joints; one fit of all")
     fitted.add_argument(
         "--by",
         choices=BY,
@@ -121,21 +145,10 @@ def add_fit(fitted: argparse.ArgumentParser) -> None:
         help="what is explained: watts, the motors' torques or currents, both (watts if there are)",
     )
     fitted.add_argument(
-        "--mapping", type=Path, metavar="FILE", help="what the columns of the joints mean"
-    )
-    fitted.add_argument(
-        "--meter-mapping", type=Path, metavar="FILE", help="what those of the meter mean"
-    )
-    fitted.add_argument("--cell", default="", help="of the robot, where the recording carries none")
-    fitted.add_argument("--load", default="", help='what is held all the time: "gripper+part"')
-    prior = fitted.add_argument(
-        "--power-parameters", default="", metavar="FILE", help="to begin with (the data sheet)"
-    )
-    add_renamed(fitted, "--prior", prior)
-    fitted.add_argument(
         "--centres",
-        action="store_true",
-        help="find the links' centres of mass as well; needs postures of all kinds",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="find the links' centres of mass as well (as near to the data as their marks say)",
     )
     fitted.add_argument("--name", default="fit", help="of the parameters (fit)")
     fitted.add_argument(
@@ -181,8 +194,16 @@ def add_excite(excite: argparse.ArgumentParser) -> None:
 
 def run_compare(arguments: argparse.Namespace) -> int:
     """Print both measurements of every movement; exit code 1 where there is nothing to compare."""
-    analysis = analyse(read_recording(arguments.recording))
-    both = agreement(analysis)
+    first = arguments.motion[0]
+    given = (arguments.meter, arguments.mapping, arguments.cell, arguments.power_parameters)
+    if len(arguments.motion) == 1 and first.suffix.lower() == ".mcap" and not any(given):
+        analysis = analyse(read_recording(first))
+        both = agreement(analysis)
+        source = analysis.recording.hardware
+        notes: tuple[str, ...] = ()
+    else:
+        both, notes = _by_traces(arguments)
+        source = ", ".join(path.name for path in arguments.motion)[:300]
     rows: list[Row] = [
         {
             "movement": row.label,
@@ -198,21 +219,55 @@ def run_compare(arguments: argparse.Namespace) -> int:
     if arguments.json:
         mean = both.difference
         interval = {"mean": mean.value, "low": mean.low, "high": mean.high, "spread": both.spread}
-        source = analysis.recording.hardware
         print_json(
             {"source": source, "movements": rows, "difference": interval, "sentence": both.sentence}
         )
     elif arguments.csv:
         print_csv(rows)
     else:
-        sys.stdout.write(f"{analysis.recording.hardware or 'measured on an unknown robot'}\n")
+        sys.stdout.write(f"{source or 'measured on an unknown robot'}\n")
         print_table(rows, COMPARED)
-        sys.stdout.write(f"{both.sentence}\n")
+        sys.stdout.write("".join(f"{sentence}\n" for sentence in (*notes, both.sentence)))
     return 0 if rows else 1
 
 
-def run_fit(arguments: argparse.Namespace) -> int:
-    """Fit, write the file and the picture, print what was found."""
+def _by_traces(arguments: argparse.Namespace) -> tuple[Agreement, tuple[str, ...]]:
+    """Both measurements of every movement in logs with a meter, and notes on how these were
+    read.
+    """
+    sources, prior = _asked(arguments)
+    data = fit_data(sources, prior, BY[0])
+    model = data.model
+    second = PowerModel(
+        model.robot,
+        model.robot.controller.dc_link,
+        source_cell(sources[0]).base_pose,
+        prior,
+        pinocchio_torques,
+    )
+    rows: list[Measured] = []
+    for name, samples in zip(data.names, data.recordings, strict=True):
+        predicted = samples.metered(model.watts(prior.mean, model.prepare(samples)))
+        other = np.full(len(samples), np.nan)
+        if available():
+            other = samples.metered(second.watts(prior.mean, second.prepare(samples)))
+        joules = samples.step * np.column_stack([samples.watts, predicted, other])
+        rows += [
+            Measured(
+                f"{name} {number}",
+                samples.step * (behind - begin),
+                direct=float(joules[begin:behind, 0].sum()),
+                indirect=float(joules[begin:behind, 1].sum()),
+                from_torques=np.nan,
+                second_opinion=float(joules[begin:behind, 2].sum()),
+            )
+            for number, (begin, behind) in enumerate(movements(samples), start=1)
+        ]
+    return agreement_of(tuple(rows)), data.notes
+
+
+def _asked(arguments: argparse.Namespace) -> tuple[list[Source], PowerParameters]:
+    """What was recorded, and the parameters to begin with."""
     with sentences():
         cell = load_cell(arguments.cell) if arguments.cell else None
     motion = arguments.mapping
@@ -235,12 +290,21 @@ def run_fit(arguments: argparse.Namespace) -> int:
     ]
     with sentences():
         robot = source_cell(sources[0]).robot
-        prior = load_power_parameters(arguments.power_parameters, robot)
+        return sources, load_power_parameters(arguments.power_parameters, robot)
+
+
+def run_fit(arguments: argparse.Namespace) -> int:
+    """Fit, write the file and the picture, print what was found."""
+    sources, prior = _asked(arguments)
     if arguments.centres:
-        prior = prior.with_centres(centre_deviations(robot))
+        prior = prior.with_centres(centre_deviations(source_cell(sources[0]).robot))
     data = fit_data(sources, prior, arguments.by)
     estimate = Estimate(data.recordings, data.names, data.model, prior, motors=data.motors)
     found = result(estimate, arguments.name)
+    if data.aligned and estimate.meter is not None:  # the fit's own power is nearer
+        data = fit_data(sources, found.parameters, arguments.by)
+        estimate = Estimate(data.recordings, data.names, data.model, prior, motors=data.motors)
+        found = result(estimate, arguments.name)
     unseen = left_out(estimate)
     named = ", ".join(path.name for path in arguments.motion)[:300]
     page = power_parameters_to_yaml(found.parameters, f"fit on {named}")
@@ -248,9 +312,10 @@ def run_fit(arguments: argparse.Namespace) -> int:
     written = [write_output(arguments.output, page.encode(), PARAMETERS_START, ANYWHERE)]
     if arguments.picture:
         written.append(write_fit_picture(found, prior, arguments.picture))
-    doubted = doubts(estimate)
-    advised = recommendation(unseen, doubted=bool(doubted))
-    said = (*data.notes, *fit_sentences(found), *doubted, advised)
+    doubted = doubts(estimate, found)
+    begun = "the data sheet" if prior.name == DATA_SHEET else prior.name
+    advised = recommendation(unseen, doubted=bool(doubted), begun=begun)
+    said = (*data.notes, *fit_sentences(found, begun), *doubted, advised)
     rows = parameter_rows(found, prior)
     if arguments.json:
         listed = [asdict(each) for each in found.movements]
@@ -258,7 +323,7 @@ def run_fit(arguments: argparse.Namespace) -> int:
             {
                 "parameters": rows,
                 "movements": listed,
-                "left_out": left_out_rows(unseen),
+                "left_out": left_out_rows(unseen, begun.removeprefix("the ")),
                 "sentences": said,
                 "files": [str(path) for path in written],
             }
@@ -266,7 +331,7 @@ def run_fit(arguments: argparse.Namespace) -> int:
         return 0
     print_table(rows, FITTED)
     sys.stdout.write("\n")
-    print_table(left_out_rows(unseen), LEFT_OUT)
+    print_table(left_out_rows(unseen, begun.removeprefix("the ")), LEFT_OUT)
     sys.stdout.write("".join(f"{sentence}\n" for sentence in said))
     sys.stdout.write("".join(f"{path}\n" for path in written))
     return 0
@@ -290,7 +355,9 @@ def run_excite(arguments: argparse.Namespace) -> int:
 
     with sentences():
         planner = planner_of(arguments.cell)
-        prior = load_power_parameters(arguments.power_parameters, planner.cell.robot)
+        robot = planner.cell.robot
+        prior = load_power_parameters(arguments.power_parameters, robot)
+        prior = open_prior(prior, robot.time_value)
         asked = ExcitationRequest(
             arguments.seconds,
             arguments.postures,

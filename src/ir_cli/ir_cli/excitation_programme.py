@@ -275,7 +275,8 @@ class Design:
     def identified(self) -> Identified:
         """What is known of each parameter after all that was chosen."""
         left = np.sqrt(np.diag(np.linalg.inv(self._information)))
-        return Identified(self._prior.names, np.where(self._free, left, 1.0))
+        open_ones = np.flatnonzero(self._free)  # of the others there is nothing to learn
+        return Identified(tuple(self._prior.names[k] for k in open_ones), left[open_ones])
 
 
 # The programme: stays in every mode, excursions by load and posture, movements between postures.

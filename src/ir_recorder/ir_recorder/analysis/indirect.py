@@ -178,6 +178,11 @@ def agreement(analysis: Analysis) -> Agreement:
         for result in analysis.movements
         if result.step.outcome == "ended"
     )
+    return agreement_of(rows)
+
+
+def agreement_of(rows: tuple[Measured, ...]) -> Agreement:
+    """What both measurements of some movements say together."""
     both = [row for row in rows if math.isfinite(row.difference)]
     differences = np.array([row.difference for row in both])
     return Agreement(

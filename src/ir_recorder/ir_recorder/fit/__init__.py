@@ -1,5 +1,6 @@
 """Power parameters fitted to a meter or to the motors, and what the data say of each."""
 
+from ir_recorder.fit.channels import open_prior
 from ir_recorder.fit.data import BY, FitData, Source, fit_data, source_cell
 from ir_recorder.fit.doubts import doubts, result
 from ir_recorder.fit.estimate import Estimate, Fit, FittedMovement, fit
@@ -27,6 +28,7 @@ __all__ = [
     "left_out",
     "left_out_rows",
     "median_error",
+    "open_prior",
     "parameter_rows",
     "plain_torques",
     "recommendation",

@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ir_description import PowerParameters
+from ir_description import IDLE, IDLE_WATTS, PowerParameters
 from ir_recorder.measure import PowerModel, Samples
 from ir_recorder.measure.power_model import Prepared
 from ir_values.arrays import BoolArray, FloatArray, IntArray
@@ -104,9 +104,18 @@ class Meter:
         """Watts (M,) of every sample of each recording, as its meter shows them."""
         return [run.samples.metered(self._model.watts(mean, run.prepared)) for run in self._runs]
 
+    def missing(self, mean: FloatArray) -> FloatArray:
+        """Watts (R,) that parameters `mean` leave open."""
+        return self.measured - self.reduced(self.watts(mean))
+
     def time(self) -> FloatArray:
         """Seconds (R,) of the rows on their recordings' clocks."""
         return self.reduced([run.samples.time for run in self._runs])
+
+    @property
+    def level(self) -> float:
+        """W that the meter shows at rest, about."""
+        return max(float(np.median(self.measured)), 10.0 * LEAST_WATTS)
 
     def reduced(self, values: Sequence[FloatArray]) -> FloatArray:
         """Means over the rows of values (M, ...) of each recording."""
@@ -189,16 +198,21 @@ class Motors:
 FRICTION = ("viscous", "coulomb")
 
 
-def open_prior(prior: PowerParameters, meter: Meter | None) -> PowerParameters:
-    """The prior of a fit: where nobody knows what a controller draws at rest (`controller: none`),
-    its watts are open, so that a meter finds them.
+def open_prior(prior: PowerParameters, level: float) -> PowerParameters:
+    """The prior of a fit with a meter that shows `level` [W] at rest. Where nobody knows what a
+    controller draws at rest (`controller: none`), its watts are open. Where no data part what
+    inverters take from the DC link from what they draw at rest, that is open too: as much as
+    IDLE_WATTS says, at most all.
     """
-    names = [f"watts.{mode}" for mode in prior.modes]
-    open_ones = [k for k in map(prior.index, names) if prior.deviation[k] == prior.mean[k] == 0.0]
-    if meter is None or not len(meter.measured) or not open_ones:
-        return prior
-    level = max(float(np.median(meter.measured)), 10.0 * LEAST_WATTS)
     covariance = prior.covariance.copy()
-    for k in open_ones:
-        covariance[k, k] = level**2
+    for mode in prior.modes:
+        k = prior.index(f"watts.{mode}")
+        if prior.deviation[k] == prior.mean[k] == 0.0:
+            covariance[k, k] = level**2
+    idle = prior.index(IDLE)
+    if prior.deviation[idle] == prior.mean[idle] == 0.0:
+        most = min(IDLE_WATTS * len(prior.joints), level)
+        on = prior.index("watts.STAND_ON_MOTORS")
+        covariance[idle, idle] = most**2
+        covariance[on, on] += most**2
     return replace(prior, covariance=covariance)

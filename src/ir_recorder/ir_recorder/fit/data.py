@@ -9,7 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ir_description import Cell, DescriptionError, Load, PowerParameters, RobotModel, cell_from_yaml
+from ir_description import (
+    DATA_SHEET,
+    Cell,
+    DescriptionError,
+    Load,
+    PowerParameters,
+    RobotModel,
+    cell_from_yaml,
+)
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_recorder.analysis.loads import LoadTimeline, carried, load_timeline, normal
 from ir_recorder.errors import RecorderError
@@ -87,6 +95,32 @@ def check_determined(determined: BoolArray, moving: BoolArray, window: float) ->
     )
 
 
+_LEAST_WATTS = 5.0  # in the median: with its drives on, the lightest arm takes more
+_MOST_POWER = 3.0  # of peak torque times full speed, all axes together: in the mean
+
+
+def check_unit(watts: FloatArray, robot: RobotModel, source: str) -> None:
+    """RecorderError where watts (M,) can't be those of a robot: kW read as W, or the other way."""
+    known = watts[np.isfinite(watts)]
+    if not len(known):
+        return
+    median = float(np.median(known))
+    most = _MOST_POWER * float(robot.envelope_torque[:, 0] @ robot.velocity_max)
+    remedy = "is the heading's unit right (power_W, power_kW, or unit: kW in a mapping)?"
+    if 0.0 <= median < _LEAST_WATTS and float(known.max()) < 20.0 * _LEAST_WATTS:
+        raise RecorderError(
+            f"{source}: no parameters explain the meter: it shows {median:.3g} W in the median and "
+            f"{float(known.max()):.3g} W at most, a robot takes more than {_LEAST_WATTS:g} W: "
+            f"{remedy}"
+        )
+    if median > most:
+        raise RecorderError(
+            f"{source}: no parameters explain the meter: it shows {median:.3g} W in the median, "
+            f"all axes of {robot.name} at peak torque and full speed give {most / _MOST_POWER:.3g} "
+            f"W: {remedy}"
+        )
+
+
 def check_readings(meter: Trace) -> None:
     """RecorderError where a meter reads so seldom that movements vanish between its readings."""
     if meter.period > _SELDOM:
@@ -153,6 +187,7 @@ def check_range(source: str, robot: RobotModel, q: FloatArray) -> None:
 class FitData:
     """Recordings, by name, the model of their robot, and sentences on how they were laid
     together. motors: whether the fit has to rest on what the controllers say of their motors.
+    aligned: whether a meter's clock was found by its power.
     """
 
     recordings: tuple[Samples, ...]
@@ -160,6 +195,7 @@ class FitData:
     model: PowerModel
     notes: tuple[str, ...]
     motors: bool
+    aligned: bool
 
 
 @dataclass(frozen=True)
@@ -213,7 +249,12 @@ def fit_data(sources: Source | Sequence[Source], prior: PowerParameters, by: str
         raise RecorderError("some recordings have torques, others currents: fit them one by one")
     notes = [note for _, own in runs for note in own]
     names = tuple(each.motion.stem for each in given)
-    return FitData(tuple(samples for samples, _ in runs), names, model, tuple(notes), motors)
+    aligned = any(
+        each.meter is not None and np.isnan((each.meter_mapping or TraceMapping()).clock_offset)
+        for each in given
+    )
+    recordings = tuple(samples for samples, _ in runs)
+    return FitData(recordings, names, model, tuple(notes), motors, aligned)
 
 
 def _run(
@@ -258,7 +299,10 @@ def _run(
     if meter is not None and by != BY[1]:
         check_readings(meter)
     notes += _gaps(joints)
-    return samples_of(joints, meter, names, prior.modes, runs), notes
+    samples = samples_of(joints, meter, names, prior.modes, runs)
+    if meter is not None and by != BY[1]:
+        check_unit(samples.watts, cell.robot, meter.source)
+    return samples, notes
 
 
 def _gaps(joints: Trace) -> list[str]:
@@ -333,7 +377,8 @@ def _aligned(
         samples = samples_of(joints, None, prior.joints, prior.modes, runs)
         time = samples.time
         watts = model.watts(prior.mean, model.prepare(samples))
-        what = "the power that the data sheet predicts"
+        begun = "the data sheet" if prior.name == DATA_SHEET else prior.name
+        what = f"the power that {begun} predicts"
     offset = clock_offset(time, watts, *_watts(outer))
     note = (
         f"{outer.source}: {offset.seconds:+.3f} s on its clock agrees with {what} by "

@@ -10,20 +10,21 @@ from itertools import combinations
 
 import numpy as np
 
+from ir_description import AXIS_UNITS
 from ir_recorder.errors import RecorderError
 from ir_recorder.fit.channels import Run, by_window
 from ir_recorder.fit.estimate import Estimate, Fit
-from ir_recorder.measure import PowerModel
+from ir_recorder.measure import Samples
 from ir_values.arrays import FloatArray, IntArray
 
 EXPLAINED = 0.8  # of the variance of power, or of an axis' torque, in motion: less is a doubt
-_SURE = 0.95  # with more, columns are where they belong
-_BETTER = 0.1  # of the variance: by so much another order of columns has to explain more
+_MOVED = 0.05  # rad: a joint that moves
+_STILL = 1e-3  # rad: one that doesn't
 _LATE = 0.03  # s: less is not told apart
 _LONGEST = 1.0  # s that are looked for
 _GAIN = 0.9  # of the rms: what a later clock has to reach
-_SECONDS = 60.0  # of a recording that other columns are tried on
 _FEWEST = 50  # samples in motion
+_USABLE = 0.5  # of a part's samples
 
 
 def result(estimate: Estimate, name: str) -> Fit:
@@ -36,11 +37,16 @@ def result(estimate: Estimate, name: str) -> Fit:
         raise RecorderError(". ".join([str(error), *doubts(estimate)])) from error
 
 
-def doubts(estimate: Estimate) -> tuple[str, ...]:
-    """Sentences on recordings whose power or torques the fit explains badly, after `result`; each
-    ends with what to look at.
+def doubts(estimate: Estimate, found: Fit | None = None) -> tuple[str, ...]:
+    """Sentences on recordings whose power or torques the fit explains badly or by what can't be,
+    after `result`; found: that result. Each ends with what to look at.
     """
-    said: list[str] = []
+    said = list(_of_still_joints(estimate))
+    if found is not None:
+        said += _of_factors(estimate, found)
+    if found is not None and estimate.meter is not None:
+        said += _of_gains(estimate, found)
+        said += _of_columns(estimate)
     if estimate.meter is not None:
         fitted = estimate.meter.watts(estimate.found[: len(estimate.prior.names)])
         sheet = estimate.meter.watts(estimate.prior.mean)
@@ -71,8 +77,6 @@ def _of_power(
             "power varies by: look at clocks, columns, signs, units and loads before you plan "
             "with it"
         )
-    if share < _SURE:
-        yield from _of_columns(estimate.model, estimate.prior.mean, run)
 
 
 def _explained(measured: FloatArray, predicted: FloatArray) -> float:
@@ -101,47 +105,181 @@ def _lateness(measured: FloatArray, predicted: FloatArray, step: float) -> float
     return best * step
 
 
-def _of_columns(model: PowerModel, mean: FloatArray, run: Run) -> Iterator[str]:
-    """Two columns of joints that explain the power better the other way round, or one that does
-    with its sign changed, by the data sheet.
-    """
-    samples = run.samples
-    first = int(np.argmax(samples.moving & np.isfinite(samples.watts)))
-    begin = samples.time[first] if len(samples) else 0.0
-    part = samples.part(begin, begin + _SECONDS)
-    moving = part.moving & part.known & np.isfinite(part.watts)
-    if np.count_nonzero(moving) < _FEWEST:
+def _of_still_joints(estimate: Estimate) -> Iterator[str]:
+    """Columns that never change while others do."""
+    positions = [run.samples.q[run.samples.known] for run in estimate.runs]
+    spans = np.max([np.ptp(q, axis=0) for q in positions if len(q)], axis=0, initial=0.0)
+    if not (spans > _MOVED).any():
         return
-    joints = model.layout.joints
+    for joint, span in zip(estimate.prior.joints, spans, strict=True):
+        if span < _STILL:
+            yield (
+                f"{joint} never moves, other joints do: if it did move, its column is wrong; if it "
+                "did not, nothing is known of it"
+            )
 
-    def share(order: IntArray, sign: FloatArray) -> float:
-        turned = replace(
-            part,
-            q=part.q[:, order] * sign,
-            qd=part.qd[:, order] * sign,
-            qdd=part.qdd[:, order] * sign,
+
+# What a fit has to believe to explain the data: masses and inverter factors far from what is known
+# of them, or a meter that shows a part of what the robot takes.
+#
+# A model that takes g times the watts, with g times the masses and friction, predicts the same
+# movements: whether the meter shows a share of the watts is seen only by what is known of masses,
+# inertias and losses. So the fit is held against the same with every g.
+
+_FAR = 4.0  # deviations, of what was known and of what the fit leaves, together
+_KNOWN_FACTORS = (
+    "link_mass",
+    "load_mass",
+    "rotor_inertia",
+    "counterbalance",
+    "rectifier_efficiency",
+)
+_GAINS = {1.0 / 3.0: "a third", 0.5: "half", 2.0 / 3.0: "two thirds", 2.0: "twice", 3.0: "3 times"}
+_LIKELIER = 3.0  # by how much the sum of squared deviations has to fall
+_WITH_WATTS = ("viscous", "coulomb", "iron", "link_mass", "load_mass", "rotor_inertia")
+_AGAINST_WATTS = ("copper",)
+
+
+def _of_factors(estimate: Estimate, found: Fit) -> Iterator[str]:
+    """Factors that lie where they are not believed."""
+    before = estimate.prior
+    for name in _KNOWN_FACTORS:
+        k = before.index(name)
+        spread = float(np.hypot(before.deviation[k], found.parameters.deviation[k]))
+        off = float(found.parameters.mean[k] - before.mean[k])
+        if found.determined[k] and abs(off) > _FAR * spread:
+            yield (
+                f"{name} would be {found.parameters.mean[k]:.2f}, {abs(off) / spread:.1f} "
+                f"deviations from {before.mean[k]:.2f}: look at the meter (all phases, its unit), "
+                "the load, and the masses of the robot file"
+            )
+
+
+def _of_gains(estimate: Estimate, found: Fit) -> Iterator[str]:
+    """A meter that shows a share of the watts."""
+    as_found = _strain(estimate, found, 1.0)
+    gain = min(_GAINS, key=lambda each: _strain(estimate, found, 1.0 / each))
+    with_gain = _strain(estimate, found, 1.0 / gain)
+    if with_gain < as_found - _LIKELIER:
+        yield (
+            f"masses and losses are as known if the meter shows {_GAINS[gain]} of the watts "
+            f"(squared deviations {with_gain:.1f}, as read {as_found:.1f}): are all phases in, and "
+            "is the unit right?"
         )
-        predicted = part.metered(model.watts(mean, model.prepare(turned)))
-        both = np.corrcoef(predicted[moving], part.watts[moving])
-        return float(np.nan_to_num(both[0, 1]))
 
+
+def _strain(estimate: Estimate, found: Fit, factor: float) -> float:
+    """Squared deviations from what is known of what the data determine, if the robot took `factor`
+    times the watts that the meter shows.
+    """
+    before = estimate.prior
+    total = 0.0
+    for k, name in enumerate(before.names):
+        kind = name.partition(".")[0]
+        if kind not in (*_WITH_WATTS, *_AGAINST_WATTS) or not found.determined[k]:
+            continue
+        power = -1.0 if kind in _AGAINST_WATTS else 1.0
+        scale = factor**power
+        wide = estimate.wide[k]
+        spread = float(np.hypot(wide, scale * found.parameters.deviation[k]))
+        total += float((scale * found.parameters.mean[k] - before.mean[k]) / spread) ** 2
+    return total
+
+
+# Columns that stand for each other.
+#
+# With two columns exchanged, or one with its sign changed, the parameters that were found (those of
+# the two joints exchanged as well) are held against the same power. The likeliest such reading, and
+# the columns as given, then take one step of Gauss and Newton. The data count as little as the
+# fit's widened noise says.
+
+_SECONDS = 40.0  # of a recording that other columns are tried on
+_STRIDE = 5.0  # s between parts that are looked at
+_ODDS = 12.0  # by how much twice the log-likelihood has to rise
+_BETTER = 0.7  # or: to what share the squares fall, whatever they count
+
+
+def _of_columns(estimate: Estimate) -> Iterator[str]:
+    """Two columns of joints that explain the power better the other way round, or one that does
+    with its sign changed.
+    """
+    run = max(estimate.runs, key=lambda each: len(each.samples))
+    part = _liveliest(run.samples)
+    usable = part.known & np.isfinite(part.watts)
+    if np.count_nonzero(usable & part.moving) < _FEWEST or usable.mean() < _USABLE:
+        return
+    joints = estimate.prior.joints
     n = len(joints)
     given = np.arange(n)
-    as_given = share(given, np.ones(n))
-    found: list[tuple[float, str]] = []
+    up = np.ones(n)
+    readings: list[tuple[str, IntArray, FloatArray]] = [
+        (f"the sign of {joints[j]} changed", given, np.where(given == j, -1.0, 1.0))
+        for j in range(n)
+    ]
     for a, b in combinations(range(n), 2):
         order = given.copy()
         order[[a, b]] = b, a
-        what = f"the columns of {joints[a]} and {joints[b]} swapped"
-        found.append((share(order, np.ones(n)), what))
-    for j in range(n):
-        sign = np.where(given == j, -1.0, 1.0)
-        found.append((share(given, sign), f"the sign of {joints[j]} changed"))
-    best, what = max(found)
-    if best > as_given + _BETTER:
+        readings.append((f"the columns of {joints[a]} and {joints[b]} swapped", order, up))
+    costs = [_Reading(estimate, part, order, sign).cost() for _, order, sign in readings]
+    what, order, sign = readings[int(np.argmin(costs))]
+    other = _Reading(estimate, part, order, sign).stepped()
+    as_given = _Reading(estimate, part, given, up).stepped()
+    if other < max(as_given - _ODDS, _BETTER * as_given):
         yield (
-            f"{run.name}: with {what} the data sheet's power agrees with the meter by {best:.2f}, "
-            f"as given by {as_given:.2f}: look at the mapping"
+            f"{run.name}: with {what} the power is explained better "
+            f"(odds of e^{0.5 * (as_given - other):.0f}): look at the mapping"
+        )
+
+
+def _liveliest(samples: Samples) -> Samples:
+    """The part of _SECONDS in which the joint that moves least moves most."""
+    if len(samples) * samples.step <= _SECONDS:
+        return samples
+    travel = np.abs(np.nan_to_num(samples.qd)).cumsum(axis=0)
+    width = round(_SECONDS / samples.step)
+    begins = np.arange(0, len(samples) - width, round(_STRIDE / samples.step))
+    own = travel[begins + width] - travel[begins]
+    least = (own / np.maximum(own.max(axis=0), 1e-12)).min(axis=1)
+    first = int(begins[least.argmax()])
+    return samples.part(samples.time[first], samples.time[first] + _SECONDS)
+
+
+class _Reading:
+    """The power of a part with its columns in another order and with other signs, both (n,)."""
+
+    def __init__(
+        self, estimate: Estimate, part: Samples, order: IntArray, sign: FloatArray
+    ) -> None:
+        motion = (each[:, order] * sign for each in (part.q, part.qd, part.qdd))
+        q, qd, qdd = motion
+        turned = replace(part, q=q, qd=qd, qdd=qdd, effort=None)
+        self._own = Estimate([turned], [""], estimate.model, estimate.given)
+        assert self._own.meter is not None  # asked before
+        found = estimate.found[: len(self._own.prior.names)].copy()
+        standing = [k for k, name in enumerate(self._own.prior.names) if name.startswith("watts.")]
+        known = estimate.prior.mean.copy()
+        known[standing] = found[standing]
+        for term in AXIS_UNITS:
+            places = self._own.prior.places(term)
+            found[places] = found[places][order]
+        self._starts = (found, known)
+        self._weight = estimate.widened_meter_weights()[self._own.meter.group]
+        self._wide = estimate.wide[: len(found)]
+
+    def cost(self) -> float:
+        """Twice the negative log-likelihood of the power, by the parameters that were found or by
+        those that were known.
+        """
+        meter = self._own.meter
+        assert meter is not None  # asked before
+        return min(
+            float(np.square(self._weight * meter.missing(start)).sum()) for start in self._starts
+        )
+
+    def stepped(self) -> float:
+        """The same with what is known of the parameters, after one step from them."""
+        return min(
+            self._own.stepped_cost(start, self._weight, self._wide) for start in self._starts
         )
 
 

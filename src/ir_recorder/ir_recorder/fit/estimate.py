@@ -117,12 +117,15 @@ def widening(
     pull: FloatArray,
     deviation: FloatArray,
     stretches: Sequence[Stretch],
+    *,
+    stay: bool = False,
 ) -> float:
     """The least factor, 1 or more, on the variance of the noise that explains the stretches, else
     the likeliest. Movements and rests are explained each: many rests, which are easy, say nothing
     of how well movements are known. slopes (R, P) and residual (R,)
     are weighted by it, fold (R,) says what is left out together, pull (P, P) is the prior's
-    precision, deviation (P,) its deviations.
+    precision, deviation (P,) its deviations. stay: the parameters are those of the weights that
+    are given, only what is said of their uncertainty takes the factor.
     """
     parts = [
         (own.T @ own, own.T @ residual[fold == k])
@@ -139,10 +142,12 @@ def widening(
         for k, (information, pulled) in enumerate(parts):
             without = inverse((whole - information) / factor + pull, deviation)
             shift = without @ pulled / factor
+            if stay:
+                shift = inverse(whole - information + pull, deviation) @ pulled
             own = [each for each in stretches if each.fold == k]
             errors += [(each.missing + each.slope @ shift) ** 2 for each in own]
-            variances += [each.slope @ without @ each.slope + each.white for each in own]
             moving += [each.moving for each in own]
+            variances += [each.slope @ without @ each.slope + each.white for each in own]
         ratios = np.divide(errors, variances)
         kinds = (ratios[np.array(moving, bool) == kind] for kind in (True, False))
         if all(own.mean() <= 1.0 for own in kinds if len(own)):
@@ -268,7 +273,7 @@ class Estimate:
         channels = (self.meter, self.motors)
         self._channels: list[Channel] = [each for each in channels if each is not None]
         self._check_length(recordings)
-        self.prior = open_prior(prior, self.meter)
+        self.prior = prior if self.meter is None else open_prior(prior, self.meter.level)
         self.given = prior
         own = (np.zeros(0), np.zeros(0))
         if self.motors is not None:
@@ -309,13 +314,13 @@ class Estimate:
             raise RecorderError("the covariance of the prior is singular")
         root = np.eye(len(self._before))
         root[:count, :count] = (vectors / np.sqrt(values)).T
-        self._wide = self.deviation * wide
-        self._pull = root / safe(self._wide)
-        self._free = self._wide > 0.0
+        self.wide = self.deviation * wide
+        self._pull = root / safe(self.wide)
+        self._free = self.wide > 0.0
 
     def result(self, name: str) -> Fit:
         """Both noises and the parameters in turn, then with the noise that explains what was left
-        out, and once more with what is not determined as before.
+        out; what is said of their uncertainty explains what these parameters leave.
         """
         weight = 1.0 / self._first_noise()[self._group]
         x = self._before.copy()
@@ -329,32 +334,32 @@ class Estimate:
             if self._friction_scale == before:
                 break
             x, weight, noise = self._reweighted(x, weight)
-        x, _ = self.solve(x, weight, self._free)
-        inflation = 1.0
-        if self.meter is not None:
-            inflation = self._widening(x, weight)
-            weight = weight / np.sqrt(inflation)
         x, precision = self.solve(x, weight, self._free)
-        left = np.sqrt(np.diag(inverse(precision, self._wide))) / safe(self._wide)
+        fitted_with = inflation = 1.0
+        if self.meter is not None:
+            fitted_with = self._widening(x, weight)
+            weight = weight / np.sqrt(fitted_with)
+            x, _ = self.solve(x, weight, self._free)
+            inflation = self._widening(x, weight, stay=True)
+            precision = self.precision(x, weight / np.sqrt(inflation))
+        left = np.sqrt(np.diag(inverse(precision, self.wide))) / safe(self.wide)
         determined = np.asarray(self._free & (left < DETERMINED))
         count = len(self.prior.names)
         self.found = x
+        self.weight = weight
+        self.inflation = inflation
         if self.meter is not None:
             moving = self.meter.group > 0
             check_explained(self.meter.measured, self.meter.predicted(x, 0.0)[0], moving)
         seconds = WINDOW * self.runs[0].samples.step
         check_determined(determined[:count], self._moving(), seconds)
-        if self.meter is not None:
-            x, precision = self.solve(x, weight, determined | (np.arange(len(x)) >= count))
-        self.found = x
-        self.weight = weight
-        self.covariance = inverse(precision, self._wide)
+        self.covariance = inverse(precision, self.wide)
         if self.meter is None:
             inflation = self._torque_widening(x, weight)
-            least = np.minimum(inflation * np.diag(self.covariance), self._wide**2)
+            least = np.minimum(inflation * np.diag(self.covariance), self.wide**2)
             factor = np.sqrt(least / safe(np.diag(self.covariance)))
             self.covariance = self.covariance * np.outer(factor, factor)
-        return self._fit(name, determined[:count], noise, inflation)
+        return self._fit(name, determined[:count], noise, fitted_with * inflation)
 
     def _fit(self, name: str, determined: BoolArray, noise: FloatArray, inflation: float) -> Fit:
         count = len(self.prior.names)
@@ -438,12 +443,38 @@ class Estimate:
                     break
             else:
                 break
-            moved = np.abs((trial - x) / safe(self._wide)).max()
+            moved = np.abs((trial - x) / safe(self.wide)).max()
             x = trial
             (cost, residual, slopes) = better
             if moved < _DONE:
                 break
         return x, slopes.T @ slopes + self._pull.T @ self._pull
+
+    def widened_meter_weights(self) -> FloatArray:
+        """What a residual of the meter at rest and one in motion (2,) weigh, with what they share
+        with their neighbours and what the model lacks.
+        """
+        assert self.meter is not None  # asked before
+        rows = len(self.meter.measured)
+        own = np.zeros(2)
+        for k in range(2):
+            weights = self.weight[:rows][self.meter.group == k]
+            own[k] = weights[0] if len(weights) else 0.0
+        return np.asarray(own / np.sqrt(self.inflation))
+
+    def stepped_cost(self, x: FloatArray, weight: FloatArray, wide: FloatArray) -> float:
+        """The cost after one step from x (P + E,), with priors as wide as `wide` (P + E,)."""
+        self.wide = wide[: len(x)]
+        self._pull = np.diag(1.0 / safe(self.wide))
+        cost, residual, slopes = self._at(x, weight, 0.0)
+        step = self._step(x, residual, slopes, self.wide > 0.0)
+        trial = np.clip(x + step, self._low, self._high)
+        return min(cost, self._at(trial, weight, 0.0)[0])
+
+    def precision(self, x: FloatArray, weight: FloatArray) -> FloatArray:
+        """Precision (P + E, P + E) of parameters that rows of these weights (R,) leave."""
+        slopes = weight[:, None] * self.rows(x)[1]
+        return np.asarray(slopes.T @ slopes + self._pull.T @ self._pull)
 
     def rows(self, x: FloatArray, softness: float = 0.0) -> tuple[FloatArray, FloatArray]:
         """What the rows miss (R,), and the slopes (R, P + E) of what is predicted."""
@@ -465,7 +496,7 @@ class Estimate:
         self, x: FloatArray, residual: FloatArray, slopes: FloatArray, free: BoolArray
     ) -> FloatArray:
         """The step of Gauss and Newton within the bounds; zero for what is not free."""
-        scale = safe(self._wide)[free]
+        scale = safe(self.wide)[free]
         reduced = np.asarray(
             np.linalg.qr(np.column_stack([slopes[:, free] * scale, residual]), mode="r")
         )
@@ -524,7 +555,7 @@ class Estimate:
             own = slopes[fold == k]
             if not len(own):
                 continue
-            without = inverse(whole - own.T @ own, self._wide)
+            without = inverse(whole - own.T @ own, self.wide)
             left = residual[fold == k] + own @ (without @ (own.T @ residual[fold == k]))
             total += float(left @ left)
         return total
@@ -561,7 +592,7 @@ class Estimate:
             ]
         return tuple(found)
 
-    def _widening(self, x: FloatArray, weight: FloatArray) -> float:
+    def _widening(self, x: FloatArray, weight: FloatArray, *, stay: bool = False) -> float:
         """The factor on the noise that the residual energies of movements and rests take."""
         missing, slopes = self.rows(x)
         fold = self._folds()
@@ -575,7 +606,7 @@ class Estimate:
                 stretches += [replace(each, moving=moving) for each in found]
         pull = self._pull.T @ self._pull
         whole = weight[:, None] * slopes
-        return widening(whole, weight * missing, fold, pull, self._wide, stretches)
+        return widening(whole, weight * missing, fold, pull, self.wide, stretches, stay=stay)
 
     def _stretches(
         self,

@@ -18,6 +18,7 @@ from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 QUARTERS = 4  # parts of a single recording
 METHODS = ("fit", "data sheet", "regression")
+_NEARER = 0.9  # of the fit's error: a regression with less is said to be nearer
 _NINETY = 1.645  # standard deviations
 
 
@@ -44,9 +45,11 @@ def left_out(estimate: Estimate) -> tuple[LeftOut, ...]:
     return _worked(estimate, parts)
 
 
-def recommendation(rows: Sequence[LeftOut], *, doubted: bool = False) -> str:
-    """Which of fit and data sheet to plan with, as a sentence with both medians; doubted: whether
-    something speaks against the data.
+def recommendation(
+    rows: Sequence[LeftOut], *, doubted: bool = False, begun: str = "the data sheet"
+) -> str:
+    """Which of fit and data sheet to plan with, as a sentence with the medians; doubted: whether
+    something speaks against the data; begun: the name of what the fit began with.
     """
     medians = {name: 100.0 * median_error(rows, name) for name in METHODS}
     fitted, sheet, regression = (medians[name] for name in METHODS)
@@ -54,12 +57,18 @@ def recommendation(rows: Sequence[LeftOut], *, doubted: bool = False) -> str:
         return "no movement could be left out: how far this fit can be trusted is not known"
     said = (
         f"what was left out is predicted within {fitted:.1f} % (median) by the fit, {sheet:.1f} % "
-        f"by the data sheet, {regression:.1f} % by a plain regression"
+        f"by {begun}, {regression:.1f} % by a plain regression"
     )
     if fitted > sheet:
-        return f"{said}: plan with the data sheet, this fit is worse on this robot"
+        return f"{said}: plan with {begun}, this fit is worse on this robot"
     if doubted:
         return f"{said}: settle what speaks against the data before you plan with the fit"
+    if regression < _NEARER * fitted:
+        return (
+            f"{said}: plan with the fit only if {fitted:.1f} % is near enough; the regression, "
+            "which no plan can use, is nearer, so the model lacks something of this robot (a load, "
+            "a coupling, other losses)"
+        )
     return f"{said}: plan with the fit"
 
 
@@ -95,7 +104,8 @@ def _end(run: Run) -> int:
 def _without(estimate: Estimate, part: _Part) -> tuple[FloatArray, FloatArray]:
     """Parameters and covariance of a fit that has not seen a part."""
     weight = np.where(np.isin(estimate.window, part.windows), 0.0, estimate.weight)
-    x, precision = estimate.solve(estimate.found, weight, estimate.deviation > 0.0)
+    x, _ = estimate.solve(estimate.found, weight, estimate.deviation > 0.0)
+    precision = estimate.precision(x, weight / np.sqrt(estimate.inflation))
     return x, np.asarray(np.linalg.pinv(precision, hermitian=True))
 
 
@@ -182,7 +192,7 @@ def _energies(
                 slope = WINDOW * slopes[rows].sum(axis=0)
                 deviation = np.sqrt(
                     slope @ covariance @ slope
-                    + WINDOW**2 * (1.0 / estimate.weight[rows] ** 2).sum()
+                    + WINDOW**2 * (estimate.inflation / estimate.weight[rows] ** 2).sum()
                 )
                 covered += abs(off) <= _NINETY * deviation
     return errors, covered if covariance is not None else None

@@ -12,7 +12,7 @@ import numpy as np
 from ir_description import PowerParameters, parameter_unit
 from ir_recorder.errors import RecorderError
 from ir_recorder.fit.estimate import Fit, FittedMovement
-from ir_recorder.fit.left_out import LeftOut
+from ir_recorder.fit.left_out import METHODS, LeftOut
 from ir_recorder.report.files import write_output
 from ir_recorder.report.picture import PICTURE_START
 from ir_values.files import ANYWHERE
@@ -20,17 +20,18 @@ from ir_values.files import ANYWHERE
 # A fit in words: what the data determined, what they did not, and how well it then agrees.
 
 
-def sentences(found: Fit) -> tuple[str, ...]:
-    """The findings for people, one sentence each."""
+def sentences(found: Fit, begun: str = "the data sheet") -> tuple[str, ...]:
+    """The findings for people, one sentence each; begun: the name of what the fit began with."""
     own = int(found.determined.sum())
     lines = [f"{own} of {len(found.determined)} parameters are determined by the data"]
     metered = bool(len(found.measured))
     if found.kept:
-        kept = "kept at the prior, because the data say" if metered else "the data say"
-        lines.append(f"{kept} little of them: {', '.join(found.kept)}")
+        lines.append(
+            f"the data say little of these, which stay near what was known: {', '.join(found.kept)}"
+        )
     if found.friction_scale > 1.0:
         lines.append(
-            f"friction may lie {found.friction_scale:g} times farther from the data sheet than its "
+            f"friction may lie {found.friction_scale:g} times farther from {begun} than its "
             "marks say: so what is left out is predicted best"
             if metered
             else "friction is open: torques show it axis by axis"
@@ -72,15 +73,17 @@ def _share(movements: Sequence[FittedMovement], field: str) -> str:
     return f"{100.0 * np.median(shares):.1f} % and {100.0 * shares.max():.1f} %"
 
 
-def left_out_rows(found: Sequence[LeftOut]) -> list[dict[str, object]]:
-    """One row per part and method: what was left out, and how it is predicted."""
+def left_out_rows(found: Sequence[LeftOut], begun: str = METHODS[1]) -> list[dict[str, object]]:
+    """One row per part and method: what was left out, and how it is predicted; begun: the name of
+    what the fit began with.
+    """
     rows: list[dict[str, object]] = []
     for each in found:
         sizes = np.abs(each.errors) if each.errors else np.array([np.nan])
         rows.append(
             {
                 "part": each.part,
-                "method": each.method,
+                "method": begun if each.method == METHODS[1] else each.method,
                 "count": len(each.errors),
                 "rms": each.rms,
                 "median": float(np.median(sizes)),
