@@ -87,7 +87,7 @@ def run_move(arguments: argparse.Namespace) -> int:
         figures = figures_of(plan.report)
         print_json({"trajectory_id": plan.trajectory.trajectory_id, **figures, "notes": notes})
     else:
-        sys.stdout.write(f"{sentence_of(plan.report, planner.cell)}{said}\n")
+        sys.stdout.write(f"{sentence_of(plan.report, planner)}{said}\n")
     return 0
 
 
@@ -191,7 +191,7 @@ def run_path(arguments: argparse.Namespace) -> int:
         figures = {**figures_of(plan.report), **kept, "notes": notes}
         print_json({"trajectory_id": plan.trajectory.trajectory_id, **figures})
     else:
-        sys.stdout.write(f"{sentence_of(plan.report, planner.cell)}\n{_kept(plan)}{said}\n")
+        sys.stdout.write(f"{sentence_of(plan.report, planner)}\n{_kept(plan)}{said}\n")
     return 0
 
 

@@ -28,6 +28,7 @@ from ir_cli.planning import (
     add_parameters,
     check_stations,
     configuration_of,
+    mains_counted,
     options_of,
     planner_of,
     sentences,
@@ -129,7 +130,7 @@ def run_compare(arguments: argparse.Namespace) -> int:
     if arguments.table:
         locale = arguments.locale
         table = write_before_after_table(found, arguments.table, costs, locale=locale)
-    counted = planner.cell.robot.controller.counted
+    counted = mains_counted(planner)
     whole = of_saving(found.planned.saving, costs) if counted else None
     rows = [row_of(side) for side in (found.today, *found.sides)]
     if arguments.json:
@@ -141,7 +142,7 @@ def run_compare(arguments: argparse.Namespace) -> int:
         print_csv(rows)
     else:
         print_table(rows, COLUMNS)
-        apart = [] if counted else [f"all energies: {supply(planner.cell)}"]
+        apart = [] if counted else [f"all energies: {supply(planner)}"]
         said = [*_sentences(found), *apart, *([whole.sentence] if whole is not None else [])]
         sys.stdout.write("\n".join(said) + "\n")
         sys.stdout.write("".join(f"{path}\n" for path in (page, table) if path is not None))

@@ -39,7 +39,6 @@ from ir_cli.planning import (
 )
 from ir_cli.robots_plan import robots_of, run_robots
 from ir_cli.steady import OUTPUTS, add_steady, run_steady
-from ir_description import Cell
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
 from ir_planner import Planner, PlannerSettings, ProgramPlan
@@ -144,7 +143,7 @@ def run_plan(arguments: argparse.Namespace) -> int:
         print_csv(rows)
     else:
         print_table(rows, COLUMNS)
-        sys.stdout.write("\n".join(sentences_of(plan, planner.cell)) + f"{said}\n")
+        sys.stdout.write("\n".join(sentences_of(plan, planner)) + f"{said}\n")
     return 0
 
 
@@ -273,7 +272,7 @@ def totals_of(plan: ProgramPlan) -> Row:
     }
 
 
-def sentences_of(plan: ProgramPlan, cell: Cell) -> list[str]:
+def sentences_of(plan: ProgramPlan, planner: Planner) -> list[str]:
     """The totals for people, and what is saved."""
     totals = totals_of(plan)
     standing = totals["seconds"] - totals["moving_seconds"]
@@ -287,7 +286,7 @@ def sentences_of(plan: ProgramPlan, cell: Cell) -> list[str]:
     lines = [
         f"movements {totals['moving_seconds']:.2f} s {totals['moving_joules'] / 1e3:.2f} kJ, "
         f"pauses {standing:.2f} s {waiting / 1e3:.2f} kJ",
-        f"cycle {totals['seconds']:.2f} s, {energy} {supply(cell)}, predicted: "
+        f"cycle {totals['seconds']:.2f} s, {energy} {supply(planner)}, predicted: "
         f"{predicted(plan.report)}; {proof if totals['certified'] else 'NOT certified'}",
     ]
     if plan.status.message:

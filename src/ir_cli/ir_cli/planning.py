@@ -16,7 +16,7 @@ from typing import TypedDict
 
 from ir_cli.errors import CommandError, InputError, nearest, unknown_name
 from ir_cli.output import Row
-from ir_description import Cell, DescriptionError, UnknownNameError, load_cell
+from ir_description import DescriptionError, UnknownNameError, load_cell
 from ir_krl import KrlError
 from ir_msgs_py.options import NO_TILT, OBJECTIVES, ROBOTS_TIME_VALUE, PlanOptions
 from ir_msgs_py.report import TrajectoryReport
@@ -227,13 +227,19 @@ def predicted(report: TrajectoryReport) -> str:
     return f"90 % interval {within} by {report.power_parameters}{f', {why}' if why else ''}"
 
 
-def supply(cell: Cell) -> str:
+def mains_counted(planner: Planner) -> bool:
+    """Whether joules hold what the controller draws, by its data or by fitted parameters."""
+    parameters = planner.scene("").parameters
+    return parameters.power_with(planner.cell.robot.controller).counted
+
+
+def supply(planner: Planner) -> str:
     """Where joules are counted: without watts of a controller they are those of drives and tool."""
-    counted = cell.robot.controller.counted
+    counted = mains_counted(planner)
     return "from the mains" if counted else "at the drives, no controller counted"
 
 
-def sentence_of(report: TrajectoryReport, cell: Cell) -> str:
+def sentence_of(report: TrajectoryReport, planner: Planner) -> str:
     """The same for people."""
     near = report.closest
     pair = (
@@ -253,7 +259,7 @@ def sentence_of(report: TrajectoryReport, cell: Cell) -> str:
     tilt = f"leans at most {math.degrees(report.largest_tilt):.2f} deg; "
     leans = "" if report.largest_tilt == NO_TILT else tilt
     return (
-        f"{report.duration:.3f} s, {report.energy:.0f} J {supply(cell)}, predicted "
+        f"{report.duration:.3f} s, {report.energy:.0f} J {supply(planner)}, predicted "
         f"({predicted(report)}), "
         f"at most {report.peak_power / 1e3:.1f} kW\n"
         f"clearance {report.min_clearance * 1e3:.1f} mm{pair}; uses {100.0 * used:.0f} % of a "

@@ -63,7 +63,7 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
         listed = [{"what": v.what, "seconds": v.time, "sentence": v.sentence} for v in violations]
         print_json({**figures_of(found.report), **measured_figures(known), "violations": listed})
     else:
-        sys.stdout.write(sentence_of(found.report, planner.cell) + "\n")
+        sys.stdout.write(sentence_of(found.report, planner) + "\n")
         if known is not None:
             sys.stdout.write("\n".join(known.sentences) + "\n")
         if verification.violation is not None:
@@ -119,7 +119,7 @@ def run_optimize(arguments: argparse.Namespace) -> int:
         before = {**figures_of(found.before), **measured_figures(known)}
         print_json({"before": before, "after": figures_of(found.after)})
         return 0
-    said = [f"before: {sentence_of(found.before, planner.cell)}"]
+    said = [f"before: {sentence_of(found.before, planner)}"]
     said += known.sentences if known is not None else ()
-    sys.stdout.write("\n".join([*said, f"after: {sentence_of(found.after, planner.cell)}"]) + "\n")
+    sys.stdout.write("\n".join([*said, f"after: {sentence_of(found.after, planner)}"]) + "\n")
     return 0

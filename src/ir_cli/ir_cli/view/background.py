@@ -199,7 +199,7 @@ class PlanWorker:
             )
             if not plan.status.ok:
                 return Planned(None, failure=plan.status.message)
-            moving, _, *others = sentences_of(plan, cell)
+            moving, _, *others = sentences_of(plan, planner)
             lines = (moving, *others[:-1])  # the cycle stands in figures; what is saved, compared
             return Planned(motion_of(plan.movements, cell), lines, report=plan.report)
         movements = []
