@@ -86,6 +86,34 @@ def test_ends_stay_where_they_are_and_still(core: Any) -> None:
     assert np.abs(along(found.control, found.interval, ends, 2)).max() < 1e-6
 
 
+def moving(control: FloatArray, seed: int = 0) -> FloatArray:
+    """q, qd, qdd (2, 3, n) at the ends of a spline that is to begin and end in motion."""
+    size = np.array([0.4, 1.0])[:, None]
+    values = size * np.random.default_rng(seed).uniform(-1.0, 1.0, (2, 2, control.shape[1]))
+    return np.concatenate([control[[0, -1], None], values], axis=1)
+
+
+@pytest.mark.parametrize("fixed", [False, True])
+def test_ends_in_motion_have_it_whatever_the_interval_becomes(core: Any, fixed: bool) -> None:
+    ends = moving(swing(16))
+    _, control, found = descended(core, 40, ends=ends, fixed_interval=fixed)
+    span = (len(control) - 3) * found.interval
+    for k, at in enumerate((0.0, span * (1.0 - 1e-12))):
+        for order, most in enumerate((1e-9, 1e-9, 1e-6)):
+            there = along(found.control, found.interval, np.array([at]), order)[0]
+            assert np.abs(there - ends[k, order]).max() < most
+    assert (found.interval == 0.15) is fixed
+    start = descended(core, 1, ends=ends, fixed_interval=fixed)[2]
+    assert found.value < 0.7 * start.value
+
+
+def test_ends_that_rest_give_the_same_bytes_as_none(core: Any) -> None:
+    control = swing(16)
+    rest = np.zeros((2, 2, control.shape[1]))
+    ends = np.concatenate([control[[0, -1], None], rest], axis=1)
+    assert same(descended(core, 30)[2], descended(core, 30, ends=ends)[2])
+
+
 def test_a_fixed_interval_stays(core: Any) -> None:
     cost, control, found = descended(core, 40, fixed_interval=True)
     assert found.interval == 0.15
@@ -115,7 +143,11 @@ def test_it_ends_when_steps_gain_little(core: Any) -> None:
 
 
 def test_compiled_descent_is_that_of_the_reference(compiled_core: Any) -> None:
-    for options in ({"fixed_interval": False}, {"fixed_interval": True}):
+    for options in (
+        {"fixed_interval": False},
+        {"fixed_interval": True},
+        {"ends": moving(swing(16))},
+    ):
         found, expected = (descended(one, 25, **options)[2] for one in (compiled_core, None))
         assert found.evaluations == expected.evaluations
         assert found.value == pytest.approx(expected.value, rel=1e-9)

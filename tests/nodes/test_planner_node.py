@@ -464,12 +464,12 @@ BAD: list[tuple[str, Any, str, dict[str, Any], int, str]] = [
         "finite",
     ),
     (
-        "moving start",
+        "start too fast",
         PlanRegionalMovement,
         "plan_regional_movement",
-        {"start": moving(0.3), "goal": "park"},
+        {"start": moving(30.0), "goal": "park"},
         -26,
-        "start: joint_a1 has a velocity of 0.3 rad/s",
+        "start in motion: joint_a1 has velocity 30 rad/s: it must be at most",
     ),
     (
         "nan velocity of a start",
@@ -480,12 +480,12 @@ BAD: list[tuple[str, Any, str, dict[str, Any], int, str]] = [
         "velocity[0] is nan",
     ),
     (
-        "moving goal",
+        "goal too fast",
         PlanRegionalMovement,
         "plan_regional_movement",
-        {"start": state(HOME), "goal_state": moving(0.3)},
+        {"start": state(HOME), "goal_state": moving(30.0)},
         -27,
-        "goal_state: joint_a1",
+        "goal in motion: joint_a1 has velocity 30 rad/s: it must be at most",
     ),
     (
         "nan velocity of a state",

@@ -77,11 +77,16 @@ class SplineCost {
     return py::make_tuple(value, gradient, of_interval, energy);
   }
 
-  // control (K, n), of which three points at both ends stay; new control, interval, value, evaluations
-  py::tuple descend(const Array& control, const Rows& row, double interval, bool fixed, int most, double tolerance) const {
+  // control (K, n), of which three points at both ends stay, or follow from q, qd, qdd there, ends (2, 3, n), where these
+  // are given; new control, interval, value, evaluations
+  py::tuple descend(const Array& control, const Rows& row, double interval, bool fixed, int most, double tolerance,
+                    const Array& ends) const {
     check(control, row);
     const int K = static_cast<int>(control.shape(0));
     ir::expect(K >= 7, "control has to be (K, n) with K >= 7");
+    ir::expect(ends.size() == 0 || (ends.ndim() == 3 && ends.shape(0) == 2 && ends.shape(1) == 3 && ends.shape(2) == n_),
+               "ends have to be (2, 3, n)");
+    const double* moving = ends.size() > 0 ? ends.data() : nullptr;
     Array result({control.shape(0), control.shape(1)});
     double* all = result.mutable_data();
     std::copy_n(control.data(), control.size(), all);
@@ -89,7 +94,7 @@ class SplineCost {
     {
       py::gil_scoped_release released;
       const Borrowed cost(*this);
-      done = descended(*cost, all, K, row.data(), interval, fixed, most, tolerance);
+      done = descended(*cost, all, K, row.data(), interval, fixed, most, tolerance, moving);
     }
     return py::make_tuple(result, interval, done.value, done.evaluations);
   }
@@ -155,8 +160,28 @@ class SplineCost {
   static constexpr double profile_bending = 0.03; // weight of the jerk of s in its metric
   static constexpr double profile_scale = 0.03, profile_time = 0.1;  // of s, and of the duration's logarithm
 
+  // Sets the three control points at both ends for q, qd, qdd there, ends (2, 3, n), at an interval h; returns the derivative
+  // by h of a cost whose slopes (K, n) by all control points are given, nullptr: 0.
+  double put_ends(const double* ends, double h, double* all, int K, const double* slopes) const {
+    double of_interval = 0.0;
+    for (int end = 0; end < 2; ++end)
+      for (int j = 0; j < n_; ++j) {
+        const double* state = ends + 3 * end * n_ + j;
+        const double q = state[0], v = state[n_], a = state[2 * n_];
+        const double middle = q - h * h * a / 6.0, bend = 0.5 * h * h * a, lean = h * v;
+        const std::size_t first = static_cast<std::size_t>(end == 0 ? 0 : K - 3) * n_ + j;
+        all[first] = middle + bend - lean;
+        all[first + n_] = middle;
+        all[first + 2 * n_] = middle + bend + lean;
+        if (slopes == nullptr) continue;
+        of_interval += slopes[first] * (2.0 / 3.0 * h * a - v) - slopes[first + n_] * (h * a / 3.0) +
+                       slopes[first + 2 * n_] * (2.0 / 3.0 * h * a + v);
+      }
+    return of_interval;
+  }
+
   ir::Descent descended(ir::SplineCost& cost, double* all, int K, const std::int32_t* row, double& interval, bool fixed,
-                        int most, double tolerance) const {
+                        int most, double tolerance, const double* ends = nullptr) const {
     const int m = K - 6;
     const std::size_t size = static_cast<std::size_t>(m) * n_;
     double* inner = all + 3 * static_cast<std::size_t>(n_);
@@ -168,7 +193,9 @@ class SplineCost {
       std::copy_n(at.begin(), size, inner);
       const double now = first * ir::exponential(at[size]);
       double of_interval;
+      if (ends != nullptr) put_ends(ends, now, all, K, nullptr);
       const double value = cost(all, K, row, now, slopes.data(), of_interval);
+      if (ends != nullptr) of_interval += put_ends(ends, now, all, K, slopes.data());
       std::copy_n(slopes.begin() + 3 * n_, size, gradient.begin());
       gradient[size] = fixed ? 0.0 : of_interval * now;
       return value;
@@ -180,6 +207,7 @@ class SplineCost {
     const ir::Descent done = ir::descend(x, function, precondition, most, tolerance);
     std::copy_n(x.begin(), size, inner);
     interval = first * ir::exponential(x[size]);
+    if (ends != nullptr) put_ends(ends, interval, all, K, nullptr);
     return done;
   }
 

@@ -37,7 +37,7 @@ from ir_kernels.spline import (
     SplineStarts,
     SplineValue,
 )
-from ir_kernels.spline_terms import SplineTerms
+from ir_kernels.spline_terms import SplineTerms, end_points
 
 __all__ = [
     "COLLIDES",
@@ -82,6 +82,7 @@ __all__ = [
     "ccd",
     "dc_bus",
     "drive_energy",
+    "end_points",
     "inverse_kinematics",
     "motion_extrema",
     "polynomial_extrema",

@@ -151,9 +151,10 @@ class SplineCost:
         fixed_interval: bool = False,
         evaluations: int = 100,
         tolerance: float = 1e-4,
+        ends: ArrayLike | None = None,
     ) -> SplineDescent:
         """Descend from a spline (K, n), K >= 7, at rest at both ends, which stay: three points at
-        each.
+        each. ends (2, 3, n): q, qd, qdd there instead, which these points follow from.
 
         L-BFGS with a metric in which bending counts; the interval changes too unless
         `fixed_interval`. Ends after `evaluations`, or when ten steps gain less than `tolerance` of
@@ -163,8 +164,9 @@ class SplineCost:
         seconds = arguments.number("interval", interval, 0.0, above=True)
         gain = arguments.number("tolerance", tolerance, 0.0)
         most = _most(evaluations)
+        moving = np.zeros(0) if ends is None else data.array(ends, "ends", (2, 3, self.n))
         return SplineDescent(
-            *self._core.descend(points, rows, seconds, bool(fixed_interval), most, gain)
+            *self._core.descend(points, rows, seconds, bool(fixed_interval), most, gain, moving)
         )
 
     def descend_along(

@@ -153,3 +153,18 @@ def _thresholds(value: ArrayLike, pairs: int) -> FloatArray:
             f"{name} holds nan or +inf: expected lengths in m, or -inf to ignore a pair"
         )
     return limits
+
+
+def end_points(state: FloatArray, interval: float) -> FloatArray:
+    """Three control points (3, n) with q, qd, qdd, state (3, n), at the knot in their middle."""
+    q, qd, qdd = state
+    middle = q - interval * interval * qdd / 6.0
+    bend = 0.5 * interval * interval * qdd
+    return np.stack([middle + bend - interval * qd, middle, middle + bend + interval * qd])
+
+
+def end_slopes(state: FloatArray, interval: float) -> FloatArray:
+    """Their derivatives (3, n) by the interval."""
+    _, qd, qdd = state
+    bend = 2.0 / 3.0 * interval * qdd
+    return np.stack([bend - qd, -interval * qdd / 3.0, bend + qd])

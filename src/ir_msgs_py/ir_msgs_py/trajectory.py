@@ -68,6 +68,7 @@ def evaluate(c: FloatArray, t: FloatArray) -> tuple[FloatArray, FloatArray, Floa
 
 NS_PER_S = 1_000_000_000
 _ID_LENGTH = 16
+_JOINED = 1e-6  # rad between two motions that are one
 _MAX_TIME_NS = 2**31 * NS_PER_S  # what builtin_interfaces/Duration holds
 
 
@@ -221,6 +222,74 @@ class JointTrajectory:
             None if self.velocities is None else self.velocities[:, order],
             None if self.accelerations is None else self.accelerations[:, order],
         )
+
+    def until(self, time: float) -> JointTrajectory:
+        """The same motion as far as `time` [s], which is rounded to a nanosecond. Raises
+        TrajectoryError: beyond its ends, and without accelerations, which a cut needs.
+        """
+        if self.velocities is None or self.accelerations is None:
+            raise TrajectoryError(
+                "the trajectory has no accelerations: it can't be cut between its points"
+            )
+        at = round(time * NS_PER_S)
+        if not self.times_ns[0] <= at <= self.times_ns[-1]:
+            raise TrajectoryError(
+                f"{time:.9g} s lies outside of the trajectory: it lasts from "
+                f"{self.times[0]:.9g} to {self.duration:.9g} s"
+            )
+        before = int(np.searchsorted(self.times_ns, at))
+        if self.times_ns[before] == at:
+            last = tuple(values[before] for values in self._derivatives)
+        else:
+            last = tuple(values[0] for values in self.sample([at / NS_PER_S])[:3])
+        positions, velocities, accelerations = (
+            np.concatenate([values[:before], value[None]])
+            for values, value in zip(self._derivatives, last, strict=True)
+        )
+        times = np.append(self.times_ns[:before], at)
+        return JointTrajectory(self.joint_names, times, positions, velocities, accelerations)
+
+    @property
+    def last(self) -> Samples:
+        """Motion (1, n) at the last point, as its values say; what they don't say is 0."""
+        still = np.zeros_like(self.positions[-1:])
+        velocity = still if self.velocities is None else self.velocities[-1:]
+        acceleration = still if self.accelerations is None else self.accelerations[-1:]
+        return Samples(self.positions[-1:], velocity, acceleration, still)
+
+    def then(self, following: JointTrajectory) -> JointTrajectory:
+        """This motion and, from its last point on, the one that begins there. Raises
+        TrajectoryError where it begins more than 1e-6 rad away.
+        """
+        if (
+            self.velocities is None
+            or self.accelerations is None
+            or following.velocities is None
+            or following.accelerations is None
+        ):
+            raise TrajectoryError("trajectories without accelerations are not joined")
+        after = following.reordered(self.joint_names)
+        away = np.abs(after.positions[0] - self.positions[-1])
+        j = int(away.argmax())
+        if away[j] > _JOINED:
+            raise TrajectoryError(
+                f"{self.joint_names[j]} begins {away[j]:.3g} rad from where it was: at most "
+                f"{_JOINED:g} rad",
+                joint=j,
+            )
+        times = self.times_ns[-1] + after.times_ns - after.times_ns[0]
+        values = [
+            np.concatenate([mine, others[1:]])
+            for mine, others in zip(self._derivatives, after._derivatives, strict=True)
+        ]
+        return JointTrajectory(self.joint_names, np.append(self.times_ns, times[1:]), *values)
+
+    @property
+    def _derivatives(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Positions and their two derivatives at the points, which have both."""
+        assert self.velocities is not None
+        assert self.accelerations is not None
+        return self.positions, self.velocities, self.accelerations
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, JointTrajectory):

@@ -65,6 +65,8 @@ from ir_planner.request import (
     examinable,
     joints_of,
     leaning_freely_only,
+    motion_of,
+    motion_on,
     noted,
     one_tilt,
     parse_goal,
@@ -323,12 +325,19 @@ class Planner:
         *,
         goal: Place,
         start: Place | None = None,
+        start_velocity: FloatArray | None = None,
+        start_acceleration: FloatArray | None = None,
+        goal_velocity: FloatArray | None = None,
+        goal_acceleration: FloatArray | None = None,
         options: PlanOptions | None = None,
         cancelled: Cancelled = _NEVER,
         **changes: Unpack[OptionFields],
     ) -> MovementPlan:
         """Movement from start (n,), None: machine home, to a goal; a pose is reached in the
         configuration that serves best.
+
+        It starts and ends with the velocities (n,) rad/s and accelerations (n,) rad/s^2, None: at
+        rest; a goal in motion is a configuration.
         """
         options, note = self._checked(options_with(options, changes))
         scene = self.scene(options.load)
@@ -336,7 +345,40 @@ class Planner:
         end = self._goal(goal)
         context = Context.of(scene, options, self._work(options, cancelled))
         context = context.leaning_by(_tilt_to(end, scene))
+        motion = motion_of(
+            (start_velocity, start_acceleration),
+            (goal_velocity, goal_acceleration),
+            end,
+            scene.cell,
+        )
+        context = context.in_motion(motion)
         return self._kept(plan_to_goal(begin, end, context, self.settings.searches), scene, note)
+
+    def replan(
+        self,
+        driven: JointTrajectory | str,
+        at: float,
+        *,
+        goal: Place,
+        options: PlanOptions | None = None,
+        cancelled: Cancelled = _NEVER,
+        **changes: Unpack[OptionFields],
+    ) -> MovementPlan:
+        """Movement to a goal that starts on a trajectory that is driven, or on the one behind an
+        id, in its motion at its time `at` [s]: `driven.until(at).then(plan.trajectory)` is one
+        motion.
+        """
+        trajectory = self.trajectories.get(driven) if isinstance(driven, str) else driven
+        motion = motion_on(trajectory, at, self.cell)
+        return self.plan_regional(
+            goal=goal,
+            start=motion.q[0],
+            start_velocity=motion.qd[0],
+            start_acceleration=motion.qdd[0],
+            options=options,
+            cancelled=cancelled,
+            **changes,
+        )
 
     def plan_escape(
         self,

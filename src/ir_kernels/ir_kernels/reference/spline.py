@@ -15,7 +15,7 @@ from ir_kernels.dynamics_data import DynamicsData
 from ir_kernels.geometry import Geometry
 from ir_kernels.reference import collision, dynamics
 from ir_kernels.reference.descent import bending_metric, descend
-from ir_kernels.spline_terms import SplineTerms
+from ir_kernels.spline_terms import SplineTerms, end_points, end_slopes
 from ir_values.arrays import FloatArray, IntArray
 
 SAMPLES = 2  # per interval
@@ -204,8 +204,9 @@ class SplineCost:
         fixed: bool,
         evaluations: int,
         tolerance: float,
+        ends: FloatArray,
     ) -> tuple[FloatArray, float, float, int]:
-        """New control (K, n), interval, value, evaluations."""
+        """New control (K, n), interval, value, evaluations; ends (2, 3, n), or none."""
         m = len(control) - 6
         n = control.shape[1]
         metric = bending_metric(m, HOLDING)
@@ -213,12 +214,19 @@ class SplineCost:
         def spline(x: FloatArray) -> tuple[FloatArray, float]:
             with np.errstate(over="ignore"):
                 now = interval * np.exp(x[-1])
-            return np.concatenate([control[:3], x[:-1].reshape(m, n), control[-3:]]), float(now)
+            begin, end = (
+                [end_points(state, float(now)) for state in ends]
+                if ends.size
+                else (control[:3], control[-3:])
+            )
+            return np.concatenate([begin, x[:-1].reshape(m, n), end]), float(now)
 
         def function(x: FloatArray) -> tuple[float, FloatArray]:
             points, now = spline(x)
             with np.errstate(divide="ignore", invalid="ignore"):
                 value, gradient, of_interval, _ = self.value(points, row, now)
+                for state, owed in zip(ends, (gradient[:3], gradient[-3:]), strict=False):
+                    of_interval += float(np.sum(end_slopes(state, now) * owed))
             return value, np.append(gradient[3:-3], 0.0 if fixed else of_interval * now)
 
         def solve(v: FloatArray) -> FloatArray:

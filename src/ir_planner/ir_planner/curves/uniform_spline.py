@@ -1,17 +1,23 @@
 """Motions along uniform cubic B-splines: control points with one interval of time between all
 knots.
 
-Three equal control points at an end mean rest there. Acceleration is linear and jerk constant
+Three equal control points at an end mean rest there; those of an end in motion follow from its
+state and the interval. Acceleration is linear and jerk constant
 between knots, so a point per knot with position, velocity and acceleration is the motion exactly,
 and its largest values are closed forms.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_kernels import end_points
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_values.arrays import FloatArray
+
+_GENTLY = (
+    6.0  # times v / a, in which the motion of an end dies out: none of it is faster than a then
+)
 
 
 def at_shares(path: FloatArray, shares: FloatArray) -> FloatArray:
@@ -76,10 +82,36 @@ class Tops:
 
 @dataclass(frozen=True, eq=False)
 class UniformSpline:
-    """control (K, n) rad, K >= 7; interval [s] between the K - 2 knots."""
+    """control (K, n) rad, K >= 7; interval [s] between the K - 2 knots. ends (2, 3, n): q, qd, qdd
+    at both ends, which three control points at each follow from; None: at rest.
+    """
 
     control: FloatArray
     interval: float
+    ends: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        if self.ends is not None:
+            control = self.control.copy()
+            control[:3] = end_points(self.ends[0], self.interval)
+            control[-3:] = end_points(self.ends[1], self.interval)
+            object.__setattr__(self, "control", control)
+
+    def at_interval(self, interval: float) -> "UniformSpline":
+        """The same inner control points and ends at another interval [s]."""
+        return replace(self, interval=interval)
+
+    def moving(self, motion: FloatArray, acceleration: FloatArray) -> "UniformSpline":
+        """A spline from rest to rest with qd, qdd at its ends, motion (2, 2, n), that die out
+        within the accelerations (n,) or its duration.
+        """
+        ends = np.concatenate([self.control[[0, -1], None], motion], axis=1)
+        control = self.control.copy()
+        after: FloatArray = self.interval * (np.arange(len(control), dtype=np.float64) - 1.0)
+        control += _dying(motion[0, 0], motion[0, 1], after, self.duration, acceleration)
+        until = after[::-1]
+        control += _dying(-motion[1, 0], motion[1, 1], until, self.duration, acceleration)
+        return UniformSpline(control, self.interval, ends)
 
     @property
     def intervals(self) -> int:
@@ -96,9 +128,15 @@ class UniformSpline:
         c = self.control
         h = self.interval
         q = (c[:-2] + 4.0 * c[1:-1] + c[2:]) / 6.0
-        q[0] = c[0]
-        q[-1] = c[-1]
-        return q, (c[2:] - c[:-2]) / (2.0 * h), (c[:-2] - 2.0 * c[1:-1] + c[2:]) / (h * h)
+        qd = (c[2:] - c[:-2]) / (2.0 * h)
+        qdd = (c[:-2] - 2.0 * c[1:-1] + c[2:]) / (h * h)
+        if self.ends is None:
+            q[0] = c[0]
+            q[-1] = c[-1]
+        else:
+            for values, at_ends in zip((q, qd, qdd), self.ends.transpose(1, 0, 2), strict=True):
+                values[[0, -1]] = at_ends
+        return q, qd, qdd
 
     def samples(self, per_interval: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         """q, qd, qdd (S * per_interval, n) at evenly spaced instants, the beginnings of the
@@ -135,19 +173,33 @@ class UniformSpline:
         # rounding must not move the ends
         finer[:3] = c[0]
         finer[-3:] = c[-1]
-        return UniformSpline(finer, 0.5 * self.interval)
+        return replace(self, control=finer, interval=0.5 * self.interval)
 
     def lasting(self, duration: float) -> "UniformSpline":
         """The same path in another time [s]."""
-        return UniformSpline(self.control, duration / self.intervals)
+        return self.at_interval(duration / self.intervals)
 
     def trajectory(self, joint_names: tuple[str, ...]) -> JointTrajectory:
         """The motion as it is sent, a point per knot; the interval is rounded up to a
         nanosecond.
         """
         step = int(np.ceil(self.interval * 1e9 - 1e-3))
-        q, qd, qdd = UniformSpline(self.control, step * 1e-9).knots()
+        q, qd, qdd = self.at_interval(step * 1e-9).knots()
         return JointTrajectory(joint_names, np.arange(len(q), dtype=np.int64) * step, q, qd, qdd)
+
+
+def _dying(
+    qd: FloatArray, qdd: FloatArray, t: FloatArray, longest: float, acceleration: FloatArray
+) -> FloatArray:
+    """What a motion with qd, qdd (n,) at 0 s adds to positions (K, n) at t (K,) s, until it has
+    died out: smoothly, within the accelerations (n,) where that takes less than `longest` s.
+    """
+    lasts = min(longest, float(np.max(_GENTLY * np.abs(qd) / acceleration)))
+    if lasts <= 0.0:
+        return np.zeros((len(t), len(qd)))
+    at = np.clip(t, 0.0, lasts)[:, None]
+    left = 1.0 - at / lasts
+    return np.asarray(at * (qd + at * (0.5 * qdd + 3.0 * qd / lasts)) * (left * left * left))
 
 
 def along_motion(trajectory: JointTrajectory, count: int, duration: float) -> UniformSpline:

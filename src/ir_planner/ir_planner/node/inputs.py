@@ -26,10 +26,10 @@ from ir_msgs_py.ros.conversions import (
 )
 from ir_msgs_py.ros.plan_conversions import plan_options_from_msg
 from ir_msgs_py.status import StatusCode
-from ir_msgs_py.trajectory import JointTrajectory
+from ir_msgs_py.trajectory import JointTrajectory, Samples
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
-from ir_planner.request import POSITION_MAX, Goal, one_goal
+from ir_planner.request import POSITION_MAX, Goal, motion_on, one_goal
 from ir_planner.state_queries import STATES_MAX
 from ir_planner.trajectories import POINTS_MAX, Reference
 from ir_values.arrays import FloatArray
@@ -241,20 +241,72 @@ def goal_of(request: Any, cell: Cell) -> Goal:
     forms = tuple(name for name in ("goal", "goal_state", "goal_pose") if hasattr(request, name))
     configuration = None
     if "goal_state" in forms:
-        configuration = state_of(
-            request.goal_state, cell, StatusCode.GOAL_STATE_INVALID, "goal_state"
-        )
+        at_rest = "" if hasattr(request, "goal_acceleration") else "goal_state"
+        configuration = state_of(request.goal_state, cell, StatusCode.GOAL_STATE_INVALID, at_rest)
     return one_goal(request.goal, configuration, pose_of(request.goal_pose, cell), cell, forms)
 
 
-def refuse_motion(request: Any) -> None:
-    """Raise RequestError where a regional movement is to start or end in motion."""
-    for name in ("start_acceleration", "goal_acceleration", "joins"):
-        if len(getattr(request, name)):
+EndMotion = tuple[FloatArray | None, FloatArray | None]
+"""Velocities and accelerations (n,) at an end of a movement; None, None: it rests there."""
+
+
+def start_motion_of(request: Any, cell: Cell) -> EndMotion:
+    """The motion with which a regional movement starts. A state as it was measured, at most AT_REST
+    and without accelerations, stands. Raises RequestError.
+    """
+    return _end_motion(request.start, request.start_acceleration, "start", cell)
+
+
+def goal_motion_of(request: Any, cell: Cell) -> EndMotion:
+    """The motion with which it ends, in the same way."""
+    return _end_motion(request.goal_state, request.goal_acceleration, "goal", cell)
+
+
+def _end_motion(msg: Any, acceleration: Sequence[float], what: str, cell: Cell) -> EndMotion:
+    start = what == "start"
+    code = StatusCode.START_STATE_INVALID if start else StatusCode.GOAL_STATE_INVALID
+    field_name = "start" if start else "goal_state"
+    names = cell.robot.joint_names
+    if not configuration_given(msg):
+        if len(acceleration):
             raise RequestError(
-                StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"{name} is given: movements start and end at rest",
+                code, f"{what}_acceleration is given without {field_name}: give its joint values"
             )
+        return None, None
+    try:
+        configuration_from_msg(msg, names)  # its names are looked at first
+        velocity = velocity_from_msg(msg, names)
+    except InvalidValueError as error:
+        raise RequestError(code, str(error)) from error
+    if not len(acceleration):
+        moves = velocity is not None and bool(np.abs(velocity).max() > AT_REST)
+        return (velocity, None) if moves else (None, None)
+    given = tuple(msg.name) or names
+    if len(acceleration) != len(given):
+        raise RequestError(
+            code, f"{what}_acceleration has {len(acceleration)} values: it must have {len(given)}"
+        )
+    in_order = np.array([acceleration[given.index(name)] for name in names], dtype=np.float64)
+    return velocity, in_order
+
+
+def joined_motion(request: Any, planner: Planner) -> Samples | None:
+    """Where and in which motion (1, n) a regional movement leaves the trajectory that is driven;
+    None where it joins none. Raises RequestError.
+    """
+    if not request.joins:
+        if request.at != 0.0:
+            raise RequestError(
+                StatusCode.START_STATE_INVALID,
+                f"at is {request.at:g} s without joins: give the trajectory that it is a time of",
+            )
+        return None
+    if configuration_given(request.start) or len(request.start_acceleration):
+        raise RequestError(
+            StatusCode.START_STATE_INVALID,
+            "start and joins are given: give one of them, the trajectory has its own motion",
+        )
+    return motion_on(planner.trajectories.get(request.joins), request.at, planner.cell)
 
 
 def options_of(msg: Any, draw_seed: Any) -> PlanOptions:

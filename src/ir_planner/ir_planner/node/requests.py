@@ -37,12 +37,14 @@ from ir_planner.node.answers import (
 )
 from ir_planner.node.inputs import (
     LastState,
+    goal_motion_of,
     goal_of,
+    joined_motion,
     options_of,
     path_of,
     pose_of,
     reference_of,
-    refuse_motion,
+    start_motion_of,
     state_of,
     states_of,
     trajectory_of,
@@ -197,9 +199,23 @@ class Requests:
         cell = self.planner.cell
         options = options_of(request.options, self.draw_seed)
         goal = goal_of(request, cell)
-        refuse_motion(request)
-        start = self._state(request.start, StatusCode.START_STATE_INVALID, at_rest="start")
-        plan = self.planner.plan_regional(start=start, goal=goal, options=options)
+        driven = joined_motion(request, self.planner)
+        if driven is None:
+            velocity, acceleration = start_motion_of(request, cell)
+            stands = "start" if velocity is None and acceleration is None else ""
+            start = self._state(request.start, StatusCode.START_STATE_INVALID, at_rest=stands)
+        else:
+            start, velocity, acceleration = driven.q[0], driven.qd[0], driven.qdd[0]
+        goal_velocity, goal_acceleration = goal_motion_of(request, cell)
+        plan = self.planner.plan_regional(
+            start=start,
+            start_velocity=velocity,
+            start_acceleration=acceleration,
+            goal=goal,
+            goal_velocity=goal_velocity,
+            goal_acceleration=goal_acceleration,
+            options=options,
+        )
         response.searches = searches_to_msg(plan.info.searches)
         return self._movement(plan, response, options.include_points)
 

@@ -54,6 +54,7 @@ def first_looks(
     most = len(paths) * evaluations * MOST * EDGES_PER_INTERVAL
     begin = refinement.begun(along_path(paths[0], FEWEST, 1.0), evaluations) if paths else None
     alike = begin is not None and len(begin.kept) == 1 and options.objective != "movement_cost"
+    alike = alike and refinement.context.motion is None
     if begin is None or not alike or most > SHARE_OF_WORK * work.left:
         return [refinement.coarse(path, evaluations) for path in paths]
     work.check()
@@ -133,6 +134,10 @@ class Portfolio:
             path = fewest_corners(free, self.space, weights) if len(free) > 2 else free
             new += self._take(Candidate(method, path, self.refinement.coarse(path)))
         return new
+
+    def offer(self, method: str, path: FloatArray, solution: Solution) -> bool:
+        """Take a coarse solution near a path (M, n) from elsewhere; whether it is new."""
+        return self._take(Candidate(method, path, solution))
 
     def _take(self, candidate: Candidate) -> bool:
         """Keep a candidate unless one that is alike costs no more."""

@@ -178,6 +178,7 @@ _TIGHTENINGS = 4  # of the limits, where a motion of requested duration exceeds 
 _TIGHTENED = 100  # evaluations after each
 _TIGHTEST = 0.85  # share of the limits' speed, and of torque
 _TIGHTER = 0.999  # than what was exceeded
+_MOVING = 0.985  # share of the limits' speed, for ends in motion: penalties give way by as much
 # shares of the speed tried where a duration is requested, until it is met
 SPEED_MARGINS = (0.9995, 0.95, 0.9)
 _ROUNDING = 1e-9  # relative
@@ -238,10 +239,31 @@ class Refinement:
     def coarse(self, path: FloatArray, evaluations: int = QUICK.coarse) -> Solution:
         """The coarse solution near a free path (M, n), M >= 2: enough to compare paths."""
         least = fewest_seconds(path, self.limits.velocity, self.limits.acceleration)
+        if self.context.motion is not None:
+            change = np.abs(self.context.motion[:, 0]) / self.limits.acceleration
+            least = max(least, float(change.max(axis=1).sum()))
         check_duration(least, self.context.options)
         count = int(np.clip(np.ceil(least / SPACING), FEWEST, MOST))
         start = along_path(path, count, self.context.options.duration or SLOWER * least)
-        return self.coarse_from(start, path, evaluations)
+        return self.coarse_from(self._moving(start), path, evaluations)
+
+    def _moving(self, spline: UniformSpline) -> UniformSpline:
+        """A spline from rest to rest with the motion that the request has at its ends."""
+        motion = self.context.motion
+        return spline if motion is None else spline.moving(motion, self.limits.acceleration)
+
+    def coarse_along(self, trajectory: JointTrajectory, path: FloatArray) -> Solution:
+        """The coarse solution near a trajectory with the request's motion at its ends; path (M, n):
+        what it came from.
+        """
+        span = trajectory.duration
+        count = int(np.clip(np.ceil(span / SPACING), FEWEST, MOST))
+        own = along_motion(trajectory, count, self.context.options.duration or span)
+        if self.context.motion is None:
+            return self.coarse_from(own, path, THOROUGH.coarse)
+        ends = np.concatenate([own.control[[0, -1], None], self.context.motion], axis=1)
+        spline = UniformSpline(own.control, own.interval, ends)
+        return self.coarse_from(spline, path, THOROUGH.coarse)
 
     def coarse_from(self, spline: UniformSpline, path: FloatArray, evaluations: int) -> Solution:
         """The coarse solution by descent from a spline of any origin; path (M, n): what it came
@@ -252,6 +274,8 @@ class Refinement:
     def begun(self, spline: UniformSpline, evaluations: int) -> Solution:
         """A spline about to descend with so many evaluations of the first stage."""
         speed = SPEED_MARGINS[0] if self.context.options.duration > 0.0 else 1.0
+        if self.context.motion is not None:
+            speed = _MOVING
         stage = replace(QUICK.stages[0], evaluations=evaluations)
         return Solution(spline, stage, np.inf, self._kept, speed)
 
@@ -267,7 +291,7 @@ class Refinement:
                 if found is None:
                     slower = self._optimised(replace(solution, speed=speed), path)
                     found = self._refined(slower, path, effort)
-            if found is None:
+            if found is None and self.context.motion is None:
                 return self._within_limits(path)
         return found
 
@@ -369,11 +393,13 @@ class Refinement:
 
     def _as_fast_as_requested(self, solution: Solution, path: FloatArray) -> Solution:
         """The solution with bounds that are tightened by as much as its motion exceeds them
-        (between samples, by softness of the penalties) until it needs no more time than requested.
+        (between samples, by softness of the penalties) until it needs no more time than requested,
+        or, where it is in motion at its ends and can't be slowed, none at all.
         """
         limits = self.limits.with_torque_share(TORQUE_SHARES[0])
         scene = self.context.scene
-        for _ in range(_TIGHTENINGS if self.context.options.duration > 0.0 else 0):
+        fixed = self.context.options.duration > 0.0 or self.context.motion is not None
+        for _ in range(_TIGHTENINGS if fixed else 0):
             torque, longer = beyond_limits(solution.spline, limits, scene)
             if max(torque, longer) <= 1.0:
                 break
@@ -401,11 +427,12 @@ class Refinement:
             fixed_interval=self.context.options.duration > 0.0,
             evaluations=min(solution.stage.evaluations, affordable),
             tolerance=solution.stage.tolerance,
+            ends=spline.ends,
         )
         work.spend(int(np.ceil(found.evaluations * spline.intervals * EDGES_PER_INTERVAL)))
         # a spline stays within the range of its control points
         control = np.minimum(np.maximum(found.control, robot.position_min), robot.position_max)
-        return solution.ended(UniformSpline(control, found.interval), found.value)
+        return solution.ended(UniformSpline(control, found.interval, spline.ends), found.value)
 
     def cost(self, solution: Solution, path: FloatArray) -> SplineCost:
         """What a solution on a path (M, n) is optimised for."""

@@ -80,6 +80,7 @@ def _tilt_terms(context: Context, upright: float) -> dict[str, Any]:
 
 _TORQUE_SAMPLES = 6  # per interval; the proof comes after
 _ROUNDS = 25
+_ROUNDED = 5e-7  # relative: of a limit that an end in motion reaches exactly
 _PLAIN = (
     3  # rounds as if all of the torque fell with the speed: enough unless weight takes much of it
 )
@@ -104,8 +105,11 @@ def slowed_to_limits(
     spline: UniformSpline, limits: MotionLimits, scene: PlanningScene
 ) -> UniformSpline | None:
     """The spline at its own duration or longer, within the limits; torque at samples. None where no
-    duration carries it.
+    duration carries it. One in motion at its ends is within them as it is, or None: what it begins
+    with doesn't slow down.
     """
+    if spline.ends is not None:
+        return spline if max(beyond_limits(spline, limits, scene)) <= 1.0 + _ROUNDED else None
     for k in range(_ROUNDS):
         top = spline.extremes()
         samples = spline.samples(_TORQUE_SAMPLES)
@@ -116,7 +120,7 @@ def slowed_to_limits(
             return spline
         if k >= _PLAIN:
             longer = max(longer, _longer_by_inertia(torque, samples, limits, scene))
-        spline = UniformSpline(spline.control, spline.interval * longer * _BELOW)
+        spline = spline.at_interval(spline.interval * longer * _BELOW)
     return None
 
 

@@ -22,6 +22,7 @@ from ir_planner.errors import RequestError
 from ir_planner.optimize import Portfolio, Refinement
 from ir_planner.presentation import in_mm, plot_trajectory, result_text
 from ir_planner.regional.exploration import Path, Searches, first_paths
+from ir_planner.regional.in_motion import search_in_motion
 from ir_planner.regional.no_path import barrier, enclosure
 from ir_planner.regional.safeguards import (
     DIRECT,
@@ -155,6 +156,8 @@ def search_regional(
     """
     context = context.upright_from(np.asarray(start))
     _check_search(context, searches)
+    if context.motion is not None:
+        return search_in_motion(start, np.atleast_2d(goals), context, searches)
     status, found = _search_timed(start, goals, context, searches)
     if found is None and TOO_HEAVY in status.message:
         lines = [(np.asarray(start), goal) for goal in np.atleast_2d(goals)]

@@ -180,13 +180,16 @@ def cone_of(options: PlanOptions, scene: PlanningScene) -> ToolCone | None:
 class Context:
     """scene: where the robot moves. options: as they were checked, with the robot's own price of a
     second where none was given. journal: what happened so far;
-    it counts the work. station: whose allowed contacts hold in its zone; "": nobody's.
+    it counts the work. station: whose allowed contacts hold in its zone; "": nobody's. motion (2,
+    2, n): qd, qdd at the start and at the goal of a movement that isn't at rest at both; None: it
+    is.
     """
 
     scene: PlanningScene
     options: PlanOptions
     journal: Journal
     station: str = ""
+    motion: FloatArray | None = None
 
     def __post_init__(self) -> None:
         if self.options.time_value == ROBOTS_TIME_VALUE:
@@ -252,6 +255,17 @@ class Context:
     def leaning_freely(self) -> "Context":
         """The same without a bound of the tool's tilt."""
         return replace(self, options=_leaning_freely(self.options))
+
+    @property
+    def at_rest(self) -> tuple[bool, bool]:
+        """Whether the movement starts and ends at rest."""
+        if self.motion is None:
+            return True, True
+        return not self.motion[0].any(), not self.motion[1].any()
+
+    def in_motion(self, motion: FloatArray | None) -> "Context":
+        """The same with qd, qdd, motion (2, 2, n), at start and goal; None: at rest."""
+        return replace(self, motion=motion)
 
     def thresholds(self) -> FloatArray:
         """Distance (Z,) m that each pair must exceed."""

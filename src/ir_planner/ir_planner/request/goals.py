@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from ir_description import LIMIT_TOLERANCE, OUTSIDE_MAX, Cell
 from ir_description.poses import rotation_from_abc
 from ir_msgs_py.status import StatusCode
+from ir_msgs_py.trajectory import JointTrajectory, Samples
 from ir_planner.errors import RequestError, UnknownNameError
 from ir_values.arrays import FloatArray
 
@@ -47,7 +48,8 @@ def one_goal(
     """The goal that a request gives in exactly one of its `forms`: configuration (n,), pose (4,
     4).
     """
-    given = [name for name, there in (("goal", bool(text)), ("goal_state", configuration is not None),  # noqa: E501
+    given = [name for name, there in (("goal", bool(text)), ("goal_state", configuration is not
+    None),
                                       ("goal_pose", pose is not None)) if there]  # fmt: skip
     if len(given) != 1:
         which = " and ".join(given) or "none (a goal_pose without a frame_id is not given)"
@@ -189,3 +191,45 @@ def _numbers(keys: list[str], values: list[str], expected: list[str], unit: str)
             )
         numbers[key] = number
     return [numbers[key] for key in expected]
+
+
+def motion_of(
+    start: tuple[ArrayLike | None, ArrayLike | None],
+    goal: tuple[ArrayLike | None, ArrayLike | None],
+    end: Goal,
+    cell: Cell,
+) -> FloatArray | None:
+    """qd, qdd (2, 2, n) at start and goal of a movement, given as two (n,) each, None: 0; None
+    where both rest. Raises RequestError.
+    """
+    motion = np.zeros((2, 2, cell.robot.n))
+    codes = (StatusCode.START_STATE_INVALID, StatusCode.GOAL_STATE_INVALID)
+    for k, (values, what, code) in enumerate(
+        zip((start, goal), ("start", "goal"), codes, strict=True)
+    ):
+        for i, (given, kind) in enumerate(zip(values, ("velocity", "acceleration"), strict=True)):
+            if given is None:
+                continue
+            motion[k, i] = joint_values(given, (cell.robot.n,), f"{what}_{kind}", code)
+            if not np.isfinite(motion[k, i]).all():
+                raise RequestError(code, f"{what}_{kind} is {given}: it must be finite")
+    if motion[1].any() and end.configuration is None:
+        raise RequestError(
+            StatusCode.GOAL_STATE_INVALID,
+            "a pose is reached at rest: give joint values for a goal in motion",
+        )
+    return motion if motion.any() else None
+
+
+def motion_on(trajectory: JointTrajectory, at: float, cell: Cell) -> Samples:
+    """Motion (1, n) at the time `at` [s], to a nanosecond, of a trajectory in the robot's joint
+    order. Raises RequestError where it lasts not as long.
+    """
+    own = trajectory.reordered(cell.robot.joint_names)
+    begin = float(own.times[0])
+    if not begin <= at <= own.duration:
+        raise RequestError(
+            StatusCode.START_STATE_INVALID,
+            f"at is {at:g} s: the trajectory lasts from {begin:g} to {own.duration:g} s",
+        )
+    return own.until(at).last

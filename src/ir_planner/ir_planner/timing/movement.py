@@ -74,7 +74,7 @@ class Movement:
     @cached_property
     def verification(self) -> Verification:
         """What holds at every instant of it, as it is sent."""
-        found = (self.clearance, self.torque)
+        found = (self.clearance, self.torque, self.context.at_rest)
         return verified(self.trajectory, self.context.scene, *found, tilt=self.tilt)
 
     @property

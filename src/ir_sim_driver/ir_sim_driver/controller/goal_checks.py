@@ -14,6 +14,7 @@ from ir_kernels.dynamics import DynamicsModel
 from ir_sim_driver.controller.cell_scene import ContactScene, Keep, Piece
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import (
+    Driven,
     ErrorCode,
     ExecutionSettings,
     Motion,
@@ -107,15 +108,16 @@ class VettedGoal:
         dynamics: DynamicsModel,
         settings: ExecutionSettings,
         delay: float,
+        driven: Driven | None = None,
     ) -> Route:
-        """Path from the commanded motion `now` onto the trajectory. Raises
-        TrajectoryRefusedError.
+        """Path from the commanded motion `now`, or on the movement that is driven, onto the
+        trajectory. Raises TrajectoryRefusedError.
         """
         if self.dynamics is not dynamics:
             raise TrajectoryRefusedError(
                 ErrorCode.INVALID_GOAL, "the load changed while the trajectory was checked"
             )
-        route = checked_route(self.goal.trajectory, now, robot, dynamics, settings, delay)
+        route = checked_route(self.goal.trajectory, now, robot, dynamics, settings, delay, driven)
         if not self.goal.allow_collision and route.lead:
             check_collision(route.path, slice(0, route.lead), route.offset, self.keep)
         return route

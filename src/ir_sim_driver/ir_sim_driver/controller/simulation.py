@@ -261,8 +261,10 @@ class Simulation:
             raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, refusal)
         now = self.executor.motion()
         delay = vetted.delay(now_ns)
-        route = vetted.route(now, self.robot, self.dynamics, self.settings.execution, delay)
-        wait = 0.0 if now.qd.any() else max(0.0, delay - route.offset)
+        driven = self.executor.driven
+        route = vetted.route(now, self.robot, self.dynamics, self.settings.execution, delay, driven)
+        moves = route.joined or bool(now.qd.any())
+        wait = 0.0 if moves else max(0.0, delay - route.offset)
         goal_id = self._outcomes.next_id()
         self.executor.start(goal_id, goal, route, wait)
         self.cell_watch.begin(goal.station)

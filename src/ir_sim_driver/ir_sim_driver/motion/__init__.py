@@ -11,6 +11,7 @@ from ir_sim_driver.motion.goal import (
 from ir_sim_driver.motion.path import Motion, Path
 from ir_sim_driver.motion.tool_point import ToolPoint, manual_scaling
 from ir_sim_driver.motion.trajectory_checks import (
+    Driven,
     Route,
     check_goal,
     check_trajectory,
@@ -18,6 +19,7 @@ from ir_sim_driver.motion.trajectory_checks import (
 )
 
 __all__ = [
+    "Driven",
     "ErrorCode",
     "ExecutionSettings",
     "Executor",

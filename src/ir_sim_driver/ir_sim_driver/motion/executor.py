@@ -23,7 +23,7 @@ from ir_sim_driver.motion.goal import (
 )
 from ir_sim_driver.motion.path import Motion, Path
 from ir_sim_driver.motion.tool_point import EXACT_FROM, ToolPoint
-from ir_sim_driver.motion.trajectory_checks import Route
+from ir_sim_driver.motion.trajectory_checks import Driven, Route
 from ir_sim_driver.plant import Backend
 from ir_values.arrays import FloatArray
 
@@ -226,6 +226,14 @@ class Executor:
         return None if self._run is None else self._run.route.path
 
     @property
+    def driven(self) -> Driven | None:
+        """The movement that another may join; None where none goes on."""
+        run = self._run
+        if run is None or run.stopping or run.wait > 0 or run.s >= run.route.path.duration:
+            return None
+        return Driven(run.route.path, run.s)
+
+    @property
     def path_parameter(self) -> float:
         """Time [s] along the path, lead-in included."""
         return 0.0 if self._run is None else self._run.s
@@ -279,6 +287,7 @@ class Executor:
         preempted.
         """
         moving = self.motion().qd.any()
+        speed = self.path_speed
         if self._run is not None:
             if not self._run.stopping:
                 self._will_end(
@@ -302,7 +311,10 @@ class Executor:
             goal.note,
         )
         # a route from rest starts with speed zero, so path time may start at once; one in motion
-        # carries on
+        # carries on, in the present time of the path where it goes on along that
+        if route.joined:
+            self._speed.value = speed
+            return
         self._speed.value = 1.0 if moving else 0.0
         self._fresh = not moving
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from typing import NamedTuple
 
@@ -66,6 +67,21 @@ class Path:
         powers = np.vander(t, 6, increasing=True)
         positions: FloatArray = np.einsum("kp,kpn->kn", powers, self._c[segment])
         return positions
+
+    def between(self, begin: float, end: float) -> tuple[FloatArray, FloatArray]:
+        """Coefficients (S, n, 6) and durations (S,) [s] from one path time to a later one."""
+        first = bisect_right(self._starts, begin) - 1
+        last = bisect_right(self._starts, end) - 1
+        coefficients = self.coefficients[first : last + 1].copy()
+        durations = self.durations[first : last + 1].copy()
+        skipped = begin - self._starts[first]
+        durations[-1] = end - self._starts[last]
+        durations[0] -= skipped
+        for k in range(6):
+            powers = [math.comb(m, k) * skipped ** (m - k) for m in range(k, 6)]
+            coefficients[0, :, k] = self.coefficients[first, :, k:] @ np.array(powers)
+        some = durations > 0.0
+        return coefficients[some], durations[some]
 
     def motion(self, s: float) -> Motion:
         """Position and derivatives at path time s; derivatives are zero before the start and after

@@ -188,6 +188,8 @@ def _sentence(name: str, verb: str, value: float, bound: float, time: float, uni
 
 # Lead-in: from where the command is onto a trajectory, without a jump.
 #
+# A trajectory that begins in the motion which the driven movement has farther on: the movement goes
+# on as far as that, and then along the trajectory.
 # First time > 0: a polynomial leads in until then. First time 0 at rest: the last difference
 # (within the start tolerance) is closed before path time starts, as slowly as is asked. First
 # time 0 in motion, or with a first velocity: a polynomial bridges to the next point far enough
@@ -201,12 +203,60 @@ AT_REST = 1e-6  # rad/s that still count as standing
 @dataclass(frozen=True, eq=False)
 class Route:
     """A path and the path time [s] at which its trajectory starts; the first `lead` segments are
-    not the trajectory's.
+    not the trajectory's. joined: they are those of the movement that is driven, at its present
+    speed.
     """
 
     path: Path
     offset: float
     lead: int
+    joined: bool = False
+
+
+class Driven(NamedTuple):
+    """The path of the movement that is driven, and the path time [s] that it has reached."""
+
+    path: Path
+    s: float
+
+
+_AHEAD = 30.0  # s of path time within which a movement may be joined
+_LOOKS = 0.004  # s between two looks along a path for a place on it
+_POLISHED = 8  # steps towards that place
+# that a place on a path may be off a trajectory's first point: rad, rad/s, rad/s^2
+_JOINED = (1e-6, 1e-4, 1e-2)
+
+
+def joining(
+    trajectory: JointTrajectory, driven: Driven, settings: ExecutionSettings, delay: float
+) -> Route | None:
+    """The movement that is driven as far as the trajectory begins on it, in its motion, and then
+    the trajectory; None where it doesn't begin there. delay [s]: until its time 0 by its header
+    stamp, which counts within bridge_time, 0: none.
+    """
+    path, s = driven
+    begin = _motion_at_point(trajectory, 0)
+    if trajectory.times_ns[0] != 0 or np.abs(begin.qd).max() <= AT_REST or s >= path.duration:
+        return None
+    until = min(path.duration, s + _AHEAD)
+    looks = np.linspace(s, until, 2 + int((until - s) / _LOOKS))
+    away = np.abs(path.positions(looks) - begin.q).max(axis=1)
+    if delay > 0.0:
+        away[np.abs(looks - s - delay) > settings.bridge_time] = np.inf
+    at = float(looks[int(away.argmin())])
+    for _ in range(_POLISHED):
+        there = path.motion(at)
+        along = float(np.square(there.qd).sum())
+        at += float(((begin.q - there.q) * there.qd).sum()) / along if along > 0.0 else 0.0
+        at = min(max(at, s), path.duration)
+    there = path.motion(at)
+    off = [float(np.abs(a - b).max()) for a, b in zip(there, begin, strict=True)]
+    if any(value > most for value, most in zip(off, _JOINED, strict=True)):
+        return None
+    coefficients, durations = path.between(s, at)
+    own, seconds = trajectory.coefficients()
+    whole = _path([coefficients, own], [durations, seconds], path.position(s))
+    return Route(whole, float(durations.sum()), len(durations), joined=True)
 
 
 def route_onto(
@@ -410,8 +460,10 @@ def checked_route(
     dynamics: DynamicsModel,
     settings: ExecutionSettings,
     delay: float = 0.0,
+    driven: Driven | None = None,
 ) -> Route:
-    """Path from the commanded motion `now` along a trajectory that passed check_trajectory.
+    """Path from the commanded motion `now` along a trajectory that passed check_trajectory. driven:
+    the movement that goes on, which it may join.
 
     Only what leads in is checked here; from outside its range a joint may come back, and go no
     farther out.
@@ -420,17 +472,18 @@ def checked_route(
     delay [s]: until time 0 of the trajectory. Raises TrajectoryRefusedError.
     """
     allowed = Range.of(robot).including(now.q)
+    joined = None if driven is None else joining(trajectory, driven, settings, delay)
+    if joined is not None:
+        _check_lead(joined, robot, dynamics, settings, allowed)
+        return joined
 
     def route(share: float) -> Route:
         return route_onto(trajectory, now, robot.acceleration_max, settings, delay, share)
 
     for share in _GENTLENESS:
         found = route(share)
-        lead = slice(0, found.lead)
-        coefficients = found.path.coefficients[lead]
-        durations = found.path.durations[lead]
         try:
-            check_limits(coefficients, durations, -found.offset, robot, dynamics, settings, allowed)
+            _check_lead(found, robot, dynamics, settings, allowed)
         except TrajectoryRefusedError as error:
             if found.offset <= 0.0:
                 raise
@@ -443,6 +496,19 @@ def checked_route(
         f"{refusal}; until 0 s it goes from where it stands to the first point, however slowly: "
         "plan it again from where it stands"
     ) from refusal
+
+
+def _check_lead(
+    route: Route,
+    robot: RobotModel,
+    dynamics: DynamicsModel,
+    settings: ExecutionSettings,
+    allowed: Range,
+) -> None:
+    """Raise TrajectoryRefusedError where what leads in exceeds a limit."""
+    coefficients = route.path.coefficients[: route.lead]
+    durations = route.path.durations[: route.lead]
+    check_limits(coefficients, durations, -route.offset, robot, dynamics, settings, allowed)
 
 
 def _check_points(
