@@ -119,6 +119,24 @@ def test_every_body_wherever_it_hangs_belongs_to_a_link(kind: str, place: str) -
     assert any("finger is left out as asked, with 1 bodies" in note for note in left.notes)
 
 
+FINGER = (
+    '<link name="{0}"/><joint name="j{0}" type="revolute"><parent link="hand"/><child link="{0}"/>'
+    '<axis xyz="0 0 1"/><limit lower="0" upper="0.5"/></joint>'
+)
+
+
+def test_fingers_behind_the_sixth_axis_are_no_seventh_axis() -> None:
+    """Two side by side are a hand; one alone may be an axis, which is refused with its name."""
+    text = arm_text().replace("tool0", "hand")
+    two = text.replace("</robot>", FINGER.format("left") + FINGER.format("right") + "</robot>")
+    arm = urdf_arm(two, "arm.urdf")
+    assert [joint.name for joint in arm.joints] == [f"j{k}" for k in range(1, 7)]
+    np.testing.assert_allclose(arm.origin[5], [0.18, 0.0, 0.0], atol=1e-12)
+    one = text.replace("</robot>", FINGER.format("left") + "</robot>")
+    with pytest.raises(RobotFileError, match=r"has 7 axes \(j1, .*jleft\).*see --tip"):
+        urdf_arm(one, "arm.urdf")
+
+
 def test_a_side_joint_sweeps_its_body_through_its_whole_range() -> None:
     """A point of a flap on a hinge lies in the body of its link at every angle."""
     extra = (

@@ -85,8 +85,9 @@ class Meshes:
                 )
             if beside:
                 self.notes.append(
-                    f"{path.name}: triangles within {1e3 * beside:g} mm of its curved surfaces are "
-                    "taken, and capsules around them are wider by that"
+                    f"{path.name}: its curved surfaces are taken as triangles that OpenCASCADE "
+                    f"lays within {1e3 * beside:g} mm of them, which is not proved; capsules are "
+                    "wider by that"
                 )
             self._known[name] = triangles, beside
         return self._known[name]

@@ -219,7 +219,16 @@ def _tip(tree: UrdfTree, tip: str, source: str) -> str:
     six = [name for name in known if _turning(tree, name) == AXES]
     if tip or six or known:
         return tip or (six or known)[0]
-    return max(tree.links, key=lambda name: (_turning(tree, name), -_followers(tree, name)))
+    hand = next((name for name in tree.links if _is_hand(tree, name)), "")
+    return hand or max(tree.links, key=lambda name: (_turning(tree, name), -_followers(tree, name)))
+
+
+def _is_hand(tree: UrdfTree, name: str) -> bool:
+    """Whether a link behind six turning joints carries several moving ones side by side: fingers,
+    not a seventh axis.
+    """
+    beside = [joint for joint in tree.below(name) if joint.kind != "fixed"]
+    return len(beside) > 1 and _turning(tree, name) == AXES
 
 
 def _turning(tree: UrdfTree, name: str) -> int:
