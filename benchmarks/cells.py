@@ -1,7 +1,7 @@
 """Is the cheapest cycle of a robotic cell found and proved, and how soon?
 
-    python benchmarks/cells.py [--only drawn|flexible|robots] [--file FILE.xml]... [--seeds N]
-                               [--seconds S] [--quick] [--json FILE]
+    python benchmarks/cells.py [--only drawn|flexible|driven|robots] [--file FILE.xml]...
+                               [--seeds N] [--seconds S] [--quick] [--json FILE]
 
 Cells drawn at random that have a schedule by construction, and instances of the public benchmark
 where --file names them. Each is solved by the project's model and by the published one, in the same
@@ -15,6 +15,9 @@ cycle of the same order, which moves at 100 % and leaves waits to the controller
 robots: drawn cells of two robots, each joint cycle driven with drawn delays of every step, and the
 bundled cell. A judge that knows the programs with their signals alone measures with Coal, at every
 0.5 ms where the robots are near; a planted collision, the same without signals, is found.
+
+driven: that cycle from an empty line on, on the simulated robot (nominal plant) with simulated
+machines by the program runner's own steps: every part needs what was planned within 1 % or 10 J.
 """
 
 from __future__ import annotations
@@ -36,11 +39,14 @@ from _robots_judge import Judge, drawn_cell, driven
 from ir_description import RobotCells, load_robot_cells
 from ir_planner import Planner, ProgramPlan, RequestError
 from ir_planner.robots import RobotsPlan, plan_robots
+from ir_recorder.analysis.tending import tending_of
 from ir_studies.cells import CellAnswer, read_instances, solve_cell, written
+from ir_studies.stepped_run import driven_program
 
 SIZES = ((2, 6), (3, 6), (3, 9))  # robots and stops of each
 LARGE = ((5, 10), (8, 10))
 PARTS_PER_HOUR = 30.0
+CYCLES = 4
 
 
 @dataclass(frozen=True)
@@ -102,16 +108,33 @@ class RobotsRow:
     refused: str = ""
 
 
+@dataclass(frozen=True)
+class DrivenRow:
+    """A part of the driven cycle: seconds and joules, planned beside driven; late [s]: waits for
+    signals that no plan contains.
+    """
+
+    part: int
+    filling: bool
+    seconds: float
+    planned_seconds: float
+    joules: float
+    planned: float
+    late: float
+
+
 def main() -> None:
     """Solve, judge, compare."""
     parser = command_line(__doc__, ["drawn"], 5, "two seeds, no large cells")
-    parser.add_argument("--only", choices=("drawn", "flexible", "robots"), help="one part of it")
+    parser.add_argument(
+        "--only", choices=("drawn", "flexible", "driven", "robots"), help="one part of it"
+    )
     parser.add_argument("--file", action="append", default=[], help="instances of the benchmark")
     parser.add_argument("--seconds", type=float, default=120.0, help="of processor time")
     arguments = parser.parse_args()
     seeds = 2 if arguments.quick else arguments.seeds
     seconds = min(arguments.seconds, 20.0) if arguments.quick else arguments.seconds
-    rows: list[Row | FlexibleRow | RobotsRow] = []
+    rows: list[Row | FlexibleRow | DrivenRow | RobotsRow] = []
     claims: list[Claim] = []
     if arguments.only in (None, "robots"):
         robots = list(robots_rows(4 if arguments.quick else 30))
@@ -122,6 +145,10 @@ def main() -> None:
         print(line_of(asdict(flexible)), flush=True)
         claims += flexible_claims(flexible)
         rows.append(flexible)
+    if arguments.only in (None, "driven"):
+        parts = driven_rows()
+        claims += driven_claims(parts)
+        rows += parts
     if arguments.only in (None, "drawn"):
         solved = drawn_rows(arguments, seeds, seconds)
         claims += drawn_claims(solved)
@@ -238,6 +265,39 @@ def flexible_claims(row: FlexibleRow) -> list[Claim]:
         at_least("flexible: saved against the common cycle", saved, "%", 0.0),
         at_least("flexible: low end of what is saved", row.low, "J", 0.0),
         at_most("flexible: processor time", row.seconds, "s", 30.0),
+    ]
+
+
+def driven_rows() -> list[DrivenRow]:
+    """The bundled cell from an empty line on, driven by the nominal plant."""
+    plan = Planner("flexible").plan_steady_cycle(parts_per_hour=PARTS_PER_HOUR, cycles=CYCLES)
+    run = driven_program(plan.run_cell, plan.run.movements)
+    run.close()
+    tending = tending_of(plan.run_cell, run.steps, run.signals)
+    rows = []
+    for part in tending.parts:
+        row = DrivenRow(
+            part.number,
+            part.number <= tending.filling,
+            part.span.seconds,
+            part.planned_seconds,
+            part.joules,
+            part.planned_joules,
+            sum(part.late.values()),
+        )
+        print(line_of(asdict(row)), flush=True)
+        rows.append(row)
+    return rows
+
+
+def driven_claims(rows: list[DrivenRow]) -> list[Claim]:
+    """Every part as planned, and nobody late."""
+    off = [abs(row.joules - row.planned) / max(10.0, 0.01 * row.planned) for row in rows]
+    slow = max(row.seconds - row.planned_seconds for row in rows)
+    return [
+        at_least("driven: parts", len(rows), "", CYCLES),
+        at_most("driven: joules of a part off the plan, of 1 % or 10 J", max(off), "", 1.0),
+        at_most("driven: a part later than planned", slow, "s", 0.5),
     ]
 
 

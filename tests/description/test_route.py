@@ -4,6 +4,7 @@ meant.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import pytest
@@ -12,6 +13,8 @@ from hypothesis import strategies as st
 
 from ir_description import (
     CellFileError,
+    ProcessTimes,
+    ProgramStep,
     cell_from_yaml,
     cell_hash,
     cell_to_yaml,
@@ -24,7 +27,24 @@ TEXT = cell_to_yaml(FLEXIBLE)
 VISITS = "visits: [infeed_pick, lathe_chuck, washer_basket, gauge_seat, outfeed_place]"
 
 BROKEN = {
-    "no seconds": ("{seconds: 95}", "{}", "process has no seconds"),
+    "no seconds": ("{seconds: 95}", "{}", "process has no seconds, must have seconds, between or"),
+    "both": (
+        "{seconds: 95}",
+        "{between: [90, 95], samples: [90]}",
+        "samples stands beside between, must be one of both",
+    ),
+    "falling": ("{seconds: 95}", "{between: [95, 90]}", "between is 95 to 90 s, must rise and be"),
+    "no sample": ("{seconds: 95}", "{samples: []}", "samples has 0 entries, must have 1 to"),
+    "no such process": (
+        "route:",
+        "signals: [{name: go}, {name: end, follows: go, process: infeed}]\nroute:",
+        "machine with a process that end reports 'infeed' is unknown; known are lathe, washer",
+    ),
+    "a process that nothing starts": (
+        "route:",
+        "signals: [{name: end, process: lathe}]\nroute:",
+        "signal end reports the process of lathe: it follows the signal that starts it",
+    ),
     "a process of no time": ("seconds: 95", "seconds: 0", "is 0 s, must be in (0, 86400] s"),
     "two days": ("seconds: 95", "seconds: 2e5", "is 2e5 s, must be in (0, 86400] s"),
     "negative handling": ("handling: 0.5", "handling: -1", "handling is -1 s, must be in [0,"),
@@ -81,3 +101,55 @@ def test_a_process_that_no_route_visits_is_found() -> None:
     (*_, finding) = check_cell(replace(FLEXIBLE, route=None))
     assert finding.subject == "gauge"
     assert finding.sentence == "has a process of 12 s, but the cell has no route"
+
+
+@given(
+    times=st.one_of(
+        st.lists(st.floats(1.0, 500.0), min_size=1, max_size=5).map(ProcessTimes.of),
+        st.tuples(st.floats(1.0, 100.0), st.floats(0.0, 100.0)).map(
+            lambda ends: ProcessTimes(ends[0], ends[0] + ends[1])
+        ),
+    ),
+    share=st.floats(0.0, 1.0),
+)
+@settings(max_examples=25)
+def test_times_that_vary_survive_their_file_and_count_by_their_mean(
+    times: ProcessTimes, share: float
+) -> None:
+    machines = tuple(
+        replace(machine, process=times.mean, process_times=times)
+        if machine.name == "lathe"
+        else machine
+        for machine in FLEXIBLE.equipment
+    )
+    cell = replace(FLEXIBLE, equipment=machines)
+    again = cell_from_yaml(cell_to_yaml(cell)).machine("lathe")
+    assert again.process_times == times
+    assert times.low <= again.process <= times.high or times.low == times.high
+    assert times.low <= times.quantile(share) <= times.high
+    assert cell_hash(cell) == cell_hash(FLEXIBLE)
+
+
+def test_without_seconds_the_mean_of_the_samples_counts() -> None:
+    text = TEXT.replace("{seconds: 95}", "{samples: [90, 100, 104]}")
+    assert cell_from_yaml(text).machine("lathe").process == 98.0
+
+
+def test_parts_come_to_the_first_station_and_go_from_the_last_one() -> None:
+    part = FLEXIBLE.part("gear")
+    spare = replace(
+        part,
+        load=replace(part.load, name="gear.1", capsules=()),
+        bodies=(),
+        station="",
+    )
+    cell = replace(FLEXIBLE, parts=(*FLEXIBLE.parts, spare))
+    places = cell.parts_at_start()
+    assert FLEXIBLE.route is not None
+    visits = FLEXIBLE.route.visits
+    for here, there in itertools.pairwise(visits):
+        places = places.after(ProgramStep("STATION", here, attach="gear"))
+        assert places.lying["gear.1"] == ("" if here == visits[0] else visits[0])
+        places = places.after(ProgramStep("STATION", there, detach="gear"))
+        assert places.lying["gear.1"] == visits[0]
+    assert places.lying["gear"] == ""

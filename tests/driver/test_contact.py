@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -9,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_description import AllowedContact, Zone, load_cell, machine_in
+from ir_description import AllowedContact, ProgramStep, Zone, load_cell, machine_in
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver import make_simulation
-from ir_sim_driver.controller.cell_scene import Machines
+from ir_sim_driver.controller.cell_scene import Machines, Parts
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.goal import ErrorCode, TrajectoryGoal
 from ir_sim_driver.plant import carried
@@ -220,3 +221,27 @@ def test_a_machine_ends_in_the_state_of_its_last_signal_in_its_own_time(heard):
         assert machines.present(DEMO.machine("lathe")) == (
             switch.on if heard[-1][0] else switch.off,
         )
+
+
+def test_parts_come_and_go_at_the_ends_of_a_route() -> None:
+    """The same places as the cell's own rule gives, from loads and the place of the tool alone."""
+    cell = load_cell("flexible")
+    part = cell.part("gear")
+    load = replace(part.load, name="gear.1", capsules=())
+    cell = replace(cell, parts=(*cell.parts, replace(part, load=load, bodies=(), station="")))
+    tool = carried(cell, "gripper")
+    parts = Parts(cell, tool)
+    places = cell.parts_at_start()
+    visits = cell.route.visits
+    for here, there in itertools.pairwise(visits):
+        for step in (
+            ProgramStep("STATION", here, attach="gear"),
+            ProgramStep("STATION", there, detach="gear"),
+        ):
+            places = places.after(step)
+            held = carried(cell, f"gripper+{places.held}") if places.held else tool
+            parts.carry(held, cell.station(step.target).pose)
+            lying = {name: station for name, station in places.lying.items() if station}
+            assert parts._places.keys() == lying.keys()
+            for name, station in lying.items():
+                assert np.array_equal(parts._places[name], cell.station(station).pose)

@@ -96,6 +96,7 @@ REQUESTS: dict[str, Any] = {
     "plan_trajectory": srv.PlanTrajectory.Request(reference=line(), options=QUICK),
     "optimize_trajectory": srv.OptimizeTrajectory.Request(trajectory=line(), options=QUICK),
     "plan_program": srv.PlanProgram.Request(stations=["home"], savings=False, options=QUICK),
+    "plan_steady_cycle": srv.PlanSteadyCycle.Request(savings=False, options=QUICK),
 }
 RESPONSES = {
     name: getattr(srv, type(request).__name__.split("_")[0]).Response

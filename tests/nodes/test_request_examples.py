@@ -52,6 +52,7 @@ EXPECTED: dict[str, tuple[int, str]] = {
     "PlanTrajectory": (Status.SUCCESS, ""),
     "PlanCartesianMovement": (Status.SUCCESS, ""),
     "PlanProgram": (Status.SUCCESS, ""),
+    "PlanSteadyCycle": (Status.INVALID_GOAL_CONSTRAINTS, "cell demo has no route"),
     "PlanStandby": (Status.SUCCESS, ""),
     "EvaluateTrajectory": (Status.INVALID_OBJECT_NAME, UNKNOWN),
     "GetTrajectory": (Status.INVALID_OBJECT_NAME, UNKNOWN),

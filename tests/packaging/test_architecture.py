@@ -25,7 +25,7 @@ KNOWS = {
     **LANGUAGE,
     **dict.fromkeys(ROOMS, BASE),
     "ir_planner": BASE | set(LANGUAGE),
-    "ir_studies": BASE | {"ir_planner", "ir_recorder", "ir_sim_driver"},
+    "ir_studies": BASE | {"ir_planner", "ir_program_runner", "ir_recorder", "ir_sim_driver"},
     "ir_cli": BASE | ROOMS | set(LANGUAGE) | {"ir_studies"},
 }
 PROJECT = set(KNOWS)

@@ -11,7 +11,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from ir_description import Cell, cell_from_yaml, cell_to_yaml, check_cell, load_cell
+from ir_description import (
+    Cell,
+    ProgramStep,
+    cell_from_yaml,
+    cell_to_yaml,
+    check_cell,
+    load_cell,
+)
+from ir_msgs_py.report import PlannedMovement
 from ir_planner import Planner, RequestError, SteadyPlan
 
 CELL = load_cell("flexible")
@@ -20,13 +28,15 @@ SETTLED = 0.005  # of the energy: two plans of slightly different durations, eac
 
 
 @cache
-def planned(parts_per_hour: float, lathe: float = 95.0, *, saving: bool = False) -> SteadyPlan:
+def planned(
+    parts_per_hour: float, lathe: float = 95.0, *, saving: bool = False, cycles: int = 0
+) -> SteadyPlan:
     machines = tuple(
         replace(machine, process=lathe) if machine.name == "lathe" else machine
         for machine in CELL.equipment
     )
     planner = Planner(replace(CELL, equipment=machines), clock=lambda: 0.0)
-    return planner.plan_steady_cycle(parts_per_hour=parts_per_hour, saving=saving)
+    return planner.plan_steady_cycle(parts_per_hour=parts_per_hour, saving=saving, cycles=cycles)
 
 
 def test_every_movement_is_certified_and_the_robot_is_back_where_it_began() -> None:
@@ -43,6 +53,45 @@ def test_every_movement_is_certified_and_the_robot_is_back_where_it_began() -> N
     assert plan.gap < 1.0
 
 
+def begun(step: PlannedMovement) -> list[str]:
+    """Signals that start a machine when the step has ended."""
+    return [name for name in step.set_signals if name.endswith(".start")]
+
+
+def test_a_run_fills_the_line_from_empty_and_comes_into_the_planned_cycle() -> None:
+    """From its steps alone: no part is taken before it is finished, none put where one lies, the
+    first station always has one, and the last cycles are the planned one.
+    """
+    plan = planned(30.0, cycles=2)
+    assert plan.cycle is not None
+    assert plan.run is not None
+    assert plan.run_cell is not None
+    visits = CELL.route.visits if CELL.route else ()
+    here = 0.0
+    places = plan.run_cell.parts_at_start()
+    assert [station for station in places.lying.values() if station] == [visits[0]]
+    ready: dict[str, float] = {}
+    left = []
+    for step in plan.run.movements:
+        for name in step.wait_for:
+            assert here >= ready.pop(name.removesuffix(".done")) - ROUNDING
+        here += step.duration
+        if step.attach or step.detach:
+            target = step.to_station
+            places = places.after(
+                ProgramStep("STATION", target, attach=step.attach, detach=step.detach)
+            )
+            assert visits[0] in places.lying.values() or places.held
+            left += [here] if step.detach and target == visits[-1] else []
+        for name in begun(step):
+            machine = name.removesuffix(".start")
+            ready[machine] = here + CELL.machine(machine).process
+        assert step.trajectory is None or step.report.certified
+    assert len(left) == 2
+    assert left[1] - left[0] == pytest.approx(plan.cycle.period, abs=10.0 * ROUNDING)
+    assert max(step.duration for step in plan.run.movements) <= 95.0 + ROUNDING
+
+
 def test_the_program_waits_for_every_machine_at_least_as_long_as_it_works() -> None:
     """From the steps alone, in a cycle that runs on and on."""
     plan = planned(30.0)
@@ -53,7 +102,7 @@ def test_the_program_waits_for_every_machine_at_least_as_long_as_it_works() -> N
     for step in plan.program.movements:
         awaited |= {name.removesuffix(".done"): here for name in step.wait_for}
         here += step.duration
-        started |= {name.removesuffix(".start"): here for name in step.set_signals}
+        started |= {name.removesuffix(".start"): here for name in begun(step)}
     process = {machine.name: machine.process for machine in CELL.equipment if machine.process}
     assert set(started) == set(awaited) == set(process)
     for name, seconds in process.items():

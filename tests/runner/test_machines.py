@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from ir_description import ProcessTimes, load_cell
 from ir_msgs_py.plc import Signal
 from ir_program_runner.machines import MOST_SIGNALS, Machines
 from ir_values.errors import InvalidValueError
@@ -17,6 +20,7 @@ class Described:
     initial: bool = False
     follows: str = ""
     delay: float = 0.0
+    process: str = ""
 
 
 def test_a_machine_answers_after_its_delay():
@@ -50,3 +54,50 @@ def test_signals_of_invented_names_are_bounded() -> None:
         machines.hear(Signal("another", True), 0.0)
     machines.hear(Signal("s0", False), 0.0)
     assert machines.holds([Signal("s0", False), Signal("s1", True)])
+
+
+LATHE = (Described("start"), Described("done", follows="start", process="lathe"))
+
+
+@given(
+    orders=st.lists(st.tuples(st.floats(0.01, 60.0), st.booleans()), max_size=12),
+    seconds=st.floats(0.5, 30.0),
+)
+def test_a_part_is_done_its_process_after_the_last_start_unless_it_was_taken(
+    orders: list[tuple[float, bool]], seconds: float
+) -> None:
+    """However often it is started and cleared, a machine says what a stopwatch says."""
+    machines = Machines(LATHE, {"lathe": ProcessTimes(seconds, seconds)})
+    now = 0.0
+    begun = None
+    for wait, level in [*orders, (60.0, True)]:
+        now += wait
+        for answer in machines.take_answers(now):
+            machines.hear(answer, now)
+        finished = begun is not None and now >= begun + seconds
+        assert machines.holds([Signal("done", finished)])
+        machines.set(Signal("start", level), now)
+        begun = now if level else None
+        assert machines.holds([Signal("done", False)])
+
+
+def test_times_that_vary_are_drawn_from_their_samples_and_again_with_their_seed() -> None:
+    def times(seed: int) -> list[float]:
+        machines = Machines(LATHE, {"lathe": ProcessTimes.of([3.0, 4.0, 9.0])}, seed)
+        found = []
+        for part in range(20):
+            machines.set(Signal("start", True), 100.0 * part)
+            found.append(round(machines.next_answer - 100.0 * part, 9))
+            machines.take_answers(100.0 * part + 50.0)
+            machines.hear(Signal("done", True), 100.0 * part + 50.0)
+            machines.set(Signal("start", False), 100.0 * part + 60.0)
+            machines.take_answers(100.0 * part + 70.0)
+        return found
+
+    assert set(times(1)) == {3.0, 4.0, 9.0}
+    assert times(1) == times(1) != times(2)
+
+
+def test_the_machines_of_a_cell_that_reports_no_process_answer_as_before() -> None:
+    machines = Machines.of(load_cell("demo"))
+    assert machines.next_answer == float("inf")

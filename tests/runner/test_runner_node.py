@@ -170,6 +170,7 @@ class Described:
     initial: bool = False
     follows: str = ""
     delay: float = 0.0
+    process: str = ""
 
 
 class Cell:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from io import BytesIO
 from pathlib import Path
 
@@ -53,6 +53,13 @@ def add_steady(plan: argparse.ArgumentParser) -> None:
         action="store_true",
         help="with --parts-per-hour: also cycles from the fastest to the cheapest",
     )
+    words = "with --parts-per-hour: parts a cycle at most, 1 or 2 (1)"
+    plan.add_argument("--units", type=int, default=1, metavar="K", help=words)
+    words = (
+        "with --parts-per-hour: the program fills the line from empty and makes so many whole "
+        "cycles (0: it is one cycle)"
+    )
+    plan.add_argument("--cycles", type=int, default=0, metavar="N", help=words)
 
 
 Report = Callable[[Path, ProgramPlan, Planner], None]
@@ -69,16 +76,20 @@ def run_steady(arguments: argparse.Namespace, report: Report) -> int:
             options=options_of(arguments),
             saving=arguments.saving,
             front_points=_FRONT if arguments.front else 0,
+            units=arguments.units,
+            cycles=arguments.cycles,
         )
     if plan.cycle is None or plan.program is None or plan.cell is None:
         return failed(plan.status.message)
     for output in arguments.output:
         if output.suffix in PICTURES:
             sys.stderr.write(f"ir: {_written(plan, output, front=arguments.front)}\n")
-    planner.set_cell(plan.cell)
+    cell = plan.run_cell or plan.cell
+    program = plan.run or plan.program
+    planner.set_cell(cell)
     for output in arguments.output:
         if output.suffix not in PICTURES:
-            report(output, plan.program, planner)
+            report(output, program, planner)
     rows = _rows(plan)
     front = [asdict(point) for point in plan.front]
     if arguments.json:
@@ -109,10 +120,11 @@ def _check(arguments: argparse.Namespace) -> None:
 
 def _written(plan: SteadyPlan, path: Path, *, front: bool) -> Path:
     """Write the cell with the program of the cycle, or the chart (front: of the front)."""
-    assert plan.cell is not None
+    cell = plan.run_cell or plan.cell
+    assert cell is not None
     try:
         if path.suffix == ".yaml":
-            return write_output(path, cell_to_yaml(plan.cell).encode(), _CELL, ANYWHERE)
+            return write_output(path, cell_to_yaml(cell).encode(), _CELL, ANYWHERE)
         picture = BytesIO()
         figure = plan.plot_front() if front else plan.plot()
         figure.savefig(picture, format="png")
@@ -151,13 +163,14 @@ def _totals(plan: SteadyPlan) -> Row:
     report = plan.program.report
     return {
         "program_id": plan.program.program_id,
-        "parts_per_hour": HOUR / plan.cycle.period,
+        "parts_per_hour": HOUR / plan.cycle.seconds_per_part,
         "period": plan.cycle.period,
+        "units": plan.cycle.units,
         "fastest_period": plan.fastest,
         "order": [plan.machines[visit.activity] for visit in plan.cycle.visits],
-        "joules": report.energy,
-        "joules_low": report.energy_low,
-        "joules_high": report.energy_high,
+        "joules": plan.joules,
+        "joules_low": report.energy_low / plan.cycle.units,
+        "joules_high": report.energy_high / plan.cycle.units,
         "gap": plan.gap,
         "certified": report.certified,
         "planning_seconds": plan.info.planning_time,
@@ -169,16 +182,28 @@ def _sentences(plan: SteadyPlan) -> list[str]:
     """The totals for people."""
     totals = _totals(plan)
     assert plan.program is not None
+    report = replace(
+        plan.program.report,
+        energy=totals["joules"],
+        energy_low=totals["joules_low"],
+        energy_high=totals["joules_high"],
+    )
     proof = "free of collision and within all limits at every instant, proved"
     lines = [
         f"order: a part from {', '.join(totals['order'])}, each to the next station of the route",
         f"{totals['parts_per_hour']:.2f} parts an hour, a cycle of {totals['period']:.2f} s "
         f"(the shortest: {totals['fastest_period']:.2f} s)",
         f"{totals['joules'] / 1e3:.2f} kJ a part from the mains, predicted: "
-        f"{predicted(plan.program.report)}; {proof if totals['certified'] else 'NOT certified'}",
+        f"{predicted(report)}; {proof if totals['certified'] else 'NOT certified'}",
         f"at most {totals['gap']:.2f} % above the cheapest cycle of these configurations, without "
         "what the capacitor carries from one movement to the next",
     ]
+    if plan.run is not None:
+        run = plan.run.report
+        lines.append(
+            f"run from an empty line: {len(plan.run.movements)} steps, {run.duration:.1f} s, "
+            f"{run.energy / 1e3:.1f} kJ"
+        )
     if totals["truncated"]:
         lines.append("cut by --planning-time: more time may give a better cycle")
     if plan.saving is not None:

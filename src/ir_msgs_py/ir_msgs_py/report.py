@@ -216,7 +216,8 @@ class PlannedMovement:
     detach: load that is attached or detached when this step has ended; load: what is attached while
     it runs ("gripper+part", "none"). wait_for: signals of the machines to wait for before;
     set_signals: to set after, "name=0" clears; states: of machines that it relies on,
-    "lathe=door_open".
+    "lathe=door_open". since: signal that a pause is for, "" for none: it ends as long after that
+    was set as planned.
     """
 
     kind: str
@@ -233,6 +234,7 @@ class PlannedMovement:
     wait_for: tuple[str, ...] = ()
     set_signals: tuple[str, ...] = ()
     states: tuple[str, ...] = ()
+    since: str = ""
 
     def __post_init__(self) -> None:
         kind = MovementKind(one_of(self.kind, list(MovementKind), "kind of movement"))
@@ -246,6 +248,8 @@ class PlannedMovement:
                 raise InvalidValueError("a pause has no trajectory")
         elif self.power_mode:
             raise InvalidValueError(f"power_mode is {self.power_mode}: only a pause has one")
+        if self.since and kind is not MovementKind.PAUSE:
+            raise InvalidValueError(f"since is {self.since}: only a pause ends after a signal")
 
     @property
     def is_pause(self) -> bool:

@@ -551,19 +551,31 @@ class Planner:
         cancelled: Cancelled = _NEVER,
         saving: bool = False,
         front_points: int = 0,
+        cycles: int = 0,
+        units: int = 1,
         **changes: Unpack[OptionFields],
     ) -> SteadyPlan:
         """The cheapest cycle of the cell's route that makes at least so many parts an hour, 0: as
         many as possible. saving: hold it against the common cycle; front_points: so many cycles
-        from the fastest to the cheapest.
+        from the fastest to the cheapest; cycles: also the run that fills the line from empty and
+        makes so many; units: parts a cycle at most.
         """
         options, note = self._checked(options_with(options, changes))
         request, work = self._cycle_request(options, cancelled)
         plan = plan_steady_cycle(
-            request, parts_per_hour, work, saving=saving, front_points=front_points
+            request,
+            parts_per_hour,
+            work,
+            saving=saving,
+            front_points=front_points,
+            cycles=cycles,
+            units=units,
         )
         if plan.program is not None and plan.request is not None:
             plan = replace(plan, program=self.kept_program(plan.program, plan.request))
+            if plan.run is not None and plan.run_cell is not None:
+                asked = replace(plan.request, cell=plan.run_cell)
+                plan = replace(plan, run=self.kept_program(plan.run, asked))
         return replace(plan, info=noted(plan.info, note))
 
     def cycle_request(

@@ -1,12 +1,15 @@
-"""The cell's machines as a soft PLC: levels of signals, and answers that follow a signal after a
-delay.
+"""The cell's machines as a soft PLC: levels of signals, answers that follow a signal after a delay,
+and machines that work on a part.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Protocol
 
+import numpy as np
+
+from ir_description import Cell, ProcessTimes
 from ir_msgs_py.plc import Signal
 from ir_values.errors import InvalidValueError
 
@@ -32,24 +35,57 @@ class CellSignal(Protocol):
     def delay(self) -> float:
         """Seconds after that signal was set."""
 
+    @property
+    def process(self) -> str:
+        """Machine whose process it reports, or empty."""
+
 
 class Machines:
-    """Levels of all signals; one that was never set is 0."""
+    """Levels of all signals; one that was never set is 0.
 
-    def __init__(self, signals: Iterable[CellSignal] = ()) -> None:
+    times: how long each machine with a process works on a part, by name; where that varies it is
+    drawn, for every machine in a row of its own that the seed decides.
+    """
+
+    def __init__(
+        self,
+        signals: Iterable[CellSignal] = (),
+        times: Mapping[str, ProcessTimes] | None = None,
+        seed: int = 0,
+    ) -> None:
         self._signals = tuple(signals)
+        self._times = times or {}
+        self._draws = {name: np.random.default_rng([seed, *name.encode()]) for name in self._times}
         self._levels = {signal.name: signal.initial for signal in self._signals}
         self._due: list[tuple[float, Signal]] = []
 
+    @staticmethod
+    def of(cell: Cell, seed: int = 0) -> Machines:
+        """The machines of a cell."""
+        times = {
+            machine.name: machine.process_times or ProcessTimes(machine.process, machine.process)
+            for machine in cell.equipment
+            if machine.process > 0.0
+        }
+        return Machines(cell.signals, times, seed)
+
     def set(self, signal: Signal, now: float) -> None:
         """Take a level; machines that follow it will answer later. now: a steady clock [s]."""
+        changed = self._levels.get(signal.name) != signal.value
         self._levels[signal.name] = signal.value
         for each in self._signals:
-            if each.follows == signal.name:
-                self._due = [
-                    (when, answer) for when, answer in self._due if answer.name != each.name
-                ]
+            if each.follows != signal.name or (each.process and not (changed or signal.value)):
+                continue
+            self._due = [(when, answer) for when, answer in self._due if answer.name != each.name]
+            if not each.process:
                 self._due.append((now + each.delay, Signal(each.name, signal.value)))
+                continue
+            if self._levels[each.name]:
+                self._levels[each.name] = False
+                self._due.append((now, Signal(each.name, False)))
+            if signal.value:
+                seconds = self._times[each.process].drawn(self._draws[each.process])
+                self._due.append((now + seconds, Signal(each.name, True)))
 
     def hear(self, signal: Signal, now: float) -> None:
         """Take a level from outside. Raises InvalidValueError for a new name when there are
@@ -64,6 +100,11 @@ class Machines:
     def holds(self, signals: Iterable[Signal]) -> bool:
         """Whether all signals have these levels."""
         return all(self._levels.get(signal.name, False) == signal.value for signal in signals)
+
+    @property
+    def next_answer(self) -> float:
+        """When the next machine answers; inf where none will."""
+        return min((when for when, _ in self._due), default=float("inf"))
 
     def take_answers(self, now: float) -> tuple[Signal, ...]:
         """Answers of the machines that are due, in their order; each is given once."""

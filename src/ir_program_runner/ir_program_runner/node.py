@@ -89,6 +89,10 @@ _FEEDBACK_PERIOD = 0.2  # s: a person reads no faster
 _MACHINES_PERIOD = 0.02  # s: cycle of the soft PLC, as a small real one has
 
 
+def _machines_of(links: LinkSettings) -> Machines:
+    return Machines.of(load_cell(links.cell), links.seed) if links.cell else Machines()
+
+
 class ProgramRunnerNode(Node):
     """Runs one program at a time.
 
@@ -107,11 +111,7 @@ class ProgramRunnerNode(Node):
         self._settings = declare_parameters(self, lambda: self._progress is not None)
         links = self._settings.links.value
         self._send = send
-        self._machines = (
-            Machines(load_cell(links.cell).signals if links.cell else ())
-            if machines is None
-            else machines
-        )
+        self._machines = _machines_of(links) if machines is None else machines
         self._waiting = Waiting(self)
         self._planner = PlannerClient(self, self._waiting, links.planner, links.response_timeout)
         self._driver = self._link_to_driver(links)

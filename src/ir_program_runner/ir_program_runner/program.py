@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate
 
 import numpy as np
 
@@ -70,7 +71,8 @@ def check_program(movements: Sequence[PlannedMovement]) -> None:
     for index, movement in enumerate(movements):
         where = step_name(index, len(movements), movement)
         try:
-            signals = [Signal.parse(text) for text in (*movement.wait_for, *movement.set_signals)]
+            texts = (*movement.wait_for, *movement.set_signals, *filter(None, (movement.since,)))
+            signals = [Signal.parse(text) for text in texts]
             load_after(movement)
         except InvalidValueError as error:
             raise ProgramError(f"{where}: {error}") from error
@@ -159,12 +161,20 @@ _BIT = {row.mode: row.bit or "drives_off" for row in RESTS}
 
 
 class Pause:
-    """One pause; `run()` is the generator that returns a note, "" when all went as planned."""
+    """One pause; `run()` is the generator that returns a note, "" when all went as planned.
+
+    end: of the clock of the outcomes [s], None: as long after its begin as planned.
+    """
 
     def __init__(
-        self, movement: PlannedMovement, settings: ProgramSettings, times: TransitionTimes
+        self,
+        movement: PlannedMovement,
+        settings: ProgramSettings,
+        times: TransitionTimes,
+        end: float | None = None,
     ) -> None:
         self._movement = movement
+        self._end = end
         self._duration = movement.duration
         self._modes = modes_of(movement.power_mode)
         self._settings = settings
@@ -176,6 +186,9 @@ class Pause:
         """Spend the pause; raises StepFailedError when the robot isn't ready in the end."""
         begun = yield Phase("pause")
         end = begun.now + self._duration
+        if self._end is not None:
+            end = max(self._end, begun.now)
+            self._duration = end - begun.now
         if not self._modes:
             outcome = need((yield WaitUntil(end)))
             return self._difference(outcome.energy - begun.energy)
@@ -358,6 +371,9 @@ class Program:
         self._settings = settings
         self._times = times or TransitionTimes()
         self._carried = ""  # load text last sent to the driver; "" = not known
+        # when each step begins by the plan, and when each signal was set by plan and clock [s]
+        self._begins = [0.0, *accumulate(movement.duration for movement in movements)]
+        self._set: dict[str, tuple[float, float]] = {}
 
     def run(self) -> Generator[Request, Outcome, ProgramResult]:
         """Run all steps; ends early with the status of the step that failed, or PREEMPTED."""
@@ -407,7 +423,7 @@ class Program:
         yield from self._carry(movement.load)
         yield Announce(index, Event.STARTED)
         if movement.is_pause:
-            pause = Pause(movement, self._settings, self._times)
+            pause = Pause(movement, self._settings, self._times, self._end_of_pause(index))
             note = yield from pause.run()
             if pause.restarted:
                 self._carried = ""  # the controller has started anew
@@ -421,8 +437,21 @@ class Program:
         yield Done()
         yield from self._carry(load_after(movement))
         for text in movement.set_signals:
-            need((yield SetSignal(Signal.parse(text))))
+            signal = Signal.parse(text)
+            outcome = need((yield SetSignal(signal)))
+            if signal.value:
+                self._set[signal.name] = self._begins[index + 1], outcome.now
         return note
+
+    def _end_of_pause(self, index: int) -> float | None:
+        """As long after the signal that the pause is for was set as planned; None where it is for
+        none, or the program hasn't set it yet.
+        """
+        since = self._set.get(self._movements[index].since)
+        if since is None:
+            return None
+        planned, now = since
+        return now + self._begins[index + 1] - planned
 
     def _wait_for_signals(self, texts: Sequence[str]) -> Steps:
         names = ", ".join(texts)

@@ -61,6 +61,13 @@ class LinkSettings:
         "Cell file or bundled cell whose machines are simulated; empty: signals come from outside.",
         read_only=True,
     )
+    seed: int = setting(
+        0,
+        "Seed of the process times that vary, of the machines that are simulated.",
+        minimum=0,
+        maximum=2**31 - 1,
+        read_only=True,
+    )
     mac: str = setting(CONTROLLER_MAC, "MAC address of the robot's controller.", read_only=True)
     wake_address: str = setting(
         "127.0.0.1", "Where Wake-on-LAN packets go; may be a broadcast.", read_only=True

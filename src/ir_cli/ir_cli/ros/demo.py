@@ -1,8 +1,10 @@
 """`ir demo`: a cell planned, driven, recorded and explained, by real nodes in own processes.
 
-Pauses of the program and the transitions of hibernation and Bus Power Off are shortened, so that it
-takes a minute instead of half an hour; the recording carries the facts and the report shows them.
-The clock is never scaled. The exit code is 0 when every check of the recording held.
+Of a cell with a program its pauses and the transitions of hibernation and Bus Power Off are
+shortened, so that it takes a minute instead of half an hour; the recording carries the facts and
+the report shows them. A cell with a route is tended: its cheapest cycle is planned, the line filled
+from empty, and so many cycles are made, with pauses and transitions as they are. The clock is never
+scaled. The exit code is 0 when every check of the recording held.
 """
 
 from __future__ import annotations
@@ -11,13 +13,14 @@ import argparse
 import math
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ir_cli.errors import DemonstrationError
 from ir_cli.output import Progress, add_renamed, table
+from ir_cli.planning import sentences
 from ir_cli.ports import UDP, free_port
 from ir_cli.ros.domain import apply, own_domain
 from ir_cli.ros.power_tour import MODE_SECONDS, PowerWatch, tour
@@ -27,8 +30,10 @@ from ir_msgs.srv import StartRecording, StopRecording
 from ir_msgs_py import names
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.plc import magic_packet, send_packet
+from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.ros.client import Client, ProgramPlan
 from ir_msgs_py.savings import one_sided
+from ir_planner import Goal, Planner
 from ir_program_runner.settings import LinkSettings
 from ir_recorder import (
     Analysis,
@@ -73,6 +78,7 @@ class Outcome:
             self._movements(),
             self._at_rest(),
             self._cycle(),
+            self._parts(),
             self._saved(),
             *self.analysis.problems,
         ]
@@ -92,6 +98,34 @@ class Outcome:
             cut = f"pauses of {full.full_pauses:.0f} s instead of {full.run_pauses:.0f} s"
             lines.append(f"with full pauses (computed): {_total(full.energy, full.seconds)}; {cut}")
         return "\n".join(lines)
+
+    def _parts(self) -> str:
+        """What each part of a route took, and who waited for whom."""
+        tending = self.analysis.tending
+        if tending is None:
+            return ""
+        header = [
+            "part",
+            "s",
+            "s planned",
+            "J",
+            "J predicted",
+            "robot waited for",
+            "part waited in",
+        ]
+        rows = [
+            [
+                f"{part.number}{' (fills the line)' if part.number <= tending.filling else ''}",
+                f"{part.span.seconds:.2f}",
+                f"{part.planned_seconds:.2f}",
+                f"{part.joules:.0f}",
+                f"{part.planned_joules:.0f}",
+                _listed({**part.paused, **{f"{n}, late": s for n, s in part.late.items()}}),
+                _listed(part.finished),
+            ]
+            for part in tending.parts
+        ]
+        return table(header, rows)
 
     def _saved(self) -> str:
         """What the program saves by its plan, each figure with its baseline."""
@@ -131,6 +165,10 @@ class Outcome:
         ]
         header = ["at rest, machine home", "W by data", "W net", "", "W Table II"]
         return table(header, rows) if rows else ""
+
+
+def _listed(waits: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {seconds:.1f} s" for name, seconds in waits.items()) or "-"
 
 
 def _total(energy: float, seconds: float) -> str:
@@ -188,6 +226,14 @@ machine.
 """
 
 
+@dataclass(frozen=True)
+class Tended:
+    """How a cell with a route is tended: parts an hour (0: as many as possible), whole cycles."""
+
+    parts_per_hour: float = 0.0
+    cycles: int = 3
+
+
 class Demonstration:
     """One run: `run` returns what came out of it, or raises an error with a sentence."""
 
@@ -200,11 +246,16 @@ class Demonstration:
         progress: Progress,
         *,
         real_pauses: bool = False,
+        tended: Tended | None = None,
     ) -> None:
         self._out = out
         self._plant = plant
         self._progress = progress
         full = load_cell(cell)
+        self._steps: tuple[PlannedMovement, ...] = ()
+        if full.route is not None and not full.program:
+            real_pauses = True
+            full, self._steps = self._tending(full, tended or Tended(), seed)
         pauses = [step.dwell for step in full.program if step.kind == "PAUSE"]
         self._full_pauses = [] if real_pauses else pauses
         self._transitions = {} if real_pauses else TRANSITIONS
@@ -213,7 +264,39 @@ class Demonstration:
         self._options = PlanOptions(seed=seed)
         self._link = LinkSettings(wake_port=free_port(UDP))
         loads = ("none", self._cell.tool.name) if self._cell.tool else ("none",)
-        self._loads = loads if full.robot.controller.has_table else ()
+        visited = full.robot.controller.has_table and not self._steps
+        self._loads = loads if visited else ()
+
+    def _tending(
+        self, cell: Cell, tended: Tended, seed: int
+    ) -> tuple[Cell, tuple[PlannedMovement, ...]]:
+        """The run of the cell's cheapest cycle, from its park posture on, and the cell of it."""
+        self._progress.begin("plan the cheapest cycle")
+        planner = Planner(cell, clock=time.monotonic)
+        plan = planner.plan_steady_cycle(
+            parts_per_hour=tended.parts_per_hour, cycles=tended.cycles, seed=seed
+        )
+        if plan.run is None or plan.run_cell is None:
+            raise DemonstrationError(plan.status.message)
+        self._progress.end(repr(plan))
+        planner.set_cell(plan.run_cell)
+        first = plan.run.movements[0]
+        assert first.trajectory is not None
+        start = first.trajectory.positions[0]
+        there = planner.plan_regional(goal=Goal(configuration=start), start="park", seed=seed)
+        if there.trajectory is None:
+            raise DemonstrationError(there.status.message)
+        approach = PlannedMovement(
+            kind=MovementKind.REGIONAL,
+            from_station="park",
+            to_station=first.from_station,
+            trajectory_id=there.trajectory.trajectory_id,
+            trajectory=there.trajectory,
+            report=there.report,
+            duration=there.trajectory.duration,
+            load=first.load,
+        )
+        return plan.run_cell, (approach, *plan.run.movements)
 
     def run(self) -> Outcome:
         """Start the nodes, run the story, stop the nodes, examine the recording."""
@@ -235,7 +318,7 @@ class Demonstration:
                     str(cell_file.resolve()),
                     planner=transitions,
                     driver={**transitions, "wake_port": self._link.wake_port, "plant": self._plant},
-                    runner={"wake_port": self._link.wake_port},
+                    runner={"wake_port": self._link.wake_port, "seed": self._options.seed},
                     recorder={"facts": self._facts(), "roots": [str(self._out.resolve())]},
                 )
             )
@@ -258,6 +341,8 @@ class Demonstration:
         """Plan, visit the modes, drive; why that ended early, "" where it didn't: what was recorded
         till then is reported.
         """
+        if self._steps:
+            return self._tend(client)
         try:
             plan = self._plan(client)
         except RequestRefusedError as error:
@@ -265,7 +350,16 @@ class Demonstration:
             return str(error)
         try:
             self._tour(client)
-            self._drive(client, plan)
+            self._drive(client, plan.program_id)
+        except (DemonstrationError, IrError) as error:
+            self._progress.end("ended early")
+            return str(error)
+        return ""
+
+    def _tend(self, client: Client) -> str:
+        """Drive the run; why that ended early."""
+        try:
+            self._drive(client, self._steps)
         except (DemonstrationError, IrError) as error:
             self._progress.end("ended early")
             return str(error)
@@ -325,10 +419,10 @@ class Demonstration:
         )
         self._progress.end("motors, brakes, Bus Power Off, hibernation, with and without the tool")
 
-    def _drive(self, client: Client, plan: ProgramPlan) -> None:
+    def _drive(self, client: Client, program: str | Sequence[PlannedMovement]) -> None:
         self._progress.begin("drive the program")
         run = client.run_program(
-            plan.program_id,
+            program,
             progress=lambda at: self._progress.update(
                 f"{at.movement + 1}/{at.total} {at.phase}, {at.remaining:.0f} s left"
             ),
@@ -395,6 +489,10 @@ def add_demo(demo: argparse.ArgumentParser) -> None:
     )
     words = "the program's own pauses and the controller's own transitions (default: shortened)"
     demo.add_argument("--real-pauses", action="store_true", help=words)
+    words = "of a cell with a route: its cycle makes at least so many (0: as many as possible)"
+    demo.add_argument("--parts-per-hour", type=float, default=0.0, metavar="R", help=words)
+    words = "of a cell with a route: whole cycles, after the line was filled (3)"
+    demo.add_argument("--cycles", type=int, default=3, metavar="N", help=words)
     demo.set_defaults(run=run)
 
 
@@ -405,7 +503,9 @@ def run(arguments: argparse.Namespace) -> int:
     from ir_cli.ros.domain import alone
 
     words = (arguments.cell, arguments.output, arguments.seed, arguments.plant)
-    with alone(""):
-        outcome = Demonstration(*words, Progress(), real_pauses=arguments.real_pauses).run()
+    tended = Tended(arguments.parts_per_hour, arguments.cycles)
+    real = arguments.real_pauses
+    with alone(""), sentences():
+        outcome = Demonstration(*words, Progress(), real_pauses=real, tended=tended).run()
     sys.stdout.write(outcome.text() + "\n")
     return 0 if outcome.ok else 1

@@ -122,6 +122,8 @@ def check_step(
     for signal in (*step.wait_for, *step.set_signals):
         if signal.name not in signals:
             raise UnknownNameError("signal", signal.name, signals)
+    if step.since and step.since not in signals:
+        raise UnknownNameError("signal", step.since, signals)
     return before.after(step)
 
 
@@ -155,6 +157,16 @@ def check_numbers(signals: Iterable[CellSignal]) -> None:
                 raise InvalidValueError(
                     f"{what} of {signal.name} is {number}, which {other} has already"
                 )
+
+
+def check_processes(signals: Iterable[CellSignal], machines: Iterable[Equipment]) -> None:
+    """Refuse a signal that reports a process that no machine has."""
+    working = [machine.name for machine in machines if machine.process > 0.0]
+    for signal in signals:
+        if signal.process and signal.process not in working:
+            raise UnknownNameError(
+                f"machine with a process that {signal.name} reports", signal.process, working
+            )
 
 
 def check_switch(machine: Equipment, signals: Collection[str]) -> None:
@@ -197,6 +209,7 @@ def check_names(cell: _Cell) -> None:  # noqa: C901
                 f"equipment of station {station.name}", station.equipment, machines
             )
     check_follows(cell.signals)
+    check_processes(cell.signals, cell.equipment)
     check_numbers(cell.signals)
     signals = dict.fromkeys(signal.name for signal in cell.signals)
     for machine in cell.equipment:
@@ -476,7 +489,8 @@ class Cell:
     def parts_at_start(self) -> PartPlaces:
         """Return where the parts are before the program's first step."""
         carrying = self.whole_loads[0].name if self.whole_loads else ""
-        return PartPlaces("", {part.name: part.station for part in self.parts}, carrying)
+        lying = {part.name: part.station for part in self.parts}
+        return PartPlaces("", lying, carrying, self.route)
 
     def loads_at(self, places: PartPlaces) -> tuple[Load, ...]:
         """Return what is carried while the parts are at `places`."""

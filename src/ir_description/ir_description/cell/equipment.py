@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, get_args
@@ -31,6 +31,8 @@ SWITCH_MAX = 3600.0
 """Longest change of a machine's state [s]."""
 PROCESS_MAX = 86_400.0
 """Longest process of a machine [s]: a day."""
+SAMPLES_MAX = 10_000
+"""Most samples of a process."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,13 +102,56 @@ class StateSwitch:
             raise InvalidValueError(f"a switch needs two states, on and off are both {self.on}")
 
 
+@dataclass(frozen=True)
+class ProcessTimes:
+    """How long a machine works on a part where that varies: anything from `low` to `high` s alike,
+    or one of `samples` [s], each as often.
+    """
+
+    low: float
+    high: float
+    samples: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        in_range(self.low, 0.0, PROCESS_MAX, "s", "shortest process")
+        in_range(self.high, self.low, PROCESS_MAX, "s", "longest process")
+        for seconds in self.samples:
+            in_range(seconds, self.low, self.high, "s", "sample of a process")
+
+    @staticmethod
+    def of(samples: Sequence[float]) -> ProcessTimes:
+        """What was measured."""
+        return ProcessTimes(min(samples), max(samples), tuple(samples))
+
+    @property
+    def mean(self) -> float:
+        """Mean [s]."""
+        if self.samples:
+            return sum(self.samples) / len(self.samples)
+        return 0.5 * (self.low + self.high)
+
+    def drawn(self, generator: np.random.Generator) -> float:
+        """Seconds of one part."""
+        if self.samples:
+            return self.samples[int(generator.integers(len(self.samples)))]
+        return float(generator.uniform(self.low, self.high))
+
+    def quantile(self, share: float) -> float:
+        """Seconds [s] that so large a share in [0, 1] of the parts takes at most."""
+        if self.samples:
+            place = int(np.ceil(share * len(self.samples))) - 1
+            return sorted(self.samples)[max(place, 0)]
+        return self.low + share * (self.high - self.low)
+
+
 @dataclass(frozen=True, eq=False)
 class Equipment:
     """A machine. pose (4, 4) in the world; bodies and zone_in_equipment in the machine's frame.
 
     A body that no state names is always there; one that states name is there in these states only.
     Where there is a switch, `state` is the one that plans assume and that counts until its signal
-    is heard. process [s]: how long it works on a part, 0: it doesn't; it holds one part at a time.
+    is heard. process [s]: how long it works on a part as plans count, 0: it doesn't; it holds one
+    part at a time. process_times: where that varies.
     """
 
     name: str
@@ -118,6 +163,7 @@ class Equipment:
     enabled: bool = True
     switch: StateSwitch | None = None
     process: float = 0.0
+    process_times: ProcessTimes | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", frozen_pose(self.pose, f"pose of {self.name}"))

@@ -7,7 +7,7 @@ pause stays where the step before it ended.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
@@ -34,7 +34,9 @@ class CellSignal:
     """A signal of the cell, its value at the start, and how the machine answers.
 
     Where `follows` is given the signal takes its value `delay` [s] after that signal was set (the
-    soft PLC's rule), e.g. the door is open 1.5 s after it was asked to. output, input: its numbers
+    soft PLC's rule), e.g. the door is open 1.5 s after it was asked to. process: the machine whose
+    part it reports, "" for none: it is cleared when the followed signal changes, and set when the
+    process that was started by setting that is over. output, input: its numbers
     at the controller, where the robot sets it and where it reads it, 0: nobody said.
     """
 
@@ -44,6 +46,7 @@ class CellSignal:
     delay: float = 0.0
     output: int = 0
     input: int = 0
+    process: str = ""
 
     def __post_init__(self) -> None:
         for what in ("output", "input"):
@@ -51,6 +54,11 @@ class CellSignal:
         in_range(self.delay, 0.0, PAUSE_MAX, "s", f"delay of {self.name}")
         if self.follows == self.name:
             raise InvalidValueError(f"signal {self.name} follows itself")
+        if self.process and (not self.follows or self.delay):
+            raise InvalidValueError(
+                f"signal {self.name} reports the process of {self.process}: it follows the signal "
+                "that starts it, and has no delay of its own"
+            )
 
 
 @dataclass(frozen=True)
@@ -63,6 +71,8 @@ class ProgramStep:
     whoever plans. planner: which search looks for the regional movement to the target, "": as the
     request says. carries: which of the cell's whole loads is carried from then on, "": as before.
     tilt: how far the tool may lean on the movement to the target, None: as it likes.
+    since: the signal that a pause is for, "": it is as long as it says; else it ends as long after
+    that was set as planned, so that a late machine shifts what depends on it alone.
     """
 
     kind: StepKind
@@ -76,6 +86,7 @@ class ProgramStep:
     planner: str = ""
     carries: str = ""
     tilt: ToolTilt | None = None
+    since: str = ""
 
     def __post_init__(self) -> None:
         in_range(self.dwell, 0.0, PAUSE_MAX, "s", "dwell")
@@ -95,6 +106,8 @@ class ProgramStep:
             raise InvalidValueError("a pause has no planner")
         if self.kind not in ("STATION", "POSTURE") and self.tilt is not None:
             raise InvalidValueError("only movements to stations and postures have a tilt")
+        if self.kind != "PAUSE" and self.since:
+            raise InvalidValueError("only a pause ends some time after a signal was set")
         if self.kind != "STATION" and (self.attach or self.detach):
             raise InvalidValueError("parts are attached and detached at stations only")
         if self.attach and self.detach:
@@ -105,11 +118,15 @@ class ProgramStep:
 class PartPlaces:
     """Where the parts are between two steps: the held one and the station each lies at; "" is
     none. carrying: the one of the cell's whole loads that stands for tool and part, "" for none.
+    route: of the parts that come and go by themselves, None for none: what is put down at its last
+    station is taken away; when a part is put down elsewhere, the next one comes to its first
+    station, the first by name order of the file that isn't there.
     """
 
     held: str
     lying: Mapping[str, str]
     carrying: str = ""
+    route: PartRoute | None = None
 
     def after(self, step: ProgramStep) -> PartPlaces:
         """Return where they are after a step; a step that can't be done is refused."""
@@ -138,8 +155,21 @@ class PartPlaces:
                     raise InvalidValueError(
                         f"{step.detach} can't be detached at {station}, {part} lies there"
                     )
-            return replace(self, held="", lying={**self.lying, step.detach: step.target})
+            lying = {**self.lying, step.detach: step.target}
+            return replace(self, held="", lying=self._supplied(lying))
         return self
+
+    def _supplied(self, lying: dict[str, str]) -> dict[str, str]:
+        """With what the route takes away and brings."""
+        route = self.route
+        if route is None:
+            return lying
+        last = route.visits[-1]
+        lying = {part: "" if station == last else station for part, station in lying.items()}
+        following = route.following(part for part, station in lying.items() if not station)
+        if following and route.visits[0] not in lying.values():
+            lying[following] = route.visits[0]
+        return lying
 
     def _station_of(self, part: str) -> str:
         if part not in self.lying:
@@ -166,3 +196,18 @@ class PartRoute:
                 raise InvalidValueError(
                     f"the route visits {station} twice, at most once is planned"
                 )
+
+    def copy_name(self, number: int) -> str:
+        """Name of a part that is like the one of the route: itself, and copies from 1 on."""
+        return self.part if number == 0 else f"{self.part}.{number}"
+
+    def following(self, absent: Iterable[str]) -> str:
+        """The part that comes to the first station next, of those that aren't in the cell, in their
+        order; "" for none.
+        """
+        return next((p for p in absent if p == self.part or self.is_copy(p)), "")
+
+    def is_copy(self, part: str) -> bool:
+        """Whether a part is named as a copy."""
+        name, _, number = part.rpartition(".")
+        return name == self.part and number.isdigit()

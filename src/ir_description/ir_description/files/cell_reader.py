@@ -33,6 +33,7 @@ from ir_description.cell import (
     check_part_mass,
     check_path,
     check_posture,
+    check_processes,
     check_route,
     check_step,
     check_switch,
@@ -211,6 +212,9 @@ class _CellReader:
         self._check_contacts(placed, paths, equipment, parts)
         signals = self._signals()
         self._check_switches(equipment, signals)
+        if "signals" in self._table:
+            with self._table["signals"].blamed():
+                check_processes(signals, equipment)
         route = self._route(parts, equipment, stations)
         home = self._posture("home", robot.machine_home)
         with self._root.blamed():

@@ -127,10 +127,20 @@ def _machine(machine: Equipment, stations: list[Station]) -> Iterator[str]:
     if machine.switch is not None:
         yield f"switch: {_switch(machine.switch)}"
     if machine.process:
-        yield f"process: {{seconds: {_number(machine.process)}}}"
+        yield f"process: {_process(machine)}"
     yield "bodies:" if machine.bodies else "bodies: []"
     yield from _entries([_body(body)] for body in machine.bodies)
     yield from _block("stations", (_station(station) for station in stations))
+
+
+def _process(machine: Equipment) -> str:
+    times = machine.process_times
+    varies = ""
+    if times is not None:
+        ends = times.samples or (times.low, times.high)
+        key = "samples" if times.samples else "between"
+        varies = f", {key}: [{', '.join(_number(seconds) for seconds in ends)}]"
+    return f"{{seconds: {_number(machine.process)}{varies}}}"
 
 
 def _switch(switch: StateSwitch) -> str:
@@ -188,9 +198,11 @@ def _tilt(tilt: ToolTilt) -> str:
 
 
 def _signal(signal: CellSignal) -> str:
-    follows = (
-        f", follows: {signal.follows}, delay: {_number(signal.delay)}" if signal.follows else ""
-    )
+    follows = f", follows: {signal.follows}" if signal.follows else ""
+    if signal.process:
+        follows += f", process: {signal.process}"
+    elif signal.follows:
+        follows += f", delay: {_number(signal.delay)}"
     given = (("output", signal.output), ("input", signal.input))
     numbers = "".join(f", {key}: {number}" for key, number in given if number)
     return f"{{name: {signal.name}, initial: {_word(signal.initial)}{follows}{numbers}}}"
@@ -200,6 +212,7 @@ def _step(step: ProgramStep) -> str:
     fields = []
     if step.kind == "PAUSE":
         fields += [f"pause: {_number(step.dwell)}", f"power_mode: {step.power_mode}"]
+        fields += [f"since: {step.since}"] if step.since else []
     else:
         fields.append(f"{step.kind.lower()}: {step.target}")
         if step.dwell:
@@ -311,7 +324,7 @@ def cell_hash(cell: Cell) -> str:
 
 
 def _unswitched(machine: Equipment) -> Equipment:
-    machine = replace(machine, process=0.0)
+    machine = replace(machine, process=0.0, process_times=None)
     if machine.switch is None:
         return machine
     return replace(machine, state=machine.states[0].name, switch=None)

@@ -16,6 +16,7 @@ from ir_description.cell import (
     BODIES_MAX,
     CONFIGURATION_SEARCHES,
     PROCESS_MAX,
+    SAMPLES_MAX,
     STARTS_MAX,
     SWITCH_MAX,
     ZONE_KINDS,
@@ -26,6 +27,7 @@ from ir_description.cell import (
     EquipmentState,
     NameRegister,
     Part,
+    ProcessTimes,
     StateSwitch,
     Station,
     StationSearch,
@@ -280,6 +282,7 @@ def read_equipment(item: Item, bodies: BodyReader) -> tuple[Equipment, list[tupl
     table = item.table(("name", "bodies"), _MACHINE_KEYS)
     read = bodies.all(table["bodies"].list(0, BODIES_MAX))
     states = _states(table, bodies)
+    process, times = _process(table["process"]) if "process" in table else (0.0, None)
     machine = Equipment(
         name=table["name"].name(),
         pose=_pose(table),
@@ -289,7 +292,8 @@ def read_equipment(item: Item, bodies: BodyReader) -> tuple[Equipment, list[tupl
         state=_state(table, states),
         enabled=table["enabled"].boolean() if "enabled" in table else True,
         switch=_switch(table["switch"], states) if "switch" in table else None,
-        process=_process(table["process"]) if "process" in table else 0.0,
+        process=process,
+        process_times=times,
     )
     items = table["stations"].list(0, 10_000) if "stations" in table else []
     stations = [_station(station, machine) for station in items]
@@ -351,8 +355,30 @@ def _switch(item: Item, states: tuple[EquipmentState, ...]) -> StateSwitch:
         return StateSwitch(table["signal"].name(), on, off, time)
 
 
-def _process(item: Item) -> float:
-    return item.table(("seconds",))["seconds"].number(0.0, PROCESS_MAX, "s", above=True)
+def _process(item: Item) -> tuple[float, ProcessTimes | None]:
+    """Seconds that plans count with, and how they vary."""
+    table = item.table((), ("seconds", "between", "samples"))
+    times = _process_times(table)
+    if "seconds" in table:
+        return table["seconds"].number(0.0, PROCESS_MAX, "s", above=True), times
+    if times is None:
+        item.fail("has no seconds, must have seconds, between or samples")
+    return times.mean, times
+
+
+def _process_times(table: Table) -> ProcessTimes | None:
+    """Between two ends, or samples; None for neither."""
+    if "between" in table and "samples" in table:
+        table["samples"].fail("stands beside between, must be one of both")
+    if "samples" in table:
+        items = table["samples"].list(1, SAMPLES_MAX)
+        return ProcessTimes.of([one.number(0.0, PROCESS_MAX, "s", above=True) for one in items])
+    if "between" not in table:
+        return None
+    low, high = table["between"].numbers(2, 0.0, PROCESS_MAX, "s")
+    if not 0.0 < low <= high:
+        table["between"].fail(f"is {low:g} to {high:g} s, must rise and be above 0 s")
+    return ProcessTimes(float(low), float(high))
 
 
 def _station(item: Item, machine: Equipment) -> Station:

@@ -48,6 +48,7 @@ _STEP_KEYS = (
         "power_mode",
         "planner",
         "tilt",
+        "since",
     ),
     *_COMMON,
 )
@@ -55,7 +56,7 @@ _KEYS = {
     "station": ("station", "dwell", "attach", "detach", "planner", "tilt", *_COMMON),
     "posture": ("posture", "dwell", "planner", "tilt", *_COMMON),
     "path": ("path", "dwell", "planner", *_COMMON),
-    "pause": ("pause", "power_mode", *_COMMON),
+    "pause": ("pause", "power_mode", "since", *_COMMON),
 }
 
 
@@ -82,20 +83,22 @@ def read_signals(item: Item, high: int) -> list[tuple[Item, CellSignal]]:
 
 def _cell_signal(item: Item, named: str = "") -> CellSignal:
     table = item.table(
-        () if named else ("name",), ("initial", "follows", "delay", "output", "input")
+        () if named else ("name",), ("initial", "follows", "delay", "process", "output", "input")
     )
     if "delay" in table and "follows" not in table:
         table["delay"].fail("belongs to a signal that follows another")
     numbers = {
         key: table[key].integer(1, NUMBER_MAX) for key in ("output", "input") if key in table
     }
-    return CellSignal(
-        name=named or table["name"].name(),
-        initial=table["initial"].boolean() if "initial" in table else False,
-        follows=table["follows"].name() if "follows" in table else "",
-        delay=table["delay"].number(0.0, PAUSE_MAX, "s") if "delay" in table else 0.0,
-        **numbers,
-    )
+    with item.blamed():
+        return CellSignal(
+            name=named or table["name"].name(),
+            initial=table["initial"].boolean() if "initial" in table else False,
+            follows=table["follows"].name() if "follows" in table else "",
+            delay=table["delay"].number(0.0, PAUSE_MAX, "s") if "delay" in table else 0.0,
+            process=table["process"].name() if "process" in table else "",
+            **numbers,
+        )
 
 
 def read_step(item: Item) -> ProgramStep:
@@ -121,6 +124,7 @@ def read_step(item: Item) -> ProgramStep:
             wait_for=wait_for,
             set_signals=set_signals,
             power_mode=mode,
+            since=table["since"].name() if "since" in table else "",
         )
     moving: _Moving = {
         "dwell": table["dwell"].number(0.0, PAUSE_MAX, "s") if "dwell" in table else 0.0,

@@ -45,6 +45,7 @@ from ir_msgs_py.ros.network import apply_network
 from ir_msgs_py.ros.plan_conversions import (
     plan_options_to_msg,
     planned_movement_from_msg,
+    planned_movement_to_msg,
     planning_info_from_msg,
     program_point_from_msg,
     program_savings_from_msg,
@@ -545,14 +546,16 @@ class Client:
 
     def run_program(
         self,
-        program_id: str,
+        program: str | Sequence[PlannedMovement],
         progress: Callable[[RunProgram.Feedback], object] | None = None,
         timeout: float = float("inf"),
     ) -> ProgramRun:
-        """Run a planned program; progress gets the action's feedback."""
-        result = self.send_goal(
-            names.RUN_PROGRAM, RunProgram.Goal(program_id=program_id), progress, timeout
-        )
+        """Run a planned program, by its id or its steps; progress gets the action's feedback."""
+        if isinstance(program, str):
+            goal = RunProgram.Goal(program_id=program)
+        else:
+            goal = RunProgram.Goal(movements=[planned_movement_to_msg(step) for step in program])
+        result = self.send_goal(names.RUN_PROGRAM, goal, progress, timeout)
         _check(names.RUN_PROGRAM, result)
         return ProgramRun(int(result.executed), float(result.duration), float(result.energy))
 

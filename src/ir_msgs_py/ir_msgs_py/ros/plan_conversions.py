@@ -76,6 +76,7 @@ _TEXTS = (
     "attach",
     "detach",
     "load",
+    "since",
 )
 
 

@@ -13,7 +13,7 @@ that are chosen (a time is zero where its hop isn't), a power mode is a range of
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -114,7 +114,9 @@ class SteadyProblem:
     """activities (m + 1): their curves. hops: of the empty hops by the activities that they are
     between; where one is missing, the next activity begins where the other ended. after, before:
     modes of a wait at the end of each activity and at the begin of each. process (m): seconds of
-    the machines; the one of machine a + 1 lies between the activities a and a + 1.
+    the machines; the one of machine a + 1 lies between the activities a and a + 1. own, own_hops:
+    curves of an activity of one unit, and of the hops after it by the activity that follows, where
+    they aren't those of all units.
     """
 
     activities: tuple[Curve, ...]
@@ -122,6 +124,16 @@ class SteadyProblem:
     after: tuple[tuple[WaitMode, ...], ...]
     before: tuple[tuple[WaitMode, ...], ...]
     process: tuple[float, ...]
+    own: Mapping[Node, Curve] = field(default_factory=dict)
+    own_hops: Mapping[tuple[Node, int], Curve] = field(default_factory=dict)
+
+    def activity(self, node: Node) -> Curve:
+        """The curve of an activity of a unit."""
+        return self.own.get(node, self.activities[node[0]])
+
+    def hop(self, node: Node, following: int) -> Curve | None:
+        """The curve of the hop after it; None where the next activity begins where it ended."""
+        return self.own_hops.get((node, following), self.hops.get((node[0], following)))
 
     @property
     def longest(self) -> float:
@@ -167,6 +179,16 @@ class SteadyCycle:
     bound: float
 
     @property
+    def seconds_per_part(self) -> float:
+        """Of the period, for each part [s]."""
+        return self.period / self.units
+
+    @property
+    def joules_per_part(self) -> float:
+        """Of the energy, for each part [J]."""
+        return self.joules / self.units
+
+    @property
     def order(self) -> tuple[Node, ...]:
         """The activities in order."""
         return tuple((visit.activity, visit.unit) for visit in self.visits)
@@ -207,9 +229,8 @@ class _Model:
         self.period = self.program.variable(0.0, period, cost=float(fastest))
         self.start = {node: self._time(node) for node in self.nodes}
         self.duration: dict[Node, dict[int, float]] = {}
-        self.shortest = {a: curve.seconds[0] for a, curve in enumerate(problem.activities)}
         for node in self.nodes:
-            curve = problem.activities[node[0]]
+            curve = problem.activity(node)
             self.duration[node] = self._segments(curve, self._cost(curve.joules[0]), None)
         self.waits: dict[tuple[str, Node], list[tuple[WaitMode, int, int]]] = {}
         for node in self.nodes:
@@ -265,7 +286,7 @@ class _Model:
             for other in self.nodes:
                 if node[0] == other[0]:
                     continue
-                curve = self.problem.hops.get((node[0], other[0]))
+                curve = self.problem.hop(node, other[0])
                 arc = node, other
                 joules = 0.0 if curve is None else curve.joules[0]
                 self.taken[arc] = program.binary(cost=self.price * joules)

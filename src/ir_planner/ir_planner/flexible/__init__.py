@@ -3,7 +3,9 @@
 from ir_planner.flexible.columns import RUNGS, Column, slowed_down
 from ir_planner.flexible.steady_plan import (
     CyclePoint,
+    CycleStep,
     SteadyPlan,
+    cycle_steps,
     machine_bars,
     plan_steady_cycle,
     robot_bars,
@@ -14,7 +16,9 @@ __all__ = [
     "RUNGS",
     "Column",
     "CyclePoint",
+    "CycleStep",
     "SteadyPlan",
+    "cycle_steps",
     "machine_bars",
     "plan_steady_cycle",
     "robot_bars",

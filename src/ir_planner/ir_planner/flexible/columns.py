@@ -38,6 +38,9 @@ from ir_planner.timing import Movement
 Key = tuple[str, str, str, bool]
 """A kind of movement, from which station, to which, and whether a part is held."""
 
+UnitKey = tuple[Key, int]
+"""The same of one of the units of a cycle."""
+
 RUNGS = (20, 17, 14, 11, 8, 5, 2, 0)  # of the ladder of time values: from time alone to least
 _SLOWER = (1.15, 1.3, 1.5, 1.75, 2.0, 2.5, 3.0)  # times the slowest, where a wait costs more
 
@@ -214,6 +217,19 @@ def _configurations(
     return {
         name: choices[name][chosen] for name, chosen in zip(visits, chain.chosen[1:], strict=False)
     }
+
+
+def activity_keys(visits: Sequence[str], activity: int) -> list[Key]:
+    """The movements of an activity in order."""
+    start = visits[activity]
+    end = visits[activity + 1]
+    return [
+        (ENTER, start, start, False),
+        (LEAVE, start, start, True),
+        (ACROSS, start, end, True),
+        (ENTER, end, end, True),
+        (LEAVE, end, end, False),
+    ]
 
 
 def exact(movement: Movement, scene: PlanningScene, station: str) -> Movement:

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_description import Cell
+from ir_description import Cell, ProgramStep
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import interval
 from ir_planner.cycle import SteadyCycle, Visit, Wait
-from ir_planner.flexible.columns import Key, Tending, exact
+from ir_planner.flexible.columns import Tending, UnitKey, activity_keys, exact
+from ir_planner.flexible.cycle_program import Lengths, cycle_program, occupied, run_program
 from ir_planner.flexible.tending_cell import (
-    cycle_program,
     front_name,
     machines_of,
-    program_cell,
+    with_copies,
+    with_signals,
 )
 from ir_planner.program import (
     ACROSS,
@@ -29,7 +30,6 @@ from ir_planner.program import (
     Movements,
     Node,
     Part,
-    PlacedStep,
     ProgramRequest,
     Route,
     Scenes,
@@ -77,52 +77,32 @@ class CycleSaving:
         )
 
 
-class CycleSteps:
-    """The steps of a cycle with the chosen movements, each proved in the scene it is driven in."""
+class RouteSteps:
+    """Programs among the configurations of a route, with certified movements, each proved in the
+    scene in which it is driven. finished: places where a part lies at the begin.
+    """
 
     def __init__(
-        self,
-        request: ProgramRequest,
-        tending: Tending,
-        cycle: SteadyCycle,
-        movements: Mapping[Key, Movement],
-        context: Context,
+        self, request: ProgramRequest, tending: Tending, first: int, finished: Sequence[int]
     ) -> None:
-        self._tending = tending
-        self._cycle = cycle
-        scene = tending.empty
-        fronts = {
-            name: scene.chain.tcp_poses(node.departure[None])[0]
-            for name, node in tending.nodes.items()
-        }
-        self.cell: Cell = program_cell(request.cell, cycle, fronts)
-        first = tending.route.visits[cycle.visits[0].activity]
-        start = tending.nodes[first].departure
-        self._request = replace(request, cell=self.cell, start=start, stations=(), cycle_time=0.0)
-        self._context = context
+        self.tending = tending
+        self.cell = _cell_of(request.cell, tending, finished)
+        start = tending.nodes[tending.route.visits[first]].departure
+        self.request = replace(request, cell=self.cell, start=start, stations=(), cycle_time=0.0)
         self._scenes = Scenes(self.cell, request.power, request.settings.drives(self.cell.robot))
         self._names = {front_name(name): name for name in tending.route.visits}
-        self._choice = self._along(cycle, {name: [n] for name, n in tending.nodes.items()})
-        self._found = {part: self._exact(part, movements) for part in self._choice.parts}
+        self._proved: dict[tuple[UnitKey, int, str], Movement] = {}
 
-    @property
-    def request(self) -> ProgramRequest:
-        """The request for the program of the cycle, from in front of its first station."""
-        return self._request
-
-    @property
-    def steps(self) -> tuple[PlannedMovement, ...]:
-        """Movements and pauses of one cycle."""
-        return self._choice.steps(self._found)
-
-    def _placed(self, cycle: SteadyCycle) -> tuple[PlacedStep, ...]:
-        program = cycle_program(self._tending.cell, cycle)
-        return placed_steps(self.cell, program, self.cell.parts_at_start(), self._request.doors)
-
-    def _along(self, cycle: SteadyCycle, nodes: Mapping[str, list[Node]]) -> Choice:
-        """The steps of a cycle over configurations at the stations; it ends where it starts."""
-        route = Route.over(self._placed(cycle), self._scenes)
-        begin = Node(ServiceLine(self._request.start[None]))
+    def along(
+        self,
+        program: tuple[ProgramStep, ...],
+        nodes: Mapping[str, Sequence[Node]],
+        context: Context,
+    ) -> Choice:
+        """A program over configurations at the stations; it ends where it starts."""
+        steps = placed_steps(self.cell, program, self.cell.parts_at_start(), self.request.doors)
+        route = Route.over(steps, self._scenes)
+        begin = Node(ServiceLine(self.request.start[None]))
         layers = [[begin]]
         for place in range(len(route)):
             name = route.name(place)
@@ -130,23 +110,47 @@ class CycleSteps:
                 at = nodes[self._names[name]]
                 layers.append([Node(ServiceLine(node.departure[None])) for node in at])
             else:
-                layers.append(nodes[name])
+                layers.append(list(nodes[name]))
         layers[-1] = [begin]
-        context = self._context.inside(self._scenes.before(route.steps[0]))
-        settings = self._request.settings
+        context = context.inside(self._scenes.before(route.steps[0]))
+        settings = self.request.settings
         movements = Movements(route, layers, context, settings.searches)
         chain = Chain([0] * len(layers), 0.0, 0.0, 0.0)
-        return Choice(self._request, Ladder(movements, settings.improvement_iterations), chain)
+        return Choice(self.request, Ladder(movements, settings.improvement_iterations), chain)
 
-    def _exact(self, part: Part, movements: Mapping[Key, Movement]) -> Movement:
-        route = self._choice.movements.route
+    def steps(
+        self,
+        program: tuple[ProgramStep, ...],
+        units: Sequence[int],
+        movements: Mapping[UnitKey, Movement],
+        context: Context,
+    ) -> tuple[PlannedMovement, ...]:
+        """The program in these movements; units: of its transports in order. Raises StageError for
+        one that isn't free there.
+        """
+        choice = self.along(program, {n: [node] for n, node in self.tending.nodes.items()}, context)
+        route = choice.movements.route
+        taken = np.cumsum([route.at(place).step.attach != "" for place in range(len(route))])
+        found = {
+            part: self._exact(part, route, movements, units[taken[part.hop] - 1])
+            for part in choice.parts
+        }
+        return choice.steps(found)
+
+    def _exact(
+        self, part: Part, route: Route, movements: Mapping[UnitKey, Movement], unit: int
+    ) -> Movement:
         ends = [self._station(route.name(part.hop - 1)), self._station(route.name(part.hop))]
         if part.kind != ACROSS:
             ends = [ends[part.kind == ENTER]] * 2
         loaded = route.at(part.hop).before.held != ""
         station = "" if part.kind == ACROSS else ends[0]
-        key = part.kind, ends[0], ends[1], loaded
-        found = exact(movements[key], route.arriving(part.hop), station)
+        key = (part.kind, ends[0], ends[1], loaded), unit
+        scene = route.arriving(part.hop)
+        known = key, id(scene), station
+        if known not in self._proved:
+            self._proved[known] = exact(movements[key], scene, station)
+        found = self._proved[known]
         if found.violation is not None:
             sentence = f"{part.kind} {' to '.join(ends)}: {found.violation.sentence}"
             raise StageError(Status(StatusCode.PLANNING_FAILED, sentence))
@@ -154,6 +158,82 @@ class CycleSteps:
 
     def _station(self, name: str) -> str:
         return self._names.get(name, name)
+
+
+def _cell_of(cell: Cell, tending: Tending, finished: Sequence[int]) -> Cell:
+    """With as many parts as can be in flight, one more than machines and one for the gripper; those
+    at the machines before which one lies finished, the others aren't there yet.
+    """
+    route = tending.route
+    scene = tending.empty
+    stations = {
+        number: route.visits[number] if number in finished else ""
+        for number in range(1, len(route.visits))
+    }
+    fronts = {
+        name: scene.chain.tcp_poses(node.departure[None])[0] for name, node in tending.nodes.items()
+    }
+    return with_signals(cell, with_copies(cell, stations), fronts, finished)
+
+
+class CycleSteps:
+    """The steps of a cycle with the chosen movements."""
+
+    def __init__(
+        self,
+        request: ProgramRequest,
+        tending: Tending,
+        cycle: SteadyCycle,
+        movements: Mapping[UnitKey, Movement],
+        context: Context,
+    ) -> None:
+        self._request = request
+        self._tending = tending
+        self._cycle = cycle
+        self._context = context
+        self._movements = movements
+        self._first = cycle.visits[0].activity
+        self._route = RouteSteps(request, tending, self._first, occupied(cycle))
+        program = cycle_program(self._route.cell, cycle)
+        self.cell: Cell = replace(self._route.cell, program=program)
+        units = [visit.unit for visit in cycle.visits]
+        self.steps = self._route.steps(program, units, movements, context)
+
+    @property
+    def request(self) -> ProgramRequest:
+        """The request for the program of the cycle, from in front of its first station."""
+        return replace(self._route.request, cell=self.cell)
+
+    def run(self, cycles: int) -> tuple[Cell, tuple[PlannedMovement, ...]]:
+        """The steps that fill the line from empty and make so many whole cycles, and their cell."""
+        route = RouteSteps(self._request, self._tending, self._first, ())
+        program, units = run_program(route.cell, self._cycle, self._run_lengths(), cycles)
+        steps = route.steps(program, units, self._movements, self._context)
+        return replace(route.cell, program=program), steps
+
+    def _run_lengths(self) -> Lengths:
+        """Seconds of every activity and every empty hop in the chosen movements."""
+        visits = self._tending.route.visits
+        count = len(visits) - 1
+        units = range(self._cycle.units)
+        seconds = {key: found.trajectory.duration for key, found in self._movements.items()}
+        handling = 2.0 * self._tending.route.handling
+        activities = {
+            (a, unit): handling + sum(seconds[key, unit] for key in activity_keys(visits, a))
+            for a in range(count)
+            for unit in units
+        }
+        hops = {
+            ((a, unit), b): seconds[(ACROSS, visits[a + 1], visits[b], False), unit]
+            for a in range(count)
+            for b in range(count)
+            if b not in (a, a + 1)
+            for unit in units
+        }
+        return Lengths(activities, hops)
+
+    def _along(self, cycle: SteadyCycle, nodes: Mapping[str, Sequence[Node]]) -> Choice:
+        return self._route.along(cycle_program(self._route.cell, cycle), nodes, self._context)
 
     def saving(self, spreads: Spreads) -> CycleSaving:
         """Against the common cycle. Raises StageError where that isn't found."""
@@ -164,15 +244,16 @@ class CycleSteps:
         own = self.steps
         energies = [sum(step.report.energy for step in each) for each in (own, steps)]
         added = sum(spreads.of(steps), np.zeros(1)) - sum(spreads.of(own), np.zeros(1))
-        saved = interval(energies[1] - energies[0], added)
+        units = cycle.units
+        saved = interval((energies[1] - energies[0]) / units, added / units)
         return CycleSaving(
-            joules=energies[0],
-            common=energies[1],
+            joules=energies[0] / units,
+            common=energies[1] / units,
             low=saved.low,
             high=saved.high,
             period=self._cycle.period,
             common_period=cycle.period,
-            on_motors=energies[1] + self._more_on_motors(cycle),
+            on_motors=(energies[1] + self._more_on_motors(cycle)) / units,
         )
 
     def _more_on_motors(self, cycle: SteadyCycle) -> float:
@@ -193,14 +274,14 @@ class CycleSteps:
         visits = self._cycle.visits
         cell = self._tending.cell
         process = [cell.machine(name).process for name in machines_of(cell)]
-        order = [visit.activity for visit in visits]
+        order = [(visit.activity, visit.unit) for visit in visits]
         count = len(order)
         waits = np.zeros(count)
         for _ in range(4 * count):
-            for k, activity in enumerate(order):
+            for k, (activity, unit) in enumerate(order):
                 if activity == 0:
                     continue
-                i = order.index(activity - 1)
+                i = order.index((activity - 1, unit))
                 since = lengths[i][1]
                 i = (i + 1) % count
                 while i != k:
@@ -214,9 +295,10 @@ class CycleSteps:
         for k, visit in enumerate(visits):
             here += float(waits[k]) if k else 0.0
             before = (Wait(MOTORS, float(waits[k])),) if waits[k] > 0.0 else ()
-            again.append(Visit(visit.activity, 0, here, *lengths[k], before, ()))
+            again.append(Visit(visit.activity, visit.unit, here, *lengths[k], before, ()))
             here += sum(lengths[k])
-        return SteadyCycle(tuple(again), max(period, self._cycle.period), 1, np.nan, np.nan)
+        period = max(period, self._cycle.period)
+        return SteadyCycle(tuple(again), period, self._cycle.units, np.nan, np.nan)
 
     def _lengths(self, choice: Choice, found: Mapping[Part, Movement]) -> list[tuple[float, float]]:
         """Seconds of every activity and of the hop after it."""

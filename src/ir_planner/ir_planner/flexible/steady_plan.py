@@ -13,6 +13,7 @@ from ir_msgs_py.modes import DEEPER
 from ir_msgs_py.report import PlanningInfo
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.cycle import (
+    UNITS_MAX,
     Curve,
     SteadyCycle,
     SteadyProblem,
@@ -23,14 +24,19 @@ from ir_planner.cycle import (
     shared_among,
 )
 from ir_planner.errors import RequestError
-from ir_planner.flexible.columns import Column, Key, Tending, planned_columns
+from ir_planner.flexible.columns import (
+    Column,
+    Key,
+    Tending,
+    UnitKey,
+    activity_keys,
+    planned_columns,
+)
 from ir_planner.flexible.cycle_steps import CycleSaving, CycleSteps
-from ir_planner.flexible.tending_cell import held_from, machines_of, route_of
+from ir_planner.flexible.tending_cell import held_from, machines_of, route_of, without_cycle
 from ir_planner.presentation import plot_cycle, plot_throughputs
 from ir_planner.program import (
     ACROSS,
-    ENTER,
-    LEAVE,
     MOTORS,
     ProgramPlan,
     ProgramRequest,
@@ -47,6 +53,7 @@ from ir_planner.timing import Movement
 
 HOUR = 3600.0
 FRONT_MAX = 50
+CYCLES_MAX = 50
 _LONGEST_WAIT = 86_400.0  # s: no wait of a cycle is longer
 _ROUNDING = 1e-6  # s: of the linear program
 _SLACK = 1.0005  # of the shortest period: the first point of the front
@@ -69,12 +76,14 @@ class CyclePoint:
 class SteadyPlan:
     """cycle: the schedule; gap [%]: how far above the cheapest one it can be, for the
     configurations that were chosen and movements that begin with an empty capacitor. program: its
-    movements and pauses, in `cell`. fastest [s]: the shortest period.
+    movements and pauses, in `cell`. fastest [s]: the shortest period. run: the program that fills
+    the line and makes the cycles that were asked for, in `run_cell`; None for none.
     """
 
     status: Status
     info: PlanningInfo
     parts_per_hour: float = 0.0
+    stations: tuple[str, ...] = ()
     machines: tuple[str, ...] = ()
     process: tuple[float, ...] = ()
     request: ProgramRequest | None = None
@@ -84,14 +93,23 @@ class SteadyPlan:
     cell: Cell | None = None
     program: ProgramPlan | None = None
     saving: CycleSaving | None = None
+    run: ProgramPlan | None = None
+    run_cell: Cell | None = None
     front: tuple[CyclePoint, ...] = field(default=())
+
+    @property
+    def joules(self) -> float:
+        """Joules a part, with what the capacitor carries from one movement to the next."""
+        if self.cycle is None or self.program is None:
+            return np.nan
+        return self.program.report.energy / self.cycle.units
 
     def __repr__(self) -> str:
         if self.cycle is None or self.program is None:
             return f"SteadyPlan({self.status.message})"
         return (
-            f"SteadyPlan({HOUR / self.cycle.period:.1f} parts an hour, "
-            f"{self.cycle.period:.2f} s, {self.program.report.energy:.0f} J a part, "
+            f"SteadyPlan({self.cycle.units * HOUR / self.cycle.period:.1f} parts an hour, "
+            f"{self.cycle.period:.2f} s, {self.joules:.0f} J a part, "
             f"gap {self.gap:.2f} %)"
         )
 
@@ -107,23 +125,58 @@ class SteadyPlan:
         return plot_throughputs(points, repr(self))
 
 
-def robot_bars(plan: SteadyPlan) -> tuple[tuple[str, float, float, str], ...]:
-    """What the robot does: name, begin, length [s], and kind: transport, hop or a power mode."""
+TRANSPORT = "transport"
+HOP = "hop"
+WAIT = "wait"
+
+
+@dataclass(frozen=True)
+class CycleStep:
+    """A step of a cycle: a transport of a part, of which unit, an empty hop, or a wait in a power
+    mode, between stations of the route. start, seconds [s].
+    """
+
+    kind: str
+    from_station: str
+    to_station: str
+    unit: int
+    start: float
+    seconds: float
+    power_mode: str = ""
+
+
+def cycle_steps(plan: SteadyPlan) -> tuple[CycleStep, ...]:
+    """The steps of one cycle in order."""
     assert plan.cycle is not None
-    bars = []
+    steps: list[CycleStep] = []
     following = (*plan.cycle.visits[1:], plan.cycle.visits[0])
     for visit, after in zip(plan.cycle.visits, following, strict=True):
-        names = plan.machines[visit.activity], plan.machines[visit.activity + 1]
-        here = visit.start
-        entries = [(f"{names[0]} to {names[1]}", visit.seconds, "transport")]
-        entries += [(wait.mode, wait.seconds, wait.mode) for wait in visit.after]
-        entries.append((f"to {plan.machines[after.activity]}", visit.hop, "hop"))
-        entries += [(wait.mode, wait.seconds, wait.mode) for wait in after.before]
-        for name, seconds, kind in entries:
+        here = plan.stations[visit.activity + 1]
+        there = plan.stations[after.activity]
+        now = visit.start
+        parts = [(TRANSPORT, plan.stations[visit.activity], here, visit.seconds, "")]
+        parts += [(WAIT, here, here, wait.seconds, wait.mode) for wait in visit.after]
+        parts.append((HOP, here, there, visit.hop, ""))
+        parts += [(WAIT, there, there, wait.seconds, wait.mode) for wait in after.before]
+        for kind, start, end, seconds, mode in parts:
             if seconds > _SAME:
-                bars.append((name, here, seconds, kind))
-            here += seconds
-    return tuple(bars)
+                steps.append(CycleStep(kind, start, end, visit.unit, now, seconds, mode))
+            now += seconds
+    return tuple(steps)
+
+
+def robot_bars(plan: SteadyPlan) -> tuple[tuple[str, float, float, str], ...]:
+    """What the robot does: name, begin, length [s], and kind: transport, hop or a power mode."""
+    machine = dict(zip(plan.stations, plan.machines, strict=True))
+    names = {
+        TRANSPORT: lambda step: f"{machine[step.from_station]} to {machine[step.to_station]}",
+        HOP: lambda step: f"to {machine[step.to_station]}",
+        WAIT: lambda step: step.power_mode,
+    }
+    return tuple(
+        (names[step.kind](step), step.start, step.seconds, step.power_mode or step.kind)
+        for step in cycle_steps(plan)
+    )
 
 
 def machine_bars(plan: SteadyPlan) -> dict[str, tuple[tuple[float, float], ...]]:
@@ -152,13 +205,19 @@ def plan_steady_cycle(
     *,
     front_points: int = 0,
     saving: bool = False,
+    cycles: int = 0,
+    units: int = 1,
 ) -> SteadyPlan:
     """The cheapest cycle of the route of the request's cell that makes at least so many parts an
-    hour; 0: as many as possible. Raises RequestError for a request that makes no sense,
-    CancelledError when stopped.
+    hour; 0: as many as possible. units: parts a cycle at most. cycles: whole ones of the run that
+    fills the line from empty and goes on so; 0: no run. Raises RequestError for a request that
+    makes no sense, CancelledError when stopped.
     """
     bounded(parts_per_hour, 0.0, HOUR, "parts_per_hour")
     bounded(front_points, 0, FRONT_MAX, "front_points")
+    bounded(cycles, 0, CYCLES_MAX, "cycles")
+    bounded(units, 1, UNITS_MAX, "units")
+    request = replace(request, cell=without_cycle(request.cell))
     route = route_of(request.cell)
     request.check()
     journal = Journal(work, request.options.seed)
@@ -172,16 +231,15 @@ def plan_steady_cycle(
         return SteadyPlan(failed.status, info)
     model = _TendingModel(request, tending)
     with journal.stage("steady cycle") as notes:
-        fastest = fastest_cycle(model.problem)
-        assert fastest is not None  # without a bound there is one
-        period = HOUR / parts_per_hour if parts_per_hour > 0.0 else fastest.period * _SLACK
-        if period < fastest.period - _ROUNDING:
+        fastest = model.fastest(units).seconds_per_part
+        period = HOUR / parts_per_hour if parts_per_hour > 0.0 else fastest * _SLACK
+        if period < fastest - _ROUNDING:
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"parts_per_hour is {parts_per_hour:g}, a cycle of {period:.2f} s: at most "
-                f"{HOUR / fastest.period:.2f} are possible, a cycle of {fastest.period:.2f} s",
+                f"parts_per_hour is {parts_per_hour:g}, one in {period:.2f} s: at most "
+                f"{HOUR / fastest:.2f} are possible, one in {fastest:.2f} s",
             )
-        chosen = model.cheapest(max(period, fastest.period * _SLACK))
+        chosen = model.cheapest(max(period, fastest * _SLACK), units)
         notes.append(f"{chosen.cycle.period:.2f} s, {chosen.cycle.joules:.0f} J")
     try:
         made = CycleSteps(request, tending, chosen.cycle, chosen.movements, context)
@@ -191,21 +249,30 @@ def plan_steady_cycle(
         status=Status.success(),
         info=journal.info(request.start, context.joint_names),
         parts_per_hour=parts_per_hour,
+        stations=route.visits,
         machines=machines_of(request.cell),
         process=model.problem.process,
         cycle=chosen.cycle,
         request=made.request,
         gap=chosen.gap,
-        fastest=fastest.period,
+        fastest=fastest,
         cell=made.cell,
         program=program_of(made.steps),
     )
     if saving:
         with journal.stage("saving"):
             plan = replace(plan, saving=made.saving(Spreads(made.request)))
+    if cycles:
+        try:
+            with journal.stage("run"):
+                run_cell, steps = made.run(cycles)
+        except StageError as failed:
+            info = journal.info(request.start, context.joint_names)
+            return replace(plan, status=failed.status, info=info)
+        plan = replace(plan, run=program_of(steps), run_cell=run_cell)
     if front_points:
         with journal.stage("front"):
-            plan = replace(plan, front=_front(model, fastest.period, front_points))
+            plan = replace(plan, front=_front(model, fastest, front_points, units))
     return replace(plan, info=journal.info(request.start, context.joint_names))
 
 
@@ -214,7 +281,7 @@ class _Chosen:
     """A cycle of certified movements, and what no cycle can be below."""
 
     cycle: SteadyCycle
-    movements: Mapping[Key, Movement]
+    movements: Mapping[UnitKey, Movement]
     bound: float
 
     @property
@@ -256,20 +323,8 @@ class _TendingModel:
             rests_at(q, self.tending.empty, times).motors * route.handling,
         )
 
-    def _keys(self, activity: int) -> list[Key]:
-        """The movements of an activity in order."""
-        start = self.visits[activity]
-        end = self.visits[activity + 1]
-        return [
-            (ENTER, start, start, False),
-            (LEAVE, start, start, True),
-            (ACROSS, start, end, True),
-            (ENTER, end, end, True),
-            (LEAVE, end, end, False),
-        ]
-
     def _activity(self, activity: int) -> Curve:
-        curves = [self.tending.columns[key].curve for key in self._keys(activity)]
+        curves = [self.tending.columns[key].curve for key in activity_keys(self.visits, activity)]
         return self._with_handling(in_turn(curves), activity)
 
     def _with_handling(self, curve: Curve, activity: int) -> Curve:
@@ -285,44 +340,66 @@ class _TendingModel:
             if b not in (a, a + 1)
         }
 
-    def cheapest(self, period: float) -> _Chosen:
-        """The cheapest cycle within a period [s], of movements that are certified at the durations
-        that the linear problem chose, and its waits once more for these.
+    def fastest(self, units: int) -> SteadyCycle:
+        """The fastest cycle of at most so many units."""
+        cycles = [fastest_cycle(self.problem, units=count) for count in range(1, units + 1)]
+        found = [cycle for cycle in cycles if cycle is not None]  # without a bound there is one
+        return min(found, key=lambda cycle: cycle.seconds_per_part)
+
+    def cheapest(self, period: float, units: int) -> _Chosen:
+        """The cheapest cycle of at most so many units within a period a part [s]."""
+        found = [self._cheapest(period, count) for count in range(1, units + 1)]
+        known = [chosen for chosen in found if chosen is not None]  # one can be as fast as that
+        return min(known, key=lambda chosen: chosen.cycle.joules_per_part)
+
+    def _cheapest(self, period: float, units: int) -> _Chosen | None:
+        """Of exactly so many units, of movements that are certified at the durations that the
+        linear problem chose, and its waits once more for these; None where there is none.
         """
-        cycle = cheapest_cycle(self.problem, period=period)
-        assert cycle is not None  # the period isn't below the shortest
+        cycle = cheapest_cycle(self.problem, period=period, units=units)
+        if cycle is None:
+            return None
         movements = self._realised(cycle)
-        again = cheapest_cycle(self._fixed(movements), period=period + _ROUNDING)
+        again = cheapest_cycle(
+            self._fixed(movements, units), period=period + _ROUNDING, units=units
+        )
         assert again is not None  # no movement takes longer than was chosen
         return _Chosen(again, movements, cycle.bound)
 
-    def _realised(self, cycle: SteadyCycle) -> dict[Key, Movement]:
+    def _realised(self, cycle: SteadyCycle) -> dict[UnitKey, Movement]:
         columns = self.tending.columns
         hops = self._hops()
-        movements = {key: columns[key].movements[0] for key in hops.values()}
+        movements = {
+            (key, unit): columns[key].movements[0]
+            for key in hops.values()
+            for unit in range(cycle.units)
+        }
         following = (*cycle.visits[1:], cycle.visits[0])
         for visit, after in zip(cycle.visits, following, strict=True):
-            keys = self._keys(visit.activity)
+            keys = activity_keys(self.visits, visit.activity)
             own = [columns[key] for key in keys]
             moving = visit.seconds - 2.0 * self.tending.route.handling
             lengths = shared_among([column.curve for column in own], moving)
             for key, column, seconds in zip(keys, own, lengths, strict=True):
-                movements[key] = column.taking(seconds)
+                movements[key, visit.unit] = column.taking(seconds)
             arc = visit.activity, after.activity
             if arc in hops:
-                movements[hops[arc]] = columns[hops[arc]].taking(visit.hop)
+                movements[hops[arc], visit.unit] = columns[hops[arc]].taking(visit.hop)
         return movements
 
-    def _fixed(self, movements: Mapping[Key, Movement]) -> SteadyProblem:
+    def _fixed(self, movements: Mapping[UnitKey, Movement], units: int) -> SteadyProblem:
         """The problem with these movements alone."""
-        activities = tuple(
-            self._with_handling(
-                in_turn([Column.of([movements[key]]).curve for key in self._keys(a)]), a
-            )
-            for a in range(len(self.visits) - 1)
-        )
-        hops = {arc: Column.of([movements[key]]).curve for arc, key in self._hops().items()}
-        return replace(self.problem, activities=activities, hops=hops)
+        own = {}
+        hops = {}
+        for unit in range(units):
+            for a in range(len(self.visits) - 1):
+                curves = [
+                    Column.of([movements[key, unit]]).curve for key in activity_keys(self.visits, a)
+                ]
+                own[a, unit] = self._with_handling(in_turn(curves), a)
+            for (a, b), key in self._hops().items():
+                hops[(a, unit), b] = Column.of([movements[key, unit]]).curve
+        return replace(self.problem, own=own, own_hops=hops)
 
 
 def wait_modes(rests: Rests) -> tuple[WaitMode, ...]:
@@ -337,18 +414,19 @@ def wait_modes(rests: Rests) -> tuple[WaitMode, ...]:
     return tuple(modes)
 
 
-def _front(model: _TendingModel, fastest: float, count: int) -> tuple[CyclePoint, ...]:
+def _front(model: _TendingModel, fastest: float, count: int, units: int) -> tuple[CyclePoint, ...]:
     """Cycles from the fastest on to the cheapest of all, by even steps of their period; at a
     lower throughput what is cheaper at a higher one is kept.
     """
-    free = model.cheapest(model.problem.longest)
+    free = model.cheapest(model.problem.longest, units)
     begin = fastest * _SLACK
-    end = max(free.cycle.period, begin)
+    end = max(free.cycle.seconds_per_part, begin)
     points: list[CyclePoint] = []
     for period in np.linspace(begin, end, count):
-        chosen = model.cheapest(float(period))
-        best = chosen.cycle
-        point = CyclePoint(HOUR / best.period, best.period, best.joules, chosen.gap)
+        chosen = model.cheapest(float(period), units)
+        seconds = chosen.cycle.seconds_per_part
+        joules = chosen.cycle.joules_per_part
+        point = CyclePoint(HOUR / seconds, seconds, joules, chosen.gap)
         if points and points[-1].joules <= point.joules:
             continue
         points.append(point)

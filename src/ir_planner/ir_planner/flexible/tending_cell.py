@@ -6,7 +6,7 @@ capsules, bodies and allowed contacts of its own names.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +23,6 @@ from ir_description import (
 )
 from ir_kernels import portable
 from ir_msgs_py.status import StatusCode
-from ir_planner.cycle import SteadyCycle, Wait
 from ir_planner.errors import RequestError
 from ir_planner.program import AUTO
 from ir_values.arrays import FloatArray
@@ -42,40 +41,73 @@ def route_of(cell: Cell) -> PartRoute:
     return cell.route
 
 
-def copy_name(route: PartRoute, place: int) -> str:
-    """Name of the part that lies at a place of a route when a cycle begins."""
-    return route.part if place == 0 else f"{route.part}.{place}"
-
-
 def with_parts_at(cell: Cell, places: Sequence[int]) -> Cell:
     """The cell with a part at the first place of its route, and a copy at each of `places`; it has
     no program.
     """
+    visits = route_of(cell).visits
+    return with_copies(cell, {place: visits[place] for place in places})
+
+
+def with_copies(cell: Cell, stations: Mapping[int, str]) -> Cell:
+    """The cell with a part at the first place of its route, and copies by their numbers, each at a
+    station ("": it isn't there yet); it has no program.
+    """
     route = route_of(cell)
     original = cell.part(route.part)
-    copies = [_copy(original, place, route) for place in places]
+    copies = [_copy(original, number, station, route) for number, station in stations.items()]
     return replace(
         cell,
         parts=(*cell.parts, *copies),
-        stations=tuple(_with_contacts(station, original, places) for station in cell.stations),
+        stations=tuple(_with_contacts(each, original, stations) for each in cell.stations),
         program=(),
         route=None,
     )
 
 
-def _copy(part: Part, place: int, route: PartRoute) -> Part:
+def without_cycle(cell: Cell) -> Cell:
+    """The cell of a route without what an earlier cycle has added: copies of the part, their
+    contacts, and places to wait at.
+    """
+    route = route_of(cell)
+    copies = {part.name for part in cell.parts if route.is_copy(part.name)}
+    gone = {
+        *(capsule.name for name in copies for capsule in cell.part(name).load.capsules),
+        *(body.name for name in copies for body in cell.part(name).bodies),
+    }
+    fronts = {front_name(station) for station in route.visits}
+    return replace(
+        cell,
+        parts=tuple(part for part in cell.parts if part.name not in copies),
+        stations=tuple(
+            replace(
+                station,
+                allowed_contacts=tuple(
+                    contact
+                    for contact in station.allowed_contacts
+                    if not gone & {contact.body_a, contact.body_b}
+                ),
+            )
+            for station in cell.stations
+            if station.name not in fronts
+        ),
+        program=(),
+    )
+
+
+def _copy(part: Part, number: int, station: str, route: PartRoute) -> Part:
     load = replace(
         part.load,
-        name=copy_name(route, place),
+        name=route.copy_name(number),
         capsules=tuple(
-            replace(capsule, name=f"{capsule.name}.{place}") for capsule in part.load.capsules
+            replace(capsule, name=f"{capsule.name}.{number}") for capsule in part.load.capsules
         ),
     )
-    bodies = tuple(replace(body, name=f"{body.name}.{place}") for body in part.bodies)
-    return replace(part, load=load, bodies=bodies, station=route.visits[place])
+    bodies = tuple(replace(body, name=f"{body.name}.{number}") for body in part.bodies)
+    return replace(part, load=load, bodies=bodies, station=station)
 
 
-def _with_contacts(station: Station, part: Part, places: Sequence[int]) -> Station:
+def _with_contacts(station: Station, part: Part, places: Iterable[int]) -> Station:
     """The station with the contacts of the part for its copies too."""
     own = {capsule.name for capsule in part.load.capsules} | {body.name for body in part.bodies}
     more = [
@@ -98,7 +130,7 @@ def _of_copy(name: str, own: set[str], place: int) -> str:
 def all_lying(route: PartRoute) -> PartPlaces:
     """A part at every place of a route: what an empty hop may meet in any order."""
     places = enumerate(route.visits)
-    return PartPlaces("", {copy_name(route, place): station for place, station in places})
+    return PartPlaces("", {route.copy_name(place): station for place, station in places})
 
 
 def held_from(route: PartRoute, activity: int) -> PartPlaces:
@@ -106,9 +138,9 @@ def held_from(route: PartRoute, activity: int) -> PartPlaces:
     may meet in any order.
     """
     lying = dict(all_lying(route).lying)
-    lying[copy_name(route, activity)] = ""
-    lying[copy_name(route, activity + 1)] = ""
-    return PartPlaces(copy_name(route, activity), lying)
+    lying[route.copy_name(activity)] = ""
+    lying[route.copy_name(activity + 1)] = ""
+    return PartPlaces(route.copy_name(activity), lying)
 
 
 def front_name(station: str) -> str:
@@ -116,44 +148,43 @@ def front_name(station: str) -> str:
     return f"{station}.front"
 
 
-def cycle_program(cell: Cell, cycle: SteadyCycle) -> tuple[ProgramStep, ...]:
-    """One cycle as steps, from in front of the first station of the route until the robot is there
-    again. It waits in front of stations, starts every machine when it has left it, and waits for
-    the machine before it takes a part.
+def transport(
+    cell: Cell, place: int, part: str, *, finished: bool, start: bool
+) -> tuple[ProgramStep, ...]:
+    """The part at a place of the route is taken and brought to the next one; the robot ends in
+    front of it. finished: it waits for the machine before; start: it starts the one after.
     """
     route = route_of(cell)
     names = machines_of(cell)
-    last = len(route.visits) - 1
-    lying = {place: copy_name(route, place) for place in (0, *occupied(cycle))}
-    steps: list[ProgramStep] = []
-    following = (*cycle.visits[1:], cycle.visits[0])
-    for visit, after in zip(cycle.visits, following, strict=True):
-        place = visit.activity
-        part = lying.pop(place)
-        lying[place + 1] = part
-        here = route.visits[place + 1]
-        done = (Signal(f"{names[place]}.done"),) if place > 0 else ()
-        start = (Signal(f"{names[place + 1]}.start"),) if place + 1 < last else ()
-        handling = route.handling
-        steps += [
-            ProgramStep("STATION", route.visits[place], dwell=handling, attach=part, wait_for=done),
-            ProgramStep("STATION", here, dwell=handling, detach=part),
-            ProgramStep("STATION", front_name(here), set_signals=start),
-            *_pauses(visit.after),
-        ]
-        there = front_name(route.visits[after.activity])
-        if there != front_name(here):
-            steps.append(ProgramStep("STATION", there))
-        steps += _pauses(after.before)
-    return tuple(steps)
+    here = route.visits[place + 1]
+    wait = (Signal(done_of(names[place])),) if finished else ()
+    taken = (Signal(start_of(names[place]), False),) if finished else ()
+    begun = (Signal(start_of(names[place + 1])),) if start else ()
+    time = route.handling
+    return (
+        ProgramStep("STATION", route.visits[place], time, part, wait_for=wait, set_signals=taken),
+        ProgramStep("STATION", here, dwell=time, detach=part),
+        ProgramStep("STATION", front_name(here), set_signals=begun),
+    )
 
 
-def _pauses(waits: Sequence[Wait]) -> list[ProgramStep]:
+def pause_steps(waits: Iterable[tuple[float, str]]) -> list[ProgramStep]:
+    """Pauses of some seconds, each with the signal that it is for."""
     return [
-        ProgramStep("PAUSE", dwell=wait.seconds, power_mode=AUTO)
-        for wait in waits
-        if wait.seconds > _NO_WAIT
+        ProgramStep("PAUSE", dwell=seconds, power_mode=AUTO, since=since)
+        for seconds, since in waits
+        if seconds > _NO_WAIT
     ]
+
+
+def start_of(machine: str) -> str:
+    """The signal that starts a machine; cleared when its part has been taken."""
+    return f"{machine}.start"
+
+
+def done_of(machine: str) -> str:
+    """The signal by which a machine says that its part is finished."""
+    return f"{machine}.done"
 
 
 def machines_of(cell: Cell) -> tuple[str, ...]:
@@ -161,44 +192,34 @@ def machines_of(cell: Cell) -> tuple[str, ...]:
     return tuple(cell.station(name).equipment for name in route_of(cell).visits)
 
 
-def occupied(cycle: SteadyCycle) -> tuple[int, ...]:
-    """Places at whose machine a part lies when the cycle begins: it is taken before one is
-    brought.
+def with_signals(
+    cell: Cell, standing: Cell, fronts: Mapping[str, FloatArray], finished: Iterable[int]
+) -> Cell:
+    """The cell with its parts as they are `standing`, the places in front of its stations (poses
+    (4, 4) of the tcp in the cell), and the signals of its machines. finished: places whose part is
+    when the program begins. Numbers of signals that the cell has are kept.
     """
-    first: dict[int, bool] = {}
-    for visit in cycle.visits:
-        first.setdefault(visit.activity, True)
-        first.setdefault(visit.activity + 1, False)
-    return tuple(sorted(place for place, taken in first.items() if taken and place > 0))
-
-
-def program_cell(cell: Cell, cycle: SteadyCycle, fronts: Mapping[str, FloatArray]) -> Cell:
-    """The cell with the parts that lie in it when a cycle begins, the places in front of its
-    stations (poses (4, 4) of the tcp in the cell), signals of the machines, and the program of the
-    cycle.
-    """
-    standing = with_parts_at(cell, occupied(cycle))
     names = machines_of(cell)
-    visits = route_of(cell).visits
+    route = route_of(cell)
     stations = list(standing.stations)
     for name, pose in fronts.items():
         own = cell.station(name)
         inside = _within(cell.machine(own.equipment).pose, pose)
         stations.append(Station(front_name(name), own.equipment, pose, own.zone, inside))
-    signals = list(standing.signals)
-    for place in range(1, len(visits) - 1):
-        start = f"{names[place]}.start"
-        seconds = cell.machine(names[place]).process
-        lies = place in occupied(cycle)
-        signals.append(CellSignal(start))
-        signals.append(CellSignal(f"{names[place]}.done", lies, start, seconds))
-    return replace(
-        standing,
-        equipment=tuple(replace(machine, process=0.0) for machine in standing.equipment),
-        stations=tuple(stations),
-        signals=tuple(signals),
-        program=cycle_program(cell, cycle),
-    )
+    signals = {signal.name: signal for signal in standing.signals}
+    done = tuple(finished)
+    for place in range(1, len(route.visits) - 1):
+        start = start_of(names[place])
+        end = done_of(names[place])
+        signals[start] = replace(signals.get(start, CellSignal(start)), initial=place in done)
+        signals[end] = replace(
+            signals.get(end, CellSignal(end)),
+            initial=place in done,
+            follows=start,
+            delay=0.0,
+            process=names[place],
+        )
+    return replace(standing, stations=tuple(stations), signals=tuple(signals.values()), route=route)
 
 
 def _within(frame: FloatArray, pose: FloatArray) -> FloatArray:

@@ -4,8 +4,10 @@ from typing import Any
 
 import numpy as np
 
-from ir_description import Cell, Station
+from ir_description import Cell, Station, cell_to_yaml
 from ir_msgs.msg import AllowedContact as AllowedContactMsg
+from ir_msgs.msg import CyclePoint as CyclePointMsg
+from ir_msgs.msg import CycleStep as CycleStepMsg
 from ir_msgs.msg import Station as StationMsg
 from ir_msgs_py.ros.conversions import (
     float_array,
@@ -21,15 +23,17 @@ from ir_msgs_py.ros.plan_conversions import (
     program_point_to_msg,
     program_savings_to_msg,
     report_to_msg,
+    saving_to_msg,
     service_candidate_to_msg,
 )
 from ir_msgs_py.ros.power_conversions import power_mode_to_msg
 from ir_msgs_py.ros.search_conversions import searches_to_msg
-from ir_msgs_py.savings import ProgramPoint
+from ir_msgs_py.savings import ProgramPoint, Saving
 from ir_msgs_py.status import Status
 from ir_planner.cartesian import CartesianPlan
 from ir_planner.checks import Evaluation, StateCheck
 from ir_planner.configurations import IkAnswer
+from ir_planner.flexible import SteadyPlan, cycle_steps
 from ir_planner.krl import KrlExport
 from ir_planner.program import ProgramPlan, Standby
 from ir_planner.regional import EscapePlan, MovementPlan
@@ -147,6 +151,53 @@ def fill_program(response: Any, plan: ProgramPlan, include_points: bool) -> None
     response.savings = program_savings_to_msg(plan.savings)
     response.front = [program_point_to_msg(_point(program)) for program in plan.front]
     response.searches = searches_to_msg(plan.info.searches)
+
+
+def fill_steady_cycle(response: Any, plan: SteadyPlan, include_points: bool) -> None:
+    """plan_steady_cycle: the program is that of the run where one was asked for."""
+    response.info = planning_info_to_msg(plan.info)
+    program = plan.run or plan.program
+    cell = plan.run_cell or plan.cell
+    if plan.cycle is None or program is None or cell is None:
+        return
+    response.program_id = program.program_id
+    response.movements = [
+        planned_movement_to_msg(movement, include_points) for movement in program.movements
+    ]
+    response.report = report_to_msg(program.report)
+    response.cell = cell_to_yaml(cell)
+    response.steps = [
+        CycleStepMsg(
+            kind=step.kind,
+            from_station=step.from_station,
+            to_station=step.to_station,
+            unit=step.unit,
+            start=step.start,
+            duration=step.seconds,
+            power_mode=step.power_mode,
+        )
+        for step in cycle_steps(plan)
+    ]
+    response.period = plan.cycle.period
+    response.units = plan.cycle.units
+    response.energy = plan.joules
+    response.gap = plan.gap
+    response.shortest_period = plan.fastest
+    if plan.saving is not None:
+        saved = plan.saving
+        saving = Saving(saved.common, saved.joules, saved.period, saved.low, saved.high)
+        response.saving = saving_to_msg(saving)
+        response.common_period = saved.common_period
+        response.on_motors = saved.on_motors
+    response.front = [
+        CyclePointMsg(
+            parts_per_hour=point.parts_per_hour,
+            period=point.period,
+            energy=point.joules,
+            gap=point.gap,
+        )
+        for point in plan.front
+    ]
 
 
 def _point(program: ProgramPlan) -> ProgramPoint:

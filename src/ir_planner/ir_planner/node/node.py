@@ -41,6 +41,7 @@ from ir_msgs.srv import (
     PlanRegionalMovement,
     PlanServiceMovement,
     PlanStandby,
+    PlanSteadyCycle,
     PlanTrajectory,
     SetCell,
     SetEquipment,
@@ -156,6 +157,7 @@ class PlannerNode(Node):
             (PlanCartesianMovement, names.PLAN_CARTESIAN_MOVEMENT, ask.plan_cartesian, long),
             (OptimizeTrajectory, names.OPTIMIZE_TRAJECTORY, ask.optimize_trajectory, long),
             (PlanProgram, names.PLAN_PROGRAM, ask.plan_program, long),
+            (PlanSteadyCycle, names.PLAN_STEADY_CYCLE, ask.plan_steady_cycle, long),
         ):
             BoundedService(self, kind, own(name), ask.guarded(handler), group)
         self._action = RecordedActionServer(

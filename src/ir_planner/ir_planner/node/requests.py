@@ -32,6 +32,7 @@ from ir_planner.node.answers import (
     fill_standby,
     fill_state_check,
     fill_states_check,
+    fill_steady_cycle,
     fill_stored_program,
     stations_to_msg,
 )
@@ -313,6 +314,20 @@ class Requests:
         for movement in plan.movements:
             if movement.trajectory is not None:
                 self.planned(movement.trajectory)
+        return plan.status
+
+    def plan_steady_cycle(self, request: Any, response: Any) -> Status:
+        """The cheapest cycle of the cell's route."""
+        options = options_of(request.options, self.draw_seed)
+        plan = self.planner.plan_steady_cycle(
+            parts_per_hour=request.parts_per_hour,
+            options=options,
+            units=request.units,
+            cycles=request.cycles,
+            saving=request.savings,
+            front_points=request.front_points,
+        )
+        fill_steady_cycle(response, plan, options.include_points)
         return plan.status
 
     def get_program(self, request: Any, response: Any) -> Status:

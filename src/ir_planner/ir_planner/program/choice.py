@@ -198,6 +198,7 @@ def assembled(
                     attach=step.attach if late else "",
                     detach=step.detach if late else "",
                     set_signals=setting if late else (),
+                    since=step.since,
                 )
             )
     return tuple(result)

@@ -317,7 +317,9 @@ def program_hash(movements: tuple[PlannedMovement, ...]) -> str:
             m.power_mode,
         )
         handling = (m.attach, m.detach, m.load, *m.wait_for, "|", *m.set_signals)
-        digest.update("\0".join(str(value) for value in (*texts, *handling)).encode() + b"\n")
+        since = ("since", m.since) if m.since else ()
+        said = "\0".join(str(value) for value in (*texts, *handling, *since))
+        digest.update(said.encode() + b"\n")
     return digest.hexdigest()[:16]
 
 

@@ -52,6 +52,7 @@ from ir_recorder.analysis.results import (
     station_uses,
 )
 from ir_recorder.analysis.steps import ExecutedStep, executed_steps
+from ir_recorder.analysis.tending import SignalChange, TendedStep, Tending, tending_of
 from ir_recorder.format import contents
 from ir_recorder.reading.recording import Recording
 from ir_values.arrays import FloatArray
@@ -222,6 +223,22 @@ def analyse(recording: Recording, parameters: PowerParameters | None = None) -> 
     return _Analyser(recording, parameters).analysis()
 
 
+def _tending(
+    cell: Cell, results: Sequence[StepResult], meter: Meter, recording: Recording
+) -> Tending | None:
+    """The parts of a route, from the steps and signals of the recording."""
+    steps = []
+    turn = results[0].step.start if results else 0.0
+    for result in results:
+        step = result.step
+        waiting = meter.energy(turn, step.start)
+        begin = min(turn, step.start)
+        steps.append(TendedStep(step.movement, begin, step.start, step.end, waiting, result.energy))
+        turn = step.end
+    changes = [SignalChange(each.time, each.name, each.text == "1") for each in recording.signals]
+    return tending_of(cell, steps, changes)
+
+
 @dataclass
 class _Analyser:
     recording: Recording
@@ -267,6 +284,7 @@ class _Analyser:
             grid=check_grid(recording.joints, power) if recording.joints is not None else None,
             plateaus=plateaus(recording, meter, loads, cell, self.data) if meter and cell else (),
             problems=(*recording.problems, *self.problems),
+            tending=_tending(cell, results, meter, recording) if cell and meter else None,
         )
 
     def _cell(self) -> Cell | None:

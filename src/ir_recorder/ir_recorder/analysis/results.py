@@ -16,6 +16,7 @@ from ir_recorder.analysis.clearance import StepClearance
 from ir_recorder.analysis.loads import LoadTimeline
 from ir_recorder.analysis.resting_power import Plateau
 from ir_recorder.analysis.steps import ExecutedStep
+from ir_recorder.analysis.tending import Tending
 from ir_recorder.reading.recording import JointSeries, PowerSeries, Recording
 from ir_values.arrays import FloatArray
 
@@ -242,6 +243,7 @@ class Analysis:
     grid: GridCheck | None
     plateaus: tuple[Plateau, ...]
     problems: tuple[str, ...]
+    tending: Tending | None = None
 
     @property
     def savings(self) -> ProgramSavings | None:

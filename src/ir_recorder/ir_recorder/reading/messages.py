@@ -49,6 +49,7 @@ def movement_from(message: Any) -> PlannedMovement:
         load=message.load,
         wait_for=tuple(message.wait_for),
         set_signals=tuple(message.set_signals),
+        since=getattr(message, "since", ""),  # older recordings have none
     )
 
 

@@ -32,6 +32,7 @@ from ir_recorder.report.tables import (
     step_table,
     warning_table,
 )
+from ir_recorder.report.tending import tending_section
 from ir_recorder.report.whole_line import line_section, of_recording
 from ir_values.files import ANYWHERE, FileRoots
 
@@ -47,6 +48,7 @@ CHARTS: Mapping[str, Chart] = {
     "bars": lambda analysis: joule_bars(analysis.movements),
     "flows": sankey_section,
     "steps": step_table,
+    "tending": tending_section,
     "savings": savings_section,
     "methods": methods_section,
     "stations": station_table,

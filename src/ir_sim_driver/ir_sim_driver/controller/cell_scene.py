@@ -11,7 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ir_description import AllowedContact, Body, Capsule, Cell, Equipment, cell_in, sweep_speeds
+from ir_description import (
+    AllowedContact,
+    Body,
+    Capsule,
+    Cell,
+    Equipment,
+    PartRoute,
+    cell_in,
+    sweep_speeds,
+)
 from ir_kernels.chain import Chain
 from ir_kernels.collision import CollisionModel
 from ir_msgs_py.announcements import MachineState
@@ -164,9 +173,13 @@ class Machines:
 
 # Parts: held by the robot, lying where they were put down, or not there.
 
+_THERE = 0.01  # m: twice the tube that the tool is kept in
+
 
 class Parts:
-    """Parts of `cell`; a part lies as it was held when the tcp stood at its place (4, 4)."""
+    """Parts of `cell`; a part lies as it was held when the tcp stood at its place (4, 4). Where the
+    cell has a route, parts come to its first station and go from its last one by themselves.
+    """
 
     def __init__(self, cell: Cell, load: Carried) -> None:
         self.stand_in(cell, load)
@@ -190,13 +203,36 @@ class Parts:
                 self._places[name] = tcp
         for name in held:
             self._places.pop(name, None)
+        released = self._held - held
         self._held = held
+        if released and self.cell.route is not None:
+            self._supply(self.cell.route)
+
+    def _supply(self, route: PartRoute) -> None:
+        """What lies at the last station is taken away; the next part comes to the first one when
+        one was put down elsewhere.
+        """
+        first, last = (self.cell.station(name).pose for name in (route.visits[0], route.visits[-1]))
+        for name in [name for name, place in self._places.items() if _same(place, last)]:
+            del self._places[name]
+        there = self._held | self._places.keys()
+        absent = (part.name for part in self.cell.parts if part.name not in there)
+        following = route.following(absent)
+        if following and not any(_same(place, first) for place in self._places.values()):
+            self._places[following] = first
 
     def bodies(self) -> tuple[Body, ...]:
         """What lies there, in the world."""
         return tuple(
             body for name, pose in self._places.items() for body in self.cell.part(name).lying(pose)
         )
+
+
+def _same(place: FloatArray, station: FloatArray) -> bool:
+    """Whether a part was put down at a station: the tcp was there within what it may be off its
+    path.
+    """
+    return float(np.linalg.norm(place[:3, 3] - station[:3, 3])) < _THERE
 
 
 def _parts_of(load: Carried) -> set[str]:

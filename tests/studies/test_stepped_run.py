@@ -1,0 +1,77 @@
+"""A robot that tends a machine, driven without real time: what was planned, and late machines."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import pytest
+
+from ir_description import Cell, ProcessTimes, load_cell
+from ir_planner import Planner, SteadyPlan
+from ir_recorder.analysis.tending import Tending, tending_of
+from ir_studies.stepped_run import driven_program
+
+# of a part, whichever is larger
+SHARE = 0.01
+JOULES = 10.0
+LATE = 7.0  # s
+
+
+def cell_of_one_machine() -> Cell:
+    """The gauge of the flexible cell alone."""
+    cell = load_cell("flexible")
+    assert cell.route is not None
+    machines = tuple(
+        machine if machine.name == "gauge" else replace(machine, process=0.0)
+        for machine in cell.equipment
+    )
+    visits = ("infeed_pick", "gauge_seat", "outfeed_place")
+    return replace(cell, equipment=machines, route=replace(cell.route, visits=visits))
+
+
+@cache
+def planned() -> SteadyPlan:
+    planner = Planner(cell_of_one_machine(), clock=lambda: 0.0)
+    return planner.plan_steady_cycle(cycles=3)
+
+
+def driven(late: float) -> Tending:
+    """The run with a machine that takes so many seconds more."""
+    plan = planned()
+    assert plan.run is not None
+    assert plan.run_cell is not None
+    machines = tuple(
+        replace(machine, process_times=ProcessTimes(machine.process, machine.process + late))
+        if machine.process
+        else machine
+        for machine in plan.run_cell.equipment
+    )
+    cell = replace(plan.run_cell, equipment=machines)
+    run = driven_program(cell, plan.run.movements)
+    run.close()
+    tending = tending_of(cell, run.steps, run.signals)
+    assert tending is not None
+    return tending
+
+
+def test_every_part_needs_what_was_planned() -> None:
+    tending = driven(0.0)
+    assert len(tending.parts) == 3
+    for part in tending.parts:
+        assert part.joules == pytest.approx(part.planned_joules, rel=SHARE, abs=JOULES)
+        assert part.span.seconds == pytest.approx(part.planned_seconds, abs=0.1)
+        assert not part.late
+    (gauge,) = tending.machines
+    assert [span.seconds for span in gauge.working] == pytest.approx([12.0] * 3, abs=0.02)
+
+
+def test_a_late_machine_is_waited_for_and_named() -> None:
+    tending = driven(LATE)
+    (gauge,) = tending.machines
+    late = sum(span.seconds - 12.0 for span in gauge.working)
+    assert late > 0.0
+    waited = sum(part.late.get("gauge", 0.0) for part in tending.parts)
+    assert waited == pytest.approx(late, abs=0.1)
+    longer = sum(part.span.seconds - part.planned_seconds for part in tending.parts)
+    assert longer == pytest.approx(late, abs=0.3)
