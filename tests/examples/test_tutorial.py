@@ -35,5 +35,5 @@ def test_who_follows_the_tutorial_gets_a_cell_that_plans(
             said = capsys.readouterr().out
             assert code == command.code, f"ir {command.words}: {said}"
             count += 1
-    assert count == 10
+    assert count == 12
     assert typed.read_text() == (EXAMPLES / "first_cell.yaml").read_text()

@@ -9,11 +9,14 @@ from dataclasses import asdict, replace
 from io import BytesIO
 from pathlib import Path
 
+import numpy as np
+
 from ir_cli.errors import CommandError, InputError
 from ir_cli.output import Columns, Row, number, print_csv, print_json, print_table, text
 from ir_cli.planning import failed, options_of, planner_of, predicted, sentences
-from ir_description import cell_to_yaml
+from ir_description import Cell, cell_to_yaml
 from ir_planner import Planner, ProgramPlan, SteadyPlan
+from ir_planner.flexible import SHARES, counted_times, outage_replay, with_counted_times
 from ir_recorder.report.files import write_output
 from ir_values.files import ANYWHERE
 
@@ -60,6 +63,16 @@ def add_steady(plan: argparse.ArgumentParser) -> None:
         "cycles (0: it is one cycle)"
     )
     plan.add_argument("--cycles", type=int, default=0, metavar="N", help=words)
+    words = (
+        "with --cycles: what it costs when a machine is down so many seconds once, by how the "
+        "robot waits meanwhile (on the schedule, not driven)"
+    )
+    plan.add_argument("--outage", default="", metavar="MACHINE=S", help=words)
+    words = (
+        "with --cycles: with which process times a plan should count where they vary, for least "
+        "energy (on the schedule, not driven)"
+    )
+    plan.add_argument("--vary", action="store_true", help=words)
 
 
 Report = Callable[[Path, ProgramPlan, Planner], None]
@@ -71,6 +84,7 @@ def run_steady(arguments: argparse.Namespace, report: Report) -> int:
     _check(arguments)
     with sentences():
         planner = planner_of(arguments.cell, arguments.power_parameters)
+        given = planner.cell
         plan = planner.plan_steady_cycle(
             parts_per_hour=arguments.parts_per_hour,
             options=options_of(arguments),
@@ -101,12 +115,20 @@ def run_steady(arguments: argparse.Namespace, report: Report) -> int:
         print_table(rows, COLUMNS)
         if front:
             print_table(front, FRONT_COLUMNS)
-        sys.stdout.write("\n".join(_sentences(plan)) + "\n")
+        said = _sentences(plan)
+        with sentences():
+            said += [_outage(plan, arguments.outage)] if arguments.outage else []
+        sys.stdout.write("\n".join(said) + "\n")
+        if arguments.vary:
+            with sentences():
+                print_table(_varied(arguments, planner, given), _COUNTED)
     return 0
 
 
 def _check(arguments: argparse.Namespace) -> None:
     """Raise InputError for what doesn't belong to a steady cycle."""
+    if (arguments.outage or arguments.vary) and not arguments.cycles:
+        raise InputError("--outage and --vary follow a run: give --cycles as well")
     if not arguments.cell:
         raise InputError("--parts-per-hour needs a CELL with a route, such as flexible")
     for given, name in (
@@ -209,3 +231,61 @@ def _sentences(plan: SteadyPlan) -> list[str]:
     if plan.saving is not None:
         lines.append(f"saving: {plan.saving.sentence}")
     return lines
+
+
+# Surprises, on the schedule alone.
+
+_OUTAGES = np.geomspace(10.0, 3600.0, 200)  # s: as long as one may be, when nobody knows
+_LONGEST_OUTAGE = 86_400.0  # s
+_WAITED = (
+    ("by itself", "as the controller waits by itself"),
+    ("timeouts", "by the policy for waits of 10 s to an hour"),
+    ("known", "for who knows how long"),
+)
+_COUNTED: Columns = {
+    "share": ("done within", text),
+    "joules": ("J a part", number(0)),
+    "seconds": ("s a part", number(2)),
+    "known": ("J, who knows", number(0)),
+}
+
+
+def _outage(plan: SteadyPlan, asked: str) -> str:
+    """What an outage costs by each policy."""
+    machine, _, value = asked.partition("=")
+    try:
+        seconds = float(value)
+    except ValueError:
+        seconds = -1.0
+    if not 0.0 < seconds <= _LONGEST_OUTAGE:
+        raise InputError(
+            f"--outage is {asked[:60]!r}: it must be MACHINE=S with S in (0, {_LONGEST_OUTAGE:g}]"
+        )
+    middle = len(plan.process)
+    replay = outage_replay(plan, machine, seconds, middle, _OUTAGES)
+    said = ", ".join(f"{replay.joules(name) / 1e3:.1f} kJ {words}" for name, words in _WAITED)
+    return (
+        f"{machine} down for {seconds:g} s once: {said}; in step again {replay.back} parts after "
+        "(on the schedule, not driven)"
+    )
+
+
+def _varied(arguments: argparse.Namespace, planner: Planner, cell: Cell) -> list[Row]:
+    """Plans that count with different times."""
+    if all(machine.process_times is None for machine in cell.equipment):
+        raise InputError("--vary needs a machine whose process has between or samples")
+    rows: list[Row] = []
+    for share in (0.0, *SHARES):
+        planner.set_cell(with_counted_times(cell, share))
+        plan = planner.plan_steady_cycle(
+            parts_per_hour=arguments.parts_per_hour,
+            options=options_of(arguments),
+            units=arguments.units,
+            cycles=arguments.cycles,
+        )
+        if plan.run is None:
+            continue
+        counted = counted_times(plan, share, arguments.seed)
+        said = f"{100.0 * share:g} %" if share else "mean"
+        rows.append({**asdict(counted), "share": said})
+    return rows

@@ -11,17 +11,33 @@ from ir_planner.flexible.steady_plan import (
     robot_bars,
     wait_modes,
 )
+from ir_planner.flexible.surprises import (
+    SHARES,
+    CountedTimes,
+    OutageReplay,
+    ReplayedPart,
+    counted_times,
+    outage_replay,
+    with_counted_times,
+)
 
 __all__ = [
     "RUNGS",
+    "SHARES",
     "Column",
+    "CountedTimes",
     "CyclePoint",
     "CycleStep",
+    "OutageReplay",
+    "ReplayedPart",
     "SteadyPlan",
+    "counted_times",
     "cycle_steps",
     "machine_bars",
+    "outage_replay",
     "plan_steady_cycle",
     "robot_bars",
     "slowed_down",
     "wait_modes",
+    "with_counted_times",
 ]

@@ -12,6 +12,7 @@ from ir_planner.program.pauses import (
     Charge,
     Pause,
     Rests,
+    Steps,
     at_once,
     pause_by_itself,
     rests_at,
@@ -29,7 +30,7 @@ from ir_planner.program.request import (
 )
 from ir_planner.program.savings import common_program
 from ir_planner.program.spreads import Spreads, with_intervals
-from ir_planner.program.standby import Lengths, Standby, Trip, best_posture, lengths_of
+from ir_planner.program.standby import Lengths, Standby, Timeouts, Trip, best_posture, lengths_of
 from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Chain, Part
 from ir_planner.program.steps import (
     Doors,
@@ -73,7 +74,9 @@ __all__ = [
     "Spreads",
     "StageError",
     "Standby",
+    "Steps",
     "TimeValues",
+    "Timeouts",
     "Trip",
     "at_once",
     "best_posture",
