@@ -168,15 +168,15 @@ def cycle_steps(plan: SteadyPlan) -> tuple[CycleStep, ...]:
 def robot_bars(plan: SteadyPlan) -> tuple[tuple[str, float, float, str], ...]:
     """What the robot does: name, begin, length [s], and kind: transport, hop or a power mode."""
     machine = dict(zip(plan.stations, plan.machines, strict=True))
-    names = {
-        TRANSPORT: lambda step: f"{machine[step.from_station]} to {machine[step.to_station]}",
-        HOP: lambda step: f"to {machine[step.to_station]}",
-        WAIT: lambda step: step.power_mode,
-    }
-    return tuple(
-        (names[step.kind](step), step.start, step.seconds, step.power_mode or step.kind)
-        for step in cycle_steps(plan)
-    )
+    bars = []
+    for step in cycle_steps(plan):
+        there = f"to {machine[step.to_station]}"
+        if step.kind == TRANSPORT:
+            there = f"{machine[step.from_station]} {there}"
+        bars.append(
+            (step.power_mode or there, step.start, step.seconds, step.power_mode or step.kind)
+        )
+    return tuple(bars)
 
 
 def machine_bars(plan: SteadyPlan) -> dict[str, tuple[tuple[float, float], ...]]:
