@@ -18,14 +18,17 @@ from ir_description import Cell, cell_to_yaml
 from ir_planner import Planner, ProgramPlan, SteadyPlan
 from ir_planner.flexible import SHARES, counted_times, outage_replay, with_counted_times
 from ir_recorder.report.files import write_output
+from ir_studies.cells import tended_instance, written
+from ir_studies.errors import StudyError
 from ir_values.files import ANYWHERE
 
 HOUR = 3600.0
-PICTURES = (".yaml", ".png")
+PICTURES = (".yaml", ".png", ".xml")
 OUTPUTS = (*PICTURES, ".mcap", ".html")
 _FRONT = 8  # cycles of a front
 _PICTURE = b"\x89PNG"
 _CELL = b"format: "
+_XML = b"<?xml "
 COLUMNS: Columns = {
     "begin": ("begin s", number(2)),
     "seconds": ("s", number(2)),
@@ -48,7 +51,8 @@ def add_steady(plan: argparse.ArgumentParser) -> None:
     """Arguments of `ir plan` for a cell with a route."""
     words = (
         "the cheapest steady cycle of the cell's route that makes at least so many parts an hour; "
-        "0: as many as possible; -o FILE.yaml is its program as a cell, FILE.png the chart"
+        "0: as many as possible; -o FILE.yaml is its program as a cell, FILE.png the chart, "
+        "FILE.xml an instance of the public benchmark"
     )
     plan.add_argument("--parts-per-hour", type=float, default=None, metavar="R", help=words)
     plan.add_argument(
@@ -147,11 +151,13 @@ def _written(plan: SteadyPlan, path: Path, *, front: bool) -> Path:
     try:
         if path.suffix == ".yaml":
             return write_output(path, cell_to_yaml(cell).encode(), _CELL, ANYWHERE)
+        if path.suffix == ".xml":
+            return write_output(path, written([tended_instance(plan)]).encode(), _XML, ANYWHERE)
         picture = BytesIO()
         figure = plan.plot_front() if front else plan.plot()
         figure.savefig(picture, format="png")
         return write_output(path, picture.getvalue(), _PICTURE, ANYWHERE)
-    except ImportError as error:
+    except (ImportError, StudyError) as error:
         raise CommandError(str(error)) from error
 
 

@@ -76,8 +76,9 @@ class CyclePoint:
 class SteadyPlan:
     """cycle: the schedule; gap [%]: how far above the cheapest one it can be, for the
     configurations that were chosen and movements that begin with an empty capacitor. program: its
-    movements and pauses, in `cell`. fastest [s]: the shortest period. run: the program that fills
-    the line and makes the cycles that were asked for, in `run_cell`; None for none.
+    movements and pauses, in `cell`. problem: what the cycle was chosen from. fastest [s]: the
+    shortest period. run: the program that fills the line and makes the cycles that were asked for,
+    in `run_cell`; None for none.
     """
 
     status: Status
@@ -86,6 +87,7 @@ class SteadyPlan:
     stations: tuple[str, ...] = ()
     machines: tuple[str, ...] = ()
     process: tuple[float, ...] = ()
+    problem: SteadyProblem | None = None
     request: ProgramRequest | None = None
     cycle: SteadyCycle | None = None
     gap: float = 0.0
@@ -252,6 +254,7 @@ def plan_steady_cycle(
         stations=route.visits,
         machines=machines_of(request.cell),
         process=model.problem.process,
+        problem=model.problem,
         cycle=chosen.cycle,
         request=made.request,
         gap=chosen.gap,

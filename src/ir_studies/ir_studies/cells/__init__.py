@@ -7,6 +7,7 @@ for instance in read_instances("cells.xml"):
 
 from ir_studies.cells.instance import Instance, Schedule
 from ir_studies.cells.solution import CellAnswer, hurried, solve_cell
+from ir_studies.cells.tended_cell import tended_instance
 from ir_studies.cells.xml_file import read_instances, written
 
 __all__ = [
@@ -16,5 +17,6 @@ __all__ = [
     "hurried",
     "read_instances",
     "solve_cell",
+    "tended_instance",
     "written",
 ]

@@ -1,0 +1,95 @@
+"""Surprises on the schedule of a tended cell: without any it is the plan; with one, what who knows
+more needs less, and the line comes back into step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ir_description import Cell, ProcessTimes, load_cell
+from ir_planner import Planner, RequestError, SteadyPlan
+from ir_planner.flexible import counted_times, outage_replay, with_counted_times
+from ir_planner.flexible.surprises import BY_ITSELF, KNOWN, POLICIES, TIMEOUTS, Replay
+
+CYCLES = 5
+ROUNDING = 0.01  # s, and of joules its share
+LENGTHS = np.geomspace(1.0, 3600.0, 50)
+
+
+def two_machines() -> Cell:
+    """Washer and gauge of the flexible cell."""
+    cell = load_cell("flexible")
+    assert cell.route is not None
+    machines = tuple(
+        machine if machine.name in ("washer", "gauge") else replace(machine, process=0.0)
+        for machine in cell.equipment
+    )
+    visits = ("infeed_pick", "washer_basket", "gauge_seat", "outfeed_place")
+    return replace(cell, equipment=machines, route=replace(cell.route, visits=visits))
+
+
+@cache
+def planned() -> SteadyPlan:
+    return Planner(two_machines(), clock=lambda: 0.0).plan_steady_cycle(cycles=CYCLES)
+
+
+def test_without_surprises_the_schedule_is_the_plan() -> None:
+    plan = planned()
+    assert plan.run is not None
+    replay = Replay(plan)
+    for policy in (BY_ITSELF, TIMEOUTS):
+        parts = replay.follow(replay.planned_times(), policy, LENGTHS)
+        assert len(parts) == CYCLES
+        end = sum(part.seconds for part in parts)
+        assert end <= plan.run.report.duration + ROUNDING
+        assert plan.cycle is not None
+        assert parts[-1].seconds == pytest.approx(plan.cycle.period, abs=ROUNDING)
+        assert parts[-1].joules == pytest.approx(plan.joules, rel=ROUNDING)
+
+
+@given(
+    machine=st.sampled_from(("washer", "gauge")),
+    seconds=st.floats(30.0, 3600.0),
+    part=st.integers(1, 2),
+)
+@settings(max_examples=30, deadline=None)
+def test_an_outage_costs_less_the_more_is_known_and_ends(
+    machine: str, seconds: float, part: int
+) -> None:
+    replay = outage_replay(planned(), machine, seconds, part, LENGTHS)
+    assert replay.joules(KNOWN) <= replay.joules(BY_ITSELF) + ROUNDING
+    assert replay.joules(KNOWN) <= replay.joules(TIMEOUTS) + ROUNDING
+    for policy in POLICIES:
+        longer = sum(row.seconds for row in replay.parts[policy])
+        longer -= sum(row.seconds for row in replay.planned)
+        assert longer <= seconds + 300.0  # and what a deep mode takes to wake
+        last = replay.parts[policy][-1]
+        assert last.seconds == pytest.approx(replay.planned[-1].seconds, abs=ROUNDING)
+    assert replay.back <= 1
+
+
+def test_a_machine_that_works_on_nothing_has_no_outage() -> None:
+    with pytest.raises(RequestError, match="machine with a process 'lathe' is unknown"):
+        outage_replay(planned(), "lathe", 600.0, 1, LENGTHS)
+
+
+def test_who_knows_the_times_needs_no_more_and_longer_times_are_kept() -> None:
+    cell = two_machines()
+    machines = tuple(
+        replace(machine, process_times=ProcessTimes.of([8.0, 10.0, 12.0, 20.0]))
+        if machine.name == "gauge"
+        else machine
+        for machine in cell.equipment
+    )
+    cell = replace(cell, equipment=machines)
+    for share in (0.0, 1.0):
+        planner = Planner(with_counted_times(cell, share), clock=lambda: 0.0)
+        counted = counted_times(planner.plan_steady_cycle(cycles=8), share, 3)
+        assert counted.known <= counted.joules * (1.0 + ROUNDING)
+        assert counted.times["gauge"] == (20.0 if share else 12.0)
