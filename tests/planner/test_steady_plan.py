@@ -174,3 +174,43 @@ def test_one_machine_alone_is_tended_too() -> None:
     assert plan.cycle is not None
     assert plan.cycle.order == ((0, 0), (1, 0))
     assert plan.cycle.period >= 12.0
+
+
+@pytest.mark.parametrize("over", [1.05, 1.5])
+def test_fixed_order_and_no_process_cost_what_a_planned_program_costs(over: float) -> None:
+    """One machine that takes no time leaves one order: the cycle is a program of its own period."""
+    cell = routed(CELL, ("infeed_pick", "gauge_seat", "outfeed_place"))
+    machines = tuple(
+        replace(machine, process=1e-3) if machine.process else machine for machine in cell.equipment
+    )
+    planner = Planner(replace(cell, equipment=machines), clock=lambda: 0.0)
+    fastest = planner.plan_steady_cycle().fastest
+    plan = planner.plan_steady_cycle(parts_per_hour=3600.0 / (over * fastest))
+    assert plan.cycle is not None
+    assert plan.cell is not None
+    assert plan.request is not None
+    program = Planner(plan.cell, clock=lambda: 0.0).plan_program(
+        cycle_time=plan.cycle.period, start=plan.request.start
+    )
+    assert program.status.ok, program.status.message
+    assert plan.joules >= program.report.energy * (1.0 - program.gap / 100.0)
+    assert plan.joules == pytest.approx(program.report.energy, rel=SETTLED)
+
+
+def test_two_units_are_never_dearer_and_every_one_of_their_parts_is_made() -> None:
+    cell = routed(CELL, ("infeed_pick", "washer_basket", "gauge_seat", "outfeed_place"))
+    planner = Planner(cell, clock=lambda: 0.0)
+    one = planner.plan_steady_cycle(parts_per_hour=50.0)
+    two = planner.plan_steady_cycle(parts_per_hour=50.0, units=2, cycles=2)
+    assert one.cycle is not None
+    assert two.cycle is not None
+    assert two.run is not None
+    assert two.joules <= one.joules * (1.0 + SETTLED)
+    assert two.cycle.seconds_per_part <= 72.0 + ROUNDING
+    made = [step for step in two.run.movements if step.detach and step.to_station == cell_end(cell)]
+    assert len(made) >= 2 * two.cycle.units
+
+
+def cell_end(cell: Cell) -> str:
+    assert cell.route is not None
+    return cell.route.visits[-1]
