@@ -100,14 +100,12 @@ class ProgramStep:
             raise InvalidValueError(
                 f"a pause must be longer than 0 s and has no target, it is {self.dwell:g} s long"
             )
-        if self.kind != "PAUSE" and self.power_mode:
-            raise InvalidValueError("only a pause has a power mode")
+        if self.kind != "PAUSE" and (self.power_mode or self.since):
+            raise InvalidValueError("only a pause has a power mode, or ends after a signal")
         if self.kind == "PAUSE" and self.planner:
             raise InvalidValueError("a pause has no planner")
         if self.kind not in ("STATION", "POSTURE") and self.tilt is not None:
             raise InvalidValueError("only movements to stations and postures have a tilt")
-        if self.kind != "PAUSE" and self.since:
-            raise InvalidValueError("only a pause ends some time after a signal was set")
         if self.kind != "STATION" and (self.attach or self.detach):
             raise InvalidValueError("parts are attached and detached at stations only")
         if self.attach and self.detach:
