@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from ir_msgs_py.cartesian import CartesianPath, CartesianSegment
 from ir_planner import Planner
 from ir_planner.cartesian.path_parts import Evenly, Rates, ThroughPoses, about_tool, rates_of
-from ir_planner.cartesian.tool_error import tool_motion
+from ir_planner.checks import tool_derivatives
 
 ROOT = np.sqrt(2.0)
 STEP = 1e-4
@@ -71,7 +71,7 @@ def test_the_tool_keeps_within_the_bounds_of_its_path(planner: Planner) -> None:
     assert off <= plan.speed_deviation
     assert plan.speed_deviation <= off + 1e-3, "the bound is close"
     assert 0.0 < plan.rotation_error < 3e-4
-    motion = tool_motion(trajectory, scene)
+    motion = tool_derivatives(trajectory, scene)
     moved = {2: motion.acceleration, 3: motion.jerk}
     for order, bound in moved.items():
         values = np.linalg.norm(np.diff(tcp[::20, :3, 3], n=order, axis=0), axis=1) / 1e-3**order

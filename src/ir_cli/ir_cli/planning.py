@@ -129,6 +129,29 @@ def add_margin(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_tool_limits(parser: argparse.ArgumentParser) -> None:
+    """How fast the tool may be."""
+    parser.add_argument(
+        "--tool-speed",
+        type=float,
+        default=0.0,
+        metavar="M/S",
+        help="most speed of the tcp in m/s (as the axes allow)",
+    )
+    parser.add_argument(
+        "--tool-acceleration",
+        type=float,
+        default=0.0,
+        metavar="M/S^2",
+        help="most acceleration of the tcp in m/s^2 (as the axes allow)",
+    )
+    parser.add_argument(
+        "--whole-tool",
+        action="store_true",
+        help="both hold for every point of the capsules of tool and part",
+    )
+
+
 def add_options(parser: argparse.ArgumentParser) -> None:
     """What a planning request may choose."""
     add_margin(parser)
@@ -140,6 +163,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="W",
         help="worth of a second (the robot's own: ir robot check; 500 for the KR 210)",
     )
+    add_tool_limits(parser)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument(
         "--planning-time", type=float, default=CEILING, metavar="S", help="ceiling in s"
@@ -182,6 +206,9 @@ def options_of(arguments: argparse.Namespace, duration: float = 0.0) -> PlanOpti
         duration=duration,
         load=arguments.load,
         **tilt_of(arguments),
+        tool_speed=arguments.tool_speed,
+        tool_acceleration=arguments.tool_acceleration,
+        whole_tool=arguments.whole_tool,
     )
 
 
@@ -213,6 +240,8 @@ def figures_of(report: TrajectoryReport) -> Row:
         "acceleration_share": report.acceleration_ratio,
         "jerk_share": report.jerk_ratio,
         "torque_share": report.torque_ratio,
+        "tool_speed": report.tool_speed,
+        "tool_acceleration": report.tool_acceleration,
     }
 
 
@@ -264,5 +293,6 @@ def sentence_of(report: TrajectoryReport, planner: Planner) -> str:
         f"at most {report.peak_power / 1e3:.1f} kW\n"
         f"clearance {report.min_clearance * 1e3:.1f} mm{pair}; uses {100.0 * used:.0f} % of a "
         f"limit; {leans}"
+        f"the tool at most {report.tool_speed:.3f} m/s and {report.tool_acceleration:.2f} m/s^2; "
         f"{'certified' if report.certified else 'NOT certified'}"
     )

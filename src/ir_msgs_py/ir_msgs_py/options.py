@@ -32,6 +32,8 @@ class PlanOptions:
     tilt_direction, (3,) in the cell, at every instant of a regional movement; -1: as it likes. ()
     is the axis that points in the direction at the start, and the direction up. Both are brought
     to length 1.
+    tool_speed [m/s], tool_acceleration [m/s^2]: the most that the tcp may have, 0 = as the axes
+    allow; whole_tool: every point of tool and part instead.
     """
 
     planner_id: str = ""
@@ -51,6 +53,9 @@ class PlanOptions:
     tilt_max: float = NO_TILT
     tilt_axis: tuple[float, ...] = ()
     tilt_direction: tuple[float, ...] = ()
+    tool_speed: float = 0.0
+    tool_acceleration: float = 0.0
+    whole_tool: bool = False
 
     def __post_init__(self) -> None:
         for name, bound in (("seed", 2**64), ("max_iterations", 2**32)):
@@ -63,7 +68,13 @@ class PlanOptions:
             raise InvalidValueError(
                 f"planning_time is {planning_time:g} s: it must be more than 0 s"
             )
-        asked = [("safety_distance", "m"), ("time_value", "W"), ("duration", "s")]
+        asked = [
+            ("safety_distance", "m"),
+            ("time_value", "W"),
+            ("duration", "s"),
+            ("tool_speed", "m/s"),
+            ("tool_acceleration", "m/s^2"),
+        ]
         if self.time_value == ROBOTS_TIME_VALUE:
             asked.remove(("time_value", "W"))
         for name, unit in asked:

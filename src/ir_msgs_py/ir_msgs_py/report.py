@@ -85,6 +85,8 @@ class TrajectoryReport:
     distance. torque_reserve: share of the torque envelope that was left to the feedback.
     largest_tilt [rad]: a proved bound of how far the tool leans, -1 where nobody asked; inf where
     none is proved.
+    tool_speed [m/s], tool_acceleration [m/s^2]: bounds at the tcp; of every point of tool and part
+    where those are limited.
     """
 
     duration: float = 0.0
@@ -112,9 +114,18 @@ class TrajectoryReport:
     power_parameters: str = ""
     torque_reserve: float = 0.0
     largest_tilt: float = NO_TILT
+    tool_speed: float = 0.0
+    tool_acceleration: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("duration", "burnt_energy", "path_length", "torque_reserve"):
+        for name in (
+            "duration",
+            "burnt_energy",
+            "path_length",
+            "torque_reserve",
+            "tool_speed",
+            "tool_acceleration",
+        ):
             set_field(self, name, at_least(getattr(self, name), 0.0, name))
         for name in ("movement_cost", "energy", "base_energy", "peak_power", "closest_time"):
             set_field(self, name, finite(getattr(self, name), name))

@@ -123,6 +123,9 @@ class OptionFields(TypedDict, total=False):
     tilt_max: float
     tilt_axis: tuple[float, ...]
     tilt_direction: tuple[float, ...]
+    tool_speed: float
+    tool_acceleration: float
+    whole_tool: bool
 
 
 def options_with(options: PlanOptions | None, changes: OptionFields) -> PlanOptions:
@@ -282,23 +285,36 @@ class Planner:
         tilt_max: float = NO_TILT,
         tilt_axis: tuple[float, ...] = (),
         tilt_direction: tuple[float, ...] = (),
+        tool_speed: float = 0.0,
+        tool_acceleration: float = 0.0,
+        whole_tool: bool = False,
     ) -> Evaluation:
         """Everything that is known about a trajectory, with the first violation. station: its
         allowed contacts hold. tilt_max and the others: as in PlanOptions.
         """
-        checked_margin(safety_distance)
+        options = options_with(
+            None,
+            {
+                "safety_distance": safety_distance,
+                "tilt_max": tilt_max,
+                "tilt_axis": tilt_axis,
+                "tilt_direction": tilt_direction,
+                "tool_speed": tool_speed,
+                "tool_acceleration": tool_acceleration,
+                "whole_tool": whole_tool,
+            },
+        )
+        options, _ = checked_options(options)
         scene = self.scene(load)
         scene.allowed(station)  # an unknown one is refused here
-        asked: OptionFields = {
-            "tilt_max": tilt_max,
-            "tilt_axis": tilt_axis,
-            "tilt_direction": tilt_direction,
-        }
         trajectory = examinable(trajectory)
         start = trajectory.reordered(scene.cell.robot.joint_names).positions[0]
-        options = upright_options(options_with(None, asked), scene, start)
+        options = upright_options(options, scene, start)
         cone = cone_of(options, scene)
-        found = evaluate_trajectory(trajectory, scene, safety_distance, station, cone=cone)
+        tool = Context.of(scene, options, self._work(options, _NEVER), station).tool_bounds
+        found = evaluate_trajectory(
+            trajectory, scene, safety_distance, station, cone=cone, tool=tool
+        )
         return evaluation_in(found, trajectory, scene)
 
     def standby(

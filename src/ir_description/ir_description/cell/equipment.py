@@ -11,7 +11,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from ir_description.poses import composed, pose_of
-from ir_description.robot import Load
+from ir_description.robot import UNLIMITED, Load, ToolLimits
 from ir_description.shapes import SIZE_MAX, Body
 from ir_kernels import portable
 from ir_msgs_py.cartesian import CartesianPath
@@ -289,7 +289,7 @@ class Station:
 
     zone is the kind of its machine's zone. The tool leaves by approach_distance [m] along -x of the
     tcp. The allowed contacts hold inside the machine's zone only. tilt: how far the tool may lean
-    on the movement to it, None: as it likes.
+    on the movement to it, None: as it likes. limits: of the movements into and out of it.
     """
 
     name: str
@@ -301,6 +301,7 @@ class Station:
     approach_distance: float = 0.0
     search: StationSearch = StationSearch()
     tilt: ToolTilt | None = None
+    limits: ToolLimits = UNLIMITED
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", frozen_pose(self.pose, f"pose of {self.name}"))
@@ -320,6 +321,7 @@ def station_at(
     approach_distance: float = 0.0,
     search: StationSearch = StationSearch(),
     tilt: ToolTilt | None = None,
+    limits: ToolLimits = UNLIMITED,
 ) -> Station:
     """Return a station of a machine from its pose (4, 4) in the machine's frame."""
     return Station(
@@ -332,6 +334,7 @@ def station_at(
         approach_distance=approach_distance,
         search=search,
         tilt=tilt,
+        limits=limits,
     )
 
 

@@ -26,7 +26,7 @@ from ir_description.cell import (
 from ir_description.files.cell_reader import FORMAT
 from ir_description.files.program_reader import path_lines
 from ir_description.poses import abc_from_rotation, rotation_from_abc
-from ir_description.robot import Load
+from ir_description.robot import Load, ToolLimits
 from ir_description.shapes import Body, Capsule
 from ir_msgs_py.plc import Signal
 from ir_values.arrays import FloatArray
@@ -92,7 +92,20 @@ def _load(load: Load) -> Iterator[str]:
     if load.kind == "tool":
         yield f"watts_always: {_number(load.watts_always)}"
         yield f"watts_drive_bus: {_number(load.watts_drive_bus)}"
+    yield from _limits(load.limits)
     yield from _block("capsules", ([_capsule(capsule)] for capsule in load.capsules))
+
+
+def _limits(limits: ToolLimits) -> Iterator[str]:
+    fields = []
+    if limits.speed:
+        fields.append(f"tool_speed: {_number(limits.speed)}")
+    if limits.acceleration:
+        fields.append(f"tool_acceleration: {_number(limits.acceleration)}")
+    if fields and limits.whole:
+        fields.append("whole_tool: true")
+    if fields:
+        yield f"limits: {{{', '.join(fields)}}}"
 
 
 def _capsule(capsule: Capsule) -> str:
@@ -179,6 +192,7 @@ def _station(station: Station) -> Iterator[str]:
         yield f"starts: {search.starts}"
     if search.withdrawal:
         yield f"withdrawal: {search.withdrawal}"
+    yield from _limits(station.limits)
     yield from _block(
         "allowed_contacts",
         (

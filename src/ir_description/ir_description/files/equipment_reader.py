@@ -54,7 +54,14 @@ from ir_description.poses import (
     rotation_from_matrix,
     rotation_from_quaternion,
 )
-from ir_description.robot import MASS_MAX, Load
+from ir_description.robot import (
+    MASS_MAX,
+    TOOL_ACCELERATION_MAX,
+    TOOL_SPEED_MAX,
+    UNLIMITED,
+    Load,
+    ToolLimits,
+)
 from ir_description.shapes import KINDS, SIZE_MAX, Body, Capsule
 from ir_kernels import portable
 from ir_values.arrays import FloatArray, solid_box_inertia
@@ -381,10 +388,11 @@ def _process_times(table: Table) -> ProcessTimes | None:
     return ProcessTimes(float(low), float(high))
 
 
+_STATION_KEYS = ("approach_distance", "allowed_contacts", "tilt", "limits", *_SEARCH_KEYS)
+
+
 def _station(item: Item, machine: Equipment) -> Station:
-    table = item.table(
-        ("name", "pose"), ("approach_distance", "allowed_contacts", "tilt", *_SEARCH_KEYS)
-    )
+    table = item.table(("name", "pose"), _STATION_KEYS)
     contacts = table["allowed_contacts"].list(0, 1000) if "allowed_contacts" in table else []
     approach = table.get("approach_distance")
     return station_at(
@@ -395,6 +403,7 @@ def _station(item: Item, machine: Equipment) -> Station:
         0.0 if approach is None else approach.number(0.0, APPROACH_MAX, "m"),
         _search(table),
         read_tilt(table),
+        _limits(table),
     )
 
 
@@ -430,6 +439,26 @@ def _search(table: Table) -> StationSearch:
     return StationSearch(configurations, starts, withdrawal)
 
 
+def _limits(table: Table) -> ToolLimits:
+    """How fast the tool may move, of a load or a station; as the axes allow where nothing is
+    said.
+    """
+    if "limits" not in table:
+        return UNLIMITED
+    given = table["limits"].table((), ("tool_speed", "tool_acceleration", "whole_tool"))
+    speed = given.get("tool_speed")
+    acceleration = given.get("tool_acceleration")
+    if speed is None and acceleration is None:
+        table["limits"].fail("must have tool_speed or tool_acceleration")
+    return ToolLimits(
+        0.0 if speed is None else speed.number(0.0, TOOL_SPEED_MAX, "m/s", above=True),
+        0.0
+        if acceleration is None
+        else acceleration.number(0.0, TOOL_ACCELERATION_MAX, "m/s^2", above=True),
+        given["whole_tool"].boolean() if "whole_tool" in given else False,
+    )
+
+
 def read_contact(item: Item) -> AllowedContact:
     """A pair with the distance that it must keep at its station or along its path."""
     table = item.table(("between", "safety_distance"))
@@ -442,7 +471,7 @@ def read_contact(item: Item) -> AllowedContact:
 
 # The tool and the parts.
 
-_MASS_KEYS = ("inertia", "inertia_box", "capsules")
+_MASS_KEYS = ("inertia", "inertia_box", "capsules", "limits")
 
 
 def read_tool(item: Item, link: int, shapes: NameRegister) -> Load:
@@ -458,6 +487,7 @@ def read_tool(item: Item, link: int, shapes: NameRegister) -> Load:
         capsules=_capsules(table, link, shapes),
         watts_always=_watts(table, "watts_always"),
         watts_drive_bus=_watts(table, "watts_drive_bus"),
+        limits=_limits(table),
     )
 
 
@@ -472,6 +502,7 @@ def read_part(item: Item, link: int, shapes: NameRegister, bodies: BodyReader) -
         com=table["com"].numbers(3, -FAR, FAR, "m"),
         inertia=_inertia(table, mass),
         capsules=_capsules(table, link, shapes),
+        limits=_limits(table),
     )
     return Part(
         load=load,

@@ -294,13 +294,41 @@ RobotModel.rated_payload.
 LoadKind = Literal["tool", "part"]
 
 
+TOOL_SPEED_MAX = 100.0  # m/s
+TOOL_ACCELERATION_MAX = 1e4  # m/s^2
+
+
+@dataclass(frozen=True)
+class ToolLimits:
+    """How fast the tcp may move [m/s] and change its speed [m/s^2], 0: as the axes allow. whole:
+    holds for every point of the capsules of tool and part instead.
+    """
+
+    speed: float = 0.0
+    acceleration: float = 0.0
+    whole: bool = False
+
+    def __post_init__(self) -> None:
+        in_range(self.speed, 0.0, TOOL_SPEED_MAX, "m/s", "tool_speed")
+        in_range(self.acceleration, 0.0, TOOL_ACCELERATION_MAX, "m/s^2", "tool_acceleration")
+
+    @property
+    def asked(self) -> bool:
+        """Whether anything is limited."""
+        return max(self.speed, self.acceleration) > 0.0
+
+
+UNLIMITED = ToolLimits()
+"""As fast as the axes allow."""
+
+
 @dataclass(frozen=True, eq=False)
 class Load:
     """What moves with the last link.
 
     A tool is mass data plus watts, a part is mass only. com (3,) [m] and the capsules stand in the
     frame of the last link for a tool, in the part's own frame for a part (see `placed`). inertia
-    (3, 3) [kg m^2] is about com.
+    (3, 3) [kg m^2] is about com. limits: of every movement with it.
     """
 
     name: str
@@ -311,6 +339,7 @@ class Load:
     capsules: tuple[Capsule, ...] = ()
     watts_always: float = 0.0
     watts_drive_bus: float = 0.0
+    limits: ToolLimits = UNLIMITED
 
     def __post_init__(self) -> None:
         if self.kind not in ("tool", "part"):

@@ -65,6 +65,8 @@ _REPORT_NUMBERS = (
     "path_length",
     "torque_reserve",
     "largest_tilt",
+    "tool_speed",
+    "tool_acceleration",
 )
 _PER_JOINT = ("joint_energy", "velocity_ratio", "acceleration_ratio", "jerk_ratio", "torque_ratio")
 _TEXTS = (

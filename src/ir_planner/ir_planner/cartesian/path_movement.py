@@ -13,6 +13,7 @@ from ir_planner.cartesian.path_times import SentPath, sent, timed_stroke
 from ir_planner.cartesian.slowing import slower_between, unhurried
 from ir_planner.cartesian.speed_ramps import Span
 from ir_planner.cartesian.tool_path import Asked, PathRefusedError, StrayedError, ToolPath
+from ir_planner.checks import ToolUse
 from ir_planner.curves import extremes
 from ir_planner.request import DURATION_MAX
 from ir_planner.scene import MotionLimits, PlanningScene, lasting_longer
@@ -288,6 +289,8 @@ def _as_slow_as_sent(path: SentPath, limits: MotionLimits, scene: PlanningScene)
             largest.jerk,
             np.zeros_like(largest.velocity),
         )
+        if limits.tool.asked:
+            use = np.maximum(use, ToolUse(path.trajectory, scene, limits.tool, largest).longer)
         if use.max() <= 1.0:
             break
         counts = np.cumsum([0, *(len(tau) - 1 for tau in path.instants)])

@@ -119,6 +119,7 @@ def drawn(path: CartesianPath, start: FloatArray | None, t1: bool, context: Cont
     """A path with its configurations, from `start` (n,) or from all. Raises PathRefusedError."""
     if t1:
         path = _at_most(path, T1_SPEED)
+    path = _at_most(path, _BELOW * context.tool_bounds.tcp.speed)
     with context.journal.stage("path") as notes:
         whole, joints = joined(path, parts_of(path))
         _check_corners(path, whole, joints)
@@ -130,6 +131,9 @@ def drawn(path: CartesianPath, start: FloatArray | None, t1: bool, context: Cont
         layers = layers_of(whole, path.free_angle, asked.space, start)
         notes.append(f"{len(layers.q)} at {len(layers.s)} samples, {int(layers.free.sum())} free")
     return Drawn(asked, joints, layers)
+
+
+_BELOW = 0.998  # of the tool's largest speed: by how much the tool may be off the speed asked for
 
 
 def _at_most(path: CartesianPath, speed: float) -> CartesianPath:

@@ -5,76 +5,13 @@ from dataclasses import astuple, dataclass
 import numpy as np
 
 from ir_kernels import portable
-from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.cartesian.joint_curve import Angle, tool_poses
 from ir_planner.cartesian.path_parts import TURN_LENGTH
 from ir_planner.cartesian.path_times import SentPath
 from ir_planner.cartesian.tool_path import ToolPath
-from ir_planner.curves import extremes
+from ir_planner.checks import ToolDerivatives, tool_derivatives
 from ir_planner.scene import PlanningScene
 from ir_values.arrays import FloatArray
-
-# Bounds of the tool's motion on each segment of a trajectory, from those of its axes.
-#
-# A place at the distance r from an axis moves by at most r per radian. By the chain rule a
-# derivative of the tool's place is a sum over axes, over pairs of them and over triples, each at
-# most the product of the axes' derivatives and the distance from the outermost axis of the term;
-# with all distances 1 it holds for its rotation.
-
-
-@dataclass(frozen=True, eq=False)
-class ToolMotion:
-    """Bounds (S,) on each segment: of |p''| [m/s^2] and |p'''| [m/s^3] of the tcp's place, and of
-    |R''| [rad/s^2] of its rotation, as 1 / sqrt(2) of the Frobenius norm, and of |w''| [rad/s^3] of
-    its turning speed; times (S + 1,) s.
-    """
-
-    times: FloatArray
-    acceleration: FloatArray
-    jerk: FloatArray
-    turning: FloatArray
-    spinning: FloatArray
-
-    def between(self, values: FloatArray, times: FloatArray) -> FloatArray:
-        """The largest of values (S,) between times (M,) s and the next (M - 1,), at most a segment
-        apart.
-        """
-        last = len(values) - 1
-        first = np.clip(np.searchsorted(self.times, times[:-1], side="right") - 1, 0, last)
-        second = np.clip(np.searchsorted(self.times, times[1:], side="left") - 1, 0, last)
-        return np.maximum(values[first], values[np.maximum(second, first)])
-
-
-def tool_motion(trajectory: JointTrajectory, scene: PlanningScene) -> ToolMotion:
-    """Bounds of the tool's motion along a trajectory."""
-    largest = extremes(*trajectory.coefficients())
-    reach = _reach(scene)
-    v, a, j = (
-        np.cumsum(one, axis=1) for one in (largest.velocity, largest.acceleration, largest.jerk)
-    )
-
-    def outermost(sums: FloatArray) -> FloatArray:
-        """Sums (S,) of terms times the distance from their outermost axes, from those up to each
-        axis.
-        """
-        return np.asarray(portable.matmul(np.diff(sums, axis=1, prepend=0.0), reach))
-
-    return ToolMotion(
-        trajectory.times,
-        outermost(a + v * v),
-        outermost(j + 3.0 * a * v + portable.power(v, 3)),
-        np.asarray(a[:, -1] + v[:, -1] ** 2),
-        np.asarray(j[:, -1] + 3.0 * a[:, -1] * v[:, -1] + portable.power(v[:, -1], 3)),
-    )
-
-
-def _reach(scene: PlanningScene) -> FloatArray:
-    """Farthest (n,) m that the tcp can be from each axis."""
-    chain = scene.chain
-    links = np.linalg.norm(chain.joint_origin[1:, :3, 3], axis=1)
-    tail = np.append(links, portable.norm(chain.tcp[:3, 3]))
-    return np.asarray(np.cumsum(tail[::-1])[::-1])
-
 
 # How well the tool keeps to its path: bounds of its distance, its turn and its speed at every
 # instant.
@@ -112,7 +49,7 @@ class Kept:
 
 def kept_of(sent: SentPath, path: ToolPath, angle: Angle | None, scene: PlanningScene) -> Kept:
     """What the trajectory that is sent keeps of the path."""
-    motion = tool_motion(sent.trajectory, scene)
+    motion = tool_derivatives(sent.trajectory, scene)
     kept = Kept()
     for k in range(len(sent.strokes)):
         judged = _Stroke(sent, k, path, angle, scene, motion)
@@ -131,7 +68,7 @@ class _Stroke:
     path: ToolPath
     angle: Angle | None
     scene: PlanningScene
-    motion: ToolMotion
+    motion: ToolDerivatives
 
     @property
     def in_place(self) -> bool:

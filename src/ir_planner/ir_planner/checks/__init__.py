@@ -43,6 +43,7 @@ from ir_planner.checks.shapes import (
     cell_shapes,
     movement_shapes,
 )
+from ir_planner.checks.tool_motion import ToolDerivatives, ToolUse, tool_derivatives
 from ir_planner.checks.verification import (
     AT_REST,
     SLACK,
@@ -72,6 +73,8 @@ __all__ = [
     "MovementEnergy",
     "Shape",
     "StateCheck",
+    "ToolDerivatives",
+    "ToolUse",
     "TorqueProof",
     "Verification",
     "Violation",
@@ -101,6 +104,7 @@ __all__ = [
     "tilt_violation",
     "too_near",
     "too_near_sentence",
+    "tool_derivatives",
     "torque_proof",
     "total_report",
     "verified",

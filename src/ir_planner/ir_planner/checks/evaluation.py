@@ -16,7 +16,14 @@ from ir_planner.checks.clearance import ClearanceProfile, clearance_profile
 from ir_planner.checks.energy import MovementEnergy, movement_energy, peak_power
 from ir_planner.checks.verification import TILT, AtRest, Verification, verify
 from ir_planner.presentation import plot_profiles, report_text, status_text
-from ir_planner.scene import PROOF_TOLERANCE, TILT_TOLERANCE, PlanningScene, Stops, ToolCone
+from ir_planner.scene import (
+    PROOF_TOLERANCE,
+    TILT_TOLERANCE,
+    PlanningScene,
+    Stops,
+    ToolBounds,
+    ToolCone,
+)
 from ir_values.arrays import FloatArray
 
 
@@ -71,12 +78,13 @@ def evaluate_trajectory(
     station: Stops = "",
     at_rest: AtRest = (True, True),
     cone: ToolCone | None = None,
+    tool: ToolBounds | None = None,
 ) -> Evaluation:
     """Verify and measure a trajectory with the loads of the scene. station: whose contacts are
     allowed; of a hop between two stations both, each in its own zone. cone: in which the tool has
-    to stay.
+    to stay. tool: how fast it may be, None: what the loads let it do.
     """
-    verification = verify(trajectory, scene, safety_distance, station, at_rest, cone)
+    verification = verify(trajectory, scene, safety_distance, station, at_rest, cone, tool)
     energy = movement_energy(trajectory, scene)
     return measured(trajectory, scene, safety_distance, station, verification, energy, cone)
 
@@ -113,6 +121,8 @@ def measured(
         contacts=clearance.contacts,
         torque_reserve=_reserve(verification.torque, scene),
         largest_tilt=_largest_tilt(trajectory, cone, verification),
+        tool_speed=verification.tool_speed,
+        tool_acceleration=verification.tool_acceleration,
     )
     return Evaluation(report, verification, clearance, energy)
 
@@ -188,6 +198,8 @@ def total_report(
         contacts=tuple(pair for report in reports for pair in report.contacts),
         torque_reserve=min(report.torque_reserve for report in moving),
         largest_tilt=max(report.largest_tilt for report in moving),
+        tool_speed=max(report.tool_speed for report in moving),
+        tool_acceleration=max(report.tool_acceleration for report in moving),
         velocity_ratio=ratios["velocity_ratio"],
         acceleration_ratio=ratios["acceleration_ratio"],
         jerk_ratio=ratios["jerk_ratio"],

@@ -15,12 +15,14 @@ from ir_msgs_py.report import DistancePair
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.clearance import pair_value
+from ir_planner.checks.tool_motion import ToolUse
 from ir_planner.curves import Extremes, extremes
 from ir_planner.presentation import in_mm, told_apart
 from ir_planner.scene import (
     PROOF_TOLERANCE,
     PlanningScene,
     Stops,
+    ToolBounds,
     ToolCone,
     polynomials_between,
     spans_outside,
@@ -175,6 +177,34 @@ def share_violation(
     return Violation(float(trajectory.times[k]), k, name, float(share[k, j] - 1.0), sentence)
 
 
+def tool_violation(use: ToolUse) -> Violation | None:
+    """Where the tool is faster than it may be, or can't be proved to be slower."""
+    first: Violation | None = None
+    for name, found, bounds in use.asked:
+        for what, most, sampled, limit, unit in (
+            ("speed", found.speed, found.found_speed, bounds.speed, "m/s"),
+            (
+                "acceleration",
+                found.acceleration,
+                found.found_acceleration,
+                bounds.acceleration,
+                "m/s^2",
+            ),
+        ):
+            beyond = np.flatnonzero(most > limit * (1.0 + SLACK))
+            if len(beyond) == 0 or (first is not None and first.waypoint <= beyond[0]):
+                continue
+            k = int(beyond[0])
+            sentence = (
+                f"the {what} of {name} comes to {sampled[k]:.6g} {unit} (at most {most[k]:.6g}) "
+                f"after waypoint {k}: it must be at most {limit:g} {unit} "
+                f"(excess {100.0 * (most[k] / limit - 1.0):.2g} %)"
+            )
+            time = float(use.trajectory.times[k])
+            first = Violation(time, k, f"tool {what}", float(most[k] - limit), sentence)
+    return first
+
+
 # The proof of clearance leaves out no instant between samples. At a station its allowed contacts
 # hold while the tcp is in the machine's zone; outside every pair keeps S_m.
 
@@ -326,7 +356,9 @@ def leans(tilt: float, cone: ToolCone, where: str) -> str:
 @dataclass(frozen=True, eq=False)
 class Verification:
     """violation: the first one, None: everything is proved; others: the first of every other kind,
-    in the order of their times. Largest used shares of the limits, each (n,).
+    in the order of their times. Largest used shares of the limits, each (n,). tool_speed [m/s],
+    tool_acceleration [m/s^2]: bounds at the tcp; of every point of tool and part where those are
+    limited.
     """
 
     violation: Violation | None
@@ -336,6 +368,8 @@ class Verification:
     torque: FloatArray
     travel: FloatArray
     others: tuple[Violation, ...] = ()
+    tool_speed: float = 0.0
+    tool_acceleration: float = 0.0
 
     @property
     def certified(self) -> bool:
@@ -381,14 +415,15 @@ def verify(
     station: Stops = "",
     at_rest: AtRest = (True, True),
     cone: ToolCone | None = None,
+    tool: ToolBounds | None = None,
 ) -> Verification:
-    """Check a trajectory against the robot's limits, S_m (or what `station` allows its pairs), and
-    the cone in which the tool has to stay.
+    """Check a trajectory against the robot's limits, those of the tool, S_m (or what `station`
+    allows its pairs), and the cone in which the tool has to stay.
     """
     clearance = clearance_violation(trajectory, scene, safety_distance, station)
     torque = torque_proof(trajectory, scene)
     tilt = tilt_violation(trajectory, cone)
-    return verified(trajectory, scene, clearance, torque, at_rest, tilt)
+    return verified(trajectory, scene, clearance, torque, at_rest, tilt, tool)
 
 
 def verified(
@@ -398,11 +433,15 @@ def verified(
     torque: TorqueProof,
     at_rest: AtRest = (True, True),
     tilt: Violation | None = None,
+    tool: ToolBounds | None = None,
 ) -> Verification:
-    """The verification of a trajectory whose clearance, torque and tilt have been examined."""
+    """The verification of a trajectory whose clearance, torque and tilt have been examined; tool:
+    None: what the loads let it do.
+    """
     largest = extremes(*trajectory.coefficients())
     robot = scene.cell.robot
     limits = scene.limits
+    use = ToolUse(trajectory, scene, limits.tool if tool is None else tool, largest)
     share = {
         "velocity": largest.velocity / limits.velocity,
         "acceleration": largest.acceleration / limits.acceleration,
@@ -413,6 +452,7 @@ def verified(
         rest_violation(trajectory, scene, at_rest),
         jump_violation(trajectory, robot.joint_names),
         torque.violation,
+        tool_violation(use),
         *(
             share_violation(name, values, trajectory, robot.joint_names)
             for name, values in share.items()
@@ -430,6 +470,7 @@ def verified(
         torque.upper,
         largest.travel.sum(axis=0),
         tuple(violations[1:]),
+        *(use.whole if use.bounds.whole.asked else use.tcp).most(),
     )
 
 

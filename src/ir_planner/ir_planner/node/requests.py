@@ -363,6 +363,9 @@ class Requests:
             tilt_max=request.tilt_max,
             tilt_axis=tuple(request.tilt_axis),
             tilt_direction=tuple(request.tilt_direction),
+            tool_speed=request.tool_speed,
+            tool_acceleration=request.tool_acceleration,
+            whole_tool=request.whole_tool,
         )
         fill_evaluation(response, evaluation)
         return evaluation.status

@@ -15,6 +15,7 @@ import numpy as np
 
 from ir_kernels import portable
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.checks import ToolUse
 from ir_planner.curves import UniformSpline
 from ir_planner.optimize.fixed_path import FixedPath, never_back
 from ir_planner.optimize.refinement import EDGES_PER_INTERVAL, SPEED_MARGINS
@@ -333,7 +334,11 @@ def _use(spline: UniformSpline, limits: MotionLimits, scene: PlanningScene) -> F
     speed, acceleration = (np.maximum(np.abs(x[:-1]), np.abs(x[1:])) for x in (qd, qdd))
     jerk = np.abs(np.diff(qdd, axis=0)) / spline.interval
     shape = (spline.intervals, _TORQUE_SAMPLES, -1)
-    return lasting_longer(limits, speed, acceleration, jerk, torque.reshape(shape).max(axis=1))
+    use = lasting_longer(limits, speed, acceleration, jerk, torque.reshape(shape).max(axis=1))
+    if not limits.tool.asked:
+        return use
+    trajectory = spline.trajectory(scene.cell.robot.joint_names)
+    return np.maximum(use, ToolUse(trajectory, scene, limits.tool).longer)
 
 
 KEPT = 1e-3  # rad by which a time scaling may leave its path: some millimetres of the tool at most

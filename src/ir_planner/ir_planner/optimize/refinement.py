@@ -242,7 +242,7 @@ class Refinement:
         if self.context.motion is not None:
             change = np.abs(self.context.motion[:, 0]) / self.limits.acceleration
             least = max(least, float(change.max(axis=1).sum()))
-        check_duration(least, self.context.options)
+        check_duration(least, self.context)
         count = int(np.clip(np.ceil(least / SPACING), FEWEST, MOST))
         start = along_path(path, count, self.context.options.duration or SLOWER * least)
         return self.coarse_from(self._moving(start), path, evaluations)
@@ -346,7 +346,7 @@ class Refinement:
         found.
         """
         if np.isfinite(self.shortest):
-            check_requested(self.shortest, self.context.options)
+            check_requested(self.shortest, self.context)
 
     def _refined(self, solution: Solution, path: FloatArray, effort: Effort) -> Movement | None:
         for stage in effort.after(solution.stage.level):
@@ -496,7 +496,7 @@ class Refinement:
         if slowed is None:
             return None
         options = self.context.options
-        check_duration(slowed.duration, options)
+        check_duration(slowed.duration, self.context)
         if options.duration > 0.0:
             if slowed.duration > options.duration * (1.0 + _ROUNDING):
                 return None

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from ir_kernels import SplineCost, SplineTerms
+from ir_planner.checks import ToolUse
 from ir_planner.curves import UniformSpline
 from ir_planner.request import Context
-from ir_planner.scene import MotionLimits, PlanningScene, lasting_longer, torque_use
+from ir_planner.scene import MotionLimits, PlanningScene, ToolBounds, lasting_longer, torque_use
 from ir_planner.timing import ObjectiveWeights
 from ir_values.arrays import FloatArray
 
@@ -92,13 +93,16 @@ def beyond_limits(
     spline: UniformSpline, limits: MotionLimits, scene: PlanningScene
 ) -> tuple[float, float]:
     """By what factor a spline exceeds its share of torque (at samples), and by what factor it would
-    have to last longer for its speed, acceleration and jerk.
+    have to last longer for its speed, acceleration and jerk, and those of the tool.
     """
     top = spline.extremes()
     torque = torque_use(scene.dynamics, *spline.samples(_TORQUE_SAMPLES)).max()
     none = np.zeros(spline.control.shape[1])
-    longer = lasting_longer(limits, top.velocity, top.acceleration, top.jerk, none)
-    return float(torque) / limits.torque_share, float(longer)
+    longer = float(lasting_longer(limits, top.velocity, top.acceleration, top.jerk, none))
+    if limits.tool.asked:
+        trajectory = spline.trajectory(scene.cell.robot.joint_names)
+        longer = max(longer, float(ToolUse(trajectory, scene, limits.tool).longer.max()))
+    return float(torque) / limits.torque_share, longer
 
 
 def slowed_to_limits(
@@ -110,6 +114,7 @@ def slowed_to_limits(
     """
     if spline.ends is not None:
         return spline if max(beyond_limits(spline, limits, scene)) <= 1.0 + _ROUNDED else None
+    spline = _slowed_for_tool(spline, limits.tool, scene)
     for k in range(_ROUNDS):
         top = spline.extremes()
         samples = spline.samples(_TORQUE_SAMPLES)
@@ -122,6 +127,17 @@ def slowed_to_limits(
             longer = max(longer, _longer_by_inertia(torque, samples, limits, scene))
         spline = spline.at_interval(spline.interval * longer * _BELOW)
     return None
+
+
+def _slowed_for_tool(
+    spline: UniformSpline, bounds: ToolBounds, scene: PlanningScene
+) -> UniformSpline:
+    """The spline, evenly slower where its tool would be faster than it may be."""
+    if not bounds.asked:
+        return spline
+    trajectory = spline.trajectory(scene.cell.robot.joint_names)
+    longer = float(ToolUse(trajectory, scene, bounds).longer.max())
+    return UniformSpline(spline.control, spline.interval * max(longer, 1.0))
 
 
 def _longer_by_inertia(

@@ -25,7 +25,7 @@ from ir_planner.errors import RequestError, TimingError
 from ir_planner.presentation import plot_trajectory, result_text
 from ir_planner.request import Context, joint_values
 from ir_planner.scene import END_TOLERANCE, PROOF_TOLERANCE, PlanningScene, polynomials_between
-from ir_planner.timing import GRID_S, StepLaws, TimedPath, blended, fastest
+from ir_planner.timing import StepLaws, TimedPath, blended, fastest, slowed_for_tool
 from ir_values.arrays import FloatArray
 
 DEEPER = 1e-5  # m that a pair may get nearer within a step: what the proof of it needs
@@ -280,12 +280,13 @@ def _driven(
             StepLaws((fastest(a, b, limits, scene.dynamics),)) for a, b in pairwise(points)
         )
         path = TimedPath(points, laws, (0,) * (len(laws) - 1))
-        trajectory = blended(path, context.joint_names)
+        trajectory = slowed_for_tool(blended(path, context.joint_names), context)
         torque = torque_proof(trajectory, scene, most)
         if torque.violation is None:
             break
-    ends = GRID_S * np.concatenate([[0], np.cumsum([law.total for law in laws])])
-    verification = verified(trajectory, scene, None, torque)
+    lasting = np.cumsum([law.total for law in laws])
+    ends = trajectory.duration * np.concatenate([[0.0], lasting / lasting[-1]])
+    verification = verified(trajectory, scene, None, torque, tool=context.tool_bounds)
     found = [one for one in (verification.violation, *verification.others) if one is not None]
     wrong = [one.sentence for one in found if one.what != "position"]
     wrong += _worse(trajectory, points, ends, way)

@@ -219,7 +219,7 @@ def _search(  # noqa: C901
         best = not_worse_than_baseline(best, paths, context)
     if best is None:
         if np.isfinite(shortest):
-            check_requested(shortest, context.options)
+            check_requested(shortest, context)
         best = _in_straight_steps(paths, Portfolio(space, Refinement(context)), context)
     if best is None:
         return refusal(start, ends.goals[0], space, context.journal, path=True), None

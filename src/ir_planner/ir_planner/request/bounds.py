@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ir_description import TOOL_ACCELERATION_MAX, TOOL_SPEED_MAX
 from ir_msgs_py.options import NO_TILT, ROBOTS_TIME_VALUE, PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -16,6 +17,7 @@ SAFETY_DISTANCE_MAX = 1.0  # m
 DURATION_MIN = 1e-3  # s: shorter than any movement, and long enough for its square to be a number
 DURATION_MAX = 3600.0  # s
 SCALING_MIN = 1e-6
+TOOL_LEAST = 1e-4  # m/s, m/s^2
 TIME_VALUE_MAX = 1e6  # W
 PLANNING_TIME_MAX = 600.0  # s
 
@@ -70,6 +72,12 @@ def checked_options(options: PlanOptions) -> tuple[PlanOptions, str]:
         bounded(options.time_value, 0.0, TIME_VALUE_MAX, "time_value", "W")
     if options.duration != 0.0:  # 0: free
         bounded(options.duration, DURATION_MIN, DURATION_MAX, "duration", "s")
+    for value, most, name, unit in (
+        (options.tool_speed, TOOL_SPEED_MAX, "tool_speed", "m/s"),
+        (options.tool_acceleration, TOOL_ACCELERATION_MAX, "tool_acceleration", "m/s^2"),
+    ):
+        if value != 0.0:  # 0: as the axes allow
+            bounded(value, TOOL_LEAST, most, name, unit)
     bounded(options.velocity_scaling, SCALING_MIN, 1.0, "velocity_scaling")
     bounded(options.acceleration_scaling, SCALING_MIN, 1.0, "acceleration_scaling")
     if options.planning_time > PLANNING_TIME_MAX:

@@ -8,13 +8,13 @@ from functools import cached_property
 
 import numpy as np
 
-from ir_description import ToolTilt
+from ir_description import ToolLimits, ToolTilt
 from ir_msgs_py.options import NO_TILT, ROBOTS_TIME_VALUE, TILT_MAX, UP, PlanOptions
 from ir_msgs_py.report import PlanningInfo, PlanningStage, Rejection
 from ir_msgs_py.search_log import ConfigurationLog, SearchLog
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import CancelledError, RequestError
-from ir_planner.scene import MotionLimits, PlanningScene, ToolCone
+from ir_planner.scene import MotionLimits, PlanningScene, ToolBounds, ToolCone
 from ir_values.arrays import FloatArray
 
 # How much work a request may cost: counted in certified edges, with time only as a ceiling, and
@@ -218,10 +218,18 @@ class Context:
 
     @property
     def limits(self) -> MotionLimits:
-        """The robot's bounds times the request's scalings."""
-        return self.scene.limits.scaled(
-            self.options.velocity_scaling, self.options.acceleration_scaling
-        )
+        """The robot's bounds times the request's scalings, and those of the tool."""
+        options = self.options
+        limits = self.scene.limits.scaled(options.velocity_scaling, options.acceleration_scaling)
+        return replace(limits, tool=self.tool_bounds)
+
+    @property
+    def tool_bounds(self) -> ToolBounds:
+        """How fast the tool may be: what the request, the loads and the station say."""
+        options = self.options
+        asked = [ToolLimits(options.tool_speed, options.tool_acceleration, options.whole_tool)]
+        asked += [s.limits for s in self.scene.cell.stations if s.name == self.station]
+        return self.scene.tool_bounds.within(ToolBounds.of(asked))
 
     @cached_property
     def cone(self) -> ToolCone | None:

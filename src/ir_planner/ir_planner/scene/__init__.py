@@ -18,6 +18,7 @@ from ir_planner.scene.planning_scene import (
     scene_with,
     with_parts,
 )
+from ir_planner.scene.tool_bounds import PointBounds, ToolBounds
 from ir_planner.scene.tool_cone import TILT_TOLERANCE, ToolCone
 from ir_planner.scene.zones import polynomials_between, spans_outside, tcp_inside
 
@@ -33,7 +34,9 @@ __all__ = [
     "LinkVoltage",
     "MotionLimits",
     "PlanningScene",
+    "PointBounds",
     "Stops",
+    "ToolBounds",
     "ToolCone",
     "lasting_longer",
     "load_text",

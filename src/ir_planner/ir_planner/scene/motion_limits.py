@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from ir_kernels import portable
+from ir_planner.scene.tool_bounds import UNBOUNDED, ToolBounds
 from ir_values.arrays import FloatArray
 
 STILL = 1e-9  # rad: nothing moves
@@ -24,7 +25,7 @@ class Dynamics(Protocol):
 @dataclass(frozen=True)
 class MotionLimits:
     """Bounds per joint (n,): rad/s, rad/s^2, rad/s^3; the share (0, 1] of the torque envelope to
-    use, and the share of it that is left to the feedback.
+    use, and the share of it that is left to the feedback. tool: bounds of the tool's motion.
     """
 
     velocity: FloatArray
@@ -32,15 +33,19 @@ class MotionLimits:
     jerk: FloatArray
     torque_share: float = 0.98
     torque_reserve: float = 0.0
+    tool: ToolBounds = UNBOUNDED
 
     def scaled(self, velocity: float, acceleration: float) -> "MotionLimits":
-        """Bounds times the request's scalings; acceleration scaling holds for the jerk as well."""
+        """Bounds times the request's scalings; acceleration scaling holds for the jerk as well,
+        none for the tool.
+        """
         return MotionLimits(
             self.velocity * velocity,
             self.acceleration * acceleration,
             self.jerk * acceleration,
             self.torque_share,
             self.torque_reserve,
+            self.tool,
         )
 
     def for_speed(self, share: float) -> "MotionLimits":
@@ -53,6 +58,7 @@ class MotionLimits:
             self.jerk * portable.power(share, 3),
             self.torque_share * (share * share),
             self.torque_reserve,
+            self.tool.for_speed(share),
         )
 
     def with_torque_share(self, share: float) -> "MotionLimits":

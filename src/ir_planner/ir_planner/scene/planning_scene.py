@@ -38,6 +38,7 @@ from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError, UnknownNameError
 from ir_planner.scene.actuators import LinkVoltage, within_current_and_voltage
 from ir_planner.scene.motion_limits import MotionLimits
+from ir_planner.scene.tool_bounds import ToolBounds
 from ir_values.arrays import BoolArray, FloatArray
 
 
@@ -223,12 +224,32 @@ class PlanningScene:
             robot.link_mass, robot.velocity_max, sum(load.mass for load in self.loads)
         )
 
+    @cached_property
+    def tool_points(self) -> tuple[FloatArray, FloatArray]:
+        """Points (P, 3) m in the frame of the last link and radii (P,) m: the tcp, then the ends of
+        the capsules of tool and part.
+        """
+        points = [self.chain.tcp[:3, 3]]
+        radii = [0.0]
+        for load in self.loads:
+            for capsule in load.capsules:
+                points += [capsule.p0, capsule.p1]
+                radii += [capsule.radius, capsule.radius]
+        return np.array(points), np.array(radii)
+
+    @cached_property
+    def tool_bounds(self) -> ToolBounds:
+        """What the loads let the tool do."""
+        return ToolBounds.of(load.limits for load in self.loads)
+
     @property
     def limits(self) -> MotionLimits:
-        """Bounds of every joint's motion."""
+        """Bounds of every joint's motion, and of the tool's with the loads."""
         robot = self.cell.robot
         bounds = (robot.velocity_max, robot.acceleration_max, robot.jerk_max)
-        limits = MotionLimits(*bounds, torque_reserve=self.drives.torque_reserve)
+        limits = MotionLimits(
+            *bounds, torque_reserve=self.drives.torque_reserve, tool=self.tool_bounds
+        )
         return limits.with_torque_share(limits.torque_share)
 
     @property

@@ -19,7 +19,14 @@ from ir_planner.optimize import QUICK_TIMING, movement_over, rescaled
 from ir_planner.request import Context
 from ir_planner.scene import MotionLimits
 from ir_planner.service.withdrawals import ExitPath
-from ir_planner.timing import Movement, best_stretch, stretched, time_spline, within_torque
+from ir_planner.timing import (
+    Movement,
+    best_stretch,
+    slowed_for_tool,
+    stretched,
+    time_spline,
+    within_torque,
+)
 from ir_values.arrays import FloatArray
 
 SPACING = (
@@ -152,7 +159,7 @@ def timed_service(
         return movement_over(points, context)
 
     def timed(limits: MotionLimits) -> Movement:
-        quickest = line.quickest(entry, limits, context)
+        quickest = slowed_for_tool(line.quickest(entry, limits, context), context)
         trajectory = stretched(quickest, best_stretch(quickest, context))
         return Movement(np.array(points), trajectory, context)
 

@@ -15,6 +15,7 @@ from ir_planner.timing.objective import (
     objective_value,
     objective_weights,
     request_cost,
+    slowed_for_tool,
 )
 from ir_planner.timing.ptp import TOO_HEAVY, fastest, free_law
 from ir_planner.timing.reserve import need_of, with_less_reserve
@@ -49,6 +50,7 @@ __all__ = [
     "objective_value",
     "objective_weights",
     "request_cost",
+    "slowed_for_tool",
     "standing",
     "straight_steps",
     "stretched",

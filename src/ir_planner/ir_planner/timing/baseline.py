@@ -12,7 +12,12 @@ from ir_planner.request import Context
 from ir_planner.scene import STILL, MotionLimits
 from ir_planner.timing.blending import TimedPath, blended, stretched
 from ir_planner.timing.movement import Movement, within_torque
-from ir_planner.timing.objective import DURATION_SLACK, at_best_duration, least_stretched_cost
+from ir_planner.timing.objective import (
+    DURATION_SLACK,
+    at_best_duration,
+    least_stretched_cost,
+    slowed_for_tool,
+)
 from ir_planner.timing.ptp import free_law, path_limits, torque_per_segment
 from ir_planner.timing.time_law import StepLaws
 from ir_values.arrays import FloatArray
@@ -56,7 +61,9 @@ def baseline_costs_at_least(start: FloatArray, goal: FloatArray, context: Contex
 def _quickest(ends: FloatArray, limits: MotionLimits, context: Context) -> JointTrajectory | None:
     """The law at the limits, uniformly slowed by no more than its torque asks for."""
     law = free_law(path_limits(ends[1] - ends[0], limits))
-    at_limits = blended(TimedPath(ends, (StepLaws((law,)),), ()), context.joint_names)
+    at_limits = slowed_for_tool(
+        blended(TimedPath(ends, (StepLaws((law,)),), ()), context.joint_names), context
+    )
 
     def use_at(factor: float) -> float:
         trajectory = stretched(at_limits, factor)

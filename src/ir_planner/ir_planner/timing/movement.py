@@ -74,8 +74,11 @@ class Movement:
     @cached_property
     def verification(self) -> Verification:
         """What holds at every instant of it, as it is sent."""
-        found = (self.clearance, self.torque, self.context.at_rest)
-        return verified(self.trajectory, self.context.scene, *found, tilt=self.tilt)
+        context = self.context
+        found = (self.clearance, self.torque, context.at_rest)
+        return verified(
+            self.trajectory, context.scene, *found, tilt=self.tilt, tool=context.tool_bounds
+        )
 
     @property
     def violation(self) -> Violation | None:

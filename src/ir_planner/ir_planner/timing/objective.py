@@ -14,7 +14,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks import Consumption, movement_energy
+from ir_planner.checks import Consumption, ToolUse, movement_energy
 from ir_planner.curves import motion_at
 from ir_planner.errors import RequestError
 from ir_planner.request import DURATION_MAX, Context
@@ -216,27 +216,44 @@ def _drawn(axes: FloatArray, steps: FloatArray, scene: PlanningScene) -> FloatAr
 DURATION_SLACK = 1e-6  # relative: what rounding to nanoseconds may add to a duration
 
 
-def check_duration(duration: float, options: PlanOptions) -> None:
+def check_duration(duration: float, context: Context) -> None:
     """Raise RequestError where a movement would last longer than any may."""
+    options = context.options
     if duration > DURATION_MAX:
         raise RequestError(
             StatusCode.INVALID_GOAL_CONSTRAINTS,
             f"velocity_scaling {options.velocity_scaling:g} and acceleration_scaling "
-            f"{options.acceleration_scaling:g} make a movement of {duration:.4g} s: "
-            f"it must be at most {DURATION_MAX:g} s",
+            f"{options.acceleration_scaling:g}{_and_tool(context)} make a movement of "
+            f"{duration:.4g} s: it must be at most {DURATION_MAX:g} s",
         )
 
 
-def check_requested(shortest: float, options: PlanOptions) -> None:
+def _and_tool(context: Context) -> str:
+    """What bounds the tool, as a sentence goes on; "": nothing."""
+    bounds = context.tool_bounds
+    return f" and {bounds.text()}" if bounds.asked else ""
+
+
+def check_requested(shortest: float, context: Context) -> None:
     """Raise RequestError where a duration is requested that is shorter than the shortest [s] there
     is.
     """
+    options = context.options
     if options.duration > 0.0 and shortest * (1.0 - DURATION_SLACK) > options.duration:
         raise RequestError(
             StatusCode.INVALID_GOAL_CONSTRAINTS,
-            f"duration is {options.duration:g} s: the shortest within the limits is "
-            f"{shortest:.4g} s",
+            f"duration is {options.duration:g} s: the shortest within the limits"
+            f"{_and_tool(context)} is {shortest:.4g} s",
         )
+
+
+def slowed_for_tool(trajectory: JointTrajectory, context: Context) -> JointTrajectory:
+    """The trajectory, evenly slower where its tool would be faster than it may be."""
+    bounds = context.tool_bounds
+    if not bounds.asked:
+        return trajectory
+    longer = float(ToolUse(trajectory, context.scene, bounds).longer.max(initial=0.0))
+    return stretched(trajectory, longer) if longer > 1.0 else trajectory
 
 
 def at_best_duration(quickest: JointTrajectory, context: Context) -> JointTrajectory:
@@ -247,8 +264,9 @@ def at_best_duration(quickest: JointTrajectory, context: Context) -> JointTrajec
     any may be.
     """
     options = context.options
-    check_duration(quickest.duration, options)
-    check_requested(quickest.duration, options)
+    quickest = slowed_for_tool(quickest, context)
+    check_duration(quickest.duration, context)
+    check_requested(quickest.duration, context)
     if options.duration > 0.0:
         return stretched(quickest, max(options.duration / quickest.duration, 1.0))
     return stretched(quickest, best_stretch(quickest, context))

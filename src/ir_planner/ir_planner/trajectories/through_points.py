@@ -28,6 +28,7 @@ from ir_planner.timing import (
     blended,
     distinct,
     fastest,
+    slowed_for_tool,
     straight_steps,
     time_spline,
     with_less_reserve,
@@ -171,7 +172,9 @@ def _in_proportion(points: FloatArray, durations: FloatArray | None, context: Co
         quickest = time_spline(
             points, context.joint_names, limits, context.scene.dynamics, durations
         )
-        trajectory = quickest if free else at_best_duration(quickest, context)
+        trajectory = (
+            slowed_for_tool(quickest, context) if free else at_best_duration(quickest, context)
+        )
         return Movement(points, trajectory, context)
 
     movement = within_torque(timed, context)

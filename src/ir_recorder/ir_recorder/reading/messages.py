@@ -83,7 +83,15 @@ def report_from(message: Any) -> TrajectoryReport:
     """A TrajectoryReport of its decoded message; what recordings of before don't have keeps its
     default.
     """
-    later = ("energy_low", "energy_high", "power_parameters", "torque_reserve", "safety_distance")
+    later = (
+        "energy_low",
+        "energy_high",
+        "power_parameters",
+        "torque_reserve",
+        "safety_distance",
+        "tool_speed",
+        "tool_acceleration",
+    )
     return TrajectoryReport(
         **{name: getattr(message, name) for name in later if hasattr(message, name)},
         duration=message.duration,

@@ -1,0 +1,307 @@
+"""How fast the tool is, and how much its speed changes: at every instant of a trajectory.
+
+Between two instants a curve leaves the chord of its values by at most h^2 / 8 times a bound of its
+second derivative; so a speed is nowhere more than the larger one of both ends and that, where the
+third derivative of the place is bounded, and an acceleration likewise by the fourth. Such bounds
+follow from those of the axes: a place at the distance r from an axis moves by at most r per radian.
+By the chain rule a derivative of a place is a sum over axes, over pairs of them, over triples and
+so on, each at most the product of the axes' derivatives and the distance from the outermost axis of
+the term; with all distances 1 it holds for the rotation.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ir_kernels import portable
+from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.curves import Extremes, extremes
+from ir_planner.scene import PlanningScene, PointBounds, ToolBounds
+from ir_values.arrays import FloatArray, IntArray
+
+# Bounds of the derivatives of places of the tool on each segment of a trajectory.
+
+
+@dataclass(frozen=True, eq=False)
+class ToolDerivatives:
+    """Bounds (S,) on each segment: of |p''| [m/s^2], |p'''| [m/s^3] and |p''''| [m/s^4] of a place,
+    and of |R''| [rad/s^2] of the rotation, as 1 / sqrt(2) of the Frobenius norm, and of |w''|
+    [rad/s^3] of its turning speed; times (S + 1,) s.
+    """
+
+    times: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+    snap: FloatArray
+    turning: FloatArray
+    spinning: FloatArray
+
+    def between(self, values: FloatArray, times: FloatArray) -> FloatArray:
+        """The largest of values (S,) between times (M,) s and the next (M - 1,), at most a segment
+        apart.
+        """
+        last = len(values) - 1
+        first = np.clip(np.searchsorted(self.times, times[:-1], side="right") - 1, 0, last)
+        second = np.clip(np.searchsorted(self.times, times[1:], side="left") - 1, 0, last)
+        return np.maximum(values[first], values[np.maximum(second, first)])
+
+
+def tool_derivatives(
+    trajectory: JointTrajectory,
+    scene: PlanningScene,
+    farthest: float | None = None,
+    largest: Extremes | None = None,
+) -> ToolDerivatives:
+    """Bounds along a trajectory of places at most `farthest` m from the origin of the last link,
+    None: of the tcp. largest: the extremes of its polynomials, where they are known.
+    """
+    coefficients, durations = trajectory.coefficients()
+    top = extremes(coefficients, durations) if largest is None else largest
+    end = portable.norm(scene.chain.tcp[:3, 3]) if farthest is None else farthest
+    reach = _reach(scene, end)
+    fourth = 24.0 * coefficients[:, :, 4]
+    last = fourth + 120.0 * coefficients[:, :, 5] * durations[:, None]
+    v, a, j, s = (
+        np.cumsum(one, axis=1)
+        for one in (
+            top.velocity,
+            top.acceleration,
+            top.jerk,
+            np.maximum(np.abs(fourth), np.abs(last)),
+        )
+    )
+
+    def outermost(sums: FloatArray) -> FloatArray:
+        """Sums (S,) of terms times the distance from their outermost axes, from those up to each
+        axis.
+        """
+        return np.asarray(portable.matmul(np.diff(sums, axis=1, prepend=0.0), reach))
+
+    square = v * v
+    return ToolDerivatives(
+        trajectory.times,
+        outermost(a + square),
+        outermost(j + 3.0 * a * v + square * v),
+        outermost(s + 4.0 * j * v + 3.0 * a * a + 6.0 * a * square + square * square),
+        np.asarray(a[:, -1] + v[:, -1] ** 2),
+        np.asarray(j[:, -1] + 3.0 * a[:, -1] * v[:, -1] + portable.power(v[:, -1], 3)),
+    )
+
+
+def _reach(scene: PlanningScene, end: float) -> FloatArray:
+    """Farthest (n,) m that a place `end` m from the origin of the last link can be from each
+    axis.
+    """
+    links = np.linalg.norm(scene.chain.joint_origin[1:, :3, 3], axis=1)
+    tail = np.append(links, end)
+    return np.asarray(np.cumsum(tail[::-1])[::-1])
+
+
+# Speeds and accelerations of the points of the tool at instants. Vectors lie along the first axis.
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.stack(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )
+
+
+def _length(a: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]))
+
+
+def _turned(rotation: FloatArray, vector: FloatArray) -> FloatArray:
+    """A vector (3,) of links with rotations (N, 3, 3), (3, N) in the world."""
+    x, y, z = vector
+    return np.asarray((rotation[:, :, 0] * x + rotation[:, :, 1] * y + rotation[:, :, 2] * z).T)
+
+
+def tool_states(
+    scene: PlanningScene, q: FloatArray, qd: FloatArray, qdd: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Largest speed [m/s] and acceleration [m/s^2] (N, P) of the spheres around the points of the
+    tool, at states (N, n): those of the centre, and what turning adds on its surface at most.
+    """
+    chain = scene.chain
+    poses = chain.link_poses(q)
+    count = len(q)
+    turn, change, speed, gain = np.zeros((4, 3, count))  # of the frame after an axis, at its origin
+    for k in range(chain.n):
+        if k > 0:
+            arm = (poses[:, k + 1, :3, 3] - poses[:, k, :3, 3]).T
+            lift = _cross(turn, arm)
+            speed = speed + lift
+            gain = gain + _cross(change, arm) + _cross(turn, lift)
+        axis = _turned(poses[:, k + 1, :3, :3], chain.joint_axis[k])
+        rate = axis * qd[:, k]
+        change = change + axis * qdd[:, k] + _cross(turn, rate)
+        turn = turn + rate
+    points, radii = scene.tool_points
+    speeds, accelerations = np.empty((2, count, len(points)))
+    swing = _length(turn)
+    twist = _length(change) + swing * swing
+    for p, (point, radius) in enumerate(zip(points, radii, strict=True)):
+        arm = _turned(poses[:, -1, :3, :3], point)
+        lift = _cross(turn, arm)
+        speeds[:, p] = _length(speed + lift) + radius * swing
+        accelerations[:, p] = (
+            _length(gain + _cross(change, arm) + _cross(turn, lift)) + radius * twist
+        )
+    return speeds, accelerations
+
+
+def _values(polynomials: FloatArray, t: FloatArray) -> FloatArray:
+    """Polynomials (N, n, K), lowest power first, at t (N, 1)."""
+    value = polynomials[:, :, -1]
+    for k in range(polynomials.shape[2] - 2, -1, -1):
+        value = value * t + polynomials[:, :, k]
+    return np.asarray(value)
+
+
+# Bounds of both along a trajectory: what is found at instants, and what may be between them.
+
+_RESOLUTION = 2e-3  # share of the largest value that the bound may add between instants
+_FINER = 8  # times as many instants where a bound doesn't decide,
+_ROUNDS = 3
+_MOST = 200_000  # instants of a trajectory at a time
+
+
+@dataclass(frozen=True, eq=False)
+class Largest:
+    """Of one kind of points on each segment (S,): bounds of speed [m/s] and acceleration [m/s^2],
+    and what was found of both at instants.
+    """
+
+    speed: FloatArray
+    acceleration: FloatArray
+    found_speed: FloatArray
+    found_acceleration: FloatArray
+
+    def most(self) -> tuple[float, float]:
+        """The largest bounds of all segments."""
+        return float(self.speed.max(initial=0.0)), float(self.acceleration.max(initial=0.0))
+
+
+class ToolUse:
+    """How fast the tool is along one trajectory."""
+
+    def __init__(
+        self,
+        trajectory: JointTrajectory,
+        scene: PlanningScene,
+        bounds: ToolBounds,
+        largest: Extremes | None = None,
+    ) -> None:
+        self.trajectory = trajectory
+        self.scene = scene
+        self.bounds = bounds
+        self._coefficients, self._durations = trajectory.coefficients()
+        self._largest = (
+            extremes(self._coefficients, self._durations) if largest is None else largest
+        )
+
+    @cached_property
+    def tcp(self) -> Largest:
+        """Of the tcp."""
+        return self._of(slice(0, 1), self.bounds.tcp)
+
+    @cached_property
+    def whole(self) -> Largest:
+        """Of every point of tool and part, the tcp among them."""
+        return self._of(slice(None), self.bounds.whole)
+
+    @property
+    def asked(self) -> list[tuple[str, Largest, PointBounds]]:
+        """What is bounded, with its name."""
+        kinds = []
+        if self.bounds.tcp.asked:
+            kinds.append(("the tcp", self.tcp, self.bounds.tcp))
+        if self.bounds.whole.asked:
+            kinds.append(("tool and part", self.whole, self.bounds.whole))
+        return kinds
+
+    @property
+    def longer(self) -> FloatArray:
+        """By what factor each segment (S,) should last longer; at most 1: within the bounds."""
+        factors = np.zeros(len(self._durations))
+        for _, found, bounds in self.asked:
+            longer = np.maximum(
+                found.speed / bounds.speed, np.sqrt(found.acceleration / bounds.acceleration)
+            )
+            factors = np.maximum(factors, longer)
+        return factors
+
+    def _of(self, points: slice, bounds: PointBounds) -> Largest:
+        places, radii = self.scene.tool_points
+        away = float((np.linalg.norm(places[points], axis=1) + radii[points]).max())
+        motion = tool_derivatives(self.trajectory, self.scene, away, self._largest)
+        every = np.arange(len(self._durations))
+        ends = self._sampled(every, np.ones(len(every), np.int64), points)
+        top = (ends[0].max(initial=0.0), ends[1].max(initial=0.0))
+        count = self._counts(motion, top)
+        found = self._bounded(motion, every, count, points)
+        for _ in range(_ROUNDS if bounds.asked else 0):
+            open_ = np.flatnonzero(
+                ((found.speed > bounds.speed) & (found.found_speed <= bounds.speed))
+                | (
+                    (found.acceleration > bounds.acceleration)
+                    & (found.found_acceleration <= bounds.acceleration)
+                )
+            )
+            if len(open_) == 0 or (count[open_].sum() + len(open_)) * _FINER > _MOST:
+                break
+            count[open_] *= _FINER
+            finer = self._bounded(motion, open_, count[open_], points)
+            found.speed[open_] = finer.speed
+            found.acceleration[open_] = finer.acceleration
+            found.found_speed[open_] = finer.found_speed
+            found.found_acceleration[open_] = finer.found_acceleration
+        return found
+
+    def _counts(self, motion: ToolDerivatives, top: tuple[float, float]) -> IntArray:
+        """Pieces of each segment (S,) so that little may be between their ends."""
+        of_speed, of_acceleration = (
+            np.sqrt(8.0 * _RESOLUTION * max(most, 1e-9) / np.maximum(bound, 1e-12))
+            for most, bound in zip(top, (motion.jerk, motion.snap), strict=True)
+        )
+        step = np.minimum(of_speed, of_acceleration)
+        whole = np.ceil(self._durations / step)
+        share = max(float(whole.sum()) / _MOST, 1.0)
+        return np.maximum(np.ceil(whole / share), 1.0).astype(np.int64)
+
+    def _bounded(
+        self, motion: ToolDerivatives, segments: IntArray, count: IntArray, points: slice
+    ) -> Largest:
+        speed, acceleration = self._sampled(segments, count, points)
+        step = self._durations[segments] / count
+        between = step * step / 8.0
+        return Largest(
+            speed + between * motion.jerk[segments],
+            acceleration + between * motion.snap[segments],
+            speed,
+            acceleration,
+        )
+
+    def _sampled(
+        self, segments: IntArray, count: IntArray, points: slice
+    ) -> tuple[FloatArray, FloatArray]:
+        """Largest speed and acceleration (K,) of points of the tool at count + 1 instants of each
+        of the segments (K,).
+        """
+        if len(segments) == 0:
+            return np.zeros(0), np.zeros(0)
+        begins = np.concatenate([[0], np.cumsum(count + 1)[:-1]])
+        owner = np.repeat(np.arange(len(segments)), count + 1)
+        share = (np.arange(len(owner)) - begins[owner]) / count[owner]
+        t = (share * self._durations[segments][owner])[:, None]
+        c = self._coefficients[segments][owner]
+        order = np.arange(6)
+        q = _values(c, t)
+        qd = _values((c * order)[:, :, 1:], t)
+        qdd = _values((c * order * (order - 1))[:, :, 2:], t)
+        speeds, accelerations = tool_states(self.scene, q, qd, qdd)
+        return (
+            np.maximum.reduceat(speeds[:, points].max(axis=1), begins),
+            np.maximum.reduceat(accelerations[:, points].max(axis=1), begins),
+        )
