@@ -10,7 +10,7 @@ snapshot of the cell; changing the cell meanwhile reaches the next one.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import TypedDict, Unpack
@@ -88,7 +88,15 @@ from ir_planner.service import (
 from ir_planner.settings import PlannerSettings
 from ir_planner.state_queries import StatesCheck, asked_state, asked_states
 from ir_planner.store import StoredProgram, program_store, trajectory_store
-from ir_planner.trajectories import OptimizationPlan, Reference, optimize_trajectory, plan_through
+from ir_planner.trajectories import (
+    VIA_TOLERANCE,
+    OptimizationPlan,
+    Reference,
+    Via,
+    optimize_trajectory,
+    plan_through,
+    plan_via,
+)
 from ir_planner.waiting_postures import standby_at
 from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError
@@ -345,6 +353,9 @@ class Planner:
         start_acceleration: FloatArray | None = None,
         goal_velocity: FloatArray | None = None,
         goal_acceleration: FloatArray | None = None,
+        via: Sequence[Place] = (),
+        via_tolerance: float = VIA_TOLERANCE,
+        via_distance: float = 0.0,
         options: PlanOptions | None = None,
         cancelled: Cancelled = _NEVER,
         **changes: Unpack[OptionFields],
@@ -354,6 +365,10 @@ class Planner:
 
         It starts and ends with the velocities (n,) rad/s and accelerations (n,) rad/s^2, None: at
         rest; a goal in motion is a configuration.
+
+        via: places that are passed in this order, without a stop where that is better: every joint
+        within via_tolerance [rad], or the tcp within via_distance [m] above 0 and its orientation
+        within via_tolerance.
         """
         options, note = self._checked(options_with(options, changes))
         scene = self.scene(options.load)
@@ -367,8 +382,24 @@ class Planner:
             end,
             scene.cell,
         )
+        searches = self.settings.searches
+        if len(via) > 0 and motion is not None:
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"via has {len(via)} places and the start or the goal is in motion: a movement "
+                "past places starts and ends at rest",
+            )
+        if len(via) > 0:
+            places = Via(tuple(self._goal(place) for place in via), via_tolerance, via_distance)
+
+            def fresh() -> Context:
+                asked = Context.of(scene, options, self._work(options, cancelled))
+                return asked.leaning_by(_tilt_to(end, scene))
+
+            plan = plan_via(begin, places, end, fresh(), fresh, searches)
+            return self._kept(plan, scene, note)
         context = context.in_motion(motion)
-        return self._kept(plan_to_goal(begin, end, context, self.settings.searches), scene, note)
+        return self._kept(plan_to_goal(begin, end, context, searches), scene, note)
 
     def replan(
         self,

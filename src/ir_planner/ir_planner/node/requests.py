@@ -215,6 +215,9 @@ class Requests:
             goal=goal,
             goal_velocity=goal_velocity,
             goal_acceleration=goal_acceleration,
+            via=tuple(request.via),
+            via_tolerance=request.via_tolerance,
+            via_distance=request.via_distance,
             options=options,
         )
         response.searches = searches_to_msg(plan.info.searches)

@@ -2,5 +2,15 @@
 
 from ir_planner.trajectories.optimization import OptimizationPlan, optimize_trajectory
 from ir_planner.trajectories.through_points import POINTS_MAX, Reference, plan_through
+from ir_planner.trajectories.via import VIA_TOLERANCE, Via, plan_via
 
-__all__ = ["POINTS_MAX", "OptimizationPlan", "Reference", "optimize_trajectory", "plan_through"]
+__all__ = [
+    "POINTS_MAX",
+    "VIA_TOLERANCE",
+    "OptimizationPlan",
+    "Reference",
+    "Via",
+    "optimize_trajectory",
+    "plan_through",
+    "plan_via",
+]

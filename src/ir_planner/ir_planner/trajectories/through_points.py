@@ -129,7 +129,7 @@ def _followed(reference: Reference, context: Context) -> Movement:
         if reference.times is not None and len(points) == len(reference.points):
             movement = _in_proportion(points, np.diff(reference.times), context)
         else:
-            movement = _best_along(points, context, notes)
+            movement = best_along(points, context, notes)
         violation = movement.violation
         if violation is None or violation.what not in _AT_STOPS:
             return movement
@@ -182,7 +182,7 @@ def _in_proportion(points: FloatArray, durations: FloatArray | None, context: Co
     return movement
 
 
-def _best_along(points: FloatArray, context: Context, notes: list[str]) -> Movement:
+def best_along(points: FloatArray, context: Context, notes: list[str]) -> Movement:
     """The path of the spline whose intervals are timed by rules, with the best time scaling along
     it.
     """

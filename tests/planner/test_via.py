@@ -1,0 +1,102 @@
+"""Laws of places that are passed without a stop."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ir_planner import Planner, RequestError
+
+CELLS = ("open", "kr6_bench", "ur10e_bench")
+
+
+@pytest.fixture(scope="module")
+def planners() -> dict[str, Planner]:
+    return {name: Planner(name, clock=lambda: 0.0) for name in CELLS}
+
+
+def drawn(planner: Planner, draw: np.random.Generator, count: int) -> list[np.ndarray]:
+    """Free configurations around home."""
+    home = np.array(planner.cell.machine_home)
+    found: list[np.ndarray] = []
+    while len(found) < count:
+        q = home + draw.uniform(-0.5, 0.5, len(home))
+        if planner.check_state(q=q).valid:
+            found.append(q)
+    return found
+
+
+def passes(trajectory: object, places: list[np.ndarray], tolerance: float) -> bool:
+    """Whether samples come within the tolerance of the places, one after the other."""
+    q = trajectory.sample(np.linspace(0.0, trajectory.duration, 20_000)).q
+    first = 0
+    for place in places:
+        near = np.flatnonzero(np.abs(q[first:] - place).max(axis=1) <= tolerance + 1e-4)
+        if len(near) == 0:
+            return False
+        first += int(near[0])
+    return True
+
+
+@pytest.mark.parametrize("cell", CELLS)
+@pytest.mark.parametrize("seed", range(2))
+def test_places_are_passed_in_order_and_never_slower_than_with_stops(
+    planners: dict[str, Planner], cell: str, seed: int
+) -> None:
+    planner = planners[cell]
+    places = drawn(planner, np.random.default_rng([seed, 7]), 3)
+    tolerance = (0.02, 0.1)[seed]
+    asked = {"objective": "time", "planning_time": 100.0}
+    plan = planner.plan_regional(goal=places[-1], via=places[:-1], via_tolerance=tolerance, **asked)
+    assert plan.status.ok, plan.status
+    assert plan.report.certified
+    assert passes(plan.trajectory, places[:-1], tolerance)
+    assert plan.trajectory.positions[-1] == pytest.approx(places[-1], abs=1e-9)
+    stops = 0.0
+    here = np.array(planner.cell.machine_home)
+    for place in places:
+        leg = planner.plan_regional(start=here, goal=place, **asked)
+        stops += leg.report.duration
+        here = place
+    assert plan.report.duration <= stops + 1e-6
+    again = planner.plan_regional(
+        goal=places[-1], via=places[:-1], via_tolerance=tolerance, **asked
+    )
+    assert again.trajectory.trajectory_id == plan.trajectory.trajectory_id
+
+
+def test_the_tcp_passes_within_a_distance(planners: dict[str, Planner]) -> None:
+    planner = planners["open"]
+    place, goal = drawn(planner, np.random.default_rng(3), 2)
+    plan = planner.plan_regional(goal=goal, via=[place], via_distance=0.02, via_tolerance=0.2)
+    assert plan.status.ok
+    times = np.linspace(0.0, plan.trajectory.duration, 5000)
+    chain = planner.scene().chain
+    poses = chain.tcp_poses(plan.trajectory.sample(times).q)
+    away = np.linalg.norm(poses[:, :3, 3] - chain.tcp_poses(place[None])[0, :3, 3], axis=1)
+    assert away.min() <= 0.02 + 1e-4
+
+
+def test_a_requested_duration_is_kept_or_refused_with_the_shortest(
+    planners: dict[str, Planner],
+) -> None:
+    planner = planners["kr6_bench"]
+    place, goal = drawn(planner, np.random.default_rng(4), 2)
+    plan = planner.plan_regional(goal=goal, via=[place], duration=9.0)
+    assert plan.report.duration == pytest.approx(9.0, abs=1e-5)
+    with pytest.raises(RequestError, match="shortest within the limits is"):
+        planner.plan_regional(goal=goal, via=[place], duration=0.05)
+
+
+def test_a_place_in_collision_or_without_sense_is_an_answer(
+    planners: dict[str, Planner],
+) -> None:
+    planner = planners["open"]
+    buried = np.radians([0.0, -6.0, 155.0, 0.0, 0.0, 0.0])
+    plan = planner.plan_regional(goal="park", via=[buried])
+    assert not plan.status.ok
+    assert "to via 1" in plan.status.message
+    with pytest.raises(RequestError, match="via_tolerance"):
+        planner.plan_regional(goal="park", via=["home"], via_tolerance=0.0)
+    with pytest.raises(RequestError, match="via_distance"):
+        planner.plan_regional(goal="park", via=["home"], via_distance=5.0)
