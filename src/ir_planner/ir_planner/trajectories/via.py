@@ -278,13 +278,15 @@ class _Passing:
         space = FreeSpace.of(context.scene, context.safety_distance, context.work)
         pulled = self._pulled(chain)
         found: list[Movement] = []
-        makers: list[tuple[str, Callable[[], Movement]]] = []
-        for points in (distinct(np.concatenate([leg.path for leg in legs])), pulled):
-            if len(points) <= _CORNERS and space.edges_free(points[:-1], points[1:]).all():
-                makers.append(("blended", partial(straight_steps, points, context)))
+        steps = (distinct(np.concatenate([leg.path for leg in legs])), pulled)
+        makers: list[tuple[str, Callable[[], Movement]]] = [
+            ("blended", partial(straight_steps, points, context))
+            for points in steps
+            if len(points) <= _CORNERS and space.edges_free(points[:-1], points[1:]).all()
+        ]
         splines = [self._points(legs, per_leg) for per_leg in _PER_LEG]
-        for points in (*splines, *([pulled] if len(pulled) > 2 else [])):
-            makers.append(("spline", partial(best_along, points, context, [])))
+        splines += [pulled] if len(pulled) > 2 else []
+        makers += [("spline", partial(best_along, points, context, [])) for points in splines]
         for name, make in makers:
             if context.work.exhausted:
                 return
