@@ -5,7 +5,8 @@ limit, or that goes on getting faster than it may while its acceleration falls, 
 the axis, the value and the bound. Then movements come from three sources, and the cheapest
 certified one is the answer: descents with the given motion at the ends, along free paths and
 guesses; the stop and go around it (braking, a movement from rest to rest, getting up to speed); and
-the descent from that one. So no answer costs more than the stop and go.
+the descent from that one. So no answer costs more than that stop
+and go.
 """
 
 from dataclasses import dataclass, replace
