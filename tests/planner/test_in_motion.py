@@ -30,9 +30,8 @@ from _second_opinion import SecondOpinion
 MARGIN = 0.02  # m
 _INSTANTS = 400
 _ROUNDED = 1e-5  # m between two codes
-_NEARLY = (
-    1.1  # times the duration of the stop and go whose second half had the work of a whole plan
-)
+# times the duration of the stop and go whose second half had the work of a whole plan
+_NEARLY = 1.15
 
 
 @pytest.fixture(scope="module", params=["open", "table_columns", "kr6_bench"])
