@@ -619,9 +619,10 @@ class Planner:
             units=units,
         )
         if plan.program is not None and plan.request is not None:
-            plan = replace(plan, program=self.kept_program(plan.program, plan.request))
+            own = plan.request
+            plan = replace(plan, program=self.kept_program(plan.program, own))
             if plan.run is not None and plan.run_cell is not None:
-                asked = replace(plan.request, cell=plan.run_cell)
+                asked = replace(own, cell=plan.run_cell)
                 plan = replace(plan, run=self.kept_program(plan.run, asked))
         return replace(plan, info=noted(plan.info, note))
 
