@@ -152,18 +152,16 @@ class _Passing:
                 if self._serves(movement, chosen) and (best is None or movement.cost < best.cost):
                     best = movement
                     notes.append(f"{name}: {movement.trajectory.duration:.3f} s")
-        movement = self._best(stopping, best)
-        if movement is None:
+        answer = self._best(stopping, best)
+        if answer is None:
             raise self._too_short(stopping)
-        times = passed(movement.trajectory, chosen[1:-1], self.via, self.context.scene)
+        times = passed(answer.trajectory, chosen[1:-1], self.via, self.context.scene)
         assert times is not None  # of all that serve
         text = ", ".join(f"{t:.3f} s" for t in times)
-        stops = "" if movement is best else ", with a stop at each"
+        stops = "" if answer is best else ", with a stop at each"
         journal.note("via", f"passed at {text}{stops}")
         info = journal.info(self.start, self.context.joint_names)
-        return MovementPlan(
-            Status.success(), info, movement.report, movement.trajectory, movement.path
-        )
+        return MovementPlan(Status.success(), info, answer.report, answer.trajectory, answer.path)
 
     def _best(self, stopping: Movement, best: Movement | None) -> Movement | None:
         """The cheaper one of both that is certified and not too long."""
