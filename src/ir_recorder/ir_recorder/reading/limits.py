@@ -17,7 +17,7 @@ from ir_recorder.errors import ReadError
 _STEP = 1 << 20  # bytes that are decompressed at a time
 _HEAD = 9  # bytes of a record's kind and length
 MOST_RECORDS = 500_000  # in one chunk; one of 4 MB of the smallest messages has 100,000
-MOST_CHEAP = 1_000_000  # records of a recording beyond one for each byte of its compressed chunks
+MOST_CHEAP = 100_000  # records of a recording beyond one for each byte of its compressed chunks
 MOST_CHANNELS = 10_000  # of a recording, and as many schemas; a cell has 50
 MOST_RECORD = 1 << 20  # bytes of a record but chunks, messages and attachments; a schema has 20 kB
 MOST_CHANNEL = 1 << 16  # bytes of a channel; one of this project has 500
