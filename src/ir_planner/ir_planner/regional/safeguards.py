@@ -2,8 +2,8 @@
 
 The baseline movement is a candidate of every answer of the default portfolio. A requested duration
 is met by the cheapest movement of free duration too, and where nothing else is left by the fastest
-one, both stretched. The movements of least W have few turns: some of them are faster than what the
-descent for time ends in.
+one, both stretched. The movements of least W have few turns, and those of a high price of time come
+from smoother descents: some of them are faster than what the descent for time ends in.
 """
 
 from collections.abc import Callable, Iterator
@@ -37,6 +37,8 @@ _OPTIMISED_AGAIN = (
 _OTHER_DURATIONS = (0.75, 1.33)
 _DURATION_STEPS = 4
 _COARSELY = 0.99  # of a bound by a few durations: the best of all is little below it
+_HURRY = 100.0  # times the robot's own value of a second
+_NEAR = 1.03  # times the duration of the fastest: a descent gains less
 _WORTH_PROVING = 1.01  # times the cost of the best: coarse costs are off by less
 DIRECT = "direct"  # the search that finds straight segments
 
@@ -72,20 +74,18 @@ def best_found(exploration: Exploration, context: Context) -> tuple[Answer | Non
                 own.refine_exactly()
             return own.best(), shortest
     if options.duration > 0.0:
-        free, duration = _as_asked(
-            _optimised_again(own, context.asking("time_and_energy")), context
-        )
-        best = _cheaper(best, free)
+        free = _optimised_again(own, context.asking("time_and_energy"))
+        best, duration = _with_others(best, [free], context)
         shortest = min(shortest, duration)
         if duration <= options.duration:
             return best, shortest
         own = _explored(exploration, context.asking("time"))  # there is no time for least cost
-        fastest, duration = _as_asked(own.best(), context)
-        best = _cheaper(best, fastest)
+        best, duration = _with_others(best, [own.best()], context)
         shortest = min(shortest, duration)
     if options.duration > 0.0 or options.objective == "time":
-        least, duration = _as_asked(_optimised_again(own, context.asking("movement_cost")), context)
-        best = _cheaper(best, least)
+        turning = _optimised_again(own, context.asking("movement_cost"))
+        hurried = _hurried(own.best(), exploration, context.asking("time"))
+        best, duration = _with_others(best, [turning, hurried], context)
         shortest = min(shortest, duration)
     if options.duration <= 0.0:
         best = _held_against_others(best, exploration, context)
@@ -103,6 +103,19 @@ def _held_against_others(
         other = _explored(exploration, context.asking("time_and_energy"))
         return _cheaper(best, _as_asked(other.best(), context)[0])
     return best
+
+
+def _hurried(best: Answer | None, exploration: Exploration, context: Context) -> Answer | None:
+    """The fastest movement near the best one for a high price of time: joules smooth the descent,
+    and lead to other local minima than time alone. None where that is far from the best one.
+    """
+    found = _explored(exploration, context.valuing_time(_HURRY)).best()
+    hurried = _as_asked(found, context)[0]
+    if hurried is None or (best is not None and hurried[1].cost > _NEAR * best[1].cost):
+        return None
+    method, movement = hurried
+    fastest = near(movement, context)
+    return _cheaper(hurried, None if fastest is None else (method, fastest))
 
 
 def _least_over_durations(best: Movement, context: Context) -> Movement:
@@ -215,6 +228,18 @@ def _as_asked(found: Answer | None, context: Context) -> tuple[Answer | None, fl
             return None, own
         movement = movement.stretched_by(max(requested / own, 1.0))
     return ((method, movement) if movement.certified else None), own
+
+
+def _with_others(
+    best: Answer | None, others: list[Answer | None], context: Context
+) -> tuple[Answer | None, float]:
+    """The cheapest of an answer and of those of other objectives as answers to this request, and
+    the shortest of the others' own durations [s].
+    """
+    asked = [_as_asked(other, context) for other in others]
+    for answer, _ in asked:
+        best = _cheaper(best, answer)
+    return best, min(duration for _, duration in asked)
 
 
 def _cheaper(best: Answer | None, other: Answer | None) -> Answer | None:

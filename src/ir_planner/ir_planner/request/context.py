@@ -283,6 +283,14 @@ class Context:
         """The same with another objective and requested duration [s], 0: free."""
         return replace(self, options=replace(self.options, objective=objective, duration=duration))
 
+    def valuing_time(self, times: float) -> "Context":
+        """The same asking for least J where a second is worth so many times the robot's own value
+        of it.
+        """
+        time_value = times * self.scene.cell.robot.time_value
+        options = replace(self.options, objective="time_and_energy", time_value=time_value)
+        return replace(self, options=options)
+
     def planned_by(self, planner_id: str) -> "Context":
         """The same asking for another search."""
         return replace(self, options=replace(self.options, planner_id=planner_id))
