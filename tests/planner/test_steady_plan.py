@@ -90,6 +90,8 @@ def test_a_run_fills_the_line_from_empty_and_comes_into_the_planned_cycle() -> N
     assert len(left) == 2
     assert left[1] - left[0] == pytest.approx(plan.cycle.period, abs=10.0 * ROUNDING)
     assert max(step.duration for step in plan.run.movements) <= 95.0 + ROUNDING
+    again = cell_from_yaml(cell_to_yaml(plan.run_cell))
+    assert again.program == plan.run_cell.program
 
 
 def test_the_program_waits_for_every_machine_at_least_as_long_as_it_works() -> None:

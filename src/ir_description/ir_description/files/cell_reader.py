@@ -231,7 +231,7 @@ class _CellReader:
                 signals=signals,
                 park=self._posture("park", home),
                 machine_home=home,
-                program=self._program(stations, paths, parts, signals),
+                program=self._program(stations, paths, parts, signals, route),
                 tasks=read_tasks(self._list("tasks", 10_000), self._robot),
                 paths=paths,
                 floor=table["floor"].boolean() if "floor" in table else True,
@@ -414,9 +414,10 @@ class _CellReader:
         paths: tuple[CellPath, ...],
         parts: tuple[Part, ...],
         signals: tuple[CellSignal, ...],
+        route: PartRoute | None,
     ) -> tuple[ProgramStep, ...]:
         named = [dict.fromkeys(each.name for each in kind) for kind in (stations, signals, paths)]
-        places = PartPlaces("", {part.name: part.station for part in parts})
+        places = PartPlaces("", {part.name: part.station for part in parts}, route=route)
         steps = []
         for item in self._list("program", 10_000):
             with item.blamed():
