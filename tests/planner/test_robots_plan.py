@@ -148,6 +148,27 @@ REFUSED = {
         0.0,
         "step 1 of the program of right waits for ready",
     ),
+    "ends with a part": (
+        "{station: outfeed_place, detach: gear, dwell: 0.5}",
+        "{station: outfeed_place, dwell: 0.5}",
+        0.0,
+        "the program of right ends with gear in the gripper",
+    ),
+    "stands still": (
+        "      - {station: table_seat, attach: gear, dwell: 0.5}\n"
+        "      - {station: outfeed_place, detach: gear, dwell: 0.5}\n      - {posture: park}\n",
+        "      - {pause: 5}\n",
+        0.0,
+        "the program of right has no movement",
+    ),
+    "leaves what it takes again": (
+        "      - {station: table_seat, detach: gear, dwell: 0.5}\n",
+        "      - {station: table_seat, detach: gear, dwell: 0.5}\n      - {posture: park}\n"
+        "      - {station: table_seat, attach: gear}\n"
+        "      - {station: infeed_pick, detach: gear}\n",
+        0.0,
+        "table_seat holds one part.*left leaves gear, left takes gear, right takes gear",
+    ),
     "a machine that works": (
         "    pose: {xyz: [1.9, 0, 0]}\n",
         "    pose: {xyz: [1.9, 0, 0]}\n    process: {seconds: 20}\n",
@@ -179,3 +200,21 @@ def test_a_robot_in_the_way_wherever_it_waits_is_said(tmp_path: Path) -> None:
     near = TEXT.replace("park_deg: [45, -125, 120, 0, 80, 0]", "park_deg: [0, -60, 60, 0, 60, 0]")
     with pytest.raises(RequestError, match="waiting place"):
         plan_robots(cells_of(tmp_path, near))
+
+
+def test_a_station_holds_one_part_whatever_it_is_called(tmp_path: Path) -> None:
+    begin = TEXT.index("  - name: gear\n")
+    other = TEXT[begin : TEXT.index("equipment:\n")].replace("gear", "disc")
+    other = other.replace("    station: infeed_pick\n", "")
+    text = TEXT.replace("equipment:\n", other + "equipment:\n")
+    at = text.index("  - name: right\n")
+    right = text[at:].replace("gear", "disc")
+    with pytest.raises(RequestError, match="left leaves gear, right takes disc"):
+        plan_robots(cells_of(tmp_path, text[:at] + right))
+
+
+def test_a_robot_that_only_looks_keeps_clear_of_what_another_has_there(tmp_path: Path) -> None:
+    at = TEXT.index("    starts:")
+    looks = "    program:\n      - {station: table_seat}\n      - {posture: park}\n"
+    with pytest.raises(RequestError, match="right comes too near to gear, which left has at"):
+        plan_robots(cells_of(tmp_path, TEXT[:at] + looks))

@@ -161,10 +161,21 @@ def capsules_in(scene: PlanningScene) -> tuple[Capsule, ...]:
 
 def planned_arm(robot: str, request: ProgramRequest, journal: Journal) -> ArmProgram:
     """The program of a robot by itself, certified in its cell at many durations. Raises
-    RequestError for one that doesn't end where it begins, waits for signals or switches machines,
-    StageError for what isn't found.
+    RequestError for one that doesn't end where it begins, StageError for what isn't found.
     """
-    cell = request.cell
+    try:
+        return _planned(robot, request, journal)
+    except StageError as failed:
+        status = failed.status
+        sentence = f"the program of {robot}: {status.message}"
+        raise StageError(Status(status.code, sentence)) from failed
+
+
+def check_repeatable(robot: str, cell: Cell) -> None:
+    """Refuse, by RequestError, what no cycle of several robots is planned with: machines that work
+    or change, signals of machines, a program without movements or one that ends with a part in the
+    gripper.
+    """
     switches = {m.switch.signal: m.name for m in cell.equipment if m.switch is not None}
     for machine in cell.equipment:
         if machine.process > 0.0:
@@ -173,6 +184,13 @@ def planned_arm(robot: str, request: ProgramRequest, journal: Journal) -> ArmPro
                 f"{machine.name} has a process of {machine.process:g} s: processes aren't planned "
                 "with several robots yet; leave it out, and let a program dwell instead",
             )
+    if not any(step.kind != "PAUSE" for step in cell.program):
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"the program of {robot} has no movement: give it one that ends with "
+            "{posture: park}, or leave the robot out",
+        )
+    places = cell.parts_at_start()
     for k, step in enumerate(cell.program, start=1):
         for signal in step.set_signals:
             if signal.name in switches:
@@ -189,12 +207,13 @@ def planned_arm(robot: str, request: ProgramRequest, journal: Journal) -> ArmPro
                 "machines aren't planned with several robots yet, and those between robots follow "
                 "from the movements; leave it out",
             )
-    try:
-        return _planned(robot, request, journal)
-    except StageError as failed:
-        status = failed.status
-        sentence = f"the program of {robot}: {status.message}"
-        raise StageError(Status(status.code, sentence)) from failed
+        places = places.after(step)
+    if places.held:
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"the program of {robot} ends with {places.held} in the gripper, so it can't be "
+            "repeated: let it detach that at a station",
+        )
 
 
 def _planned(robot: str, request: ProgramRequest, journal: Journal) -> ArmProgram:
@@ -206,12 +225,11 @@ def _planned(robot: str, request: ProgramRequest, journal: Journal) -> ArmProgra
             values.seconds(rung)
         fronts = values.fronts()
         notes.append(f"{len(choice.parts)} movements at {len(RUNGS)} values of a second")
-    columns = [
-        Column.of(slowed_down([point.movement for point in fronts[part]])) for part in choice.parts
-    ]
+    columns = [_column([point.movement for point in fronts[part]]) for part in choice.parts]
     if not columns:
         raise RequestError(
-            StatusCode.INVALID_GOAL_CONSTRAINTS, f"the program of {robot} has no movement"
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"the program of {robot} has no movement: it begins where it stays",
         )
     steps = choice.energies({p: c.movements[0] for p, c in zip(choice.parts, columns, strict=True)})
     return _arm(robot, request, steps, columns)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -28,11 +28,12 @@ from ir_planner.planner import Planner
 from ir_planner.presentation import plot_robots
 from ir_planner.program import MOTORS, ProgramPlan, StageError, program_of
 from ir_planner.request import Journal, bounded
-from ir_planner.robots.arm_program import ArmProgram, planned_arm
+from ir_planner.robots.arm_program import ArmProgram, check_repeatable, planned_arm
 from ir_planner.robots.meetings import (
     Cells,
     Meetings,
     check_lying_parts,
+    check_places,
     hand_over_cells,
     ordered,
 )
@@ -135,6 +136,9 @@ def plan_robots(
     """
     bounded(cycle_time, 0.0, PERIOD_MAX, "cycle_time", "s")
     planners = tuple(Planner(cell, settings=settings) for cell in cells.cells)
+    for robot, cell in zip(cells.robots, cells.cells, strict=True):
+        check_repeatable(robot, cell)
+    check_places(cells)
     arms: list[ArmProgram] = []
     try:
         for robot, planner in zip(cells.robots, planners, strict=True):
@@ -154,7 +158,7 @@ class _Joint:
         self.arms = arms
         self.planners = planners
         self._meetings = Meetings(max(arm.request.options.safety_distance for arm in arms))
-        self._pairs = list(combinations(range(len(arms)), 2))
+        self._pairs = list(itertools.combinations(range(len(arms)), 2))
         self._cells: dict[tuple[int, int], Cells] = {
             pair: hand_over_cells(self._both(pair), pair) for pair in self._pairs
         }
@@ -253,7 +257,8 @@ class _Joint:
         fixed = [arm.work(own) for arm, own in zip(self.arms, chosen, strict=True)]
         cycle = cheapest_joint(fixed, zones, first.period + _ROUNDING)
         assert cycle is not None  # no movement takes longer than was chosen
-        signals = self._signals(zones)
+        names = self._names(len(zones))
+        signals = self._signals(zones, names)
         programs = []
         for k, (arm, planner) in enumerate(zip(self.arms, self.planners, strict=True)):
             steps = arm.driven(chosen[k], cycle.arms[k].waits, signals[k])
@@ -264,7 +269,7 @@ class _Joint:
             tuple(arm.robot for arm in self.arms),
             tuple(programs),
             self.planners,
-            tuple(self._shared(n, zone, cycle) for n, zone in enumerate(zones)),
+            tuple(self._shared(n, zone, cycle, names[n]) for n, zone in enumerate(zones)),
             tuple(self._begin(k, schedule) for k, schedule in enumerate(cycle.arms)),
             cycle.period,
             fastest,
@@ -287,14 +292,20 @@ class _Joint:
         cycle = cheapest_joint(works, zones, period)
         return np.inf if cycle is None else cycle.joules
 
+    def _names(self, count: int) -> list[str]:
+        """Names of the signals of zones, none of which the cell has."""
+        taken = {signal.name for signal in self.arms[0].cell.signals}
+        numbered = map("zone_{}".format, itertools.count(1))
+        free = (name for name in numbered if name not in taken)
+        return list(itertools.islice(free, count))
+
     def _signals(
-        self, zones: Sequence[Zone]
+        self, zones: Sequence[Zone], names: Sequence[str]
     ) -> list[list[tuple[tuple[str, ...], tuple[str, ...]]]]:
         """Of each movement of each robot, the signals that it waits for and that it sets."""
         waits: list[list[list[str]]] = [[[] for _ in arm.steps] for arm in self.arms]
         sets: list[list[list[str]]] = [[[] for _ in arm.steps] for arm in self.arms]
-        for n, zone in enumerate(zones):
-            name = _signal(n)
+        for zone, name in zip(zones, names, strict=True):
             for stretch, turn, done in (
                 (zone.one, f"{name}=0", name),
                 (zone.other, name, f"{name}=0"),
@@ -308,7 +319,7 @@ class _Joint:
             for own_waits, own_sets in zip(waits, sets, strict=True)
         ]
 
-    def _shared(self, n: int, zone: Zone, cycle: JointCycle) -> SharedZone:
+    def _shared(self, n: int, zone: Zone, cycle: JointCycle, signal: str) -> SharedZone:
         spans = [
             _passed(stretch, cycle, len(self.arms[stretch.robot].steps))
             for stretch in (zone.one, zone.other)
@@ -322,16 +333,12 @@ class _Joint:
         return SharedZone(
             (robots[0], robots[1]),
             (self._span(zone.one), self._span(zone.other)),
-            _signal(n),
+            signal,
             begun[1] or (cycle.later[n] and not begun[0]),
             first,
             (spans[0][0], spans[1][0]),
             (spans[0][1], spans[1][1]),
         )
-
-
-def _signal(n: int) -> str:
-    return f"zone_{n + 1}"
 
 
 def _passed(stretch: Stretch, cycle: JointCycle, count: int) -> tuple[float, float]:

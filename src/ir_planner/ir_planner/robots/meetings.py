@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ir_description import Equipment
+from ir_description import Equipment, RobotCells
 from ir_kernels import FREE
 from ir_kernels.swept import SweptArm, meeting
 from ir_msgs_py.status import StatusCode
@@ -177,18 +177,47 @@ def _lying(arm: ArmProgram, part: str, station: str) -> Equipment:
     return Equipment(name, np.eye(4), bodies, machine.zone)
 
 
+def check_places(cells: RobotCells) -> None:
+    """Refuse, by RequestError, a station where one robot leaves a part that another one takes,
+    unless just these two are there, once a cycle each; and one where robots take different parts.
+    """
+    left: dict[str, list[tuple[str, str]]] = {}
+    taken: dict[str, list[tuple[str, str]]] = {}
+    for robot, cell in zip(cells.robots, cells.cells, strict=True):
+        for step in cell.program:
+            if step.detach:
+                left.setdefault(step.target, []).append((robot, step.detach))
+            if step.attach:
+                taken.setdefault(step.target, []).append((robot, step.attach))
+    for station, takers in taken.items():
+        givers = left.get(station, [])
+        parts = {part for _, part in (*givers, *takers)}
+        if len({robot for robot, _ in (*givers, *takers)}) == 1:
+            continue
+        handed_over = len(givers) == len(takers) == len(parts) == 1
+        if handed_over or (not givers and len(parts) == 1):
+            continue
+        several = [f"{robot} leaves {part}" for robot, part in givers]
+        several += [f"{robot} takes {part}" for robot, part in takers]
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"{station} holds one part, which one robot leaves and another one takes, once a cycle "
+            f"each; there {', '.join(several)}: give each of them a station of its own",
+        )
+
+
 def check_lying_parts(arms: Sequence[ArmProgram]) -> None:
-    """Refuse a movement that comes too near to where another robot leaves or finds a part, at a
-    station that its own robot doesn't visit.
+    """Refuse a movement that comes too near to a part that its own scene doesn't have there: one
+    that another robot leaves or finds, or the next one at a station to which no robot brings any.
     """
     for owner in arms:
         for part, station in _places(owner):
+            if not owner.cell.part(part).bodies:
+                continue
+            lying = _lying(owner, part, station)
+            brought = any(_leaves(arm, part, station) for arm in arms)
             for other in arms:
-                visited = {step.to_station for step in other.steps}
-                if other is owner or station in visited or not owner.cell.part(part).bodies:
-                    continue
-                lying = _lying(owner, part, station)
-                for k in range(len(other.steps)):
+                for k in _unaware(other, part, station, brought or other is not owner):
                     if _near(other, k, lying):
                         raise RequestError(
                             StatusCode.INVALID_GOAL_CONSTRAINTS,
@@ -196,6 +225,22 @@ def check_lying_parts(arms: Sequence[ArmProgram]) -> None:
                             f"{station}, in {other.label(k)}: let its program take another way, "
                             "by a station or a posture between",
                         )
+
+
+def _unaware(arm: ArmProgram, part: str, station: str, brought: bool) -> Sequence[int]:
+    """Movements of a robot that are planned without a part that may lie at a station. brought: by
+    robots, in turns that zones keep; else the next one lies there once this one was taken and left.
+    """
+    handled = [k for k, step in enumerate(arm.steps) if part in (step.attach, step.detach)]
+    here = [k for k in handled if arm.steps[k].to_station == station]
+    if here:
+        return () if brought else range(here[0] + 2, len(arm.steps))
+    lies = {each.name: each.station for each in arm.cell.parts}[part] == station
+    return () if lies and not handled else range(len(arm.steps))
+
+
+def _leaves(arm: ArmProgram, part: str, station: str) -> bool:
+    return any((step.detach, step.to_station) == (part, station) for step in arm.steps)
 
 
 def _places(arm: ArmProgram) -> list[tuple[str, str]]:
