@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import ir_description
 from ir_cli.main import main
 
 
@@ -45,5 +46,33 @@ def test_what_belongs_to_one_robot_is_refused(
 def test_one_of_the_robots_is_planned_by_its_name(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", "two_robots@right"]) == 0
     assert "outfeed_place" in capsys.readouterr().out
-    assert main(["check", "two_robots"]) == 1
-    assert "CELL@left" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["two_robots", "two_robots@left", "two_robots@right"])
+def test_a_robot_is_checked_at_its_own_stations(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["check", name]) == 0
+    said = capsys.readouterr().out
+    assert "error" not in said
+    assert "warning" not in said
+    assert ("infeed_pick" in said) == (name != "two_robots@right")
+    assert ("outfeed_place" in said) == (name != "two_robots@left")
+
+
+def test_a_station_that_no_program_visits_is_checked_for_the_nearest_robot(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (Path(ir_description.__file__).parent / "data/robot_cells/two_robots.yaml").read_text()
+    file = tmp_path / "cell.yaml"
+    far = "      - {name: far, pose: {xyz: [4, 0, 2], abc_deg: [0, 90, 0]}}\n"
+    file.write_text(text.replace("    stations:\n", "    stations:\n" + far, 1))
+    assert main(["check", str(file), "--json"]) == 1
+    cells = json.loads(capsys.readouterr().out)["cells"]
+    found = [[f["subject"] for f in cell["findings"] if f["severity"] == "error"] for cell in cells]
+    assert found == [["far"], []]
+
+
+def test_a_robot_that_a_cell_does_not_have_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "two_robots@middle"]) == 2
+    assert "robot 'middle' is unknown; known are left, right" in capsys.readouterr().err

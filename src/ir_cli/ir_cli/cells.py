@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from textwrap import indent
 from typing import TYPE_CHECKING
@@ -27,14 +27,18 @@ from ir_description import (
     Cell,
     DescriptionFileError,
     Finding,
+    RobotCells,
     UnknownNameError,
     bundled_cells,
     bundled_robot_cells,
     cell_file_errors,
     cell_file_line,
     check_cell,
+    check_robot_cell,
     is_path,
     load_cell,
+    load_robot_cells,
+    robot_in,
 )
 
 if TYPE_CHECKING:
@@ -77,41 +81,102 @@ def add_list(listing: argparse.ArgumentParser) -> None:
     listing.set_defaults(run=run_list)
 
 
+@dataclass(frozen=True, eq=False)
+class _Looked:
+    """A cell that is checked; its robot among those of `several`, None: it has one."""
+
+    cell: Cell
+    several: RobotCells | None = None
+    robot: str = ""
+
+    def own(self, station: str) -> bool:
+        """Whether a station is looked at: others are left to the robots that visit them."""
+        return self.several is None or station in self.several.stations_of(self.robot)
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What looks wrong."""
+        if self.several is None:
+            return check_cell(self.cell)
+        return check_robot_cell(self.several, self.robot)
+
+
+@dataclass(frozen=True, eq=False)
+class _Checked:
+    cell: Cell
+    stations: list[Row]
+    findings: list[Finding]
+    suggestions: list[Suggestion]
+    configurations: list[Row]
+
+    @property
+    def passed(self) -> bool:
+        """Whether the program can run."""
+        reached = all(row["free"] for row in self.stations)
+        return reached and all(each.severity != "error" for each in self.remarks)
+
+    @property
+    def remarks(self) -> list[Finding | Suggestion]:
+        """What is said below the tables."""
+        return [*self.findings, *self.suggestions]
+
+    @property
+    def answer(self) -> dict[str, object]:
+        """For other programs."""
+        return {
+            "cell": self.cell.name,
+            "stations": self.stations,
+            "configurations": self.configurations,
+            "findings": [asdict(finding) for finding in self.findings],
+            "suggestions": [asdict(suggestion) for suggestion in self.suggestions],
+        }
+
+
 def run_check(arguments: argparse.Namespace) -> int:
-    """Print all errors of a file, else what is in it; exit code 1 where its program can't run."""
-    cell = _readable(arguments.cell)
-    if cell is None:
-        return 1
+    """Print all errors of a file, else what is in it, of each of several robots; exit code 1 where
+    a program can't run.
+    """
+    looked = _readable(arguments.cell)
+    checked = [_checked(each, deep=arguments.deep) for each in looked]
+    if arguments.json and looked:
+        answers = [each.answer for each in checked]
+        print_json(answers[0] if len(answers) == 1 else {"cells": answers})
+    elif not arguments.json:
+        for each in checked:
+            _print_checked(each, robot_in(arguments.cell)[0])
+    return 0 if checked and all(each.passed for each in checked) else 1
+
+
+def _checked(looked: _Looked, *, deep: bool) -> _Checked:
     from ir_cli.station_access import heavy_loads, stations_of
     from ir_planner.program import unknown_searches  # a planner, only for a cell that can be read
     from ir_planner.search import SEARCHES
 
-    stations = stations_of(cell)
-    suggestions, configurations = _deep(cell) if arguments.deep else ([], [])
-    findings: list[Finding | Suggestion] = [
-        *check_cell(cell),
-        *unknown_searches(cell, cell.program, SEARCHES),
-        *heavy_loads(cell),
-        *suggestions,
-    ]
-    if arguments.json:
-        listed = {"findings": [asdict(f) for f in findings if isinstance(f, Finding)]}
-        listed["suggestions"] = [asdict(s) for s in suggestions]
-        print_json(
-            {"cell": cell.name, "stations": stations, "configurations": configurations, **listed}
-        )
-    else:
-        _print_cell(cell)
-        if stations:
-            print_table(stations, STATIONS)
-        if configurations:
-            from ir_cli.station_access import CONFIGURATIONS
+    cell = looked.cell
+    suggestions, configurations = _deep(cell) if deep else ([], [])
+    others = {station.name for station in cell.stations if not looked.own(station.name)}
+    return _Checked(
+        cell,
+        [row for row in stations_of(cell) if row["station"] not in others],
+        [
+            *looked.findings(),
+            *unknown_searches(cell, cell.program, SEARCHES),
+            *heavy_loads(cell),
+        ],
+        [each for each in suggestions if each.subject not in others],
+        [row for row in configurations if row["station"] not in others],
+    )
 
-            print_table(configurations, CONFIGURATIONS)
-        for finding in findings:
-            _print_finding(finding, arguments.cell)
-    unreached = any(not row["free"] for row in stations)
-    return 1 if unreached or any(each.severity == "error" for each in findings) else 0
+
+def _print_checked(checked: _Checked, file: str) -> None:
+    _print_cell(checked.cell)
+    if checked.stations:
+        print_table(checked.stations, STATIONS)
+    if checked.configurations:
+        from ir_cli.station_access import CONFIGURATIONS
+
+        print_table(checked.configurations, CONFIGURATIONS)
+    for finding in checked.remarks:
+        _print_finding(finding, file)
 
 
 def run_new(arguments: argparse.Namespace) -> int:
@@ -144,19 +209,26 @@ def run_list(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _readable(name: str) -> Cell | None:
-    """The cell, or None when all errors of its file have been printed."""
+def _readable(name: str) -> list[_Looked]:
+    """The cells that are meant, none when all errors of their file have been printed."""
+    file, robot = robot_in(name)
     try:
-        return load_cell(name)
+        several = load_robot_cells(file)
+        if several is None:
+            return [_Looked(load_cell(name))]
+        robots = (robot,) if robot else several.robots
+        return [_Looked(several.of_robot(each), several, each) for each in robots]
     except UnknownNameError as error:
+        if robot:
+            raise InputError(str(error)) from error
         raise InputError(unknown_name("cell", name[:80], error.known, "ir cell list")) from error
     except DescriptionFileError as error:
-        found = (cell_file_errors(name) if is_path(name) else ()) or (error,)
+        found = (cell_file_errors(file) if is_path(file) else ()) or (error,)
         for each in found:
             sys.stderr.write(f"ir: {each}\n")
         count = len(found)
         sys.stderr.write(f"ir: {count} error{'s' if count > 1 else ''}\n")
-        return None
+        return []
 
 
 def _print_cell(cell: Cell) -> None:

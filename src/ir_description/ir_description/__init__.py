@@ -25,7 +25,7 @@ from ir_description.cell import (
     machine_in,
     sweep_speeds,
 )
-from ir_description.cell_review import Finding, check_cell
+from ir_description.cell_review import Finding, check_cell, check_robot_cell
 from ir_description.files import (
     cell_hash,
     cell_to_yaml,
@@ -159,6 +159,7 @@ __all__ = [
     "centre_deviations",
     "centre_directions",
     "check_cell",
+    "check_robot_cell",
     "data_sheet",
     "data_sheet_of",
     "drawn_robots",

@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from ir_description.cell import AUTO, Cell, Zone
+from ir_description.cell import AUTO, Cell, RobotCells, Zone
 from ir_description.poses import abc_from_rotation
 from ir_description.robot import PowerData
 from ir_description.shapes import Body, Capsule, capsule_distance, overlapping, point_distance
@@ -52,6 +52,24 @@ def check_cell(cell: Cell, power: PowerData | None = None) -> tuple[Finding, ...
         *_processes(cell),
     ]
     return tuple(sorted(findings, key=lambda finding: finding.severity))
+
+
+def check_robot_cell(
+    cells: RobotCells, robot: str, power: PowerData | None = None
+) -> tuple[Finding, ...]:
+    """Return the same of the cell of one of several robots: stations that concern another robot
+    alone are left to that one, and feet may look as they do.
+    """
+    cell = cells.of_robot(robot)
+    own = cells.stations_of(robot)
+    others = {station.name for station in cell.stations} - set(own)
+    feet = cells.feet_of_others(robot)
+    return tuple(
+        finding
+        for finding in check_cell(cell, power)
+        if finding.subject not in others
+        and not (finding.severity == "warning" and finding.subject in feet)
+    )
 
 
 def _sizes(cell: Cell) -> Iterator[Finding]:

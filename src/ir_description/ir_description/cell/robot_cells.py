@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ir_description.cell.cell import Cell, NameRegister
-from ir_description.cell.equipment import Equipment, zone_around
+from ir_description.cell.equipment import Equipment, Station, zone_around
 from ir_description.shapes import standing_capsule
 from ir_values.errors import UnknownNameError
 
@@ -47,6 +49,35 @@ class RobotCells:
         if name not in self.robots:
             raise UnknownNameError("robot", name, self.robots)
         return self.cells[self.robots.index(name)]
+
+    def stations_of(self, name: str) -> tuple[str, ...]:
+        """Names of the stations that concern a robot: those of its program, and of those that no
+        program visits the ones to which no other robot's foot is nearer.
+        """
+        visited = {
+            robot: {step.target for step in cell.program if step.kind == "STATION"}
+            for robot, cell in zip(self.robots, self.cells, strict=True)
+        }
+        anybody = set[str]().union(*visited.values())
+        return tuple(
+            station.name
+            for station in self.of_robot(name).stations
+            if station.name in visited[name]
+            or (station.name not in anybody and self._nearest(station) == name)
+        )
+
+    def _nearest(self, station: Station) -> str:
+        """The robot whose foot is nearest to a station."""
+        feet = np.array([cell.base_pose[:3, 3] for cell in self.cells])
+        far = np.linalg.norm(feet - station.pose[:3, 3], axis=1)
+        return self.robots[int(np.argmin(far))]
+
+    def feet_of_others(self, name: str) -> tuple[str, ...]:
+        """Names of the bodies of other robots' feet in a robot's cell."""
+        machines = self.of_robot(name).equipment
+        return tuple(
+            body.name for each in machines if each.name in self.robots for body in each.bodies
+        )
 
 
 def _foot(name: str, cell: Cell) -> Equipment:
