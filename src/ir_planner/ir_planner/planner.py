@@ -146,7 +146,7 @@ def options_with(options: PlanOptions | None, changes: OptionFields) -> PlanOpti
         return replace(options or PlanOptions(), **changes)
     except InvalidValueError as error:
         raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, str(error)) from error
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         given = ", ".join(f"{name}={value!r}"[:80] for name, value in changes.items())
         sentence = f"options {given}: one has a value of no fitting type: {error}"
         raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, sentence) from error
@@ -383,14 +383,14 @@ class Planner:
             scene.cell,
         )
         searches = self.settings.searches
-        if len(via) > 0 and motion is not None:
+        places = Via(self._places(via), via_tolerance, via_distance)
+        if places.places and motion is not None:
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"via has {len(via)} places and the start or the goal is in motion: a movement "
-                "past places starts and ends at rest",
+                f"via has {len(places.places)} places and the start or the goal is in motion: a "
+                "movement past places starts and ends at rest",
             )
-        if len(via) > 0:
-            places = Via(tuple(self._goal(place) for place in via), via_tolerance, via_distance)
+        if places.places:
 
             def fresh() -> Context:
                 asked = Context.of(scene, options, self._work(options, cancelled))
@@ -668,6 +668,20 @@ class Planner:
         code = StatusCode.GOAL_STATE_INVALID
         q = within_limits(goal.configuration, self.cell, "goal", code)
         return replace(goal, configuration=q)
+
+    def _places(self, via: Sequence[Place]) -> tuple[Goal, ...]:
+        """Places on the way as values. Raises RequestError, which names the place."""
+        if isinstance(via, str) or not isinstance(via, (Sequence, np.ndarray)):
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS, f"via is {via!r:.60}: give a list of places"
+            )
+        found = []
+        for k, place in enumerate(via, start=1):
+            try:
+                found.append(self._goal(place))
+            except RequestError as error:
+                raise RequestError(error.code, f"via {k}: {error}") from error
+        return tuple(found)
 
     def _configuration(self, place: Place | None, what: str, code: StatusCode) -> FloatArray:
         """Joint values (n,) of a posture, a text or an array, None: machine home. Raises

@@ -24,8 +24,14 @@ PLANNING_TIME_MAX = 600.0  # s
 
 def bounded(value: float, low: float, high: float, name: str, unit: str = "") -> float:
     """The value as a float within [low, high]; else RequestError with value, bound and unit."""
-    number = float(value)
     suffix = f" {unit}" if unit else ""
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"{name} is {value!r:.60}: it must be a number in [{low:g}, {high:g}]{suffix}",
+        ) from error
     if not math.isfinite(number):
         raise RequestError(
             StatusCode.INVALID_GOAL_CONSTRAINTS, f"{name} is {number}{suffix}: it must be finite"
