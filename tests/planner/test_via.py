@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import numpy as np
+import pinocchio
 import pytest
 
+from ir_msgs_py.status import StatusCode
 from ir_planner import Planner, RequestError
+
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # the judge of poses
+from _pinocchio_arm import pinocchio_arm
 
 CELLS = ("open", "kr6_bench", "ur10e_bench")
 
@@ -100,3 +108,74 @@ def test_a_place_in_collision_or_without_sense_is_an_answer(
         planner.plan_regional(goal="park", via=["home"], via_tolerance=0.0)
     with pytest.raises(RequestError, match="via_distance"):
         planner.plan_regional(goal="park", via=["home"], via_distance=5.0)
+
+
+def sampled(trajectory: object) -> np.ndarray:
+    """States (N, n) all along a trajectory."""
+    return trajectory.sample(np.linspace(0.0, trajectory.duration, 2000)).q
+
+
+def leaning(planner: Planner, states: np.ndarray) -> float:
+    """The largest angle [rad] in states (N, n) by which what points up in the first leans."""
+    cell = planner.cell
+    model = pinocchio_arm(cell.robot, (), cell.base_pose)
+    data = model.createData()
+    hand = np.asarray(cell.tcp)[:3, :3]
+
+    def rotation(q: np.ndarray) -> np.ndarray:
+        pinocchio.forwardKinematics(model, data, q)
+        return data.oMi[cell.robot.n].rotation @ hand
+
+    axis = rotation(states[0]).T[:, 2]
+    heights = [(rotation(q) @ axis)[2] for q in states]
+    return float(np.arccos(np.clip(min(heights), -1.0, 1.0)))
+
+
+@pytest.mark.parametrize("cell", CELLS)
+@pytest.mark.parametrize("seed", range(2))
+def test_the_tool_leans_from_where_the_whole_movement_begins(
+    planners: dict[str, Planner], cell: str, seed: int
+) -> None:
+    """What is answered keeps the tilt of the axis that is upright at the start, not at each place;
+    a goal that leans too far from it is refused, however little it leans from the place before.
+    """
+    planner = planners[cell]
+    start, other = drawn(planner, np.random.default_rng([seed, 9]), 2)
+    step = 0.2 * (other - start)
+    asked = {"start": start, "via": [start + step], "via_tolerance": 0.02}
+    free = planner.plan_regional(goal=start + 0.2 * step, **asked)
+    assert free.status.ok, free.status
+    states = np.concatenate([sampled(free.trajectory), asked["via"]])
+    most = 1.1 * leaning(planner, states)
+    kept = planner.plan_regional(goal=start + 0.2 * step, tilt_max=most, **asked)
+    assert kept.status.ok, kept.status
+    seen = leaning(planner, sampled(kept.trajectory))
+    assert seen <= most + 1e-6
+    assert seen <= kept.report.largest_tilt + 1e-6
+    far = planner.plan_regional(goal=start + 2.0 * step, tilt_max=most, **asked)
+    assert far.status.code is StatusCode.GOAL_VIOLATES_PATH_CONSTRAINTS
+
+
+def test_nothing_to_move_past_a_place_is_an_answer(planners: dict[str, Planner]) -> None:
+    planner = planners["open"]
+    home = np.array(planner.cell.machine_home)
+    for duration in (0.0, 3.0):
+        plan = planner.plan_regional(start=home, goal=home, via=[home, home], duration=duration)
+        assert plan.status.ok
+        assert plan.report.certified
+        assert np.abs(plan.trajectory.positions - home).max() <= 1e-9
+
+
+@pytest.mark.parametrize("name", ["via_tolerance", "via_distance"])
+@pytest.mark.parametrize("value", [None, [0.1], "0.1 rad", 10**400, float("nan")])
+def test_a_tolerance_that_is_no_number_is_refused(
+    planners: dict[str, Planner], name: str, value: object
+) -> None:
+    with pytest.raises(RequestError, match=f"{name} is .*: it must be"):
+        planners["open"].plan_regional(goal="park", via=["home"], **{name: value})
+
+
+@pytest.mark.parametrize("via", ["park", "", None, 3.0])
+def test_places_that_are_no_list_are_refused(planners: dict[str, Planner], via: object) -> None:
+    with pytest.raises(RequestError, match=r"via is .*: give a list of places"):
+        planners["open"].plan_regional(goal="park", via=via)

@@ -36,6 +36,7 @@ DISTANCE_MAX = 1.0  # m
 _CORNERS = 30  # of straight steps that are blended
 _CONFIGURATIONS = 12  # of a pose that are looked at
 _STEP = 1e-3  # s between the instants at which places are looked for
+_INSTANTS = 20_000  # of a movement at most, beside its points
 _PER_LEG = (2, 5)  # points between two places that a spline passes
 _INSIDE = 0.9  # of the tolerance by which a place is moved towards the line beside it
 _SMALL = 1e-3  # rad: points that near to the one before are left out
@@ -57,8 +58,10 @@ class Via:
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
                 f"via has {len(self.places)} places: at most {VIA_MAX} are passed",
             )
-        bounded(self.tolerance, 1e-6, TOLERANCE_MAX, "via_tolerance", "rad")
-        bounded(self.distance, 0.0, DISTANCE_MAX, "via_distance", "m")
+        tolerance = bounded(self.tolerance, 1e-6, TOLERANCE_MAX, "via_tolerance", "rad")
+        distance = bounded(self.distance, 0.0, DISTANCE_MAX, "via_distance", "m")
+        object.__setattr__(self, "tolerance", tolerance)
+        object.__setattr__(self, "distance", distance)
 
 
 def passed(
@@ -67,7 +70,7 @@ def passed(
     """Instants [s] at which the places (V, n) are passed within their tolerance, one after the
     other; None where one isn't.
     """
-    count = int(np.ceil(trajectory.duration / _STEP)) + 1
+    count = min(int(np.ceil(trajectory.duration / _STEP)), _INSTANTS) + 1
     times = np.union1d(np.linspace(0.0, trajectory.duration, count), trajectory.times)
     q = trajectory.sample(times).q
     poses = scene.chain.tcp_poses(q) if via.distance > 0.0 else None
@@ -123,10 +126,10 @@ class _Passing:
         leg_context: Callable[[], Context],
         searches: Searches,
     ) -> None:
-        self.context = context
         self.start = within_limits(
             start, context.scene.cell, "start", StatusCode.START_STATE_INVALID
         )
+        self.context = context.upright_from(self.start)
         self.via = via
         self.goal = goal
         self.leg_context = leg_context
@@ -231,7 +234,7 @@ class _Passing:
         """The movements from place to place, with a stop at each."""
         legs = []
         for k, (first, second) in enumerate(pairwise(chain)):
-            context = self.leg_context()
+            context = self.leg_context().upright_from(self.start)
             options = replace(context.options, duration=0.0)
             if self.context.options.duration > 0.0:
                 options = replace(options, objective="time")
@@ -280,11 +283,15 @@ class _Passing:
         makers: list[tuple[str, Callable[[], Movement]]] = [
             ("blended", partial(straight_steps, points, context))
             for points in steps
-            if len(points) <= _CORNERS and space.edges_free(points[:-1], points[1:]).all()
+            if 1 < len(points) <= _CORNERS and space.edges_free(points[:-1], points[1:]).all()
         ]
         splines = [self._points(legs, per_leg) for per_leg in _PER_LEG]
         splines += [pulled] if len(pulled) > 2 else []
-        makers += [("spline", partial(best_along, points, context, [])) for points in splines]
+        makers += [
+            ("spline", partial(best_along, points, context, []))
+            for points in splines
+            if len(points) > 1
+        ]
         for name, make in makers:
             if context.work.exhausted:
                 return
