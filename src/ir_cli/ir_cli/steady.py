@@ -133,6 +133,8 @@ def _check(arguments: argparse.Namespace) -> None:
     """Raise InputError for what doesn't belong to a steady cycle."""
     if (arguments.outage or arguments.vary) and not arguments.cycles:
         raise InputError("--outage and --vary follow a run: give --cycles as well")
+    if (arguments.outage or arguments.vary) and (arguments.json or arguments.csv):
+        raise InputError("--outage and --vary are printed as text: leave out --json or --csv")
     if not arguments.cell:
         raise InputError("--parts-per-hour needs a CELL with a route, such as flexible")
     for given, name in (
