@@ -36,16 +36,15 @@ from ir_recorder import analyse, read_recording
 from ir_recorder.analysis.indirect import Agreement, Measured, agreement, agreement_of
 from ir_recorder.fit import (
     BY,
-    Estimate,
     Source,
     doubts,
     fit_data,
+    fit_sources,
     left_out,
     left_out_rows,
     open_prior,
     parameter_rows,
     recommendation,
-    result,
     source_cell,
     write_fit_picture,
 )
@@ -298,13 +297,7 @@ def run_fit(arguments: argparse.Namespace) -> int:
     sources, prior = _asked(arguments)
     if arguments.centres:
         prior = prior.with_centres(centre_deviations(source_cell(sources[0]).robot))
-    data = fit_data(sources, prior, arguments.by)
-    estimate = Estimate(data.recordings, data.names, data.model, prior, motors=data.motors)
-    found = result(estimate, arguments.name)
-    if data.aligned and estimate.meter is not None:  # the fit's own power is nearer
-        data = fit_data(sources, found.parameters, arguments.by)
-        estimate = Estimate(data.recordings, data.names, data.model, prior, motors=data.motors)
-        found = result(estimate, arguments.name)
+    data, estimate, found = fit_sources(sources, prior, arguments.by, arguments.name)
     unseen = left_out(estimate)
     named = ", ".join(path.name for path in arguments.motion)[:300]
     page = power_parameters_to_yaml(found.parameters, f"fit on {named}")

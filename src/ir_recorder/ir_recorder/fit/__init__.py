@@ -2,7 +2,7 @@
 
 from ir_recorder.fit.channels import open_prior
 from ir_recorder.fit.data import BY, FitData, Source, fit_data, source_cell
-from ir_recorder.fit.doubts import doubts, result
+from ir_recorder.fit.doubts import doubts, fit_sources, result
 from ir_recorder.fit.estimate import Estimate, Fit, FittedMovement, fit
 from ir_recorder.fit.left_out import (
     LeftOut,
@@ -25,6 +25,7 @@ __all__ = [
     "doubts",
     "fit",
     "fit_data",
+    "fit_sources",
     "left_out",
     "left_out_rows",
     "median_error",

@@ -25,7 +25,7 @@ from ir_recorder.measure import PowerModel, Samples, samples_of
 from ir_recorder.measure.samples import STEP, LoadRuns
 from ir_recorder.reading.reader import read_recording
 from ir_recorder.reading.recording import Recording
-from ir_recorder.traces import Trace, TraceMapping, clock_offset, read_traces
+from ir_recorder.traces import ClockOffset, Trace, TraceMapping, clock_offset, read_traces
 from ir_recorder.traces.reader import recorded_traces
 from ir_recorder.traces.trace import CURRENT, EFFORT, LOAD
 from ir_values.arrays import BoolArray, FloatArray
@@ -187,7 +187,8 @@ def check_range(source: str, robot: RobotModel, q: FloatArray) -> None:
 class FitData:
     """Recordings, by name, the model of their robot, and sentences on how they were laid
     together. motors: whether the fit has to rest on what the controllers say of their motors.
-    aligned: whether a meter's clock was found by its power.
+    offsets [s]: added to the clock of each recording's meter so that its power agrees with the one
+    that the prior predicts; NaN where nothing was to be found so.
     """
 
     recordings: tuple[Samples, ...]
@@ -195,7 +196,7 @@ class FitData:
     model: PowerModel
     notes: tuple[str, ...]
     motors: bool
-    aligned: bool
+    offsets: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -216,6 +217,11 @@ class Source:
     def recording(self) -> Recording | None:
         """The recording that the motion is from, read once; None for other files."""
         return read_recording(self.motion) if self.motion.suffix.lower() == ".mcap" else None
+
+    def on_clock(self, seconds: float) -> Source:
+        """The same with so much added to the meter's clock."""
+        mapping = self.meter_mapping or TraceMapping()
+        return replace(self, meter_mapping=replace(mapping, clock_offset=seconds))
 
 
 def source_cell(source: Source) -> Cell:
@@ -240,27 +246,28 @@ def fit_data(sources: Source | Sequence[Source], prior: PowerParameters, by: str
     cell = cells[0]
     model = PowerModel(cell.robot, cell.robot.controller.dc_link, cell.base_pose, prior)
     runs = [_run(each, prior, model, by) for each in given]
+    recordings = tuple(samples for samples, _, _ in runs)
     motors = by in BY[1:]
     if not by:
-        motors = not any(np.isfinite(samples.watts).any() for samples, _ in runs)
+        motors = not any(np.isfinite(samples.watts).any() for samples in recordings)
     if by == BY[1]:
-        runs = [(replace(samples, watts=np.full(len(samples), np.nan)), n) for samples, n in runs]
-    if motors and len({samples.currents for samples, _ in runs}) > 1:
+        recordings = tuple(
+            replace(samples, watts=np.full(len(samples), np.nan)) for samples in recordings
+        )
+    if motors and len({samples.currents for samples in recordings}) > 1:
         raise RecorderError("some recordings have torques, others currents: fit them one by one")
-    notes = [note for _, own in runs for note in own]
+    notes = tuple(note for _, own, _ in runs for note in own)
     names = tuple(each.motion.stem for each in given)
-    aligned = any(
-        each.meter is not None and np.isnan((each.meter_mapping or TraceMapping()).clock_offset)
-        for each in given
-    )
-    recordings = tuple(samples for samples, _ in runs)
-    return FitData(recordings, names, model, tuple(notes), motors, aligned)
+    offsets = tuple(offset for _, _, offset in runs)
+    return FitData(recordings, names, model, notes, motors, offsets)
 
 
 def _run(
     source: Source, prior: PowerParameters, model: PowerModel, by: str
-) -> tuple[Samples, list[str]]:
-    """A source on one grid, and sentences on how it was laid there."""
+) -> tuple[Samples, list[str], float]:
+    """A source on one grid, sentences on how it was laid there, and what was added to the clock of
+    its meter so that its power agrees with the predicted one [s]; else NaN.
+    """
     recording = source.recording
     cell = source_cell(source)
     _check_load(cell, source.load)
@@ -278,6 +285,7 @@ def _run(
     assert positions is not None  # the trace was chosen for them
     check_range(joints.source, cell.robot, positions)
     meter = _metered(traces)
+    added = np.nan
     notes = [*(problem for trace in traces for problem in trace.problems), *turned]
     if source.meter is not None:
         mapping = source.meter_mapping or TraceMapping()
@@ -285,8 +293,13 @@ def _run(
         if outer is None:
             raise RecorderError(f"{source.meter}: there is neither a column power nor energy")
         if np.isnan(mapping.clock_offset):
-            outer, note = _aligned(joints, meter, outer, prior, model, runs)
-            notes.append(note)
+            offset, what = _offset(joints, meter, outer, prior, model, runs)
+            notes.append(
+                f"{outer.source}: {offset.seconds:+.3f} s on its clock agrees with {what} by "
+                f"{offset.correlation:.2f}"
+            )
+            outer = outer.shifted(offset.seconds)
+            added = offset.seconds if meter is None else np.nan
         meter = outer
     names = cell.robot.joint_names
     said = joints.joints(names, EFFORT) is not None or joints.joints(names, CURRENT) is not None
@@ -302,7 +315,7 @@ def _run(
     samples = samples_of(joints, meter, names, prior.modes, runs)
     if meter is not None and by != BY[1]:
         check_unit(samples.watts, cell.robot, meter.source)
-    return samples, notes
+    return samples, notes, added
 
 
 def _gaps(joints: Trace) -> list[str]:
@@ -359,16 +372,16 @@ def _metered(traces: Sequence[Trace]) -> Trace | None:
     return next((trace for trace in traces if trace.joules() is not None), None)
 
 
-def _aligned(
+def _offset(
     joints: Trace,
     meter: Trace | None,
     outer: Trace,
     prior: PowerParameters,
     model: PowerModel,
     runs: LoadRuns,
-) -> tuple[Trace, str]:
-    """The outer meter on the robot's clock: its power against the recorded one, else the predicted
-    one.
+) -> tuple[ClockOffset, str]:
+    """What lays the outer meter on the robot's clock, its power against the recorded one, else the
+    predicted one; and which of them.
     """
     if meter is not None:
         time, watts = _watts(meter)
@@ -379,12 +392,7 @@ def _aligned(
         watts = model.watts(prior.mean, model.prepare(samples))
         begun = "the data sheet" if prior.name == DATA_SHEET else prior.name
         what = f"the power that {begun} predicts"
-    offset = clock_offset(time, watts, *_watts(outer))
-    note = (
-        f"{outer.source}: {offset.seconds:+.3f} s on its clock agrees with {what} by "
-        f"{offset.correlation:.2f}"
-    )
-    return outer.shifted(offset.seconds), note
+    return clock_offset(time, watts, *_watts(outer)), what
 
 
 def _watts(meter: Trace) -> tuple[FloatArray, FloatArray]:

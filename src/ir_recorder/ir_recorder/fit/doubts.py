@@ -4,15 +4,16 @@ taken for each other. Such data fit badly, but fit; so it is said.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
-from ir_description import AXIS_UNITS
+from ir_description import AXIS_UNITS, PowerParameters
 from ir_recorder.errors import RecorderError
 from ir_recorder.fit.channels import Run, by_window
+from ir_recorder.fit.data import FitData, Source, fit_data
 from ir_recorder.fit.estimate import Estimate, Fit
 from ir_recorder.measure import Samples
 from ir_values.arrays import FloatArray, IntArray
@@ -25,6 +26,9 @@ _LONGEST = 1.0  # s that are looked for
 _GAIN = 0.9  # of the rms: what a later clock has to reach
 _FEWEST = 50  # samples in motion
 _USABLE = 0.5  # of a part's samples
+_CLOCKS = 2  # times that a meter's clock is moved
+_ON_TIME = 1e-3  # s: less changes nothing
+_MOVED_AT_MOST = 0.1  # s at once: beyond it the first order says nothing
 
 
 def result(estimate: Estimate, name: str) -> Fit:
@@ -35,6 +39,39 @@ def result(estimate: Estimate, name: str) -> Fit:
         return estimate.result(name)
     except RecorderError as error:
         raise RecorderError(". ".join([str(error), *doubts(estimate)])) from error
+
+
+def fit_sources(
+    sources: Sequence[Source], prior: PowerParameters, by: str, name: str
+) -> tuple[FitData, Estimate, Fit]:
+    """A fit of files. Where a meter's clock was found by the power that the prior predicts, which
+    is some ms off as that power is, it is found with the parameters. Errors as in `fit_data` and
+    `result`.
+    """
+    data = fit_data(sources, prior, by)
+    notes = list(data.notes)
+    offsets = np.array(data.offsets)
+    open_ones = np.isfinite(offsets)
+    for moves in range(_CLOCKS + 1):
+        estimate = Estimate(data.recordings, data.names, data.model, prior, motors=data.motors)
+        found = result(estimate, name)
+        if moves == _CLOCKS or estimate.meter is None or not open_ones.any():
+            break
+        late = estimate.lateness()
+        if (np.abs(late[open_ones]) < _ON_TIME).all():
+            break
+        offsets = offsets - late.clip(-_MOVED_AT_MOST, _MOVED_AT_MOST)
+        moved = [
+            source.on_clock(float(offset)) if own else source
+            for source, offset, own in zip(sources, offsets, open_ones, strict=True)
+        ]
+        data = fit_data(moved, prior, by)
+    notes += [
+        f"{run}: {offset:+.3f} s on its meter's clock agrees best with the power of the fit"
+        for run, offset, own in zip(data.names, offsets, open_ones, strict=True)
+        if own
+    ]
+    return replace(data, notes=tuple(notes)), estimate, found
 
 
 def doubts(estimate: Estimate, found: Fit | None = None) -> tuple[str, ...]:

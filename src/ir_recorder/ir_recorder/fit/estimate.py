@@ -450,6 +450,27 @@ class Estimate:
                 break
         return x, slopes.T @ slopes + self._pull.T @ self._pull
 
+    def lateness(self) -> FloatArray:
+        """Seconds (recordings,) by which each meter shows power later than the joints explain it,
+        beside what the parameters can take of that; to first order, after `result`.
+        """
+        assert self.meter is not None  # asked before
+        missing, slopes = self.rows(self.found)
+        powers = self.meter.watts(self.found[: len(self.prior.names)])
+        late = np.zeros((len(missing), len(self.runs)))
+        for k, run in enumerate(self.runs):
+            each = [np.zeros(len(other.samples)) for other in self.runs]
+            each[k] = -np.gradient(powers[k], run.samples.step)
+            late[: len(self.meter.measured), k] = self.meter.reduced(each)
+        scale = safe(self.wide)
+        weighted = self.weight[:, None] * np.hstack([slopes * scale, late])
+        pull = np.hstack([self._pull * scale, np.zeros((len(scale), len(self.runs)))])
+        target = [self.weight * missing, self._pull @ (self._before - self.found)]
+        solved = np.linalg.lstsq(
+            np.concatenate([weighted, pull]), np.concatenate(target), rcond=None
+        )
+        return np.asarray(solved[0][len(scale) :])
+
     def widened_meter_weights(self) -> FloatArray:
         """What a residual of the meter at rest and one in motion (2,) weigh, with what they share
         with their neighbours and what the model lacks.
