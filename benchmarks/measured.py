@@ -4,8 +4,9 @@
 
 DIR holds public recordings that a user has fetched (docs/energy.md names them; none is in the
 repository). What is not there is left out, and said. Simulated plants as in `truth.py --only fit`
-follow (not with DIR and --quick), and how often intervals hold over everything together; then
-robots that nobody has a file of (`_measured_strangers`), by a meter of ten readings a second.
+follow (not with DIR and --quick, none with --seeds 0), then robots that nobody has a file of
+(`_measured_strangers`), by a meter of ten readings a second, and how often intervals hold over
+everything together.
 --page writes the table of the recordings into the page's chapter "Measured".
 """
 
@@ -110,11 +111,12 @@ def main() -> None:
         from _truth_fit import driven
 
         seeds = min(asked.seeds, 3) if asked.quick else asked.seeds
-        plants, inside = driven(Asked(("demo",), seeds, asked.quick))
-        rows += plants.rows
-        claims += plants.claims
-        held += sum(inside)
-        count += len(inside)
+        if seeds > 0:
+            plants, inside = driven(Asked(("demo",), seeds, asked.quick))
+            rows += plants.rows
+            claims += plants.claims
+            held += sum(inside)
+            count += len(inside)
         own, found, others = _strangers(2 if asked.quick else STRANGERS)
         rows += own
         claims += found

@@ -98,6 +98,7 @@ CORRUPTIONS = {
     "kW as W": lambda samples: replace(samples, watts=samples.watts / 1e3),
     "A5 stands": lambda s: with_columns(s, STRAIGHT, np.array([1, 1, 1, 1, 0, 1.0])),
     "A2 and A3": lambda s: with_columns(s, [0, 2, 1, 3, 4, 5], np.ones(6)),
+    "A4 and A5": lambda s: with_columns(s, [0, 1, 2, 4, 3, 5], np.ones(6)),
     "sign of A2": lambda s: with_columns(s, STRAIGHT, np.array([1, -1, 1, 1, 1, 1.0])),
     "late": lambda samples: replace(samples, watts=np.roll(samples.watts, 8)),
 }

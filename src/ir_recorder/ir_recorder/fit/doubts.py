@@ -226,14 +226,14 @@ def _strain(estimate: Estimate, found: Fit, factor: float) -> float:
 # Columns that stand for each other.
 #
 # With two columns exchanged, or one with its sign changed, the parameters that were found (those of
-# the two joints exchanged as well) are held against the same power. The likeliest such reading, and
-# the columns as given, then take one step of Gauss and Newton. The data count as little as the
-# fit's widened noise says.
+# the two joints exchanged as well) are held against the same power. The likeliest such readings,
+# and the columns as given, are then fitted to a part of the recording, by the noise of the meter
+# alone: columns of a wrist that are exchanged leave errors that a widened noise would swallow.
 
 _SECONDS = 40.0  # of a recording that other columns are tried on
 _STRIDE = 5.0  # s between parts that are looked at
-_ODDS = 12.0  # by how much twice the log-likelihood has to rise
-_BETTER = 0.7  # or: to what share the squares fall, whatever they count
+_LIKELIEST = 3  # readings that are fitted
+_BETTER = 0.5  # of the squares that are left as given: with less the columns are doubted
 
 
 def _of_columns(estimate: Estimate) -> Iterator[str]:
@@ -257,14 +257,15 @@ def _of_columns(estimate: Estimate) -> Iterator[str]:
         order = given.copy()
         order[[a, b]] = b, a
         readings.append((f"the columns of {joints[a]} and {joints[b]} swapped", order, up))
-    costs = [_Reading(estimate, part, order, sign).cost() for _, order, sign in readings]
-    what, order, sign = readings[int(np.argmin(costs))]
-    other = _Reading(estimate, part, order, sign).stepped()
-    as_given = _Reading(estimate, part, given, up).stepped()
-    if other < max(as_given - _ODDS, _BETTER * as_given):
+    tried = [_Reading(estimate, part, order, sign) for _, order, sign in readings]
+    likeliest = np.argsort([each.cost() for each in tried], kind="stable")[:_LIKELIEST]
+    fitted = {readings[k][0]: tried[k].fitted() for k in likeliest.tolist()}
+    what = min(fitted, key=lambda each: fitted[each])
+    as_given = _Reading(estimate, part, given, up).fitted()
+    if fitted[what] < _BETTER * as_given:
         yield (
             f"{run.name}: with {what} the power is explained better "
-            f"(odds of e^{0.5 * (as_given - other):.0f}): look at the mapping"
+            f"({fitted[what] / as_given:.2f} of the squares are left): look at the mapping"
         )
 
 
@@ -300,7 +301,7 @@ class _Reading:
             places = self._own.prior.places(term)
             found[places] = found[places][order]
         self._starts = (found, known)
-        self._weight = estimate.widened_meter_weights()[self._own.meter.group]
+        self._weight = estimate.meter_weights()[self._own.meter.group]
         self._wide = estimate.wide[: len(found)]
 
     def cost(self) -> float:
@@ -313,11 +314,9 @@ class _Reading:
             float(np.square(self._weight * meter.missing(start)).sum()) for start in self._starts
         )
 
-    def stepped(self) -> float:
-        """The same with what is known of the parameters, after one step from them."""
-        return min(
-            self._own.stepped_cost(start, self._weight, self._wide) for start in self._starts
-        )
+    def fitted(self) -> float:
+        """The same of the best parameters, with what is known of them."""
+        return min(self._own.least_cost(start, self._weight, self._wide) for start in self._starts)
 
 
 def _of_torques(estimate: Estimate) -> Iterator[str]:

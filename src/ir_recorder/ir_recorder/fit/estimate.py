@@ -471,26 +471,23 @@ class Estimate:
         )
         return np.asarray(solved[0][len(scale) :])
 
-    def widened_meter_weights(self) -> FloatArray:
-        """What a residual of the meter at rest and one in motion (2,) weigh, with what they share
-        with their neighbours and what the model lacks.
+    def meter_weights(self) -> FloatArray:
+        """What a residual of the meter at rest and one in motion (2,) weigh by what they don't
+        share with their neighbours, which is noise and not what the model lacks.
         """
         assert self.meter is not None  # asked before
-        rows = len(self.meter.measured)
-        own = np.zeros(2)
-        for k in range(2):
-            weights = self.weight[:rows][self.meter.group == k]
-            own[k] = weights[0] if len(weights) else 0.0
-        return np.asarray(own / np.sqrt(self.inflation))
+        missing = self.meter.missing(self.found[: len(self.prior.names)])
+        return np.asarray(1.0 / np.sqrt(self._white(self.meter, missing)))
 
-    def stepped_cost(self, x: FloatArray, weight: FloatArray, wide: FloatArray) -> float:
-        """The cost after one step from x (P + E,), with priors as wide as `wide` (P + E,)."""
-        self.wide = wide[: len(x)]
-        self._pull = np.diag(1.0 / safe(self.wide))
-        cost, residual, slopes = self._at(x, weight, 0.0)
-        step = self._step(x, residual, slopes, self.wide > 0.0)
-        trial = np.clip(x + step, self._low, self._high)
-        return min(cost, self._at(trial, weight, 0.0)[0])
+    def least_cost(self, start: FloatArray, weight: FloatArray, wide: FloatArray) -> float:
+        """The cost of the best parameters from a start (P + E,), with priors as wide as `wide`
+        (P + E,); weight (R,): of the rows.
+        """
+        self.wide = wide
+        self._pull = np.diag(1.0 / safe(wide))
+        inside = np.clip(start, self._low, self._high)
+        x, _ = self.solve(inside, weight, wide > 0.0)
+        return self._at(x, weight, 0.0)[0]
 
     def precision(self, x: FloatArray, weight: FloatArray) -> FloatArray:
         """Precision (P + E, P + E) of parameters that rows of these weights (R,) leave."""
