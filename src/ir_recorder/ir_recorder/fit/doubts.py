@@ -233,7 +233,8 @@ def _strain(estimate: Estimate, found: Fit, factor: float) -> float:
 _SECONDS = 40.0  # of a recording that other columns are tried on
 _STRIDE = 5.0  # s between parts that are looked at
 _LIKELIEST = 3  # readings that are fitted
-_BETTER = 0.5  # of the squares that are left as given: with less the columns are doubted
+_ODDS = 12.0  # by how much twice the log-likelihood has to rise, with noise as wide as the fit's
+_BETTER = 0.5  # or: of the squares that are left as given, whatever they count
 
 
 def _of_columns(estimate: Estimate) -> Iterator[str]:
@@ -262,7 +263,8 @@ def _of_columns(estimate: Estimate) -> Iterator[str]:
     fitted = {readings[k][0]: tried[k].fitted() for k in likeliest.tolist()}
     what = min(fitted, key=lambda each: fitted[each])
     as_given = _Reading(estimate, part, given, up).fitted()
-    if fitted[what] < _BETTER * as_given:
+    sure = as_given - _ODDS * estimate.widened_by()
+    if fitted[what] < max(sure, _BETTER * as_given):
         yield (
             f"{run.name}: with {what} the power is explained better "
             f"({fitted[what] / as_given:.2f} of the squares are left): look at the mapping"

@@ -479,6 +479,17 @@ class Estimate:
         missing = self.meter.missing(self.found[: len(self.prior.names)])
         return np.asarray(1.0 / np.sqrt(self._white(self.meter, missing)))
 
+    def widened_by(self) -> float:
+        """How much more than by `meter_weights` a squared residual in motion counts as noise, with
+        what it shares with its neighbours and what the model lacks; after `result`.
+        """
+        assert self.meter is not None  # asked before
+        moving = np.flatnonzero(self.meter.group == 1)
+        if not len(moving):
+            return 1.0
+        own = self.weight[moving[0]] ** 2 / self.inflation
+        return max(float(self.meter_weights()[1] ** 2 / own), 1.0)
+
     def least_cost(self, start: FloatArray, weight: FloatArray, wide: FloatArray) -> float:
         """The cost of the best parameters from a start (P + E,), with priors as wide as `wide`
         (P + E,); weight (R,): of the rows.
