@@ -270,7 +270,7 @@ class Demonstration:
     def _tending(
         self, cell: Cell, tended: Tended, seed: int
     ) -> tuple[Cell, tuple[PlannedMovement, ...]]:
-        """The run of the cell's cheapest cycle, from its park posture on, and the cell of it."""
+        """The run of the cell's cheapest cycle, from machine home on, and the cell of it."""
         self._progress.begin("plan the cheapest cycle")
         planner = Planner(cell, clock=time.monotonic)
         plan = planner.plan_steady_cycle(
@@ -283,12 +283,12 @@ class Demonstration:
         first = plan.run.movements[0]
         assert first.trajectory is not None
         start = first.trajectory.positions[0]
-        there = planner.plan_regional(goal=Goal(configuration=start), start="park", seed=seed)
+        there = planner.plan_regional(goal=Goal(configuration=start), start="home", seed=seed)
         if there.trajectory is None:
             raise DemonstrationError(there.status.message)
         approach = PlannedMovement(
             kind=MovementKind.REGIONAL,
-            from_station="park",
+            from_station="home",
             to_station=first.from_station,
             trajectory_id=there.trajectory.trajectory_id,
             trajectory=there.trajectory,

@@ -154,11 +154,11 @@ class PartPlaces:
                         f"{step.detach} can't be detached at {station}, {part} lies there"
                     )
             lying = {**self.lying, step.detach: step.target}
-            return replace(self, held="", lying=self._supplied(lying))
+            return replace(self, held="", lying=self.supplied(lying))
         return self
 
-    def _supplied(self, lying: dict[str, str]) -> dict[str, str]:
-        """With what the route takes away and brings."""
+    def supplied(self, lying: dict[str, str]) -> dict[str, str]:
+        """Where parts lie once the route has taken away and brought what it does."""
         route = self.route
         if route is None:
             return lying

@@ -8,7 +8,7 @@ from it: they keep their own.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -63,11 +63,12 @@ def places_after(cell: Cell, places: PartPlaces, movement: PlannedMovement) -> P
     lying = dict(places.lying)
     parts = {part.name for part in cell.parts}
     if movement.attach in parts:
-        return PartPlaces(movement.attach, {**lying, movement.attach: ""})
+        return replace(places, held=movement.attach, lying={**lying, movement.attach: ""})
     if movement.detach in parts:
         stations = {station.name for station in cell.stations}
         station = movement.to_station if movement.to_station in stations else ""
-        return PartPlaces("", {**lying, movement.detach: station})
+        put = places.supplied({**lying, movement.detach: station})
+        return replace(places, held="", lying=put)
     return places
 
 
