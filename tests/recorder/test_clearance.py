@@ -35,8 +35,8 @@ def test_a_route_takes_parts_away_at_its_end_and_brings_the_next() -> None:
     first, *_, last = cell.route.visits
     places = cell.parts_at_start()
     for movement in (
-        PlannedMovement(to_station=first, attach="gear"),
-        PlannedMovement(to_station=last, detach="gear"),
+        PlannedMovement(kind="regional", to_station=first, attach="gear"),
+        PlannedMovement(kind="regional", to_station=last, detach="gear"),
     ):
         places = places_after(cell, places, movement)
     assert places.held == ""
