@@ -165,6 +165,9 @@ _RESOLUTION = 2e-3  # share of the largest value that the bound may add between 
 _FINER = 8  # times as many instants where a bound doesn't decide,
 _ROUNDS = 3
 _MOST = 200_000  # instants of a trajectory at a time
+# where nothing is asked, and the bounds are only reported: a proof of a movement stays fast
+_REPORTED_RESOLUTION = 0.02
+_REPORTED_MOST = 1_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,7 +242,7 @@ class ToolUse:
         every = np.arange(len(self._durations))
         ends = self._sampled(every, np.ones(len(every), np.int64), points)
         top = (ends[0].max(initial=0.0), ends[1].max(initial=0.0))
-        count = self._counts(motion, top)
+        count = self._counts(motion, top, asked=bounds.asked)
         found = self._bounded(motion, every, count, points)
         for _ in range(_ROUNDS if bounds.asked else 0):
             open_ = np.flatnonzero(
@@ -259,15 +262,19 @@ class ToolUse:
             found.found_acceleration[open_] = finer.found_acceleration
         return found
 
-    def _counts(self, motion: ToolDerivatives, top: tuple[float, float]) -> IntArray:
+    def _counts(
+        self, motion: ToolDerivatives, top: tuple[float, float], *, asked: bool
+    ) -> IntArray:
         """Pieces of each segment (S,) so that little may be between their ends."""
+        resolution = _RESOLUTION if asked else _REPORTED_RESOLUTION
+        instants = _MOST if asked else _REPORTED_MOST
         of_speed, of_acceleration = (
-            np.sqrt(8.0 * _RESOLUTION * max(most, 1e-9) / np.maximum(bound, 1e-12))
+            np.sqrt(8.0 * resolution * max(most, 1e-9) / np.maximum(bound, 1e-12))
             for most, bound in zip(top, (motion.jerk, motion.snap), strict=True)
         )
         step = np.minimum(of_speed, of_acceleration)
         whole = np.ceil(self._durations / step)
-        share = max(float(whole.sum()) / _MOST, 1.0)
+        share = max(float(whole.sum()) / instants, 1.0)
         return np.maximum(np.ceil(whole / share), 1.0).astype(np.int64)
 
     def _bounded(
