@@ -21,6 +21,7 @@ OTHERS = {
     "paper": {"--only", "--again", "--seeds", "--quick", "--json"},  # each claim names its cells
     "hostile": {"--seeds", "--quick", "--json"},  # one cell: it asks for the driver
     "strangers": {"--seeds", "--quick", "--json"},  # files, no cells
+    "requests": {"--only", "--cases", "--quick", "--json"},  # each kind draws cells of its own
 }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -43,15 +44,17 @@ def test_a_demonstration_that_ends_early_says_why_and_is_reported(
 ) -> None:
     demonstration = Demonstration("demo", tmp_path, 0, "nominal", Progress())
     reached = []
+    plan = SimpleNamespace(program_id="0")
 
-    def done(name: str) -> None:
+    def done(name: str) -> SimpleNamespace:
         reached.append(name)
         if name == stage:
             raise STORY[stage]
+        return plan
 
     for name in STORY:
         monkeypatch.setattr(demonstration, name, lambda *_, name=name: done(name))
     assert demonstration._story(None) == str(STORY[stage])
     assert reached[-1] == stage
-    monkeypatch.setattr(demonstration, stage, lambda *_: None)
+    monkeypatch.setattr(demonstration, stage, lambda *_: plan)
     assert demonstration._story(None) == ""

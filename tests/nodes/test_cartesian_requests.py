@@ -72,7 +72,10 @@ REFUSED = {
     "no segments": (asked(), "segments have 0 poses: it must be 1 to 2000"),
     "nothing": (PlanCartesianMovement.Request(), "exactly one of path and start_pose"),
     "no end": (asked(part("line")), "a line has 0 poses: it must have 1"),
-    "zero length": (asked(part("line", pose(1.8, -0.3, 1.2))), "is 0 m from the pose before it"),
+    "zero length": (
+        asked(part("line", pose(1.8, -0.3, 1.2))),
+        "is where the pose before it is, turned by 0 rad",
+    ),
     "collinear": (asked(part("circle", pose(1.8, 0.0, 1.2), pose(1.8, 0.3, 1.2))), "lie on a line"),
     "there and back": (
         asked(part("circle", pose(1.6, 0.0, 1.2), pose(1.8, -0.3, 1.2))),

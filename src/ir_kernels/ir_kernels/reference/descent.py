@@ -272,6 +272,9 @@ def descend_along(
         control, interval = spline_along(path, terms.velocity, terms.acceleration, settings)
         row = np.zeros(len(control) - 3, np.int32)
         fixed = settings[2] > 0.0
-        control, *ended = core.descend(control, row, interval, fixed, evaluations, tolerance)
+        at_rest = np.zeros(0)
+        control, *ended = core.descend(
+            control, row, interval, fixed, evaluations, tolerance, at_rest
+        )
         found.append((np.clip(control, terms.low, terms.high), *ended))
     return found

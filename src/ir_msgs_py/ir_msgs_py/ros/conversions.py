@@ -6,6 +6,7 @@ and joint: a quaternion that is no rotation, an unknown frame, times that don't 
 
 from __future__ import annotations
 
+import math
 from array import array
 from collections.abc import Mapping, Sequence
 
@@ -167,7 +168,7 @@ def pose_from_msg(msg: Pose) -> FloatArray:
             f"position is {_text(position)} m: it must be finite",
             StatusCode.INVALID_GOAL_CONSTRAINTS,
         )
-    norm = float(np.linalg.norm(quaternion))
+    norm = math.hypot(*quaternion)  # of any numbers, without an overflow
     if not abs(norm - 1.0) <= NORM_TOLERANCE:
         raise PoseError(
             f"orientation is {_text(quaternion)} (x, y, z, w), its norm {norm:g}: "
