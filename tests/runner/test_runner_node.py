@@ -285,6 +285,16 @@ def test_a_program_is_fetched_by_its_id_and_run(cell, wait_for):
     wait_for(lambda: (1, 2, "moving") in phases)
 
 
+@pytest.mark.parametrize("field", ["from_station", "load", "states"])
+def test_a_step_that_late_recorders_could_not_be_sent_is_refused_with_its_size(cell, field):
+    text = "x" * 70_000
+    result = cell.run(movements=[move(**{field: [text] if field == "states" else text})])
+    assert result.status.code == StatusCode.INVALID_GOAL_CONSTRAINTS
+    assert "at most 65536 are taken" in result.status.message
+    assert len(result.status.message) < 300
+    assert cell.driver.log == []
+
+
 def test_diagnostics_say_what_runs_how_it_ended_and_whether_the_driver_is_heard(
     impatient, wait_for
 ):

@@ -12,6 +12,7 @@ from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.serialization import serialize_message
 
 from ir_description import DescriptionError, load_cell
 from ir_msgs.action import RunProgram
@@ -43,6 +44,7 @@ from ir_program_runner.program import (
     Progress,
     check_program,
     check_request,
+    step_name,
 )
 from ir_program_runner.requests import Announce
 from ir_program_runner.settings import LinkSettings
@@ -84,6 +86,7 @@ _KEPT = QoSProfile(depth=5 * MOST_STEPS, durability=DurabilityPolicy.TRANSIENT_L
 """The longest program is kept for a recorder that comes late; a runner that works for weeks stays
 small.
 """
+_MOST_STATE = 65_536  # bytes that a step announces; a planned one has two thousand
 _SIGNALS = COMMANDS[0]  # a driver that starts later hears them too
 _FEEDBACK_PERIOD = 0.2  # s: a person reads no faster
 _MACHINES_PERIOD = 0.02  # s: cycle of the soft PLC, as a small real one has
@@ -91,6 +94,24 @@ _MACHINES_PERIOD = 0.02  # s: cycle of the soft PLC, as a small real one has
 
 def _machines_of(links: LinkSettings) -> Machines:
     return Machines.of(load_cell(links.cell), links.seed) if links.cell else Machines()
+
+
+def _check_announced(movements: Sequence[PlannedMovement]) -> None:
+    """Raise ProgramError for a step too large to be kept for recorders that come late."""
+    for index, movement in enumerate(movements):
+        state = ProgramState(
+            stamp_ns=0,
+            program_id="",
+            index=index,
+            total=len(movements),
+            event=Event.STARTED,
+            movement=movement,
+        )
+        size = len(serialize_message(program_state_to_msg(state)))
+        if size > _MOST_STATE:
+            where = step_name(index, len(movements), movement)
+            sentence = f"{where} has {size} bytes without its points: at most {_MOST_STATE}"
+            raise ProgramError(f"{sentence} are taken", StatusCode.INVALID_GOAL_CONSTRAINTS)
 
 
 class ProgramRunnerNode(Node):
@@ -208,6 +229,7 @@ class ProgramRunnerNode(Node):
             status, movements = await fetch
             if status.ok:
                 check_program(movements)
+                _check_announced(movements)
         except InvalidValueError as error:
             return Status(StatusCode.INVALID_MOTION_PLAN, str(error)), ()
         except ProgramError as error:

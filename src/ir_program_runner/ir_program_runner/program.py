@@ -38,13 +38,14 @@ from ir_program_runner.requests import (
     need,
 )
 from ir_program_runner.settings import ProgramSettings
-from ir_values.errors import InvalidValueError
+from ir_values.errors import InvalidValueError, one_line
 
 # Checks of a whole program before its first movement: what can't end well must not start.
 
 MOST_STEPS = 1000  # of a request; a program of a cell has tens
 LONGEST_ID = 256  # characters
 LONGEST_PAUSE = 604_800.0  # s: a week, as for the driver's pauses
+_STATION_MAX = 60  # characters of a station's name in a sentence
 JOINT_TOLERANCE = 0.01  # rad, as the driver's for the first point of a trajectory
 
 
@@ -123,7 +124,8 @@ def load_after(movement: PlannedMovement) -> str:
 
 def step_name(index: int, total: int, movement: PlannedMovement) -> str:
     """Name of a step in sentences: "step 2 of 5 (regional lathe -> park)"."""
-    places = " -> ".join(place for place in (movement.from_station, movement.to_station) if place)
+    stations = (movement.from_station, movement.to_station)
+    places = " -> ".join(one_line(station, _STATION_MAX) for station in stations if station)
     mode = movement.power_mode if movement.is_pause else ""
     text = " ".join(part for part in (str(movement.kind), mode, places) if part)
     return f"step {index + 1} of {total} ({text})"
