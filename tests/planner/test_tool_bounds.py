@@ -20,6 +20,7 @@ from _pinocchio_arm import pinocchio_arm
 CELLS = ("open", "kr6_bench", "ur10e_bench")
 SAMPLES = 1000
 ROUNDING = 1e-6  # relative
+CLOSE = 1.04  # 2 % between instants, and what the judge's samples miss
 
 
 @pytest.fixture(scope="module")
@@ -28,14 +29,17 @@ def planners() -> dict[str, Planner]:
 
 
 def judged(
-    planner: Planner, trajectory: JointTrajectory, points: list[np.ndarray] | None = None
+    planner: Planner,
+    trajectory: JointTrajectory,
+    points: list[np.ndarray] | None = None,
+    samples: int = SAMPLES,
 ) -> tuple[float, float]:
     """Largest speed and acceleration of points of the last link, the tcp if none are given."""
     cell = planner.cell
     model = pinocchio_arm(cell.robot, (), cell.base_pose)
     data = model.createData()
     joint = cell.robot.n
-    motion = trajectory.sample(np.linspace(0.0, trajectory.duration, SAMPLES))
+    motion = trajectory.sample(np.linspace(0.0, trajectory.duration, samples))
     places = np.array(points or [cell.tcp[:3, 3]])
     speed = gain = 0.0
     for q, qd, qdd in zip(motion.q, motion.qd, motion.qdd, strict=True):
@@ -101,6 +105,41 @@ def test_no_point_exceeds_its_limit_and_a_looser_one_takes_no_longer(
         if objective == "time":
             assert plan.report.duration <= 1.02 * longer
         longer = plan.report.duration
+
+
+def drawn_trajectory(
+    planner: Planner, draw: np.random.Generator, count: int, known: int
+) -> JointTrajectory:
+    """Points around home at uneven times, with `known` derivatives: from linear to quintic."""
+    robot = planner.cell.robot
+    shape = (count, robot.n)
+    times = np.cumsum(draw.uniform(0.1, 1.0, count)) - 0.1
+    q = np.array(planner.cell.machine_home) + draw.uniform(-0.5, 0.5, shape)
+    scale = 10.0 ** draw.uniform(-2.0, 1.0)
+    derivatives = [scale * draw.normal(size=shape) for _ in range(known)]
+    return JointTrajectory.from_seconds(robot.joint_names, times, q, *derivatives)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+@pytest.mark.parametrize(("count", "known"), [(2, 2), (3, 1), (6, 0), (6, 2), (60, 1), (60, 2)])
+def test_reported_speeds_are_upper_bounds_and_close(
+    planners: dict[str, Planner], cell: str, count: int, known: int
+) -> None:
+    """Also where nobody asks for a limit, of any trajectory."""
+    planner = planners[cell]
+    draw = np.random.default_rng([count, known, 33])
+    drawn = drawn_trajectory(planner, draw, count, known)
+    report = planner.evaluate(drawn).report
+    speed, gain = judged(planner, drawn, samples=400 * count)
+    assert speed <= report.tool_speed * (1.0 + ROUNDING)
+    assert gain <= report.tool_acceleration * (1.0 + ROUNDING)
+    assert report.tool_speed <= CLOSE * speed
+    assert report.tool_acceleration <= CLOSE * gain
+    points = surface(planner, draw)
+    whole = planner.evaluate(drawn, tool_speed=1e-3, whole_tool=True).report
+    speed, gain = judged(planner, drawn, points, samples=100 * count)
+    assert speed <= whole.tool_speed * (1.0 + ROUNDING)
+    assert gain <= whole.tool_acceleration * (1.0 + ROUNDING)
 
 
 @pytest.mark.parametrize("cell", CELLS)

@@ -165,9 +165,9 @@ _RESOLUTION = 2e-3  # share of the largest value that the bound may add between 
 _FINER = 8  # times as many instants where a bound doesn't decide,
 _ROUNDS = 3
 _MOST = 200_000  # instants of a trajectory at a time
-# where nothing is asked, and the bounds are only reported: a proof of a movement stays fast
+# where nothing is asked and the largest bounds are only reported: a proof of a movement stays fast
 _REPORTED_RESOLUTION = 0.02
-_REPORTED_MOST = 1_000
+_REPORTED_AT_ONCE = 1_000  # instants that cost less than another round
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,6 +184,18 @@ class Largest:
     def most(self) -> tuple[float, float]:
         """The largest bounds of all segments."""
         return float(self.speed.max(initial=0.0)), float(self.acceleration.max(initial=0.0))
+
+    def replace(self, segments: IntArray, closer: "Largest") -> None:
+        """Take what was found of these segments (K,) at more instants."""
+        self.speed[segments] = closer.speed
+        self.acceleration[segments] = closer.acceleration
+        self.found_speed[segments] = closer.found_speed
+        self.found_acceleration[segments] = closer.found_acceleration
+
+
+def _largest_with(values: FloatArray, share: float) -> float:
+    """The largest of values (S,), and a share of it."""
+    return (1.0 + share) * float(values.max(initial=0.0))
 
 
 class ToolUse:
@@ -240,11 +252,21 @@ class ToolUse:
         away = float((np.linalg.norm(places[points], axis=1) + radii[points]).max())
         motion = tool_derivatives(self.trajectory, self.scene, away, self._largest)
         every = np.arange(len(self._durations))
-        ends = self._sampled(every, np.ones(len(every), np.int64), points)
-        top = (ends[0].max(initial=0.0), ends[1].max(initial=0.0))
-        count = self._counts(motion, top, asked=bounds.asked)
+        found = self._bounded(motion, every, np.ones(len(every), np.int64), points)
+        if bounds.asked:
+            return self._decided(motion, found, points, bounds)
+        return self._reported(motion, found, points)
+
+    def _decided(
+        self, motion: ToolDerivatives, ends: Largest, points: slice, bounds: PointBounds
+    ) -> Largest:
+        """Bounds that say of every segment whether it keeps what is asked."""
+        every = np.arange(len(self._durations))
+        pieces = self._pieces(motion, ends, every, _RESOLUTION)
+        share = max(float(pieces.sum()) / _MOST, 1.0)
+        count = np.maximum(np.ceil(pieces / share), 1.0).astype(np.int64)
         found = self._bounded(motion, every, count, points)
-        for _ in range(_ROUNDS if bounds.asked else 0):
+        for _ in range(_ROUNDS):
             open_ = np.flatnonzero(
                 ((found.speed > bounds.speed) & (found.found_speed <= bounds.speed))
                 | (
@@ -255,27 +277,52 @@ class ToolUse:
             if len(open_) == 0 or (count[open_].sum() + len(open_)) * _FINER > _MOST:
                 break
             count[open_] *= _FINER
-            finer = self._bounded(motion, open_, count[open_], points)
-            found.speed[open_] = finer.speed
-            found.acceleration[open_] = finer.acceleration
-            found.found_speed[open_] = finer.found_speed
-            found.found_acceleration[open_] = finer.found_acceleration
+            found.replace(open_, self._bounded(motion, open_, count[open_], points))
         return found
 
-    def _counts(
-        self, motion: ToolDerivatives, top: tuple[float, float], *, asked: bool
-    ) -> IntArray:
-        """Pieces of each segment (S,) so that little may be between their ends."""
-        resolution = _RESOLUTION if asked else _REPORTED_RESOLUTION
-        instants = _MOST if asked else _REPORTED_MOST
+    def _reported(self, motion: ToolDerivatives, found: Largest, points: slice) -> Largest:
+        """Bounds of which the largest are close: those of segments that can't have it stay as
+        loose as their ends leave them.
+        """
+        count = np.ones(len(self._durations), np.int64)
+        while True:
+            open_ = np.flatnonzero(
+                (found.speed > _largest_with(found.found_speed, _REPORTED_RESOLUTION))
+                | (
+                    found.acceleration
+                    > _largest_with(found.found_acceleration, _REPORTED_RESOLUTION)
+                )
+            )
+            pieces = self._pieces(motion, found, open_, _REPORTED_RESOLUTION)
+            if pieces.sum() > _REPORTED_AT_ONCE:
+                pieces = np.minimum(pieces, float(_FINER) * count[open_])
+            more = pieces.astype(np.int64)
+            if len(open_) == 0 or more.sum() > _MOST or (more <= count[open_]).all():
+                return found
+            count[open_] = more
+            found.replace(open_, self._bounded(motion, open_, more, points))
+
+    def _pieces(
+        self, motion: ToolDerivatives, found: Largest, segments: IntArray, resolution: float
+    ) -> FloatArray:
+        """How many pieces of each of the segments (K,) leave at most `resolution` of the largest
+        value between their ends.
+        """
         of_speed, of_acceleration = (
-            np.sqrt(8.0 * resolution * max(most, 1e-9) / np.maximum(bound, 1e-12))
-            for most, bound in zip(top, (motion.jerk, motion.snap), strict=True)
+            np.sqrt(
+                8.0
+                * resolution
+                * max(float(values.max(initial=0.0)), 1e-9)
+                / np.maximum(bound[segments], 1e-12)
+            )
+            for values, bound in (
+                (found.found_speed, motion.jerk),
+                (found.found_acceleration, motion.snap),
+            )
         )
-        step = np.minimum(of_speed, of_acceleration)
-        whole = np.ceil(self._durations / step)
-        share = max(float(whole.sum()) / instants, 1.0)
-        return np.maximum(np.ceil(whole / share), 1.0).astype(np.int64)
+        return np.asarray(
+            np.ceil(self._durations[segments] / np.minimum(of_speed, of_acceleration))
+        )
 
     def _bounded(
         self, motion: ToolDerivatives, segments: IntArray, count: IntArray, points: slice
