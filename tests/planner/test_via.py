@@ -177,5 +177,5 @@ def test_a_tolerance_that_is_no_number_is_refused(
 
 @pytest.mark.parametrize("via", ["park", "", None, 3.0])
 def test_places_that_are_no_list_are_refused(planners: dict[str, Planner], via: object) -> None:
-    with pytest.raises(RequestError, match=r"via is .*: give a list of places"):
+    with pytest.raises(RequestError, match=r"via is .*: it must be a list"):
         planners["open"].plan_regional(goal="park", via=via)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ir_values.argument_types import typed_methods
 from ir_values.arrays import FloatArray, finite, one_of, read_only, set_field
 from ir_values.errors import InvalidValueError
 
@@ -59,6 +60,7 @@ def _rigid(value: FloatArray, name: str) -> FloatArray:
     return pose
 
 
+@typed_methods(InvalidValueError)
 @dataclass(frozen=True, eq=False)
 class CartesianSegment:
     """One part of a path; it begins where the part before it ends.
@@ -100,6 +102,7 @@ def _rotation_speed(value: float) -> float:
     return _within(value, ROTATION_SPEED_MIN, ROTATION_SPEED_MAX, "rotation_speed", "rad/s")
 
 
+@typed_methods(InvalidValueError)
 @dataclass(frozen=True, eq=False)
 class CartesianPath:
     """Where the tool begins, (4, 4) [m] in the cell, its segments, and what is kept along them.

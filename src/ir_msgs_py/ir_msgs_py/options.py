@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ir_values.argument_types import typed_methods
 from ir_values.arrays import at_least, direction, finite, in_fraction, one_of, set_field
 from ir_values.errors import InvalidValueError
 
@@ -19,6 +20,7 @@ UP = (0.0, 0.0, 1.0)
 """The tilt_direction of who names none."""
 
 
+@typed_methods(InvalidValueError)
 @dataclass(frozen=True, kw_only=True)
 class PlanOptions:
     """Zero is a value: a seed or safety distance of 0 is taken literally.

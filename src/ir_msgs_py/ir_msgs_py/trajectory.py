@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ir_values.argument_types import typed_methods
 from ir_values.arrays import FloatArray, IntArray, set_field
 from ir_values.errors import JointNamesError, TrajectoryError
 
@@ -81,6 +82,7 @@ class Samples(NamedTuple):
     qddd: FloatArray
 
 
+@typed_methods(TrajectoryError)
 @dataclass(frozen=True, eq=False)
 class JointTrajectory:
     """Points of n joints at N instants; equal when the content is, bit by bit.
@@ -231,11 +233,12 @@ class JointTrajectory:
             raise TrajectoryError(
                 "the trajectory has no accelerations: it can't be cut between its points"
             )
-        at = round(time * NS_PER_S)
+        is_time = abs(time) * NS_PER_S < _MAX_TIME_NS  # NaN isn't
+        at = round(time * NS_PER_S) if is_time else -1
         if not self.times_ns[0] <= at <= self.times_ns[-1]:
             raise TrajectoryError(
-                f"{time:.9g} s lies outside of the trajectory: it lasts from "
-                f"{self.times[0]:.9g} to {self.duration:.9g} s"
+                f"time is {time:.9g} s: the trajectory lasts from {self.times[0]:.9g} to "
+                f"{self.duration:.9g} s"
             )
         before = int(np.searchsorted(self.times_ns, at))
         if self.times_ns[before] == at:

@@ -31,6 +31,11 @@ class RequestError(PlannerError):
         return Status(self.code, str(self))
 
 
+def unfit(sentence: str) -> RequestError:
+    """An argument of another type."""
+    return RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, sentence)
+
+
 class UnknownNameError(RequestError):
     """A name that is not known."""
 

@@ -18,6 +18,8 @@ from typing import TypedDict, Unpack
 import numpy as np
 
 from ir_description import Cell, CellPath, PowerData, ToolTilt, cell_hash, is_path
+from ir_kernels import InputError
+from ir_kernels.data import pose as rigid_pose
 from ir_msgs_py.cartesian import CartesianPath
 from ir_msgs_py.options import NO_TILT, PlanOptions
 from ir_msgs_py.status import StatusCode
@@ -39,7 +41,7 @@ from ir_planner.configurations import (
     configurations_at,
 )
 from ir_planner.current_cell import CurrentCell, Heard, ReadCell, read_cell_here
-from ir_planner.errors import RequestError, UnknownNameError
+from ir_planner.errors import RequestError, UnknownNameError, unfit
 from ir_planner.flexible import SteadyPlan, plan_steady_cycle
 from ir_planner.program import (
     Lengths,
@@ -98,6 +100,7 @@ from ir_planner.trajectories import (
     plan_via,
 )
 from ir_planner.waiting_postures import standby_at
+from ir_values.argument_types import typed_methods
 from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError
 
@@ -152,6 +155,7 @@ def options_with(options: PlanOptions | None, changes: OptionFields) -> PlanOpti
         raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, sentence) from error
 
 
+@typed_methods(unfit)
 class Planner:
     """Answers requests about one cell. Methods raise RequestError for requests that make no sense.
 
@@ -659,11 +663,10 @@ class Planner:
         """The goal as a value, joint values within their limits. Raises RequestError."""
         if isinstance(goal, str):
             return parse_goal(goal, self.cell)
-        if goal is None:
-            raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, "goal is None: give one")
         if not isinstance(goal, Goal):
             goal = Goal(pose=goal) if np.shape(goal) == (4, 4) else Goal(configuration=goal)
         if goal.configuration is None:
+            _check_pose(goal)
             return goal
         code = StatusCode.GOAL_STATE_INVALID
         q = within_limits(goal.configuration, self.cell, "goal", code)
@@ -671,10 +674,6 @@ class Planner:
 
     def _places(self, via: Sequence[Place]) -> tuple[Goal, ...]:
         """Places on the way as values. Raises RequestError, which names the place."""
-        if isinstance(via, str) or not isinstance(via, (Sequence, np.ndarray)):
-            raise RequestError(
-                StatusCode.INVALID_GOAL_CONSTRAINTS, f"via is {via!r:.60}: give a list of places"
-            )
         found = []
         for k, place in enumerate(via, start=1):
             try:
@@ -690,7 +689,7 @@ class Planner:
         if place is None:
             return np.array(self.cell.machine_home)
         if isinstance(place, str):
-            place = parse_goal(place, self.cell)
+            place = parse_goal(place, self.cell, what)
         q = place.configuration if isinstance(place, Goal) else place
         if q is None:
             raise RequestError(
@@ -718,6 +717,14 @@ class Planner:
         improvement = options.max_iterations or self.settings.improvement_iterations
         deadline = self.clock() + options.planning_time * movements
         return Work(most, deadline, self.clock, cancelled, improvement)
+
+
+def _check_pose(goal: Goal) -> None:
+    """Raises RequestError where a goal's pose is none."""
+    try:
+        rigid_pose(np.asarray(goal.pose), "goal")
+    except InputError as error:
+        raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, str(error)) from error
 
 
 def _tilt_to(goal: Goal, scene: PlanningScene) -> ToolTilt | None:

@@ -11,7 +11,8 @@ from typing import Generic, TypeVar
 from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.errors import RequestError
+from ir_planner.errors import RequestError, unfit
+from ir_values.argument_types import typed_methods
 
 T = TypeVar("T")
 
@@ -25,6 +26,7 @@ class StoredProgram:
     report: TrajectoryReport
 
 
+@typed_methods(unfit)
 class Store(Generic[T]):
     """Values by id; safe to use from several threads.
 

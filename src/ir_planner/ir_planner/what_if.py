@@ -23,8 +23,9 @@ from ir_description import Cell, InvalidValueError, Load, cell_from_yaml, cell_t
 from ir_kernels import portable
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
-from ir_planner.errors import RequestError, UnknownNameError
+from ir_planner.errors import RequestError, UnknownNameError, unfit
 from ir_planner.planner import Planner
+from ir_values.argument_types import typed
 from ir_values.arrays import FloatArray
 
 ROWS_MAX = 10_000
@@ -37,6 +38,7 @@ Row = dict[str, float | bool | str]
 Change = Mapping[str, float]
 
 
+@typed(unfit)
 def what_if(
     cell: str | Path | Cell,
     values: Mapping[str, Sequence[float]],

@@ -13,16 +13,25 @@ import numpy as np
 import numpy.typing as npt
 from numpy.typing import ArrayLike
 
-from ir_values.errors import InvalidValueError
+from ir_values.errors import InvalidValueError, shown
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
 
+def as_float(value: float, name: str, unit: str = "") -> float:
+    """Return the value as a float; refuse what is no number."""
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        suffix = f" of {unit}" if unit else ""
+        raise InvalidValueError(f"{name} is {shown(value)}: it must be a number{suffix}") from error
+
+
 def finite(value: float, name: str, unit: str = "") -> float:
     """Return the value as a float; refuse NaN and infinities."""
-    number = float(value)
+    number = as_float(value, name, unit)
     if not math.isfinite(number):
         raise InvalidValueError(f"{name} is {number}{_spaced(unit)}: it must be finite")
     return number
@@ -32,7 +41,7 @@ def not_nan(value: float, name: str, unit: str = "") -> float:
     """Return the value as a float; infinities stay (no pair of bodies: the clearance is
     infinite).
     """
-    number = float(value)
+    number = as_float(value, name, unit)
     if math.isnan(number):
         raise InvalidValueError(f"{name} is nan{_spaced(unit)}: it must be a number")
     return number
@@ -58,9 +67,17 @@ def in_fraction(value: float, name: str) -> float:
 
 def one_of(value: str, known: Collection[str], name: str) -> str:
     """Return the choice; an unknown one lists the known."""
-    if value not in known:
-        raise InvalidValueError(f'{name} is "{value[:80]}": known are {", ".join(known)}')
+    if not isinstance(value, str) or value not in known:
+        raise InvalidValueError(f'{name} is "{str(value)[:80]}": known are {", ".join(known)}')
     return value
+
+
+def as_array(value: ArrayLike, name: str) -> FloatArray:
+    """Return the value as an array of floats; refuse what is none."""
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidValueError(f"{name} must be an array of numbers: {error}") from error
 
 
 def read_only(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> FloatArray:
@@ -68,7 +85,7 @@ def read_only(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> Flo
 
     A copy that is already read-only float64 and owns its data is passed on as it is.
     """
-    array: FloatArray = np.asarray(value, dtype=np.float64)
+    array = as_array(value, name)
     if array.ndim != len(shape) or any(
         want is not None and have != want for have, want in zip(array.shape, shape, strict=True)
     ):
@@ -118,10 +135,7 @@ def frozen(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> FloatA
     """Return a read-only float64 copy of that shape, (None, 3) for (N, 3), refusing NaN and
     infinity.
     """
-    try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidValueError(f"{name} must be an array of numbers") from error
+    array = np.array(as_array(value, name))
     if array.shape != shape and (
         array.ndim != len(shape)
         or any(want not in (None, got) for want, got in zip(shape, array.shape, strict=True))
@@ -199,7 +213,7 @@ def in_range(
     value: float, low: float, high: float, unit: str, name: str, *, open_low: bool = False
 ) -> float:
     """Return value as a float, refusing NaN and what lies outside [low, high] (or (low, high])."""
-    number = float(value)
+    number = as_float(value, name, unit)
     if not (low < number <= high if open_low else low <= number <= high):
         left = "(" if open_low else "["
         raise InvalidValueError(

@@ -141,7 +141,7 @@ def shown(value: object, limit: int = 60) -> str:
     """The value as it may stand in a message or a log: quoted, one line of printable characters,
     bounded.
     """
-    text = repr(value)
+    text = " ".join(repr(value).split("\n"))
     return text if len(text) <= limit else f"{text[: limit - 4]}...{text[-1]}"
 
 

@@ -15,7 +15,8 @@ from ir_description import LIMIT_TOLERANCE, OUTSIDE_MAX, Cell
 from ir_description.poses import rotation_from_abc
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory, Samples
-from ir_planner.errors import RequestError, UnknownNameError
+from ir_planner.errors import RequestError, UnknownNameError, unfit
+from ir_values.argument_types import typed, typed_methods
 from ir_values.arrays import FloatArray
 
 POSTURES = ("home", "park")
@@ -26,6 +27,7 @@ _LENGTH_MAX = 100.0  # m
 _NO_ANGLE = 1e6  # rad
 
 
+@typed_methods(unfit)
 @dataclass(frozen=True, eq=False)
 class Goal:
     """Exactly one of configuration (n,) rad and pose (4, 4) of the tcp in the cell; station: its
@@ -66,13 +68,16 @@ def one_goal(
     return Goal(pose=pose)
 
 
-def parse_goal(text: str, cell: Cell) -> Goal:
-    """The goal of a text. Raises RequestError: what is wrong, and what may stand there."""
+@typed(unfit)
+def parse_goal(text: str, cell: Cell, what: str = "goal") -> Goal:
+    """The goal of a text. Raises RequestError: what is wrong, and what may stand there; `what`: its
+    name in the sentence.
+    """
     stripped = text.strip()
     if len(stripped) > _TEXT_MAX or not stripped.isprintable():
         raise RequestError(
             StatusCode.INVALID_GOAL_CONSTRAINTS,
-            f"goal has {len(text)} characters: it must be one line of 1 to 300",
+            f"{what} has {len(text)} characters: it must be one line of 1 to 300",
         )
     for station in cell.stations:
         if station.name == stripped:
@@ -82,12 +87,12 @@ def parse_goal(text: str, cell: Cell) -> Goal:
     words, keys = _words(stripped)
     joints = joints_of(stripped, cell)
     if joints is not None:
-        q = within_limits(joints, cell, "goal", StatusCode.GOAL_STATE_INVALID)
+        q = within_limits(joints, cell, what, StatusCode.GOAL_STATE_INVALID)
         return Goal(configuration=q, text=stripped)
     if len(words) > 1 and keys[0] in _POSE_KEYS:
         return Goal(pose=_pose(_numbers(keys, words[1::2], list(_POSE_KEYS), "")), text=stripped)
     texts = ('"A1 0 A2 -90 ..." in degrees', '"X 1.8 Y 0 Z 1.2 A 0 B 90 C 0"')
-    raise UnknownNameError("goal", stripped, [*(s.name for s in cell.stations), *POSTURES, *texts])
+    raise UnknownNameError(what, stripped, [*(s.name for s in cell.stations), *POSTURES, *texts])
 
 
 def joints_of(text: str, cell: Cell) -> FloatArray | None:

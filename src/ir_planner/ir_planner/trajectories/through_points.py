@@ -15,10 +15,10 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import FreeSpace, end_in_collision
-from ir_planner.errors import RequestError, TimingError
+from ir_planner.errors import RequestError, TimingError, unfit
 from ir_planner.optimize import rescaled
 from ir_planner.regional import MovementPlan
-from ir_planner.request import DURATION_MAX, Context, Work, bounded, within_limits
+from ir_planner.request import DURATION_MAX, Context, Work, bounded, joint_values, within_limits
 from ir_planner.scene import MotionLimits, PlanningScene
 from ir_planner.timing import (
     Movement,
@@ -34,12 +34,14 @@ from ir_planner.timing import (
     with_less_reserve,
     within_torque,
 )
+from ir_values.argument_types import typed_methods
 from ir_values.arrays import FloatArray
 
 POINTS_MAX = 1000
 _AT_STOPS = ("clearance", "position")  # violations that straight steps avoid
 
 
+@typed_methods(unfit)
 @dataclass(frozen=True, eq=False)
 class Reference:
     """points (M, n) rad to pass; times (M,) s at which they are requested, or None."""
@@ -103,13 +105,16 @@ def _with_what_torque_there_is(reference: Reference, context: Context) -> Moveme
 
 def _within(reference: Reference, scene: PlanningScene) -> Reference:
     """The reference with its points within the limits; RequestError for what can't be driven."""
-    if len(reference.points) > POINTS_MAX:
+    count = len(reference.points)
+    if not 1 <= count <= POINTS_MAX:
         raise RequestError(
             StatusCode.INVALID_MOTION_PLAN,
-            f"the reference has {len(reference.points)} points: at most {POINTS_MAX} are taken",
+            f"the reference has {count} points: it must have 1 to {POINTS_MAX}",
         )
     if reference.times is not None:
-        bounded(float(reference.times[-1]), 0.0, DURATION_MAX, "time of the last point", "s")
+        times = joint_values(reference.times, (count,), "times", StatusCode.INVALID_MOTION_PLAN)
+        for k, time in enumerate(times):
+            bounded(time, 0.0, DURATION_MAX, f"time of point {k}", "s")
     points = [
         within_limits(q, scene.cell, f"point {k}", StatusCode.INVALID_MOTION_PLAN)
         for k, q in enumerate(reference.points)
